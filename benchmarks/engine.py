@@ -17,7 +17,7 @@ import numpy as np
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine.form import FAILURE, SCORES, SETTING
-from smc_mujoco.analysis.engine.group import Group
+from smc_mujoco.analysis.engine.group import FormGroup
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.robustness import region_figure
 from smc_mujoco.simulation.run import cores
@@ -48,7 +48,7 @@ def scenario(fields: dict, seed: int = 0) -> smc.Scenario:
     return smc.Scenario(law=LAW, noise=NOISE, duration=DURATION, u_max=6.0, seed=seed, **fields)
 
 
-def rows_of(group: Group, count: int) -> np.ndarray:
+def rows_of(group: FormGroup, count: int) -> np.ndarray:
     """Rows of runs that differ in seed and start."""
     rows = np.repeat(group.rows[:1], count, axis=0)
     at = group.layout.row
@@ -77,7 +77,7 @@ def apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 def on_processor(fields: dict) -> str:
     """Runs a second in all threads, how they scale, MuJoCo's, and how far apart the scores are."""
-    group = Group([scenario(fields, seed) for seed in range(BY_MUJOCO)], METRICS)
+    group = FormGroup([scenario(fields, seed) for seed in range(BY_MUJOCO)], METRICS)
     rows = rows_of(group, COMPARED)
     found = group.run(group.rows)
     in_one = rate(lambda: group.run(rows, threads=1), COMPARED)
@@ -95,7 +95,7 @@ def on_processor(fields: dict) -> str:
 
 def on_device(fields: dict, wanted: int) -> str:
     """Runs a second on the device, beside the processor, and how far apart the scores are."""
-    group = Group([scenario(fields)], METRICS)
+    group = FormGroup([scenario(fields)], METRICS)
     few = rows_of(group, COMPARED)
     many = rows_of(group, AT_ONCE)
     found = group.run(few, device="cuda")

@@ -47,13 +47,13 @@ import numpy as np
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine import scores
 from smc_mujoco.analysis.engine.form import FAILURE, SCORES, SETTING, Form, layout
-from smc_mujoco.analysis.engine.group import Group, why_not
+from smc_mujoco.analysis.engine.group import FormGroup, why_not
 from smc_mujoco.analysis.engine.scores import log_in
 from smc_mujoco.analysis.signed_rank import interval
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.evaluator import with_gains
 from smc_mujoco.analysis.tuning.objective import BUDGET, OBJECTIVES, Objective
-from smc_mujoco.analysis.tuning.search import Task, task_of
+from smc_mujoco.analysis.tuning.search import TuningTask, task_of
 from smc_mujoco.common.jit import inlined
 from smc_mujoco.common.scripts import execute
 from smc_mujoco.control import gain_sets
@@ -215,7 +215,7 @@ class Bench:
         scores.WRITTEN_OUT["rms_before"] = _rms_before  # in each process
         self.job = job
         self.plant = plant_of(job.plant)
-        self.task: Task = task_of(self.plant, smc.law(job.law), GOAL, BUDGET, 0, 1)
+        self.task: TuningTask = task_of(self.plant, smc.law(job.law), GOAL, BUDGET, 0, 1)
         self.goal: Objective = self.task.goal
         self.start = self.task.scales["X"]
         self.bound = float(self.goal.u_max or math.nan)
@@ -228,7 +228,7 @@ class Bench:
         self.priced = self.size - len(job.conditions)
         self.fast = not any(map(why_not, self.cases))
         if self.fast:
-            self.group = Group(self.cases, SUMS)
+            self.group = FormGroup(self.cases, SUMS)
             rows = self.group.rows
             rows[:, SETTING.early] = rows[:, SETTING.samples] + 1 - self.windows
             rows[:, SETTING.late] = rows[:, SETTING.samples] - self.windows

@@ -303,8 +303,8 @@ def files(random: Random) -> str:
     source, read = {
         "trace": ("trace.npz", smc.load),
         "about": ("trace.npz", smc.load),
-        "tuned": ("tuned.json", tuned.load),
-        "json": ("tuned.json", tuned.load),
+        "tuned": ("tuned.json", tuned.load_tuned),
+        "json": ("tuned.json", tuned.load_tuned),
         "table": ("out/results.parquet", smc.Table.read),
         "csv": ("a.csv", smc.signals.TimeSeries.from_csv),
     }[kind]

@@ -402,3 +402,29 @@ def test_no_file_names_a_folder_of_one_machine():
     for path in TEXTS:
         found[label(path)] = folder.findall(path.read_text())
     assert {name: folders for name, folders in found.items() if folders} == {}
+
+
+# catalogues whose files may share a name: one of a law is also one of a surface
+SURFACES_OF_LAWS = {
+    "terminal",
+    "nonsingular_terminal",
+    "nonsingular_fast_terminal",
+    "integral",
+    "pid",
+}
+# the public list of a room's names beside the room, and the commands of each annex
+SHELVES = {"errors", "signals", "commands"}
+
+
+def test_no_two_files_and_no_two_classes_share_a_name():
+    files: dict[str, list[str]] = {}
+    classes: dict[str, set[str]] = {}
+    for path in FILES:
+        files.setdefault(path.stem, []).append(label(path))
+        for node in ast.walk(parsed(path)):
+            if isinstance(node, ast.ClassDef):
+                classes.setdefault(node.name, set()).add(label(path))
+    allowed = SURFACES_OF_LAWS | SHELVES | {"__init__"}
+    twice = {name for name, its in files.items() if len(its) > 1}
+    assert twice <= allowed
+    assert {name: its for name, its in classes.items() if len(its) > 1} == {}

@@ -29,7 +29,7 @@ from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.control.properties import PROPERTIES, reads, searched
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.draw import style
-from smc_mujoco.exchange.c.export import law_to_c
+from smc_mujoco.exchange.c.export_c import law_to_c
 from smc_mujoco.mechanisms.plant import Plant, model_path
 from smc_mujoco.mechanisms.plant import catalogue as plants
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import find
 from smc_mujoco.control.law import Law, law
-from smc_mujoco.control.source import SHIPPED, Search
+from smc_mujoco.control.source import SHIPPED, GainSearch
 from smc_mujoco.mechanisms.plant import Plant, Values, plant
 from smc_mujoco.metrics.conventions import last_exit
 from smc_mujoco.metrics.tip import tip_error
@@ -110,7 +110,7 @@ def gained(name: str, gains: Mapping[str, float] | None = None) -> Law:
         made = law(OUTER[name], **values).on_computed_torque()
     if gains:
         return made
-    return made.sourced(SHIPPED, Search(rule="random draws", evaluations=DRAWS))
+    return made.sourced(SHIPPED, GainSearch(rule="random draws", evaluations=DRAWS))
 
 
 def hybrid(friction: bool = False) -> Law:

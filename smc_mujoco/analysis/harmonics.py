@@ -111,7 +111,7 @@ class Loop:
             self.joints = [channel, free]
         else:
             self.joints = [channel]
-        self.controller = Controller(s.velocity, s.surface, s.law.of_channel(channel))
+        self.controller = CompiledController(s.velocity, s.surface, s.law.of_channel(channel))
         self._linearise_mechanism()
         self.nominal_models = [self._nominal_model(joint) for joint in self.joints]
         # all amplitudes of a frequency share an answer and a clock, and the loops of `later` share
@@ -360,7 +360,7 @@ class Loop:
         limit = self.scenario.limits[self.channel]
         return clock.angles, np.clip(u[clock.first :], -limit, limit), s[clock.first :]
 
-    def _clock_of(self, omega: float, max_samples: float, position: float) -> "Clock":
+    def _clock_of(self, omega: float, max_samples: float, position: float) -> "SampleTimes":
         period = math.tau / omega
         h = max(self.scenario.resolved.control_period, period / max_samples)
         periods = min(
@@ -370,10 +370,10 @@ class Loop:
         first = int(SETTLING_SHARE * count)
         angles = omega * (h * np.arange(first, count) + h * position)
         turns = np.exp(1j * omega * h * (np.arange(count) + position))
-        return Clock(h, turns, first, angles, np.exp(-1j * angles))
+        return SampleTimes(h, turns, first, angles, np.exp(-1j * angles))
 
 
-class Clock(NamedTuple):
+class SampleTimes(NamedTuple):
     """The times of an excitation's samples."""
 
     h: float  # from one sample to the next, s
@@ -383,7 +383,7 @@ class Clock(NamedTuple):
     against: Array  # exp(-j omega t) of the others, complex
 
 
-class Controller:
+class CompiledController:
     """Estimator, surface and law in compiled code, called without a simulation."""
 
     def __init__(self, *parts: Component | None):

@@ -33,8 +33,8 @@ from smc_mujoco.common.aliases import Array, ArrayPair, Pair
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.constraints import Finite, Natural, Positive, constrained
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.control.design import DIFFERENCE_STEP
 from smc_mujoco.control.law import Law
+from smc_mujoco.control.nominal_gains import DIFFERENCE_STEP
 from smc_mujoco.mechanisms.plant import Plant
 
 EQUALITY_TOLERANCE = 1e-6  # relative: smaller differences count as none

@@ -34,7 +34,7 @@ GAIN_ENTRIES = ("law", "surface", "velocity")
 OTHER_ENTRIES = ("model", "versions")
 
 
-class Columns(Protocol):
+class RunColumns(Protocol):
     """A table with a row per run and columns plant, law, condition, seed, failure, diverged_at,
     arrived, and every metric.
     """
@@ -64,7 +64,7 @@ def check_table(table: object) -> None:
         raise ScenarioError(f"table is {shown(table)}: give a study's, as smc.Table.read(path)")
 
 
-def values(table: Columns, metric: str) -> Array:
+def values(table: RunColumns, metric: str) -> Array:
     """Return a metric by row: inf for a failed run, and for one that has not arrived unless the
     metric is an error; NaN where it does not apply.
 
@@ -91,7 +91,7 @@ def _column(metric: str) -> str:
     return {SETTLES: "settling_time"}.get(metric, metric)
 
 
-def by_row(table: Columns, metric: str) -> ByRow:
+def by_row(table: RunColumns, metric: str) -> ByRow:
     """Return a metric of the rows of a table, with what is charged to it."""
     name = _column(metric)
     whole = values(table, metric)
@@ -111,7 +111,7 @@ def _settled(times: Array) -> Array:
     return np.where(np.isnan(times), np.nan, np.isinf(times))
 
 
-def _from_json(table: Columns, column: str, name: str, absent: float) -> Array:
+def _from_json(table: RunColumns, column: str, name: str, absent: float) -> Array:
     """Return a number by row from a column of JSON objects, NaN where there is none; {} is a run
     that failed.
     """
@@ -122,18 +122,18 @@ def _from_json(table: Columns, column: str, name: str, absent: float) -> Array:
     return np.array(found, float)
 
 
-def has_arrived(table: Columns) -> Array:
+def has_arrived(table: RunColumns) -> Array:
     """Return which rows are runs that have arrived."""
     return table.column("arrived") == np.array(True)
 
 
-def failed(table: Columns) -> Array:
+def failed(table: RunColumns) -> Array:
     """Return which rows are runs that failed."""
     lost = np.array([failure is not None for failure in table.column("failure")], bool)
     return lost | ~np.isnan(np.array(table.column("diverged_at"), float))
 
 
-def failures(table: Columns) -> list[str]:
+def failures(table: RunColumns) -> list[str]:
     """Return a sentence for each law with failed runs: how many, and how the first one failed."""
     laws = np.asarray(table.column("law"), str)
     lost = failed(table)
@@ -153,14 +153,14 @@ class Scores(NamedTuple):
     blocks: list[int]  # the numbers of these blocks in the group
     # NaN where not all laws ran, or every law did the same as with an earlier seed
     values: dict[str, Array]
-    outcomes: dict[str, Array]  # as `Group.outcome`
-    sets: dict[str, Array]  # as `Group.sets`
+    outcomes: dict[str, Array]  # as `RunGroup.outcome`
+    sets: dict[str, Array]  # as `RunGroup.sets`
     halves: dict[str, Array]  # as `ByRow.halves`
     trends: dict[str, Array]  # as `ByRow.trends`
     arrived: dict[str, Array]  # as `ByRow.arrived`
 
 
-class Group:
+class RunGroup:
     """The runs on a plant, or in one condition on it.
 
     Arrays are (laws, blocks, seeds), -1 where there is no run.
@@ -221,7 +221,7 @@ class Group:
         return Scores(blocks.tolist(), *parts)
 
 
-def groups(table: Columns, by: Sequence[str]) -> list[Group]:
+def groups(table: RunColumns, by: Sequence[str]) -> list[RunGroup]:
     """Return the groups of a table, one for each plant, or for each plant and condition, in the
     order of its rows.
     """
@@ -241,11 +241,11 @@ def groups(table: Columns, by: Sequence[str]) -> list[Group]:
     made = []
     for key, rows in rows_of.items():
         of_group = {name: column[rows] for name, column in columns.items()}
-        made.append(Group(dict(zip(by, key, strict=True)), np.array(rows), of_group))
+        made.append(RunGroup(dict(zip(by, key, strict=True)), np.array(rows), of_group))
     return made
 
 
-def _checked_sets(table: Columns, columns: Mapping[str, Array]) -> Array:
+def _checked_sets(table: RunColumns, columns: Mapping[str, Array]) -> Array:
     """Return a number for each row, equal for equal gains; refuse runs of a cell that differ in
     more than the law.
     """
@@ -271,7 +271,7 @@ def _checked_sets(table: Columns, columns: Mapping[str, Array]) -> Array:
     return np.array(sets, np.int64)
 
 
-def _outcomes(table: Columns) -> Array:
+def _outcomes(table: RunColumns) -> Array:
     """Return a number for each row: equal for runs whose metrics are all equal up to rounding."""
     columns = []
     for name in (*CATALOGUE, "diverged_at"):
@@ -285,7 +285,7 @@ def _outcomes(table: Columns) -> Array:
     return np.unique(numbers, axis=0, return_inverse=True)[1].ravel()
 
 
-def scenarios(table: Columns, group: Group) -> list[Scenario | None]:
+def scenarios(table: RunColumns, group: RunGroup) -> list[Scenario | None]:
     """Return a scenario of each block of a group.
 
     It is None if its plant is a user's and cannot be loaded here.
@@ -305,7 +305,7 @@ def unit_of_x(plant: str, ran: Sequence[Scenario | None]) -> str:
     return next((machine.unit for machine in known if machine), "")
 
 
-def sources(table: Columns, rows: Array) -> dict[str, tuple[Source, ...]]:
+def sources(table: RunColumns, rows: Array) -> dict[str, tuple[Source, ...]]:
     """Return law -> sources of its gains in some rows."""
     columns = [np.asarray(table.column(name))[rows] for name in ("law", "source", "search")]
     by_law: dict[str, tuple[Source, ...]] = {}

@@ -10,7 +10,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown
 from smc_mujoco.common.mjcb import installed
-from smc_mujoco.control import design
+from smc_mujoco.control import nominal_gains
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.written import state_feedback
 from smc_mujoco.mechanisms.layout import dof_ids, drive_ids
@@ -55,7 +55,7 @@ def lqr(
     """
     plant = as_plant(plant)
     if not plant.free:
-        return design.lqr(plant, (q[0], q[1]) if len(q) == 2 else q, r)  # pyright: ignore[reportArgumentType] refused there
+        return nominal_gains.lqr(plant, (q[0], q[1]) if len(q) == 2 else q, r)  # pyright: ignore[reportArgumentType] refused there
     weights = [number("q", weight, low=0.0) for weight in items_of("q", q)]
     if len(weights) not in (2, 2 * plant.n):
         raise ScenarioError(f"q is {shown(q)}: give two weights, or {2 * plant.n}")

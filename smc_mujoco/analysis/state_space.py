@@ -9,7 +9,7 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.mjcb import installed
-from smc_mujoco.control.design import DIFFERENCE_STEP
+from smc_mujoco.control.nominal_gains import DIFFERENCE_STEP
 from smc_mujoco.mechanisms.layout import channel_names, dof_ids, drive_ids
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant

@@ -12,8 +12,8 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.commands import analysis, catalogue, rigs, runs, studies
-from smc_mujoco.cli.terminal import errors_as_sentences
+from smc_mujoco.cli.commands import analysis, listing, rigs, run_and_look, studies
+from smc_mujoco.cli.console import errors_as_sentences
 from smc_mujoco.common import annexes
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.gl import choose_gl
@@ -30,7 +30,7 @@ atexit.register(gc.freeze)
 DRAWN = ("film", "figure", "plot", "video")  # commands that do not exist, and that users try
 # heading in the help -> commands; the annexes add theirs
 GROUPS: dict[str, list[Callable[..., None]]] = {
-    "Run and look": [catalogue.list_, runs.run, runs.show, runs.view],
+    "Run and look": [listing.list_, run_and_look.run, run_and_look.show, run_and_look.view],
     "Compare": [studies.compare, studies.which],
     "Tune and analyse": [
         analysis.tune,

@@ -14,7 +14,7 @@ from rich.text import Text
 from smc_mujoco.analysis.differ import differ
 from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.analysis.step_halving import MARK, NOTE, SCORE_NOTE, first_order
-from smc_mujoco.common.catalogue import Catalogue
+from smc_mujoco.common.registry import Catalogue
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import first_paragraph, number
 from smc_mujoco.control.source import in_words
@@ -22,7 +22,7 @@ from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.catalogue import scores as metric_scores
-from smc_mujoco.metrics.conventions import CATALOGUE, Group, Metric, groups
+from smc_mujoco.metrics.conventions import CATALOGUE, ChannelGroup, Metric, groups
 from smc_mujoco.metrics.tip import tip_scores
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -170,7 +170,7 @@ def tips(title: str, traces: Mapping[str, Trace], again: Again | None = None) ->
     return _noted([_by_label(f"{title}, tip", heads, traces, rows)])
 
 
-def headings(scenario: Scenario) -> dict[Group, str]:
+def headings(scenario: Scenario) -> dict[ChannelGroup, str]:
     """Return group of channels -> heading that names its joints; "" for an only group."""
     of_plant = groups(scenario)
     if len(of_plant) == 1:

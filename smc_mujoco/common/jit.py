@@ -506,7 +506,7 @@ def _complete(library: Any) -> bool:
     return not any(map(NUMBERS.foreign, defined))
 
 
-class Function:
+class CompiledFunction:
     """A compiled C function, kept alive, and its `address`. For `key` see `compiled`.
 
     Whether it was `checked` for how it `differs` from its Python is of simulation/agreement.py.

@@ -24,7 +24,7 @@ from smc_mujoco.common.constraints import Each, Number, Whole, constrained
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown, users_stacklevel
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.control.source import DEFAULT, NONE, YOURS, Search, Source, combined
+from smc_mujoco.control.source import DEFAULT, NONE, YOURS, GainSearch, Source, combined
 from smc_mujoco.control.units import INPUT_GAIN, Gain, Unit
 
 GainConditions = Mapping[str, Callable[[SimpleNamespace], bool]]
@@ -138,7 +138,7 @@ class Component:
         )
         return dataclasses.replace(self, name=name, template=template)
 
-    def sourced(self, kind: str, search: Search | None = None) -> "Component":
+    def sourced(self, kind: str, search: GainSearch | None = None) -> "Component":
         """Return the same law with another source of its gains, one of `source.KINDS`; a law
         without gains has none.
         """

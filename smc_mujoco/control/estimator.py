@@ -6,8 +6,8 @@ import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple, Unpack, overload
 
-from smc_mujoco.common.catalogue import Catalogue, catalogue_of
 from smc_mujoco.common.errors import find
+from smc_mujoco.common.registry import Catalogue, catalogue_of
 from smc_mujoco.control.component import Component, Options, Template, decorated
 
 Estimator = Component

@@ -7,7 +7,7 @@
 
 Files are Python (.py), tunings (.json), C (.c, .so) and FMUs (.fmu). Gains in brackets may follow a
 file, too. A text is parsed and never evaluated, but the code of a file is run. So data that others
-wrote is restored by serialise.py, which runs no files.
+wrote is restored by component_json.py, which runs no files.
 """
 
 import ast
@@ -24,7 +24,7 @@ from smc_mujoco.common.aliases import Data
 from smc_mujoco.common.errors import ScenarioError, find, shown, warn_once
 from smc_mujoco.common.files import read_json, reading
 from smc_mujoco.common.scripts import execute
-from smc_mujoco.control import gain_sets, serialise
+from smc_mujoco.control import component_json, gain_sets
 from smc_mujoco.control.component import Component, GainValue, Template
 from smc_mujoco.control.law import Law, known_laws
 from smc_mujoco.mechanisms.named import as_plant
@@ -124,7 +124,7 @@ def laws(text: object) -> list[str | Law]:
                 f"{tuned['tuning']} has gains of law {found.name!r}, and {tuned['file']} has law "
                 f"{own.name!r}: give the file of the same law"
             )
-        serialise.check_gains(found.name, found.gains, own.gains)
+        component_json.check_gains(found.name, found.gains, own.gains)
         return [dataclasses.replace(_with_gains(own, found.gains), source=found.source)]
     else:
         head, gains = _parts("law", text, "pid(kp=50,ki=50,kd=8)")
@@ -216,7 +216,7 @@ def _tuned(path: str) -> Law:
     """Return the law of a tuning, with its search as the source of the gains."""
     scenario = _described(path)
     with _reading(path):
-        found = serialise.law(scenario["law"], scenario["source"])
+        found = component_json.law(scenario["law"], scenario["source"])
         of_library = scenario["plant"]["module"].startswith("smc_mujoco.mechanisms.plants.")
     if of_library:
         find(f"plant of {path}", scenario["plant"]["name"], plants_known())
@@ -234,11 +234,13 @@ def _reading(path: str) -> contextlib.AbstractContextManager[Path]:
 
 
 def _of_c(path: str) -> list[Law]:
-    return [annexes.module("smc_mujoco.exchange.c.load", f"law {path}").law_from_c(path)()]
+    return [annexes.module("smc_mujoco.exchange.c.law_from_c", f"law {path}").law_from_c(path)()]
 
 
 def _of_fmu(path: str) -> list[Law]:
-    return [annexes.module("smc_mujoco.exchange.fmu.load", f"law {path}").law_from_fmu(path)()]
+    return [
+        annexes.module("smc_mujoco.exchange.fmu.law_from_fmu", f"law {path}").law_from_fmu(path)()
+    ]
 
 
 READERS: dict[str, Callable[[str], list[Any]]] = {  # by suffix

@@ -198,11 +198,11 @@ class TunedGains:
         return self.sets[self.objectives.index(self.objective)]
 
     @property
-    def search(self) -> source.Search:
+    def search(self) -> source.GainSearch:
         """The searches: their rule, number and evaluations, and how far their J differ."""
         spread = max(self.objectives) / self.objective - 1.0
         count = len(self.sets)
-        return source.Search(
+        return source.GainSearch(
             rule=self.rule, evaluations=self.evaluations, searches=count, spread=spread
         )
 

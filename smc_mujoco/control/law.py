@@ -21,8 +21,8 @@ from typing import Any, Unpack, overload
 
 from numba import njit
 
-from smc_mujoco.common.catalogue import Catalogue, catalogue_of
 from smc_mujoco.common.errors import ScenarioError, find
+from smc_mujoco.common.registry import Catalogue, catalogue_of
 from smc_mujoco.control import estimator, surface
 from smc_mujoco.control.component import FREE_BODY, Component, Options, Template, decorated
 from smc_mujoco.control.measurement import Measurement  # noqa: F401

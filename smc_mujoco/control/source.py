@@ -44,7 +44,7 @@ def spread_in_words(searches: int, spread: float) -> str:
 
 
 @named_data
-class Search:
+class GainSearch:
     """The searches for gains behind a law."""
 
     rule: str  # how they search, in words; its name stands before the first comma, colon or bracket
@@ -74,7 +74,7 @@ class Source:
 
     kind: str = NONE  # one of KINDS
     gains: Data = dataclasses.field(default=frozen({}), repr=False)  # the set
-    search: Search | None = None  # the search that the gains are the result of
+    search: GainSearch | None = None  # the search that the gains are the result of
     outside: bool = False  # whether the gains miss a condition of their law's theorem
 
     def __post_init__(self):
@@ -104,7 +104,7 @@ class Source:
 def restore(data: Data) -> Source:
     """Return the source that `Source.about` wrote, without its gains."""
     kind = data["kind"].removesuffix(MARK)
-    search = data["search"] and Search(**data["search"])
+    search = data["search"] and GainSearch(**data["search"])
     return Source(kind=kind, search=search, outside=kind != data["kind"])
 
 

@@ -12,7 +12,7 @@ from smc_mujoco.analysis.bootstrap import MIN_INTERVAL_SAMPLES, Interval, median
 from smc_mujoco.analysis.paired_runs import (
     GROUPS,
     SETTLES,
-    Columns,
+    RunColumns,
     by_row,
     check_table,
     groups,
@@ -40,7 +40,7 @@ LINE_HEIGHT, WORDS_HEIGHT = 0.18, 0.9
 
 
 def plot(
-    table: Columns,
+    table: RunColumns,
     path: AnyPath | None = None,
     metrics: Sequence[str] = METRICS,
     title: str | None = None,
@@ -128,7 +128,7 @@ def plot(
         return pages.write(page, paths)
 
 
-def _intervals(table: Columns, metrics: Sequence[str]) -> dict[Cell, Interval]:
+def _intervals(table: RunColumns, metrics: Sequence[str]) -> dict[Cell, Interval]:
     """Return (metric, plant, condition, law) -> the median, or the share of runs that settle, with
     its interval.
     """
@@ -151,7 +151,7 @@ def _intervals(table: Columns, metrics: Sequence[str]) -> dict[Cell, Interval]:
 
 
 def _key(
-    table: Columns,
+    table: RunColumns,
     looks: Mapping[str, Mapping[str, str]],
     intervals: Sequence[Interval],
     ringed: bool,

@@ -25,7 +25,7 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import COLUMNS, band, end, line, smooth, window
 from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.metrics.conventions import (
-    Group,
+    ChannelGroup,
     group_trace,
     last_exit,
     scale,
@@ -113,7 +113,7 @@ def contact_force(trace: Trace) -> Array:
     return contacts(trace).force[:, None]
 
 
-def load(trace: Trace) -> Array:
+def share_of_limit(trace: Trace) -> Array:
     """Return the largest |u| of a joint, as a share of its limit, (K+1, 1) %."""
     return 100.0 * (np.abs(trace.applied) / trace.scenario.limits).max(axis=1, keepdims=True)
 
@@ -132,7 +132,7 @@ QUANTITIES: dict[str, Callable[[Trace], Array]] = {  # name -> (K+1, n)
     "spread": lambda trace: np.ptp(trace.x, axis=1, keepdims=True),
     "tip": off_path,
     "contact": contact_force,
-    "load": load,
+    "load": share_of_limit,
     "settling": lambda trace: peaks(np.abs(trace.x - trace.r).max(axis=1), trace),
     "largest": lambda trace: np.abs(trace.u).max(axis=1, keepdims=True),
 }
@@ -142,7 +142,7 @@ class Panel(NamedTuple):
     """A quantity of a group of channels, or of one channel, over time."""
 
     quantity: str
-    group: Group
+    group: ChannelGroup
     traces: Sequence[Trace]  # of these channels alone
     channel: int | None = None  # of a small panel
 

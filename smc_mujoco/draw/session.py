@@ -28,7 +28,7 @@ from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import ScenarioBatch
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.serialise import describe, restore
+from smc_mujoco.simulation.scenario_json import describe, restore
 from smc_mujoco.simulation.signals import Push
 
 PUSH_WIDTH = 0.1  # s
@@ -37,7 +37,7 @@ SAVED = '''"""What was seen in `smc-mujoco view`, to the bit."""
 from math import inf, nan  # noqa: F401
 
 import smc_mujoco as smc
-from smc_mujoco.simulation.serialise import restore
+from smc_mujoco.simulation.scenario_json import restore
 
 RUNS = {runs}
 RESTORED = {{label: restore(run) for label, run in RUNS.items()}}

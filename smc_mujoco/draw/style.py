@@ -28,7 +28,7 @@ from smc_mujoco.control import surface as surfaces
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import known_laws
 from smc_mujoco.mechanisms.plant import EFFORT, Plant, catalogue
-from smc_mujoco.metrics.conventions import Group, group_trace, groups
+from smc_mujoco.metrics.conventions import ChannelGroup, group_trace, groups
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation.conditions import CONDITION_FIELDS
 from smc_mujoco.simulation.scenario import Scenario
@@ -591,7 +591,7 @@ def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
     return traces
 
 
-def split(traces: Sequence[Trace]) -> dict[Group, list[Trace]]:
+def split(traces: Sequence[Trace]) -> dict[ChannelGroup, list[Trace]]:
     """Return the traces of each group of channels, which share a pair of axes.
 
     All traces are of one plant.
@@ -603,7 +603,7 @@ def split(traces: Sequence[Trace]) -> dict[Group, list[Trace]]:
     return parts
 
 
-def units(group: Group) -> dict[str, str]:
+def units(group: ChannelGroup) -> dict[str, str]:
     """Return the units of x, v, u and s of a group's channels, and of a force on them."""
     x = group.unit
     u = group.effort.replace(" ", "·")

@@ -78,7 +78,7 @@ def register() -> None:
 
 def plants() -> list[str]:
     """Return the names of the plants, other packages' included, without importing one."""
-    from smc_mujoco.common.catalogue import points
+    from smc_mujoco.common.registry import points
 
     folder = Path(__file__).parents[1] / "mechanisms" / "plants"
     shipped = [module.name for module in pkgutil.iter_modules([str(folder)])]

@@ -20,7 +20,7 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.envs.episode import Records, Setting, bounded
 from smc_mujoco.envs.gymnasium_env import action_space, observation_space
 from smc_mujoco.envs.tasks import reward
-from smc_mujoco.mechanisms.custom.constraints import smooth
+from smc_mujoco.mechanisms.custom.model_constraints import smooth
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Plant
 from smc_mujoco.simulation.model import state_with, without_scenery
 from smc_mujoco.simulation.run import cores  # also imports mujoco.batch without a callback

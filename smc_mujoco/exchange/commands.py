@@ -102,14 +102,14 @@ def export(
     with delay_signals():
         if out.suffix == ".c":
             from smc_mujoco.common.files import replacing
-            from smc_mujoco.exchange.c.export import law_to_c
+            from smc_mujoco.exchange.c.export_c import law_to_c
 
             text = law_to_c(chosen, numbers, joints)
             with replacing(out) as part:
                 part.write_text(text, "utf-8")
             what_it_is = "C99"
         else:
-            from smc_mujoco.exchange.fmu.export import law_to_fmu
+            from smc_mujoco.exchange.fmu.export_fmu import law_to_fmu
 
             law_to_fmu(
                 chosen,

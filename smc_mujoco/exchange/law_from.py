@@ -10,8 +10,8 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.exchange.c.load import law_from_c
-from smc_mujoco.exchange.fmu.load import law_from_fmu
+from smc_mujoco.exchange.c.law_from_c import law_from_c
+from smc_mujoco.exchange.fmu.law_from_fmu import law_from_fmu
 from smc_mujoco.exchange.linear_law import law_from_control
 from smc_mujoco.exchange.policy import controller, policy
 

@@ -66,7 +66,7 @@ class Columns:
         return tuple(dict.fromkeys((*self.needed(True), *more)))
 
 
-def load(path: AnyPath, names: Mapping[str, str] | None = None) -> Record | Trace:
+def load_record(path: AnyPath, names: Mapping[str, str] | None = None) -> Record | Trace:
     """Return the columns of a CSV or npz file, or a saved trace.
 
     `names`: the rig's name of a column -> the file's.

@@ -29,7 +29,7 @@ from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioWarning
 from smc_mujoco.identification import inverse_dynamics, records
 from smc_mujoco.identification.records import Record
-from smc_mujoco.identification.rig import Part, Quantity, Rig
+from smc_mujoco.identification.rig import Quantity, RecordPart, Rig
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -52,7 +52,7 @@ class Piece:
     """A part of a record that is compared with its replay."""
 
     record: int  # its index
-    part: Part | None  # what its replay takes from the record; None if torques are predicted
+    part: RecordPart | None  # what its replay takes from the record; None if torques are predicted
     skipped: int  # samples at its start that are not compared
     measured: Record  # the columns compared, (N,) each
     spread: Numbers  # norm of each whole column about its mean: the unit of residuals

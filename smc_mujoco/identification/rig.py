@@ -21,10 +21,10 @@ import numpy as np
 from smc_mujoco.common import annexes
 from smc_mujoco.common.aliases import Array, Data, Fields, Floats, Names, Numbers
 from smc_mujoco.common.cached import cached_property
-from smc_mujoco.common.catalogue import Catalogue, added, discover, imported
 from smc_mujoco.common.data import frozen_data, named_data
 from smc_mujoco.common.errors import ScenarioError, find, number
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.registry import Catalogue, added, discover, imported
 from smc_mujoco.control.law import Law
 from smc_mujoco.identification import inverse_dynamics, records
 from smc_mujoco.identification.records import Columns, Record
@@ -73,7 +73,7 @@ class Fall(float):
 
 
 @frozen_data
-class Part:
+class RecordPart:
     """What a replay takes from a record, whatever the quantities of the rig."""
 
     fields: Data  # of the replay's Scenario: law, duration, signals
@@ -209,7 +209,7 @@ class Rig:
         start: float | None = None,
         duration: float | None = None,
         closed: bool = True,
-    ) -> Part:
+    ) -> RecordPart:
         """Return what a replay takes from a record.
 
         If not `closed`, it has the recorded command in any case.
@@ -247,7 +247,7 @@ class Rig:
         zero = {}
         if self.zero:
             zero = self.zero(Values(**self.values), data)
-        return Part(
+        return RecordPart(
             fields=fields,
             state=np.concatenate(records.state(data, names, period, first)),
             largest_u=float(np.abs(data[names.u][first : last + 1]).max()),
@@ -268,7 +268,7 @@ class Rig:
         )
 
     def repeated(
-        self, part: Part, rounded: bool = False, state: Array | None = None, **changes: Any
+        self, part: RecordPart, rounded: bool = False, state: Array | None = None, **changes: Any
     ) -> Scenario:
         """Return the scenario that repeats a part of a record.
 

@@ -19,13 +19,13 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.aliases import Array, Floats, Names, Numbers, Pair
-from smc_mujoco.common.catalogue import Catalogue, catalogue_of
 from smc_mujoco.common.constraints import Number
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, unknown, whole
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.common.registry import Catalogue, catalogue_of
 from smc_mujoco.mechanisms import rotation
 
 DIRECT_TEXT = "smc:direct"  # name of a text in models on whose joints, not bodies, disturbances act

@@ -89,7 +89,7 @@ CATALOGUE: dict[str, Metric] = {}  # filled by @metric, in order of definition
 
 
 @named_data
-class Group:
+class ChannelGroup:
     """Channels of one kind and one unit."""
 
     name: str  # "driven" or "free"; "driven rad" if several groups are driven
@@ -99,7 +99,7 @@ class Group:
     channels: tuple[int, ...]  # their indices, ascending
 
 
-def groups(machine: Plant | Scenario) -> tuple[Group, ...]:
+def groups(machine: Plant | Scenario) -> tuple[ChannelGroup, ...]:
     """Return the groups of a plant, or of a scenario's plant, driven groups first.
 
     A scenario's u may be a voltage.
@@ -117,7 +117,7 @@ def groups(machine: Plant | Scenario) -> tuple[Group, ...]:
             name += f" {unit}"
         effort = machine.efforts[channels[0]]
         found.append(
-            Group(
+            ChannelGroup(
                 name=name, unit=unit + rate, effort=effort, driven=driven, channels=tuple(channels)
             )
         )
@@ -132,7 +132,7 @@ def reference_rates(trace: Trace) -> Array:
     return rates
 
 
-def group_trace(trace: Trace, group: Group) -> Trace:
+def group_trace(trace: Trace, group: ChannelGroup) -> Trace:
     """Return the trace of a group's channels; the same trace if these are all.
 
     Its scenario has all channels.
@@ -210,7 +210,7 @@ class Metric:
         """Return the value of the worst group, for a trace that `refuse` and `refusal` accept."""
         return self.worst(by_group(trace))
 
-    def worst(self, traces: Mapping[Group, Trace]) -> float:
+    def worst(self, traces: Mapping[ChannelGroup, Trace]) -> float:
         """Return the value of the worst group, from the result of `by_group`."""
         counted = []
         for group, trace in traces.items():
@@ -222,7 +222,7 @@ class Metric:
         # a group without the value, such as a limit cycle, hides no other
         return max((value for value in values if not math.isnan(value)), default=math.nan)
 
-    def applies_to(self, group: Group) -> bool:
+    def applies_to(self, group: ChannelGroup) -> bool:
         """Return whether the metric applies to a group by itself."""
         return (group.driven or not self.command) and (len(group.channels) > 1 or not self.network)
 
@@ -338,7 +338,7 @@ def error(trace: Trace) -> Array:
     return trace.x - trace.r
 
 
-def by_group(trace: Trace) -> dict[Group, Trace]:
+def by_group(trace: Trace) -> dict[ChannelGroup, Trace]:
     """Return group -> the trace of its channels, which is the argument of the functions below."""
     return {group: group_trace(trace, group) for group in groups(trace.scenario)}
 
@@ -411,7 +411,7 @@ def travels(trace: Trace) -> bool:
     return bool(np.any(straight & (steps.min(axis=0) > 0.0)))
 
 
-def resolution(scenario: Scenario, group: Group) -> float:
+def resolution(scenario: Scenario, group: ChannelGroup) -> float:
     """Return what the sensor of a group tells apart: the standard deviation of its noise, or half a
     count if that is larger.
     """

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.terminal import Terminal
+from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.interrupts import delay_signals
 

@@ -1,6 +1,6 @@
 """Enter a law in a suite: check its folder, run it, and write what it did.
 
-    results/smc-30@1/soft relay/runs.parquet  # a row a run
+    results/smc-30@1/soft relay/entry_runs.parquet  # a row a run
     results/smc-30@1/soft relay/result.json   # the entry, failed runs, time a sample, versions
 
 Until both are there, a folder of parts keeps the runs of each problem that is done.
@@ -25,11 +25,11 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import read_json, reading, replacing, scratch, slug, write_json
 from smc_mujoco.common.version import versions
 from smc_mujoco.problems import entry as entries
-from smc_mujoco.problems import runs, suite
+from smc_mujoco.problems import entry_runs, suite
 from smc_mujoco.problems.problem import Problem, problem
 
 FAILURES = 3  # that a result shows
-TABLE = "runs.parquet"
+TABLE = "entry_runs.parquet"
 RESULT = "result.json"
 PARTS = "parts"
 
@@ -123,10 +123,10 @@ def run(
     instances = range(count)
     failures = list[str]()
 
-    def made(one: Problem) -> tuple[list[runs.Row], list[str]]:
-        return runs.rows(one, one.scenarios(entry.law(one.plant), instances, seed), instances)
+    def made(one: Problem) -> tuple[list[entry_runs.Row], list[str]]:
+        return entry_runs.rows(one, one.scenarios(entry.law(one.plant), instances, seed), instances)
 
-    def groups() -> Iterator[list[runs.Row]]:
+    def groups() -> Iterator[list[entry_runs.Row]]:
         for name in problems:
             rows, failed = cached(
                 parts / f"{slug(name)}.json",
@@ -138,7 +138,7 @@ def run(
             failures.extend(failed)
             yield rows
 
-    runs.write(table, groups())
+    entry_runs.write(table, groups())
     first = problem(problems[0])
     (scenario,) = first.scenarios(entry.law(first.plant), [0])
     time = law_time(scenario)

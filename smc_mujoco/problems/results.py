@@ -31,7 +31,7 @@ from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import as_path, read_json, reading, slug
-from smc_mujoco.problems import enter, runs, suite
+from smc_mujoco.problems import enter, entry_runs, suite
 from smc_mujoco.problems.enter import RESULT, TABLE
 from smc_mujoco.problems.problem import problem
 
@@ -113,7 +113,7 @@ class QuestionBoard:
         return "\n".join(lines)
 
 
-class Result:
+class EntryResult:
     """What an entry did. Its runs are read when they are asked for."""
 
     def __init__(self, folder: Path):
@@ -142,9 +142,9 @@ class Result:
         return self.about["entry"]["name"]
 
     @cached_property
-    def runs(self) -> runs.Runs:
+    def runs(self) -> entry_runs.EntryRuns:
         """The table of the runs."""
-        return runs.Runs(self.table)
+        return entry_runs.EntryRuns(self.table)
 
     @cached_property
     def medians(self) -> dict[str, dict[str, float]]:
@@ -166,7 +166,7 @@ class Result:
 class Results:
     """What entries did on a suite, on the instances of a seed."""
 
-    def __init__(self, name: str, seed: int, entries: Mapping[str, Result]):
+    def __init__(self, name: str, seed: int, entries: Mapping[str, EntryResult]):
         self.suite = name
         self.seed = seed
         self.entries = dict(entries)
@@ -364,10 +364,10 @@ def sound(folder: Path) -> tuple[list[Results], list[ScenarioError]]:
         if RESULT in files:
             places.append(Path(place))
     refused = []
-    entries: dict[tuple[str, int], dict[str, Result]] = {}
+    entries: dict[tuple[str, int], dict[str, EntryResult]] = {}
     for place in sorted(places):
         try:
-            one = Result(place)
+            one = EntryResult(place)
         except ScenarioError as error:
             refused.append(error)
             continue

@@ -29,7 +29,7 @@ import numpy as np
 
 from smc_mujoco.analysis import linear_theory as theory
 from smc_mujoco.analysis.engine import Device
-from smc_mujoco.analysis.engine.runs import Runs
+from smc_mujoco.analysis.engine.scored_runs import ScoredRuns
 from smc_mujoco.common.constraints import Boolean, Called, constrained
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find
@@ -73,7 +73,7 @@ Key = TypeVar("Key")
 
 
 @dataclasses.dataclass(kw_only=True)
-class Search:
+class LevelSearch:
     """The search for the largest tolerated level below the first one that is not tolerated."""
 
     # tried first, from small to large, up to the first that is not tolerated
@@ -102,7 +102,8 @@ class Search:
 
 
 def find_boundaries(
-    searches: Mapping[Key, Search], tolerated: Callable[[list[tuple[Key, float]]], Iterable[bool]]
+    searches: Mapping[Key, LevelSearch],
+    tolerated: Callable[[list[tuple[Key, float]]], Iterable[bool]],
 ) -> None:
     """Advance searches together until all are done; `tolerated` judges a level of each search that
     continues.
@@ -118,7 +119,7 @@ def find_boundaries(
 
 
 @named_data
-class Kind:
+class MarginKind:
     """A kind of margin: something that a law tolerates up to some level."""
 
     label: str  # in tables and figures
@@ -144,7 +145,7 @@ class Kind:
                 scenarios.append(self.put(base, value))
         return scenarios
 
-    def search(self, base: Scenario, resolution: float) -> Search:
+    def search(self, base: Scenario, resolution: float) -> LevelSearch:
         """Return the search for the margin of a scenario."""
         if quantum := self.quantum(base):
 
@@ -153,14 +154,14 @@ class Kind:
 
             step = QUANTA[resolution] * quantum
             levels = [rounded(level) for level in self.levels]
-            return Search(
+            return LevelSearch(
                 levels=levels, resolution=lambda low: step, rounded=rounded, low=self.none
             )
         size = 1.0
         if self.forces and base.plant.is_user_model:
             size = default_u_max(base.plant) / MAX_FORCE
         levels = [size * level for level in self.levels]
-        return Search(
+        return LevelSearch(
             levels=levels, resolution=lambda low: resolution * max(low, levels[0]), low=self.none
         )
 
@@ -250,8 +251,8 @@ def _with_lost_gain(base: Scenario, level: float) -> Scenario:
     return dataclasses.replace(base, fault=Fault(at=0.0, gain=1.0 - level, on=on))
 
 
-MARGIN_KINDS: dict[str, Kind] = {
-    "delay": Kind(
+MARGIN_KINDS: dict[str, MarginKind] = {
+    "delay": MarginKind(
         label="input delay",
         unit="s",
         levels=DELAYS,
@@ -259,7 +260,7 @@ MARGIN_KINDS: dict[str, Kind] = {
         quantum=lambda base: base.control_period,
         theory=_critical_delay,
     ),
-    "disturbance": Kind(
+    "disturbance": MarginKind(
         label="constant disturbance",
         unit="{u}",
         levels=FORCES,
@@ -268,7 +269,7 @@ MARGIN_KINDS: dict[str, Kind] = {
         forces=True,
         theory=_tolerated_force,
     ),
-    "friction": Kind(
+    "friction": MarginKind(
         label="dry friction",
         unit="{u}",
         levels=FORCES,
@@ -276,22 +277,22 @@ MARGIN_KINDS: dict[str, Kind] = {
         forces=True,
         theory=_tolerated_force,
     ),
-    "mass": Kind(label="mass", unit="1", levels=MASS_RATIOS, put=_with_mass, none=1.0),
-    "noise": Kind(label="position noise", unit="{x}", levels=NOISES, put=_with_noise),
-    "jitter": Kind(
+    "mass": MarginKind(label="mass", unit="1", levels=MASS_RATIOS, put=_with_mass, none=1.0),
+    "noise": MarginKind(label="position noise", unit="{x}", levels=NOISES, put=_with_noise),
+    "jitter": MarginKind(
         label="largest delay of a sample, of the control period",
         unit="1",
         levels=JITTERS,
         put=with_jitter,
         quantum=lambda base: JITTERS[0],
     ),
-    "missed": Kind(
+    "missed": MarginKind(
         label="share of missed samples",
         unit="1",
         levels=tuple(i / 10 for i in range(1, 10)),
         put=_with_missed,
     ),
-    "gain": Kind(
+    "gain": MarginKind(
         label="share of gain that an actuator loses",
         unit="1",
         levels=tuple(i / 10 for i in range(1, 10)),
@@ -403,7 +404,7 @@ def margins_of(
             cells.append((base, find("kind of margin", kind, MARGIN_KINDS)))
     searches = [kind.search(base, resolution) for base, kind in cells]
     # a coarse search by MuJoCo takes less time than compiling its law for the fast engine
-    runs = Runs({"rest_share": rest_share}, device, threads, resolution != COARSE)
+    runs = ScoredRuns({"rest_share": rest_share}, device, threads, resolution != COARSE)
     done = 0
 
     def tolerated(tried: Sequence[tuple[int, float | None]], runner: Callable) -> list[bool]:

@@ -39,7 +39,7 @@ import numpy as np
 
 from smc_mujoco.analysis.engine import CHECKED, CONVERGES, DOES_NOT, UNDECIDED, Device
 from smc_mujoco.analysis.engine.form import SCORES, SETTING
-from smc_mujoco.analysis.engine.group import Group, why_not
+from smc_mujoco.analysis.engine.group import FormGroup, why_not
 from smc_mujoco.analysis.engine.outcome import NAME, over_trace
 from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair, Fields, Floats
 from smc_mujoco.common.constraints import Called, constrained
@@ -97,7 +97,7 @@ class Basin:
         return float((self.outcome == CONVERGES).mean())
 
     def save(self, path: AnyPath) -> Path:
-        """Write a .json file that `load` reads back."""
+        """Write a .json file that `load_basin` reads back."""
         data = {}
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
@@ -271,7 +271,7 @@ class _Grid:
         """Return the same by the fast engine, on a device."""
 
         def run(shortened: Scenario, states: Array, final: bool) -> Array:
-            made = Group([shortened], (NAME,))
+            made = FormGroup([shortened], (NAME,))
             rows = np.repeat(made.rows, len(states), axis=0)
             at = made.layout.row
             n = self.base.plant.n
@@ -310,7 +310,7 @@ def _reach(x: Array, v: Array, u_max: Any, final: bool) -> Floats:
     return np.abs(x).max() or 1.0, np.abs(v).max() or 1.0, float(np.max(u_max)), float(final)
 
 
-def load(path: AnyPath) -> Basin:
+def load_basin(path: AnyPath) -> Basin:
     """Read the map that `Basin.save` wrote."""
     kinds = {"x": float, "v": float, "decided_at": float, "outcome": np.int8}
     with reading(path, "map", "give a .json file that Basin.save wrote") as file:

@@ -27,7 +27,7 @@ import numpy as np
 
 from smc_mujoco.analysis.bootstrap import Interval, share_interval
 from smc_mujoco.analysis.engine import Device
-from smc_mujoco.analysis.engine.runs import Runs, worth_compiling
+from smc_mujoco.analysis.engine.scored_runs import ScoredRuns, worth_compiling
 from smc_mujoco.common.constraints import Seed, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.progress import bar
@@ -245,7 +245,7 @@ def sensitivity(
     held = np.empty(len(design), bool)
     work = len(design) * scenario.work
     formulas = {metric: lambda trace: _score(trace, metric), "rest_share": rest_share}
-    runs = Runs(formulas, device, threads, worth_compiling(work), by_group=True)
+    runs = ScoredRuns(formulas, device, threads, worth_compiling(work), by_group=True)
     words = f"sensitivity of {scenario.law.name} on {scenario.plant.name}"
     with bar(words, work, shown=progress) as drawn:
         for first in range(0, len(design), AT_ONCE):

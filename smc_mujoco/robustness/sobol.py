@@ -17,7 +17,7 @@ import numpy as np
 from smc_mujoco.analysis.bootstrap import LEVEL, Interval, share_interval
 from smc_mujoco.common.aliases import Array, ArrayPair, Pair
 from smc_mujoco.common.constraints import MAX_SEED
-from smc_mujoco.robustness.uncertainty import Constant, Member, Members, Uncertainty
+from smc_mujoco.robustness.uncertainty import Member, Members, RunConstant, Uncertainty
 from smc_mujoco.simulation.scenario import Scenario
 
 RESAMPLES = 499  # of a bootstrap: chosen
@@ -35,7 +35,7 @@ class Axis(NamedTuple):
     name: str
     low: float
     high: float
-    unit: str  # of low and high, as that of a `Constant`
+    unit: str  # of low and high, as that of a `RunConstant`
     first: Interval  # first-order index, the axis alone, with its 95 % interval
     total: Interval  # total index, with others
     direction: float  # Spearman's rank correlation of the score with the axis; NaN for chance
@@ -79,10 +79,10 @@ class Space:
         self.members = members = Members([scenario], within)
         unit = scenario.plant.units[0]
         self.names: list[str] = []
-        self.columns: list[Constant | None] = []
+        self.columns: list[RunConstant | None] = []
         self.ends: list[tuple[float, float, str]] = []
 
-        def add(name: str, low: float, high: float, unit: str, constant: Constant | None = None):
+        def add(name: str, low: float, high: float, unit: str, constant: RunConstant | None = None):
             self.names.append(name)
             self.columns.append(constant)
             self.ends.append((low, high, unit))

@@ -226,7 +226,7 @@ class Members:
     """The members of a class around one scenario, or around the same scenario on several parameter
     sets.
 
-    `constants` has a `Constant` for each share of a member. If there are several parameter sets,
+    `constants` has a `RunConstant` for each share of a member. If there are several parameter sets,
     the first chooses one. `ends` are the shares at corners. `bare` has no force or noise, and
     shares of 0.5, on the first parameter set.
     """
@@ -244,7 +244,9 @@ class Members:
         _check_class(scenario, within)
         self.constants = list(_constants(scenario, within))
         if count > 1:
-            sets = Constant("set", (0.0, count), lambda _, at: scenarios[min(int(at), count - 1)])
+            sets = RunConstant(
+                "set", (0.0, count), lambda _, at: scenarios[min(int(at), count - 1)]
+            )
             self.constants.insert(0, sets)
         self.ends = [[0.0, 1.0] for _ in self.constants]
         # samples that an error of measurement lasts
@@ -412,7 +414,7 @@ def mutated_signal(values: Array, rng: np.random.Generator) -> Array:
 
 
 @frozen_data
-class Constant:
+class RunConstant:
     """Something that is constant in a run and may differ from member to member."""
 
     name: str
@@ -464,42 +466,42 @@ def _check_class(scenario: Scenario, within: Uncertainty) -> None:
         )
 
 
-def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
+def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[RunConstant]:
     """Yield each constant that may differ."""
     effort = EFFORT[scenario.plant.units[0]]
     plant = scenario.plant
     if within.delay != (0.0, 0.0):
         bounds = _multiples("delay", within.delay, scenario.resolved.physics_step)
-        yield Constant("delay", bounds, _with_delay, "s")
+        yield RunConstant("delay", bounds, _with_delay, "s")
     if within.jitter:
         step = scenario.control_period / JITTER_SHARES
         _, jitter = _multiples("jitter", (0.0, within.jitter), step)
-        yield Constant("jitter", (0.0, jitter / scenario.control_period), with_jitter, "periods")
+        yield RunConstant("jitter", (0.0, jitter / scenario.control_period), with_jitter, "periods")
     for name, bounds in {"mass": within.mass, **within.parameters}.items():
         if bounds != (1.0, 1.0):
             unit = "added" if name in plant.added else ""
-            yield Constant(name, bounds, functools.partial(_with_factor, name=name), unit)
+            yield RunConstant(name, bounds, functools.partial(_with_factor, name=name), unit)
     if within.friction_scale != (1.0, 1.0):
         if not (scenario.friction or _dry(plant)):
             raise ScenarioError(
                 f"Uncertainty's friction_scale is of {plant.name}, which has no friction here: "
                 "give it some, such as friction=smc.Coulomb(0.1)"
             )
-        yield Constant("friction_scale", within.friction_scale, _with_friction_scale)
+        yield RunConstant("friction_scale", within.friction_scale, _with_friction_scale)
     if within.friction != (0.0, 0.0):
-        yield Constant("friction", within.friction, with_friction, effort)
+        yield RunConstant("friction", within.friction, with_friction, effort)
     if within.encoder:
-        yield Constant("encoder", within.encoder, _with_counts, "counts", geometric=True)
+        yield RunConstant("encoder", within.encoder, _with_counts, "counts", geometric=True)
     if within.bound != (1.0, 1.0):
         if not math.isfinite(min(scenario.limits)):
             raise ScenarioError("Uncertainty's bound needs a finite one: give the scenario a u_max")
-        yield Constant("bound", within.bound, _with_bound)
+        yield RunConstant("bound", within.bound, _with_bound)
     for i in range(plant.n if within.x0 else 0):
         name = f"x0 {i + 1}" if plant.n > 1 else "x0"
-        yield Constant(name, (-within.x0, within.x0), functools.partial(_with_start, i=i), "%")
+        yield RunConstant(name, (-within.x0, within.x0), functools.partial(_with_start, i=i), "%")
     if within.period != (1.0, 1.0):
         bounds = _multiples("period", within.period, 1.0 / scenario.steps)
-        yield Constant("period", bounds, _with_period)
+        yield RunConstant("period", bounds, _with_period)
 
 
 def _multiples(name: str, bounds: Pair, step: float) -> Pair:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from smc_mujoco.analysis.engine import Device
-from smc_mujoco.analysis.engine.runs import Runs, worth_compiling
+from smc_mujoco.analysis.engine.scored_runs import ScoredRuns, worth_compiling
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.constraints import Seed, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown
@@ -27,8 +27,8 @@ from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.draw.style import law_colour, law_name, plant_name
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.robustness.uncertainty import Members, Uncertainty, default_class, outside
-from smc_mujoco.robustness.worst_case_search import Search
-from smc_mujoco.simulation import run_key, serialise
+from smc_mujoco.robustness.worst_case_search import WorstCaseSearch
+from smc_mujoco.simulation import run_key, scenario_json
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import warn_of_broken
@@ -112,7 +112,7 @@ class WorstCase(Tables):
         values = {name: getattr(self, name) for name in names}
         return values | {
             "within": dataclasses.asdict(self.within),
-            "scenario": serialise.describe(self.scenario),
+            "scenario": scenario_json.describe(self.scenario),
         }
 
     @property
@@ -247,8 +247,10 @@ def worst_case(
         f"worst case of {scenario.law.name} on {scenario.plant.name}", work, shown=progress
     ) as drawn:
         formulas = {metric: entry.formula, "rms_error": CATALOGUE["rms_error"].formula}
-        fast = Runs(formulas, device, threads, worth_compiling(work), by_group=True)
-        drawing, search = (Search(members, entry, budget, fast, drawn.advance) for _ in range(2))
+        fast = ScoredRuns(formulas, device, threads, worth_compiling(work), by_group=True)
+        drawing, search = (
+            WorstCaseSearch(members, entry, budget, fast, drawn.advance) for _ in range(2)
+        )
         drawing.draw(np.random.default_rng([seed, 0]))
         early = sorted(drawing.tried[:MIN_RUNS], key=lambda tried: tried.key, reverse=True)
         search.search(np.random.default_rng([seed, 1]), early[:FIRST_MEMBERS])
@@ -290,7 +292,7 @@ def cached_worst_case(
 
     def load(file: Path) -> WorstCase:
         data = read_json(file)
-        restored = serialise.restore(data.pop("scenario"))
+        restored = scenario_json.restore(data.pop("scenario"))
         worst = dataclasses.replace(restored, law=scenario.law)
         return WorstCase(**data, scenario=worst, nominal=scenario, within=within)
 

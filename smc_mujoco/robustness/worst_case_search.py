@@ -30,7 +30,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smc_mujoco.analysis.engine.runs import Runs
+from smc_mujoco.analysis.engine.scored_runs import ScoredRuns
 from smc_mujoco.common.aliases import Array, Pair
 from smc_mujoco.metrics.catalogue import CATALOGUE, arrived
 from smc_mujoco.metrics.conventions import Metric, by_group
@@ -69,7 +69,7 @@ class Case(NamedTuple):
     origin: int = -1  # number of the member from which changes led to this one; -1 for a new one
 
 
-class Tried(NamedTuple):
+class TriedMember(NamedTuple):
     """A member that was run."""
 
     member: Member
@@ -78,7 +78,7 @@ class Tried(NamedTuple):
     by_mujoco: bool = True
 
 
-class Search:
+class WorstCaseSearch:
     """A search among the members of a class."""
 
     def __init__(
@@ -86,7 +86,7 @@ class Search:
         members: Members,
         metric: Metric,
         budget: int,
-        fast: Runs,
+        fast: ScoredRuns,
         report: Callable[[int], None],
     ):
         self.members = members
@@ -95,14 +95,14 @@ class Search:
         self.budget = budget
         self.threads = fast.threads
         self.report = report
-        self.tried: list[Tried] = []  # every member that was run, in order
+        self.tried: list[TriedMember] = []  # every member that was run, in order
         self.runs = 0
         self.broken = ""  # how the law or a signal failed first, in a sentence
         # the first run under a relay of e', or without a force, for its frequency
         self.swing: Trace | None = None
 
     @property
-    def worst(self) -> Tried:
+    def worst(self) -> TriedMember:
         """The worst member so far, the first of several."""
         return max(self.tried, key=lambda one: one.key)
 
@@ -111,7 +111,7 @@ class Search:
         for left in range(self.budget, 0, -BATCH_MEMBERS):
             self.run([Case(self.members.random(rng)) for _ in range(min(left, BATCH_MEMBERS))])
 
-    def search(self, rng: np.random.Generator, known: Sequence[Tried]) -> None:
+    def search(self, rng: np.random.Generator, known: Sequence[TriedMember]) -> None:
         """Try the strategies, beginning with members that were run before."""
         self.tried += [one._replace(origin=-1 - i) for i, one in enumerate(known)]
         batches = (
@@ -126,13 +126,13 @@ class Search:
             if self.runs >= self.budget or self.worst.key == FAILED_KEY:
                 return
 
-    def run(self, cases: Sequence[Case]) -> list[Tried]:
+    def run(self, cases: Sequence[Case]) -> list[TriedMember]:
         """Run cases, as many as the budget allows, and return them as tried."""
         cases = list(cases[: self.budget - self.runs])
         first = self.runs
         replays = []
         self.runs += len(cases)
-        tried: list[Tried | None] = [None] * len(cases)
+        tried: list[TriedMember | None] = [None] * len(cases)
         scenarios = []
         for case in cases:
             scenarios.append(self.members.scenario_of(case.member, case.relay))
@@ -140,7 +140,7 @@ class Search:
         traced = [i for i in range(len(cases)) if i not in scored]
         for i, key in scored.items():
             member, _, origin = cases[i]
-            tried[i] = Tried(member, key, origin if origin >= 0 else first + i, False)
+            tried[i] = TriedMember(member, key, origin if origin >= 0 else first + i, False)
         for k, trace in stream([scenarios[i] for i in traced], self.threads, self.report):
             i = traced[k]
             member, relay, origin = cases[i]
@@ -160,7 +160,7 @@ class Search:
                     continue
             if origin < 0:
                 origin = first + i
-            tried[i] = Tried(member, self._key(trace), origin)
+            tried[i] = TriedMember(member, self._key(trace), origin)
         done = [one for one in tried if one]
         self.tried += done
         if replays:
@@ -338,7 +338,7 @@ class Search:
             yield from self._evolution(rng)
 
     def _changes(self, rng: np.random.Generator) -> list[Case]:
-        best: dict[int, Tried] = {}
+        best: dict[int, TriedMember] = {}
         for one in sorted(self.tried, key=lambda one: one.key, reverse=True):
             best.setdefault(one.origin, one)
         parents = list(best.values())[: len(CHANGES_PER_PARENT)]

@@ -17,7 +17,7 @@ from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.attended import attended
 from smc_mujoco.common.errors import ScenarioWarning, users_stacklevel
-from smc_mujoco.common.jit import AtAddress, Function, NotCompilable
+from smc_mujoco.common.jit import AtAddress, CompiledFunction, NotCompilable
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import stored_dtype
@@ -92,7 +92,7 @@ class NoDynamics:
         raise ValueError("there is no tip")
 
 
-def _known(made: Function, function: Any) -> bool:
+def _known(made: CompiledFunction, function: Any) -> bool:
     """Return whether a function needs no check: it had one, or is of this package."""
     return made.checked or fingerprint.ours(function)
 
@@ -122,7 +122,7 @@ def _joint_inputs(n: int, driven: int) -> list[Array]:
 
 
 def _check(
-    made: Function,
+    made: CompiledFunction,
     name: str,
     python: python_functions.PythonFunction,
     inputs: Sequence[Array],

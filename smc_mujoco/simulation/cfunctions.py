@@ -24,7 +24,7 @@ from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import (
     AtAddress,
-    Function,
+    CompiledFunction,
     Key,
     NotCompilable,
     Uncompiled,
@@ -60,7 +60,9 @@ OF_JOINTS = {
 
 
 @functools.cache
-def _compile_pair(function: Callable, kind: str, gains: tuple[str, ...], memory: int) -> Function:
+def _compile_pair(
+    function: Callable, kind: str, gains: tuple[str, ...], memory: int
+) -> CompiledFunction:
     """Compile (y, gains, memory) -> two numbers; an estimator may return only the velocity."""
     body = jit(function)
     inputs = loader(Reading if kind == "estimator" else Measurement)
@@ -76,7 +78,7 @@ def _compile_pair(function: Callable, kind: str, gains: tuple[str, ...], memory:
 @functools.cache
 def _compile_joint_law(
     function: Callable, gains: tuple[str, ...], shared: tuple[str, ...], memory: int
-) -> Function:
+) -> CompiledFunction:
     """Compile (y, gains, memory) -> two vectors, of a law of many joints.
 
     Its inputs are the numbers of a JointMeasurement, its parameters one number for each driven
@@ -125,7 +127,7 @@ def _joint_gains(names: tuple[str, ...], shared: tuple[str, ...]) -> Callable:
 
 
 @functools.cache
-def _compile_signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
+def _compile_signal(kind: type[Signal], names: tuple[str, ...]) -> CompiledFunction:
     """Compile a record INSTANT -> value, first and second derivative.
 
     The parameters of a series are followed by the address and the number of its points.
@@ -159,7 +161,7 @@ def _compile_signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
 
 
 @functools.cache
-def _compile_nominal(function: Callable, names: tuple[str, ...]) -> Function:
+def _compile_nominal(function: Callable, names: tuple[str, ...]) -> CompiledFunction:
     """Compile a record SEEN -> f and g of channel i."""
     body = jit(function)
     values = loader(named(names))
@@ -175,7 +177,9 @@ def _compile_nominal(function: Callable, names: tuple[str, ...]) -> Function:
 
 
 @functools.cache
-def _compile_part(function: Callable, kind: str, names: tuple[str, ...], memory: int) -> Function:
+def _compile_part(
+    function: Callable, kind: str, names: tuple[str, ...], memory: int
+) -> CompiledFunction:
     """Compile what a part does on one joint, one of OF_JOINTS."""
     record, count = OF_JOINTS[kind]
     body = jit(function)
@@ -190,7 +194,7 @@ def _compile_part(function: Callable, kind: str, names: tuple[str, ...], memory:
 
 
 @functools.cache
-def _compile_act(function: Callable) -> Function:
+def _compile_act(function: Callable) -> CompiledFunction:
     """Compile what a part does at a stage: of the record of the run, and its PART."""
     body = njit(error_model="numpy")(function)
 
@@ -213,9 +217,9 @@ def _compile_act(function: Callable) -> Function:
     return _stored(native, function)
 
 
-def _stored(native: Callable, function: Callable) -> Function:
+def _stored(native: Callable, function: Callable) -> CompiledFunction:
     """Return the C function that calls a user's function. It is kept on disk."""
-    compiled = Function(native, _key(function, native))
+    compiled = CompiledFunction(native, _key(function, native))
     fingerprint.keep(function)
     return compiled
 
@@ -252,7 +256,7 @@ def _key(function: Callable, body: Callable) -> Key | None:
         return None
 
 
-def compile_component(c: Component) -> Function | AtAddress:
+def compile_component(c: Component) -> CompiledFunction | AtAddress:
     """Return a law, a surface or an estimator as a C function; NotCompilable has its name and the
     reason.
     """
@@ -280,12 +284,12 @@ def compile_component(c: Component) -> Function | AtAddress:
     )
 
 
-def compile_signal(s: Signal) -> Function:
+def compile_signal(s: Signal) -> CompiledFunction:
     """Return a signal as a C function; raises as `compile_component`."""
     return _compile(type(s).__name__, _compile_signal, type(s), tuple(s.parameters()))
 
 
-def compile_nominal(plant: Plant) -> Function:
+def compile_nominal(plant: Plant) -> CompiledFunction:
     """Return a plant's nominal model of one equation a channel as a C function; raises as
     `compile_component`.
     """
@@ -293,7 +297,7 @@ def compile_nominal(plant: Plant) -> Function:
     return _compile(name, _compile_nominal, plant.nominal, tuple(plant.parameters))
 
 
-def compile_part(part: Part, kind: str) -> Function:
+def compile_part(part: Part, kind: str) -> CompiledFunction:
     """Return a function of a part, see hardware/moments.py, as a C function; raises as
     `compile_component`.
     """
@@ -303,7 +307,9 @@ def compile_part(part: Part, kind: str) -> Function:
     return _compile(name, _compile_act, getattr(part, kind))
 
 
-def _compile(name: str, compiler: Callable[..., Function], *arguments: object) -> Function:
+def _compile(
+    name: str, compiler: Callable[..., CompiledFunction], *arguments: object
+) -> CompiledFunction:
     """Return what a compiler makes of these arguments. Its errors begin with the name."""
     try:
         made = compiler(*arguments)

@@ -40,10 +40,10 @@ import numpy as np
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.aliases import Data
-from smc_mujoco.common.catalogue import subclasses
 from smc_mujoco.common.errors import ScenarioError, find, number, shown, unknown
 from smc_mujoco.common.files import reading
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.registry import subclasses
 from smc_mujoco.common.text import stated
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component

@@ -12,7 +12,7 @@ from smc_mujoco.common.aliases import Fields
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import to_json
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation import scenario_json
 from smc_mujoco.simulation.codes import Hashes, code_hashes
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, find_condition
 from smc_mujoco.simulation.scenario import U_MAX, Scenario
@@ -46,7 +46,7 @@ def description(scenario: Scenario) -> Fields:
 
     It is the same for equal scenarios: the source of gains is left out.
     """
-    data = serialise.describe(scenario)
+    data = scenario_json.describe(scenario)
     del data["left_out"], data["source"]
     return data
 

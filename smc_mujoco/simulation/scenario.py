@@ -21,7 +21,7 @@ from smc_mujoco.common.constraints import Number, OneOf, Seed, of_fields, sugges
 from smc_mujoco.common.errors import ScenarioError, find, shown, warn_once
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.common.text import joined
-from smc_mujoco.control import design
+from smc_mujoco.control import nominal_gains
 from smc_mujoco.control.component import Template, gain_text
 from smc_mujoco.control.estimator import Estimator, estimator
 from smc_mujoco.control.law import Law, joint_catalogue, suits
@@ -636,7 +636,7 @@ def _defaults(s: Scenario) -> dict[str, Any]:
         "integrator": integration.default_integrator(s),
     }
     missing = {name: value for name, value in defaults.items() if getattr(s, name) is None}
-    return missing | {"law": design.at_plant(s.law, s.plant)}
+    return missing | {"law": nominal_gains.at_plant(s.law, s.plant)}
 
 
 def _default_bound(s: Scenario) -> float | tuple[float, ...]:

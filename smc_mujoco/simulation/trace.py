@@ -27,7 +27,7 @@ from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import as_path, from_json, reading, replacing, to_json
 from smc_mujoco.mechanisms.layout import channel_names, column_ends
 from smc_mujoco.mechanisms.plant import EFFORT
-from smc_mujoco.simulation import damping, serialise
+from smc_mujoco.simulation import damping, scenario_json
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.state import LOGGED
 
@@ -177,7 +177,7 @@ class Trace:
             raise ScenarioError(f"cannot save to {path.name!r}: end the name in .npz")
         path = path.with_suffix(".npz")
         about = to_json(
-            serialise.describe(self.scenario)
+            scenario_json.describe(self.scenario)
             | {"diverged_at": self.diverged_at, "failure": self.failure}
         )
         if len(about) > MAX_TEXT:
@@ -283,7 +283,7 @@ class Trace:
         frame = pandas.DataFrame(columns, index=pandas.Index(columns.pop("t"), name="t"))
         frame.attrs = {
             "units": self.units(),
-            "scenario": to_json(serialise.describe(self.scenario)),
+            "scenario": to_json(scenario_json.describe(self.scenario)),
         }
         return frame
 
@@ -301,7 +301,7 @@ class Trace:
         with package("xarray", "Trace.to_xarray"):
             import xarray  # pyright: ignore[reportMissingImports]
 
-        about = {"scenario": to_json(serialise.describe(self.scenario))}
+        about = {"scenario": to_json(scenario_json.describe(self.scenario))}
         variables = {}
         for n in ARRAYS[1:]:
             variables[n] = (("t", "channel"), getattr(self, n), {"units": self._unit(n)})
@@ -348,7 +348,7 @@ def _write_csv(trace: Trace, file: Path) -> None:
 def _write_mat(trace: Trace, file: Path) -> None:
     from scipy.io import savemat
 
-    about = to_json(serialise.describe(trace.scenario))
+    about = to_json(scenario_json.describe(trace.scenario))
     arrays = {name: getattr(trace, name) for name in ARRAYS}
     savemat(
         file,
@@ -361,7 +361,7 @@ def _write_parquet(trace: Trace, file: Path) -> None:
     import pyarrow as pa
     from pyarrow import parquet
 
-    about = to_json(serialise.describe(trace.scenario))
+    about = to_json(scenario_json.describe(trace.scenario))
     fields = []
     for name, unit in trace.units().items():
         fields.append(pa.field(name, pa.float64(), metadata={"unit": unit}))
@@ -447,7 +447,7 @@ def load(path: AnyPath) -> Trace:
         about = from_json(str(_checked_array(archive, "about")))
         end = {key: about.pop(key) for key in ("diverged_at", "failure")}
     try:
-        scenario = serialise.restore(about)
+        scenario = scenario_json.restore(about)
     except ScenarioError as error:  # with its cure
         raise ScenarioError(f"the scenario of {path} cannot be restored, {error}") from None
     except Exception as error:

@@ -65,7 +65,7 @@ UNDER = {
 
 
 @named_data
-class Entry:
+class BoardEntry:
     """A law's line in a board."""
 
     law: str
@@ -186,7 +186,7 @@ class Board(Tables):
     metric: str  # its name, or "settles"
     # of the medians, with {x} and {u} as in `Metric.unit`; "" for "settles", which is 0 to 1
     unit: str
-    entries: tuple[Entry, ...]  # lowest mean rank first
+    entries: tuple[BoardEntry, ...]  # lowest mean rank first
     blocks: tuple[Block, ...]  # the same laws in each condition
     family: int  # number of blocks of the table for which winners are corrected
     relevant: float  # share of a value that is relevant
@@ -388,7 +388,7 @@ class Board(Tables):
         not_ranked = f"{joined(words)} {_are(words)} not ranked"
         return f"{not_ranked}, which needs {least} ({self._cure(least)})"
 
-    def failures(self, entry: Entry) -> str:
+    def failures(self, entry: BoardEntry) -> str:
         """Return how many of a law's runs failed, have not arrived, or never reach a time, such as
         "2 of 24 failed"; "" if none did.
         """
@@ -517,7 +517,7 @@ def _table(name: str, boards: Sequence[Board]) -> Tabular:
     )
 
 
-def _cell(board: Board, entry: Entry) -> Cell:
+def _cell(board: Board, entry: BoardEntry) -> Cell:
     """Return a law's median, strong if the law may be the best in every block."""
     median = size(entry.interval.median, board.metric)
     below = [spread(entry.interval, board.metric)]

@@ -336,7 +336,7 @@ class Trial(NamedTuple):
                 [run_key.key(first), goal.describe(), code],
                 searched,
                 lambda made, path: made.save(path),
-                lambda path: result.load(path, plant),
+                lambda path: result.load_tuned(path, plant),
             )
         except BrokenLawError:
             raise

@@ -15,14 +15,22 @@ import numpy as np
 
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import Interval, median_of, share_interval
-from smc_mujoco.analysis.paired_runs import EPS, OBJECTIVE, SETTLES, UNITS, Columns, Group, Scores
+from smc_mujoco.analysis.paired_runs import (
+    EPS,
+    OBJECTIVE,
+    SETTLES,
+    UNITS,
+    RunColumns,
+    RunGroup,
+    Scores,
+)
 from smc_mujoco.analysis.ranking import RELEVANT, Comparison, corrected, linked, ranks
 from smc_mujoco.analysis.step_halving import first_order, repeats_all
 from smc_mujoco.common.aliases import Array, Names
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.board import Block, Board, Boards, Entry, Lead
+from smc_mujoco.studies.board import Block, Board, BoardEntry, Boards, Lead
 
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 MAX_RATIO = 4.0  # of the ends of a median's interval, above which it says too little; chosen
@@ -40,7 +48,7 @@ class Holdout(NamedTuple):
 
 
 def leaderboard(
-    table: Columns,
+    table: RunColumns,
     metrics: Sequence[str] = METRICS,
     by: Sequence[str] = ("plant",),
     defaults: bool = False,
@@ -158,7 +166,7 @@ def _untuned(sources: Sources, defaults: bool) -> Names:
 
 
 def _board(
-    group: Group,
+    group: RunGroup,
     scores: Scores,
     ran: Sequence[Scenario | None],
     metric: str,
@@ -296,7 +304,7 @@ def _resolves(comparison: Comparison, at: int, unbeaten: Sequence[str]) -> float
 
 def _entries(
     comparison: Comparison, sets: Mapping[str, Array], sources: Sources
-) -> tuple[Entry, ...]:
+) -> tuple[BoardEntry, ...]:
     """Return the entries of all laws."""
     entries = []
     for rank in ranks(comparison):
@@ -307,7 +315,7 @@ def _entries(
             share = float(1 - np.nanmean(values, axis=1).mean())
             interval = share_interval(share, interval.n)
         entries.append(
-            Entry(
+            BoardEntry(
                 law=rank.law,
                 interval=interval,
                 vague=not comparison.shares and _vague(interval, comparison.floors.min()),

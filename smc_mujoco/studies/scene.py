@@ -24,11 +24,11 @@ from pathlib import Path
 from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.analysis.ranking import exceeds
 from smc_mujoco.common import errors
-from smc_mujoco.common.catalogue import Catalogue, added, source
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.errors import find as lookup
 from smc_mujoco.common.files import shipped, slug
+from smc_mujoco.common.registry import Catalogue, added, source
 from smc_mujoco.common.scripts import execute
 from smc_mujoco.common.text import first_paragraph, joined, number
 from smc_mujoco.draw.film.camera import Camera, checked

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, overload
 
 from smc_mujoco.analysis.engine import Device
-from smc_mujoco.analysis.engine.runs import Runs
+from smc_mujoco.analysis.engine.scored_runs import ScoredRuns
 from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.errors import ScenarioError, find, has, items_of, shown
 from smc_mujoco.metrics import catalogue
@@ -66,7 +66,7 @@ def score(
     columns = {"plant": pa.string(), "law": pa.string(), "condition": pa.string()}
     columns |= {"seed": pa.int64()} | dict.fromkeys((*names, "diverged_at"), pa.float64())
     schema = pa.schema(list(columns.items()))
-    scored = Runs({name: getattr(catalogue, name) for name in names}, device, threads)
+    scored = ScoredRuns({name: getattr(catalogue, name) for name in names}, device, threads)
     tables = []
     left = iter(runs)
     while chunk := list(itertools.islice(left, CHUNK)):

@@ -36,7 +36,7 @@ from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import MAX_RATIO, MAX_UNPACKED, from_json, reading, replacing, to_json
 from smc_mujoco.common.text import counted, number
 from smc_mujoco.metrics.catalogue import metrics
-from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation import scenario_json
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -274,7 +274,7 @@ class Table:
                 "kind": row["source"][0].as_py(),
                 "search": search and from_json(search),
             }
-        return serialise.restore(about)
+        return scenario_json.restore(about)
 
     def trace(self, i: int) -> Trace:
         """Run row i again and return its trace.

@@ -74,15 +74,15 @@ def check(plant, law, conditions, duration=10.0):
     metrics = catalogue.CATALOGUE.keys() & set(names())
     metrics = sorted(metrics.difference(RESTING if moving else ()))
     assert not any(group.why_not(case, metrics) for case in cases)
-    made = group.Group(cases, metrics)
+    made = group.FormGroup(cases, metrics)
     made.rows[:, SETTING.logging] = 1.0
     logs = np.full((len(cases), base.samples + 1, base.plant.n, len(LOGGED)), np.nan)
-    scores = cpu.run(made.form, made.rows, made.tables, 1, logs)
+    scores = cpu.run_rows(made.form, made.rows, made.tables, 1, logs)
     near = [_beside(cases, offset) for offset in BESIDE]
     close = list(map(smc.run, near))
     others_scores = []
     for some in near:
-        moved = group.Group(some, metrics)
+        moved = group.FormGroup(some, metrics)
         others_scores.append(moved.run(moved.rows))
     for i, (name, trace) in enumerate(zip(conditions, smc.run(cases), strict=True)):
         score = scores[i]

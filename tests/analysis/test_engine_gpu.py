@@ -53,7 +53,7 @@ def code(monkeypatch, plant, law, metrics=("settling_time",), **fields):
     device = types.SimpleNamespace(compute_capability=(9, 0))
     monkeypatch.setattr(dispatcher, "get_current_device", lambda: device)
     case = smc.Scenario(plant=plant, law=law, duration=1.0, **fields)
-    kernel = gpu.kernel(group.Group([case], metrics).form)
+    kernel = gpu.kernel(group.FormGroup([case], metrics).form)
     return gpu.cuda.compile_ptx(kernel, gpu.ARGUMENTS, cc=(9, 0))[0]
 
 

@@ -27,10 +27,10 @@ CALLS = {
     "list pid": ["cli.law_pages.print_pages"],
     "list --needs continuous,two-gains --json l.json": ["cli.law_pages.print_suitable"],
     "list --plant duffing": ["cli.law_pages.print_suitable"],
-    "list law.c": ["exchange.c.load.check"],
-    "run duffing": ["cli.scene.perform"],
+    "list law.c": ["exchange.c.law_from_c.check"],
+    "run duffing": ["cli.run_scene.perform"],
     "run duffing --out there --no-film --seed 7 --threads 2 --export csv,mat --no-repeat "
-    "--json r.json": ["cli.scene.perform"],
+    "--json r.json": ["cli.run_scene.perform"],
     "view duffing": ["draw.studio.view"],
     "view duffing --law pid --port 8123 --no-browser": ["draw.studio.view"],
     "compare": ["studies.compare.compare"],
@@ -83,12 +83,12 @@ CALLS = {
     "chatter duffing --law pid --channel 1 --out c --json c.json --threads 2": [
         "analysis.chattering.chattering"
     ],
-    "export pid.c": ["exchange.c.export.law_to_c"],
-    "export pid there.c --gains kp=50 --type float --joints 2": ["exchange.c.export.law_to_c"],
-    "export pid.fmu": ["exchange.fmu.export.law_to_fmu"],
+    "export pid.c": ["exchange.c.export_c.law_to_c"],
+    "export pid there.c --gains kp=50 --type float --joints 2": ["exchange.c.export_c.law_to_c"],
+    "export pid.fmu": ["exchange.fmu.export_fmu.law_to_fmu"],
     "export pid p.fmu --gains kp=50 --surface linear(c=4) --velocity levant --period 0.002 "
     "--u-max 6 --model nominal "
-    "--joints 2 --no-binary": ["exchange.fmu.export.law_to_fmu"],
+    "--joints 2 --no-binary": ["exchange.fmu.export_fmu.law_to_fmu"],
 }
 
 

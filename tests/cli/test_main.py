@@ -19,8 +19,8 @@ import pytest
 from helpers import commands
 
 import smc_mujoco as smc
-from smc_mujoco.cli import main, tables, terminal
-from smc_mujoco.cli import scene as show
+from smc_mujoco.cli import console, main, tables
+from smc_mujoco.cli import run_scene as show
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
 from smc_mujoco.metrics.catalogue import metrics, score
@@ -413,9 +413,9 @@ def test_a_command_ends_with_the_code_and_the_sentence_of_what_it_raises(case, c
         open=os.open,
         dup2=lambda new, _: os.close(new),
     )
-    monkeypatch.setattr(terminal, "os", kept)  # the test's stdout stays
+    monkeypatch.setattr(console, "os", kept)  # the test's stdout stays
     error, *expected = OUTCOMES[case]
-    with pytest.raises(SystemExit) as end, terminal.errors_as_sentences():
+    with pytest.raises(SystemExit) as end, console.errors_as_sentences():
         raise error
     assert [end.value.code, capfd.readouterr().err] == expected
 
@@ -498,7 +498,7 @@ scene = smc.Scene(
 )
 
 if __name__ == "__main__":
-    from smc_mujoco.cli import scene as show
+    from smc_mujoco.cli import run_scene as show
     show.figures = lambda *_: []
     smc.play(__file__)
 '''
@@ -528,9 +528,9 @@ def test_a_scene_imports_its_neighbour_and_writes_to_the_working_folder(script):
 def test_a_terminal_that_knows_ascii_only_gets_all_there_is(scene, folder, trace):
     code = "\n".join(
         [
-            "from smc_mujoco.cli import scene",
+            "from smc_mujoco.cli import run_scene",
             "from smc_mujoco.cli.main import main",
-            "scene.figures = lambda *_: []",
+            "run_scene.figures = lambda *_: []",
             "for words in (['list'], ['run', 'mine.py', '--no-film', '--out', 'out'], ['show', "
             "'one.npz']):",
             "    try: main(words)",

@@ -11,9 +11,9 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.differ import differ
 from smc_mujoco.analysis.step_halving import MARK, halved, nudged
-from smc_mujoco.cli import scene as show
+from smc_mujoco.cli import run_scene as show
 from smc_mujoco.cli import tables
-from smc_mujoco.cli.terminal import Terminal
+from smc_mujoco.cli.console import Terminal
 
 pytestmark = pytest.mark.quick
 

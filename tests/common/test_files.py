@@ -27,8 +27,8 @@ from smc_mujoco.common.files import from_json, plain, reading, replacing, to_jso
 from smc_mujoco.evidence.audit.audit import document
 from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.robustness.region_of_attraction import Basin
-from smc_mujoco.robustness.region_of_attraction import load as load_map
-from smc_mujoco.simulation import serialise
+from smc_mujoco.robustness.region_of_attraction import load_basin as load_map
+from smc_mujoco.simulation import scenario_json
 
 WORDS = st.sampled_from(
     ["NaN", "Infinity", "-Infinity", "'NaN", "''-Infinity", "inf", "nan", "null"]
@@ -97,8 +97,8 @@ def test_tunings(tmp_path):
     found = dataclasses.replace(tuned.searches[0], history=(*tuned.history[1:], worst))
     odd = dataclasses.replace(tuned, before=math.nan, searches=(found,))
     strict(odd.save(tmp_path / "a.json").read_text())
-    assert same(result.load(tmp_path / "a.json"), odd)
-    assert result.load(tmp_path / "a.json").history == odd.history
+    assert same(result.load_tuned(tmp_path / "a.json"), odd)
+    assert result.load_tuned(tmp_path / "a.json").history == odd.history
 
 
 def test_claims():
@@ -121,7 +121,10 @@ def test_rows_of_a_study(tmp_path):
     table = smc.study([scenario], tmp_path)
     for column in ("gains", "scenario", "versions"):
         strict(table.column(column)[0])
-    assert serialise.restore(from_json(table.column("scenario")[0])).law.gains == scenario.law.gains
+    assert (
+        scenario_json.restore(from_json(table.column("scenario")[0])).law.gains
+        == scenario.law.gains
+    )
 
 
 # damaged files

@@ -14,7 +14,7 @@ from numpy.testing import assert_array_equal
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import Objective
-from smc_mujoco.common import catalogue
+from smc_mujoco.common import registry
 from smc_mujoco.control import estimator, gain_sets, law, surface
 from smc_mujoco.evidence.audit import paper
 from smc_mujoco.mechanisms import plant
@@ -24,7 +24,7 @@ from smc_mujoco.studies import scene
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "my_smc_package"
 CACHED = (
-    catalogue._points,
+    registry._points,
     law.catalogue,
     law.known_laws,
     law.joint_catalogue,
@@ -59,7 +59,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install
     def forget() -> None:
         for function in CACHED:
             function.cache_clear()
-        catalogue._warned.clear()
+        registry._warned.clear()
 
     def add(package: str, points: dict[str, dict[str, str]], **modules: str) -> Path:
         folder = tmp_path / package

@@ -8,10 +8,10 @@ import time
 
 import pytest
 
-from smc_mujoco.common.catalogue import Files, discover, modules, subclasses
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_signals
 from smc_mujoco.common.process import TimedOut, timed
+from smc_mujoco.common.registry import Files, discover, modules, subclasses
 
 pytestmark = pytest.mark.quick
 

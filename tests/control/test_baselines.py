@@ -13,7 +13,7 @@ from helpers import plants_ab
 from scipy.linalg import expm, solve_continuous_are
 
 import smc_mujoco as smc
-from smc_mujoco.control import design
+from smc_mujoco.control import nominal_gains
 
 FREE = smc.plant(
     "duffing",
@@ -191,9 +191,11 @@ def test_design_linearises_a_plant_at_the_origin():
         "pendulum_network": (-9.81 / 0.5 - 0.5 / inertia, -0.02 / inertia, 1 / inertia),
     }
     for name, numbers in expected.items():
-        np.testing.assert_allclose(design.linearised(smc.plant(name), "lqr"), numbers, rtol=1e-6)
+        np.testing.assert_allclose(
+            nominal_gains.linearised(smc.plant(name), "lqr"), numbers, rtol=1e-6
+        )
     heavy = smc.plant("duffing", M=2.0, alpha=4.0)
-    np.testing.assert_allclose(design.linearised(heavy, "lqr"), (-2.0, -0.1, 0.5), rtol=1e-6)
+    np.testing.assert_allclose(nominal_gains.linearised(heavy, "lqr"), (-2.0, -0.1, 0.5), rtol=1e-6)
 
 
 # computed torque

@@ -159,7 +159,7 @@ def test_laws_with_equal_gains_are_equal():
 
 
 def test_the_gains_of_one_law_are_told_with_their_search_and_of_several_by_their_kind():
-    search = source.Search(
+    search = source.GainSearch(
         rule="CMA-ES",
         evaluations=90,
         searches=3,

@@ -184,10 +184,10 @@ STUBS = {  # of each command: the functions replaced, and what they give
     "rig": {
         "identification.identify.identify": lambda of, many, *_, **__: identified(len(many)),
         "identification.rig.rig": repeated,
-        "identification.records.load": lambda file, names: {"t": np.array([3.0, 4.0])},
+        "identification.records.load_record": lambda file, names: {"t": np.array([3.0, 4.0])},
         "identification.residual_figure.residual_figure": [Path("run.svg")],
         "simulation.run.run": lambda runs: runs,
-        "cli.scene.filmed": [Path("film.mp4")],
+        "cli.run_scene.filmed": [Path("film.mp4")],
     },
 }
 AXIS = (
@@ -257,7 +257,7 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
     ): (
         0,
         [
-            "load(Path(c.csv), {x: 'position'})",
+            "load_record(Path(c.csv), {x: 'position'})",
             "['mass', 'offset'], start={mass: 5.0}, starts=2, seed=3",
             *AXIS,
             "c.csv falls at 8.4 s (falls at 8.4 s)",
@@ -282,7 +282,7 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
     "rig emps run.csv --columns x=position": (
         0,
         [
-            "rig('emps') load(Path(run.csv), {x: 'position'})",
+            "rig('emps') load_record(Path(run.csv), {x: 'position'})",
             "x u",
             "twin 99.0 1.2",
         ],

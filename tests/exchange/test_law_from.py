@@ -11,7 +11,7 @@ from helpers.plants_ab import called
 import smc_mujoco as smc
 from smc_mujoco.common import fingerprint
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.exchange.fmu.load import FmuLaw
+from smc_mujoco.exchange.fmu.law_from_fmu import FmuLaw
 from smc_mujoco.exchange.policy import File, Policy
 
 RUN = {"plant": "duffing", "duration": 0.2, "u_max": 6.0}
@@ -170,7 +170,7 @@ def test_a_system_that_is_not_linear_is_refused_with_a_cure_that_works(refused):
 )
 def test_a_law_s_file_counts_by_its_content_and_not_by_its_folder(made, monkeypatch):
     """Two people with one file in two folders get the same bytes of a table."""
-    running = "smc_mujoco.exchange.fmu.load._running.by_number"
+    running = "smc_mujoco.exchange.fmu.law_from_fmu._running.by_number"
     monkeypatch.setattr(running, {1: ctypes.c_void_p()})  # which cannot be pickled
     here, there, other = (
         made(path=path, digest=digest)

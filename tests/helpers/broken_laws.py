@@ -13,9 +13,9 @@ from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.evidence.audit.audit import measure, sets, wanted
-from smc_mujoco.evidence.audit.paper import Entry, Paper
+from smc_mujoco.evidence.audit.claim_runs import ClaimRuns, RunResult
+from smc_mujoco.evidence.audit.paper import ClaimEntry, Paper
 from smc_mujoco.evidence.audit.paper import paper as find_paper
-from smc_mujoco.evidence.audit.runs import Result, Runs
 from smc_mujoco.evidence.audit.variants import variant
 from smc_mujoco.evidence.audit.verdict import Evidence, sentences
 
@@ -50,15 +50,15 @@ def survivors(
     names = sets(audited, gains, quick)
 
     def measured(
-        entries: Iterable[Entry], law: str, mutant: str
+        entries: Iterable[ClaimEntry], law: str, mutant: str
     ) -> Iterator[tuple[str, str, Evidence | None]]:
         """Yield claim, set of gains, and evidence; None as evidence if the claim's function cannot
         measure a mutant.
         """
-        shared: dict[str, Result] = {}
+        shared: dict[str, RunResult] = {}
         replaced = {law: functools.partial(variant, name=mutant)} if mutant else {}
         for name in names:
-            runs = Runs(audited, name, quick, replaced, threads, {}, shared)
+            runs = ClaimRuns(audited, name, quick, replaced, threads, {}, shared)
             for entry in sorted(entries, key=lambda entry: entry.late):
                 try:
                     yield entry.id, name, measure(entry, runs.of(entry))
@@ -83,7 +83,7 @@ def survivors(
     return {id: KEPT if id in holding else BLIND for id in kept}
 
 
-def first_law(entry: Entry) -> str:
+def first_law(entry: ClaimEntry) -> str:
     """Return the law that mutants of a claim replace."""
     if not entry.laws:
         raise ScenarioError(
@@ -92,7 +92,7 @@ def first_law(entry: Entry) -> str:
     return entry.laws[0]
 
 
-def lost(entry: Entry, intact: Evidence, mutant: Evidence | None, holding: bool) -> bool:
+def lost(entry: ClaimEntry, intact: Evidence, mutant: Evidence | None, holding: bool) -> bool:
     """Return whether a mutant loses a claim.
 
     `mutant`: its evidence; None if it cannot be measured.

@@ -7,7 +7,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation import scenario_json
 
 TEXTS = {
     "plant": "duffing",
@@ -41,7 +41,7 @@ class MadeTable:
         text = self.column("scenario")[i]
         if text == TEXTS["scenario"]:
             raise ScenarioError("no run")
-        return serialise.restore(json.loads(text))
+        return scenario_json.restore(json.loads(text))
 
     def taken(self, rows) -> "MadeTable":
         return MadeTable(**{name: values[rows] for name, values in self.columns.items()})

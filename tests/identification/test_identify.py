@@ -441,14 +441,14 @@ def test_files_of_columns_and_traces_are_read_alike(moved, tmp_path):
         writer.writerows(zip(*columns.values(), strict=True))
     moved.save(tmp_path / "trace.npz")
     for name in ("a.npz", "a.csv"):
-        read = dict(records.load(tmp_path / name))
+        read = dict(records.load_record(tmp_path / name))
         for key in columns:
             assert np.array_equal(read[key], columns[key])
     assert np.array_equal(
         records.of_trace(smc.load(tmp_path / "trace.npz"), AXIS.columns)["x"], columns["x"]
     )
-    assert isinstance(records.load(tmp_path / "trace.npz"), smc.Trace)
-    renamed = dict(records.load(tmp_path / "a.csv", {"position": "x"}))
+    assert isinstance(records.load_record(tmp_path / "trace.npz"), smc.Trace)
+    renamed = dict(records.load_record(tmp_path / "a.csv", {"position": "x"}))
     np.testing.assert_array_equal(renamed["position"], columns["x"])
 
 
@@ -458,7 +458,7 @@ def test_a_damaged_npz_file_is_one_sentence(tmp_path, cut):
     np.savez(file, t=np.arange(99.0))
     file.write_bytes(file.read_bytes()[:cut])
     with pytest.raises(smc.ScenarioError, match="is not a record"):
-        records.load(file)
+        records.load_record(file)
 
 
 @pytest.mark.parametrize(
@@ -471,7 +471,7 @@ def test_a_damaged_npz_file_is_one_sentence(tmp_path, cut):
 def test_files_that_are_no_columns_get_one_sentence(content, sentence, tmp_path):
     (tmp_path / "a.csv").write_text(content)
     with pytest.raises(smc.ScenarioError) as error:
-        records.load(tmp_path / "a.csv")
+        records.load_record(tmp_path / "a.csv")
     assert sentence in str(error.value)
     with pytest.raises(smc.ScenarioError, match="no record at"):
-        records.load(tmp_path / "b.csv")
+        records.load_record(tmp_path / "b.csv")

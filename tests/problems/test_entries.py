@@ -9,7 +9,7 @@ import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.problems import enter as entering
-from smc_mujoco.problems import entry, results, runs, suite
+from smc_mujoco.problems import entry, entry_runs, results, suite
 
 LAW = """import math
 
@@ -94,7 +94,7 @@ def test_entering_twice_gives_equal_bytes_and_a_changed_table_is_refused(tmp_pat
     assert found.title == "smc-30@1, seed 7"
     drawn = found.entries["own law"].runs.columns(PROBLEMS[0])["itae"]
     assert not np.array_equal(
-        drawn, runs.Runs(visible / "runs.parquet").columns(PROBLEMS[0])["itae"]
+        drawn, entry_runs.EntryRuns(visible / "runs.parquet").columns(PROBLEMS[0])["itae"]
     )
     with pytest.raises(ScenarioError, match="seed 7"):
         found.compare(smc.results(visible.parent))
@@ -141,7 +141,7 @@ def test_an_entry_that_is_stopped_goes_on_and_gives_the_same_bytes(tmp_path, sma
     job = {"problems": PROBLEMS, "count": 2, "seed": 0, "table": table, "parts": parts}
     job["folder"] = tmp_path / "entry"
     computed = []
-    runs_of = runs.rows
+    runs_of = entry_runs.rows
 
     def rows(one, *arguments):
         if len(computed) == 1 and not table.exists():
@@ -149,7 +149,7 @@ def test_an_entry_that_is_stopped_goes_on_and_gives_the_same_bytes(tmp_path, sma
         computed.append(one.id)
         return runs_of(one, *arguments)
 
-    monkeypatch.setattr(runs, "rows", rows)
+    monkeypatch.setattr(entry_runs, "rows", rows)
     with pytest.raises(KeyboardInterrupt):
         entering.run(**job)
     assert computed == [PROBLEMS[0]]
@@ -184,10 +184,10 @@ def made(medians):
     """
     found = results.Results("smc-30@1", 0, {})
     for name, values in medians.items():
-        one = object.__new__(results.Result)
+        one = object.__new__(results.EntryResult)
         rows = {}
         for cell, value in zip(found.problems, values, strict=True):
-            rows[cell] = dict.fromkeys(runs.VALUES, value)
+            rows[cell] = dict.fromkeys(entry_runs.VALUES, value)
         one.__dict__["medians"] = rows
         one.targets = lambda problems, measure: np.zeros(0)  # pyright: ignore[reportAttributeAccessIssue]
         found.entries[name] = one
@@ -238,9 +238,9 @@ def test_variation_of_u_counts_only_where_the_easiest_accuracy_is_kept(tmp_path)
         easiest = f"accuracy_{len(smc.problem(name).targets['accuracy'])}"
         group = []
         for i in range(5):
-            row = dict.fromkeys(runs.VALUES, 0.1 * (i + 1)) | {"problem": name, "instance": i}
+            row = dict.fromkeys(entry_runs.VALUES, 0.1 * (i + 1)) | {"problem": name, "instance": i}
             group.append(row | {easiest: 1.0 if i < kept else np.nan})
         groups.append(group)
-    runs.write(tmp_path / "runs.parquet", groups)
-    medians = runs.Runs(tmp_path / "runs.parquet").medians()
+    entry_runs.write(tmp_path / "runs.parquet", groups)
+    medians = entry_runs.EntryRuns(tmp_path / "runs.parquet").medians()
     assert [medians[name]["calm"] for name in PROBLEMS] == [np.inf, pytest.approx(0.3)]

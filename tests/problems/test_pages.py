@@ -14,7 +14,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import write_json
-from smc_mujoco.problems import enter, pages, runs, suite
+from smc_mujoco.problems import enter, entry_runs, pages, suite
 from smc_mujoco.problems.enter import RESULT, TABLE
 
 pytestmark = pytest.mark.quick
@@ -32,11 +32,11 @@ def entered(folder, name, factor, failures=()):
         group = []
         for i in range(3):
             row = {}
-            for column in runs.COLUMNS[1:]:
+            for column in entry_runs.COLUMNS[1:]:
                 row[column] = factor * rng.uniform(0.1, 1.0)
             group.append({"problem": cell, "instance": i, "failed": 0.0} | row)
         groups.append(group)
-    runs.write(target / TABLE, groups)
+    entry_runs.write(target / TABLE, groups)
     table = hashlib.sha256((target / TABLE).read_bytes()).hexdigest()
     entry = dict.fromkeys(("source", "licence", "division", "digest"), "here")
     about = {
@@ -113,9 +113,11 @@ def test_pages_are_complete_and_their_links_lead_to_pages(site):
 def test_a_table_is_read_once_for_the_medians_and_once_for_each_board(site, monkeypatch):
     """Whatever the number of pages: else 43 entries take minutes, and 430 days."""
     read = list[str]()
-    columns = runs.Runs.columns
+    columns = entry_runs.EntryRuns.columns
     monkeypatch.setattr(
-        runs.Runs, "columns", lambda self, name: (read.append(name), columns(self, name))[1]
+        entry_runs.EntryRuns,
+        "columns",
+        lambda self, name: (read.append(name), columns(self, name))[1],
     )
     pages.build(site.parent / "results", site)
     on_boards = sum(len(suite.boards(name)) for name in PROBLEMS)
@@ -157,7 +159,8 @@ FORGED = {
     ),
     "one problem": (
         lambda folder: with_row(
-            folder, lambda table: runs.write(table, [[{"problem": PROBLEMS[0], "instance": 0}]])
+            folder,
+            lambda table: entry_runs.write(table, [[{"problem": PROBLEMS[0], "instance": 0}]]),
         ),
         rf"1 runs of {PROBLEMS[0]}, not 3",
     ),

@@ -25,7 +25,7 @@ def found():
 
 
 def kind_of(put):
-    return margins.Kind(
+    return margins.MarginKind(
         label="push",
         unit="{u}",
         levels=(1.0, 2.0, 4.0),

@@ -283,7 +283,7 @@ def test_a_pendulum_beyond_the_saddle_of_full_torque_comes_back_only_by_a_swing(
 
 
 def test_a_map_survives_its_file(weak, tmp_path):
-    again = maps.load(weak.save(tmp_path / "map.json"))
+    again = maps.load_basin(weak.save(tmp_path / "map.json"))
     for field in dataclasses.fields(Basin):
         assert np.array_equal(getattr(again, field.name), getattr(weak, field.name))
     assert again.outcome.dtype == np.int8

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.engine import runs
+from smc_mujoco.analysis.engine import scored_runs
 from smc_mujoco.robustness import sobol as module
 from smc_mujoco.robustness.sensitivity import default_class, default_points
 from smc_mujoco.robustness.uncertainty import Members
@@ -442,7 +442,7 @@ def test_with_many_runs_the_fast_engine_makes_them_and_mujoco_repeats_some(monke
     within = smc.Uncertainty(mass=(0.7, 1.3), friction=(0.0, 0.3), delay=(0.0, 0.01))
     case = scenario(law=smc.law("boundary_layer"), duration=1.0)
     expected = smc.sensitivity(case, within, points=8)
-    monkeypatch.setattr(runs, "MIN_WORK", 0)
+    monkeypatch.setattr(scored_runs, "MIN_WORK", 0)
     found = smc.sensitivity(case, within, points=8)
     assert found.values == pytest.approx(expected.values, rel=1e-9)
     assert (found.failed == expected.failed).all()

@@ -12,13 +12,13 @@ import pytest
 from helpers import reference
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.engine import runs
-from smc_mujoco.analysis.engine.runs import Runs
+from smc_mujoco.analysis.engine import scored_runs
+from smc_mujoco.analysis.engine.scored_runs import ScoredRuns
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.robustness import worst_case_search as attack
 from smc_mujoco.robustness.uncertainty import Members, default_class, outside
-from smc_mujoco.robustness.worst_case_search import Search, recorded_force
-from smc_mujoco.simulation import serialise
+from smc_mujoco.robustness.worst_case_search import WorstCaseSearch, recorded_force
+from smc_mujoco.simulation import scenario_json
 from smc_mujoco.simulation.signals import Relay
 
 CLASSICAL = smc.law("classical", k=1.826, c=2.874)
@@ -61,7 +61,7 @@ def test_the_worst_scenario_replays_in_the_class_whatever_the_threads(name):
     assert again.value == worst.value
     assert again.median == worst.median
     assert again.scenario == worst.scenario
-    trace = smc.run(serialise.restore(serialise.describe(worst.scenario)))
+    trace = smc.run(scenario_json.restore(scenario_json.describe(worst.scenario)))
     assert smc.score(trace)["rms_error"] == worst.value >= worst.median
     assert worst.tried == 16
     assert np.abs(trace.d).max() <= within.disturbance
@@ -161,11 +161,11 @@ def test_a_larger_budget_continues_the_search():
 def test_the_loop_s_frequency_is_read_of_a_run_under_a_relay_of_the_rate_or_without_a_force(
     name, disturbance
 ):
-    searcher = Search(
+    searcher = WorstCaseSearch(
         Members([scenario(duration=0.1)], CLASSES[name]),
         CATALOGUE["rms_error"],
         9,
-        Runs({}, worth_compiling=False),
+        ScoredRuns({}, worth_compiling=False),
         lambda _: None,
     )
     searcher.search(np.random.default_rng(0), [])
@@ -347,12 +347,16 @@ def test_a_class_beyond_the_theorem_of_the_law_is_said_to_be_outside(change, bou
     assert bool(found) == bool(expected)
 
 
-def searching(tried: list[tuple[Any, float, int]], **members: Any) -> Search:
+def searching(tried: list[tuple[Any, float, int]], **members: Any) -> WorstCaseSearch:
     """A search that has tried members of these values and origins; nothing is run."""
     made: Any = SimpleNamespace(**members)
     metric: Any = None
-    search = Search(made, metric, 10**6, Runs({}, worth_compiling=False), lambda done: None)
-    search.tried = [attack.Tried(member, (value, 0.0), origin) for member, value, origin in tried]
+    search = WorstCaseSearch(
+        made, metric, 10**6, ScoredRuns({}, worth_compiling=False), lambda done: None
+    )
+    search.tried = [
+        attack.TriedMember(member, (value, 0.0), origin) for member, value, origin in tried
+    ]
     return search
 
 
@@ -368,7 +372,9 @@ def test_an_evolution_begins_with_the_worst_member_and_climbs():
     for generation in search._evolution(np.random.default_rng(0)):
         points: list[Any] = [case.member for case in generation]
         means.append(float(np.mean([point.sum() for point in points])))
-        search.tried += [attack.Tried(point, (float(point.sum()), 0.0), 1) for point in points]
+        search.tried += [
+            attack.TriedMember(point, (float(point.sum()), 0.0), 1) for point in points
+        ]
     assert set(start) == {"worst"}
     assert means[-1] > means[0] + 0.1
 
@@ -379,7 +385,7 @@ def test_with_many_runs_the_fast_engine_searches_and_the_worst_is_mujoco_s(monke
     case = scenario(duration=1.0)
     within = smc.Uncertainty(**bounds, mass=(0.7, 1.3))
     expected = smc.worst_case(case, within=within, budget=40)
-    monkeypatch.setattr(runs, "MIN_WORK", 0)
+    monkeypatch.setattr(scored_runs, "MIN_WORK", 0)
     found = smc.worst_case(case, within=within, budget=40)
     assert found.value == smc.score(smc.run(found.scenario))["rms_error"]
     assert found.value == pytest.approx(expected.value, rel=1e-3)

@@ -17,7 +17,7 @@ from helpers.commands import python
 from helpers.runs import made, plainly, same, scenario
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.engine.group import Group
+from smc_mujoco.analysis.engine.group import FormGroup
 from smc_mujoco.common import attended
 from smc_mujoco.common.jit import integers
 from smc_mujoco.simulation import callback
@@ -421,7 +421,7 @@ def test_ctrl_c_calls_a_slow_law_no_more_and_leaves_no_thread(engine):
     if engine == "MuJoCo":
         started = functools.partial(smc.run, [case] * 2)
     else:
-        started = functools.partial(Group([case] * 2, ("itae",)).scored, "cpu", 2)
+        started = functools.partial(FormGroup([case] * 2, ("itae",)).scored, "cpu", 2)
     before = signal.signal(signal.SIGALRM, interrupt)
     signal.setitimer(signal.ITIMER_REAL, 0.1, 0.1)
     try:

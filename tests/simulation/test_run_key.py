@@ -18,7 +18,7 @@ from smc_mujoco.common import fingerprint
 from smc_mujoco.control import joint_law
 from smc_mujoco.mechanisms.plant import Variant
 from smc_mujoco.metrics.catalogue import metrics
-from smc_mujoco.simulation import gaber_study, serialise
+from smc_mujoco.simulation import gaber_study, scenario_json
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.run_key import condition, key
 
@@ -71,9 +71,9 @@ def test_equal_scenarios_have_one_key_and_others_another():
 
 def test_other_versions_are_other_runs(monkeypatch):
     before = key(scenario(smc.law("classical")))
-    described = serialise.describe
+    described = scenario_json.describe
     monkeypatch.setattr(
-        serialise, "describe", lambda s: described(s) | {"versions": {"mujoco": "99"}}
+        scenario_json, "describe", lambda s: described(s) | {"versions": {"mujoco": "99"}}
     )
     assert key(scenario(smc.law("classical"))) != before
 

@@ -955,11 +955,11 @@ def test_how_this_machine_rounds_is_part_of_what_a_run_is(monkeypatch):
         fingerprint.math, "tanh", lambda x: math.nextafter(math.sinh(x) / math.cosh(x), 2.0)
     )
     monkeypatch.setattr(
-        importlib.import_module("smc_mujoco.simulation.serialise"),
+        importlib.import_module("smc_mujoco.simulation.scenario_json"),
         "arithmetic",
         fingerprint.arithmetic.__wrapped__,
     )
-    versions = importlib.import_module("smc_mujoco.simulation.serialise")._versions
+    versions = importlib.import_module("smc_mujoco.simulation.scenario_json")._versions
     versions.cache_clear()
     try:
         assert run_key.key(scenario()) != here

@@ -10,7 +10,7 @@ import warnings
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.simulation import gaber_study, serialise
+from smc_mujoco.simulation import gaber_study, scenario_json
 from smc_mujoco.simulation.conditions import find_condition
 
 pytestmark = pytest.mark.quick
@@ -132,7 +132,7 @@ def test_a_motor_too_weak_for_gravity_at_the_start_says_so():
 def test_a_run_that_has_been_is_read_without_a_warning():
     with pytest.warns(smc.errors.ScenarioWarning):
         scenario = dataclasses.replace(PENDULUM, x0=30.0, actuator=smc.DCMotor(gear=1.0))
-    assert serialise.restore(serialise.describe(scenario)) == scenario
+    assert scenario_json.restore(scenario_json.describe(scenario)) == scenario
 
 
 def test_the_study_warns_of_nothing():

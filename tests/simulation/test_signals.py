@@ -13,9 +13,9 @@ import pytest
 from helpers import reference
 
 import smc_mujoco as smc
-from smc_mujoco.common.catalogue import subclasses
+from smc_mujoco.common.registry import subclasses
 from smc_mujoco.mechanisms.hardware.part import Part
-from smc_mujoco.simulation import cfunctions, serialise
+from smc_mujoco.simulation import cfunctions, scenario_json
 from smc_mujoco.simulation.signals import (
     SINUSOIDS,
     BandLimited,
@@ -467,7 +467,7 @@ def test_a_signal_survives_json():
         made = scenario(
             disturbance=[signal, Constant(1.0)], reference=signal if signal in LED else LED[0]
         )
-        assert serialise.restore(json.loads(json.dumps(serialise.describe(made)))) == made
+        assert scenario_json.restore(json.loads(json.dumps(scenario_json.describe(made)))) == made
 
 
 @dataclasses.dataclass(frozen=True)
@@ -483,4 +483,4 @@ def test_parts_survive_json():
         (),
         (Sticker(), Sticker((3.0,), 5.0)),
     ):
-        assert serialise._restored(json.loads(json.dumps(serialise._data(value)))) == value
+        assert scenario_json._restored(json.loads(json.dumps(scenario_json._data(value)))) == value

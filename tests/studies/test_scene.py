@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.cli import scene as show
+from smc_mujoco.cli import run_scene as show
 from smc_mujoco.common.scripts import execute
 from smc_mujoco.draw import page
 from smc_mujoco.simulation.conditions import NAMED, REAL

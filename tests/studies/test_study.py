@@ -10,7 +10,7 @@ from helpers.runs import fails_late
 
 import smc_mujoco as smc
 from smc_mujoco.simulation import gaber_study as paper
-from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation import scenario_json
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run_key import condition
@@ -257,9 +257,9 @@ def test_a_part_that_is_none_is_computed_again(tmp_path, monkeypatch, ran, harm)
 
 def test_runs_of_other_versions_are_run_again(tmp_path, monkeypatch):
     study(small(), tmp_path)
-    described = serialise.describe
+    described = scenario_json.describe
     monkeypatch.setattr(
-        serialise, "describe", lambda s: described(s) | {"versions": {"mujoco": "99"}}
+        scenario_json, "describe", lambda s: described(s) | {"versions": {"mujoco": "99"}}
     )
     table = study(small(), tmp_path)
     assert set(table.column("versions")) == {'{"mujoco": "99"}'}

@@ -33,7 +33,7 @@ from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import HIGH_FREQUENCY, settling_time
-from smc_mujoco.robustness.margins import DELAYS, TOLERATED_ERROR, Search, find_boundaries
+from smc_mujoco.robustness.margins import DELAYS, TOLERATED_ERROR, LevelSearch, find_boundaries
 from smc_mujoco.simulation.gaber_study import CONTROL_PERIOD, LAWS, U_MAX
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Noise
@@ -172,7 +172,9 @@ def largest_delays(runs, plants, laws, within=TOLERATED_ERROR):
 
     searches = {}
     for pair in itertools.product(plants, laws):
-        searches[pair] = Search(levels=levels, resolution=lambda low: apart, rounded=round, low=-1)
+        searches[pair] = LevelSearch(
+            levels=levels, resolution=lambda low: apart, rounded=round, low=-1
+        )
     find_boundaries(searches, tolerated)
     return {pair: max(search.low, 0) * CONTROL_PERIOD for pair, search in searches.items()}
 

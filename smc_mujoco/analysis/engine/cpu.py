@@ -52,7 +52,9 @@ def compiled(form: Form) -> Any:
     return made
 
 
-def run(form: Form, rows: Array, tables: Array, threads: int, logs: Array | None = None) -> Array:
+def run_rows(
+    form: Form, rows: Array, tables: Array, threads: int, logs: Array | None = None
+) -> Array:
     """Return the scores of runs, (runs, SCORES + metrics), given their rows; NaN after a failure.
 
     `logs` is (runs, K + 1, n, 6) and gets `form.LOGGED`, if the rows say `logging`.

@@ -51,7 +51,7 @@ class Settings(NamedTuple):
 SETTING = Settings(*range(len(Settings._fields)))  # places
 
 
-class Part(NamedTuple):
+class ChannelFunction(NamedTuple):
     """A function that acts on channels, with the names of its parameters and its memory in each."""
 
     function: Any  # None: one in C, whose address is in the row
@@ -66,13 +66,13 @@ class Form(NamedTuple):
     n: int  # channels
     driven: int  # those that have an actuator, which come first
     joint: bool  # whether the law is of many joints
-    nominal: Part
-    laws: tuple[Part, ...]  # of all channels, or one for each
-    estimator: Part
-    surface: Part | None
-    sensor: Part | None
-    drive: Part | None  # between command and force
-    frictions: tuple[Part, ...]
+    nominal: ChannelFunction
+    laws: tuple[ChannelFunction, ...]  # of all channels, or one for each
+    estimator: ChannelFunction
+    surface: ChannelFunction | None
+    sensor: ChannelFunction | None
+    drive: ChannelFunction | None  # between command and force
+    frictions: tuple[ChannelFunction, ...]
     references: tuple[type, ...]  # kinds of signals, of all channels, or one for each
     disturbances: tuple[type, ...]
     feedforward: type | None
@@ -92,7 +92,7 @@ class Form(NamedTuple):
 class PartAt(NamedTuple):
     """Where a part of a form has its numbers."""
 
-    part: Part
+    part: ChannelFunction
     address: int  # in the row: of a function in C
     numbers: int  # in the row: its parameters, of all channels or of each in turn
     memory: int  # in the state: of each channel in turn
@@ -191,7 +191,7 @@ def layout(form: Form) -> Layout:
     row = Places(len(SETTING))
     work = Places()
 
-    def of_part(part: Part) -> PartAt:
+    def of_part(part: ChannelFunction) -> PartAt:
         width = len(part.names) * (form.n if part.channels else 1)
         return PartAt(part, row.take(), row.take(width), work.take(part.memory * form.n))
 

@@ -90,7 +90,7 @@ def compiled(form: Form) -> Any:
     return cuda.jit(ARGUMENTS)(kernel(form))
 
 
-def run(form: Form, rows: Array, tables: Array) -> Array:
+def run_rows(form: Form, rows: Array, tables: Array) -> Array:
     """Return the scores of runs, as `cpu.run` does."""
     made = compiled(form)
     scores = np.full((len(rows), SCORES + len(form.metrics)), np.nan)

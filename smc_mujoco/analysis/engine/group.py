@@ -13,8 +13,8 @@ from smc_mujoco.analysis.engine.form import (
     FAILURE,
     SCORES,
     SETTING,
+    ChannelFunction,
     Form,
-    Part,
     PartAt,
     Settings,
     SignalAt,
@@ -119,17 +119,17 @@ def key(scenario: Scenario) -> Hashable:
 def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
     """Return the form of one run."""
     every = tuple(range(s.plant.n))
-    drives = [Part(advanced, part.names, part.memory, every) for part in _drives(s)]
-    sensors = [Part(part.read, part.names, part.memory, every) for part in s.sensors]
+    drives = [ChannelFunction(advanced, part.names, part.memory, every) for part in _drives(s)]
+    sensors = [ChannelFunction(part.read, part.names, part.memory, every) for part in s.sensors]
     laws = []
     for law in s.law.of_channels(s.plant.driven):
         laws.append(_part(law)._replace(channels=every if law.joint else ()))
     frictions = []
     for part in s.exact_parts:
         channels = tuple(part.channels(s.plant))
-        frictions.append(Part(part.stage_force, part.names, part.memory, channels))
+        frictions.append(ChannelFunction(part.stage_force, part.names, part.memory, channels))
     for part in _held(s):
-        frictions.append(Part(part.force, part.names, part.memory, tuple(part.channels(s.plant))))
+        frictions.append(ChannelFunction(part.force, part.names, part.memory, tuple(part.channels(s.plant))))
     clock = not s.clock.regular
     slots = 1
     while slots < s.delay_steps // s.steps + 1 + clock:  # few sizes, each of which is compiled
@@ -143,7 +143,7 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
         n=s.plant.n,
         driven=s.plant.driven,
         joint=s.law.joint,
-        nominal=Part(s.plant.nominal, tuple(s.plant.parameters)),
+        nominal=ChannelFunction(s.plant.nominal, tuple(s.plant.parameters)),
         laws=tuple(laws),
         estimator=_part(s.velocity),
         surface=s.surface and _part(s.surface),
@@ -167,11 +167,11 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
     )
 
 
-def _part(c: Component) -> Part:
+def _part(c: Component) -> ChannelFunction:
     function = c.function
     if c.joint or isinstance(function, AtAddress):
         function = None
-    return Part(function, tuple(c.gains), c.memory)
+    return ChannelFunction(function, tuple(c.gains), c.memory)
 
 
 def _drives(s: Resolved) -> list[Any]:
@@ -200,7 +200,7 @@ def wider(form: Form, other: Form) -> Form:
     return form._replace(**flags, disturbances=tuple(kinds.elements()))
 
 
-class Group:
+class FormGroup:
     """Runs of one form.
 
     Args:
@@ -228,10 +228,10 @@ class Group:
         if device == "cpu":
             from smc_mujoco.analysis.engine import cpu
 
-            return cpu.run(self.form, rows, self.tables, cores(threads))
+            return cpu.run_rows(self.form, rows, self.tables, cores(threads))
         from smc_mujoco.analysis.engine import gpu
 
-        return gpu.run(self.form, rows, self.tables)
+        return gpu.run_rows(self.form, rows, self.tables)
 
     def scored(self, device: str, threads: int | None) -> list[tuple[list[float], float | None]]:
         """Return the metrics of every scenario, and the time of its failure, s, or None."""

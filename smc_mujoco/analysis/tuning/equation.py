@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.analysis.engine.group import Group, key, why_not
+from smc_mujoco.analysis.engine.group import FormGroup, key, why_not
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common.aliases import Floats, Pair
 from smc_mujoco.simulation import state
@@ -36,7 +36,7 @@ class Equations:
         self.cases = cases
         self.threads = threads
         self.device = device
-        self.group = Group(cases, ("itae", "tv"))
+        self.group = FormGroup(cases, ("itae", "tv"))
         self.columns = [self.group.gain_columns(name) for name in names]
 
     def __call__(self, candidates: Sequence[Floats], terms: Any) -> list[Pair]:

@@ -17,7 +17,7 @@ from smc_mujoco.common.text import counted
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation import scenario_json
 
 # equal in tunings that are compared
 COMPARED_FIELDS = "rule", "plant", "definition", "budget", "seed", "versions"
@@ -117,9 +117,9 @@ class Tuned(Tables):
         return dataclasses.replace(self, law=self.law.sourced(source.TUNED, self.search))
 
     @property
-    def search(self) -> source.Search:
+    def search(self) -> source.GainSearch:
         """The searches: their rule, their number, their evaluations, and how far their J differ."""
-        return source.Search(
+        return source.GainSearch(
             rule=self.rule,
             searches=len(self.searches),
             evaluations=self.evaluations,
@@ -204,24 +204,24 @@ class Tuned(Tables):
         }
 
     def save(self, path: AnyPath) -> Path:
-        """Write a .json file that `load` reads back."""
+        """Write a .json file that `load_tuned` reads back."""
         path = with_ending(path, ".json")
         scenario = self.definition.scenarios(self.plant, self.law, self.seed)[0]
         data = {name: getattr(self, name) for name in SAVED_FIELDS} | {
             "definition": self.definition.describe(),
             "at_bound": self.at_bound,
-            "scenario": serialise.describe(scenario),
+            "scenario": scenario_json.describe(scenario),
             "record": self.record(),
             "searches": list(map(vars, self.searches)),
         }
         return write_json(path, data)
 
 
-def load(path: AnyPath, plant: Plant | None = None) -> Tuned:
+def load_tuned(path: AnyPath, plant: Plant | None = None) -> Tuned:
     """Read the tuning that `Tuned.save` wrote, of this plant if it is given."""
     with reading(path, "tuning", "give a .json file that Tuned.save wrote") as file:
         data = read_json(file)
-        scenario = serialise.restore(data["scenario"], plant)
+        scenario = scenario_json.restore(data["scenario"], plant)
         fields: Fields = {name: data[name] for name in SAVED_FIELDS}
         fields |= {
             name: {k: tuple(v) for k, v in data[name].items()} for name in ("bounds", "searched")

@@ -73,7 +73,7 @@ from smc_mujoco.control.component import Component, Template, unit_cure
 from smc_mujoco.mechanisms.custom.scales import falls
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.conventions import leans
-from smc_mujoco.simulation import coerce, serialise
+from smc_mujoco.simulation import coerce, scenario_json
 from smc_mujoco.simulation.codes import code_hashes
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import Starts
@@ -190,7 +190,7 @@ def tune(
 
 
 def _searched_here(
-    task: "Task", missing: Sequence[int], failure: str, shown: Bar
+    task: "TuningTask", missing: Sequence[int], failure: str, shown: Bar
 ) -> Iterator[tuple[int, SearchResult]]:
     """Make searches one after the other, and yield the number and the result of each."""
     before = shown.done
@@ -202,7 +202,7 @@ def _searched_here(
 
 
 def _searched_elsewhere(
-    task: "Task", missing: Sequence[int], failure: str, shown: Bar, executor: Any
+    task: "TuningTask", missing: Sequence[int], failure: str, shown: Bar, executor: Any
 ) -> Iterator[tuple[int, SearchResult]]:
     """Have workers make searches side by side, and yield the number and the result of each."""
     made_of = task.plant, task.law, task.goal, task.budget, task.seed
@@ -394,7 +394,7 @@ def _descend(trials: Trials, box: Box, logs: Array, size: int) -> None:
         minimize(cost, logs, method="COBYQA", bounds=bounds, options={"maxfev": size - 1, **radii})
 
 
-class Task(NamedTuple):
+class TuningTask(NamedTuple):
     """What every search of a tuning has in common."""
 
     law: Component
@@ -442,7 +442,7 @@ class Task(NamedTuple):
         for i in range(searches):
             first, *_ = self.cases(i)
             depends = (
-                serialise.describe(first),
+                scenario_json.describe(first),
                 self.goal.describe(),
                 codes,
                 self.budget,
@@ -514,7 +514,7 @@ def task_of(
     seed: int,
     threads: int | None,
     outside_theorem: bool = False,
-) -> Task:
+) -> TuningTask:
     """Return what the searches of a tuning share: plant, bound on u, and search space."""
     first, *others = goal.scenarios(plant, law, seed)
     if len(units := sorted({one.efforts[0] for one in (first, *others)})) > 1:
@@ -532,7 +532,7 @@ def task_of(
     scales = search_space.scales(first.plant, bound, reach, per_u)
     box = search_space.box(first.law, scales)
     low, high = np.log10(list(box.values())).T
-    task = Task(
+    task = TuningTask(
         law=first.law,
         plant=first.plant,
         goal=goal,
@@ -612,7 +612,7 @@ def _only_limits(case: Scenario) -> bool:
     return bool(plain and not dry and all(part.in_callback for part in case.actuator))
 
 
-def _result(task: Task, found: tuple[SearchResult, ...]) -> Tuned:
+def _result(task: TuningTask, found: tuple[SearchResult, ...]) -> Tuned:
     rule = RULE
     if task.outside_theorem:
         rule += ", outside the conditions of the law's theorem"
@@ -663,7 +663,7 @@ def _warn_if_it_leans(trace: Trace) -> None:
         )
 
 
-def _failure_of_law(task: Task) -> str:
+def _failure_of_law(task: TuningTask) -> str:
     """Return how the first run failed, if the law fails in every run, and the plant in none; else
     "".
 

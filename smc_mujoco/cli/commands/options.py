@@ -335,7 +335,7 @@ def actuator(text: str) -> "tuple[Actuator, ...]":
     """Return a drive or gear from "lag:0.01", or several from "dcmotor+lag:0.01"; numbers are in
     the fields' order.
     """
-    from smc_mujoco.common.catalogue import subclasses
+    from smc_mujoco.common.registry import subclasses
     from smc_mujoco.mechanisms.hardware import backlash, drives  # noqa: F401
     from smc_mujoco.mechanisms.hardware.part import Actuator
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Terminal
+from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_signals
 
@@ -153,7 +153,7 @@ def _fit(
     with delay_signals():
         from smc_mujoco.cli import rig_tables
         from smc_mujoco.identification.identify import identify as find
-        from smc_mujoco.identification.records import load
+        from smc_mujoco.identification.records import load_record
         from smc_mujoco.identification.rig import rigs
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.mechanisms.plant import catalogue as plants
@@ -161,7 +161,7 @@ def _fit(
     options.check_files(None, figure)
     identified = find(
         as_plant(rig) if rig not in rigs() and (rig in plants() or ":" in rig) else rig,
-        [load(file, columns) for file in files],
+        [load_record(file, columns) for file in files],
         quantities or None,
         start=start,
         starts=starts,
@@ -192,16 +192,16 @@ def _repeat(
     """Show a record beside the runs of the rig's twins."""
     with delay_signals():
         from smc_mujoco.cli import rig_tables
-        from smc_mujoco.cli.scene import filmed
+        from smc_mujoco.cli.run_scene import filmed
         from smc_mujoco.common.files import with_ending, writable
-        from smc_mujoco.identification.records import load
+        from smc_mujoco.identification.records import load_record
         from smc_mujoco.identification.rig import rig as find_rig
         from smc_mujoco.simulation.run import run
         from smc_mujoco.simulation.trace import Trace
 
     twin = find_rig(rig)
     writable(figure, film and with_ending(film, ".mp4"))
-    record = load(file, columns)
+    record = load_record(file, columns)
     if isinstance(record, Trace):
         raise ScenarioError(
             f"{file} is a trace: give a record, with columns {', '.join(twin.needed)}"

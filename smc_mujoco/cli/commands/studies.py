@@ -7,7 +7,7 @@ import typer
 
 from smc_mujoco.analysis.ranking import RELEVANT
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Terminal
+from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_signals
 from smc_mujoco.common.text import counted

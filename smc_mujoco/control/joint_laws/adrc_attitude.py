@@ -33,7 +33,7 @@ from smc_mujoco.control.units import RATE, Gain, shared
 LEAST = 0.2  # chosen: of |q0|
 
 
-class Axis(NamedTuple):
+class AxisReading(NamedTuple):
     """What the observer of one axis reads."""
 
     e: float
@@ -79,7 +79,7 @@ def adrc_attitude(y, gains, memory):
         states = memory[3 + i, 2:]
         if turns:
             states[1], states[2] = -states[1], -states[2]
-        z3 = observe(Axis(angle[i], change[i], y.dt), l1, l2, l3, states)
+        z3 = observe(AxisReading(angle[i], change[i], y.dt), l1, l2, l3, states)
         s[3 + i] = states[2] + 0.5 * gains.wc * states[1]
         v[i] = (-2.0 * gains.wc * s[3 + i] - z3) / part
         most = y.limit[3 + i] / y.M[3 + i, 3 + i]

@@ -22,7 +22,7 @@ from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import Envelope, windows
 from smc_mujoco.draw.film import world
 from smc_mujoco.mechanisms.plant import EFFORT, Plant, catalogue
-from smc_mujoco.metrics.conventions import Group, groups
+from smc_mujoco.metrics.conventions import ChannelGroup, groups
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -168,7 +168,7 @@ class Scale(NamedTuple):
     units: tuple[str, str] = ("", "")  # of u, and of a force
 
 
-def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
+def scales(traces: Sequence[Trace]) -> dict[ChannelGroup, Scale]:
     """Return the scale of the arrows for each group of channels."""
     found = {}
     lasting = [0.0]  # forces that drive and disturb
@@ -230,7 +230,7 @@ def rgba(colour: str, opacity: float = 1.0) -> tuple[float, ...]:
     return (*(np.array(style.rgb(colour)) / 255).tolist(), opacity)
 
 
-def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
+def key(traces: Sequence[Trace], scales: Mapping[ChannelGroup, Scale]) -> list[str]:
     """Return what the longest arrow of a picture is, such as "→ u 6 N", and how much of a network
     is shown.
 
@@ -257,7 +257,7 @@ def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
     return words
 
 
-def scales_by_channel(trace: Trace, scales: Mapping[Group, Scale]) -> list[Scale]:
+def scales_by_channel(trace: Trace, scales: Mapping[ChannelGroup, Scale]) -> list[Scale]:
     """Return the scale of the arrows of each of a trace's channels."""
     of_channel = {}
     for group, scale in zip(groups(trace.scenario), scales.values(), strict=True):

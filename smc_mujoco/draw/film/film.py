@@ -35,7 +35,7 @@ from smc_mujoco.draw.film.sheet import Moment, Sheet, label_sizes, room_of
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.draw.film.track import MachineTrack
 from smc_mujoco.draw.film.video import encoder, mediapy
-from smc_mujoco.metrics.conventions import Group
+from smc_mujoco.metrics.conventions import ChannelGroup
 from smc_mujoco.simulation.trace import Trace
 
 if TYPE_CHECKING:
@@ -311,7 +311,7 @@ def pictures(frames: Frames) -> Generator[Array]:
 
 
 def tracks_at(
-    clock: FilmClock, runs: DrawnRuns, scales: Mapping[Group, arrows.Scale]
+    clock: FilmClock, runs: DrawnRuns, scales: Mapping[ChannelGroup, arrows.Scale]
 ) -> list[MachineTrack]:
     """Return what the runs do at the frames of a clock."""
     stop = runs.span[1]

@@ -12,7 +12,7 @@ from smc_mujoco.draw.decimate import windows
 from smc_mujoco.draw.film import arrows, world
 from smc_mujoco.draw.film.pace import FilmClock
 from smc_mujoco.mechanisms.layout import ROTOR, joint_ids
-from smc_mujoco.metrics.conventions import Group
+from smc_mujoco.metrics.conventions import ChannelGroup
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.run import poses
 from smc_mujoco.simulation.trace import Trace
@@ -41,7 +41,7 @@ class MachineTrack:
         colour: str,
         clock: FilmClock,
         grid: Array,
-        scales: Mapping[Group, arrows.Scale],
+        scales: Mapping[ChannelGroup, arrows.Scale],
     ):
         self.trace = trace
         self.colour = colour

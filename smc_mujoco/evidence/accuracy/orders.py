@@ -208,7 +208,7 @@ def _longest_first(periods: Sequence[float]) -> Floats:
     return tuple(sorted(numbers, reverse=True))
 
 
-class Run(NamedTuple):
+class PeriodRun(NamedTuple):
     """The numbers of a run that its row needs."""
 
     parts: Mapping[
@@ -217,10 +217,10 @@ class Run(NamedTuple):
     failure: str | None = None  # how it failed
 
 
-def _measured(trace: Trace) -> Run:
+def _measured(trace: Trace) -> PeriodRun:
     """Return the numbers of a run, over its driven channels."""
     if trace.diverged_at is not None:
-        return Run(
+        return PeriodRun(
             dict.fromkeys(QUANTITIES, (math.inf,) * PARTS),
             failure=trace.failure or f"it diverged at {trace.diverged_at:g} s",
         )
@@ -234,7 +234,7 @@ def _measured(trace: Trace) -> Run:
     parts = {}
     for name, size in sizes.items():
         parts[name] = [float(part.max()) for part in np.array_split(size, PARTS)]
-    return Run(parts)
+    return PeriodRun(parts)
 
 
 class Setup(NamedTuple):
@@ -292,7 +292,7 @@ def _setup(
     return Setup(runs, periods, len(seeds))
 
 
-def _row(setup: Setup, runs: Sequence[Run]) -> Accuracy:
+def _row(setup: Setup, runs: Sequence[PeriodRun]) -> Accuracy:
     """Return the row of a law from its runs, in the order of `Setup.scenarios`."""
     base = setup.scenarios[0]
     failures = [run.failure for run in runs if run.failure]

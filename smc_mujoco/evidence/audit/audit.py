@@ -20,10 +20,10 @@ from smc_mujoco.common.constraints import Called
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown, unknown
 from smc_mujoco.common.files import with_ending, write_json
 from smc_mujoco.common.version import __version__
-from smc_mujoco.evidence.audit import search
-from smc_mujoco.evidence.audit.paper import Entry, Paper, failed
+from smc_mujoco.evidence.audit import gain_search
+from smc_mujoco.evidence.audit.claim_runs import ClaimRuns, RunResult, Used, of_table
+from smc_mujoco.evidence.audit.paper import ClaimEntry, Paper, failed
 from smc_mujoco.evidence.audit.paper import paper as find_paper
-from smc_mujoco.evidence.audit.runs import Result, Runs, Used, of_table
 from smc_mujoco.evidence.audit.verdict import Beside, Check, Claim, Claims, Evidence, judged
 from smc_mujoco.studies.table import Table
 
@@ -99,14 +99,14 @@ def audit(
     else:
         audited = find_paper(paper)
     rows = {} if table is None else of_table(table)
-    shared: dict[str, Result] = {}
+    shared: dict[str, RunResult] = {}
     entries = wanted(audited, only)
     names = sets(audited, gains, quick)
     evidence: dict[str, dict[str, Evidence]] = defaultdict(dict)
     used: dict[str, dict[str, dict[str, Used]]] = defaultdict(dict)
     late_last = sorted(entries, key=lambda entry: entry.late)
     for k, name in enumerate(names):
-        runs = Runs(audited, name, quick, {}, threads, rows, shared)
+        runs = ClaimRuns(audited, name, quick, {}, threads, rows, shared)
         for done, entry in enumerate(late_last, 1 + k * len(entries)):
             its_runs = runs.of(entry)
             evidence[entry.id][name] = measure(entry, its_runs)
@@ -136,7 +136,7 @@ def claims(
     return audit(paper, only, gains, quick, threads, table=table).claims
 
 
-def wanted(paper: Paper, only: Iterable[str | int] | None) -> list[Entry]:
+def wanted(paper: Paper, only: Iterable[str | int] | None) -> list[ClaimEntry]:
     """Return the claims of some ids, or all for None, in the order of the file; refuse an unknown
     id.
     """
@@ -171,18 +171,18 @@ def document(claims: Sequence[Claim]) -> dict[str, Any]:
     return {"smc_mujoco": __version__, "claims": [dataclasses.asdict(claim) for claim in claims]}
 
 
-def measure(entry: Entry, runs: Runs) -> Evidence:
+def measure(entry: ClaimEntry, runs: ClaimRuns) -> Evidence:
     """Return the checks of a claim under one set of gains, and the numbers beside them.
 
     A claim about all or some of the allowed gains is measured at the gains that decide it, unless
     other laws have the gains of another set in its search.
     """
     if entry.over and entry.rivals in ("", runs.gains):
-        return search.decisive(entry, runs, lambda at: _measured(entry, at))
+        return gain_search.decisive(entry, runs, lambda at: _measured(entry, at))
     return _measured(entry, runs)
 
 
-def _measured(entry: Entry, runs: Runs) -> list[Check | Beside]:
+def _measured(entry: ClaimEntry, runs: ClaimRuns) -> list[Check | Beside]:
     """Return what a claim's function measures: checks, and numbers beside them."""
     try:
         returned = entry.evidence(runs)
@@ -194,7 +194,7 @@ def _measured(entry: Entry, runs: Runs) -> list[Check | Beside]:
         raise failed(runs.paper, entry, error) from None
 
 
-def _evidence(entry: Entry, returned: Any) -> Iterator[Check | Beside]:
+def _evidence(entry: ClaimEntry, returned: Any) -> Iterator[Check | Beside]:
     """Yield checks and numbers from what a claim's function returned."""
     if not isinstance(returned, Mapping):
         if isinstance(returned, Sequence):

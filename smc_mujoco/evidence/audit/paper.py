@@ -26,11 +26,11 @@ from typing import Any, NamedTuple
 
 from smc_mujoco.common import files
 from smc_mujoco.common.aliases import Data, Fields, Names, Numbers, Pair
-from smc_mujoco.common.catalogue import KINDS, Catalogue, added, source, warn
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, unknown, whole, words
 from smc_mujoco.common.files import as_path, reading, replacing
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.registry import KINDS, Catalogue, added, source, warn
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue as laws_known
@@ -98,7 +98,7 @@ class Allowed(NamedTuple):
 
 
 @named_data
-class Entry(Statement):
+class ClaimEntry(Statement):
     """A claim of a paper, with what measures it."""
 
     evidence: Callable[
@@ -140,7 +140,7 @@ class Paper:
     laws: Mapping[str, Template | Component]
     fields: Data  # of the scenarios of all its runs
     allowed: Mapping[str, Allowed]  # law -> gains, for claims about all or some of them
-    claims: Mapping[str, Entry]  # in the order of the file
+    claims: Mapping[str, ClaimEntry]  # in the order of the file
 
     @property
     def contents(self) -> str:
@@ -351,7 +351,7 @@ def _place(error: BaseException, folder: Path) -> str:
     return str(folder / CODE_FILE)
 
 
-def failed(paper: Paper, entry: Entry, error: BaseException) -> ScenarioError:
+def failed(paper: Paper, entry: ClaimEntry, error: BaseException) -> ScenarioError:
     """Return the error for a claim whose function raised an exception."""
     called = f"function {inspect.unwrap(entry.evidence).__name__} of claim {entry.id}"
     if isinstance(error, ScenarioError):
@@ -429,7 +429,7 @@ def _checked(folder: Path, data: Data, code: ModuleType) -> Paper:
     return dataclasses.replace(paper, claims=entries)
 
 
-def _entry(data: Data, functions: Mapping[str, Callable], paper: Paper) -> Entry:
+def _entry(data: Data, functions: Mapping[str, Callable], paper: Paper) -> ClaimEntry:
     """Return a claim from its table."""
     values: Fields = {"read": paper.read} | _values(data, CLAIM_FIELDS, REQUIRED_OF_CLAIM)
     function = find(f"function of {CODE_FILE}", values.pop("function"), functions)
@@ -448,12 +448,12 @@ def _entry(data: Data, functions: Mapping[str, Callable], paper: Paper) -> Entry
         " ".join((inspect.getdoc(function) or "").partition("\n\n")[0].split()).rstrip("."),
     )
     fields = _fields("runs", values.pop("runs", ""))
-    entry = Entry(**values, evidence=function, thresholds=thresholds, fields=fields)
+    entry = ClaimEntry(**values, evidence=function, thresholds=thresholds, fields=fields)
     _check(entry, paper)
     return entry
 
 
-def _check(entry: Entry, paper: Paper) -> None:
+def _check(entry: ClaimEntry, paper: Paper) -> None:
     """Raise ScenarioError if a claim has an unknown name, or does not say whose it is, how derived
     or over what.
     """

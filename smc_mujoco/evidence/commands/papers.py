@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Terminal
+from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.interrupts import delay_signals
 
 
@@ -79,7 +79,7 @@ def claims(
         from smc_mujoco.common.progress import bar
         from smc_mujoco.evidence.audit.audit import DEFAULT_PAPER, audit, document
         from smc_mujoco.evidence.audit.paper import paper as find_paper
-        from smc_mujoco.evidence.commands import tables
+        from smc_mujoco.evidence.commands import claim_tables
 
     terminal = Terminal(json)
     about = find_paper(paper or DEFAULT_PAPER)
@@ -94,7 +94,7 @@ def claims(
         done = audit(about, ids or None, sets, quick, threads, report=drawn.reached)
     if evidence:
         evidence = done.save(evidence)
-    tables.print_claims(done.claims, terminal, full=bool(ids))
+    claim_tables.print_claims(done.claims, terminal, full=bool(ids))
     terminal.note(f"{terminal.seconds:.0f} s", "dim")
     if quick:
         terminal.note("quick: coarser grids than the claims say, and fewer sets of gains", "dim")

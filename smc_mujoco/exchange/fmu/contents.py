@@ -25,7 +25,7 @@ from smc_mujoco.control.component import Component, gain_at
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
-from smc_mujoco.exchange.c import export
+from smc_mujoco.exchange.c import export_c
 from smc_mujoco.exchange.c.translate import JOINTS, plain
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.model import mixer
@@ -116,8 +116,10 @@ class ExportedLaw:
     @cached_property
     def code(self) -> dict[str, tuple[int, str]]:
         """Kind -> number of memory slots, and C code, of each component."""
-        code = {kind: export.translated(part) for kind, part in self.parts.items() if kind != "law"}
-        of_law = export.translated(self.law, joints=self.joints, plant=self.plant)
+        code = {
+            kind: export_c.translated(part) for kind, part in self.parts.items() if kind != "law"
+        }
+        of_law = export_c.translated(self.law, joints=self.joints, plant=self.plant)
         return {"law": of_law, **code}
 
     @property
@@ -480,9 +482,9 @@ def component_file(component: Component, slots: int, text: str) -> str:
     title = f"/* {component.name}: {component.kind}, with {slots} numbers of memory. */"
     head = [
         title,
-        *export.includes(text),
+        *export_c.includes(text),
         '#include "controller.h"',
         "",
-        *export.gain_names(component),
+        *export_c.gain_names(component),
     ]
     return "\n".join([*head, "", text, ""])

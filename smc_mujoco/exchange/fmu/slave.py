@@ -12,11 +12,11 @@ CONVERTERS = dict.fromkeys(WHOLE_TYPES, round) | {"Boolean": bool}
 CURE = "fix the FMU, or its inputs and parameters"
 
 
-class Fault(Exception):
+class SlaveFault(Exception):
     """What is wrong with an FMU, in words."""
 
 
-class Group(NamedTuple):
+class VariableGroup(NamedTuple):
     """Variables of one type: their names, value references, and places among the values that are
     set or read.
     """
@@ -83,17 +83,19 @@ class Slave:
         finally:
             self.fmu.freeInstance()
 
-    def _by_type(self, names: Sequence[str]) -> list[Group]:
+    def _by_type(self, names: Sequence[str]) -> list[VariableGroup]:
         """Return groups of variables of the same type, which one call sets or reads."""
-        groups: dict[str, Group] = {}
+        groups: dict[str, VariableGroup] = {}
         for place, name in enumerate(names):
-            group = groups.setdefault(kind := self.known[name].type, Group(kind, [], [], []))
+            group = groups.setdefault(
+                kind := self.known[name].type, VariableGroup(kind, [], [], [])
+            )
             group.names.append(name)
             group.references.append(self.known[name].valueReference)
             group.places.append(place)
         return list(groups.values())
 
-    def _set(self, groups: Sequence[Group], values: Sequence[float]) -> None:
+    def _set(self, groups: Sequence[VariableGroup], values: Sequence[float]) -> None:
         """Set variables to the values at their places."""
         for kind, names, references, places in groups:
             typed = [CONVERTERS.get(kind, float)(values[place]) for place in places]
@@ -105,7 +107,7 @@ class Slave:
                 f"setting {', '.join(names)}", getattr(self.fmu, setter), references, typed
             )
 
-    def _get(self, groups: Sequence[Group]) -> list[float]:
+    def _get(self, groups: Sequence[VariableGroup]) -> list[float]:
         """Return the values of variables in the order of their places."""
         values = [0.0] * sum(len(group.places) for group in groups)
         for kind, names, references, places in groups:
@@ -117,14 +119,14 @@ class Slave:
         return values
 
     def _called(self, what: str, function: Any, *arguments: Any, **named: Any) -> Any:
-        """Call a function of FMPy. Raise Fault if it fails, with the FMU's last words."""
+        """Call a function of FMPy. Raise SlaveFault if it fails, with the FMU's last words."""
         try:
             return function(*arguments, **named)
         except Exception as error:
             why = f"{type(error).__name__}: {error}"
             if self.said:
                 why = self.said[-1]
-            raise Fault(f"{what} fails ({' '.join(why.split())}): {CURE}") from error
+            raise SlaveFault(f"{what} fails ({' '.join(why.split())}): {CURE}") from error
 
     def _log(self, *words: Any) -> None:
         """Keep what the FMU says; the text is the last argument, in FMI 2 and 3."""

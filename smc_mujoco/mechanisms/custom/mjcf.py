@@ -53,7 +53,7 @@ process.free_after_fork(_lock)
 
 
 @dataclasses.dataclass(frozen=True)
-class Source:
+class ModelSource:
     """The source of a model: a file, or a text with the files that it names."""
 
     path: str  # of the file, absolute; "" for a text
@@ -117,13 +117,13 @@ class Source:
 
 
 @functools.lru_cache(maxsize=MAX_KEPT)
-def _parsed(source: Source) -> mujoco.MjSpec:
+def _parsed(source: ModelSource) -> mujoco.MjSpec:
     """Return the model of a source, which is shared."""
     return source.read()
 
 
 @functools.lru_cache(maxsize=MAX_KEPT)
-def as_it_is(source: Source) -> mujoco.MjModel:
+def as_it_is(source: ModelSource) -> mujoco.MjModel:
     """Return the model of a source, compiled without an edit, which is shared."""
     return source.compiled(source.spec())
 
@@ -132,9 +132,9 @@ def _built(spec: mujoco.MjSpec) -> mujoco.MjModel:
     return spec.compile()
 
 
-def source(model: object, assets: Mapping[str, bytes | str] | None = None) -> Source:
+def source(model: object, assets: Mapping[str, bytes | str] | None = None) -> ModelSource:
     """Coerce the path of a file, a text with its assets, an MjSpec, or a mjcf.RootElement of
-    dm_control to a Source.
+    dm_control to a ModelSource.
     """
     pymjcf = sys.modules.get("dm_control.mjcf")
     text = isinstance(model, str) and model.lstrip().startswith("<")
@@ -165,14 +165,14 @@ def source(model: object, assets: Mapping[str, bytes | str] | None = None) -> So
     return _of_file(path, digest(path))
 
 
-def _of_file(path: Path, sha256: str) -> Source:
+def _of_file(path: Path, sha256: str) -> ModelSource:
     """Return the source of a file whose digest is known."""
     _known[sha256] = path
     _stamps[sha256] = _stamp(path)
-    return Source(str(path), sha256)
+    return ModelSource(str(path), sha256)
 
 
-def found(name: str, sha256: str) -> Source:
+def found(name: str, sha256: str) -> ModelSource:
     """Return the source of a file that a record names without its folder: where this process has
     read it, else in the current folder or in one within it.
     """
@@ -190,7 +190,7 @@ def found(name: str, sha256: str) -> Source:
     raise ScenarioError(f"its model {name} is not there: put it back, or run in its folder")
 
 
-def _of_text(text: str, assets: Mapping[str, Any]) -> Source:
+def _of_text(text: str, assets: Mapping[str, Any]) -> ModelSource:
     """Return the source of a text whose files are all among the assets."""
     kinds = bytes | bytearray | memoryview | str
     if not (
@@ -211,10 +211,10 @@ def _of_text(text: str, assets: Mapping[str, Any]) -> Source:
             )
     pairs = tuple(sorted(assets.items()))
     parts = [part for name, content in pairs for part in (name.encode(), content)]
-    return Source("", _sha256([text.encode(errors="surrogatepass"), *parts]), text, pairs)
+    return ModelSource("", _sha256([text.encode(errors="surrogatepass"), *parts]), text, pairs)
 
 
-def _of_spec(spec: mujoco.MjSpec) -> Source:
+def _of_spec(spec: mujoco.MjSpec) -> ModelSource:
     """Return the source of an MjSpec as it is now: its XML with all digits, and the files that it
     names.
     """
@@ -351,7 +351,7 @@ def _stamp(path: Path) -> Stamp:
     return stamp
 
 
-def _unchanged(source: Source) -> bool:
+def _unchanged(source: ModelSource) -> bool:
     """Return whether a file and those that it names are as when they were hashed."""
     with contextlib.suppress(OSError):
         known = _stamps.get(source.sha256, {})

@@ -43,7 +43,7 @@ from numba import carray, types
 from smc_mujoco.common import fingerprint, libmujoco
 from smc_mujoco.common.aliases import Array, Numbers, Pair
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.jit import Function, Key, floats, pointer, record_at
+from smc_mujoco.common.jit import CompiledFunction, Key, floats, pointer, record_at
 from smc_mujoco.common.mjcb import silence
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.mechanisms import rotation
@@ -306,7 +306,7 @@ def passive_alone(model: mujoco.MjModel) -> bool:
 
 
 @functools.cache
-def native_dynamics() -> Function:
+def native_dynamics() -> CompiledFunction:
     """Return the C function of M (n, n), h and g, (n,) each, from a record SEEN. Without `at_rest`
     g is NaN.
 
@@ -378,11 +378,11 @@ def native_dynamics() -> Function:
                 forces[j] = bias[k] - passive[k] - actuator[k]
         return 0
 
-    return Function(native, Key("nominal-model", fingerprint.now(native)))
+    return CompiledFunction(native, Key("nominal-model", fingerprint.now(native)))
 
 
 @functools.cache
-def native_coriolis() -> Function:
+def native_coriolis() -> CompiledFunction:
     """Return the C function of C(x, v) w, at the state of the last call of `native_dynamics`. Its
     input is w, (n,).
     """
@@ -416,11 +416,11 @@ def native_coriolis() -> Function:
                 output[j] += sign * 0.25 * bias[place_at(places, j).qvel]
         return 0
 
-    return Function(native, Key("nominal-model", fingerprint.now(native)))
+    return CompiledFunction(native, Key("nominal-model", fingerprint.now(native)))
 
 
 @functools.cache
-def native_jacobian() -> Function:
+def native_jacobian() -> CompiledFunction:
     """Return the C function of the tip's Jacobian, (3, n), at the state of the last call of
     `native_dynamics`.
     """
@@ -441,11 +441,11 @@ def native_jacobian() -> Function:
                 output[i, j] = moves[i, place_at(int(at.places), j).qvel]
         return 0
 
-    return Function(native, Key("nominal-model", fingerprint.now(native)))
+    return CompiledFunction(native, Key("nominal-model", fingerprint.now(native)))
 
 
 @functools.cache
-def native() -> Function:
+def native() -> CompiledFunction:
     """Return the C function of the nominal model. Its input is a record SEEN, its outputs are f and
     g of channel i.
     """
@@ -506,4 +506,4 @@ def native() -> Function:
         output[1] = moved[dof]
         return 0
 
-    return Function(native, Key("nominal-model", fingerprint.now(native)))
+    return CompiledFunction(native, Key("nominal-model", fingerprint.now(native)))

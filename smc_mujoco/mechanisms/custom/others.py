@@ -22,7 +22,7 @@ from smc_mujoco.mechanisms.custom.channels import (
     joints_of,
     starts,
 )
-from smc_mujoco.mechanisms.custom.mjcf import Source, as_it_is
+from smc_mujoco.mechanisms.custom.mjcf import ModelSource, as_it_is
 
 OTHERS = ("file", "held", "locked")
 HELD = 2.0 * math.pi * 8.0  # rad/s, chosen: fast beside the channels, slow beside a physics step
@@ -55,7 +55,7 @@ def limp(spec: mujoco.MjSpec, seen: Iterable[str]) -> list[str]:
 
 @functools.lru_cache(maxsize=8)
 def at_start(
-    source: Source, channels: Pairs, keyframe: str | None
+    source: ModelSource, channels: Pairs, keyframe: str | None
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """Return the file's model, with a body for each of the file, and its state at the start."""
     spec = source.spec()
@@ -77,7 +77,7 @@ def at_start(
 
 def edit(
     spec: mujoco.MjSpec,
-    source: Source,
+    source: ModelSource,
     channels: Pairs,
     keyframe: str | None,
     others: str,

@@ -37,13 +37,13 @@ from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom import mjcf, urdf
 from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs, is_free, joints_of
 from smc_mujoco.mechanisms.custom.clearance import DEPTH, overlap
-from smc_mujoco.mechanisms.custom.constraints import (
+from smc_mujoco.mechanisms.custom.mjcf import ModelSource
+from smc_mujoco.mechanisms.custom.model_constraints import (
     default_friction,
     smooth,
     softness_warnings,
     touches,
 )
-from smc_mujoco.mechanisms.custom.mjcf import Source
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.custom.others import OTHERS, limp, ties
 from smc_mujoco.mechanisms.custom.scales import rises
@@ -176,7 +176,7 @@ def _overlaps(label: str, made: Plant, of_urdf: bool) -> list[str]:
 
 
 def _plant(
-    source: Source,
+    source: ModelSource,
     pairs: Pairs,
     name: str | None,
     keyframe: str | None,

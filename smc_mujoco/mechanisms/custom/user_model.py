@@ -11,8 +11,8 @@ from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom.channels import Motor, Pairs, joints_of
-from smc_mujoco.mechanisms.custom.constraints import harden
-from smc_mujoco.mechanisms.custom.mjcf import Source
+from smc_mujoco.mechanisms.custom.mjcf import ModelSource
+from smc_mujoco.mechanisms.custom.model_constraints import harden
 from smc_mujoco.mechanisms.custom.others import edit
 from smc_mujoco.mechanisms.layout import OWN, ROTOR, START
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Field
@@ -24,7 +24,7 @@ SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
 class UserModel:
     """Builder of a user's mechanism: Plant.build. It ignores n, because the channels decide it."""
 
-    source: Source
+    source: ModelSource
     keyframe: str | None
     channels: Pairs
     motors: tuple[Motor, ...]

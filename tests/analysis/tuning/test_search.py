@@ -14,7 +14,7 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search, search_space
 from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective
-from smc_mujoco.analysis.tuning.result import compare, load
+from smc_mujoco.analysis.tuning.result import compare, load_tuned
 from smc_mujoco.analysis.tuning.search import tune
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.units import Gain, Unit
@@ -90,7 +90,7 @@ def test_a_tuning_that_is_killed_goes_on_and_ends_with_the_same_bytes(
     found, killed_in, monkeypatch, tmp_path
 ):
     made = []
-    real = search.Task.search
+    real = search.TuningTask.search
 
     def one(task, i, *rest):
         if i == killed_in and len(made) == killed_in:
@@ -99,7 +99,7 @@ def test_a_tuning_that_is_killed_goes_on_and_ends_with_the_same_bytes(
         made.append(i)
         return real(task, i, *rest)
 
-    monkeypatch.setattr(search.Task, "search", one)
+    monkeypatch.setattr(search.TuningTask, "search", one)
     again = {
         "budget": 16,
         "seed": 3,
@@ -460,7 +460,7 @@ def test_a_law_that_got_more_than_its_rivals_is_not_compared(found, refused):
 
 def test_a_tuning_is_saved_and_read_back_as_it_was(found, tmp_path):
     path = found.save(tmp_path / "new" / "it.json")
-    assert load(path) == found
+    assert load_tuned(path) == found
     held = json.loads(path.read_text())
     assert held["budget"] == 16
     assert list(found.gains.values()) in held["record"]["sets"]

@@ -12,11 +12,10 @@ from papers.gaber.claims import OURS
 import smc_mujoco as smc
 from smc_mujoco.analysis.linear_theory import critical_delay
 from smc_mujoco.common.files import to_json
-from smc_mujoco.evidence.audit import audit
-from smc_mujoco.evidence.audit import runs as claim_runs
+from smc_mujoco.evidence.audit import audit, claim_runs
 from smc_mujoco.evidence.audit.audit import claims, measure
-from smc_mujoco.evidence.audit.paper import Entry, paper
-from smc_mujoco.evidence.audit.runs import Runs
+from smc_mujoco.evidence.audit.claim_runs import ClaimRuns
+from smc_mujoco.evidence.audit.paper import ClaimEntry, paper
 from smc_mujoco.evidence.audit.variants import VARIANTS, variant, with_gains
 from smc_mujoco.evidence.audit.verdict import (
     EXISTENTIAL,
@@ -169,7 +168,7 @@ def entry(id="900", found=(YES,), note=""):
         "holds_if": "< 2",
         "note": note,
     }
-    return Entry(
+    return ClaimEntry(
         id=id,
         evidence=lambda runs: found[runs.gains] if isinstance(found, dict) else found,
         **reported,
@@ -268,7 +267,7 @@ def test_late_claims_come_last_and_every_one_is_reported(only):
 
 @pytest.fixture
 def runs():
-    return Runs(GABER, "study", quick=True)
+    return ClaimRuns(GABER, "study", quick=True)
 
 
 def substituted(name):
@@ -312,7 +311,9 @@ def test_the_rows_of_a_table_stand_for_their_runs(runs):
         "gains": '{"lam": 6.0}',
         "failure": None,
     }
-    table = Runs(GABER, "study", table=claim_runs.of_table(SimpleNamespace(rows=lambda: [row])))
+    table = ClaimRuns(
+        GABER, "study", table=claim_runs.of_table(SimpleNamespace(rows=lambda: [row]))
+    )
     assert table.scores([scenario])[0]["itae"] == 1.5
     assert [one.gains for one in table.results()] == [{"lam": 6.0}]
 
@@ -330,10 +331,10 @@ def test_a_change_of_plant_keeps_the_gains_of_its_name(runs):
 
 
 def test_a_mutant_stands_for_its_law_alone():
-    runs = Runs(GABER, "study", substitute=substituted("zero"))
-    law = Runs(GABER, "study").law("duffing", OURS)
+    runs = ClaimRuns(GABER, "study", substitute=substituted("zero"))
+    law = ClaimRuns(GABER, "study").law("duffing", OURS)
     assert runs.law("duffing", OURS) == dataclasses.replace(variant(law, "zero"), name=OURS)
-    assert runs.law("duffing", "classical") == Runs(GABER, "study").law("duffing", "classical")
+    assert runs.law("duffing", "classical") == ClaimRuns(GABER, "study").law("duffing", "classical")
 
 
 # laws made of laws
@@ -431,7 +432,7 @@ def test_a_plant_on_which_the_claim_is_true_shows_no_rise():
 
 def about(plants, **options):
     """Runs of claim 24, of these plants."""
-    return Runs(GABER, "study", **options).of(
+    return ClaimRuns(GABER, "study", **options).of(
         dataclasses.replace(GABER.claims["24"], plants=plants)
     )
 
@@ -481,7 +482,7 @@ def test_the_same_audit_twice_gives_the_same():
 @pytest.mark.slow
 def test_the_wrong_sign_converges_just_where_the_plant_has_it_too():
     assert claims(only=["21"], gains="study")[0].verdict == REFUTED
-    runs = Runs(GABER, "study", substitute=substituted("reversed")).of(GABER.claims["21"])
+    runs = ClaimRuns(GABER, "study", substitute=substituted("reversed")).of(GABER.claims["21"])
     assert verdict(measure(GABER.claims["21"], runs)) == SUPPORTED
 
 

@@ -19,7 +19,7 @@ from smc_mujoco.common.files import from_json
 from smc_mujoco.evidence.audit import evidence, runs
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import REFUTED
-from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation import scenario_json
 from smc_mujoco.simulation.run_key import portable_key
 
 DATA = """
@@ -157,7 +157,7 @@ def test_a_run_has_one_name_with_all_versions_and_under_all_names_of_its_conditi
     scenario = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.1)
     name = portable_key(scenario)
     monkeypatch.setattr(
-        serialise, "_versions", lambda: {"mujoco": "another", "arithmetic": "another"}
+        scenario_json, "_versions", lambda: {"mujoco": "another", "arithmetic": "another"}
     )
     assert portable_key(scenario) == portable_key(scenario.named("calm")) == name
     assert portable_key(dataclasses.replace(scenario, seed=1)) != name

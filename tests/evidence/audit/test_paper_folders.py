@@ -12,8 +12,8 @@ import pytest
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.evidence.audit import evidence
 from smc_mujoco.evidence.audit.audit import claims
+from smc_mujoco.evidence.audit.claim_runs import ClaimRuns
 from smc_mujoco.evidence.audit.paper import CODE_FILE, PAPER_FILE, new, paper
-from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.variants import with_gains
 from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Beside, Check, Threshold
 
@@ -142,7 +142,7 @@ def test_a_law_of_the_paper_has_the_gains_of_the_set_and_its_mutants(folder):
     (one,) = claims(paper=folder(data, code))
     assert one.numbers["hard"]["size"]["value"] == 7.0 / 4.0
     assert one.numbers["own"]["size"]["value"] == 1.0
-    mutants = Runs(
+    mutants = ClaimRuns(
         paper(folder(data, code)), "own", substitute={"soft": lambda law: with_gains(law, k=12.0)}
     )
     assert mutants.law("duffing", "soft").gains["k"] == 12.0
@@ -178,7 +178,11 @@ def test_fields_are_the_paper_s_then_the_condition_s_the_claim_s_and_the_changes
         + 'runs = "seed=3, u_max=3.0"\n'
     )
     found = paper(folder(data + '[conditions]\nfar = "x0=0.2, u_max=2.0"'))
-    one = Runs(found, "default").of(found.claims["1"]).scenario("duffing", "pid", "far", u_max=4.0)
+    one = (
+        ClaimRuns(found, "default")
+        .of(found.claims["1"])
+        .scenario("duffing", "pid", "far", u_max=4.0)
+    )
     assert one.duration == 1.0
     assert one.x0 == (0.2,)
     assert one.seed == 3

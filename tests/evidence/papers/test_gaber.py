@@ -15,8 +15,8 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.control.law import law_function
 from smc_mujoco.evidence.audit.audit import claims, measure
+from smc_mujoco.evidence.audit.claim_runs import ClaimRuns
 from smc_mujoco.evidence.audit.paper import paper
-from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.variants import variant, with_gains
 from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED, Beside, Check, verdict
 from smc_mujoco.evidence.papers.gaber import lyapunov
@@ -42,7 +42,7 @@ Told = Callable[[Scenario], dict[str, float]]
 Drawn = Callable[[Scenario], tuple[np.ndarray, np.ndarray]]  # x and u of channel 0
 
 
-class Stub(Runs):
+class Stub(ClaimRuns):
     """Runs that were never made: what they scored, and what their traces hold, is told."""
 
     def __init__(self, reported: Told | None = None, drawn: Drawn | None = None, **about):
@@ -67,7 +67,7 @@ class Stub(Runs):
         return Trace(**arrays, t=T.copy(), scenario=scenario)
 
 
-def of(runs: Runs, id: str) -> list[Check]:
+def of(runs: ClaimRuns, id: str) -> list[Check]:
     """The checks of a claim, without what stands beside them."""
     return [
         one
@@ -76,7 +76,7 @@ def of(runs: Runs, id: str) -> list[Check]:
     ]
 
 
-def judged(runs: Runs, id: str) -> str:
+def judged(runs: ClaimRuns, id: str) -> str:
     """The verdict on a claim under one set of gains."""
     return verdict(
         measure(GABER.claims[id], runs.of(GABER.claims[id])), GABER.claims[id].quantifier
@@ -465,7 +465,7 @@ def test_fluctuation_tells_the_numbers_of_a_sum_of_two_tones():
         + np.where(T < 7.9, 1e3, 0.0)
     )
     trace = Stub(drawn=lambda s: (0.0 * T, u)).trace(
-        Runs(GABER, "study").scenario("van_der_pol", OURS)
+        ClaimRuns(GABER, "study").scenario("van_der_pol", OURS)
     )
     std, step, share = measured.fluctuation(trace)
     assert std == pytest.approx(math.sqrt(12.5), rel=1e-3)
@@ -517,7 +517,7 @@ def test_exponential_convergence_has_one_rate_at_all_distances(slowed, expected)
 
 
 def test_the_decay_rate_of_an_exponential_is_its_own_and_of_an_oscillation_its_envelopes():
-    runs = Runs(GABER, "study")
+    runs = ClaimRuns(GABER, "study")
     base = runs.scenario("duffing", OURS)
     for ring in (0.0, 40.0):
         x = 1.5 * np.exp(-2.0 * T) * np.cos(ring * T)
@@ -567,12 +567,13 @@ def test_delay_tolerance_is_more_than_each_rivals(ours, rivals, expected):
 
 
 def test_theory_of_a_delay_is_told_of_the_law_and_not_of_its_mutant():
-    assert measured.critical_delay(Runs(GABER, "study"), "duffing") == pytest.approx(
+    assert measured.critical_delay(ClaimRuns(GABER, "study"), "duffing") == pytest.approx(
         0.178, abs=0.002
     )
     assert math.isnan(
         measured.critical_delay(
-            Runs(GABER, "study", substitute={OURS: lambda law: variant(law, "zero")}), "duffing"
+            ClaimRuns(GABER, "study", substitute={OURS: lambda law: variant(law, "zero")}),
+            "duffing",
         )
     )
 
@@ -655,10 +656,12 @@ def winding(y, gains, memory):
 def test_needed_signals_and_growth_are_read_off_what_a_law_does():
     like = lambda law: {OURS: lambda _: law}  # noqa: E731
     table = GABER.claims["T"]
-    as_it_is = Runs(GABER, "study").of(table)
+    as_it_is = ClaimRuns(GABER, "study").of(table)
     assert measured.estimated(as_it_is, OURS) == 0.0
     assert (
-        measured.estimated(Runs(GABER, "study", substitute=like(accelerated())).of(table), OURS)
+        measured.estimated(
+            ClaimRuns(GABER, "study", substitute=like(accelerated())).of(table), OURS
+        )
         == 1.0
     )
     assert measured.growth(as_it_is, OURS) == pytest.approx(0.0, abs=1e-6)
@@ -666,7 +669,10 @@ def test_needed_signals_and_growth_are_read_off_what_a_law_does():
         (accelerated(), pytest.approx(9.0)),
         (winding(), pytest.approx(1.0, rel=1e-2)),
     ):
-        assert measured.growth(Runs(GABER, "study", substitute=like(law)).of(table), OURS) == grows
+        assert (
+            measured.growth(ClaimRuns(GABER, "study", substitute=like(law)).of(table), OURS)
+            == grows
+        )
     assert measured.growth(as_it_is, HOSMC) > 0.5
     assert measured.growth(as_it_is, CLASSICAL) == 0.0
 
@@ -685,12 +691,12 @@ def test_real_runs_give_the_verdicts_of_the_first_gains():
         ("29", "31", "45", "49"), SUPPORTED
     )
     (over,) = found["29"].checks("study")
-    run = smc.run(Runs(GABER, "study").scenario("inverted_pendulum", HOSMC))
+    run = smc.run(ClaimRuns(GABER, "study").scenario("inverted_pendulum", HOSMC))
     assert over.value == pytest.approx(-100 * run.x.min() / 0.5)
 
 
 @pytest.mark.slow
 def test_a_broken_law_loses_its_claims():
     ids = ["29", "35", "38", "45", "50", "57"]
-    runs = Runs(GABER, "study", substitute={OURS: lambda law: variant(law, "reversed")})
+    runs = ClaimRuns(GABER, "study", substitute={OURS: lambda law: variant(law, "reversed")})
     assert {id: judged(runs, id) for id in ids} == dict.fromkeys(ids, REFUTED)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.evidence.audit.claim_runs import ClaimRuns
 from smc_mujoco.evidence.audit.paper import paper
-from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.verdict import (
     NOT_AS_MEASURED,
     OURS,
@@ -88,7 +88,7 @@ PRINTED = [(id, name) for id, claim in GABER.claims.items() for name in claim.ex
 )
 def test_printed_gains_meet_their_limit_in_mujoco(id, name):
     entry = GABER.claims[id]
-    runs = Runs(GABER, entry.rivals or "study", id == "11").of(entry).on(name)
+    runs = ClaimRuns(GABER, entry.rivals or "study", id == "11").of(entry).on(name)
     runs = runs.at(entry.searched or entry.laws[0], entry.examples[name], runs.quick)
     measured = entry.evidence(runs)
     checks = []

@@ -21,7 +21,7 @@ from unittest import mock
 
 import pytest
 
-from smc_mujoco.evidence.audit import runs, search
+from smc_mujoco.evidence.audit import claim_runs, gain_search
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.paper import paper, shipped
 from smc_mujoco.evidence.audit.verdict import Claim
@@ -50,7 +50,7 @@ def golden(name: str) -> dict[str, Record]:
 def quick_verdicts(name: str, only: list[str] | None = None) -> dict[str, Record]:
     """Return claim -> record of a quick audit, without timings; check whose runs it used."""
     # the verdicts are those of two, in less time
-    with mock.patch.object(search, "QUICK_SPREAD_SETS", 1):
+    with mock.patch.object(gain_search, "QUICK_SPREAD_SETS", 1):
         found = audit(name, only, GAINS.get(name), quick=True)
     for id, sets in found.used.items():
         check_runs(name, id, [one.scenario for used in sets.values() for one in used.values()])
@@ -114,7 +114,7 @@ def check_runs(name: str, id: str, scenarios: list[Scenario]) -> None:
 def runs_made_once(nudge: float = 0.0) -> Iterator[None]:
     """Simulate each run once, as claims share a third of all steps; move its start by a little."""
     made = {}
-    stream = runs.stream
+    stream = claim_runs.stream
 
     def kept(scenarios, threads):
         keys = [key(scenario.named(None)) for scenario in scenarios]
@@ -131,11 +131,11 @@ def runs_made_once(nudge: float = 0.0) -> Iterator[None]:
                 made[name] = trace
         return ((i, made[name]) for i, name in enumerate(keys))
 
-    runs.stream = kept
+    claim_runs.stream = kept
     try:
         yield
     finally:
-        runs.stream = stream
+        claim_runs.stream = stream
 
 
 def moved(scenario: Scenario, nudge: float) -> Scenario:

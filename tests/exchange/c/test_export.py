@@ -19,7 +19,7 @@ from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.law import Measurement, catalogue, sliding
 from smc_mujoco.control.laws import observer_free_q15 as q15
 from smc_mujoco.exchange.c import build
-from smc_mujoco.exchange.c.load import CLaw
+from smc_mujoco.exchange.c.law_from_c import CLaw
 from smc_mujoco.simulation import cfunctions
 from smc_mujoco.simulation.python_functions import gains_of
 

@@ -17,7 +17,7 @@ from helpers.compiler import needs_compiler  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.control.law import Measurement  # noqa: E402
-from smc_mujoco.exchange.fmu import load  # noqa: E402
+from smc_mujoco.exchange.fmu import law_from_fmu  # noqa: E402
 from smc_mujoco.exchange.fmu.slave import Slave  # noqa: E402
 from smc_mujoco.simulation.python_functions import gains_of  # noqa: E402
 
@@ -125,7 +125,7 @@ def test_a_new_memory_starts_a_new_instance_and_the_old_ends_with_its_memory(fol
     )()
     assert law.function is not None
     gc.collect()
-    before = dict(load._running.by_number)
+    before = dict(law_from_fmu._running.by_number)
     y = Measurement(0.0, 1e-3, 0.5, 0.1, 0.5, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0)
     gains = gains_of(law)
     memory = np.zeros(1)
@@ -133,9 +133,9 @@ def test_a_new_memory_starts_a_new_instance_and_the_old_ends_with_its_memory(fol
     assert first != second
     memory = np.zeros(1)
     assert law.function(y, gains, memory) == first
-    assert len(load._running.by_number) == len(before) + 1
+    assert len(law_from_fmu._running.by_number) == len(before) + 1
     del memory
-    assert load._running.by_number == before
+    assert law_from_fmu._running.by_number == before
 
 
 def test_another_process_takes_the_law_from_the_file(folder):
@@ -146,7 +146,7 @@ def test_another_process_takes_the_law_from_the_file(folder):
     first, second = smc.run([scenario(law), scenario(copy)])
     np.testing.assert_array_equal(first.u, second.u)
     smc.exchange.law_to_fmu("classical", path)
-    load.extracted.cache_clear()
+    law_from_fmu.extracted.cache_clear()
     changed = smc.run(scenario(law))
     assert "FMU 'sent.fmu' is gone or has changed" in str(changed.failure)
 
@@ -171,7 +171,7 @@ def expected(trace: smc.Trace, k: float = 8.0) -> np.ndarray:
 def test_a_foreign_fmu_keeps_its_period_and_its_state(foreign):
     law = smc.exchange.law_from_fmu(foreign, **RENAMED)
     function = law.function
-    assert isinstance(function, load.FmuLaw)
+    assert isinstance(function, law_from_fmu.FmuLaw)
     assert dict(function.inputs) == {"x": "Plant.Theta", "v": "omega", "r": "setpoint"}
     assert function.outputs == ("torque",)
     assert function.period == 0.01

@@ -20,7 +20,7 @@ from smc_mujoco.mechanisms.custom import others, scales
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.metrics.catalogue import arrived
 from smc_mujoco.metrics.conventions import leans
-from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation import scenario_json
 
 # servos and motors, a frame, two joints on one body, a spring, a range away from 0
 ARM = """<mujoco model="arm"><compiler angle="radian"/>
@@ -162,7 +162,7 @@ def test_text_and_record_make_the_same_plant_again(name, mode, tmp_path, monkeyp
     made = as_plant(f"m.xml:{joint}(motor)@home+{mode}")
     assert made.argument == f"m.xml:{joint}(motor)@home+{mode}"
     assert as_plant(made.argument).spec().to_xml() == made.spec().to_xml()
-    again = serialise.restore(serialise.describe(smc.Scenario(plant=made, law="pid"))).plant
+    again = scenario_json.restore(scenario_json.describe(smc.Scenario(plant=made, law="pid"))).plant
     assert again.spec().to_xml() == made.spec().to_xml()
     assert again.rest == made.rest
     assert again.argument == made.argument
@@ -261,7 +261,7 @@ def test_joints_left_out_hold_their_goal_and_a_sine_is_about_it():
                 duration=0.5,
             )
         )
-    assert runs[0] == runs[1] == serialise.restore(serialise.describe(runs[0]))
+    assert runs[0] == runs[1] == scenario_json.restore(scenario_json.describe(runs[0]))
     trace = smc.run(runs[0])
     wanted = np.stack([0 * trace.t - 0.6, -1.1 + 0.1 * np.sin(3.0 * trace.t)], axis=1)
     np.testing.assert_allclose(trace.r, wanted, atol=1e-12)

@@ -26,7 +26,7 @@ from smc_mujoco.mechanisms.custom.scales import needs
 from smc_mujoco.mechanisms.custom.user_model import UserModel
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import model as models
-from smc_mujoco.simulation import run_key, serialise
+from smc_mujoco.simulation import run_key, scenario_json
 
 TORQUE = smc.law("computed_torque", kp=100.0, kd=20.0)
 ARRAYS = ("x", "v", "u", "applied", "s", "d", "force", "reaction")
@@ -1124,18 +1124,18 @@ def test_no_record_of_a_model_knows_its_folder(arm, tmp_path, monkeypatch):
         scenario = smc.Scenario(
             plant=smc.plant_from(path, ["shoulder"]), law=smc.law("pid"), duration=0.1
         )
-        about = serialise.describe(scenario)
+        about = scenario_json.describe(scenario)
         records.append((run_key.row(scenario), run_key.portable_key(scenario), about))
     assert records[0] == records[1]
     assert str(tmp_path) not in str(records)
     monkeypatch.setattr(mjcf, "_known", {})  # as in another process
     monkeypatch.chdir(tmp_path / "anna")
-    build: Any = serialise.restore(about).plant.build
+    build: Any = scenario_json.restore(about).plant.build
     assert build.source.path == str(Path("models/arm.xml").resolve())
     monkeypatch.chdir(tmp_path / "others")
     monkeypatch.setattr(mjcf, "_known", {})
     with pytest.raises(smc.ScenarioError, match=r"arm.xml is not there: put it back, or run in"):
-        serialise.restore(about)
+        scenario_json.restore(about)
 
 
 def test_a_plant_of_one_s_own_goes_to_another_process(arm):

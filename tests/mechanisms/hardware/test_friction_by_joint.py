@@ -10,7 +10,7 @@ from numba import njit
 
 import smc_mujoco as smc
 from smc_mujoco.common.files import shipped, to_json
-from smc_mujoco.simulation import conditions, serialise
+from smc_mujoco.simulation import conditions, scenario_json
 
 LUGRE = smc.hardware.LuGre(0.05, 0.1, 0.05)
 SIGMOID = smc.hardware.Sigmoid(0.1, 9.0)
@@ -65,8 +65,8 @@ def test_a_part_alone_is_on_the_driven_joint_and_by_name_on_any(part, plant, dri
 @pytest.mark.parametrize("friction", FORMS, ids=range(len(FORMS)))
 def test_joints_survive_text_json_and_a_batch(friction):
     made = scenario(friction)
-    data = json.loads(to_json(serialise.describe(made)))
-    assert serialise.restore(data) == made
+    data = json.loads(to_json(scenario_json.describe(made)))
+    assert scenario_json.restore(data) == made
     worn = smc.condition("worn", friction=friction)
     assert "on=()" not in str(worn)
     again = conditions.parse(str(worn)).on(made.plant, 1.0)["friction"]
@@ -93,12 +93,12 @@ def test_what_no_joint_can_have_is_refused(friction, words):
 
 
 def test_records_of_older_versions_keep_their_friction_on_every_joint():
-    data = json.loads(to_json(serialise.describe(scenario({"*": LUGRE}))))
+    data = json.loads(to_json(scenario_json.describe(scenario({"*": LUGRE}))))
     for driven, joints in {False: ("slide", "hinge"), True: ()}.items():
         values = data["friction"][0]["values"]
         values.pop("on", None)
         values["driven"] = driven
-        assert serialise.restore(data).friction[0].on == joints
+        assert scenario_json.restore(data).friction[0].on == joints
 
 
 @pytest.mark.parametrize("name", ["coulomb", "friction", "lugre"])

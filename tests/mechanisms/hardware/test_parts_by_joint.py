@@ -9,7 +9,7 @@ from helpers.own_parts import worn
 import smc_mujoco as smc
 from smc_mujoco.common.files import to_json
 from smc_mujoco.hardware import RateLimit, Stepper
-from smc_mujoco.simulation import conditions, serialise
+from smc_mujoco.simulation import conditions, scenario_json
 
 TWO = """<mujoco><compiler angle="radian"/><worldbody>
   <body><joint name="a" axis="0 1 0" damping=".1"/><geom size=".05" pos=".2 0 0" mass="1"/></body>
@@ -72,7 +72,7 @@ def test_a_joint_with_its_own_part_moves_as_if_all_joints_had_it(field, pair, mo
 def test_they_survive_text_json_and_the_order_of_a_mapping(field, pair):
     given = {joint: part for joint, part in zip("ab", pair, strict=True) if part is not None}
     made = scenario(**{field: given})
-    assert serialise.restore(json.loads(to_json(serialise.describe(made)))) == made
+    assert scenario_json.restore(json.loads(to_json(scenario_json.describe(made)))) == made
     assert scenario(**{field: dict(reversed(given.items()))}) == made
     text = str(smc.condition("own", **{field: given}))
     assert scenario(**conditions.parse(text).on(PLANT, 1.0)) == made

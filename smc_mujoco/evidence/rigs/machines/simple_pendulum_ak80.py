@@ -8,7 +8,7 @@ hanging in records, and 0 upright in the plant.
 import math
 
 from smc_mujoco.control.law import law
-from smc_mujoco.control.source import SHIPPED, Search
+from smc_mujoco.control.source import SHIPPED, GainSearch
 from smc_mujoco.identification.records import Columns
 from smc_mujoco.identification.rig import Quantity, Rig
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
@@ -34,7 +34,7 @@ def machine(q):
 
 # Found by smc.tune on the quantities below: 96 sets of gains, seed 0, starts within 20 % of 0.3
 # rad, |u| <= 6 N m.
-SEARCH = Search(rule="differential evolution", evaluations=96)
+SEARCH = GainSearch(rule="differential evolution", evaluations=96)
 LAWS = (
     law("observer_free", lam=2.749, k1=18.27).sourced(SHIPPED, SEARCH),
     law("classical", k=1.578, c=16.55).sourced(SHIPPED, SEARCH),

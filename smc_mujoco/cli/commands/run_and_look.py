@@ -7,7 +7,7 @@ import typer
 from rich.text import Text
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Terminal
+from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.interrupts import delay_signals
 
 
@@ -49,7 +49,7 @@ def run(
     Example: smc-mujoco run duffing --no-film --out results --export csv,parquet
     """
     with delay_signals():
-        from smc_mujoco.cli.scene import perform
+        from smc_mujoco.cli.run_scene import perform
         from smc_mujoco.simulation.trace import formats
         from smc_mujoco.studies import scene as scenes
 

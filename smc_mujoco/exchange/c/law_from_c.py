@@ -28,7 +28,7 @@ from smc_mujoco.common import errors
 from smc_mujoco.common.constraints import Timeout, constrained
 from smc_mujoco.common.errors import ScenarioError, shown, whole
 from smc_mujoco.common.files import as_path
-from smc_mujoco.common.jit import AtAddress, Function, call_int, pointer
+from smc_mujoco.common.jit import AtAddress, CompiledFunction, call_int, pointer
 from smc_mujoco.control.component import Template, as_gains, gain_text, template_decorator
 from smc_mujoco.control.from_text import parsed_gains
 from smc_mujoco.control.joint_law import ARRAYS
@@ -136,7 +136,7 @@ def _unpickled(file: str, symbol: str, code: bytes, sizes: tuple[int, int], name
     return law
 
 
-def _trampoline(address: int) -> Function:
+def _trampoline(address: int) -> CompiledFunction:
     """Return a function of the callback's type that calls a C function which returns an int."""
 
     def native(y: Any, g: Any, m: Any, out: Any):
@@ -145,7 +145,7 @@ def _trampoline(address: int) -> Function:
         output[1] = math.nan
         return call_int(address, y, g, m, out)
 
-    return Function(native)
+    return CompiledFunction(native)
 
 
 def law_from_c(

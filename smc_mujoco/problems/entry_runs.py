@@ -58,7 +58,7 @@ def write(path: Path, groups: Iterable[list[Row]]) -> None:
     tables.write(path, schema, parts())
 
 
-class Runs:
+class EntryRuns:
     """A table of runs, read a problem at a time."""
 
     def __init__(self, path: Path):

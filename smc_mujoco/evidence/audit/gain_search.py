@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.evidence.audit.paper import Allowed, Entry, failed
-from smc_mujoco.evidence.audit.runs import Runs
+from smc_mujoco.evidence.audit.claim_runs import ClaimRuns
+from smc_mujoco.evidence.audit.paper import Allowed, ClaimEntry, failed
 from smc_mujoco.evidence.audit.verdict import Beside, Check, Evidence
 
 QUICK_SPREAD_SETS, QUICK_NEAR_SETS = 2, 0  # in a quick audit
@@ -28,7 +28,7 @@ Gains = dict[str, float]
 Bounds = Mapping[str, tuple[float, float]]
 
 
-class Tried(NamedTuple):
+class TriedGains(NamedTuple):
     """Gains, and the evidence at them."""
 
     gains: Gains
@@ -43,7 +43,9 @@ class Tried(NamedTuple):
         )
 
 
-def decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence]) -> Evidence:
+def decisive(
+    entry: ClaimEntry, runs: ClaimRuns, measure: Callable[[ClaimRuns], Evidence]
+) -> Evidence:
     """Return the evidence at the gains that decide, with these gains and their margins beside.
 
     A claim about some gains is decided for each plant by itself, because plants may need different
@@ -59,20 +61,20 @@ def decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence]) -> E
 
 
 def _decisive(
-    entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence], prefix: str
+    entry: ClaimEntry, runs: ClaimRuns, measure: Callable[[ClaimRuns], Evidence], prefix: str
 ) -> Evidence:
     """Return the evidence at the gains that decide on all plants of a claim."""
     law = entry.searched or entry.laws[0]
     best = min if entry.over == "all" else max
     theorem = Theorem(entry, runs)
-    in_full: list[Tried] = []
-    quickly: list[Tried] = []
+    in_full: list[TriedGains] = []
+    quickly: list[TriedGains] = []
 
     def decides(gains: Gains, quick: bool) -> bool:
         """Try gains, and return whether they decide: a counter-example to "all", or an example of
         "some".
         """
-        tried = Tried(gains, measure(runs.at(law, gains, quick or runs.quick)))
+        tried = TriedGains(gains, measure(runs.at(law, gains, quick or runs.quick)))
         (quickly if quick else in_full).append(tried)
         return tried.rank[0] != (entry.over == "all")
 
@@ -104,7 +106,7 @@ def _decisive(
 class Theorem:
     """What a paper asks of the gains of a claim's first law."""
 
-    def __init__(self, entry: Entry, runs: Runs):
+    def __init__(self, entry: ClaimEntry, runs: ClaimRuns):
         law = entry.searched or entry.laws[0]
         self.allowed: Allowed = runs.paper.allowed[law]
         self.rest: Mapping[str, float] = runs.paper.law(

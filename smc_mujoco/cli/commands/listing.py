@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Terminal
+from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common import annexes
 from smc_mujoco.common.interrupts import delay_signals
 
@@ -61,7 +61,7 @@ def list_(
     terminal = Terminal(json)
     if name is not None and Path(name).suffix in (".c", ".so"):
         with delay_signals():
-            loader = annexes.module("smc_mujoco.exchange.c.load", f"a law in C, {name},")
+            loader = annexes.module("smc_mujoco.exchange.c.law_from_c", f"a law in C, {name},")
         lines = loader.check(Path(name), None, None, "smc_law", (), C_TIME)
         terminal.print(*lines, sep="\n", soft_wrap=True)
     elif name is not None and name not in KINDS:

@@ -64,7 +64,7 @@ class PackageWarning(UserWarning):
 
 
 @dataclasses.dataclass(frozen=True)
-class Added(Generic[T_co]):
+class PackageEntry(Generic[T_co]):
     """An entry of another package, which is loaded at its first use."""
 
     point: EntryPoint
@@ -133,7 +133,9 @@ class Catalogue(Mapping[str, T_co]):
     """
 
     def __init__(
-        self, own: Mapping[str, T_co], added: Mapping[str, tuple[Added[T_co], ...]] | None = None
+        self,
+        own: Mapping[str, T_co],
+        added: Mapping[str, tuple[PackageEntry[T_co], ...]] | None = None,
     ):
         self.own = own
         self.added = dict(added or {})  # entries of other packages
@@ -200,11 +202,11 @@ class Catalogue(Mapping[str, T_co]):
         return self.added[name][0].package
 
 
-def added(group: str, make: Callable[[EntryPoint], T]) -> dict[str, tuple[Added[T], ...]]:
+def added(group: str, make: Callable[[EntryPoint], T]) -> dict[str, tuple[PackageEntry[T], ...]]:
     """Return name -> the entries of other packages in a group of entry points."""
-    by_name: dict[str, tuple[Added[T], ...]] = {}
+    by_name: dict[str, tuple[PackageEntry[T], ...]] = {}
     for point in points(group):
-        by_name[point.name] = (*by_name.get(point.name, ()), Added(point, make))
+        by_name[point.name] = (*by_name.get(point.name, ()), PackageEntry(point, make))
     return by_name
 
 

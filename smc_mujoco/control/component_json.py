@@ -5,8 +5,8 @@ from collections.abc import Iterable
 
 from smc_mujoco.common import annexes
 from smc_mujoco.common.aliases import Data, Fields
-from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.registry import Catalogue
 from smc_mujoco.control import source as sources
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.law import known_laws

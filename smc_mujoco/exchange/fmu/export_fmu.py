@@ -29,7 +29,7 @@ from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.exchange.c import build
-from smc_mujoco.exchange.c.export import number_of_joints, with_head, writable
+from smc_mujoco.exchange.c.export_c import number_of_joints, with_head, writable
 from smc_mujoco.exchange.fmu import contents, description
 from smc_mujoco.exchange.fmu.contents import ExportedLaw
 from smc_mujoco.mechanisms.plant import Plant

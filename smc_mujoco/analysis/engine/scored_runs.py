@@ -1,7 +1,7 @@
 """Scores of many scenarios without their traces: by the fast engine where it can, else by MuJoCo.
 
-Where the engine's numbers are shown, MuJoCo repeats some of them, and `Runs.checked` says how far
-apart they were.
+Where the engine's numbers are shown, MuJoCo repeats some of them, and `ScoredRuns.checked` says how
+far apart they were.
 """
 
 import math
@@ -31,7 +31,7 @@ def worth_compiling(work: int) -> bool:
     return work >= MIN_WORK
 
 
-class Runs:
+class ScoredRuns:
     """Runs that are scored.
 
     Args:
@@ -67,7 +67,7 @@ class Runs:
         self, cases: Sequence[Scenario], report: Report = lambda steps: None
     ) -> list[Scored]:
         """Return the scores of scenarios, in their order."""
-        from smc_mujoco.analysis.engine.group import Group, key
+        from smc_mujoco.analysis.engine.group import FormGroup, key
 
         found: list[Scored] = [([], None)] * len(cases)
         members: dict[Hashable, list[int]] = {}
@@ -79,7 +79,7 @@ class Runs:
             if group is None:
                 scored = self.by_mujoco(some, report)
             else:
-                made = Group(some, tuple(self.formulas), self.forms.get(group, []))
+                made = FormGroup(some, tuple(self.formulas), self.forms.get(group, []))
                 self.forms[group] = [made.form]
                 scored = made.scored(self.device, self.threads)
                 report(sum(case.work for case in some))

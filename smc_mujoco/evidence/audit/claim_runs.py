@@ -1,4 +1,4 @@
-"""The runs that claims rest on. A claim's function is called with a `Runs`.
+"""The runs that claims rest on. A claim's function is called with a `ClaimRuns`.
 
     def settles(runs):
         scenarios = runs.grid()                        # (plant, law, condition) -> Scenario
@@ -26,7 +26,7 @@ from smc_mujoco.common.errors import find
 from smc_mujoco.common.files import from_json
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.component import Component
-from smc_mujoco.evidence.audit.paper import Entry, Paper
+from smc_mujoco.evidence.audit.paper import ClaimEntry, Paper
 from smc_mujoco.evidence.audit.verdict import Check, Threshold, check
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.conditions import DURATION, Condition
@@ -47,7 +47,7 @@ Substitute = Mapping[
 ]  # law's name -> function from the law to its mutant
 
 
-class Result(NamedTuple):
+class RunResult(NamedTuple):
     """What is kept of a run: its law's name, gains and scores, which are inf if the run failed."""
 
     law: str
@@ -55,7 +55,7 @@ class Result(NamedTuple):
     scores: Scores
 
     @classmethod
-    def of(cls, law: str, gains: Numbers, outcome: Data) -> "Result":
+    def of(cls, law: str, gains: Numbers, outcome: Data) -> "RunResult":
         """Return what is kept of an outcome, or of a row of a study's table."""
         scores = {}
         for metric in metrics():
@@ -77,7 +77,7 @@ class Used(NamedTuple):
 
 
 @dataclasses.dataclass(eq=False)
-class Runs:
+class ClaimRuns:
     """Runs of a paper under one set of gains, made when they are needed and kept by their
     scenario's key.
     """
@@ -87,16 +87,16 @@ class Runs:
     quick: bool = False  # whether a claim measures less: coarser grids, shorter runs
     substitute: Substitute = dataclasses.field(default_factory=dict)
     threads: int | None = None
-    table: dict[str, Result] = dataclasses.field(
+    table: dict[str, RunResult] = dataclasses.field(
         default_factory=dict
     )  # key -> run that is not made again
-    shared: dict[str, Result] = dataclasses.field(
+    shared: dict[str, RunResult] = dataclasses.field(
         default_factory=dict
-    )  # key -> run, for the Runs of all sets
+    )  # key -> run, for the ClaimRuns of all sets
     used: dict[str, Used] = dataclasses.field(
         default_factory=dict
     )  # key -> run that the claim has used
-    scored: dict[str, Result] = dataclasses.field(
+    scored: dict[str, RunResult] = dataclasses.field(
         default_factory=dict
     )  # key -> run whose scores any claim has used
     plants: Names = ()  # names of the claim's plants; below, of its laws and conditions
@@ -107,7 +107,7 @@ class Runs:
     fields: Mapping[str, Any] = frozen({})  # of the claim's scenarios
     searched: Mapping[str, Numbers] = frozen({})  # law -> gains in place of the set's
 
-    def of(self, entry: Entry) -> "Runs":
+    def of(self, entry: ClaimEntry) -> "ClaimRuns":
         """Return these runs as a claim sees them: with its names and fields, and none used yet."""
         runs = copy.copy(self)
         runs.used = {}
@@ -119,7 +119,7 @@ class Runs:
         runs.thresholds = {threshold.measure: threshold for threshold in entry.thresholds}
         return runs
 
-    def at(self, law: str, gains: Numbers, quick: bool) -> "Runs":
+    def at(self, law: str, gains: Numbers, quick: bool) -> "ClaimRuns":
         """Return the claim's runs with some gains of a law in place of the set's; they count as
         used by the claim.
         """
@@ -128,7 +128,7 @@ class Runs:
         runs.quick = quick
         return runs
 
-    def on(self, plant: str) -> "Runs":
+    def on(self, plant: str) -> "ClaimRuns":
         """Return the claim's runs on one of its plants; they count as used by the claim."""
         runs = copy.copy(self)
         runs.plants = (plant,)
@@ -221,7 +221,7 @@ class Runs:
         names = list(new)
         for index, trace in stream(list(new.values()), self.threads):
             law = trace.scenario.law
-            known[names[index]] = Result.of(law.name, law.gains, result_columns(trace))
+            known[names[index]] = RunResult.of(law.name, law.gains, result_columns(trace))
         for name, scenario in wanted:
             self.scored[name] = result = known[name]
             parts = []
@@ -272,15 +272,15 @@ class Runs:
         """Return name -> what is measured on the trace of a named scenario."""
         return {name: measure(trace) for name, trace in self.traced(scenarios).items()}
 
-    def results(self) -> Iterator[Result]:
+    def results(self) -> Iterator[RunResult]:
         """Yield every run of the audit whose scores were used, and every run of the table."""
         yield from (self.scored | self.table).values()
 
 
-def of_table(table: "Table") -> dict[str, Result]:
+def of_table(table: "Table") -> dict[str, RunResult]:
     """Return the runs that a study's table holds, by key."""
     return {
-        row["hash"]: Result.of(row["law"], from_json(row["gains"]), row) for row in table.rows()
+        row["hash"]: RunResult.of(row["law"], from_json(row["gains"]), row) for row in table.rows()
     }
 
 

@@ -8,7 +8,7 @@ from rich.text import Text
 
 from smc_mujoco.analysis.step_halving import repetitions
 from smc_mujoco.cli import tables
-from smc_mujoco.cli.terminal import Terminal
+from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.files import slug

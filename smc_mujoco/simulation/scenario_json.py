@@ -9,11 +9,11 @@ from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from typing import Any
 
-from smc_mujoco.common.catalogue import subclasses
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.fingerprint import arithmetic
+from smc_mujoco.common.registry import subclasses
 from smc_mujoco.common.version import __version__
-from smc_mujoco.control import serialise as components
+from smc_mujoco.control import component_json as components
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.surface import catalogue as surfaces
