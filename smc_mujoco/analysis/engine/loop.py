@@ -49,7 +49,7 @@ state_in = record_in(CHANNEL_STATE)
 LOGGED_COLUMNS = tuple(COLUMN[name] for name in LOGGED)
 
 
-class MotorSetting(NamedTuple):
+class PlainDrive(NamedTuple):
     """A drive whose command is its force, as a DRIVE."""
 
     limit: float
@@ -144,6 +144,7 @@ def _records(form: Form) -> Fields:
             beyond(work, work_at.seen_a),
         )
 
+    limits = row_at.limits
     return {
         "n": always(n),
         "driven": always(form.driven),
@@ -152,9 +153,7 @@ def _records(form: Form) -> Fields:
         "now": inlined(lambda view, k, i: log_in(view.work, work_at.now + WIDTH * i)),
         "before": inlined(lambda view, k, i: log_in(view.work, work_at.before + WIDTH * i)),
         "state": inlined(lambda view, i: state_in(view.work, work_at.states + STATES * i)),
-        "drive": inlined(
-            lambda view, i: MotorSetting(view.row[row_at.limits + i], 1.0, 1.0, 0.0, 0.0)
-        ),
+        "drive": inlined(lambda view, i: PlainDrive(view.row[limits + i], 1.0, 1.0, 0.0, 0.0)),
         "ring": inlined(lambda view, k: beyond(view.work, work_at.ring + k % slots * n)),
         "seen": seen,
     }
