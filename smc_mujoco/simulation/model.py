@@ -288,10 +288,10 @@ def spec(scenario: Scenario) -> mujoco.MjSpec:
     for part in parts(scenario):
         part.edit(spec)
     if scenario.plant.is_user_model and not scenario.contact:
-        from smc_mujoco.mechanisms.custom import constraints, poles
+        from smc_mujoco.mechanisms.custom import poles
 
         if not poles.may_touch(scenario.plant):
-            constraints.hold(spec)
+            model_constraints.hold(spec)
     for sensor in spec.sensors:
         sensor.nsample = scenario.readings
     return spec

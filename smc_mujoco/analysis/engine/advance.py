@@ -6,7 +6,7 @@ under the implicitfast of frictions whose force is held over a step.
 from typing import Any
 
 from smc_mujoco.analysis.engine.calls import Compiler, acting, array_in, reader
-from smc_mujoco.analysis.engine.form import SETTING, STATES, Form, Part, layout
+from smc_mujoco.analysis.engine.form import SETTING, STATES, ChannelFunction, Form, layout
 from smc_mujoco.common.jit import always, inlined, record_in
 from smc_mujoco.mechanisms.hardware.drives import KEPT
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, JointState
@@ -170,7 +170,7 @@ def _first_of(of_stage: Any) -> Any:
     return inlined(lambda view, y, i: of_stage(view, y, i)[0])
 
 
-def _and_friction(part: Part, others: Any, force: Any) -> Any:
+def _and_friction(part: ChannelFunction, others: Any, force: Any) -> Any:
     """Return a function (view, y, i) -> the force of a friction on channel i, and of the others."""
     channels = part.channels
 

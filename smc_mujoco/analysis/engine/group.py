@@ -129,7 +129,9 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
         channels = tuple(part.channels(s.plant))
         frictions.append(ChannelFunction(part.stage_force, part.names, part.memory, channels))
     for part in _held(s):
-        frictions.append(ChannelFunction(part.force, part.names, part.memory, tuple(part.channels(s.plant))))
+        frictions.append(
+            ChannelFunction(part.force, part.names, part.memory, tuple(part.channels(s.plant)))
+        )
     clock = not s.clock.regular
     slots = 1
     while slots < s.delay_steps // s.steps + 1 + clock:  # few sizes, each of which is compiled

@@ -14,7 +14,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.mjcb import compiled
-from smc_mujoco.mechanisms.custom.constraints import touches
+from smc_mujoco.mechanisms.custom.model_constraints import touches
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.layout import moving_joints, state_with
 from smc_mujoco.mechanisms.plant import Plant, write
