@@ -288,7 +288,7 @@ def spec(scenario: Scenario) -> mujoco.MjSpec:
     for part in parts(scenario):
         part.edit(spec)
     if scenario.plant.is_user_model and not scenario.contact:
-        from smc_mujoco.mechanisms.custom import poles
+        from smc_mujoco.mechanisms.custom import model_constraints, poles
 
         if not poles.may_touch(scenario.plant):
             model_constraints.hold(spec)
