@@ -2,6 +2,10 @@
 touch; and what a run cannot resolve is told in one sentence.
 """
 
+import json
+from pathlib import Path
+
+import integrators
 import mujoco
 import numpy as np
 import pytest
@@ -187,3 +191,15 @@ def test_one_joint_alone_that_chatters_is_resolved():
     assert not coarse.unresolved
     bounds = [smc.score(trace)["ultimate_bound"] for trace in (coarse, fine)]
     assert bounds[0] == pytest.approx(bounds[1], rel=0.03)
+
+
+def test_the_table_of_twelve_machines_is_that_of_the_benchmark_and_within_its_bars():
+    measured = json.loads(integrators.MEASURED.read_text(encoding="utf-8"))
+    page = Path(integrators.__file__).parents[1] / "docs" / "accuracy.md"
+    assert integrators.table(measured) in page.read_text(encoding="utf-8")
+    assert len(measured) == len(integrators.MACHINES) * len(integrators.LAWS) == 24
+    for name, row in measured.items():
+        most = 1.0 if name.endswith("pid") else 3.0
+        errors = [abs(row[f"now {score}"]) for score in integrators.SCORES]
+        assert row["marked"] or max(errors) < most
+    assert np.median([row["cost"] for row in measured.values()]) < 1.15
