@@ -14,19 +14,14 @@ import numpy as np
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.simulation.trace import Trace
 
-MEAN_WINDOW = (
-    0.01,
-    40,
-)  # of a mean: share of the run, and smallest number of samples; chosen, see `window`
+# Numbers of presentation here are chosen.
+MEAN_SHARE = 0.01  # of the run, over which a mean is taken, see `window`
+MIN_MEAN = 40  # samples of it at least
 MIN_MOVE = 2e-3  # of the largest value: smaller steps between samples do not count as moves
 MIN_REVERSALS = 6  # in a row are chattering, if each follows within a quarter of a window
-TREND_SHARE = (
-    0.5  # of the variance along a straight line, above which y moves rather than chatters; chosen
-)
+TREND_SHARE = 0.5  # of the variance along a straight line, above which y moves and does not chatter
 COLUMNS = 360  # of pixels of a panel: traces of more samples are drawn as means and ranges
-MAX_GAP = (
-    0.02  # s: shorter gaps between parts that switch are closed, or they look like a fence; chosen
-)
+MAX_GAP = 0.02  # s: shorter gaps between parts that switch are closed, or they look like a fence
 LINE_PARTS = 250  # of a line, of which each keeps its smallest and its largest value
 
 
@@ -100,8 +95,7 @@ def window(trace: Trace) -> int:
     If a control switches irregularly between +-1, its mean over w samples varies by about 2 / w,
     which makes the line jagged. The window is so wide that this is less than the width of the line.
     """
-    share, shortest = MEAN_WINDOW
-    return 4 * round(max(share * trace.scenario.samples, shortest) / 4)
+    return 4 * round(max(MEAN_SHARE * trace.scenario.samples, MIN_MEAN) / 4)
 
 
 def chattering_parts(y: Array, width: int) -> list[slice]:

@@ -596,8 +596,8 @@ def tell_agreements(ax: Axes, shared: Sequence[Agreement], names: Sequence[str])
     height = 72 * ax.get_window_extent().height / ax.figure.dpi  # points
     room = 72 * ax.get_window_extent().width / ax.figure.dpi - size
     forever = [one for one in shared if one[1] == np.inf]
-    for told in (shared, forever):
-        words = style.wrapped(agreement_words(told, names), room, size, 2)
+    for said in [agreement_words(which, names) for which in (shared, forever)]:
+        words = style.wrapped(said, room, size, 2)
         lines = 1 + words.count("\n")
         if words and "…" not in words and height >= MIN_WORDS * size * lines:
             break

@@ -27,7 +27,7 @@ from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import end
 from smc_mujoco.draw.figure import DrawnRuns
-from smc_mujoco.draw.film import arrows, camera, pace, world
+from smc_mujoco.draw.film import arrows, camera, pace
 from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.draw.film.pace import FilmClock
 from smc_mujoco.draw.film.puppet import Course, Puppet
@@ -357,13 +357,13 @@ def placement(
     size: tuple[int, int],
 ) -> Placement:
     """Return where machines stand in a film of some size, px, before the chosen camera."""
-    turn = world.turn(tracks[0].trace.scenario, chosen)
-    puppets = [Puppet.of(track.trace.scenario, turn[:, 2]) for track in tracks]
+    puppets = [Puppet.of(track.trace.scenario) for track in tracks]
+    turn = puppets[0].turn(chosen)
     courses = [puppet.course(track) for track, puppet in zip(tracks, puppets, strict=True)]
     followed = any(map(Puppet.travels, puppets, courses))
     reaches = []
     for i, track in enumerate(tracks):
-        reach, puppets[i] = puppets[i].placed(track, courses[i], followed)
+        reach, puppets[i] = puppets[i].placed(track, courses[i], followed, turn[:, 2])
         reaches.append(reach)
     points = np.concatenate(reaches)
     if not followed:  # all stand on one floor, on stands that are cut alike

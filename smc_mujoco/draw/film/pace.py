@@ -26,9 +26,7 @@ from smc_mujoco.simulation.trace import Trace
 
 MAX_TRAVEL = 0.02  # of its range: how far a thing moves in a frame, if the speeds suffice; chosen
 MAX_HALVINGS = 3  # of the speed
-REST_TRAVEL = (
-    5e-4  # of its range: a thing that moves less in a frame is at rest; chosen: a pixel in 3 frames
-)
+REST_TRAVEL = 5e-4  # of its range in a frame, a pixel in 3: what moves less is at rest; chosen
 REST_SPEED = 4.0  # times real time
 MOTION_MARGIN = 0.1  # s before and after fast motion that are shown as slowly as it
 IMPACT_TIME = 0.04  # s around the start of a contact, and around the middle of a push
@@ -40,10 +38,7 @@ SEEN_TURN = 0.25  # rad: a turn of a hinge that is seen well
 SEEN_SLIDE = 0.08  # extents of its machine: the same of a slide
 STILL = 1 / 30  # s, of the run in a still
 LITTLE = 0.2  # of these: a film of less motion shows nothing moving
-MAX_LENGTH = (
-    1.85,
-    8.0,
-)  # duration of a film: in durations of the run, or in s if that is more; chosen
+MAX_LENGTH = (1.85, 8.0)  # of a film: in durations of the run, or in s if that is more; chosen
 Rate = Annotated[float, Number(low=1.0, high=120.0)]  # frames per second
 Speed = Annotated[float, Number(low=0.01, high=100.0)]  # times real time
 

@@ -12,6 +12,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw.film import arrows, world
+from smc_mujoco.draw.film.camera import Camera
 from smc_mujoco.draw.film.track import MachineTrack
 from smc_mujoco.draw.states import Shape, shapes
 from smc_mujoco.mechanisms.layout import OWN, ROTOR, joint_ids
@@ -85,12 +86,12 @@ class Puppet:
     rail: float  # m, length along x of a cart's rail, on which it stays; inf without a cart
     start: Array  # the pose of joints without a channel, (nq,)
     rotors: Sequence[tuple[int, int]]  # channel, and place in the pose
-    mounts: Sequence[arrows.Mount]
+    mounts: Sequence[arrows.Mount] = ()  # of a machine that is placed
     height: float = 0.0  # m, of the machine over the film's floor
 
     @classmethod
-    def of(cls, scenario: Scenario, front: Array) -> "Puppet":
-        """Return the machine before a camera whose picture's normal is `front`, (3,)."""
+    def of(cls, scenario: Scenario) -> "Puppet":
+        """Return the machine of a scenario."""
         scenario = world.first_channels(scenario)
         plant = scenario.plant
         found = shapes(scenario)
@@ -121,13 +122,21 @@ class Puppet:
             rail,
             start,
             rotors,
-            arrows.mounts(scenario, ids.tolist(), slides, rail, front),
         )
 
     @property
     def model(self) -> mujoco.MjModel:
         """The machine's model at the start."""
         return self.shapes[0].model
+
+    def turn(self, chosen: Camera | None) -> Array:
+        """Return the frame of the camera, (3, 3), as camera.py has it: the chosen one, else the
+        plant's own.
+        """
+        plant = self.scenario.plant
+        if chosen is None and plant.on_stage:
+            chosen = "look"
+        return world.turn(self.model, self.start, chosen, plant.name)
 
     @property
     def shown(self) -> int:
@@ -213,18 +222,23 @@ class Puppet:
         own = max(float(np.ptp(points, axis=0).max()) for points in course.places)
         return float(np.ptp(course.middle, axis=0).max()) > FOLLOWED_TRAVEL * own
 
-    def placed(self, track: MachineTrack, course: Course, followed: bool) -> tuple[Array, "Puppet"]:
+    def placed(
+        self, track: MachineTrack, course: Course, followed: bool, front: Array
+    ) -> tuple[Array, "Puppet"]:
         """Return what moves and must be in the picture, (points, 3) m, and the machine with bent
         arrows that suit the size of what moves; one that the camera follows at its height over the
         film's floor.
 
         These are the corners of the boxes of all that the channels move, over the poses of its
-        trace and its reference, and its arrows. Of a machine that the camera follows, the machine
+        trace and its reference, and its arrows, before a camera whose picture's normal is `front`,
+        (3,). Of a machine that the camera follows, the machine
         alone counts.
         """
         sides = np.ptp(np.concatenate(course.places), axis=0)
         radius = arrows.BENT_SIZE * float(sides.max(initial=0.0))
-        mounts = [mount._replace(radius=min(mount.radius, radius)) for mount in self.mounts]
+        ids = self.ids.tolist()
+        found = arrows.mounts(self.scenario, ids, self.slides.tolist(), self.rail, front)
+        mounts = [mount._replace(radius=min(mount.radius, radius)) for mount in found]
         lines = self.lines(track, mounts)
         if followed:
             places = course.followed(np.array([*course.times, *(time for time, _ in lines)]))

@@ -143,19 +143,16 @@ def set_floor(model: mujoco.MjModel, view: camera.View, points: Array, moved: Ar
     model.vis.rgba.fog[:] = HAZE
 
 
-def turn(scenario: Scenario, chosen: Camera | None = None) -> Array:
-    """Return the frame of the camera, (3, 3), as camera.py has it: the chosen one, else the plant's
-    own.
+def turn(model: mujoco.MjModel, pose: Array, chosen: Camera | None, whose: str) -> Array:
+    """Return the frame of the camera of a model in a pose, (nq,), (3, 3), as camera.py has it: the
+    chosen one, or one that suits it. `whose` model it is, is for messages.
     """
-    if chosen is None and scenario.plant.on_stage:
-        chosen = "look"
-    model = models.compile_model(scenario)
     if not isinstance(chosen, str):
         return camera.turn(*(chosen or view(model)))
     names = {model.camera(i).name: i for i in range(model.ncam) if model.camera(i).name}
-    which = find(f"camera of {scenario.plant.name}", chosen, names)
+    which = find(f"camera of {whose}", chosen, names)
     data = mujoco.MjData(model)
-    data.qpos[:] = models.initial_state(model, scenario)[0]
+    data.qpos[:] = pose
     forward(model, data)
     return data.cam_xmat[which].reshape(3, 3).copy()
 

@@ -42,6 +42,9 @@ def trace(request, tmp_path_factory) -> smc.Trace:
     )
 
 
+FRONT = np.array([0.0, -1.0, 0.0])
+
+
 def test_angles_are_those_of_mujoco_s_free_camera():
     turn = camera.turn(90.0, -30.0)
     assert -turn[:, 2] == pytest.approx([0.0, 0.75**0.5, -0.5])
@@ -51,15 +54,16 @@ def test_angles_are_those_of_mujoco_s_free_camera():
 
 
 def test_an_own_model_s_camera_is_found_by_its_name(trace):
-    side = world.turn(trace.scenario, "side")
+    own = puppet.Puppet.of(trace.scenario)
+    side = own.turn("side")
     assert -side[:, 2] == pytest.approx([-1.0, 0.0, 0.0])
-    azimuth = -world.turn(trace.scenario)[:2, 2]
-    down = -world.turn(trace.scenario)[2, 2]
+    azimuth = -own.turn(None)[:2, 2]
+    down = -own.turn(None)[2, 2]
     # the first that stands still, which
     assert azimuth / np.linalg.norm(azimuth) == pytest.approx([0.0, 1.0])
     assert down == pytest.approx(np.sin(np.radians(world.LOW_ELEVATION)))  # looks along the floor
     with pytest.raises(smc.ScenarioError, match="sid"):
-        world.turn(trace.scenario, "sid")
+        own.turn("sid")
 
 
 @pytest.mark.slow
@@ -82,13 +86,13 @@ def test_joints_without_a_channel_move_as_in_the_run(trace):
     assert arm == pytest.approx(np.interp(times, trace.t, trace.x[:, 0]), abs=1e-9)
     assert motion.poses[:, 3] == pytest.approx(2.0 - 9.81 * times**2 / 2, abs=1e-2)
     assert motion.at(0.2)[3] == motion.poses[1, 3]
-    shown = puppet.Puppet.of(trace.scenario, np.array([0.0, -1.0, 0.0]))
+    shown = puppet.Puppet.of(trace.scenario)
     assert shown.qpos(np.array([1.0]), rest=motion.poses[2])[[0, 3]] == pytest.approx(
         [1.0, motion.poses[2, 3]]
     )
     (run,) = tracks([trace], ["#0072B2"])
     run.motion = motion
-    points, placed = shown.placed(run, shown.course(run), False)
+    points, placed = shown.placed(run, shown.course(run), False, FRONT)
     low = points[:, 2].min() - placed.height
     # the ball is in the picture
     assert low == pytest.approx(motion.poses[:, 3].min() - 0.1, abs=0.2)
@@ -123,10 +127,10 @@ def test_fixed_things_that_are_farther_or_larger_than_four_times_what_moves_may_
             x0=0.0,
         )
     )
-    shown = puppet.Puppet.of(trace.scenario, np.array([0.0, -1.0, 0.0]))
+    shown = puppet.Puppet.of(trace.scenario)
     (run,) = tracks([trace], ["#0072B2"])
     course = shown.course(run)
-    reach, _ = shown.surrounded(shown.placed(run, course, False)[0], [course])
+    reach, _ = shown.surrounded(shown.placed(run, course, False, FRONT)[0], [course])
     assert bool(np.ptp(reach[:, 0]) > 1.01) is seen
 
 

@@ -261,6 +261,7 @@ def test_a_blow_of_milliseconds_is_told_with_its_size_as_long_as_it_takes_to_rea
     assert told[0] == np.ceil(touching[0] * 30)  # at once, and not before
     faded = [now.opacity for now in reported if now]
     assert faded[0] > 0.7
+    assert faded[-1] < 0.4
     assert faded == sorted(faded, reverse=True)
 
 
