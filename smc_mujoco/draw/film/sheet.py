@@ -41,6 +41,7 @@ MAX_LINES = 2  # of a label
 SAMPLE = 0.5  # letters, height of the line above a label
 LEAST_TITLE = 0.75  # of the size of letters, of a long title
 TIME_TICKS = 5  # at most
+SIDES = ("left", "right")  # of the first and the last tick's words, so that they stay on the page
 FUTURE_LINE = 0.4  # opacity of what is still to come
 FUTURE_BAND = 0.12
 EVENT_TIME = 1.0  # s of the film for which what has ended is told
@@ -186,7 +187,8 @@ class Sheet:
             y = start + 0.5 * SAMPLE * self.letters
             ends = np.array([left + 0.3 * self.letters, right - 0.3 * self.letters])
             place = (ends / self.size[0], [1.0 - y / self.size[1]] * 2)
-            sample = Line2D(*place, color=colour, lw=style.points(2.5), **look)
+            shown = {**look, "markevery": None}  # without axes, a mark stands at each end
+            sample = Line2D(*place, color=colour, lw=style.points(2.5), **shown)
             self.page.add_artist(sample)
             y = start + (SAMPLE + LINE_PITCH * lines - 0.3) * self.letters
             self.write(middle, y, words, ha="center", va="baseline", linespacing=LINE_PITCH)
@@ -234,6 +236,8 @@ class Sheet:
         ticks = ticks[(ticks >= 0.0) & (ticks <= stop * (1.0 + 1e-9))].tolist()
         ax.set_xlim(0.0, stop)
         ax.set_xticks(ticks, [*(f"{tick:g}" for tick in ticks[:-1]), f"{ticks[-1]:g} s"])
+        for label, side in zip(ax.get_xticklabels()[:: len(ticks) - 1 or 1], SIDES, strict=False):
+            label.set_horizontalalignment(side)
         ax.tick_params(length=0)
 
     def picture(self, moment: Moment, machines: Sequence[Array]) -> Array:

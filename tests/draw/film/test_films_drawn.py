@@ -54,6 +54,15 @@ def test_labels_stay_below_their_tiles_on_as_many_lines_as_were_measured(wide):
     assert ("\n" in drawn[1].get_text()) == (wide == 150)
 
 
+def test_runs_of_one_law_have_their_marks_and_ticks_stay_on_the_page():
+    page = sheet([machine("duffing"), machine("duffing", input_delay=0.01)])
+    assert [line.get_marker() for line in page.page.artists] == ["o", "s"]
+    for one in page.moving:
+        for label in one.axes.get_xticklabels():
+            box = label.get_window_extent()
+            assert 0.0 <= box.x0 <= box.x1 <= 1280.0, label.get_text()
+
+
 def test_the_clock_the_pace_what_changed_and_what_is_said_are_told_at_their_time():
     parts = {"friction": smc.Coulomb(0.2), "jump": smc.Jump(0.2, {"mass": 2.0})}
     traces = [machine("duffing", **parts), machine("duffing", "adaptive", **parts)]
