@@ -14,6 +14,7 @@ from smc_mujoco.analysis.ranking import first_of_kind
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError, has, items_of, one_line, shown
 from smc_mujoco.common.files import from_json
+from smc_mujoco.common.text import joined
 from smc_mujoco.control.source import Source, restore
 from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
@@ -36,7 +37,7 @@ OTHER_ENTRIES = ("model", "versions")
 
 class RunColumns(Protocol):
     """A table with a row per run and columns plant, law, condition, seed, failure, diverged_at,
-    arrived, and every metric.
+    arrived, touched, and every metric.
     """
 
     def column(self, name: str) -> Array:
@@ -142,6 +143,26 @@ def failures(table: RunColumns) -> list[str]:
         how = table.column("failure")[lost & (laws == law)]
         first = one_line(how[0] or "it diverged")
         sentences.append(f"{law} failed in {len(how)} of {sum(laws == law)} runs, first: {first}.")
+    return sentences
+
+
+def untouched(table: RunColumns) -> list[str]:
+    """Return a sentence for each plant and condition with a contact that no run of some law, or of
+    any law, touches.
+    """
+    names = ("plant", "condition", "law")
+    runs = zip(*(table.column(name).tolist() for name in (*names, "touched")), strict=True)
+    free: dict[tuple[str, str], dict[str, bool]] = {}  # block -> law -> whether no run touches
+    for plant, condition, law, touched in runs:
+        laws = free.setdefault((plant, condition), {})
+        laws[law] = laws.get(law, True) and touched is False
+    sentences = []
+    for (plant, condition), laws in free.items():
+        clear = [law for law, alone in laws.items() if alone]
+        of = "" if len(clear) == len(laws) else f" of {joined(clear)}"
+        if clear:
+            where = f"on {plant} under {condition}"
+            sentences.append(f"No run{of} touches a stop or an obstacle {where}, at any sample.")
     return sentences
 
 

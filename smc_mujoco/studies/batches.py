@@ -13,6 +13,7 @@ from typing import Any
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import to_json
 from smc_mujoco.metrics.catalogue import arrived, score, trends
+from smc_mujoco.metrics.touching import touched
 from smc_mujoco.simulation import run_key, workers
 from smc_mujoco.simulation.prepare import Prepared, prepare
 from smc_mujoco.simulation.run import Report, stream
@@ -38,7 +39,8 @@ def result_columns(trace: Trace) -> ResultColumns:
         for name, value in score(trace).items():
             if not math.isnan(value):
                 known[name] = value
-        return failed | known | {"trends": to_json(trends(trace)), "arrived": arrived(trace)}
+        ends = {"trends": to_json(trends(trace)), "arrived": arrived(trace)}
+        return failed | known | ends | {"touched": touched(trace)}
     except ScenarioError as error:  # not finite, though nothing failed
         return failed | {"failure": str(error)}
 

@@ -407,7 +407,9 @@ class Boards(Tables, list[Board]):
     board.
     """
 
-    failures: Sequence[str] = ()  # a sentence for each law with failed runs, below the last table
+    # sentences below the last table: for each law with failed runs, and where no run touches
+    failures: Sequence[str] = ()
+    untouched: Sequence[str] = ()
 
     @property
     def winners(self) -> list[tuple[str, str, str, str]]:
@@ -446,7 +448,7 @@ class Boards(Tables, list[Board]):
         if not groups:
             return [Tabular(headings=["no boards: no metric applies"], rows=[])]
         made = [_table(name, boards) for name, boards in groups.items()]
-        notes = *made[-1].notes, *self.failures, key(self, repr(made))
+        notes = *made[-1].notes, *self.failures, *self.untouched, key(self, repr(made))
         return [*made[:-1], dataclasses.replace(made[-1], notes=notes)]
 
 

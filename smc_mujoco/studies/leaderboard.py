@@ -80,6 +80,7 @@ def leaderboard(
     paired_runs.check_table(table)
     boards = Boards()
     boards.failures = paired_runs.failures(table)
+    boards.untouched = paired_runs.untouched(table)
     groups = paired_runs.groups(table, by)
     ran = [paired_runs.scenarios(table, group) for group in groups]
     sources = []

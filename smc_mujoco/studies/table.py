@@ -12,6 +12,8 @@ Columns:
   there was no search;
 - every metric of `smc.score`: null if the run failed or the metric does not apply, inf for "never";
 - how the run failed: `diverged_at` in s, and `failure`; `arrived`, see `metrics.catalogue`;
+- `touched`: whether the machine touched anything at a sample, null without a contact or if the run
+  failed;
 - what `leaderboard` charges: `half_step`, the scores of the same run at half the physics step, as
   JSON, null where it was not repeated; `trends`, the ratios of the metrics of the last part to
   those before it, see `ranking`, as JSON;
@@ -56,7 +58,7 @@ RESULT_COLUMNS = {
     "half_step": "string",
     "trends": "string",
 }
-RESULT_COLUMNS |= {"arrived": "bool"}
+RESULT_COLUMNS |= {"arrived": "bool", "touched": "bool"}
 RESULT_COLUMNS |= {"versions": "string", "scenario": "string"}
 PREVIEW = ("plant", "law", "source", "condition", "seed")
 PREVIEW += ("settling_time", "ultimate_bound", "itae", "tv_rate", "failure")

@@ -366,7 +366,7 @@ class Rows:
         n = len(self.rows)
         gains = [json.dumps({"plant": {}, "law": self.sets(row[3])}) for row in self.rows]
         empty = {"scenario": np.array(gains, object), "source": np.full(n, "default", object)}
-        nothing = ("failure", "half_step", "trends", "search")
+        nothing = ("failure", "half_step", "trends", "search", "touched")
         empty |= dict.fromkeys(nothing, np.full(n, None, object))
         empty["diverged_at"] = np.full(n, np.nan)
         empty["arrived"] = np.array([row[2] not in self.away for row in self.rows])

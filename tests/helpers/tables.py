@@ -16,6 +16,7 @@ TEXTS = {
     "half_step": None,
     "trends": None,
     "arrived": True,
+    "touched": None,
     "source": "yours",
     "search": None,
     "scenario": '{"plant": {}}',

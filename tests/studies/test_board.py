@@ -84,6 +84,28 @@ def test_the_last_table_says_how_laws_failed():
         assert note in last.notes
 
 
+@pytest.mark.parametrize(
+    ("touched", "said"),
+    [
+        ([False] * 4, "No run touches a stop or an obstacle on duffing under contact"),
+        ([True, True, False, False], "No run of b touches a stop or an obstacle on duffing under"),
+        ([True, False, False, True], ""),
+        ([False, None, None, False], ""),  # a run that failed may have touched
+        ([None] * 4, ""),
+    ],
+)
+def test_the_last_table_says_where_no_run_touches(touched, said):
+    law, condition = ["a", "a", "b", "b"], ["contact"] * 4
+    made = MadeTable(
+        law=law, condition=condition, seed=[0, 1, 0, 1], itae=[1.0, 2.0, 3.0, 4.0], touched=touched
+    )
+    text = repr(leaderboard(made, ["itae"]))
+    if said:
+        assert said in " ".join(text.split())
+    else:
+        assert "touches" not in text
+
+
 def test_html_and_latex_have_the_numbers_of_the_text(boards):
     """Also of a law whose name each of them must escape."""
     (table,) = boards.tables

@@ -14,8 +14,8 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw.film import arrows, world
 from smc_mujoco.draw.film.camera import Camera
 from smc_mujoco.draw.film.track import MachineTrack
-from smc_mujoco.draw.states import Shape, shapes
 from smc_mujoco.mechanisms.layout import OWN, ROTOR, joint_ids
+from smc_mujoco.metrics.touching import Shape, shapes
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 
