@@ -439,7 +439,9 @@ def check_path(model: mujoco.MjModel, scenario: Scenario) -> None:
     # an arm: the straight line in its joints may cross what the arm goes around
     moves_around = scenario.plant.tip
     if not inside and scenario.resolved.x0 != scenario.plant.x0 and not moves_around:
-        free = initial_state(model, dataclasses.replace(scenario, x0=scenario.plant.x0))[0]
+        # no scenario is made, because it would refuse a default start beyond a stop
+        v0 = scenario.resolved.v0
+        free = state_with(model, moving_joints(model), scenario.plant.x0, v0)[0]
         if _overlap(model, data, free):
             free = model.qpos0
         for part in np.linspace(0, 1, PATH_POINTS):
