@@ -11,7 +11,7 @@ import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
 from smc_mujoco.control import surface
 from smc_mujoco.control.from_text import component, parsed_gains
-from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation import scenario_json
 
 MINE = """
 import smc_mujoco as smc
@@ -84,7 +84,7 @@ def test_a_text_is_its_law(files, text, name, gains):
     assert law.source.kind == ("yours" if "(" in text else "default" if law.gains else "none")
 
 
-SHIPPED = serialise.describe(
+SHIPPED = scenario_json.describe(
     smc.Scenario(plant="duffing", law=smc.law("pid", plant="duffing"), duration=0.1)
 )
 

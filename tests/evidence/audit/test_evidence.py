@@ -16,7 +16,7 @@ import smc_mujoco as smc
 from smc_mujoco.cli import main
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import from_json
-from smc_mujoco.evidence.audit import evidence, runs
+from smc_mujoco.evidence.audit import claim_runs, evidence
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import REFUTED
 from smc_mujoco.simulation import scenario_json
@@ -230,5 +230,7 @@ def test_the_command_writes_evidence_and_checks_the_seal(folder, tmp_path):
 
 @pytest.mark.quick
 def test_the_hash_of_some_bytes_depends_on_each_of_them():
-    hashes = {runs._hash(*parts) for parts in ((b"a", b"b"), (b"c", b"b"), (b"a", b"c"), (b"a",))}
+    hashes = {
+        claim_runs._hash(*parts) for parts in ((b"a", b"b"), (b"c", b"b"), (b"a", b"c"), (b"a",))
+    }
     assert len(hashes) == 4
