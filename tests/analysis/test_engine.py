@@ -200,5 +200,5 @@ def test_a_new_row_is_in_the_score_of_a_trace_and_in_the_engine(monkeypatch):
     expected = np.sqrt(np.mean(trace.v[400:] ** 2))
     assert late_speed(trace) == smc.score(trace)["late_speed"] == pytest.approx(expected)
     assert not group.why_not(case, ("late_speed",))
-    found = group.Group([case], ("late_speed",)).scored("cpu", 1)[0][0]
+    found = group.FormGroup([case], ("late_speed",)).scored("cpu", 1)[0][0]
     assert found == pytest.approx([expected], rel=AGREES)
