@@ -23,14 +23,14 @@ The names by task, those of a first script first; `help(smc.run)` tells what a n
     Signals and time: Signal, Jump, Fault, Clock
     Analyse: worst_case, sensitivity, Uncertainty
     Machines: rig, rigs, identify
-    Papers: audit, claims, paper
+    Papers: audit, claims
     Benchmark: problem, results
 
 What is needed less often is in modules: `smc.signals` (pushes, paths, gusts, series),
 `smc.hardware` (more friction, servos), `smc.design` (gains from theory, chattering, regions of
 attraction), `smc.accuracy` (orders, half steps), `smc.metrics` (of joints and tips),
-`smc.exchange` (laws from and to C and FMUs), `smc.envs` (environments for agents) and `smc.errors`
-(warnings).
+`smc.exchange` (laws from and to C and FMUs), `smc.envs` (environments for agents), `smc.errors`
+(warnings) and `smc.paper`.
 
 `__init__.pyi` has the modules of the names. A name is loaded when it is first used, so that
 importing the package costs nothing. Types that are only returned are in their modules, such as

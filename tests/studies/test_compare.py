@@ -7,7 +7,6 @@ import math
 import os
 import re
 import time
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -268,8 +267,8 @@ def test_more_blocks_than_have_a_table_each_are_one_table_a_plant(most, tmp_path
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:no set of gains")
 def test_a_gain_without_a_unit_is_searched_about_its_default_and_that_is_said(tmp_path):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    said = "gains lam and k1 of plain_law have no unit"
+    with pytest.warns(smc.errors.ScenarioWarning, match=said):
         made = smc.compare(
             [plain_law, "classical"],
             "duffing",

@@ -666,8 +666,8 @@ def test_a_file_is_hashed_parsed_and_compiled_once_for_a_plant(tmp_path, monkeyp
         monkeypatch.setattr(owner, name, counting)
 
     counted(mjcf, "digest")
-    counted(mjcf.Source, "read")
-    counted(mjcf.Source, "compiled")
+    counted(mjcf.ModelSource, "read")
+    counted(mjcf.ModelSource, "compiled")
     path = tmp_path / "hanging.xml"
     path.write_text(HANGING.replace("-.4", f"-.{tmp_path.stat().st_ino}"))  # none that is known
     plant = smc.plant_from(path, ["j"])
