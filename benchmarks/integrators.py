@@ -178,7 +178,7 @@ def timed(scenario: smc.Scenario) -> tuple[Trace, float]:
         start = time.process_time()
         trace = smc.run(scenario, threads=1)
         spent.append(time.process_time() - start)
-    return trace, min(spent)
+    return trace, min(spent)  # pyright: ignore[reportPossiblyUnboundVariable]
 
 
 def row(scenario: smc.Scenario) -> dict:

@@ -62,7 +62,7 @@ def cases(plant: str) -> dict[str, smc.Scenario]:
         for kind in offered.contacts
     }
     gains = smc.paper.GAINS[plant]["observer_free"]
-    plain = smc.Scenario(plant=plant, law=smc.law("observer_free", **gains))
+    plain = smc.Scenario(plant=plant, law=smc.law("observer_free", **gains))  # pyright: ignore[reportArgumentType]
     return {name: dataclasses.replace(plain, **given) for name, given in fields.items()}
 
 

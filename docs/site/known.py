@@ -155,7 +155,7 @@ def audits() -> Iterator[str]:
     for name, shown in AUDITS.items():
         about = paper(name)
         whose = {id: claim.whose for id, claim in about.claims.items()}
-        own = [verdict for id, (verdict, _) in shown.items() if whose[id] == PAPER]
+        own = [verdict for id, (verdict, *_) in shown.items() if whose[id] == PAPER]
         counts = [
             *map(own.count, kinds),
             *(list(whose.values()).count(kind) for kind in (DERIVED, OURS)),

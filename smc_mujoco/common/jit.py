@@ -40,7 +40,7 @@ from smc_mujoco.common.rebuild import helpers, names_in, rebuild, values_in
 inlined = njit(
     error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True
 )
-if numba.config.DISABLE_JIT:
+if numba.config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
     raise ScenarioError(
         "NUMBA_DISABLE_JIT is set, and MuJoCo can call only compiled laws: unset it"
     )

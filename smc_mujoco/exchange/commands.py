@@ -97,7 +97,8 @@ def export(
     with delay_signals():
         from smc_mujoco.control import from_text
     chosen = from_text.law(
-        laws[0] if laws else out.stem, **from_text.parsed_gains(gains, "--gains")
+        laws[0] if laws else out.stem,
+        **from_text.parsed_gains(gains, "--gains"),  # pyright: ignore[reportArgumentType]
     )
     with delay_signals():
         if out.suffix == ".c":

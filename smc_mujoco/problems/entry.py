@@ -77,7 +77,7 @@ class Entry:
         if self.file is None:
             return self.name
         gains = self.gains.get(EVERYWHERE, self.gains.get(plant, {}))
-        return law_of(str(self.file), **gains).named(self.name)
+        return law_of(str(self.file), **gains).named(self.name)  # pyright: ignore[reportArgumentType]
 
     @property
     def about(self) -> Fields:

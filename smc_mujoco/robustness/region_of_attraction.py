@@ -296,7 +296,7 @@ def verdict_of(trace: Trace, x: Array, v: Array, final: bool) -> int | None:
     late = last_part(trace).start if final else _early(len(trace.t) - 1)
     reach = _reach(x, v, trace.scenario.resolved.u_max, final)
     outcome = over_trace(trace, late, reach)
-    return outcome if outcome or final else None
+    return outcome if outcome or final else None  # pyright: ignore[reportReturnType]
 
 
 def _early(samples: int) -> int:

@@ -450,8 +450,8 @@ def _stepper(plant: Plant, duration: float) -> Data:
                 f"{joint.way:.2g} rad (m): give your own, as pulses: "
                 "actuator=Stepper(torque=2, speed=60, ramp=80), u_max=80"
             )
-    fields = _each_joint("actuator", lambda limit, plant: of_rig(30.0 * limit))(plant, duration)
-    return fields | {"u_max": of_rig(1.0).ramp}
+    each: Any = _each_joint("actuator", lambda limit, plant: of_rig(30.0 * limit))
+    return each(plant, duration) | {"u_max": of_rig(1.0).ramp}
 
 
 def _fault(plant: Plant, duration: float) -> Data:

@@ -152,7 +152,7 @@ def opened(where: Any) -> Iterator[Executor]:
         yield where
 
 
-def _dask_client(thing: object) -> "Client | None":
+def _dask_client(thing: Any) -> "Client | None":
     """Return the dask Client that a thing is or belongs to, if any."""
     distributed = sys.modules.get("distributed")
     if distributed is None:

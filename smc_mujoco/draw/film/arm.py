@@ -113,7 +113,7 @@ class Overlay:
         words = f"{force:.0f} N"
         arrow = arrows.Arrow(0.0, share, arrows.rgba(colour), body=hits, words=words)
         if np.linalg.norm(way) > 1.0:
-            points = np.linspace(*line, 40)
+            points = np.linspace(line[0], line[1], 40)
             arrows.stamp(image, points, SHAFT_WIDTH * self.scale, arrow, self.scale, 0, share < 1.0)
 
 

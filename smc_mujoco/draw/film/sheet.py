@@ -114,7 +114,7 @@ class Sheet:
         self.tiles = tiles
         self.start = start
         self.letters = letters(size)
-        with style.page(WIDTH), rc_context(ONE_SIZE):
+        with style.page(WIDTH), rc_context(ONE_SIZE):  # pyright: ignore[reportArgumentType]
             inches = (WIDTH, WIDTH * size[1] / size[0])
             self.page = Figure(figsize=inches, dpi=size[0] / WIDTH)
             self.canvas = FigureCanvasAgg(self.page)
@@ -230,9 +230,8 @@ class Sheet:
         stop = self.runs.span[0]
         narrow = 0.5 * self.size[0] - style.width("−00.00smooth", self.letters)
         count = int(narrow / style.width("0.0000", self.letters))
-        ticks = MaxNLocator(min(max(count, 1), TIME_TICKS), steps=pages.STEPS).tick_values(
-            0.0, stop
-        )
+        locator = MaxNLocator(min(max(count, 1), TIME_TICKS), steps=pages.STEPS)
+        ticks = np.asarray(locator.tick_values(0.0, stop))
         ticks = ticks[(ticks >= 0.0) & (ticks <= stop * (1.0 + 1e-9))].tolist()
         ax.set_xlim(0.0, stop)
         ax.set_xticks(ticks, [*(f"{tick:g}" for tick in ticks[:-1]), f"{ticks[-1]:g} s"])

@@ -91,7 +91,7 @@ def test_a_map_shows_the_paths_of_flights_up_to_the_clock_to_one_scale():
     x = np.stack([part(6.0 * run.t) for part in (np.sin, np.cos, *[np.zeros_like] * 4)], axis=1)
     shown = sheet([dataclasses.replace(run, x=0.4 * x)], ["one"], SIZE)
     (one,) = shown.flights
-    transform = one.past.axes.transData
+    transform = one.past.axes.transData  # pyright: ignore[reportOptionalMemberAccess]
     line = transform.transform(one.places.T)
     assert np.ptp(line[:, 1]) == pytest.approx(np.ptp(line[:, 0]), rel=0.01)
     now = picture(shown, 0.5).astype(int)

@@ -452,7 +452,7 @@ def test_a_robot_that_rises_from_its_floor_is_taken_and_told(mode, x0):
         made = smc.plant_from(text, knee, keyframe="home", others=mode)
     inside = next(str(one.message) for one in said if "inside" in str(one.message))
     wanted = 1e3 * (0.15 * math.cos(x0 or 0.0) + 0.05 - 0.182)
-    assert int(re.search(r"(\d+) mm", inside)[1]) == pytest.approx(wanted, abs=1)
+    assert int(re.search(r"(\d+) mm", inside)[1]) == pytest.approx(wanted, abs=1)  # pyright: ignore[reportOptionalSubscript]
     assert smc.run(smc.Scenario(plant=made, law=PID, duration=0.5)).failure is None
     with pytest.raises(smc.ScenarioError, match="18 mm inside 'foot0': give a keyframe"):
         smc.plant_from(text, knee, keyframe="home", others="locked")

@@ -650,7 +650,7 @@ def test_dry_friction_creeps_under_the_weight_where_runs_start(x0):
         assert told is None  # it hangs, and nothing pulls
         return
     trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.3))
-    assert float(told[1]) == pytest.approx(np.abs(trace.v[-1]).max(), rel=0.1)
+    assert float(told[1]) == pytest.approx(np.abs(trace.v[-1]).max(), rel=0.1)  # pyright: ignore[reportOptionalSubscript]
 
 
 def test_a_file_is_hashed_parsed_and_compiled_once_for_a_plant(tmp_path, monkeypatch):
