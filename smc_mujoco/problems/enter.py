@@ -1,6 +1,6 @@
 """Enter a law in a suite: check its folder, run it, and write what it did.
 
-    results/smc-30@1/soft relay/entry_runs.parquet  # a row a run
+    results/smc-30@1/soft relay/runs.parquet  # a row a run
     results/smc-30@1/soft relay/result.json   # the entry, failed runs, time a sample, versions
 
 Until both are there, a folder of parts keeps the runs of each problem that is done.
@@ -29,7 +29,7 @@ from smc_mujoco.problems import entry_runs, suite
 from smc_mujoco.problems.problem import Problem, problem
 
 FAILURES = 3  # that a result shows
-TABLE = "entry_runs.parquet"
+TABLE = "runs.parquet"
 RESULT = "result.json"
 PARTS = "parts"
 

@@ -67,6 +67,7 @@ NOT_OF_FREE_BODIES = {
 }
 MAX_STEPS = 100_000_000  # per run: minutes of computing
 MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
+LOST_SHARE = 0.05  # of a duration that is no whole number of periods, before it is told; chosen
 MAX_LATENESS = 0.3  # stiffness times step over damping of bristles; chosen: joints rest 20 % off
 MAX_ANGLE = (
     3.0 * math.pi
@@ -1059,7 +1060,7 @@ def _doubts(s: Resolved) -> Iterator[str]:
                     f"{0.1 * MAX_LATENESS * damping / part.stiffness:.1g} or less, or softer ones"
                 )
     lasts = s.samples * s.control_period
-    if abs(lasts - s.duration) > 1e-3 * s.control_period:
+    if abs(lasts - s.duration) > LOST_SHARE * s.duration:
         yield (
             f"duration {s.duration:g} s is not a whole number of control periods of "
             f"{s.control_period:g} s, so the run lasts {lasts:g} s: give a duration of "

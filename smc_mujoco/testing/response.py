@@ -182,7 +182,7 @@ def respond(
         raise ScenarioError(
             f"reference is {shown(fields['reference'])}: leave it out, as it is the step of {step}"
         )
-    if isinstance(law, Callable) and not isinstance(law, Template):
+    if isinstance(law, Callable) and not isinstance(law, Component | Template):
         raise ScenarioError(
             f"law is {shown(law)}: put @smc.law_function(gains={{...}}) above the function"
         )

@@ -14,7 +14,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-import wild
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -155,7 +154,6 @@ def test_a_table_that_unpacks_to_too_much_is_refused_before(tmp_path):
     "make",
     [
         lambda: smc.exchange.law_to_fmu("pid", "a.fmu"),
-        lambda: smc.plant_from(f"<!-- -->{wild.ARM}", ["shoulder"]),
     ],
 )
 def test_without_room_for_temporary_files_there_is_one_sentence(make, tmp_path, monkeypatch):

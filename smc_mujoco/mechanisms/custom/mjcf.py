@@ -307,7 +307,7 @@ def pick(label: str, kind: str, name: object, names: Sequence[str]) -> int:
     if not there:
         raise ScenarioError(
             f"unknown {kind} of {label} {shown(name)}: none has a name there, so give one of its "
-            f"{kind}s a name, or another file if it has none"
+            f"{kind}s a name, or another file if it has none, such as the one that includes it"
         )
     return find(f"{kind} of {label}", name, there)
 

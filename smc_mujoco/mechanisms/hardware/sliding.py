@@ -47,7 +47,7 @@ from smc_mujoco.mechanisms.hardware.friction import (
 )
 from smc_mujoco.mechanisms.hardware.joint_force import JointForce, PerJoint
 from smc_mujoco.mechanisms.hardware.moments import Run
-from smc_mujoco.mechanisms.hardware.part import Actuator
+from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF, Actuator
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 
 STICKING_SPEED = 1e-4  # rad/s or m/s, chosen: a joint that becomes slower than this sticks
@@ -115,6 +115,8 @@ class Sliding(JointForce):
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         if not self.zero:
             yield from Coulomb(TINY, on=self.on).fields(model)
+            yield Field("dof_solref", self.dofs(model), HARD_SOLREF)
+            yield Field("dof_solimp", self.dofs(model), HARD_SOLIMP)
 
     def friction_rows(self, run: Run) -> dict[int, int]:
         if run.rk4:

@@ -224,7 +224,7 @@ def test_a_missing_mesh_and_a_part_are_refused_with_cures_that_work(tmp_path, co
     place.write_bytes(tetrahedron(0.1))
     assert smc.plant_from(file, ["j"]).n == 1
     if not included:
-        with pytest.raises(smc.ScenarioError, match=r"give scene.xml, which includes it"):
+        with pytest.raises(smc.ScenarioError, match=r"the one that includes it"):
             smc.plant_from(tmp_path / "motor.xml", ["k"])
 
 

@@ -223,14 +223,10 @@ def test_the_force_of_contact_is_what_changes_the_momentum_of_a_ball(name):
 def test_what_is_far_away_changes_no_bit(name):
     _, body, joint = machine(name)
     far = smc.Stops({joint: (-90.0, 90.0)}), wall(name, gap=90.0), smc.Ball(body, height=90.0)
-    alone = free(
-        name,
-        None,
-        integrator="implicitfast",
-        physics_step=STEP,
-    )
+    stepped = {"integrator": "implicitfast", "physics_step": STEP}
+    alone = free(name, None, **stepped)
     for part in (*far, far):
-        with_it = free(name, part)
+        with_it = free(name, part, **stepped)
         for array, same in zip(with_it.arrays().values(), alone.arrays().values(), strict=True):
             np.testing.assert_array_equal(array, same)
 
