@@ -428,3 +428,14 @@ def test_no_two_files_and_no_two_classes_share_a_name():
     twice = {name for name, its in files.items() if len(its) > 1}
     assert twice <= allowed
     assert {name: its for name, its in classes.items() if len(its) > 1} == {}
+
+
+def test_every_public_name_in_a_docstring_or_message_exists():
+    """A cure that is printed must work: smc.MODULE.NAME is there."""
+    missing = set()
+    for path in FILES:
+        for name, inner in re.findall(r"\bsmc\.(\w+)(?:\.(\w+))?", path.read_text()):
+            found = getattr(smc, name, None)
+            if found is None or (inner and not hasattr(found, inner)):
+                missing.add(f"smc.{name}.{inner} in {label(path)}")
+    assert missing == set()

@@ -88,7 +88,7 @@ def contacts(trace: Trace, shown: Array) -> list[State | None]:
     280 N·m", with the largest force of the hit, which fades; "contact" of one that lasts.
     """
     touch = in_contact(trace)
-    on = np.any(touch, axis=1, keepdims=False).reshape(-1)
+    on: Array = np.asarray(touch.any(axis=1))
     said: list[State | None] = [None] * len(on)
     held = extended(on, shown, MIN_STATE_TIME)
     edges = np.flatnonzero(np.diff(held.astype(int), prepend=0, append=0))

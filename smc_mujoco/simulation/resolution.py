@@ -1,6 +1,6 @@
 """What the physics step of a run of a user's model does not resolve, in one sentence.
 
-docs/accuracy.md has how far such runs are off. `smc.fidelity.step_halving` repeats a run, and says
+docs/accuracy.md has how far such runs are off. `smc.accuracy.step_halving` repeats a run, and says
 how far its own numbers are. Here `trace` is a Trace, which imports this module.
 """
 
@@ -64,7 +64,7 @@ def _of_motion(trace: Any) -> Iterator[str]:
     """
     if not switches(trace):
         return
-    cure = "smc.fidelity.step_halving([trace]) repeats it at shorter steps"
+    cure = "smc.accuracy.step_halving([trace]) repeats it at shorter steps"
     name = trace.scenario.plant.name
     if np.any(trace.holding[_last(trace)]):
         yield (
