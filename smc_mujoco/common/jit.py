@@ -448,9 +448,8 @@ class Cache:
         result = content[SEAL_SIZE:]
         if _seal(path, result) != content[:SEAL_SIZE]:
             return None
-        with contextlib.suppress(
-            Exception
-        ):  # a damaged file may raise any exception: compile again
+        # a damaged file may raise any exception: compile again
+        with contextlib.suppress(Exception):
             return internals.CompileResult._rebuild(target, *pickle.loads(result))
         return None
 
