@@ -195,6 +195,7 @@ CALLS: dict[Callable, dict[str, Any]] = {
     },
     smc.sensitivity: {"scenario": SHORT, "metric": "peak", "points": ..., "seed": 0},
     smc.design.basin: {"plant": "duffing", "law": ..., "points": (2, 2), "duration": 0.1},
+    smc.design.objective: {"plant": "duffing", "law": ..., "objective": "balanced", "search": 0},
     smc.design.chattering: {"law": SHORT, "channel": 0},
     smc.grid: {"plants": "duffing", "laws": "pid", "conditions": "nominal", "seeds": 1},
     smc.study: {"scenarios": [SHORT], "out": ...},

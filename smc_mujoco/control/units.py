@@ -29,6 +29,31 @@ class Unit(NamedTuple):
         """Return the size of the unit for these sizes of F, X and T."""
         return scales["F"] ** self.force * scales["X"] ** self.position * scales["T"] ** self.time
 
+    def text(self, force: str, position: str) -> str:
+        """Return the unit in words, such as "N m s/rad" for a force "N m" and a position "rad".
+
+        A number without a unit is "1".
+        """
+        above: list[str] = []
+        below: list[str] = []
+        for name, power in ((force, self.force), (position, self.position), ("s", self.time)):
+            if power > 0.0:
+                above.append(_raised(name, power))
+            elif power < 0.0:
+                below.append(_raised(name, -power))
+        numerator = " ".join(above) or "1"
+        denominator = " ".join(below)
+        if len(below) > 1:
+            denominator = f"({denominator})"
+        return f"{numerator}/{denominator}" if below else numerator
+
+
+def _raised(name: str, power: float) -> str:
+    """Return a unit raised to a power."""
+    if power == 1.0:
+        return name
+    return f"({name})^{power:g}" if " " in name else f"{name}^{power:g}"
+
 
 FORCE = Unit(force=1)
 POSITION = Unit(position=1)

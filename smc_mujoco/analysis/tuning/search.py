@@ -130,6 +130,9 @@ def tune(
     """Find gains of a law on the plant by independent searches, by the rule that is the same for
     every law.
 
+        tuned = smc.tune("duffing", "pid", budget=8, searches=2)
+        print(tuned, tuned.law)
+
     Args:
       plant, law: names, or your own plant and law. No search starts from the law's gains;
         `Tuned.before` is their objective. Gains declared with `held=True` keep their value.
@@ -146,6 +149,10 @@ def tune(
       device: on which the fast engine runs candidates, "cpu" or "cuda".
       executor: where the searches are made side by side, one on each worker, as in `study`; the
         gains are the same.
+
+    Returns:
+      A `Tuned`: `law` has the gains of the least J, `sets` the best gains of each search,
+      `save(path)` writes a file that every command reads.
 
     Raises:
       ScenarioError: a gain of unknown unit whose default is not positive, a plant without scales,

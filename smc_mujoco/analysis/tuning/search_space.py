@@ -39,7 +39,7 @@ same way; one that needs the nominal model declares which of both a gain is.
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -86,6 +86,20 @@ def without_unit(law: Component) -> dict[str, float]:
     return {
         name: gain.default for name, gain in gains.items() if gain.unit is None and not gain.held
     }
+
+
+def unit_texts(law: Component, names: Sequence[str], plant: Plant) -> dict[str, str]:
+    """Return gain -> its unit in words on a plant, "1" for one without a unit or of unknown unit.
+
+    A gain that several channels share has the unit of the first that it belongs to.
+    """
+    texts = {}
+    for name in names:
+        gain = _gain(law, name)
+        channel = 3 if gain.turns else 0
+        unit = gain.unit or Unit()
+        texts[name] = unit.text(plant.efforts[channel], plant.units[channel])
+    return texts
 
 
 def _scales_of(gain: Gain, scales: Numbers) -> Numbers:
