@@ -126,6 +126,8 @@ def chattering(
 ) -> Chattering:
     """Predict the limit cycle about rest of one driven channel.
 
+        print(smc.design.chattering("super_twisting", plant="duffing", input_delay=2e-3))
+
     Args:
       law: a Scenario; or a law, with the other fields of a Scenario by name.
       channel: index of a driven channel; the others are at rest.

@@ -36,6 +36,8 @@ def lqr(
 ) -> Law:
     """Return the linear-quadratic regulator of a plant at its goal.
 
+        smc.run(smc.Scenario(plant="cart_pole", law=smc.design.lqr("cart_pole"), duration=1.0))
+
     Where every channel is driven, it is the law `lqr` of one channel, which minimises the integral
     of q[0] e^2 + q[1] de^2 + r u^2. Where joints or a base are only measured, it is u = -K (x - r,
     v - r') of all channels, with the sampled cost: the sum of q e^2 + q de^2 of all channels and r
@@ -48,6 +50,9 @@ def lqr(
         for each rate.
       r: weight of the control.
       control_period: s, of the runs; only used where channels are only measured.
+
+    Returns:
+      A Law with its gains.
 
     Raises:
       ScenarioError: a weight out of range, joints that are not measured, or a goal that is no rest

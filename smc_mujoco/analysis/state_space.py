@@ -30,6 +30,8 @@ MAX_REST_ACCELERATION = 1e-6
 def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     """Linearise a plant at rest as a `control.StateSpace`: x' = A x + B u, y = C x.
 
+        smc.design.state_space("inverted_pendulum").poles()
+
     The states are the positions of its joints, then their velocities, the channels first in their
     order; u are the commands of the driven channels, and y the positions of all channels. Those of
     a free body are errors of its pose, and its u are the forces of its actuators. SI units. Drives
@@ -40,6 +42,9 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
       plant: a Plant or its name.
       x: position of all channels, rad or m; the commands that hold the plant there are part of the
         operating point. Default: where the plant rests.
+
+    Returns:
+      A `control.StateSpace`.
 
     Raises:
       ScenarioError: no command holds the plant at rest there.

@@ -130,10 +130,16 @@ def step_halving(
 ) -> list[StepChange]:
     """Return how the limit cycle of each run changes in its `repetitions`.
 
+        trace = smc.run(smc.Scenario(plant="duffing", law="classical", duration=1.0))
+        print(smc.accuracy.step_halving([trace]))
+
     Args:
       traces: the runs, each of which is repeated two to four times.
       channel: the one whose s is compared. Default: that with the largest limit cycle.
       threads: as in `run`.
+
+    Returns:
+      A list of `StepChange`, one for each trace, which prints as a table.
     """
     traces = items_of("traces", traces)
     scenarios = [repetitions(trace) for trace in traces]

@@ -31,7 +31,15 @@ def estimator_function(
     """Turn a function (y, gains, memory) -> velocity, or -> (velocity, acceleration), into an
     estimator.
 
+        @smc.estimator_function(gains={"tau": 0.01}, memory=2)
+        def filtered(y, gains, memory):
+            memory[0] += (y.x - memory[0]) * y.h / gains.tau
+            return (y.x - memory[0]) / gains.tau
+
     Arguments as of `law_function`: gains, memory, positive, nonnegative, conditions and label.
+
+    Returns:
+      A decorator. The decorated function, called with gains, returns the Estimator of a Scenario.
     """
     return decorated("estimator", function, options)
 
@@ -50,5 +58,10 @@ def catalogue() -> Catalogue[Template]:
 def estimator(name: str, /, **gains: float) -> Estimator:
     """Return the estimator `name` with these gains. An unknown name or a gain out of range is a
     ScenarioError.
+
+        smc.run(smc.Scenario(plant="duffing", law="pid", velocity=smc.estimator("levant")))
+
+    Returns:
+      An Estimator, for `velocity` of a Scenario.
     """
     return find("velocity estimator", name, catalogue()).bind(gains, warn=True)

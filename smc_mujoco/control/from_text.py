@@ -64,6 +64,9 @@ def law(
         package ships for a law of the library on it, of the search with the least J.
       gains: one number for all channels, or a sequence with one for each driven channel.
 
+    Returns:
+      A Law, for `law` of a Scenario.
+
     Raises:
       ScenarioError: an unknown law or gain, a gain out of range, a file without a law or with
         several, or a plant for which no gains of the law are shipped.

@@ -119,6 +119,11 @@ def law_function(
 ) -> Callable[[Callable[..., Any]], Template] | Template:
     """Turn a function (y, gains, memory) -> (u, s) into a law.
 
+        @smc.law_function(gains={"k": 3.0, "c": 2.0})
+        def relay(y, gains, memory):
+            s = y.de + gains.c * y.e
+            return -gains.k * np.sign(s), s
+
     Args:
       gains: name -> default value, or a Gain with unit and range. `smc.tune` needs the units.
       memory: floats of memory per channel. Default: 8.
@@ -264,6 +269,8 @@ def laws(plant: Plant | str | None = None, kind: str = "law") -> list[str]:
     """List the names of laws; with a plant, only those for it: of one channel, or for a free body
     of many joints.
 
+        smc.laws("cart_pole")
+
     A law that names no plants is for every plant whose channels all have an actuator. `none` is for
     every plant. A law for joints without an actuator is also for your own models with such joints.
 
@@ -271,6 +278,9 @@ def laws(plant: Plant | str | None = None, kind: str = "law") -> list[str]:
       plant: of the library by its name, or your own; None lists all.
       kind: "law", of one channel; "joint", a law of many joints; "surface"; or "estimator", of
         velocities.
+
+    Returns:
+      Names, in alphabetical order, which `smc.law` takes.
 
     Raises:
       ScenarioError: another kind, a plant with another kind than "law", or an unknown plant.

@@ -25,8 +25,15 @@ def surface_function(
 ) -> Callable[[Callable[..., Any]], Template] | Template:
     """Turn a function (y, gains, memory) -> (s, v_eq) into a surface.
 
+        @smc.design.surface_function(gains={"c": 2.5})
+        def cubic(y, gains, memory):
+            return y.de + gains.c * (y.e + y.e**3), -gains.c * y.de * (1.0 + 3.0 * y.e**2)
+
     Arguments as of `law_function`: gains, memory, positive, nonnegative, relative_degree,
     conditions and label.
+
+    Returns:
+      A decorator. The decorated function, called with gains, returns the Surface of a Scenario.
     """
     return decorated("surface", function, options)
 
@@ -45,5 +52,10 @@ def catalogue() -> Catalogue[Template]:
 def surface(name: str, /, **gains: float) -> Surface:
     """Return the surface `name` with these gains. An unknown name or a gain out of range is a
     ScenarioError.
+
+        smc.Scenario(plant="duffing", law="super_twisting", surface=smc.surface("linear", c=3.0))
+
+    Returns:
+      A Surface, for `surface` of a Scenario.
     """
     return find("surface", name, catalogue()).bind(gains, warn=True)

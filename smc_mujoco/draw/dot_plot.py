@@ -52,6 +52,9 @@ def plot(
     """Draw the median of each law over the seeds, with its 95 % bootstrap interval: dots, by
     condition.
 
+        table = smc.study(smc.grid("duffing", ["pid", "adrc"], "noise", duration=1.0), "study")
+        smc.plot(table, "study.svg")
+
     Medians and intervals are those of a leaderboard: of the runs that all laws have. Runs that
     share one of several sets of gains are one sample. There is a column of panels per metric and a
     row per plant; on narrow pages one column. A hollow dot at the right edge, under "never" or "not
@@ -64,6 +67,9 @@ def plot(
       path, title, size, format, fig: as in `figure`.
       winners: (metric, plant, condition, law) of dots that get a ring; `compare`'s plot has those
         of its verdicts.
+
+    Returns:
+      The figure.
 
     Raises:
       ScenarioError: no runs, an unknown metric, laws without runs in common, or as `figure`.

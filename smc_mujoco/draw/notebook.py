@@ -25,12 +25,17 @@ def show(
 ) -> None:
     """Show a film of traces, or a figure, in a notebook's cell.
 
+        smc.show(smc.run(smc.Scenario(plant="duffing", law="pid")))
+
     A figure at the end of a cell shows itself; `show` is for several in a cell.
 
     Args:
       what: one or several traces of one plant, which are filmed; what `film(traces)` returns; or a
         figure.
       labels, title, size, fps, speed, camera: of a film, as `film`.
+
+    Returns:
+      None: the film or the figure stands in the cell.
 
     Raises:
       ScenarioError: not in a notebook, or as `film`.

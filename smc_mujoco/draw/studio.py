@@ -55,6 +55,8 @@ def view(
     """Show a machine under one law or two in a browser tab until Ctrl-C; return its scenarios as
     they are then.
 
+        smc.view("inverted_pendulum", ["pid", "adrc"])
+
     The second law's machine is the transparent one. The panel "Laws" has the laws, their gains,
     what acts on the runs, u, s and e, and "save as scene". Double-click a body, hold Ctrl and drag
     with the right mouse button: it is pushed when you let go. The tab needs MuJoCo 4.0.1, which
@@ -66,6 +68,9 @@ def view(
       laws: one or two; default the scenario's, or the first that suits the plant.
       port: of the page on this machine; 0 takes the first free one from 8080 on.
       open_browser: whether to open the tab.
+
+    Returns:
+      The scenarios, with the laws, gains and conditions that the tab last had.
 
     Raises:
       ScenarioError: MuJoCo is older than 4.0.1, this process had a view already, or a law does not

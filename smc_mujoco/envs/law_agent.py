@@ -40,6 +40,9 @@ def agent(
       law, model, surface, velocity: as in a Scenario.
       environment: from `suite.load`, or a single gymnasium environment, wrapped or not.
 
+    Returns:
+      A callable: an observation -> an action, (channels,).
+
     Raises:
       ScenarioError: another environment, or values that a Scenario refuses. The agent raises it if
         its law fails.

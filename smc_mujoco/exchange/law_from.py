@@ -66,6 +66,9 @@ def law_from(
       units: of the action of the last kind: "u_max", a fraction of u_max (the default), or "SI", N
         or N m.
 
+    Returns:
+      A Law, or of a file of C or an FMU a Template, which called with gains gives one.
+
     Raises:
       ScenarioError: none of these, units with another kind, or as the function that reads the
         source.

@@ -141,6 +141,9 @@ def law_from_control(
 ) -> Law:
     """Return a linear controller as a law of one channel, or K of the whole state as a law of many.
 
+        K = [[40.0, 8.0]]  # of the error and its rate
+        law = smc.exchange.law_from_control(K, inputs=["error", "error_rate"])
+
     Args:
       K: a TransferFunction or StateSpace of python-control (or scipy), with one output u, N or N m;
         or matrices (A, B, C, D) or (A, B, C, D, dt). Without dt, or with dt = 0, it is of
@@ -156,6 +159,9 @@ def law_from_control(
 
     The law has one gain, `scale`, a factor of K, which `smc.tune` searches. It has no anti-windup.
     For another discretisation give `control.sample_system(K, h, "zoh")`.
+
+    Returns:
+      A Law.
 
     Raises:
       ScenarioError: K is none of these, improper, not finite, of several outputs or over 50 states,

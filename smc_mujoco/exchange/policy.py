@@ -214,6 +214,9 @@ def policy(
 ) -> Law:
     """Return a policy as a law.
 
+        law = smc.policy(lambda seen: -seen[0] - seen[1], name="spring and damper")
+        smc.run(smc.Scenario(plant="duffing", law=law, duration=0.5))
+
     Args:
       act: one of
         - a callable from an observation to an action;
@@ -233,6 +236,9 @@ def policy(
 
     A policy that simulates ahead must make and step its environments in the thread that calls it.
     In another thread they and the run would wait for each other forever.
+
+    Returns:
+      A Law of one channel.
 
     Raises:
       ScenarioError: none of these, no such file, a library that is not installed, or other units.

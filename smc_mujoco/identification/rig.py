@@ -516,6 +516,12 @@ def catalogue() -> Catalogue[Rig]:
 def rig(name: str, **values: float) -> Rig:
     """Return the rig `name`, with some of its quantities changed.
 
+        rig = smc.rig("emps")
+        print(rig)
+
+    Returns:
+      A `Rig`: its `quantities`, and the plant and the parts that they make.
+
     Raises:
       ScenarioError: an unknown rig or quantity, or a value out of its range.
     """
@@ -523,5 +529,11 @@ def rig(name: str, **values: float) -> Rig:
 
 
 def rigs() -> list[str]:
-    """List the names that `rig` knows."""
+    """List the names that `rig` knows.
+
+        smc.rigs()
+
+    Returns:
+      Names, in alphabetical order.
+    """
     return list(catalogue())

@@ -435,8 +435,13 @@ def plant(name: str, *, set: Any = None, **parameters: float) -> Plant:
     """Return the plant `name`, with some of its parameters (or its size n) changed, else a
     ScenarioError.
 
+        smc.plant("duffing", M=1.2)
+
     `set` is the name of one of the plant's `sets` of numbers, such as plant("quadrotor",
     set="gym").
+
+    Returns:
+      A Plant.
     """
     base = find("plant", name, catalogue())
     n = whole(f"n of {name}", parameters.pop("n", base.n), *base.sizes)
@@ -457,5 +462,11 @@ def plant(name: str, *, set: Any = None, **parameters: float) -> Plant:
 
 
 def plants() -> list[str]:
-    """List the names that `plant` knows."""
+    """List the names that `plant` knows.
+
+        smc.plants()
+
+    Returns:
+      Names, in alphabetical order.
+    """
     return list(catalogue())

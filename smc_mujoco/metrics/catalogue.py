@@ -89,8 +89,14 @@ def scores(trace: Trace) -> dict[str, dict[str, float]]:
     """Return the metrics of each group of channels by itself: {"driven": {...}, "free": {...}} for
     a cart with a pole.
 
+        trace = smc.run(smc.Scenario(plant="cart_pole", law="hierarchical", duration=1.0))
+        print(smc.scores(trace)["free"]["peak"])
+
     Joints without an actuator are free. If channels of a kind have several units, each unit is a
     group, such as "driven m". Raises like `score`.
+
+    Returns:
+      Group -> metric -> value.
     """
     refuse(trace)
     return {

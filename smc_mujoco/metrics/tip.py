@@ -204,6 +204,10 @@ def _jump_sample(trace: Trace) -> int:
 def tip_scores(trace: Trace, force: Positive | None = None) -> dict[str, float]:
     """Return scores of an arm's tip, by name.
 
+        law = "computed_torque_sliding"
+        trace = smc.run(smc.Scenario(plant="panda", law=law, duration=0.5))
+        print(smc.metrics.tip_scores(trace)["max_error"])
+
     Args:
       force: the force with which it should press, N; None: the gain `force` of its law, if there is
         one.
@@ -243,9 +247,16 @@ def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
     """Return the metrics of each joint by itself, {"joint1": {"settling_time": ...}, ...}, in the
     channels' order.
 
+        law = "computed_torque_sliding"
+        trace = smc.run(smc.Scenario(plant="panda", law=law, duration=0.5))
+        print(smc.metrics.joint_scores(trace)["joint4"]["itae"])
+
     In addition to the catalogue's metrics there are peak_power, the largest |force of the drive
     times velocity|, W, and work, the integral of |force times velocity|, J. Raises like
     `smc.score`.
+
+    Returns:
+      Joint -> metric -> value.
     """
     conventions.refuse(trace)
     values = {}

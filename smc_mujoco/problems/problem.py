@@ -267,6 +267,11 @@ class Problem:
 def problem(name: str) -> Problem:
     """Return the problem of a name, such as "duffing/noise@1".
 
+        smc.problem("duffing/noise@1")
+
+    Returns:
+      A `Problem`, for which any law can be run and scored.
+
     Raises:
       ScenarioError: a text that is no such name, or an unknown version, plant or condition.
     """

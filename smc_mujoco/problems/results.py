@@ -338,6 +338,9 @@ def results(source: AnyPath = "smc-30@1", seed: int = 0) -> Results:
         results, such as "results/smc-30@1"; or a .zip of such a folder.
       seed: of the instances, if a suite's name is given.
 
+    Returns:
+      A `Results`, with a board for each question.
+
     Raises:
       ScenarioError: no results there, results on several suites or seeds, or a table that was
         changed since it was written.

@@ -353,6 +353,8 @@ def margins(
 ) -> list[Margin]:
     """Return the margins of laws on plants: plant by plant, law by law, kind by kind.
 
+        print(smc.margins("duffing", "pid", kinds="delay", gains="default", quick=True))
+
     Args:
       plants, laws: names, or your own plants and laws, one or several.
       kinds: one or several of "delay", "disturbance", "friction", "mass", "noise"; and of "jitter"
@@ -369,6 +371,9 @@ def margins(
       starts: initial states, see `smc.starts`. Default: the plant's own x0.
       device: on which the fast engine searches, "cpu" or "cuda"; a quick search on the processor is
         MuJoCo's.
+
+    Returns:
+      A list of `Margin`, which prints as a table.
 
     Raises:
       ScenarioError: an unknown plant, law, kind, set or condition, or a plant that starts at 0.

@@ -121,6 +121,8 @@ def basin(
 ) -> Basin:
     """Map the region of attraction of a law on a plant.
 
+        print(smc.design.basin("inverted_pendulum", "pid", points=(5, 5)))
+
     The fast engine makes the runs where it can, and MuJoCo repeats 20 of them: `checked` says how
     many it decides otherwise.
 
@@ -136,6 +138,9 @@ def basin(
         latter shrinks as states are decided.
       condition: condition of the runs, such as "coulomb".
       device: of the fast engine, "cpu" or "cuda".
+
+    Returns:
+      A `Basin`: `outcome` of every initial state, `share` of those that converge, and `save(path)`.
 
     Raises:
       ScenarioError: an unknown plant, law, set or condition, a condition whose reference moves, an

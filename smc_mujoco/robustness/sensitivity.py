@@ -199,6 +199,10 @@ def sensitivity(
 ) -> Sensitivity:
     """Find which uncertainties explain a law's score, and where its runs fail.
 
+        scenario = smc.Scenario(plant="duffing", law="pid", duration=1.0)
+        within = smc.Uncertainty(mass=(0.8, 1.2), delay=(0.0, 2e-3))
+        print(smc.sensitivity(scenario, within, points=8))
+
     MuJoCo makes the runs, or the fast engine if there are very many. MuJoCo then repeats 20.
 
     Args:
@@ -214,6 +218,10 @@ def sensitivity(
       seed: of the points.
       threads, progress: as in `run`. The result does not depend on threads.
       device: of the fast engine, "cpu", or "cuda" for any number of runs.
+
+    Returns:
+      A `Sensitivity`: indices by axis, the share of failures, and where they are; it prints as
+      tables.
 
     Raises:
       ScenarioError: a class that the plant cannot have, an unknown metric, points that are no power

@@ -200,6 +200,9 @@ def worst_case(
 ) -> WorstCase:
     """Search for the worst run of a scenario within a class of uncertainty, and return it.
 
+        scenario = smc.Scenario(plant="duffing", law="pid", duration=1.0)
+        print(smc.worst_case(scenario, within=smc.Uncertainty(disturbance=0.5), budget=8))
+
     Where there are very many runs the fast engine makes most of them. The worst run that is
     returned, and its value, are MuJoCo's.
 
@@ -218,6 +221,9 @@ def worst_case(
       seed: of the random members and of the search.
       threads, progress: as in `run`. The result does not depend on threads.
       device: of the fast engine, "cpu", or "cuda" for any number of runs.
+
+    Returns:
+      A `WorstCase`: the worst run, its score, and those of random members of the class.
 
     Raises:
       ScenarioError: a class that the plant cannot have, an unknown metric, or one that the plant

@@ -182,10 +182,15 @@ class Condition:
 def condition(name: str, **fields: Any) -> Condition:
     """Return your own condition, for `grid`, `tune`, `margins` and `basin`.
 
+        smc.condition("dry", friction=smc.Coulomb(0.05), noise=smc.Noise(position=1e-3))
+
     Args:
       name: its name in tables and figures; not a name of the suite.
       fields: fields of a Scenario, such as friction=smc.Coulomb(0.05), except plant, law, model,
         surface, seed and duration.
+
+    Returns:
+      A Condition.
 
     Raises:
       ScenarioError: the name is one of the suite's, a field does not exist or belongs to no

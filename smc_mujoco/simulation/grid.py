@@ -130,6 +130,8 @@ def starts(
 ) -> Starts:
     """Return where the runs of a grid begin, by seed.
 
+        smc.grid("duffing", "pid", seeds=3, starts=smc.starts(x0=0.4, spread=0.1))
+
     Args:
       x0: the middle of all starts, rad or m: one number for all channels, or one for each. Default:
         the plant's x0. Where that is the goal of your own model, its driven joints start beside it
@@ -137,6 +139,9 @@ def starts(
       spread: how far starts lie to either side of the middle, as a fraction of it, 0 or more; of a
         free body in m and rad.
       by: a distance that is added to it, rad or m, 0 or more; for a plant that rests at 0.
+
+    Returns:
+      A `Starts`, for `grid`, `tune`, `compare` and the questions about robustness.
 
     Raises:
       ScenarioError: a number out of its range.
@@ -161,6 +166,9 @@ def grid(
 ) -> list[Scenario]:
     """Return scenarios of every plant, condition, law and seed.
 
+        scenarios = smc.grid("duffing", ["pid", "adrc"], ["nominal", "noise"], seeds=3)
+        len(scenarios)  # 12
+
     The plant varies slowest, then condition, law and seed.
 
     Args:
@@ -175,6 +183,9 @@ def grid(
       gains: "study", "tuned", "tracking" or "default", see `gains`.
       duration: of each run, s.
       starts: where runs begin, by seed. Default: within 20 % of the plant's own x0.
+
+    Returns:
+      A list of Scenarios.
 
     Raises:
       ScenarioError: an unknown name, different plants, laws or conditions of the same name, no

@@ -95,6 +95,9 @@ def run(
 ) -> Trace | list[Trace]:
     """Run one scenario or many.
 
+        trace = smc.run(smc.Scenario(plant="duffing", law="pid", duration=1.0))
+        print(trace.t.shape, trace.x.shape, trace.u.shape)
+
     Args:
       scenarios: a Scenario, or any number of them.
       threads: how many simulations at once; None for one per available core.
@@ -147,7 +150,14 @@ def stream(
     threads: int | None = None,
     report: Report = lambda steps: None,
 ) -> Iterator[tuple[int, Trace]]:
-    """Yield pairs (index, Trace) as soon as their batch is done. At most one batch is in memory."""
+    """Yield pairs (index, Trace) as soon as their batch is done. At most one batch is in memory.
+
+        for i, trace in smc.stream(smc.grid("duffing", "pid", seeds=4, duration=1.0)):
+            print(i, smc.score(trace)["itae"])
+
+    Returns:
+      An iterator over (index, Trace).
+    """
     threads = cores(threads)
     if not callable(report):
         raise ScenarioError(f"report is {shown(report)}: give a function of a number of steps")

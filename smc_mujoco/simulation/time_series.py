@@ -298,6 +298,10 @@ def cartesian_path(
     """Return a reference for each channel, under which a tip moves through points in space with
     minimum jerk.
 
+        arm = smc.plant("panda")
+        points = [(0.5, 0.0, 0.5), (0.5, 0.1, 0.5)]
+        reference = smc.signals.cartesian_path(arm, [0.0, 2.0], points, site="tip")
+
     Inverse kinematics computes the joints' positions every 10 ms: least squares with MuJoCo's
     Jacobians, damped near singular poses. If an arm has more joints than the task needs, each
     solution is the one nearest to the one before. After a closed path of the tip, the joints may
@@ -309,6 +313,9 @@ def cartesian_path(
       points: (N, 3), m, in the world.
       site, body: name of the site or body whose origin is the tip; give one of the two.
       x0: positions at which the search begins, one for each channel; None: the plant's.
+
+    Returns:
+      A list of Waypoints, one for each channel, for `reference` of a Scenario.
 
     Raises:
       ScenarioError: an unknown plant, site or body, numbers out of range, or a point out of reach.

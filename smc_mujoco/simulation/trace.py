@@ -434,6 +434,12 @@ def from_log(scenario: Scenario, log: Array, failed_step: int, failure: str | No
 def load(path: AnyPath) -> Trace:
     """Return the trace in a file that `Trace.save` wrote.
 
+        smc.run(smc.Scenario(plant="duffing", law="pid", duration=1.0)).save("run.npz")
+        trace = smc.load("run.npz")
+
+    Returns:
+      A Trace.
+
     Raises:
       ScenarioError: there is no such file, or it is not a trace.
     """

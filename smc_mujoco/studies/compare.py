@@ -286,6 +286,9 @@ def compare(
     """Compare laws on plants in conditions, with gains by one rule for all, and say which is better
     and how certain that is.
 
+        compared = smc.compare(["pid", "adrc"], "duffing", "friction", seeds=3, out="compared")
+        print(compared)
+
     A law whose gains you gave keeps them. Any other law has those that come with the package for
     the plant, or is tuned by one rule, yours too: run i has the gains that search i found, so
     twelve searches are twelve answers to "what do I get if I tune it?". The folder keeps each
@@ -320,6 +323,10 @@ def compare(
         of the tables are MuJoCo's.
       executor: where searches and runs are made side by side, in place of threads of this process,
         as in `study`. The numbers are the same.
+
+    Returns:
+      A `Compared`, which prints its tables, verdicts and gains: `table` has a row a run, `plot`,
+      `to_latex` and `to_html` write files, `traces` are runs to draw and film.
 
     Raises:
       ScenarioError: an unknown name, or arguments that `grid`, `study` or `leaderboard` refuse.

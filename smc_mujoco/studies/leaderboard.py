@@ -56,6 +56,9 @@ def leaderboard(
 ) -> Boards:
     """Compare the laws of a table in each metric within each group.
 
+        table = smc.study(smc.grid("duffing", ["pid", "adrc"], "noise", duration=1.0), "study")
+        print(smc.leaderboard(table, ["itae"]))
+
     Only cells (plant, condition, seed) that every law of the group has are compared. A failed run
     is inf in all metrics. For two laws, a seed in which both repeat their results of an earlier
     seed is not counted. Runs that share one of several sets of gains of a law are one sample. A
@@ -68,6 +71,9 @@ def leaderboard(
       defaults: whether a winner may be named over laws whose gains are their defaults.
       relevant: the least relevant difference, as a share of the larger value. Values below
         `paired_runs.floor` count as equal, and a lead that is less than it is called that.
+
+    Returns:
+      A list of `Board`, one for each group and metric, which prints as tables.
 
     Raises:
       ScenarioError: no runs, an unknown metric or group, two runs in a cell, or laws without a

@@ -35,6 +35,8 @@ def score(
 ) -> dict[str, float] | Table:
     """Score one trace, or many scenarios without keeping their traces.
 
+        print(smc.score(smc.grid("duffing", "pid", seeds=100, duration=1.0), ["itae"]))
+
     Metrics that compare channels are for networks only. For a cart with a pole, times and
     percentages of the motion are the worse of the two; metrics with a unit of length are the
     cart's.

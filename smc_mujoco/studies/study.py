@@ -190,6 +190,9 @@ def study(
     """Run and score scenarios; write a table with a row for each to out/results.parquet, and return
     it.
 
+        table = smc.study(smc.grid("duffing", ["pid", "adrc"], seeds=4, duration=1.0), "study")
+        print(table)
+
     Rows are in the order of the scenarios; equal scenarios have one row. Finished runs are stored
     in out/parts, some seconds of work in each file. If a study was killed, or filled the disk,
     start it again with the same arguments: it continues, and ends with the same file, bit for bit.
@@ -206,6 +209,9 @@ def study(
       executor: where the runs are computed in place of threads of this process: an Executor of
         `concurrent.futures`, a dask Client, or a dask scheduler's address, "dask://HOST:PORT". The
         table has the same bytes.
+
+    Returns:
+      The Table of `smc.Table.read`: a row a scenario, in their order.
 
     Raises:
       ScenarioError: scenarios that cannot be run, a folder that cannot be written, or an executor

@@ -167,6 +167,9 @@ def film(
     """Film traces of one plant, from t = 0 to the end of the longest, and return the path of the
     file.
 
+        trace = smc.run(smc.Scenario(plant="duffing", law="pid", duration=1.0))
+        smc.film(trace, "duffing.png", at=0.5)
+
     Fast motion and blows are shown in slow motion, and rest is shown faster. The clock tells the
     speed.
 
@@ -188,6 +191,9 @@ def film(
       at: the time of a single picture, s.
       span: the part of the runs that is shown, (start, stop) in s; default: all, and the first 4 s
         for .webp.
+
+    Returns:
+      The path of the file; without a path the pictures, `Frames`.
 
     Raises:
       ScenarioError: nothing to show, a size that is odd or too small or large, another ending, or

@@ -133,6 +133,9 @@ def orders(
     """Measure how the errors of laws fall with the control period: the order of accuracy, beside
     theory's.
 
+        periods = 4e-3, 2e-3
+        print(smc.accuracy.orders("super_twisting", "duffing", periods, seeds=1, duration=2.0))
+
     Args:
       laws, plants: names, or your own laws and plants, one or several.
       periods: control periods, s; two or more, and three or more for an interval.

@@ -89,6 +89,9 @@ def audit(
       report: called with how many claims are done and how many there are; each counts once per set
         of gains.
 
+    Returns:
+      An `Audit`: its `claims` with their verdicts, and `save(path)`.
+
     Raises:
       ScenarioError: an unknown paper, id or set of gains, or something is wrong with a file of the
         paper.
@@ -132,6 +135,11 @@ def claims(
 ) -> Claims:
     """Return the verdicts on a paper's claims, with the numbers behind them; arguments and errors
     as of `audit`.
+
+        print(smc.claims(only=[1], quick=True))
+
+    Returns:
+      A `Claims`, a list of the claims with their verdicts.
     """
     return audit(paper, only, gains, quick, threads, table=table).claims
 

@@ -42,6 +42,8 @@ def law_to_c(
 ) -> str:
     """Return a law as one C99 file, with its gains as defaults.
 
+        text = smc.exchange.law_to_c(smc.law("super_twisting", k1=3.0))
+
     `smc.exchange.law_from_c` can load it.
 
     Args:
@@ -52,6 +54,9 @@ def law_to_c(
         bits.
       joints: the number of joints for which a law of many joints is written. Default: the number of
         a gain's values.
+
+    Returns:
+      The text of the file.
 
     Raises:
       ScenarioError: no such law or type of numbers, no number of joints, or the law uses Python

@@ -67,6 +67,8 @@ def law_to_fmu(
 ) -> Path:
     """Write a law as an FMU for Simulink, Modelica and other tools:
 
+        smc.exchange.law_to_fmu("super_twisting", "law.fmu", binary=False)
+
     FMI 3.0, Co-Simulation. Return its path.
 
     Args:
@@ -87,6 +89,9 @@ def law_to_fmu(
     Inputs are x, v unless an estimator replaces it, the reference r and dr, and all that the law
     reads besides, such as ddr. Outputs are u and s. All gains are tunable parameters. Many joints
     have x[1], x[2], M[1,1] and so on.
+
+    Returns:
+      The path of the file.
 
     Raises:
       ScenarioError: a law in C, Python without translation into C, a surface that does not fit, no

@@ -71,6 +71,9 @@ def plant_from(
 ) -> Plant:
     """Make a plant of an MJCF or URDF model.
 
+        arm = smc.plant_from("arm.xml", {"elbow": smc.Channel(x0=0.3)})
+        trace = smc.run(smc.Scenario(plant=arm, law="pid", duration=1.0))
+
     Args:
       path: of an MJCF or URDF file; or the model itself: its text, an MjSpec as it is now, or a
         mjcf.RootElement of dm_control.
@@ -94,6 +97,9 @@ def plant_from(
         joint, or "base" for the model's only one, gives six channels, base_x to base_rz: position,
         rotation vector and their rates as of a free body. Its x and y count only in runs whose
         reference names a measured channel.
+
+    Returns:
+      A Plant, for `plant` of a Scenario and for every function that takes one.
 
     Raises:
       ScenarioError: a model that cannot be read; a number in it that is NaN, infinite or beyond

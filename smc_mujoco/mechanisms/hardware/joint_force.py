@@ -141,10 +141,18 @@ def actuator_function(
 ) -> Callable[[Callable], Callable[..., Drive]]:
     """Turn a function (y, p, memory) -> force of a drive, N m (N), into a kind of actuator.
 
+        @smc.hardware.actuator_function(numbers={"dead": 0.1})
+        def dead_zone(y, p, memory):
+            return y.u if abs(y.u) > p.dead else 0.0
+
     Args:
       numbers, memory: as in `friction_function`.
       delay: s, the time constant with which the force follows y.u, 0 or more. The default physics
         step resolves it.
+
+    Returns:
+      A decorator. The decorated function, called with its numbers, returns the actuator of a
+      Scenario.
 
     Raises:
       ScenarioError: for a name or a number that cannot be one.

@@ -100,11 +100,17 @@ class Servo(NamedTuple):
 def servo(name: str, model: str = "m4", command: str = "torque") -> Servo:
     """Return motor and friction of a servo, as identified by Duclusaud et al.
 
+        servo = smc.hardware.servo("mx64")
+        smc.Scenario(plant="inverted_pendulum", law="pid", actuator=servo.motor)
+
     Args:
       name: "mx64" or "mx106", for Dynamixel MX-64 and MX-106.
       model: "m1" to "m6", see `ServoFriction`. Each was fitted on its own, with its own numbers of
         the motor.
       command: what u is, as in `DCMotor`: "torque" or "voltage".
+
+    Returns:
+      A `Servo`: `motor`, for `actuator` of a Scenario, and `friction`.
 
     Raises:
       ScenarioError: an unknown servo, model or command.

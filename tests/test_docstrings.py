@@ -1,0 +1,75 @@
+"""Every public function says what comes back and shows a call, and the call runs."""
+
+import inspect
+import re
+import textwrap
+import warnings
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+
+ROOMS = "accuracy", "design", "envs", "exchange", "hardware", "metrics", "signals"
+ARM = """<mujoco><worldbody><body><joint name="elbow" axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 0 0 -.4" size=".03" mass="1"/></body></worldbody>
+<actuator><motor joint="elbow" ctrlrange="-10 10"/></actuator></mujoco>"""
+PERSONAL = {  # calls that need a person, a paper of one's own, another package's object or hours
+    "smc.audit": "a paper of one's own",
+    "smc.claims": "all claims of a paper take minutes",
+    "smc.envs.agent": "an environment that the reader has made",
+    "smc.exchange.law_from_c": "a file of the reader's",
+    "smc.exchange.law_from_fmu": "a file of the reader's",
+    "smc.law_from": "a controller of the reader's",
+    "smc.play": "a scene's own file",
+    "smc.results": "results of the reader's entries",
+    "smc.show": "a notebook",
+    "smc.view": "a browser, until Ctrl-C",
+}
+
+
+def functions():
+    """Address -> function, of every public function."""
+    found = {}
+    for name in smc.__all__:
+        found[f"smc.{name}"] = getattr(smc, name)
+    for room in ROOMS:
+        for name in getattr(smc, room).__all__:
+            found[f"smc.{room}.{name}"] = getattr(getattr(smc, room), name)
+    return {name: made for name, made in found.items() if inspect.isfunction(made)}
+
+
+def example(function) -> str:
+    """The code that a docstring shows."""
+    blocks = re.findall(r"\n\n((?: {4}.*\n?|\n(?= {4}))+)", inspect.getdoc(function) or "")
+    return "\n".join(map(textwrap.dedent, blocks))
+
+
+PUBLIC = functions()
+for changing in ("smc.identify", "smc.which", "smc.hardware.friction_function"):
+    del PUBLIC[changing]
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_a_function_says_what_comes_back(name):
+    said = inspect.getdoc(PUBLIC[name])
+    annotation = inspect.signature(PUBLIC[name]).return_annotation
+    assert said is not None
+    assert annotation in (None, "None") or "\nReturns:\n" in said
+
+
+def test_calls_that_no_test_runs_are_those_that_need_the_reader():
+    assert set(PERSONAL) <= set(PUBLIC)
+
+
+@pytest.mark.parametrize("name", [name for name in PUBLIC if name not in PERSONAL])
+def test_the_call_that_a_docstring_shows_runs(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "arm.xml").write_text(ARM)
+    code = example(PUBLIC[name])
+    assert f"{name}(" in code or f"@{name}" in code
+    with warnings.catch_warnings():
+        warnings.simplefilter(
+            "ignore", smc.errors.PlainLoopWarning
+        )  # of a law that is not compiled
+        exec(compile(code, name, "exec"), {"smc": smc, "np": np})
