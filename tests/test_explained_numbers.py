@@ -12,7 +12,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis import differ, ranking
 from smc_mujoco.analysis.engine import outcome
-from smc_mujoco.analysis.tuning import objective, search, search_space
+from smc_mujoco.analysis.tuning import objective, search, search_space, stages
 from smc_mujoco.common import constraints
 from smc_mujoco.envs import tasks
 from smc_mujoco.evidence.accuracy import scaling
@@ -103,9 +103,9 @@ SAID = {
         f"A search has {search.BUDGET} evaluations for each gain",
         f"An {part(search.SCREENED_SHARE)} screens",
         f"A {part(search.EVOLVED_SHARE)} evolves",
-        f"lower J by less than {percent(search.PATIENCE)}",
+        f"lower J by less than {percent(stages.PATIENCE)}",
         f"differ by more than {percent(search.AGREEMENT)}",
-        f"rounded to {WORDS[search.GAIN_DIGITS]} digits",
+        f"rounded to {WORDS[stages.GAIN_DIGITS]} digits",
     ],
     search_space: [f"10^-{search_space.HALF_WIDTH:g} .. 10^{search_space.HALF_WIDTH:g}"],
     search_space.at_bound: [f"within {percent(search_space.BOUND_MARGIN)} of a bound"],

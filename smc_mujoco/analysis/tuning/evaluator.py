@@ -70,6 +70,7 @@ class Evaluator:
         self.cases = list(cases)
         self.names = tuple(names)
         self.threads = cores(threads)
+        self._options = threads, by_equation, constraints, slots, device
         prepared = []
         for case in self.cases:
             prepared.append(prepare(case))
@@ -113,6 +114,10 @@ class Evaluator:
             cost = tracking + self.goal.weight * variation + self.excess(gains)
             made.append(Evaluation(gains, cost, tracking, variation))
         return made
+
+    def of_first(self) -> "Evaluator":
+        """Return the evaluator of the first case alone."""
+        return Evaluator(self.goal, self.cases[:1], self.names, *self._options)
 
     def law(self, gains: Floats) -> Component:
         """Return the law with these gains."""

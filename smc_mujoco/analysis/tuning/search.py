@@ -28,7 +28,6 @@ search depends on the others, so more of them repeat those of fewer. `objective`
 minimised.
 """
 
-import contextlib
 import dataclasses
 import time
 import warnings
@@ -39,7 +38,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis.engine import Device
-from smc_mujoco.analysis.tuning import search_space
+from smc_mujoco.analysis.tuning import quick_search, search_space
 from smc_mujoco.analysis.tuning.evaluator import EQUATION, PYTHON, Evaluator, with_gains
 from smc_mujoco.analysis.tuning.objective import (
     BUDGET,
@@ -54,10 +53,20 @@ from smc_mujoco.analysis.tuning.objective import (
 )
 from smc_mujoco.analysis.tuning.result import SearchResult, Tuned, load_found
 from smc_mujoco.analysis.tuning.search_space import Box
+from smc_mujoco.analysis.tuning.stages import (
+    DRAWS,
+    EVOLVED_SHARE,
+    SCREENED_SHARE,
+    Gains,
+    Trials,
+    descend,
+    evolved,
+    hypercube,
+)
 from smc_mujoco.common import fingerprint
-from smc_mujoco.common.aliases import AnyPath, Array, Floats, Names
+from smc_mujoco.common.aliases import AnyPath, Array, Floats
 from smc_mujoco.common.cache import Kept
-from smc_mujoco.common.constraints import FilePath, Whole, constrained
+from smc_mujoco.common.constraints import Boolean, FilePath, Whole, constrained
 from smc_mujoco.common.errors import (
     BrokenLawError,
     ScenarioError,
@@ -84,15 +93,6 @@ from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario, default_u_max
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.simulation.workers import Workers, called, opened
-
-Gains = tuple[float, ...]
-SCREENED_SHARE, EVOLVED_SHARE = 1 / 8, 1 / 2  # of the evaluations; the rest descend
-FIRST_DEVIATION = 0.3  # decades: first standard deviation of the evolution; chosen
-FIRST_RADIUS, LAST_RADIUS = 0.1, 0.005  # decades, of the descent's trust region; chosen
-PATIENCE = 1e-3  # a descent ends when 2 n + 2 evaluations lower J by a smaller share
-GAIN_DIGITS = 4
-DRAWS = 1000  # of gains that hold the conditions of the law's theorem, before it gives up; chosen
-BISECTIONS = 20  # to the border of the theorem; chosen
 
 AGREEMENT = 0.01  # of J: the equation's and MuJoCo's differ by less, or MuJoCo searches again
 SLOTS = 8  # candidates that MuJoCo screens at once: as many as CMA-ES asks for with five gains
@@ -126,6 +126,7 @@ def tune(
     outside_theorem: bool = False,
     device: Device = "cpu",
     executor: Workers | None = None,
+    quick: Boolean = False,
 ) -> Tuned:
     """Find gains of a law on the plant by independent searches, by the rule that is the same for
     every law.
@@ -149,6 +150,8 @@ def tune(
       device: on which the fast engine runs candidates, "cpu" or "cuda".
       executor: where the searches are made side by side, one on each worker, as in `study`; the
         gains are the same.
+      quick: whether all evaluations but the last three of a search take one step a control period,
+        see `quick_search`, for which 16 evaluations a gain are enough.
 
     Returns:
       A `Tuned`: `law` has the gains of the least J, `sets` the best gains of each search,
@@ -172,15 +175,15 @@ def tune(
         goal, **{name: value for name, value in changes.items() if value is not None}
     )
     task = task_of(plant, coerce.law(law), goal, budget, seed, threads, outside_theorem)
-    task = task._replace(device=device)
+    task = task._replace(device=device, quick=quick)
     if why := falls(task.plant):
         _warn(why)
     if search_space.without_unit(task.law):
         _warn(_without_unit_warning(task.law))
-    failure = _failure_of_law(task)
+    failure = failure_of_law(task)
     words = f"tuning {task.law.name} for {task.plant.name}: evaluation"
     with bar(words, searches * task.size, shown=progress, counted=True) as shown:
-        files = [] if folder is None else task.files(searches, folder)
+        files = [] if folder is None else [task.file(i, folder) for i in range(searches)]
         found = {i: made for i, file in enumerate(files) if (made := file.read())}
         missing = [i for i in range(searches) if i not in found]
         shown.advance(len(found) * task.size)
@@ -191,7 +194,7 @@ def tune(
             work = _searched_elsewhere(task, missing, failure, shown, executor)
         for i, made in work:
             found[i] = files[i].keep(made) if files else made
-        tuned = _result(task, tuple(found[i] for i in range(searches)))
+        tuned = result_of(task, tuple(found[i] for i in range(searches)))
     _warn_of_result(tuned)
     return tuned.sourced()
 
@@ -212,9 +215,7 @@ def _searched_elsewhere(
     task: "TuningTask", missing: Sequence[int], failure: str, shown: Bar, executor: Any
 ) -> Iterator[tuple[int, SearchResult]]:
     """Have workers make searches side by side, and yield the number and the result of each."""
-    made_of = task.plant, task.law, task.goal, task.budget, task.seed
-    codes = task.codes()
-    calls = [(*made_of, task.outside_theorem, i, failure, codes) for i in missing]
+    calls = [task.call(i, failure) for i in missing]
     with opened(executor) as pool:
         for k, made in called(pool, searched, calls):
             yield missing[k], made
@@ -228,177 +229,21 @@ def searched(
     budget: int,
     seed: int,
     outside_theorem: bool,
+    quick: bool,
+    codes: Any,
     i: int,
     failure: str,
-    codes: Any,
+    draw: int,
 ) -> SearchResult:
     """Make search i of a task, on a worker, on one thread of its processor.
 
     Raises:
       ScenarioError: the law's code is another one here.
     """
-    task = task_of(plant, law, goal, budget, seed, 1, outside_theorem)
+    task = task_of(plant, law, goal, budget, seed, 1, outside_theorem)._replace(quick=quick)
     if task.codes() != codes:
         raise ScenarioError(f"a worker has other code for {law.name}: install the same there")
-    return task.search(i, failure, lambda count: None)
-
-
-@dataclasses.dataclass
-class Trials:
-    """The evaluations of one search.
-
-    `cheap` screens candidates, `accurate` decides; both may be the same.
-    """
-
-    cheap: Evaluator
-    accurate: Evaluator
-    names: Names
-    # gains -> the largest values of some of them
-    limit: Callable[[dict[str, float]], dict[str, float]]
-    report: Callable[[int], None]  # called with the number of new evaluations
-    # whether gains hold the conditions of the law's theorem
-    holds: Callable[[Gains], bool] = lambda gains: True
-    screened: dict[Gains, Evaluation] = dataclasses.field(default_factory=dict)
-    decided: dict[Gains, Evaluation] = dataclasses.field(default_factory=dict)
-
-    def __post_init__(self):
-        if self.cheap is self.accurate:
-            self.screened = self.decided
-
-    @property
-    def count(self) -> int:
-        """The number of evaluations."""
-        return len(self.decided) + (0 if self.screened is self.decided else len(self.screened))
-
-    @property
-    def best(self) -> Evaluation:
-        """The accurate evaluation with the least J."""
-        return min(self.decided.values(), key=lambda one: one.objective)
-
-    def screen(self, logs: Array) -> Array:
-        """Return J of candidates (candidates, gains), given as log10 gains, from cheap runs."""
-        return self._costs([self.gains(row) for row in logs.tolist()], self.cheap, self.screened)
-
-    def cost(self, logs: Array) -> float:
-        """Return the accurate J of a candidate, given as log10 gains (gains,)."""
-        return self._costs([self.gains(logs.tolist())], self.accurate, self.decided)[0]
-
-    def within(self, logs: Array) -> bool:
-        """Return whether log10 gains hold the conditions of the law's theorem."""
-        return self.holds(self.gains(logs.tolist()))
-
-    def drawn(self, draw: Callable[[], Array], inside: Array) -> Array:
-        """Return the first of DRAWS draws within the theorem, else `inside`."""
-        for _ in range(DRAWS):
-            if self.within(logs := draw()):
-                return logs
-        return inside
-
-    def drawn_back(self, logs: Array, inside: Array) -> Array:
-        """Return the log10 gains on the way from those `inside` to others, where the theorem
-        ends.
-        """
-        if self.within(logs):
-            return logs
-        share = 0.0
-        for k in range(1, BISECTIONS + 1):
-            further = share + 0.5**k
-            if self.within(inside + further * (logs - inside)):
-                share = further
-        return inside + share * (logs - inside)
-
-    def gains(self, logs: Sequence[float]) -> Gains:
-        """Return the gains of a candidate, with four digits."""
-        gains = {name: _rounded(10.0**z) for name, z in zip(self.names, logs, strict=True)}
-        for name, largest in self.limit(gains).items():
-            gains[name] = min(gains[name], _rounded(largest))
-        return tuple(gains.values())
-
-    def _costs(
-        self, candidates: list[Gains], evaluate: Evaluator, known: dict[Gains, Evaluation]
-    ) -> Array:
-        new = list(dict.fromkeys(gains for gains in candidates if gains not in known))
-        known.update(zip(new, evaluate(new), strict=True))
-        self.report(len(new))
-        return np.array([known[gains].objective for gains in candidates])
-
-
-def _rounded(gain: float) -> float:
-    return float(f"{gain:.{GAIN_DIGITS}g}")
-
-
-def _screened(
-    trials: Trials, box: Box, random: np.random.Generator, size: int, inside: Array
-) -> tuple[Array, float]:
-    """Return the log10 gains of the best of a Latin hypercube in the box, and their J; those
-    `inside` if size is 0.
-    """
-    from scipy.stats.qmc import LatinHypercube
-
-    low, high = np.log10(list(box.values())).T
-    if not size:
-        return inside, np.inf
-    logs = low + (high - low) * LatinHypercube(len(low), rng=random).random(size)
-    for i, gains in enumerate(logs):
-        if not trials.within(gains):
-            logs[i] = trials.drawn(lambda: random.uniform(low, high), inside)
-    costs = trials.screen(logs)
-    return logs[np.argmin(costs)], costs.min()
-
-
-def _evolved(
-    trials: Trials, box: Box, random: np.random.Generator, logs: Array, cost: float, size: int
-) -> Array:
-    """Return the best log10 gains of an evolution from those given, whose J is `cost`, within a
-    box.
-    """
-    from cmaes import CMA
-
-    if len(logs) < 2:  # CMA-ES adapts a covariance
-        return logs
-    bounds = np.log10(list(box.values()))
-    seed = int(random.integers(2**31))
-    evolution = CMA(mean=logs, sigma=FIRST_DEVIATION, bounds=bounds, seed=seed)
-    for _ in range(size // evolution.population_size):
-        candidates = np.array(
-            [trials.drawn(evolution.ask, logs) for _ in range(evolution.population_size)]
-        )
-        costs = trials.screen(candidates)
-        evolution.tell(list(zip(candidates, costs, strict=True)))
-        if costs.min() < cost:
-            logs = candidates[np.argmin(costs)]
-            cost = costs.min()
-    return logs
-
-
-class _DescentEnded(Exception):
-    """A descent has ended."""
-
-
-def _descend(trials: Trials, box: Box, logs: Array, size: int) -> None:
-    """Descend from log10 gains within a box with at most `size` accurate evaluations, until they
-    gain too little.
-    """
-    from scipy.optimize import Bounds, minimize
-
-    low, high = np.log10(list(box.values())).T
-    costs = [trials.cost(logs)]
-    window = 2 * len(logs) + 2
-
-    def cost(z: Array) -> float:
-        costs.append(trials.cost(trials.drawn_back(np.clip(z, low, high), logs)))
-        if len(costs) > 2 * window and min(costs[:-window]) <= min(costs) * (1.0 + PATIENCE):
-            raise _DescentEnded
-        return np.log(costs[-1])
-
-    if size <= 1:
-        return
-    bounds, radii = (
-        Bounds(low, high),
-        {"initial_tr_radius": FIRST_RADIUS, "final_tr_radius": LAST_RADIUS},
-    )  # pyright: ignore[reportArgumentType]
-    with contextlib.suppress(_DescentEnded):
-        minimize(cost, logs, method="COBYQA", bounds=bounds, options={"maxfev": size - 1, **radii})
+    return task.search(i, failure, lambda count: None, draw)
 
 
 class TuningTask(NamedTuple):
@@ -416,6 +261,7 @@ class TuningTask(NamedTuple):
     inside: Array  # log10 gains in the box that hold the conditions
     outside_theorem: bool
     device: str = "cpu"
+    quick: bool = False  # whether searches are those of `quick_search`
 
     def holds(self, gains: Gains) -> bool:
         """Return whether gains of the box hold the conditions of the law's theorem."""
@@ -442,58 +288,91 @@ class TuningTask(NamedTuple):
         ranges = template and (dict(template.gains), dict(template.conditions))
         return code_hashes(self.cases(0)[0], {}), fingerprint.of((self.law.function, ranges))
 
-    def files(self, searches: int, folder: AnyPath) -> "list[Kept[SearchResult]]":
-        """Return the files of that many searches in a folder."""
-        codes = self.codes()
-        files = []
-        for i in range(searches):
-            first, *_ = self.cases(i)
-            depends = (
-                scenario_json.describe(first),
-                self.goal.describe(),
-                codes,
-                self.budget,
-                self.outside_theorem,
-                list(self.box.items()),
-            )
-            path = Path(folder) / f"{self.plant.name}-{self.law.name}-{i}.json"
-            files.append(Kept(path, depends, SearchResult.save, load_found))
-        return files
+    def call(self, i: int, failure: str, draw: int = 0) -> tuple:
+        """Return the arguments with which a worker makes search i, see `searched`."""
+        made_of = self.plant, self.law, self.goal, self.budget, self.seed
+        return (*made_of, self.outside_theorem, self.quick, self.codes(), i, failure, draw)
 
-    def search(self, i: int, failure: str, report: Report) -> SearchResult:
-        """Make search i.
+    def file(self, i: int, folder: AnyPath, draw: int = 0) -> "Kept[SearchResult]":
+        """Return the file of search i in a folder."""
+        first, *_ = self.cases(i)
+        depends = (
+            scenario_json.describe(first),
+            self.goal.describe(),
+            self.codes(),
+            self.budget,
+            self.outside_theorem,
+            list(self.box.items()),
+            self.quick,
+            draw,
+        )
+        again = f"-{draw}" if draw else ""
+        path = Path(folder) / f"{self.plant.name}-{self.law.name}-{i}{again}.json"
+        return Kept(path, depends, SearchResult.save, load_found)
+
+    def search(self, i: int, failure: str, report: Report, draw: int = 0) -> SearchResult:
+        """Make search i, with its first random numbers or those of another draw.
 
         Bad gains may make the numbers of a law overflow, and others may cure that. So a law whose
         own gains fail in every run is refused, with this failure, only after a whole search in
         which every run fails.
         """
         cases = self.cases(i)
-        names = tuple(self.box)
-        by_equation = Evaluator(
-            self.goal, cases, names, self.threads, by_equation=True, device=self.device
-        )
+        by_equation = self._evaluator(cases, by_equation=True)
+        random = np.random.default_rng([self.seed, i, draw] if draw else [self.seed, i])
+        if self.quick:
+            return self._search_quickly(by_equation, random, report, failure)
         if by_equation.engine == EQUATION:
-            trials = self._trials(by_equation, by_equation, i, report)
+            trials = self._search(self._trials(by_equation, by_equation, report), random)
             best = self._on_record(trials.best.gains, cases)
             if abs(best.objective - trials.best.objective) <= AGREEMENT * best.objective:
                 return self._found(trials, best, failure)
-        accurate = Evaluator(self.goal, cases, names, self.threads)
-        trials = self._trials(_cheap(accurate), accurate, i, report)
+            random = np.random.default_rng([self.seed, i, draw] if draw else [self.seed, i])
+        accurate = self._evaluator(cases)
+        trials = self._search(self._trials(_cheap(accurate), accurate, report), random)
         return self._found(trials, trials.best, failure)
 
-    def _trials(self, cheap: Evaluator, accurate: Evaluator, i: int, report: Report) -> Trials:
-        """Make search i, from the box, within the bounds `searched`, and return its evaluations."""
+    def _evaluator(self, cases: Sequence[Scenario], by_equation: bool = False) -> Evaluator:
+        return Evaluator(
+            self.goal, cases, tuple(self.box), self.threads, by_equation, device=self.device
+        )
 
+    def _trials(self, cheap: Evaluator, accurate: Evaluator, report: Report) -> Trials:
         def limit(gains: dict[str, float]) -> dict[str, float]:
             return search_space.force_limits(self.law, gains, self.goal.u_max or np.inf)
 
-        trials = Trials(cheap, accurate, tuple(self.box), limit, report, self.holds)
-        random = np.random.default_rng([self.seed, i])
+        return Trials(cheap, accurate, tuple(self.box), limit, report, self.holds)
+
+    def _search(self, trials: Trials, random: np.random.Generator) -> Trials:
+        """Make a search, from the box, within the bounds `searched`."""
         size = int(SCREENED_SHARE * self.size)
-        logs, cost = _screened(trials, self.box, random, size, self.inside)
-        logs = _evolved(trials, self.searched, random, logs, cost, int(EVOLVED_SHARE * self.size))
-        _descend(trials, self.searched, logs, self.size - trials.count)
+        logs, cost = hypercube(trials, self.box, random, size, self.inside)
+        logs = evolved(trials, self.searched, random, logs, cost, int(EVOLVED_SHARE * self.size))
+        descend(trials, self.searched, logs, self.size - trials.count)
         return trials
+
+    def _search_quickly(
+        self, by_equation: Evaluator, random: np.random.Generator, report: Report, failure: str
+    ) -> SearchResult:
+        """Make a search by the rule of `quick_search`, all cases by the equation or at one step a
+        control period.
+        """
+        if by_equation.engine == EQUATION:
+            every, accurate = by_equation, self._evaluator(by_equation.cases)
+        else:
+            every, accurate = _cheap(by_equation, at_period=True), by_equation
+        first = every.of_first()
+        trials = self._trials(every, every, report)
+        alone = self._trials(first, first, lambda count: None)
+        space = quick_search.SearchSpace(self.box, self.searched, self.inside)
+        spent = quick_search.search(alone, trials, space, random, self.size)
+        decided = accurate([one.gains for one in quick_search.first(trials)])
+        best = min(decided, key=lambda one: one.objective)
+        self._refuse_broken(best, failure)
+        count = spent + trials.count + len(decided)
+        return SearchResult(
+            best=best, history=tuple(decided), evaluations=count, engine=accurate.engine
+        )
 
     def _on_record(self, gains: Floats, cases: Sequence[Scenario]) -> Evaluation:
         """Return the evaluation of a set of gains by MuJoCo."""
@@ -501,13 +380,14 @@ class TuningTask(NamedTuple):
         cases = [dataclasses.replace(case, law=law) for case in cases]
         return self.goal.evaluation(cases[0], run(cases, self.threads), gains)
 
-    def _found(self, trials: Trials, best: Evaluation, failure: str) -> SearchResult:
-        if (
-            failure
-            and self.budget >= BUDGET
-            and best.objective >= FAILURE_COST * len(self.goal.conditions)
-        ):
+    def _refuse_broken(self, best: Evaluation, failure: str) -> None:
+        """Raise BrokenLawError if every run of a whole search fails."""
+        whole = self.quick or self.budget >= BUDGET
+        if failure and whole and best.objective >= FAILURE_COST * len(self.goal.conditions):
             raise _broken(self.law, failure)
+
+    def _found(self, trials: Trials, best: Evaluation, failure: str) -> SearchResult:
+        self._refuse_broken(best, failure)
         history = tuple(trials.decided.values())
         engine = trials.accurate.engine
         return SearchResult(best=best, history=history, evaluations=trials.count, engine=engine)
@@ -577,15 +457,17 @@ def why_not(plant: Plant, law: Component | Template, goal: Objective) -> str:
     return ""
 
 
-def _cheap(accurate: Evaluator) -> Evaluator:
-    """Return an evaluator that screens candidates at less cost; the same one for laws that do not
-    compile.
+def _cheap(accurate: Evaluator, at_period: bool = False) -> Evaluator:
+    """Return an evaluator that screens candidates at less cost, or at the least, one step a control
+    period; the same one for laws that do not compile.
     """
     if accurate.engine == PYTHON:
         return accurate
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ScenarioWarning)
         cases = [_coarse(case) for case in accurate.cases]
+        if at_period:
+            cases = [_at_period(case) for case in cases]
     constraints = not all(map(_only_limits, accurate.cases))
     goal = accurate.goal
     names = accurate.names
@@ -609,6 +491,14 @@ def _coarse(case: Scenario) -> Scenario:
         return case
 
 
+def _at_period(case: Scenario) -> Scenario:
+    """Return a case with one step a control period, if it allows that."""
+    try:
+        return dataclasses.replace(case, physics_step=case.control_period)
+    except ScenarioError:  # a delay or a clock needs a shorter step
+        return case
+
+
 def _only_limits(case: Scenario) -> bool:
     """Return whether MuJoCo's constraints are only limits and contacts of the plant itself, which
     rarely act.
@@ -619,8 +509,9 @@ def _only_limits(case: Scenario) -> bool:
     return bool(plain and not dry and all(part.in_callback for part in case.actuator))
 
 
-def _result(task: TuningTask, found: tuple[SearchResult, ...]) -> Tuned:
-    rule = RULE
+def result_of(task: TuningTask, found: tuple[SearchResult, ...]) -> Tuned:
+    """Return the tuning that these searches of a task are."""
+    rule = quick_search.RULE if task.quick else RULE
     if task.outside_theorem:
         rule += ", outside the conditions of the law's theorem"
     tuned = Tuned(
@@ -670,7 +561,7 @@ def _warn_if_it_leans(trace: Trace) -> None:
         )
 
 
-def _failure_of_law(task: TuningTask) -> str:
+def failure_of_law(task: TuningTask) -> str:
     """Return how the first run failed, if the law fails in every run, and the plant in none; else
     "".
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.tuning import search, search_space
+from smc_mujoco.analysis.tuning import search, search_space, stages
 from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective
 from smc_mujoco.analysis.tuning.result import compare, load_tuned
@@ -216,7 +216,7 @@ def test_a_descent_ends_when_it_gains_too_little(slope, least, most):
         def drawn_back(self, logs, inside):
             return logs
 
-    search._descend(Bowl(), {"a": (0.1, 10.0), "b": (0.1, 10.0)}, np.array([0.9, -0.8]), 200)
+    stages.descend(Bowl(), {"a": (0.1, 10.0), "b": (0.1, 10.0)}, np.array([0.9, -0.8]), 200)
     assert least <= len(costs) <= most
     assert min(costs) < 1.001
 
