@@ -16,7 +16,7 @@ The names by task, those of a first script first; `help(smc.run)` tells what a n
     Laws: law, laws, law_function, law_from
     Plants: plant, plants, plant_from, Channel
     Conditions: condition, starts, Noise, Constant, Step, Sine, Coulomb, Viscous, Encoder,
-        Backlash, DCMotor, Lag, Stops, Wall, Ball
+        Backlash, DCMotor, Lag, Stops, Wall, Ball, Feedforward
     Compare: compare, which, tune, margins, grid, study, leaderboard, Table
     More to run and to look at: stream, scores, Scene, play, ScenarioError
     Surfaces, estimators, policies: surface, estimator, estimator_function, policy

@@ -34,6 +34,7 @@ from smc_mujoco.mechanisms.hardware.backlash import Backlash as Backlash
 from smc_mujoco.mechanisms.hardware.drives import DCMotor as DCMotor
 from smc_mujoco.mechanisms.hardware.drives import Lag as Lag
 from smc_mujoco.mechanisms.hardware.encoder import Encoder as Encoder
+from smc_mujoco.mechanisms.hardware.feedforward import Feedforward as Feedforward
 from smc_mujoco.mechanisms.hardware.friction import Coulomb as Coulomb
 from smc_mujoco.mechanisms.hardware.friction import Viscous as Viscous
 from smc_mujoco.mechanisms.hardware.obstacles import Ball as Ball

@@ -53,6 +53,7 @@ NO_NUMBERS = [
 GIVEN = {  # what a class also needs, or two fields that depend on each other
     "Scenario": {"plant": "duffing", "law": "classical"},
     "Jump": {"factors": {}},
+    "Feedforward": {"friction": smc.Coulomb(0.1)},
     "Contact": {"kind": "stops"},
     "Stops": {"limits": {}},
     "OfBody": {"body": "arm"},

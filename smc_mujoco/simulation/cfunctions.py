@@ -53,6 +53,7 @@ instant_at, seen_at, series_at = map(record_at, (INSTANT, SEEN, SERIES))
 # Functions of a part on one joint, with what they read and how many numbers they return.
 OF_JOINTS = {
     "force": (JointState, 1),
+    "steady": (JointState, 1),
     "brake": (JointState, 3),
     "stage_force": (JointState, 2),
     "read": (Sight, 2),

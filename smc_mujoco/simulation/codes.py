@@ -21,9 +21,9 @@ def code_hashes(s: Scenario, plants: Hashes) -> list[str]:
     for part in (*s.law.parts, s.velocity, s.surface):
         if part is not None:
             functions.append(part.function)
-    known = (*dict.fromkeys(s.references), s.feedforward, *s.disturbance)
+    known = (*dict.fromkeys(s.references), s.known_signal, *s.disturbance)
     signals = [type(signal) for signal in known if signal is not None]
-    parts = [type(part) for part in (*s.friction, *s.contact, *s.actuator)]
+    parts = [type(part) for part in (*s.friction, *s.compensated, *s.contact, *s.actuator)]
     foreign = []
     for kind in parts:
         if not kind.__module__.startswith(PACKAGE):

@@ -23,6 +23,7 @@ from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.hardware.contact import Contact, Obstacle, kinds
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
+from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, OnJoints, chains
 from smc_mujoco.mechanisms.layout import all_joints, channel_names, driven_names
 from smc_mujoco.mechanisms.named import as_plant
@@ -366,6 +367,21 @@ def friction(name: str, value: Frictions | None, s: Any) -> tuple[Friction, ...]
             kinds = f"{type(part).__name__} and {type(other).__name__}"
             raise ScenarioError(f"{name} has {kinds} on the same joint: give one of them")
     return tuple(sorted(items, key=lambda part: (type(part).__name__, part.on)))
+
+
+def feedforward(name: str, value: object, s: Any) -> Signal | Feedforward | None:
+    """Return a known signal, or a compensation with its frictions as the plant's joints have
+    them.
+    """
+    if isinstance(value, Feedforward):
+        parts = friction(f"friction of {name}", value.friction, s)  # pyright: ignore[reportArgumentType]
+        return dataclasses.replace(value, friction=parts)
+    if not isinstance(value, Signal | None):
+        raise ScenarioError(
+            f"{name} is {shown(value)}: give smc.Feedforward(friction), or one signal, such as "
+            "smc.signals.TimeSeries(times, values), or None"
+        )
+    return value
 
 
 def _by_joint(

@@ -18,6 +18,7 @@ otherwise.
 
 # pyright: reportCallIssue=false
 # (an intrinsic is called without its typing context)
+import math
 from collections import namedtuple
 
 from numba import njit
@@ -32,6 +33,7 @@ from smc_mujoco.mechanisms.hardware.moments import (
     evaluate,
     function_at,
     generalised_disturbance,
+    part_at,
     reader_at,
     state_at,
 )
@@ -221,6 +223,37 @@ def _refer(view, i, k, t):
         raised = exogenous.evaluate_signal(address, sim.reference, 0)
     motion = sim.motion
     return raised, motion.value, motion.rate, motion.acceleration
+
+
+@inlined
+def _compensate(view, k, t, i):
+    """Return whether it raised, and the u of channel i that compensates friction."""
+    if view.sim.compensated == 0:
+        return False, 0.0
+    return _compensation(view, k, t, i)
+
+
+@njit(error_model="numpy")
+def _compensation(view, k, t, i):
+    address, sim, _ = view
+    v = pointer(sim.seen.v)[i]
+    if sim.on_reference != 0:
+        raised, _, v, _ = _refer(view, i, k, t)
+        if raised:
+            return True, 0.0
+    y = sim.joint_state
+    y.v = v
+    y.motor = 0.0
+    y.load = 0.0
+    force = 0.0
+    for j in range(sim.compensated):
+        part = part_at(sim.compensations, j)
+        if part.channel == i:
+            at = record.AT
+            if evaluate(part.function, 0, address + at.joint_state, address + at.exerted):
+                return True, 0.0
+            force += sim.exerted.force
+    return False, sim.share * math.tanh(abs(v) / sim.eps) * force / drive_at(sim.drives, i).gain
 
 
 @inlined
@@ -475,6 +508,7 @@ MOMENTS = Moments(
     estimate=_estimate,
     feedforward=_feedforward,
     ask=_ask,
+    compensate=_compensate,
     commanded=_commanded,
     asked=_asked,
     apply=_apply,

@@ -45,6 +45,7 @@ from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import Law, checked_name, known_laws
 from smc_mujoco.mechanisms.custom.scales import beside_goal
 from smc_mujoco.mechanisms.hardware.contact import kinds
+from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
@@ -58,6 +59,7 @@ LawOfSeed = Callable[[int], Law]  # seed -> the law of that run
 MAX_REST_ACCELERATION = 1e-9  # rad/s^2 or m/s^2; chosen: rounding stays below
 SPREAD = 0.2  # of x0, to either side; chosen
 GRID_SEEDS = 2**52  # number of a grid's seeds; tuning takes larger ones
+ERROR_STREAM = 2**31  # beyond the channels, whose starts are drawn with their index
 # where a plant starts at 0
 START_CURE = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"
 
@@ -93,6 +95,12 @@ class Starts:
             )
 
     def place(self, scenario: Scenario, seed: int) -> Scenario:
+        """Return a scenario with a seed, from the start that belongs to the seed, and with the
+        error of its compensation that does.
+        """
+        return _with_drawn_error(self._started(scenario, seed), seed)
+
+    def _started(self, scenario: Scenario, seed: int) -> Scenario:
         """Return a scenario with a seed, from the start that belongs to the seed."""
         if self.x0 is not None:
             scenario = dataclasses.replace(scenario, x0=self.x0)
@@ -113,6 +121,18 @@ class Starts:
         if "bobs" in kinds(scenario.contact):
             x0.sort()
         return dataclasses.replace(scenario, seed=seed, x0=x0)
+
+
+def _with_drawn_error(scenario: Scenario, seed: int) -> Scenario:
+    """Return a scenario whose Feedforward has the error of a seed, evenly within that of the
+    Feedforward.
+    """
+    given = scenario.feedforward
+    if not isinstance(given, Feedforward) or given.error == 0.0:
+        return scenario
+    most = abs(given.error)
+    drawn = np.random.default_rng([seed, ERROR_STREAM]).uniform(-most, most)
+    return dataclasses.replace(scenario, feedforward=dataclasses.replace(given, error=float(drawn)))
 
 
 def _at_goal(scenario: Scenario) -> bool:

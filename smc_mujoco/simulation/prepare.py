@@ -25,6 +25,7 @@ from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.properties import read_by
+from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, DRIVE, PART, READER, Run
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Native, Plant
@@ -49,7 +50,13 @@ UNKNOWN_FIELD = re.compile(
 )
 FIELDS = {record.__name__: record._fields for record in (Measurement, JointMeasurement, Reading)}
 # the records of arrays, where they are no FUNCTIONs
-KINDS = {"disturbances": state.DISTURBANCE, "parts": PART, "drives": DRIVE, "readers": READER}
+KINDS = {
+    "disturbances": state.DISTURBANCE,
+    "parts": PART,
+    "compensations": PART,
+    "drives": DRIVE,
+    "readers": READER,
+}
 # of a delayed sensor's history, per channel and reading, in mjData and in the Batch; measured
 READING_BYTES = 67
 
@@ -132,7 +139,7 @@ def _compile(s: Resolved) -> None:
     """
     signals = (
         *dict.fromkeys(s.references),
-        *filter(None, (s.feedforward, *s.noise.errors)),
+        *filter(None, (s.known_signal, *s.noise.errors)),
         *s.disturbance,
     )
     for signal in signals:
@@ -143,7 +150,9 @@ def _compile(s: Resolved) -> None:
         cfunctions.compile_nominal(s.plant)
     for signal in signals:
         agreement.check_signal(signal)
-    for part, kind in (*s.acting, *((sensor, "read") for sensor in s.sensors)):
+    others = [(sensor, "read") for sensor in s.sensors]
+    others += [(part, "steady") for part in s.compensated]
+    for part, kind in (*s.acting, *others):
         agreement.check_part(part, kind, lambda part=part: part.numbers(run_of(s, part))[0])
 
 
@@ -177,6 +186,7 @@ class Packed:
     laws: np.ndarray  # (driven,) FUNCTION; (0,) if all channels have the same
     references: np.ndarray  # (referenced,) FUNCTION; (0,) if all channels have the same
     parts: np.ndarray  # that act, on each of their joints, (p,) PART
+    compensations: np.ndarray  # of friction, on each of its joints, (c,) PART
     drives: np.ndarray  # (n,) DRIVE
     readers: np.ndarray  # (n,) READER; (0,) without a sensor
     mixer: np.ndarray  # (actuators, 8) of a free body; (0, 8) for other plants
@@ -197,7 +207,7 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
     nominal = _native_nominal(s)
     tables = _tables(prepared, buffer)
     values = _shared_functions(s, nominal, buffer)
-    values |= settings(s)
+    values |= settings(s) | compensation(s)
     values |= _moments(prepared, tables["parts"], buffer)
     values |= _arrays(s, buffer)
     if s.law.joint:
@@ -227,6 +237,7 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
     values |= {"slots": state.address(mjcb.slots())}
     values |= {"samples": len(log), "disturbance_count": len(s.disturbance)}
     values["part_count"] = len(arrays["parts"])
+    values["compensated"] = len(arrays["compensations"])
     values |= {"channels": state.address(mechanism.channels), "log": state.address(log)}
     return buffer.as_tuple(state.SIMULATION, values), Packed(
         numbers,
@@ -334,6 +345,7 @@ def _tables(prepared: Prepared, buffer: Functions) -> dict[str, list[dict[str, A
         "laws": laws,
         "references": [_signal(signal, buffer) for signal in references(s)],
         "parts": _parts(prepared, buffer),
+        "compensations": _compensations(prepared, buffer),
         "drives": _drives(s),
         "readers": _readers(prepared, buffer),
         "disturbances": disturbances,
@@ -352,7 +364,7 @@ def _shared_functions(s: Resolved, nominal: Native | None, buffer: Functions) ->
         )
     elif not s.plant.by_mujoco:
         fields["nominal"] = _function(buffer.nominal(s.plant), known_values(s), buffer)
-    signals = {"feedforward": s.feedforward}
+    signals = {"feedforward": s.known_signal}
     signals |= {"position_error": s.noise.position_error, "velocity_error": s.noise.velocity_error}
     return fields | {name: _signal(signal, buffer) for name, signal in signals.items() if signal}
 
@@ -361,6 +373,15 @@ def _signal(signal: Signal, buffer: Functions, channels: int = 1) -> dict[str, i
     """Return the fields of a signal's FUNCTION."""
     compiled = buffer.signal(signal)
     return _function(compiled, cfunctions.signal_values(signal), buffer, signal.memory, channels)
+
+
+def compensation(s: Resolved) -> dict[str, Any]:
+    """Return the numbers of a record that set the compensation of friction."""
+    given = s.feedforward
+    if not isinstance(given, Feedforward):
+        return {}
+    share = 1.0 + given.error
+    return {"share": share, "eps": given.eps, "on_reference": given.on == "reference"}
 
 
 def settings(s: Resolved) -> dict[str, Any]:
@@ -507,6 +528,21 @@ def _parts(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
                 "row": frictions.get(place, -1),
             }
             rows.append(row | {"acts": kind == "act", "staged": kind == "stage_force"})
+    return rows
+
+
+def _compensations(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
+    """Return the PARTs of the frictions that are compensated, one for each of their joints."""
+    s = prepared.scenario.resolved
+    rows = []
+    for part in s.compensated:
+        numbers = part.numbers(run_of(prepared.scenario, part))
+        compiled = buffer.part(part, "steady")
+        for place, i in enumerate(part.channels(s.plant)):
+            values = numbers[place if len(numbers) > 1 else 0]
+            rows.append(
+                {"function": _function(compiled, values, buffer, part.memory), "channel": i}
+            )
     return rows
 
 

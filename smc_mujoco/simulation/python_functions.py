@@ -411,11 +411,11 @@ def of_part(part: Part, kind: str) -> PythonFunction:
             out = function(y, numbers(*parameters[:count]), memories[memory])
         except USER_EXCEPTIONS as error:
             raise failure_of(name, error, channel=0) from error
-        if kind == "force":
+        if kind in ("force", "steady"):
             values = as_floats(name, [out], "a force", 1)
         else:
             values = as_floats(name, out, "numbers", OF_JOINTS[kind][1])
-        if kind == "force" and not math.isfinite(values[0]):
+        if kind in ("force", "steady") and not math.isfinite(values[0]):
             raise Failure(f"{name} returned {values[0]:g}", channel=0)
         return values
 

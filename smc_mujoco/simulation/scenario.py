@@ -30,6 +30,7 @@ from smc_mujoco.control.written import StateFeedback
 from smc_mujoco.mechanisms.hardware.contact import Obstacle, kinds
 from smc_mujoco.mechanisms.hardware.drives import in_series
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
+from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
 from smc_mujoco.mechanisms.hardware.friction import DryFriction, LuGre
 from smc_mujoco.mechanisms.hardware.moments import Torque
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, NominalDrive, Part, chains
@@ -120,9 +121,9 @@ class Scenario:
         plant's x0; v0 = 0.
       reference: r(t), the same for every channel, or one for each driven channel; joints that a
         mapping leaves out hold their default. Default: the plant's `rest`, or 0.
-      feedforward: a known signal that is added to the law's u before its bound, the same for every
-        driven channel: an excitation, or the command of a recorded experiment (with the law
-        "none"). None: nothing is added.
+      feedforward: what is added to the law's u before its bound: a Feedforward, which compensates
+        friction; or a known signal, the same for every driven channel, such as an excitation, or
+        the command of a recorded experiment (with the law "none"). None: nothing is added.
       disturbance: d(t) on every driven channel: one signal, or several to be added, or None. On one
         joint acts a Fault's bias, on a body a Push.
       noise: measurement noise, or None.
@@ -189,9 +190,7 @@ class Scenario:
     x0: tuple[float, ...] | None = field(coerce.state, None)
     v0: tuple[float, ...] | None = field(coerce.state, None)
     reference: Signal | None = field(coerce.reference, None)
-    feedforward: Signal | None = field(
-        coerce.instance(Signal, "one signal, such as smc.signals.TimeSeries(times, values)"), None
-    )
+    feedforward: Signal | Feedforward | None = field(coerce.feedforward, None)
     disturbance: tuple[Signal, ...] = field(coerce.disturbance, None)
     noise: Noise = field(
         coerce.instance(Noise, "smc.Noise(position=..., velocity=...)", Noise()), None
@@ -228,7 +227,7 @@ class Scenario:
             x0: float | Sequence[float] | None = None,
             v0: float | Sequence[float] | None = None,
             reference: Signal | coerce.ByChannel[Signal] | None = None,
-            feedforward: Signal | None = None,
+            feedforward: Signal | Feedforward | None = None,
             disturbance: Signal | Sequence[Signal] | None = None,
             noise: Noise | None = None,
             input_delay: float = 0.0,
@@ -480,6 +479,17 @@ class Scenario:
             else:
                 found.append(min(bound, limit))
         return tuple(found)
+
+    @property
+    def known_signal(self) -> Signal | None:
+        """The feedforward that is a signal."""
+        return self.feedforward if isinstance(self.feedforward, Signal) else None
+
+    @property
+    def compensated(self) -> tuple[Friction, ...]:
+        """The frictions that the feedforward compensates."""
+        given = self.feedforward
+        return given.friction if isinstance(given, Feedforward) else ()  # pyright: ignore[reportReturnType]
 
     @property
     def references(self) -> tuple[Signal, ...]:
@@ -750,10 +760,10 @@ def check_signals(s: Resolved) -> None:
             raise ScenarioError(
                 f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it"
             )
-    for signal in (*s.disturbance, s.feedforward):
+    for signal in (*s.disturbance, s.known_signal):
         if getattr(signal, "about", ""):
             raise ScenarioError(f"{shown(signal)} is about the goal: only a reference may be")
-    if any(isinstance(signal, PerChannel) for signal in (*s.disturbance, s.feedforward)):
+    if any(isinstance(signal, PerChannel) for signal in (*s.disturbance, s.known_signal)):
         raise ScenarioError(
             "only a reference may have a signal for each channel: give one signal for all"
         )
@@ -773,8 +783,8 @@ def check_signals(s: Resolved) -> None:
         )
     for signal in dict.fromkeys(s.references):
         check_function_of_time("reference", signal, "a smooth signal")
-    if s.feedforward:
-        check_function_of_time("feedforward", s.feedforward, "a known signal of u")
+    if s.known_signal:
+        check_function_of_time("feedforward", s.known_signal, "a known signal of u")
 
 
 def check_reference_ranges(s: Resolved) -> None:
@@ -993,6 +1003,12 @@ def check_mechanism(s: Resolved) -> None:
             part.suits(s, chain)
     for part in s.friction:
         part.check(s.plant)
+    if isinstance(s.feedforward, Feedforward):
+        s.feedforward.check(s.plant)
+        if s.accelerates:
+            raise ScenarioError(
+                "Feedforward gives a force, and u is an acceleration: leave feedforward out"
+            )
     for step in (0, s.samples * s.steps):
         values = s.plant.values(s.factors(step))  # raises for those that the plant cannot have
         if s.mechanism != "equation":

@@ -18,6 +18,7 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.custom.plant_from import restored
+from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
 from smc_mujoco.mechanisms.hardware.part import Friction, Part
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import plant as find_plant
@@ -68,8 +69,11 @@ def _data(value: Any) -> Any:  # noqa: PLR0911  # a table
             return {"each": [_data(signal) for signal in value.signals]}
         case Signal(signals=signals):
             return {"sum": [_data(signal) for signal in signals]}
-        case Signal() | Part():
-            values = {f.name: getattr(value, f.name) for f in dataclasses.fields(value) if f.init}
+        case Signal() | Part() | Feedforward():
+            values = {}
+            for f in dataclasses.fields(value):
+                if f.init:
+                    values[f.name] = _data(getattr(value, f.name))
             if not isinstance(value, Friction) and not values.get("on", True):
                 del values["on"]
             return {
@@ -136,19 +140,13 @@ def _restored(data: Any) -> Any:
             importlib.import_module(data["module"])
     kinds = {
         (kind.__name__, kind.__module__): kind
-        for base in (Signal, Part)
-        for kind in subclasses(base)
+        for kind in (Feedforward, *subclasses(Signal), *subclasses(Part))
     }
     if (kind := kinds.get((data["kind"], data["module"]))) is None:
         raise ScenarioError(
             f"{data['kind']!r} is unknown here: first import {data['module']}, which defines it"
         )
-    values = {}
-    for name, value in data["values"].items():
-        if isinstance(value, list):
-            values[name] = tuple(value)
-        else:
-            values[name] = value
+    values = {name: _restored(value) for name, value in data["values"].items()}
     if issubclass(kind, Friction) and "on" not in values:  # of an older version: on all joints
         values["on"] = () if values.pop("driven", False) else (EVERY,)
     return kind(**values)

@@ -48,9 +48,9 @@ EXERTED = floats(("force", "grip", "away"))
 # A sample of a channel: position, velocity, command, command after its delay, sliding variable,
 # disturbance, reference, the drive's force, what friction and contacts exert.
 LOGGED = ("x", "v", "u", "applied", "s", "d", "r", "force", "reaction")
-LOG = floats(
-    (*LOGGED, "held")
-)  # and the time for which `exact_friction` held its joint since the sample before, s
+# and the time for which `exact_friction` held its joint since the sample before, s; what of u
+# compensates friction
+LOG = floats((*LOGGED, "held", "compensation"))
 
 # A disturbance: its stream of random numbers (0: none, and then it is the same in every channel),
 # whether it is a horizontal force on the body instead of a force on the joint, and whether it sees
@@ -153,6 +153,13 @@ SIMULATION = np.dtype(
         ("nominal", FUNCTION),
         ("reference", FUNCTION),
         ("feedforward", FUNCTION),
+        # compensation of friction: how many PARTs, their address, 1 + error, eps, and whether on
+        # the reference
+        ("compensated", "i8"),
+        ("compensations", "i8"),
+        ("share", "f8"),
+        ("eps", "f8"),
+        ("on_reference", "i8"),
         ("uses_model", "f8"),
         # address of the other forces on the joints, (n,), for a law with the true model; else 0
         ("other_forces", "i8"),

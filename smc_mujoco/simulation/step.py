@@ -5,7 +5,8 @@ At the first stage of a physics step:
 
     sums of the forces of the step before
     the sample of the control period, if it comes in this step; for each channel
-        sense -> noise -> read -> estimate -> reference and model -> law -> bound -> ring
+        sense -> noise -> read -> estimate -> reference and model -> law -> compensation of
+        friction -> bound -> ring
     the command whose delay has passed, with what a fault makes of it
     disturbances; at the first step of a period, the log
 
@@ -71,6 +72,8 @@ class Moments(NamedTuple):
     reading: Any = inlined(lambda view, i, k, t: k)  # -> the index of the sensor's reading
     # -> raised, x and v that the sensor makes of reading j
     read: Any = inlined(lambda view, i, j, x, v: (False, x, v))
+    # (view, k, t, i) -> raised, what compensates friction of channel i; after its law
+    compensate: Any = always((False, 0.0))
     commanded: Any = always(None)  # (view, i, u): after the bound
     asked: Any = always(FINE)  # (view, k) -> failure; after all laws
     apply: Any = always(None)  # (view, i, u): give the actuator its command
@@ -200,8 +203,8 @@ def _sampling(of: Moments) -> Any:
 
 
 def _repeating(of: Moments) -> Any:
-    """Return a function (view, k): give sample k the command of the sample before, with its u, s
-    and r in the log.
+    """Return a function (view, k): give sample k the command of the sample before, with its u, s,
+    r and compensation in the log.
     """
     n_of = of.n
     ring_of = of.ring
@@ -215,6 +218,7 @@ def _repeating(of: Moments) -> Any:
             now = now_of(view, k, i)
             before = before_of(view, k, i)
             now.u, now.s, now.r, ring[i] = before.u, before.s, before.r, before.u
+            now.compensation = before.compensation
 
     return repeat
 
@@ -267,6 +271,7 @@ def _commanding(of: Moments) -> Any:
     ring_of = of.ring
     feedforward = of.feedforward
     ask = of.ask
+    compensate = of.compensate
     drive_of = of.drive
     now_of = of.now
     commanded = of.commanded
@@ -282,14 +287,18 @@ def _commanding(of: Moments) -> Any:
             failure, u, s = ask(view, k, t, i)
             if failure != FINE:
                 return failure
+            raised, compensation = compensate(view, k, t, i)
+            if raised:
+                return RAISED
             drive = drive_of(view, i)
-            u += forward
+            u += forward + compensation
             bounded = min(max(u, -drive.limit), drive.limit)
             small = abs(bounded) * max(1.0, drive.scale) < MAX_CONTROL
             now = now_of(view, k, i)
             if not (small and math.isfinite(u) and math.isfinite(s)):
                 return NOT_FINITE
             ring[i], now.u, now.s = bounded, bounded, s
+            now.compensation = compensation
             commanded(view, i, bounded)
         return asked(view, k)
 
@@ -457,8 +466,8 @@ def _arriving(of: Moments) -> Any:
 
 
 def _logging(of: Moments) -> Any:
-    """Return a function (view, k): write sample k of every channel into the log, except u, s and r,
-    which are there already.
+    """Return a function (view, k): write sample k of every channel into the log, except u, s, r and
+    the compensation, which are there already.
     """
     n_of = of.n
     settings_of = of.settings

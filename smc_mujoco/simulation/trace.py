@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     import xarray  # pyright: ignore[reportMissingImports]
 
 ARRAYS = ("t", *LOGGED)
-OPTIONAL = ("held", "damping")
+OPTIONAL = ("held", "damping", "compensation")
 PLANT_DIVERGED = "the plant diverged"  # how the failure of such a run begins
 MAX_FAILURE = 500  # characters; chosen
 MAX_TEXT = 2**26  # characters of a scenario in a file, 64 million; chosen
@@ -75,6 +75,8 @@ class Trace:
         1, n), s, by the friction's own state, if the scenario has `exact_friction`; None where dry
         friction is MuJoCo's, or none.
       damping: the part of `reaction` that damping exerts, (K + 1, n), N or N m; None without any.
+      compensation: what a Feedforward asked for beside the law, (K + 1, n), in the unit of u; None
+        without one.
 
     Of a free body x is its position, in the world's axes, and the rotation vector of its attitude;
     v its velocity in the world's axes, and its angular velocity in its own. u, d, force and
@@ -97,6 +99,7 @@ class Trace:
     failure: str | None = None
     held: Array | None = None
     damping: Array | None = None
+    compensation: Array | None = None
 
     def __post_init__(self):
         for array in self.arrays().values():
@@ -108,7 +111,9 @@ class Trace:
         return self.scenario.plant.errors(self.x, self.r)
 
     def arrays(self) -> dict[str, Array]:
-        """Return the arrays by name; `held` and `damping` only if they are not None."""
+        """Return the arrays by name; `held`, `damping` and `compensation` only if they are not
+        None.
+        """
         arrays = {name: getattr(self, name) for name in (*ARRAYS, *OPTIONAL)}
         return {name: array for name, array in arrays.items() if array is not None}
 
@@ -399,10 +404,11 @@ def from_log(scenario: Scenario, log: Array, failed_step: int, failure: str | No
         end = len(t)
     else:
         end = math.ceil(failed_step / scenario.steps)
+    names = list(LOGGED)
     if scenario.exact_friction:
-        names = (*LOGGED, "held")
-    else:
-        names = LOGGED
+        names.append("held")
+    if scenario.compensated:
+        names.append("compensation")
     arrays = {name: np.ascontiguousarray(log[name]) for name in names}
     if scenario.plant.goal and not scenario.plant.measured:
         arrays["r"][:, scenario.plant.driven :] = scenario.plant.goal

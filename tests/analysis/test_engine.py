@@ -61,6 +61,16 @@ APART = {
     "late sensor": {"sensor": smc.Encoder(2048, period=4e-3, delay=3e-3, dropout=0.1)},
     "skew": {"sensor": smc.Encoder(delay=2e-3, skew=1e-3), "noise": smc.Noise(1e-3)},
     "own friction": {"friction": (dahl(level=0.1), smc.Viscous(0.1)), "disturbance": SINE},
+    "compensation": {
+        "friction": (smc.Coulomb(0.2), smc.Viscous(0.1)),
+        "feedforward": smc.Feedforward((smc.Coulomb(0.2), smc.Viscous(0.1)), error=0.3),
+        "reference": MinimumJerk(0.4, 1.0, 2.0),
+    },
+    "compensation at speed": {
+        "friction": Sigmoid(0.4, 50.0),
+        "feedforward": smc.Feedforward(Sigmoid(0.4, 50.0), on="speed", eps=0.02),
+        "noise": smc.Noise(1e-3, 5e-3),
+    },
     "lag": {"actuator": smc.Lag(0.01), "friction": smc.Coulomb(0.1), "input_delay": 3e-3},
     "drives": {"actuator": (smc.Lag(0.01), RateLimit(50.0))},
 }

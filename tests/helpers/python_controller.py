@@ -15,6 +15,8 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
+from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
+from smc_mujoco.mechanisms.hardware.friction import Viscous
 from smc_mujoco.mechanisms.plant import Dynamics, Values
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.prepare import known_values, references
@@ -124,8 +126,8 @@ class Controller:
         n = len(x)
         driven = len(self.limits)
         feedforward = 0.0
-        if scenario.feedforward is not None:
-            feedforward = evaluate(scenario.feedforward, t)[0]
+        if scenario.known_signal is not None:
+            feedforward = evaluate(scenario.known_signal, t)[0]
         # one for all channels, or one for each
         values = [evaluate(signal, t) for signal in references(scenario)]
         motion = np.array([values[i % len(values)] for i in range(n)]).T.copy()
@@ -134,12 +136,31 @@ class Controller:
         s = np.zeros(n)
         if scenario.law.joint:
             u, s = self.law.call_joint(self.joint_measurement(x, v, t, motion))
-            u = np.array([self.bounded_command(i, u[i] + feedforward, s[i]) for i in range(n)])
+            for i in range(driven):
+                u[i] += feedforward + self.compensation(i, v, motion)
+            u = np.array([self.bounded_command(i, u[i], s[i]) for i in range(n)])
             return u, s
         for i in range(driven):
             u[i], s[i] = self.law(i, self.measurement(x, v, t, motion, i))
-            u[i] = self.bounded_command(i, u[i] + feedforward, s[i])
+            u[i] += feedforward + self.compensation(i, v, motion)
+            u[i] = self.bounded_command(i, u[i], s[i])
         return u, s
+
+    def compensation(self, i: int, v: np.ndarray, motion: np.ndarray) -> float:
+        """Return what a Feedforward of Coulomb and viscous friction adds to u of channel i."""
+        given = self.scenario.feedforward
+        if not isinstance(given, Feedforward):
+            return 0.0
+        speed = float(motion[1, i] if given.on == "reference" else v[i])
+        force = 0.0
+        for part in self.scenario.compensated:
+            if i in part.channels(self.scenario.plant):
+                if isinstance(part, Viscous):
+                    force += part.b * speed
+                else:
+                    force += math.copysign(part.level, speed)
+        share = (1.0 + given.error) * math.tanh(abs(speed) / given.eps)
+        return share * force / self.scenario.nominal_drives[i].gain
 
     def measurement(
         self, x: np.ndarray, v: np.ndarray, t: float, motion: np.ndarray, i: int

@@ -34,6 +34,22 @@ SCENARIOS = {
         velocity="levant",
         u_max=2.0,
     ),
+    "compensation at the speed that is estimated": smc.Scenario(
+        plant=smc.plant("pendulum_network", n=3),
+        law=smc.law("pid"),
+        velocity="levant",
+        noise=NOISE,
+        clock=smc.Clock(missed=0.0),
+        feedforward=smc.Feedforward((smc.Coulomb(0.2), smc.Viscous(0.3)), on="speed", error=-0.2),
+    ),
+    "compensation of one joint of many, at its reference's speed": smc.Scenario(
+        plant=arms.arm(),
+        law="computed_torque_sliding",
+        model="nominal",
+        reference=smc.Sine(0.2, 5.0),
+        feedforward=smc.Feedforward({"lift": smc.Coulomb(2.0)}, error=0.3),
+        u_max=60.0,
+    ),
     "a law of many joints": smc.Scenario(
         plant=arms.arm(),
         law="computed_torque_sliding",

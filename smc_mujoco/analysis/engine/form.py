@@ -73,6 +73,8 @@ class Form(NamedTuple):
     sensor: ChannelFunction | None
     drive: ChannelFunction | None  # between command and force
     frictions: tuple[ChannelFunction, ...]
+    compensated: tuple[ChannelFunction, ...]  # frictions
+    on_reference: bool  # whether they are compensated at the speed of the reference
     references: tuple[type, ...]  # kinds of signals, of all channels, or one for each
     disturbances: tuple[type, ...]
     feedforward: type | None
@@ -122,6 +124,7 @@ class RowPlaces(NamedTuple):
     hinges: int  # whether a joint is one; only with a sensor
     periods: int  # s between readings, and until one arrives; only with a past
     delays: int
+    compensation: int  # 1 + error and eps; only with compensated frictions
     reach: int  # 4 numbers of an `outcome`
 
 
@@ -165,6 +168,7 @@ class Layout(NamedTuple):
     sensor: PartAt | None
     drive: PartAt | None
     frictions: tuple[PartAt, ...]
+    compensated: tuple[PartAt, ...]
     references: tuple[SignalAt, ...]
     disturbances: tuple[SignalAt, ...]
     feedforward: SignalAt | None
@@ -208,6 +212,7 @@ def layout(form: Form) -> Layout:
         sensor=form.sensor and of_part(form.sensor),
         drive=form.drive and of_part(form.drive),
         frictions=tuple(map(of_part, form.frictions)),
+        compensated=tuple(map(of_part, form.compensated)),
         references=tuple(map(of_signal, form.references)),
         disturbances=tuple(map(of_signal, form.disturbances)),
         feedforward=form.feedforward and of_signal(form.feedforward),
@@ -235,6 +240,7 @@ def _row_places(form: Form, row: Places) -> RowPlaces:
         hinges=row.take(n if form.sensor else 0),
         periods=row.take(n if form.past else 0),
         delays=row.take(n if form.past else 0),
+        compensation=row.take(2 if form.compensated else 0),
         reach=row.take(4),
     )
 

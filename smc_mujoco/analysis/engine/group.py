@@ -30,7 +30,7 @@ from smc_mujoco.mechanisms.layout import moves_alone
 from smc_mujoco.metrics.conventions import SETTLING_BAND, groups, settling_band
 from smc_mujoco.metrics.fold import first_sample
 from smc_mujoco.simulation.cfunctions import compile_component
-from smc_mujoco.simulation.prepare import known_values, references, run_of, settings
+from smc_mujoco.simulation.prepare import compensation, known_values, references, run_of, settings
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import Constant, Push, Signal
@@ -87,10 +87,11 @@ def _users(s: Resolved) -> list[tuple[Any, int]]:
     """Return the functions of a run that are not this package's, each with its memory."""
     components = [part for part in (*s.law.parts, s.surface, s.velocity) if part is not None]
     found = [(part.function, part.memory) for part in components]
-    signals = (*s.references, *s.disturbance, s.feedforward, *s.noise.errors)
+    signals = (*s.references, *s.disturbance, s.known_signal, *s.noise.errors)
     found += [(type(one).value, one.memory) for one in signals if one is not None]
     found += [(part.read, part.memory) for part in s.sensors]
     found += [(part.stage_force, part.memory) for part in s.exact_parts]
+    found += [(part.steady, part.memory) for part in s.compensated]
     found += [(part.force, part.memory) for part in _held(s)]
     return [(function, memory) for function, memory in found if not fingerprint.ours(function)]
 
@@ -132,6 +133,10 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
         frictions.append(
             ChannelFunction(part.force, part.names, part.memory, tuple(part.channels(s.plant)))
         )
+    compensated = []
+    for part in s.compensated:
+        channels = tuple(part.channels(s.plant))
+        compensated.append(ChannelFunction(part.steady, part.names, part.memory, channels))
     clock = not s.clock.regular
     slots = 1
     while slots < s.delay_steps // s.steps + 1 + clock:  # few sizes, each of which is compiled
@@ -152,9 +157,11 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
         sensor=sensors[0] if sensors else None,
         drive=drives[0] if drives else None,
         frictions=tuple(frictions),
+        compensated=tuple(compensated),
+        on_reference=bool(compensation(s).get("on_reference")),
         references=tuple(map(type, references(s))),
         disturbances=tuple(Counter(map(type, s.disturbance)).elements()),
-        feedforward=s.feedforward and type(s.feedforward),
+        feedforward=s.known_signal and type(s.known_signal),
         errors=tuple(None if error is None else type(error) for error in s.noise.errors),
         noise=bool(s.noise.position or s.noise.velocity),
         true_model=s.model == "true",
@@ -277,6 +284,7 @@ class FormGroup:
         parts += [(self.layout.drive, part) for part in _drives(s)]
         parts += [(self.layout.sensor, part) for part in s.sensors]
         parts += zip(self.layout.frictions, (*s.exact_parts, *_held(s)), strict=True)
+        parts += zip(self.layout.compensated, s.compensated, strict=True)
         for at, part in parts:
             assert at is not None  # one loop's scenarios have the same parts
             names = len(part.names)
@@ -286,6 +294,9 @@ class FormGroup:
             for i in part.channels(s.plant):
                 row[self.layout.row.periods + i] = part.period or 0.0
                 row[self.layout.row.delays + i] = part.delay + part.skew * i
+        if s.compensated:
+            numbers = compensation(s)
+            _put(row, self.layout.row.compensation, (numbers["share"], numbers["eps"]))
         places = self.layout.row.damping, self.layout.row.levels
         for part in s.friction:
             for first, value in zip(places, part.added_to_model, strict=True):
@@ -306,7 +317,7 @@ class FormGroup:
 
     def _fill_signals(self, row: np.ndarray, s: Resolved) -> None:
         at = self.layout
-        self._fill_signal(row, at.feedforward, s.feedforward)
+        self._fill_signal(row, at.feedforward, s.known_signal)
         for place, signal in zip(at.references, references(s), strict=True):
             self._fill_signal(row, place, signal)
         for place, signal in zip(at.errors, s.noise.errors, strict=True):

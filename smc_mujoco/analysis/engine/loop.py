@@ -31,6 +31,7 @@ from smc_mujoco.analysis.engine.form import (
     STATES,
     WIDTH,
     Form,
+    PartAt,
     layout,
     measured_places,
 )
@@ -39,7 +40,7 @@ from smc_mujoco.common.aliases import Fields
 from smc_mujoco.common.jit import always, beyond, inlined, place, record_in
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import begin_measurement, put_channel
-from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, Sight
+from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, JointState, Sight
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.state import FINE, RAISED
@@ -112,6 +113,7 @@ def _moments(form: Form, compile_user: Compiler) -> Moments:
         **_sensing(form, compile_user),
         **_forces(form, compile_user),
         feedforward=_feeding(form, compile_user),
+        compensate=_compensating(form, compile_user),
         ask=None,
         noisy=form.noise,
         clock=form.clock,
@@ -302,6 +304,49 @@ def _feeding(form: Form, compile_user: Compiler) -> Any:
         return always((False, 0.0))
     feed = signal(layout(form).feedforward, compile_user)
     return inlined(lambda view, t: (False, feed(view, t, 0)[0]))
+
+
+def _compensating(form: Form, compile_user: Compiler) -> Any:
+    """Return a function (view, k, t, i) -> whether it raised, and what compensates the friction of
+    channel i.
+    """
+    if not form.compensated:
+        return always((False, 0.0))
+    on_reference = form.on_reference
+    refer = _referring(form, compile_user)
+    row_at, work_at = layout(form)[:2]
+    steady = always(0.0)
+    for at in layout(form).compensated:
+        steady = _with_steady(form, at, steady, compile_user)
+
+    @inlined
+    def compensate(view, k, t, i):
+        v = view.work[work_at.seen_v + i]
+        if on_reference:
+            v = refer(view, t, i)[1]
+        share = view.row[row_at.compensation]
+        eps = view.row[row_at.compensation + 1]
+        y = JointState(t, 0.0, 0.0, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return False, share * math.tanh(abs(v) / eps) * steady(view, i, y)
+
+    return compensate
+
+
+def _with_steady(form: Form, at: PartAt, others: Any, compile_user: Compiler) -> Any:
+    """Return a function (view, i, y) -> the force that a joint needs against a friction and
+    others at a steady speed.
+    """
+    force = acting(at, compile_user)
+    acts = tuple(i in at.part.channels for i in range(form.n))
+
+    @inlined
+    def total(view, i, y):
+        found = others(view, i, y)
+        if acts[i]:
+            found += force(view, y, i)
+        return found
+
+    return total
 
 
 def _referring(form: Form, compile_user: Compiler) -> Any:

@@ -46,9 +46,13 @@ class Viscous(Friction):
     """
 
     smooth = True
-    forces = ("b",)
+    forces = names = ("b",)
 
     b: Natural
+
+    @staticmethod
+    def steady(y, p, memory):
+        return p.b * y.v
 
     @property
     def added_to_model(self) -> Added:
@@ -78,9 +82,13 @@ class Coulomb(Friction):
       level: N m, N on a slide; 0 (none) or more.
     """
 
-    forces = ("level",)
+    forces = names = ("level",)
 
     level: Natural
+
+    @staticmethod
+    def steady(y, p, memory):
+        return math.copysign(p.level, y.v)
 
     @property
     def added_to_model(self) -> Added:
@@ -245,6 +253,7 @@ class LuGre(Friction):
 
     keeps_state = True
     forces = "coulomb", "static"
+    names = "coulomb", "static", "stribeck"
 
     coulomb: Positive
     static: Positive
@@ -259,6 +268,11 @@ class LuGre(Friction):
                 f"LuGre's static {self.static:g} is less than its coulomb {self.coulomb:g}: "
                 "give static >= coulomb"
             )
+
+    @staticmethod
+    def steady(y, p, memory):
+        drop = math.exp(-((y.v / p.stribeck) ** 2))
+        return math.copysign(p.coulomb + (p.static - p.coulomb) * drop, y.v)
 
     def sticks(self, v: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Return where the bristles bend: they carry less than what slides at this speed."""

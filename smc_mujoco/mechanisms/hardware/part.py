@@ -151,7 +151,14 @@ class Friction(OnJoints):
     keeps_state: ClassVar[bool] = False
     smooth: ClassVar[bool] = False  # whether it is a damper, which RK4 integrates
     forces: ClassVar[tuple[str, ...]] = ()  # fields that its force is proportional to
+    # (y, p, memory) -> the force that a joint needs to move against it at the steady speed y.v
+    steady: ClassVar[Callable[..., float] | None] = None
     added_to_model: ClassVar[Added] = Added()
+
+    def numbers(self, run: Run) -> list[Sequence[float]]:
+        if self.steady is None:
+            return super().numbers(run)
+        return [[getattr(self, name) for name in self.names]]
 
     def joints(self, spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
         """Return the joints that it acts on."""

@@ -92,6 +92,11 @@ class Sliding(JointForce):
         return _at_stages(type(self).value)
 
     @property
+    def steady(self) -> Callable:
+        """F at a steady speed, without a load."""
+        return _steady(type(self).value)
+
+    @property
     def exact(self) -> "Sliding":
         return self
 
@@ -145,6 +150,17 @@ def _dry_joints(model: mujoco.MjModel) -> list[int]:
     mujoco.mj_forward(model, data)
     dry = data.efc_type == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
     return np.where(dry, data.efc_id, -1).tolist()
+
+
+@functools.cache
+def _steady(formula: Callable) -> Callable:
+    """Return the force that resists a joint at a steady speed, without a load."""
+    formula = njit(formula)
+
+    def steady(y, p, memory):
+        return formula(y.v, 0.0, 0.0, p)[0]
+
+    return steady
 
 
 @functools.cache
