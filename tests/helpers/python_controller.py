@@ -59,6 +59,7 @@ class Controller:
         self.reported = np.zeros(n)  # other forces on the joints, for a law with the true model
         self.s = np.zeros(n)
         self.r = np.zeros(n)
+        self.added = np.zeros(n)
         self.a = np.zeros(n)  # estimated accelerations, or NaN
         self.last_reading = np.zeros((n, 2))  # x and v of the last readings that were not lost
 
@@ -123,6 +124,7 @@ class Controller:
         """
         scenario = self.scenario
         self.speeds = v
+        self.added = np.zeros(len(x))  # what compensates friction
         n = len(x)
         driven = len(self.limits)
         feedforward = 0.0
@@ -137,12 +139,14 @@ class Controller:
         if scenario.law.joint:
             u, s = self.law.call_joint(self.joint_measurement(x, v, t, motion))
             for i in range(driven):
-                u[i] += feedforward + self.compensation(i, v, motion)
+                self.added[i] = self.compensation(i, v, motion)
+                u[i] += feedforward + self.added[i]
             u = np.array([self.bounded_command(i, u[i], s[i]) for i in range(n)])
             return u, s
         for i in range(driven):
             u[i], s[i] = self.law(i, self.measurement(x, v, t, motion, i))
-            u[i] += feedforward + self.compensation(i, v, motion)
+            self.added[i] = self.compensation(i, v, motion)
+            u[i] += feedforward + self.added[i]
             u[i] = self.bounded_command(i, u[i], s[i])
         return u, s
 

@@ -215,6 +215,7 @@ class Loop:
                     self.controller.r,
                     *self.forces / self.scenario.steps,
                     self.held,
+                    self.controller.added,
                 )
                 for name, values in zip(LOG.names or (), sample, strict=True):
                     self.log[name][k] = values
