@@ -43,6 +43,7 @@ class Run:
     scenario: SimpleNamespace
     held: None = None
     damping: None = None
+    compensation: None = None
     diverged_at: float | None = None
     failure: str | None = None
     plant_diverged = Trace.plant_diverged
