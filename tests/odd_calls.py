@@ -214,7 +214,7 @@ CALLS: dict[Callable, dict[str, Any]] = {
     smc.results: {"source": ...},
     smc.problem: {"name": "duffing/noise@1"},
     smc.rig: {"name": "emps"},
-    smc.identify: {"rig": "emps", "records": ...},
+    smc.identify: {"machine": "emps", "logs": ...},
     smc.policy: {"act": lambda y: 0.0},
     smc.plot: {"table": ..., "path": "p.pdf"},
     smc.figure: {"traces": ..., "path": "f.pdf"},

@@ -39,7 +39,7 @@ GROUPS: dict[str, list[Callable[..., None]]] = {
         analysis.sensitivity,
         analysis.chatter,
     ],
-    "Machines": [rigs.rig],
+    "Machines": [rigs.identify, rigs.rig],
 }
 for annex in sorted(filter(annexes.installed, annexes.ANNEXES)):
     more = annexes.module(f"smc_mujoco.{annex}.commands", "the command line").GROUPS

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 from rich.table import Column, Table
@@ -11,6 +10,7 @@ from rich.text import Text
 from smc_mujoco.cli.tables import titled
 from smc_mujoco.common.text import number
 from smc_mujoco.identification.identify import Identified
+from smc_mujoco.identification.number_text import to_error
 
 
 def fits(title: str, by_name: Mapping[str, Mapping[str, float]]) -> Table:
@@ -25,25 +25,14 @@ def fits(title: str, by_name: Mapping[str, Mapping[str, float]]) -> Table:
     return table
 
 
-def _to_error(value: float, error: float) -> str:
-    """Return a value to the second digit of its standard error, with four digits or more: "3.19981"
-    for 2.1e-4.
-    """
-    if value and error:
-        digits = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2
-    else:
-        digits = 4
-    return f"{value:#.{min(max(digits, 4), 12)}g}"
-
-
 def identified(result: Identified, names: Sequence[str]) -> list[Table]:
-    """Return a table of the quantities found, with standard errors and values before, and one of
-    each record's fit.
+    """Return a table of the quantities found, with standard errors and where the search started,
+    and one of each log's fit.
     """
     values = titled(
         result.rig.label,
         "quantity",
-        *(Column(head, justify="right") for head in ("value", "±", "before")),
+        *(Column(head, justify="right") for head in ("value", "±", "start")),
         "",
     )
     for name, value in result.values.items():
@@ -51,10 +40,21 @@ def identified(result: Identified, names: Sequence[str]) -> list[Table]:
         before = number(result.before.values[name])
         error = result.errors[name]
         values.add_row(
-            name, _to_error(value, error), f"{error:.2g}", before, Text(quantity.unit, "dim")
+            name, to_error(value, error), f"{error:.2g}", before, Text(quantity.unit, "dim")
         )
     heads = [Column(head, justify="right") for head in result.fits[0]]
-    fits = titled("fit, % (before)", "record", *heads)
-    for name, fit, before in zip(names, result.fits, result.fits_before, strict=True):
-        fits.add_row(name, *(f"{value:.1f} ({before[key]:.1f})" for key, value in fit.items()))
+    title = "fit, % (before)"
+    if result.by_pieces:
+        title = "fit of the whole log, % (in pieces of 1 s)"
+    fits = titled(title, "log", *heads)
+    beside = list(result.by_pieces or result.fits_before)
+    rows = list(zip(names, result.fits, beside, strict=True))
+    if result.held_out:
+        rows.append(("held out", result.held_out.fit, result.held_out.by_pieces))
+    for name, fit, other in rows:
+        cells = [f"{value:.1f}" for value in fit.values()]
+        for k, key in enumerate(fit):
+            if key in other:
+                cells[k] += f" ({other[key]:.1f})"
+        fits.add_row(name, *cells)
     return [values, fits]

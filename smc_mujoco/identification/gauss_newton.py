@@ -1,9 +1,4 @@
-"""The search of identification: starts from torques and over decades, and damped Gauss-Newton steps
-from the best.
-
-Where the joints have the recorded command as their force, a first least squares compares that force
-with the inverse dynamics of the measured motion. It is nearly linear in masses and frictions, so
-any values may start it. The noise of accelerations biases it, so its result is only a start.
+"""The search of identification: starts over decades, and damped Gauss-Newton steps from the best.
 
 Quantities that cannot be negative, such as masses and frictions, differ between machines by powers
 of ten. So further starts are drawn evenly in their logarithms, and no step changes such a quantity
@@ -16,9 +11,7 @@ import itertools
 import numpy as np
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.identification import inverse_dynamics
 from smc_mujoco.identification.replays import Point, Replays, Slopes, cost
-from smc_mujoco.identification.rig import Values
 from smc_mujoco.identification.standard_errors import jackknife
 
 START_DECADES = 2.0  # by which a quantity of a further start may differ from the rig's own; chosen
@@ -46,48 +39,12 @@ def search(replays: Replays, starts: int, seed: int, most: int) -> Slopes:
     `most`: largest number of steps from the best start.
     """
     reached = [refine(replays, replays.start, min(most, ROUGH_STEPS))]
-    if reached[0].fit < GOOD_FIT and (point := _by_torques(replays)):
-        reached.append(refine(replays, point, min(most, ROUGH_STEPS)))
     if reached[-1].fit < GOOD_FIT and starts > 1:
         for point in _random(replays, starts - 1, seed):
             reached.append(refine(replays, point, min(most, ROUGH_STEPS)))
             if reached[-1].fit > GOOD_FIT:
                 break
     return refine(replays, min(reached, key=lambda slopes: slopes.cost).point, most)
-
-
-def _by_torques(replays: Replays) -> Point | None:
-    """Return the point at which inverse dynamics give the recorded command; None where u is not the
-    joints' force.
-    """
-    from scipy.optimize import least_squares
-
-    twin = replays.twin
-    start = replays.start
-    joints = twin.columns.x
-    columns = dataclasses.replace(twin.columns, torque=tuple(f"torque of {x}" for x in joints))
-    data = [twin.checked(record) for record in replays.data]
-    direct = replays.pieces[0].part is not None and twin.scenario("none").actuator == ()
-    if not direct or not all(inverse_dynamics.long_enough(record, columns) for record in data):
-        return None
-    measured = []
-    for record in data:
-        u = record[twin.columns.u]
-        record.update(dict.fromkeys(columns.torque, np.zeros_like(u)) | {columns.torque[0]: u})
-        measured.append(inverse_dynamics.measured(record, columns))
-
-    def differences(values: Array) -> Array:
-        quantities = twin.values | replays.values(Point(values, start.states))
-        plant = twin.machine(Values(**quantities))["plant"]
-        gaps = []
-        for record, theirs in zip(data, measured, strict=True):
-            ours = inverse_dynamics.torques(plant, record, columns)
-            gaps += [ours[name] - theirs[name] for name in columns.torque]
-        return np.nan_to_num(np.concatenate(gaps))
-
-    inside = np.clip(start.values, replays.low, replays.high)
-    solved = least_squares(differences, inside, bounds=(replays.low, replays.high), x_scale="jac")
-    return Point(solved.x, start.states)
 
 
 def _random(replays: Replays, count: int, seed: int) -> list[Point]:
@@ -109,6 +66,22 @@ def _random(replays: Replays, count: int, seed: int) -> list[Point]:
 def better(replays: Replays, *points: Point) -> Point:
     """Return the point of least cost, the first one if several are equal."""
     return points[replays.costs(points).sum(axis=1).argmin()]
+
+
+def by_halving(replays: Replays, slopes: Slopes) -> Array:
+    """Return about how far shorter steps would move the solution, (p,): twice what half steps do,
+    as errors by steps are of first order.
+    """
+    point = slopes.point
+    if not replays.free.size:
+        return np.zeros(len(replays.names))  # records of simulated runs have the same steps
+    plain = replays.rig(point).repeated(replays.pieces[0].part)
+    steps, replays.steps = replays.steps, {"physics_step": plain.resolved.physics_step / 2.0}
+    (residuals,) = replays.residuals([point])
+    replays.steps = steps
+    changed = [half - full for half, full in zip(residuals, slopes.residuals, strict=True)]
+    J = np.concatenate(slopes.freed(slopes.by_values))
+    return 2.0 * np.abs(np.linalg.lstsq(J, np.concatenate(slopes.freed(changed)), rcond=None)[0])
 
 
 def accurate(replays: Replays, slopes: Slopes) -> tuple[Slopes, Array]:

@@ -1,56 +1,58 @@
-"""Identification: from records to a rig's quantities, with standard errors, correlations and the
-fit on each record.
+"""Identification: from logs to the numbers of a machine, with standard errors, correlations and the
+fit on each log.
 
-The quantities are found by least squares of what the twin predicts: positions, and in a closed loop
-u, each relative to its variation in the record. A record is first replayed in short pieces under
-the recorded command, each from a state that is found along with the quantities, because the cost of
-pieces is smooth. If the machine's controller is known, the record is then replayed as a whole with
-the loop closed, from the values that the pieces gave. All runs of a step are one batch.
+    arm = smc.plant_from("arm.xml", ["shoulder", "elbow"])
+    found = smc.identify(arm, ["run1.csv", "run2.csv"], ["shoulder.damping", "elbow.frictionloss"])
+    print(found)
+    found.rig.fit("run3.csv")
+
+The numbers are found by least squares of what the twin predicts: positions, and in a closed loop u,
+each relative to its variation in the log. A log is first replayed in short pieces under the
+recorded command, each from a state that is found along with the numbers, because the cost of pieces
+is smooth. If the machine's controller is known, the log is then replayed as a whole with the loop
+closed, from the values that the pieces gave. All runs of a step are one batch.
 `mujoco.sysid` is not used: it replays recorded controls in an open loop, without controllers,
 encoders and delays, and needs ten more packages.
 """
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
-from smc_mujoco.common.aliases import Array, Data, Fields, Numbers
-from smc_mujoco.common.constraints import Seed, Whole, constrained
+from smc_mujoco.common.aliases import AnyPath, Array, Data, Fields, Numbers
+from smc_mujoco.common.constraints import Natural, Seed, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
-from smc_mujoco.common.files import write_json
+from smc_mujoco.common.files import replacing, write_json
 from smc_mujoco.common.progress import bar
-from smc_mujoco.identification import gauss_newton
-from smc_mujoco.identification.records import Columns, Record
+from smc_mujoco.identification import first_guess, gauss_newton, number_text, records
+from smc_mujoco.identification.own_rig import OwnRig, condition_fields, own_rig
+from smc_mujoco.identification.paths import known_paths
+from smc_mujoco.identification.records import Record
 from smc_mujoco.identification.replays import Point, Replays, Slopes
-from smc_mujoco.identification.rig import Fall, Quantity, Rig, Source
+from smc_mujoco.identification.rig import Fall, Rig, Source, rigs
 from smc_mujoco.identification.rig import rig as find_rig
-from smc_mujoco.identification.standard_errors import BLOCKS, MAX_CORRELATION, statistics
-from smc_mujoco.mechanisms.layout import column_ends
-from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.trace import Trace
-
-# Fields of a run's scenario that a rig made from its plant takes over.
-SETTINGS = (
-    "control_period",
-    "friction",
-    "contact",
-    "actuator",
-    "sensor",
-    "u_max",
-    "input_delay",
-    "velocity",
-    "model",
+from smc_mujoco.identification.standard_errors import (
+    BLOCKS,
+    MAX_CORRELATION,
+    check_told_apart,
+    left_out,
+    statistics,
 )
-# Frictions and inertias of the library's plants, which are 0 or more.
-FRICTIONS = frozenset(("b", "bq", "b1", "b2", "cf", "cfq", "cf1", "cf2", "delta"))
-INERTIAS = frozenset(("J", "Jc"))
+from smc_mujoco.mechanisms.custom import mjcf
+from smc_mujoco.mechanisms.named import MODEL, as_plant
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.conditions import Condition, condition
+from smc_mujoco.simulation.scenario import Scenario
+
 POOR_FIT = 80.0  # percent: a fit below may mean that the search ended in a wrong place; chosen
 PERFECT_FIT = 99.99  # percent: residuals beyond it are the simulation's; chosen
+FLOOR = 0.05  # of a value, by which drawn sets differ at least; chosen: friction warms up by more
+PIECE_STEPS = 4  # of the search for the starts of pieces of a log that was not used; chosen
+Log = Source | AnyPath  # also a data frame
 Count = Annotated[int, Whole(low=1, high=1000)]
 SLOW = (
     "the residuals are slow, as where a force was not recorded: true errors may be several "
@@ -64,11 +66,20 @@ POOR = (
 
 
 @dataclasses.dataclass(frozen=True)
+class HeldOutFit:
+    """How well a twin repeats a log that was not used."""
+
+    fit: Numbers  # of the whole log, as `Rig.fit`
+    by_pieces: Numbers  # of pieces of 1 s, whose starts are found
+
+
+@dataclasses.dataclass(frozen=True)
 class Identified:
-    """The quantities of a rig that were found from records, and how well they fit.
+    """The numbers of a machine that were found from logs, and how well they fit.
 
     Fits are those of `Rig.fit`, in an open loop with short steps; for `fits` the states at the
-    starts are found too.
+    starts are found too. In an open loop an arm under gravity leaves its log however good its
+    numbers are. Then the fits of pieces of 1 s tell more.
     """
 
     rig: Rig  # with the values found
@@ -76,18 +87,23 @@ class Identified:
     values: Numbers  # quantity -> value found
     errors: Numbers  # quantity -> its standard error
     correlations: Array  # of the errors, (p, p), in the order of `values`
-    fits: tuple[Numbers, ...]  # of each record
+    fits: tuple[Numbers, ...]  # of each log
     fits_before: tuple[Numbers, ...]
     predictions: tuple[
         tuple[Record, Record, Array], ...
     ]  # predicted columns, measured ones, and their times
     evaluations: int  # how many parameter sets were simulated
     independent: float  # how many samples of the residuals are independent of each other
+    by_pieces: tuple[Numbers, ...] = ()  # fit of the pieces of each log; empty in a closed loop
+    scatter: Numbers = dataclasses.field(default_factory=dict)  # of values between logs, if several
+    held_out: HeldOutFit | None = None  # of the log that was kept aside
+    units_doubted: tuple[str, ...] = ()  # sentences on columns that may be in another unit
+    data: tuple[Data, ...] = dataclasses.field(default=(), repr=False)  # the logs' columns
 
     @property
     def notes(self) -> list[str]:
-        """What the records cannot determine, and what to doubt."""
-        notes = []
+        """What the logs cannot determine, and what to doubt."""
+        notes = list(self.units_doubted)
         for (i, first), (j, second) in itertools.combinations(enumerate(self.values), 2):
             correlation = self.correlations[i, j]
             if abs(correlation) > MAX_CORRELATION:
@@ -100,38 +116,73 @@ class Identified:
                 notes.append(f"{name} is at the end of its range")
             elif self.errors[name] > abs(value):
                 notes.append(f"{name} may as well be 0")
-        worst = min(min(fit.values()) for fit in self.fits)
+        worst = min(min(fit.values()) for fit in self.by_pieces or self.fits)
         if self.independent < BLOCKS[0] and worst < PERFECT_FIT and self.rig.controller is None:
             notes.append(SLOW)
         if worst < POOR_FIT:
             notes.append(POOR)
+        if isinstance(self.rig, OwnRig) and (left_out_names := self.rig.not_in_runs):
+            notes.append(
+                f"replays have {', '.join(left_out_names)}, and runs of the machine leave it out: "
+                "a scenario has one Fault, and zeros of encoders are of their log"
+            )
         return notes
 
     @constrained
-    def drawn(self, count: Count = 8, seed: Seed = 0) -> Rig:
-        """Return the rig with an ensemble of other parameter sets that the records allow, for
-        rankings over them.
+    def drawn(self, count: Count = 8, seed: Seed = 0, floor: Natural = FLOOR) -> Rig:
+        """Return the rig with an ensemble of other parameter sets that the logs allow, for rankings
+        over them.
 
-        They are drawn from the normal distribution of the errors, and cut to the ranges.
+        They are drawn from a normal distribution and cut to the ranges. Its deviations are the
+        standard errors, which have the scatter between logs, and at least `floor` times the value:
+        a machine differs from day to day by more than the errors of one log. 0: no floor.
         """
         names = list(self.values)
         rng = np.random.default_rng(seed)
+        values = np.array(list(self.values.values()))
         spread = np.array([self.errors[name] for name in names])
         covariance = self.correlations * np.outer(spread, spread)
-        draws = rng.multivariate_normal(
-            list(self.values.values()), covariance, count, method="eigh"
-        )
+        missing = np.maximum((floor * values) ** 2 - spread**2, 0.0)
+        covariance = covariance + np.diag(missing)
+        draws = rng.multivariate_normal(values, covariance, count, method="eigh")
         for i, name in enumerate(names):
             quantity = self.rig.quantities[name]
             draws[:, i] = np.clip(draws[:, i], quantity.least, quantity.most)
         sets = tuple(dict(zip(names, row, strict=True)) for row in draws.tolist())
         return dataclasses.replace(self.rig, ensemble=sets)
 
+    def condition(self, name: str = "identified") -> Condition:
+        """Return a condition of the user's own machine, for `compare`, `which`, `tune`, `grid`: the
+        true machine has the numbers found, and a law's model those of the file.
+
+        Raises:
+          ScenarioError: the rig is a published machine, whose scenarios are `rig.scenario(law)`.
+        """
+        if not isinstance(self.rig, OwnRig):
+            raise ScenarioError(
+                f"{self.rig.name} is a rig: take rig.scenario(law), or compare(rig=...)"
+            )
+        return condition(name, **condition_fields(self.rig))
+
     def __repr__(self) -> str:
         values = []
         for name, value in self.values.items():
             values.append(f"{name} = {value:.4g} ± {self.errors[name]:.1g}")
         return f"identified({self.rig.name!r}, {', '.join(values)})"
+
+    def __str__(self) -> str:
+        """Return the numbers as a table, the fits and the notes."""
+        units = {name: self.rig.quantities[name].unit for name in self.values}
+        heads = [f"log {i}" for i in range(1, len(self.fits) + 1)]
+        fits = list(self.fits)
+        pieces = list(self.by_pieces or [{}] * len(fits))
+        if self.held_out:
+            heads.append("held out")
+            fits.append(self.held_out.fit)
+            pieces.append(self.held_out.by_pieces)
+        lines = number_text.table(self.values, self.errors, units)
+        lines += ["", *number_text.fits(heads, fits, pieces)]
+        return "\n".join(lines + [f"note: {note}" for note in self.notes])
 
     def about(self) -> Fields:
         """Return values, errors, correlations and fits as JSON data."""
@@ -154,19 +205,39 @@ class Identified:
                 about[key].append(
                     {name: str(value) for name, value in fit.items()} if falls else fit
                 )
+        about["fits_by_pieces"] = [dict(fit) for fit in self.by_pieces]
+        if self.held_out:
+            about["held_out"] = dataclasses.asdict(self.held_out)
         return about
 
     def save(self, path: str | Path) -> Path:
-        """Write `about` to a JSON file. Return its path."""
-        return write_json(Path(path), self.about())
+        """Write a file, and return its path. FILE.txt is the condition, with values and errors as
+        comments, for --condition of compare, which and tune. Any other is `about` as JSON.
+        """
+        file = Path(path)
+        if file.suffix != ".txt":
+            return write_json(file, self.about())
+        with replacing(file) as part:
+            comments = "".join(f"# {line}\n" for line in str(self).splitlines())
+            part.write_text(f"{comments}{self.condition()}\n", encoding="utf-8")
+        return file
 
     def figure(self, path: str | Path, record: int = 0) -> list[Path]:
-        """Draw measured and predicted columns of a record, and their residuals, as PATH.svg and
-        PATH.png.
+        """Draw measured and predicted columns of a log, their residuals over time and speed, and
+        the friction of each joint, as PATH.svg and PATH.png.
         """
+        whole("record", record, 0, len(self.fits) - 1)
+        if isinstance(self.rig, OwnRig):
+            from smc_mujoco.identification.friction_figure import friction_figure
+
+            errors = np.array(list(self.errors.values()))
+            covariance = self.correlations * np.outer(errors, errors)
+            log = self.rig.checked(self.data[record])
+            return friction_figure(
+                self.rig, covariance, log, self.predictions[record], self.fits[record], path
+            )
         from smc_mujoco.identification.residual_figure import residual_figure
 
-        whole("record", record, 0, len(self.fits) - 1)
         predicted, measured, t = self.predictions[record]
         fits = {"twin": self.fits[record]}
         return residual_figure(
@@ -176,50 +247,53 @@ class Identified:
 
 @constrained
 def identify(
-    rig: Rig | Plant | str,
-    records: Source | Sequence[Source],
-    quantities: Sequence[str] | None = None,
+    machine: Rig | Plant | Scenario | str,
+    logs: Log | Sequence[Log],
+    names: Sequence[str] | None = None,
     *,
-    start: Numbers | None = None,
-    starts: Count = 4,
+    held_out: Log | None = None,
+    columns: Mapping[str, str] | None = None,
+    corrected: bool = False,
+    starts: Count = 1,
     seed: Seed = 0,
-    most: int = 30,
+    most: Count = 30,
     progress: bool = False,
 ) -> Identified:
-    """Find a rig's quantities from records.
+    """Find numbers of a machine from logs: friction, armature, delay, masses and more.
 
     Args:
-      rig: a Rig or its name; or a Plant, whose records are traces, or columns named as those of
-        traces.
-      records: one record or several: columns by name (see `Rig.columns`), or traces of simulated
-        runs.
-      quantities: names of those to find; None: the rig's `free`, or all parameters of a plant that
-        are not 0.
-      start: quantity -> value, SI units, from which the search starts; those not given start at the
-        rig's own.
-      starts: number of parameter sets from which the search may start: the present one, and the
-        best of random ones, which differ from it by up to a factor of 100.
+      machine: your own machine as a plant, or as a scenario whose parts have numbers to find, such
+        as a friction; or the name of either's plant, as "arm.xml:shoulder+elbow". Or a rig or its
+        name, see `smc.rigs()`.
+      logs: one log or several, of any controller, at 40 Hz or more: the path of a CSV or npz file,
+        a data frame, columns by name, or traces. A log has t in s, and x (rad or m) and u (in the
+        unit of the machine's command) of the joint, or x_JOINT and u_JOINT of each.
+      names: paths of the numbers, see identification/paths.py: "shoulder.damping", .frictionloss,
+        .armature, .stiffness, .gain, .offset, .zero, "input_delay", "m", "friction.elbow.kc". None:
+        the rig's `free`. Nobody gives a start: it comes from least squares of forces.
+      held_out: a log that is not used, to check the numbers on.
+      columns: our name of a column -> that of the logs.
+      corrected: whether to correct open loops for the errors of the simulation's steps, in several
+        times the time. Without it a standard error has what half steps would change.
+      starts: number of sets from which the search may start, if the first fits badly: the present
+        one, and the best of random ones, which differ from it by up to a factor of 100.
       seed: of these starts. The same seed gives the same result.
       most: largest number of steps of the search.
       progress: whether to show a progress bar.
 
     Raises:
-      ScenarioError: an unknown quantity, not a record, columns in another unit or in the wrong
-        order, or records that cannot tell the quantities apart.
+      ScenarioError: an unknown path, which lists what there is; a log without a column, too slow,
+        without motion, in degrees, or too short; nothing in the logs depends on a number, or two
+        cannot be told apart.
     """
-    many: Any
-    if isinstance(records, (list, tuple)):
-        many = records
-    else:
-        many = [records]
-    if not many:
-        raise ScenarioError("there are no records: give at least one")
-    twin, data = _twin(rig, many)
-    twin = twin.with_values({} if start is None else start)
-    names = _checked_names(twin, quantities)
+    twin, data = _read(machine, logs, names, columns)
+    names = _checked_names(twin, names)
     fits_before = twin.fits(data)  # also refuses records that are too short
+    doubts = first_guess.doubts(twin, data) if isinstance(twin, OwnRig) else []
     with bar(f"identify {twin.name}", 2 * most * (2 * len(names) + 1), shown=progress) as drawn:
-        replays, slopes, by_steps = _solved(twin, names, data, starts, seed, most, drawn.advance)
+        replays, slopes, by_steps = _solved(
+            twin, names, data, doubts, starts, seed, most, corrected, drawn.advance
+        )
         errors, correlations, independent = statistics(replays, slopes, by_steps)
     values = replays.values(slopes.point)
     fitted = twin.with_values(values, "identified from records")
@@ -227,6 +301,10 @@ def identify(
     steps = replays.short_steps
     if steps:
         fits_before = twin.fits(data, **steps)
+    scatter = {}
+    if len(data) > 1:
+        between = left_out(slopes, [piece.record for piece in replays.pieces]) * replays.scales
+        scatter = dict(zip(names, between.tolist(), strict=True))
     return Identified(
         rig=fitted,
         before=twin,
@@ -238,38 +316,142 @@ def identify(
         predictions=tuple(fitted.predictions(data, states=states, **steps)),
         evaluations=replays.evaluations,
         independent=independent,
+        by_pieces=() if replays.whole else tuple(fits_by_pieces(replays, slopes)),
+        scatter=scatter,
+        held_out=None if held_out is None else check(fitted, held_out, columns),
+        units_doubted=tuple(doubts),
+        data=tuple(data),
     )
 
 
-def _checked_names(twin: Rig, quantities: Sequence[str] | None) -> list[str]:
+def check(rig: Rig, log: Log, columns: Mapping[str, str] | None = None) -> HeldOutFit:
+    """Return how well a rig repeats a log that its numbers were not found from."""
+    twin, data = rig.reading([records.given(log, columns)])
+    fit = twin.fits(data)[0]
+    if twin.controller is not None or twin.dynamics is not None:
+        return HeldOutFit(fit, {})
+    replays = Replays(twin, [], data, False)
+    slopes = gauss_newton.refine(replays, replays.start, PIECE_STEPS)
+    return HeldOutFit(fit, fits_by_pieces(replays, slopes)[0])
+
+
+def fits_by_pieces(replays: Replays, slopes: Slopes) -> list[dict[str, float]]:
+    """Return the fit of each column of each record, percent, in pieces whose starts were found."""
+    found = []
+    for k in range(len(replays.data)):
+        rows = []
+        for piece, residuals in zip(replays.pieces, slopes.residuals, strict=True):
+            if piece.record == k:
+                rows.append(residuals.reshape(-1, slopes.columns))
+        shares = np.linalg.norm(np.concatenate(rows), axis=0)
+        columns = next(piece.measured for piece in replays.pieces if piece.record == k)
+        percent = (100.0 * (1.0 - shares)).tolist()
+        found.append(dict(zip(columns, percent, strict=True)))
+    return found
+
+
+def _read(
+    machine: Rig | Plant | Scenario | str,
+    logs: Log | Sequence[Log],
+    names: Sequence[str] | None,
+    columns: Mapping[str, str] | None,
+) -> tuple[Rig, list[Data]]:
+    """Return the rig of a machine, and its logs as columns. An error about a file names it."""
+    many: Any = logs if isinstance(logs, (list, tuple)) else [logs]
+    if not many:
+        raise ScenarioError("there are no logs: give at least one")
+    read = [records.given(log, columns) for log in many]
+    if isinstance(machine, str):
+        machine = find_rig(machine) if machine in rigs() else _named_plant(machine, read)
+    if isinstance(machine, Plant | Scenario):
+        if not names:
+            base = own_rig(machine, []).base
+            known = ", ".join(known_paths(base))
+            raise ScenarioError(f"{base.plant.name} has no numbers to find: name some, of {known}")
+        machine = own_rig(machine, _once(names))
+    if not isinstance(machine, Rig):
+        raise ScenarioError(
+            f"cannot identify {shown(machine)}: give a plant, a scenario, or a rig or its name"
+        )
+    twin, data = machine.reading(read)
+    if isinstance(twin, OwnRig):
+        for given, record in zip(many, data, strict=True):
+            _check_log(twin, given, record)
+        twin = first_guess.first_guess(twin, data)
+    return twin, data
+
+
+def _named_plant(text: str, logs: Sequence[Any]) -> Plant:
+    """Return a plant by its name. FILE.xml alone has the joints of the first log's columns: those
+    with a command u_JOINT are driven, and those with a position x_JOINT alone are measured.
+    """
+    model = MODEL.fullmatch(text)
+    if model is None or model["joints"] is not None or not isinstance(logs[0], Mapping):
+        return as_plant(text)
+    driven = [name[2:] for name in logs[0] if name.startswith("u_")]
+    seen = [name[2:] for name in logs[0] if name.startswith("x_")]
+    joints = driven + [f"{joint}(measured)" for joint in seen if joint not in driven]
+    if not driven:
+        joints = [joint.name for joint in mjcf.source(text).spec().joints if joint.name]
+        if len(joints) != 1:
+            return as_plant(text)  # its error names the joints
+    return as_plant(f"{text}:{'+'.join(joints)}")
+
+
+def _check_log(twin: OwnRig, given: Any, record: Data) -> None:
+    """Raise ScenarioError for a log that cannot be used. It names the log's file, if it has one."""
+    try:
+        twin.checked(record)
+    except ScenarioError as error:
+        if isinstance(given, str | Path):
+            raise ScenarioError(f"{given}: {error}") from None
+        raise
+
+
+def _once(names: Sequence[str]) -> list[str]:
+    """Return the names, each of which may be there once."""
+    listed = list(names)
+    for name in listed:
+        if listed.count(name) > 1:
+            raise ScenarioError(f"quantities have {name} {listed.count(name)} times: name it once")
+    return listed
+
+
+def _checked_names(twin: Rig, names: Sequence[str] | None) -> list[str]:
     """Return the names of the quantities to find."""
-    names = list(twin.free if quantities is None else quantities)
-    for name in names:
+    listed = _once(twin.free if names is None else names)
+    for name in listed:
         find(f"quantity of {twin.name}", name, twin.quantities)
-        if names.count(name) > 1:
-            raise ScenarioError(f"quantities have {name} {names.count(name)} times: name it once")
-    if not names:
+    if not listed:
         raise ScenarioError(
             f"{twin.name} has no quantities to find: name some, of {', '.join(twin.quantities)}"
         )
-    return names
+    return listed
 
 
 def _solved(
     twin: Rig,
     names: list[str],
     data: Sequence[Data],
+    doubts: Sequence[str],
     starts: int,
     seed: int,
     most: int,
+    corrected: bool,
     report: Any,
 ) -> tuple[Replays, Slopes, Array]:
     """Return the replays of the last search, their slopes at the solution, and its error due to
     steps, (p,).
     """
     pieces = Replays(twin, names, data, False, report)
+    first = pieces.slopes(pieces.start)
+    if doubts and first.fit < 0.0:
+        raise ScenarioError(doubts[0])
+    check_told_apart(pieces, first)
     reached = gauss_newton.search(pieces, starts, seed, most)
     if twin.controller is None:
+        if not corrected:
+            return pieces, reached, gauss_newton.by_halving(pieces, reached)
         slopes, moved = gauss_newton.accurate(pieces, reached)
         return pieces, gauss_newton.not_worse(pieces, slopes), moved
     closed = Replays(twin, names, data, True, report)
@@ -306,46 +488,3 @@ def _starting_states(
     costs = repeats.costs(candidates)
     best = costs.argmin(axis=0)
     return [repeats.state(candidates[best[i]], i) for i in range(len(data))]
-
-
-def _twin(given: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[Data]]:
-    """Return the rig to identify, and its records as columns."""
-    if isinstance(given, str):
-        given = find_rig(given)
-    traces = [record for record in many if isinstance(record, Trace)]
-    if isinstance(given, Plant):
-        given = _of_plant(given, traces[0].scenario if traces else None)
-    if not isinstance(given, Rig):
-        raise ScenarioError(
-            f"cannot identify {shown(given)}: give a rig, the name of one, or a plant"
-        )
-    return given.reading(many)
-
-
-def _of_plant(plant: Plant, base: Scenario | None) -> Rig:
-    """Return a rig whose quantities are a plant's parameters, with the parts of a run's scenario
-    `base`.
-    """
-    settings = {}
-    for name in SETTINGS:
-        value = getattr(base, name, None)
-        if value is not None:
-            settings[name] = value
-    from_zero = FRICTIONS | INERTIAS | {*plant.dry, *plant.added}
-    quantities = {}
-    for name, value in plant.parameters.items():
-        least = 0.0 if name in from_zero else -np.inf
-        if name in plant.positive:
-            least = 1e-6
-        quantities[name] = Quantity(value, "", "nominal value of the plant", least)
-    ends = column_ends(plant)
-    return Rig(
-        name=plant.name,
-        label=plant.label or plant.name,
-        quantities=quantities,
-        machine=lambda q: settings | {"plant": dataclasses.replace(plant, parameters=vars(q))},
-        columns=Columns(
-            x=tuple(f"x{end}" for end in ends), u=f"u{ends[0]}", reference=f"r{ends[0]}"
-        ),
-        free=tuple(name for name, value in plant.parameters.items() if value and name != "grav"),
-    )

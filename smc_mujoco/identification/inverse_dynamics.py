@@ -53,7 +53,7 @@ class Filter:
         """
         from scipy.signal import savgol_filter
 
-        samples = 2 * max(2, round(CUBIC_WINDOW / self.step / 2)) + 1
+        samples = cubic_samples(self.step)
         smooth = savgol_filter(
             self.data[name], samples, CUBIC_DEGREE, deriv=derivative, delta=self.step
         )
@@ -69,6 +69,11 @@ class Filter:
         """Return values (N,) without the ends."""
         cut = round(END_DURATION / (self.stride * self.step))
         return values[cut : len(values) - cut]
+
+
+def cubic_samples(step: float) -> int:
+    """Return how many samples of a record, `step` s apart, a cubic goes through."""
+    return 2 * max(2, round(CUBIC_WINDOW / step / 2)) + 1
 
 
 def times(data: Record, columns: Columns) -> Array:

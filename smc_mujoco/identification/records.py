@@ -6,6 +6,7 @@ rig.
 
 import dataclasses
 import math
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -42,6 +43,7 @@ class Columns:
     # position of each channel, rad or m; or of each joint that has a torque
     x: Names = ("x",)
     u: str = "u"  # command, in the unit of the rig's u
+    inputs: Names = ()  # commands of all motors of a machine with several; empty: u alone
     reference: str = "reference"  # of the driven joint, if the loop is closed
     feedforward: str = "feedforward"  # what is added to the controller's u; records may lack it
     others: Names = ()  # references of the other joints; records may lack them
@@ -54,7 +56,7 @@ class Columns:
 
     def needed(self, closed: bool) -> Names:
         """Return the columns that a record must have; for a closed loop also the reference."""
-        command = self.torque or (self.u,)
+        command = self.torque or self.inputs or (self.u,)
         if closed and not self.torque:
             command = self.u, self.reference
         return self.time, *self.x, *command
@@ -62,27 +64,51 @@ class Columns:
     @property
     def known(self) -> Names:
         """All columns that a replay may read."""
-        more = self.reference, *self.others, self.feedforward, *self.state
+        more = *self.inputs, self.reference, *self.others, self.feedforward, *self.state
         return tuple(dict.fromkeys((*self.needed(True), *more)))
 
 
-def load_record(path: AnyPath, names: Mapping[str, str] | None = None) -> Record | Trace:
+def load_record(path: AnyPath, columns: Mapping[str, str] | None = None) -> Record | Trace:
     """Return the columns of a CSV or npz file, or a saved trace.
 
-    `names`: the rig's name of a column -> the file's.
+    `columns`: the rig's name of a column -> the file's.
     """
     cure = "give the path of a CSV file, or of an npz file with arrays by column"
-    columns = {}
+    data = {}
     with reading(path, "record", cure) as file:
         if file.suffix == ".npz":
             with file.open("rb") as opened, np.load(opened) as arrays:
-                columns = dict(arrays)
-    if "about" in columns:
+                data = dict(arrays)
+    if "about" in data:
         return traces.load(file)
-    columns = columns or _csv(file)
-    for ours, theirs in (names or {}).items():
-        columns[ours] = find(f"column of {path}", theirs, columns)
-    return columns
+    return renamed(data or _csv(file), columns, str(path))
+
+
+def renamed(data: Data, columns: Mapping[str, str] | None, what: str) -> Record:
+    """Return columns with those of `columns`, ours -> theirs, under our names, too."""
+    if columns is None:
+        return dict(data)
+    if not isinstance(columns, Mapping):
+        raise ScenarioError(
+            f"columns are {shown(columns)}: give our names with the log's, as {{'t': 'time'}}"
+        )
+    found = dict(data)
+    for ours, theirs in columns.items():
+        found[ours] = find(f"column of {what}", theirs, data)
+    return found
+
+
+def given(record: Any, columns: Mapping[str, str] | None = None) -> Any:
+    """Return a record that a user gives as its columns, or as a trace: the path of a file, a trace,
+    a data frame, or columns by name.
+    """
+    if isinstance(record, str | os.PathLike):
+        return load_record(record, columns)
+    if hasattr(record, "to_dict") and hasattr(record, "columns"):  # a data frame
+        record = {str(name): np.asarray(record[name]) for name in record.columns}
+    if isinstance(record, Mapping):
+        return renamed(record, columns, "the record")
+    return record
 
 
 def _csv(file: Path) -> Record:
@@ -160,7 +186,7 @@ def checked(record: Data, columns: Columns, period: float | None, rig: str) -> R
         raise ScenarioError(
             f"the record of {rig} has no column {', '.join(missing)} "
             f"(it has {', '.join(map(str, record)) or 'none'}): add it, or say which it is, as "
-            f"--columns {missing[0]}=NAME (in Python names={{{missing[0]!r}: 'NAME'}})"
+            f"--columns {missing[0]}=NAME (in Python columns={{{missing[0]!r}: 'NAME'}})"
         )
     data = {name: _numbers(name, record[name], rig) for name in columns.known if name in record}
     t = data[columns.time]

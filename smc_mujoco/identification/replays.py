@@ -58,6 +58,11 @@ class Piece:
     spread: Numbers  # norm of each whole column about its mean: the unit of residuals
     scales: Array  # units of the free states, (s,)
 
+    @property
+    def stride(self) -> int:
+        """Control periods of its replay for each of its samples."""
+        return self.part.stride if self.part else 1
+
 
 @frozen_data
 class Point:
@@ -296,7 +301,7 @@ class Replays:
         for piece, trace in zip(self.pieces, traces, strict=False):
             columns = rig.predicted(trace)
             for name in columns:
-                columns[name] = columns[name][piece.skipped :]
+                columns[name] = columns[name][:: piece.stride][piece.skipped :]
             found.append(columns)
         return found
 

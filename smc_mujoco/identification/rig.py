@@ -12,6 +12,7 @@ scenarios, runs and traces.
 
 import dataclasses
 import functools
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -22,7 +23,7 @@ from smc_mujoco.common import annexes
 from smc_mujoco.common.aliases import Array, Data, Fields, Floats, Names, Numbers
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.data import frozen_data, named_data
-from smc_mujoco.common.errors import ScenarioError, find, number
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, number
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.registry import Catalogue, added, discover, imported
 from smc_mujoco.control.law import Law
@@ -80,6 +81,7 @@ class RecordPart:
     state: Array  # measured positions and velocities at the start, (2n,)
     largest_u: float  # of the recorded command, in the unit of u
     zero: Numbers  # quantities that the record determines, see `Rig.zero`
+    stride: int = 1  # control periods of the replay for each sample of the record
 
 
 @named_data
@@ -451,19 +453,24 @@ class Rig:
                 torques = inverse_dynamics.torques(plant, columns, names)
                 found.append((torques, measured, inverse_dynamics.times(columns, names)))
             return found
+        parts = [self.part(record) for record in many]
         scenarios = []
-        for record, state in zip(many, states or [None] * len(many), strict=True):
-            scenarios.append(self.repeated(self.part(record), state=state, **changes))
-        for columns, trace in zip(data, run(scenarios), strict=True):
-            period = trace.scenario.control_period
+        for part, state in zip(parts, states or [None] * len(many), strict=True):
+            scenarios.append(self.repeated(part, state=state, **changes))
+        with warnings.catch_warnings():  # of laws, while these commands are a record's
+            warnings.simplefilter("ignore", ScenarioWarning)
+            traces = run(scenarios)
+        for columns, part, trace in zip(data, parts, traces, strict=True):
+            period = trace.scenario.control_period * part.stride
             first = round(self.score_from / period)
             after = round((self.score_from - self.start) / period)
-            if len(trace.t) < after + records.MIN_SAMPLES:
+            count = len(trace.t[:: part.stride])
+            if count < after + records.MIN_SAMPLES:
                 raise self._too_short(columns, "score", first + records.MIN_SAMPLES)
-            scored = slice(first, first + len(trace.t) - after)
+            scored = slice(first, first + count - after)
             predicted = self.predicted(trace)
             for name, values in predicted.items():
-                predicted[name] = values[after:]
+                predicted[name] = values[:: part.stride][after:]
             measured = {name: columns[name][scored] for name in predicted}
             found.append((predicted, measured, columns[names.time][scored]))
         return found

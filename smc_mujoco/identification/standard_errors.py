@@ -8,12 +8,17 @@ the residuals' correlation time. Where a force that was not recorded moves the m
 has enough of them. So a standard error is at least that of least squares with as many residuals as
 are independent of each other. It is still too small then, and a note says so.
 
+What a model lacks makes pieces and records disagree by more than that. So a standard error is also
+at least that of a jackknife that leaves out one piece after the other, and one record after the
+other, if there are several.
+
 A closed loop feeds the noise of its measurement back. If one short transient decides a quantity,
 the other blocks do not show the effect of that noise. So closed loops are also simulated with their
 own noise and rounding, and a standard error is at least the deviation that these cause.
 """
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -45,6 +50,25 @@ def statistics(
     """
     names = replays.names
     J = np.concatenate(slopes.freed(slopes.by_values))
+    covariance = jackknife(slopes)
+    deviation = np.sqrt(np.diag(covariance))
+    count = independent(slopes)
+    with np.errstate(all="ignore"):
+        correlations = np.nan_to_num(covariance / np.outer(deviation, deviation))
+    deviation = np.maximum(deviation, by_correlation(slopes, J, count))
+    deviation = np.maximum(deviation, left_out(slopes, list(range(len(slopes.residuals)))))
+    deviation = np.maximum(deviation, left_out(slopes, [piece.record for piece in replays.pieces]))
+    if replays.closed:
+        deviation = np.maximum(deviation, _fed_back(replays, slopes.point, J))
+    deviation = np.hypot(deviation, by_steps)
+    errors = dict(zip(names, (deviation * replays.scales).tolist(), strict=True))
+    return errors, correlations, count
+
+
+def check_told_apart(replays: Replays, slopes: Slopes) -> None:
+    """Raise ScenarioError where nothing depends on a quantity, or two cannot be told apart."""
+    names = replays.names
+    J = np.concatenate(slopes.freed(slopes.by_values))
     sizes = np.linalg.norm(J, axis=0)
     for name, size in zip(names, sizes, strict=True):
         if size == 0.0:
@@ -58,17 +82,28 @@ def statistics(
             f"the records of {replays.twin.name} cannot tell {names[one]} and {names[other]} "
             "apart: leave one out, or give a longer record or one of a richer motion"
         )
-    covariance = jackknife(slopes)
-    deviation = np.sqrt(np.diag(covariance))
-    count = independent(slopes)
-    with np.errstate(all="ignore"):
-        correlations = np.nan_to_num(covariance / np.outer(deviation, deviation))
-    deviation = np.maximum(deviation, by_correlation(slopes, J, count))
-    if replays.closed:
-        deviation = np.maximum(deviation, _fed_back(replays, slopes.point, J))
-    deviation = np.hypot(deviation, by_steps)
-    errors = dict(zip(names, (deviation * replays.scales).tolist(), strict=True))
-    return errors, correlations, count
+
+
+def left_out(slopes: Slopes, groups: Sequence[int]) -> Array:
+    """Return the deviation of the solution, (p,), by a jackknife that leaves out one group of
+    pieces after the other; 0 with fewer than two. `groups`: the group of each piece.
+    """
+    normal = []
+    for r, J, S in zip(slopes.residuals, slopes.by_values, slopes.by_states, strict=True):
+        normal.append(_normal(r, J, S))
+    p = slopes.by_values[0].shape[1]
+    every = {group: (np.zeros((p, p)), np.zeros(p)) for group in groups}
+    for group, (A, g) in zip(groups, normal, strict=True):
+        every[group] = every[group][0] + A, every[group][1] + g
+    if len(every) < 2:
+        return np.zeros(p)
+    A = sum(one for one, _ in every.values())
+    g = sum(one for _, one in every.values())
+    moves = []
+    for own_A, own_g in every.values():
+        moves.append(np.linalg.lstsq(A - own_A, g - own_g, rcond=None)[0])
+    moved = np.array(moves) - np.linalg.lstsq(A, g, rcond=None)[0]
+    return np.sqrt((len(moved) - 1) / len(moved) * np.sum(moved**2, axis=0))
 
 
 def jackknife(slopes: Slopes) -> Array:

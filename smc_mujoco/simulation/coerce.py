@@ -21,6 +21,7 @@ from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import catalogue as surfaces
+from smc_mujoco.mechanisms.custom.joint_numbers import dotted, joint_numbers, with_joint_numbers
 from smc_mujoco.mechanisms.hardware.contact import Contact, Obstacle, kinds
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
@@ -29,7 +30,7 @@ from smc_mujoco.mechanisms.layout import all_joints, channel_names, driven_names
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.controller import MAX_STATE
-from smc_mujoco.simulation.signals import Constant, PerChannel, Signal, parameter_factors
+from smc_mujoco.simulation.signals import Constant, Jump, PerChannel, Signal, parameter_factors
 
 T = TypeVar("T")
 P = TypeVar("P", bound=OnJoints)
@@ -52,8 +53,17 @@ Sensors = SomeByJoint[Encoder]
 
 
 def plant(name: str, value: object, s: Any) -> Plant:
-    """Return a plant, from itself or its name."""
-    return as_plant(value)
+    """Return a plant, from itself or its name. Numbers of its joints that the scenario changes are
+    among its parameters.
+    """
+    made = as_plant(value)
+    mismatch, jump = (vars(s).get(field) for field in ("mismatch", "jump"))
+    changed: list[str] = []
+    if isinstance(mismatch, Mapping):
+        changed += dotted(mismatch)
+    if isinstance(jump, Jump):
+        changed += [name for name in dotted(jump.factors) if name in joint_numbers(made)]
+    return with_joint_numbers(made, changed)
 
 
 def law(value: Law | Template | str) -> Law:

@@ -17,6 +17,7 @@ from smc_mujoco.control import component_json as components
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.surface import catalogue as surfaces
+from smc_mujoco.mechanisms.custom.joint_numbers import dotted, with_joint_numbers
 from smc_mujoco.mechanisms.custom.plant_from import restored
 from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
 from smc_mujoco.mechanisms.hardware.part import Friction, Part
@@ -158,7 +159,8 @@ def _restore_plant(data: dict) -> Plant:
     module = plant.pop("module")
     if mjcf := plant.pop("mjcf", None):
         del plant["n"]
-        return dataclasses.replace(restored(mjcf, name), parameters=plant)
+        made = with_joint_numbers(restored(mjcf, name), dotted(plant))
+        return dataclasses.replace(made, parameters=plant)
     if module != find_plant(name).build.__module__:
         raise ScenarioError(
             f"plant {name!r} is not one of the library's: import {module}, which defines it, to "

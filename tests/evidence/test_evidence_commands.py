@@ -181,8 +181,11 @@ STUBS = {  # of each command: the functions replaced, and what they give
             "counts": {"supported": 2},
         },
     },
-    "rig": {
+    "identify": {
         "identification.identify.identify": lambda of, many, *_, **__: identified(len(many)),
+        "identification.residual_figure.residual_figure": [Path("run.svg")],
+    },
+    "rig": {
         "identification.rig.rig": repeated,
         "identification.records.load_record": lambda file, names: {"t": np.array([3.0, 4.0])},
         "identification.residual_figure.residual_figure": [Path("run.svg")],
@@ -252,23 +255,24 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
         ],
     ),
     (
-        "rig --fit emps a.csv b.csv c.csv --columns x=position --quantities mass,offset --set "
-        "mass=5 --starts 2 --seed 3"
+        "identify emps a.csv b.csv c.csv --columns x=position --for mass,offset --starts 2 "
+        "--seed 3 --corrected --held-out d.csv"
     ): (
         0,
         [
-            "load_record(Path(c.csv), {x: 'position'})",
-            "['mass', 'offset'], start={mass: 5.0}, starts=2, seed=3",
+            "identify('emps', [Path(a.csv), Path(b.csv), Path(c.csv)], ['mass', 'offset'], "
+            "held_out=Path(d.csv), columns={x: 'position'}, corrected=True, starts=2, seed=3",
             *AXIS,
             "c.csv falls at 8.4 s (falls at 8.4 s)",
             "the fit is poor",
-            "41 parameter sets, seed 3",
+            "41 parameter sets",
         ],
     ),
-    "rig --fit duffing a.csv b.csv --json found.json --figure fit": (
+    "identify duffing a.csv b.csv --json found.json --figure fit": (
         0,
         [
-            "identify(plant duffing, [{t: a ndarray}, {t: a ndarray}], None, start={}, starts=4",
+            "identify('duffing', [Path(a.csv), Path(b.csv)], None, held_out=None, columns=None, "
+            "corrected=False, starts=1",
             "{twin: {x: 99.04, u: 81.0}}, {x: 'm', u: 'V'}, Path(fit))",
             *AXIS,
             "the fit is poor",
@@ -278,7 +282,6 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
             '"fits_before": [{"x": 99.0,',
         ],
     ),
-    "rig --fit nowhere a.csv": (0, ["identify('nowhere', [{t: a ndarray}], None", *AXIS]),
     "rig emps run.csv --columns x=position": (
         0,
         [

@@ -198,11 +198,10 @@ def test_the_command_identifies_from_files(tmp_path):
         tmp_path / "run.npz"
     )
     words = [
-        "rig",
-        "--fit",
+        "identify",
         "emps",
         str(tmp_path / "run.npz"),
-        "--quantities",
+        "--for",
         "mass",
         "--starts",
         "1",
@@ -214,4 +213,4 @@ def test_the_command_identifies_from_files(tmp_path):
     assert found["quantities"]["mass"]["value"] == pytest.approx(95.1089, rel=0.02)
     wrong = CliRunner().invoke(app, [*words, "--columns", "x"])
     assert wrong.exit_code == 2
-    assert "columns 'x' cannot be read: write it as theta=arm_angle,t=time" in wrong.output
+    assert "columns 'x' cannot be read: write it as x_elbow=angle,t=time" in wrong.output

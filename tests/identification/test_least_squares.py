@@ -18,7 +18,7 @@ from smc_mujoco.identification import (
     replays,
     standard_errors,
 )
-from smc_mujoco.identification import identify as identification
+from smc_mujoco.identification.own_rig import own_rig
 from smc_mujoco.identification.replays import Piece, Point, Replays, Slopes
 from smc_mujoco.identification.rig import Fall, Quantity, fallen, percentages
 
@@ -168,8 +168,7 @@ def test_moves_of_the_states_are_what_the_quantities_leave():
     assert len(gauss_newton._variants(curve, slopes, TRUE)) == 1
 
 
-def test_a_search_reaches_least_squares_and_tries_no_rival_of_a_good_start(monkeypatch):
-    monkeypatch.setattr(gauss_newton, "_by_torques", None)
+def test_a_search_reaches_least_squares_and_tries_no_rival_of_a_good_start():
     curve = Curve(noise=0.002)
     found = gauss_newton.search(curve, 4, 0, 30)
     rows = np.vstack([block(k, part) for k, part in enumerate(curve.parts)])
@@ -342,7 +341,7 @@ def test_a_record_is_cut_into_pieces_of_its_window():
         "x": 0.3 * np.sin(5.0 * t),
         "u": np.cos(3.0 * t),
     }
-    twin, data = identification._twin(smc.plant("servo_axis"), [record])
+    twin, data = own_rig(smc.plant("servo_axis"), ["M", "b"]), [record]
     made = Replays(twin, ["M", "b"], data, False, lambda count: None)
     assert [len(piece.measured["x"]) for piece in made.pieces] == [1101, 1101, 1101]
     scales = 0.05 * np.array([np.std(0.3 * np.sin(5.0 * t)), np.std(1.5 * np.cos(5.0 * t))])

@@ -1,10 +1,10 @@
-"""smc-mujoco rig: records of a real machine beside its twin, and a machine's quantities from its
-records.
+"""smc-mujoco rig and identify: records of a real machine beside its twin, and a machine's numbers
+from its logs.
 """
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -15,22 +15,18 @@ from smc_mujoco.common.interrupts import delay_signals
 
 
 def rig(
-    ctx: typer.Context,
     name: Annotated[
         str | None,
         typer.Argument(
             metavar="RIG",
-            help=(
-                "A rig, such as qube_servo; with --fit also a plant, or FILE.xml:joint+joint. "
-                "Without one: lists the rigs."
-            ),
+            help=("A rig, such as qube_servo. Without one: lists the rigs."),
         ),
     ] = None,
     files: Annotated[
         list[Path] | None,
         typer.Argument(
             metavar="FILE",
-            help="Records: CSV or npz files of columns; with --fit also traces.",
+            help="Record: a CSV or npz file of columns.",
         ),
     ] = None,
     columns: options.Columns = None,
@@ -54,40 +50,14 @@ def rig(
     film: Annotated[
         Path | None, typer.Option(help="Also film machine and twins side by side, to a .mp4 file.")
     ] = None,
-    fit: Annotated[
-        bool, typer.Option("--fit", help="Fit quantities (mass, friction, motor) to the records.")
-    ] = False,
-    quantities: Annotated[
-        str | None,
-        typer.Option(
-            help="Fit: quantities to find, as M,b; default: those that the records determine."
-        ),
-    ] = None,
-    given: Annotated[
-        str | None,
-        typer.Option(
-            "--set",
-            metavar="NAME=VALUE,...",
-            help="Fit: where the search starts, SI units: M=5,b=8.",
-        ),
-    ] = None,
-    starts: Annotated[
-        int, typer.Option(min=1, help="Fit: how many sets the search may start from.")
-    ] = 4,
-    seed: Annotated[int, typer.Option(min=0, help="Fit: seed of these starts.")] = 0,
     json: options.Json = None,
 ) -> None:
-    """Compare a record of a real machine with its simulation, or identify the simulation's
-    parameters.
+    """Compare a record of a real machine with its simulation.
 
     The simulation, or twin, starts from the measured state. If the machine's controller is known,
     the loop is closed and only the references are those of the record; else the twin repeats the
     recorded command. The table has the fit of the whole record, 100 (1 - |y - yhat| / |y - mean y|)
     percent.
-
-    With --fit the quantities are chosen that give the least sum of squared residuals. They are
-    printed with their standard errors, with what the records cannot tell, and with the fit of each
-    record before and after.
 
     A record has a column for each signal, sampled at the rate of the rig's controller, angles in
     rad and time in s. The first line of a CSV file has the names of the columns.
@@ -98,32 +68,108 @@ def rig(
 
     Example: smc-mujoco rig qube_servo run.csv --sets driver --duration 6 --film run.mp4
 
-    Example: smc-mujoco rig servo_axis run.csv --fit --set M=5,b=8 --columns x=position,u=force
     """
-    options.only_for(
-        ctx,
-        ("sets", "start", "duration", "film"),
-        not fit,
-        "a record beside its twin: leave out --fit",
-    )
-    options.only_for(ctx, ("quantities", "given", "starts", "seed"), fit, "--fit")
     terminal = Terminal(json)
-    data = None
     named = options.pairs(columns, "columns", "theta=arm_angle,t=time")
-    if fit:
-        if name is None:
-            raise ScenarioError("--fit without a rig: give one, or a plant")
-        values = options.numbers(given, "--set", "M=5,b=8")
-        wanted = options.names(quantities)
-        data = _fit(name, files or [], named, wanted, values, starts, seed, figure, terminal)
-    elif name is None:
+    if name is None:
         _list(terminal)
     elif not files or len(files) > 1:
-        raise ScenarioError(f"{len(files or ())} records of {name}: give one file, or --fit")
+        raise ScenarioError(
+            f"{len(files or ())} records of {name}: give one file; smc-mujoco identify takes many"
+        )
     else:
         wanted = options.names(sets)
         _repeat(name, files[0], named, wanted, start, duration, figure, film, terminal)
-    terminal.finish(data)
+    terminal.finish()
+
+
+def identify(
+    machine: Annotated[
+        str,
+        typer.Argument(
+            metavar="MACHINE",
+            help=(
+                "FILE.xml:joint+joint; FILE.xml alone has the joints of the logs' columns. "
+                "Or a plant or a rig by its name."
+            ),
+        ),
+    ],
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="LOG...", help="CSV or npz files of columns, or traces."),
+    ],
+    names: Annotated[
+        str | None,
+        typer.Option(
+            "--for",
+            metavar="PATH,...",
+            help="Numbers to find, as shoulder.damping,elbow.frictionloss,input_delay,m; "
+            "default: those that a rig's records determine.",
+        ),
+    ] = None,
+    held_out: Annotated[
+        Path | None, typer.Option(help="A log that is not used, to check the numbers on.")
+    ] = None,
+    columns: options.Columns = None,
+    figure: Annotated[
+        Path | None, options.picture("prediction over log, residuals and frictions")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="File for --condition of compare, which and tune: FILE.txt."),
+    ] = None,
+    corrected: Annotated[
+        bool,
+        typer.Option("--corrected", help="Correct for the errors of the simulation's steps."),
+    ] = False,
+    starts: Annotated[
+        int, typer.Option(min=1, help="How many sets the search may start from.")
+    ] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of these starts.")] = 0,
+    json: options.Json = None,
+) -> None:
+    """Find numbers of a machine from its logs: friction, armature, delay, masses, with errors.
+
+    A log is of any controller, at 40 Hz or more. It has columns t in s, and x (rad or m) and u (N m
+    or N) of the joint, or x_JOINT and u_JOINT of each. Nobody gives a start.
+
+    The paths of numbers are JOINT.damping, .frictionloss, .armature, .stiffness, .gain, .offset and
+    .zero, input_delay, m and grav. The table has each number with its standard error. What the logs
+    cannot tell is said below it.
+
+    Example: smc-mujoco identify arm.xml run1.csv run2.csv --for shoulder.damping,input_delay
+
+    Example: smc-mujoco identify arm.xml:shoulder run.csv --for m --columns x=angle,u=torque
+
+    Example: smc-mujoco identify emps run.csv
+    """
+    terminal = Terminal(json)
+    with delay_signals():
+        from smc_mujoco.cli import rig_tables
+        from smc_mujoco.identification import identify as identification
+
+    options.check_files(None, figure, out)
+    found = identification.identify(
+        machine,
+        list(files),
+        options.names(names) or None,
+        held_out=held_out,
+        columns=options.pairs(columns, "columns", "x_elbow=angle,t=time") or None,
+        corrected=corrected,
+        starts=starts,
+        seed=seed,
+        progress=True,
+    )
+    for table in rig_tables.identified(found, [str(file) for file in files]):
+        terminal.print(table)
+    for note in found.notes:
+        terminal.note(note, wrap=True)
+    terminal.note(f"{found.evaluations} parameter sets, {terminal.seconds:.0f} s")
+    if figure:
+        terminal.wrote(*found.figure(figure))
+    if out:
+        terminal.wrote(found.save(out))
+    terminal.finish(found.about())
 
 
 def _list(terminal: Terminal) -> None:
@@ -136,46 +182,6 @@ def _list(terminal: Terminal) -> None:
     for name, known in catalogue().items():
         rows.append((name, known.label))
     terminal.print(tables.catalogue("Rigs", rows))
-
-
-def _fit(
-    rig: str,
-    files: Sequence[Path],
-    columns: Mapping[str, str],
-    quantities: Sequence[str],
-    start: Mapping[str, float],
-    starts: int,
-    seed: int,
-    figure: Path | None,
-    terminal: Terminal,
-) -> dict[str, Any]:
-    """Find quantities of a rig, print them, and return them as JSON data."""
-    with delay_signals():
-        from smc_mujoco.cli import rig_tables
-        from smc_mujoco.identification.identify import identify as find
-        from smc_mujoco.identification.records import load_record
-        from smc_mujoco.identification.rig import rigs
-        from smc_mujoco.mechanisms.named import as_plant
-        from smc_mujoco.mechanisms.plant import catalogue as plants
-
-    options.check_files(None, figure)
-    identified = find(
-        as_plant(rig) if rig not in rigs() and (rig in plants() or ":" in rig) else rig,
-        [load_record(file, columns) for file in files],
-        quantities or None,
-        start=start,
-        starts=starts,
-        seed=seed,
-        progress=True,
-    )
-    for table in rig_tables.identified(identified, [str(file) for file in files]):
-        terminal.print(table)
-    for note in identified.notes:
-        terminal.note(note, wrap=True)
-    terminal.note(f"{identified.evaluations} parameter sets, seed {seed}, {terminal.seconds:.0f} s")
-    if figure:
-        terminal.wrote(*identified.figure(figure))
-    return identified.about()
 
 
 def _repeat(

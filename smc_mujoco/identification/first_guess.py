@@ -1,0 +1,333 @@
+"""Where a search for quantities of a user's machine starts: least squares of forces, without a
+simulation.
+
+The recorded forces, less those that the measured motion takes by MuJoCo's inverse dynamics, are
+linear in damping, dry friction, armature, stiffness, offset, gain and masses. Both sides go through
+the same filter, see inverse_dynamics.py. A delay is found by trying many. Quantities in which
+forces are not linear start at their own values.
+"""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from smc_mujoco.common.aliases import Array, Data, Numbers
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.identification import inverse_dynamics
+from smc_mujoco.identification.inverse_dynamics import CUBIC_DEGREE, Filter, cubic_samples
+from smc_mujoco.identification.own_rig import OwnRig
+from smc_mujoco.identification.paths import DELAY, MAX_DELAY, slope, steady_force
+from smc_mujoco.identification.records import Record
+from smc_mujoco.mechanisms.custom.joint_numbers import KINDS
+from smc_mujoco.mechanisms.hardware.part import Friction
+from smc_mujoco.mechanisms.layout import channel_names, driven_names
+
+# least squares, one after the other, in which parameters of a plant of the library may be no
+# linear factors of forces; chosen
+PASSES = 6
+LARGEST_FACTOR = 10.0  # of a pass, for a parameter that cannot be negative; chosen
+DELAY_STEP = 1e-3  # s, between delays that are tried; chosen
+# of the largest speed, below which a joint's direction counts in part; chosen
+SLIDING = 0.02
+SMALL = (
+    0.02  # of the command's deviation, or of the inertia: start of what would be negative; chosen
+)
+SHIFT = 0.01  # of a parameter, for the slope of forces by it
+LARGEST_ANGLE = 3.0 * math.pi  # rad: a larger one may be in degrees; chosen
+TOO_SMALL = 0.1  # of the force that a motion takes: angles may be in degrees; chosen
+TOO_LARGE = 50.0  # times that force: a command may be in another unit; chosen
+
+
+class Forces(NamedTuple):
+    """What a log says about forces, below 5 Hz: M samples of n joints."""
+
+    slopes: Array  # of the force that the motion takes by the linear quantities, (M n, p)
+    rigid: Array  # that force with these quantities at 0, or at their own values, (M n,)
+    commands: list[Array]  # for each delay the commands, (M, driven)
+
+
+def first_guess(rig: OwnRig, data: Sequence[Data]) -> OwnRig:
+    """Return the rig with values from least squares of the forces of its logs.
+
+    Raises:
+      ScenarioError: angles in degrees.
+    """
+    delays = [0.0]
+    if DELAY in rig.quantities:
+        delays = np.arange(0.0, MAX_DELAY + 1e-9, DELAY_STEP).tolist()
+    checked = _usable(rig, data)
+    guessed = rig
+    for step in range(PASSES if checked else 0):
+        logs = [forces(guessed, record, delays) for record in checked]
+        if not step:
+            check_angles(rig, checked, logs)
+        guessed = _guessed(guessed, data, logs, delays)
+        if rig.plant.is_user_model:
+            break  # the forces are linear
+    return guessed
+
+
+def _usable(rig: OwnRig, data: Sequence[Data]) -> list[Record]:
+    """Return the logs whose forces can be compared: none where the command is no force."""
+    columns = dataclasses.replace(rig.columns, torque=rig.columns.x)
+    logs = [rig.checked(record) for record in data] if rig.base.force_command else []
+    return [record for record in logs if inverse_dynamics.long_enough(record, columns)]
+
+
+def _guessed(
+    rig: OwnRig, data: Sequence[Data], logs: Sequence[Forces], delays: Sequence[float]
+) -> OwnRig:
+    """Return the rig with the values of least squares, and the delay whose residual is least."""
+    gained = [i for i, joint in enumerate(driven_names(rig.plant)) if f"{joint}.gain" in rig.free]
+    A = np.concatenate([log.slopes for log in logs])
+    best: tuple[float, float, Array] | None = None
+    for k, late in enumerate(delays):
+        targets, gains = [], []
+        for log in logs:
+            target, moved = _commanded(log, k, gained)
+            targets.append(target - log.rigid)
+            gains.append(-moved)
+        full = np.hstack([A, np.concatenate(gains)])
+        b = np.concatenate(targets)
+        found = _solved(full, b)
+        left = float(np.sum((b - full @ found) ** 2))
+        if best is None or left < best[0]:
+            best = left, late, found
+    assert best is not None
+    joints = driven_names(rig.plant)
+    names = [*linear(rig), *(f"{joints[i]}.gain" for i in gained)]
+    values = dict(zip(names, best[2].tolist(), strict=True))
+    for name in names:
+        if not starts_from_zero(rig, name):
+            values[name] += rig.values[name]
+        if rig.quantities[name].least >= 0.0 and name in rig.plant.parameters and "." not in name:
+            values[name] = _near(values[name], rig.values[name])
+    if DELAY in rig.quantities:
+        values[DELAY] = best[1] or 0.5 * DELAY_STEP
+    return _within(rig, values, data)
+
+
+def _near(value: float, before: float) -> float:
+    """Return a value that cannot be negative within a factor of the one before, if that is not
+    0.
+    """
+    if not before:
+        return value
+    return min(max(value, before / LARGEST_FACTOR), before * LARGEST_FACTOR)
+
+
+def _commanded(log: Forces, k: int, gained: Sequence[int]) -> tuple[Array, Array]:
+    """Return the force of the motors whose gain is known, (M n,), and that of each other for a
+    gain of 1, (M n, gained).
+    """
+    commands = log.commands[k]
+    n = len(log.rigid) // len(commands)
+    every = np.zeros((len(commands), n))
+    every[:, : commands.shape[1]] = commands
+    moved = np.zeros((len(log.rigid), len(gained)))
+    for j, i in enumerate(gained):
+        alone = np.zeros_like(every)
+        alone[:, i] = commands[:, i]
+        moved[:, j] = alone.ravel()
+        every[:, i] = 0.0
+    return every.ravel(), moved
+
+
+def _solved(A: Array, b: Array) -> Array:
+    """Return the least squares of A x = b, 0 for columns that are 0."""
+    sizes = np.linalg.norm(A, axis=0)
+    used = sizes > 1e-9 * max(sizes.max(initial=0.0), 1e-300)
+    found = np.zeros(A.shape[1])
+    found[used] = np.linalg.lstsq(A[:, used] / sizes[used], b, rcond=1e-6)[0] / sizes[used]
+    return found
+
+
+def _within(rig: OwnRig, values: Numbers, data: Sequence[Data]) -> OwnRig:
+    """Return the rig with values cut to their ranges; one that would be 0 or less starts small, as
+    the search takes steps by factors.
+    """
+    u = max(float(np.std(record[name])) for record in data for name in rig.columns.inputs)
+    inertia = float(np.min(rig.plant.load().dof_M0))
+    changed = dict(rig.quantities)
+    for name, value in values.items():
+        known = changed[name]
+        start = min(max(value, known.least), known.most)
+        if start <= known.least and known.least >= 0.0:
+            small = SMALL * (inertia if name.endswith(".armature") else u)
+            start = known.value if known.value > known.least else small
+        changed[name] = dataclasses.replace(known, value=start, source="forces below 5 Hz")
+    return dataclasses.replace(rig, quantities=changed)
+
+
+def linear(rig: OwnRig) -> list[str]:
+    """Return the quantities in which the forces are linear, in the order of their columns."""
+    return [name for name in rig.quantities if _is_linear(rig, name)]
+
+
+def starts_from_zero(rig: OwnRig, name: str) -> bool:
+    """Return whether the slopes' base has this quantity at 0; else it has its own value."""
+    return (name in rig.plant.parameters and "." in name) or name.endswith((".offset", ".gain"))
+
+
+def _is_linear(rig: OwnRig, name: str) -> bool:
+    if name in rig.places:
+        place = rig.places[name]
+        part = getattr(rig.base, place.field)[place.part]
+        return isinstance(part, Friction) and place.name in part.forces
+    joint, _, kind = name.rpartition(".")
+    of_joint = joint in channel_names(rig.plant) and kind in (*KINDS, "offset")
+    return of_joint or (name in rig.plant.parameters and not joint)
+
+
+def forces(rig: OwnRig, record: Record, delays: Sequence[float]) -> Forces:
+    """Return what a log says about forces."""
+    columns = dataclasses.replace(rig.columns, torque=rig.columns.x)
+    filtered = Filter(record, columns)
+    x, v, a = (
+        np.column_stack([filtered.cubic(name, order) for name in rig.columns.x])
+        for order in range(3)
+    )
+    zeroed = {name: 0.0 for name in rig.plant.parameters if "." in name}
+    base = rig.values_of_plant() | zeroed
+
+    def inertial(parameters: Numbers) -> Array:
+        plant = dataclasses.replace(rig.plant, parameters=parameters)
+        needed = inverse_dynamics.torques(plant, record, columns)
+        return np.column_stack([needed[name] for name in rig.columns.x])
+
+    plain = inertial(base)
+    rigid = plain + _of_parts(rig, filtered, v)
+    slopes = []
+    for name in linear(rig):
+        if name in rig.plant.parameters and "." not in name:
+            step = SHIFT * abs(base[name]) or SHIFT
+            slopes.append(((inertial(base | {name: base[name] + step}) - plain) / step).ravel())
+        else:
+            slopes.append(_column(rig, name, filtered, (x, v, a)).ravel())
+    commands = [_low_commands(rig, record, filtered, late) for late in delays]
+    columns_of = np.column_stack(slopes) if slopes else np.zeros((plain.size, 0))
+    return Forces(columns_of, rigid.ravel(), commands)
+
+
+def motion_forces(rig: OwnRig, record: Record, late: float) -> tuple[Array, Array, Array]:
+    """Return speeds, the forces that the motion takes by the rig's own numbers, and the commands
+    that reach the motors, (M, n), (M, n) and (M, driven), below 5 Hz.
+    """
+    columns = dataclasses.replace(rig.columns, torque=rig.columns.x)
+    filtered = Filter(record, columns)
+    needed = inverse_dynamics.torques(rig.plant, record, columns)
+    speeds = [filtered.low(filtered.cubic(name, 1)) for name in rig.columns.x]
+    forces_of = np.column_stack([needed[name] for name in rig.columns.x])
+    return np.column_stack(speeds), forces_of, _low_commands(rig, record, filtered, late)
+
+
+def _of_parts(rig: OwnRig, filtered: Filter, v: Array) -> Array:
+    """Return the force of the frictions of the scenario at their own numbers, (M, n)."""
+    found = np.zeros((len(filtered.low(v[:, 0])), v.shape[1]))
+    for part in rig.base.friction:
+        for k, i in enumerate(part.joint_names(rig.plant)):
+            at = channel_names(rig.plant).index(i)
+            found[:, at] += filtered.low(steady_force(part, _smooth_speed(v[:, at]), k))
+    return found
+
+
+def _smooth_speed(v: Array) -> Array:
+    """Return speeds without those near 0, where a measured direction is noise."""
+    slow = SLIDING * np.abs(v).max() + 1e-12
+    return v * np.tanh((v / slow) ** 2)
+
+
+def _column(rig: OwnRig, name: str, filtered: Filter, motion: Sequence[Array]) -> Array:
+    """Return how the forces of a motion depend on a linear quantity of joints, (M, n)."""
+    x, v, a = motion
+    found = np.zeros((len(filtered.low(v[:, 0])), v.shape[1]))
+    names = channel_names(rig.plant)
+    if name in rig.places:
+        place = rig.places[name]
+        part = getattr(rig.base, place.field)[place.part]
+        for k, joint in enumerate(part.joint_names(rig.plant)):
+            if place.joint in (-1, k):
+                at = names.index(joint)
+                found[:, at] = filtered.low(slope(part, place, v[:, at], k))
+        return found
+    joint, _, kind = name.rpartition(".")
+    i = names.index(joint)
+    slow = SLIDING * np.abs(v[:, i]).max() + 1e-12
+    column = {
+        "damping": v[:, i],
+        "armature": a[:, i],
+        "stiffness": x[:, i],
+        "frictionloss": np.tanh(v[:, i] / slow),
+        "offset": -np.ones(len(v)),
+    }[kind]
+    found[:, i] = filtered.low(column)
+    return found
+
+
+def _low_commands(rig: OwnRig, record: Record, filtered: Filter, late: float) -> Array:
+    """Return the commands that reach the motors with a delay, below 5 Hz, (M, driven). Each is held
+    over a sample, so that it acts half a sample late.
+    """
+    found = []
+    samples = cubic_samples(filtered.step)
+    for name in rig.columns.inputs:
+        u = record[name]
+        at = np.arange(len(u)) - late / filtered.step
+        delayed = np.interp(at, np.arange(len(u)), u)
+        held = 0.5 * (delayed + np.concatenate([delayed[:1], delayed[:-1]]))
+        smooth = np.asarray(savgol_filter(held, samples, CUBIC_DEGREE))
+        found.append(filtered.low(smooth[:: filtered.stride]))
+    return np.column_stack(found)
+
+
+def check_angles(rig: OwnRig, data: Sequence[Record], logs: Sequence[Forces]) -> None:
+    """Raise ScenarioError where angles are in degrees: larger than a turn and a half, with a motion
+    that takes far more than the recorded force.
+    """
+    for record, log in zip(data, logs, strict=True):
+        shares = force_shares(rig, log)
+        for i, name in enumerate(rig.columns.x[: len(shares)]):
+            reach = float(np.abs(record[name]).max())
+            if rig.plant.units[i] == "rad" and reach > LARGEST_ANGLE and shares[i] < TOO_SMALL:
+                raise ScenarioError(
+                    f"column {name} of {rig.name} reaches {reach:.3g}, and in rad its motion takes "
+                    f"{1.0 / max(shares[i], 1e-9):.3g} times the recorded force: if it is in "
+                    "degrees, divide it by 57.3"
+                )
+
+
+def force_shares(rig: OwnRig, log: Forces) -> list[float]:
+    """Return for each motor the recorded force over that which the motion of its joint takes by the
+    model's inertia and gravity.
+    """
+    commands = log.commands[0]
+    needed = log.rigid.reshape(len(commands), -1)
+    found = []
+    for i in range(commands.shape[1]):
+        takes = float(np.sqrt(np.mean(needed[:, i] ** 2)))
+        found.append(float(np.sqrt(np.mean(commands[:, i] ** 2))) / max(takes, 1e-300))
+    return found
+
+
+def doubts(rig: OwnRig, data: Sequence[Data]) -> list[str]:
+    """Return sentences on columns that may be in another unit."""
+    said = []
+    for record in _usable(rig, data):
+        log = forces(rig, record, [0.0])
+        shares = force_shares(rig, log)
+        for i, (x, u) in enumerate(zip(rig.columns.x, rig.columns.inputs, strict=False)):
+            reach = float(np.abs(record[x]).max())
+            if rig.plant.units[i] == "rad" and reach > LARGEST_ANGLE:
+                said.append(f"{x} reaches {reach:.3g} rad: if that is in degrees, divide by 57.3")
+            gained = f"{driven_names(rig.plant)[i]}.gain" in rig.quantities
+            if shares[i] > TOO_LARGE and not gained:
+                unit = rig.plant.efforts[i]
+                said.append(
+                    f"{u} is {shares[i]:.2g} times the force that the motion takes by inertia and "
+                    f"gravity: if it is not in {unit} but in mA or N mm, give it in {unit}"
+                )
+    return list(dict.fromkeys(said))

@@ -1,0 +1,139 @@
+"""The figure of an identified machine: for each joint its log beside the prediction in pieces, the
+residual over speed, and the friction with its error over the forces of the log.
+"""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from smc_mujoco.common.aliases import Array, Numbers
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import style
+from smc_mujoco.identification import first_guess, records
+from smc_mujoco.identification.own_rig import OwnRig
+from smc_mujoco.identification.paths import DELAY, steady_force
+from smc_mujoco.identification.records import Record
+from smc_mujoco.identification.rig import Values
+from smc_mujoco.mechanisms.layout import channel_names, dof_ids, driven_names
+
+ROW_HEIGHT = 2.5  # inches, height of a joint's panels
+SPEEDS = 200  # of the friction's curve, on each side of 0
+
+
+def friction_figure(
+    rig: OwnRig,
+    covariance: Array,
+    log: Record,
+    prediction: tuple[Record, Record, Array],
+    fit: Numbers,
+    path: str | Path,
+) -> list[Path]:
+    """Draw a log of a machine: measured and predicted positions, residuals, frictions. Write
+    PATH.svg and PATH.png.
+
+    `covariance`: of the errors of the rig's `free` quantities, (p, p). `prediction`: predicted and
+    measured columns of the log, and their times.
+    """
+    predicted, measured, t = prediction
+    paths = pages.files(Path(path).with_suffix(""))
+    colour = style.spread(1)[0]
+    handles = [
+        Line2D([], [], color=style.INK, label="log"),
+        Line2D([], [], color=colour, label="found"),
+    ]
+    joints = channel_names(rig.plant)
+    with style.page():
+        height = pages.head_height(style.FULL_WIDTH, handles) + ROW_HEIGHT * len(joints)
+        page = pages.blank(style.FULL_WIDTH, height)
+        axes = page.subplots(len(joints), 3, squeeze=False, width_ratios=(3, 2, 2))
+        forces = measured_friction(rig, log)
+        for i, name in enumerate(rig.columns.x):
+            unit = rig.plant.units[i]
+            left, middle, right = axes[i]
+            left.plot(t, measured[name], color=style.INK, lw=1.6)
+            left.plot(t, predicted[name], color=colour, lw=0.9)
+            left.set_title(f"fit of the whole log, %: {fit[name]:.1f}")
+            left.set_ylabel(f"{name} ({unit})")
+            speed = records.rate(measured[name], records.step_of(t))
+            middle.axhline(0.0, color=style.RULE, lw=0.8)
+            middle.plot(speed, measured[name] - predicted[name], ".", ms=1.5, color=colour)
+            middle.set_title(f"residual ({unit})")
+            _friction(right, rig, covariance, i, forces, colour)
+        speed_label = f"speed ({rig.plant.units[-1]}/s)"
+        for ax, label in zip(axes[-1], ("time (s)", speed_label, speed_label), strict=True):
+            ax.set_xlabel(label)
+        pages.set_head(page, style.FULL_WIDTH, rig.label, handles)
+        pages.write(page, paths)
+    return paths
+
+
+def _friction(
+    ax: Axes, rig: OwnRig, covariance: Array, i: int, forces: tuple[Array, Array], colour: str
+) -> None:
+    """Draw the friction of a joint, with two standard errors, over that of the log."""
+    speeds, points = forces
+    ax.plot(speeds[:, i], points[:, i], ".", ms=1.5, color=style.INK, alpha=0.3)
+    reach = float(np.abs(speeds[:, i]).max()) or 1.0
+    side = np.linspace(1e-3 * reach, reach, SPEEDS)
+    for v in (-side[::-1], side):
+        curve = friction(rig, rig.values, i, v)
+        error = 2.0 * curve_error(rig, covariance, i, v)
+        ax.plot(v, curve, color=colour, lw=1.2)
+        ax.fill_between(v, curve - error, curve + error, color=colour, alpha=0.25, lw=0.0)
+    effort = rig.plant.efforts[i]
+    ax.set_title(f"friction ± 2 errors ({effort})")
+
+
+def friction(rig: OwnRig, values: Numbers, i: int, v: Array) -> Array:
+    """Return the friction of channel i at steady speeds v, (K,), by the model and the parts."""
+    fields = rig.numbers_of(Values(**values))
+    plant = fields["plant"]
+    model = plant.load()
+    dof = dof_ids(model)[i]
+    found = model.dof_damping[dof] * v + model.dof_frictionloss[dof] * np.sign(v)
+    joint = channel_names(plant)[i]
+    for part in fields.get("friction", ()):
+        if joint in (names := part.joint_names(plant)):
+            found = found + steady_force(part, v, names.index(joint))
+    return found
+
+
+def curve_error(rig: OwnRig, covariance: Array, i: int, v: Array) -> Array:
+    """Return the standard error of a joint's friction at steady speeds v, (K,), at first order."""
+    values = rig.values
+    plain = friction(rig, values, i, v)
+    slopes = []
+    for name in rig.free:
+        step = 1e-3 * abs(values[name]) or 1e-6
+        moved = friction(rig, values | {name: values[name] + step}, i, v)
+        slopes.append((moved - plain) / step)
+    J = np.array(slopes)
+    return np.sqrt(np.maximum(np.einsum("pk,pq,qk->k", J, covariance, J), 0.0))
+
+
+def measured_friction(rig: OwnRig, record: Record) -> tuple[Array, Array]:
+    """Return speeds, and the forces of a log less those of inertia, gravity and springs, (M, n)
+    each, below 5 Hz: what is left is friction.
+    """
+    rubbing = {
+        name: 0.0 for name in rig.plant.parameters if name.endswith((".damping", ".frictionloss"))
+    }
+    frictionless = dataclasses.replace(
+        rig,
+        plant=dataclasses.replace(
+            rig.plant, parameters=dict(rig.plant.parameters) | rig.values_of_plant() | rubbing
+        ),
+        base=dataclasses.replace(rig.base, friction=None),
+        places={},
+        quantities={},
+        free=(),
+    )
+    late = rig.values.get(DELAY, rig.base.input_delay)
+    speeds, needed, commands = first_guess.motion_forces(frictionless, record, late)
+    drives = len(driven_names(rig.plant))
+    points = np.zeros_like(needed)
+    points[:, :drives] = rig.of_motors("gain", 1.0) * commands + rig.of_motors("offset", 0.0)
+    return speeds, points - needed

@@ -1,0 +1,45 @@
+"""Identified numbers as text: each with the digits that its error leaves, a table, and fits."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+from smc_mujoco.common.aliases import Numbers
+
+
+def to_error(value: float, error: float) -> str:
+    """Return a value to the second digit of its standard error, with four digits or more: "3.19981"
+    for 2.1e-4.
+    """
+    digits = 4
+    if value and error and math.isfinite(error):
+        digits = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2
+    return f"{value:#.{min(max(digits, 4), 12)}g}"
+
+
+def table(values: Numbers, errors: Numbers, units: Mapping[str, str]) -> list[str]:
+    """Return lines with each number, its value, standard error and unit."""
+    rows = [("number", "value", "±", "unit")]
+    for name, value in values.items():
+        rows.append((name, to_error(value, errors[name]), f"{errors[name]:.2g}", units[name]))
+    widths = [max(len(row[i]) for row in rows) for i in range(3)]
+    lines = []
+    for name, value, error, unit in rows:
+        line = f"{name:<{widths[0]}}  {value:>{widths[1]}}  {error:>{widths[2]}}  {unit}"
+        lines.append(line.rstrip())
+    return lines
+
+
+def fits(heads: Sequence[str], whole: Sequence[Numbers], pieces: Sequence[Numbers]) -> list[str]:
+    """Return a line with the fit of each log: of all of it, and of its pieces, if there are any."""
+    lines = []
+    for head, of_log, of_pieces in zip(heads, whole, pieces, strict=True):
+        line = f"{head}: fit {_percent(of_log)}"
+        if of_pieces:
+            line += f"; in pieces of 1 s {_percent(of_pieces)}"
+        lines.append(line)
+    return lines
+
+
+def _percent(fit: Numbers) -> str:
+    """Return the fit of each column, such as "x 99.1 %"."""
+    return ", ".join(f"{name} {value:.1f} %" for name, value in fit.items())

@@ -1,0 +1,289 @@
+"""A user's machine as a rig whose quantities are paths, see paths.py, and its logs' replays.
+
+A log has columns t, and x and u of the joint, or x_JOINT and u_JOINT of each. A replay commands
+what was recorded, to every motor. Each command is held until the next sample. A delay that is no
+whole number of samples mixes two neighbours, at a rate at which that hardly errs. So the replay
+depends on the delay smoothly, and no physics step has to divide it.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from smc_mujoco.common.aliases import Array, Data, Fields, Names, Numbers
+from smc_mujoco.common.data import frozen_data, named_data
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.control.law import law_function
+from smc_mujoco.identification import records
+from smc_mujoco.identification.paths import DELAY, FIELDS, MAX_DELAY, PartNumber, parts_of, resolved
+from smc_mujoco.identification.records import Columns, Record
+from smc_mujoco.identification.rig import RecordPart, Rig, Source, Values
+from smc_mujoco.mechanisms.layout import channel_names, column_ends, driven_names
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.signals import Fault
+from smc_mujoco.simulation.time_series import TimeSeries
+from smc_mujoco.simulation.trace import Trace
+
+MAX_PERIOD = 2.5e-3  # s, of a replay's commands; chosen: a mixed command then errs by 3 us^2 u/J
+SLOWEST = 40.0  # Hz: a log of fewer samples a second misses too much of the commands; chosen
+STILL = 3.0  # deviations of the noise: a record that varies by less has no motion; chosen
+RUN_STEP = 2.5e-4  # s, longest physics step of runs with a delay, which it divides
+SETTINGS = "control_period", "u_max", "mechanism", "velocity", "model"  # of a scenario, kept
+
+
+@law_function(family="baseline", continuous=True, accuracy=0, label="As recorded", colour="#6E7781")
+def as_recorded(y, gains, memory):
+    """u is the reference: a recorded command."""
+    return y.r, 0.0
+
+
+@frozen_data
+class LogPart(RecordPart):
+    """A part of a log, with the commands of all motors from MAX_DELAY before its start on."""
+
+    u: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
+    before: int = 0  # commands before the start
+    period: float = 0.0  # s, between commands
+
+
+@named_data
+class OwnRig(Rig):
+    """A rig whose quantities are paths.
+
+    Attributes:
+      base: the scenario of the machine.
+      plant: its plant, with the numbers of joints that are asked for among the parameters.
+      places: quantity -> where it is in a part of the scenario.
+    """
+
+    base: Scenario
+    plant: Plant
+    places: Mapping[str, PartNumber]
+
+    def values_of_plant(self, values: Numbers | None = None) -> dict[str, float]:
+        """Return the parameters of the plant with some values, by default the rig's own."""
+        found = self.values if values is None else values
+        parameters = dict(self.plant.parameters)
+        return parameters | {name: found[name] for name in parameters if name in found}
+
+    def numbers_of(self, values: Values) -> Fields:
+        """Return the fields of a Scenario whose parts and plant have some values."""
+        found = vars(values)
+        parameters = self.values_of_plant(found)
+        fields: Fields = {"plant": dataclasses.replace(self.plant, parameters=parameters)}
+        fields |= {field: parts_of(self.base, field) for field in FIELDS}
+        for name, place in self.places.items():
+            fields[place.field] = place.put(fields[place.field], found[name])
+        return {name: value for name, value in fields.items() if value != ()}
+
+    def checked(self, record: Data) -> Record:
+        """Return the columns of a log. Raise ScenarioError for one that is too slow, or rests."""
+        data = records.checked(record, self.columns, None, self.name)
+        rate = 1.0 / records.step_of(data[self.columns.time])
+        if rate < SLOWEST:
+            raise ScenarioError(
+                f"the record of {self.name} has {rate:.3g} samples a second, and what the motors "
+                f"did between them is not in it: record {SLOWEST:g} or more a second, or fit "
+                "friction alone, to pairs of speed and torque"
+            )
+        moved = max(float(np.std(data[name])) for name in self.columns.x)
+        if moved <= STILL * records.noise(data, self.columns):
+            raise ScenarioError(
+                f"no joint of {self.name} moves in the record: the largest deviation of a position "
+                f"is {moved:.2g}, no more than noise: record a motion"
+            )
+        return data
+
+    def reading(self, many: Sequence[Source]) -> tuple["Rig", list[Data]]:
+        """Return the rig and its logs as columns. A trace counts as what a log of it has."""
+        data = []
+        for log in many:
+            if isinstance(log, Trace):
+                columns = {self.columns.time: log.t}
+                columns |= records.positions(log, self.columns, noisy=True)
+                columns |= {name: log.u[:, i] for i, name in enumerate(self.columns.inputs)}
+                data.append(columns)
+            else:
+                data.append(self._named(log))
+        return self, data
+
+    def _named(self, log: Data) -> Data:
+        """Return the log of one joint with columns x and u, which may be x_JOINT and u_JOINT."""
+        if not isinstance(log, Mapping) or self.plant.n > 1:
+            return log
+        joint = channel_names(self.plant)[0]
+        names = {f"{kind}_{joint}": kind for kind in "xu" if kind not in log}
+        return {names.get(name, name): values for name, values in log.items()}
+
+    def part(
+        self,
+        record: Data,
+        start: float | None = None,
+        duration: float | None = None,
+        closed: bool = True,
+    ) -> LogPart:
+        """Return what a replay takes from a log."""
+        plain = super().part(record, start, duration, closed)
+        data = self.checked(record)
+        period = self.step(data)
+        stride = math.ceil(period / MAX_PERIOD - 1e-9)
+        first = self._first(start, period)
+        count = round(plain.fields["duration"] / period) + 1
+        u = np.column_stack([data[name] for name in self.columns.inputs])
+        ahead = math.ceil(MAX_DELAY / period) + 2
+        padded = np.concatenate([np.repeat(u[:1], ahead, axis=0), u])
+        commands = np.repeat(padded[first : first + ahead + count], stride, axis=0)
+        return LogPart(
+            fields=plain.fields,
+            state=plain.state,
+            largest_u=plain.largest_u,
+            zero={},
+            stride=stride,
+            u=commands,
+            before=ahead * stride,
+            period=period / stride,
+        )
+
+    def command(self, part: LogPart) -> Array:
+        """Return the commands that reach the motors, at each of a replay's, (K, driven)."""
+        late = self.values.get(DELAY, self.base.input_delay) / part.period
+        whole = math.floor(late)
+        share = late - whole
+        first = part.before - whole
+        count = len(part.u) - part.before
+        u = (1.0 - share) * part.u[first : first + count]
+        u = u + share * part.u[first - 1 : first - 1 + count]
+        return self.of_motors("gain", 1.0) * u + self.of_motors("offset", 0.0)
+
+    def of_motors(self, kind: str, default: float) -> Array:
+        """Return a quantity of each motor, (driven,)."""
+        values = self.values
+        joints = driven_names(self.plant)
+        return np.array([values.get(f"{joint}.{kind}", default) for joint in joints])
+
+    @property
+    def zeros(self) -> Array:
+        """What the encoders read at 0, (n,)."""
+        values = self.values
+        return np.array([values.get(f"{joint}.zero", 0.0) for joint in channel_names(self.plant)])
+
+    def repeated(
+        self, part: RecordPart, rounded: bool = False, state: Array | None = None, **changes: Any
+    ) -> Scenario:
+        """Return the scenario that repeats a part of a log; see `Rig.repeated`."""
+        assert isinstance(part, LogPart)
+        fields = self.numbers_of(Values(**self.values))
+        # the machine has had these commands, whatever its limits are
+        fields["plant"] = dataclasses.replace(fields["plant"], limits=(), reach=None)
+        x, v = np.split(np.array(part.state if state is None else state, float), 2)
+        x = x - self.zeros
+        if sensors := fields.get("sensor"):
+            plant = fields["plant"]
+            for sensor in sensors:
+                x[list(sensor.channels(plant))] -= sensor.bias
+            if not rounded:
+                fields["sensor"] = tuple(
+                    dataclasses.replace(sensor, counts=math.inf) for sensor in sensors
+                )
+        u = self.command(part)
+        times = (part.period * np.arange(len(u))).tolist()
+        replayed: Fields = {
+            "law": as_recorded(),
+            "reference": tuple(TimeSeries(times, column.tolist()) for column in u.T),
+            "duration": times[-1],
+            "control_period": part.period,
+            "u_max": math.inf,
+            "x0": tuple(x),
+            "v0": tuple(v),
+        }
+        return Scenario.recorded(**fields | replayed | changes)
+
+    def predicted(self, trace: Trace) -> Record:
+        """Return the columns of a log that a replay gives, with the zeros of its encoders."""
+        found = records.positions(trace, self.columns)
+        for name, zero in zip(self.columns.x, self.zeros, strict=True):
+            found[name] = found[name] + zero
+        return found
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each column of a log."""
+        joints = dict(zip(self.columns.x, self.plant.units, strict=True))
+        return joints | dict(zip(self.columns.inputs, self.base.efforts, strict=False))
+
+    @property
+    def not_in_runs(self) -> Names:
+        """The quantities that replays have and runs of the machine leave out."""
+        joints = driven_names(self.plant)
+        motors = [name for name in self.quantities if name.endswith((".gain", ".offset"))]
+        faulty = {joint for joint in joints for name in motors if name.startswith(f"{joint}.")}
+        zeros = [name for name in self.quantities if name.endswith(".zero")]
+        return tuple(zeros + (motors if len(faulty) > 1 else []))
+
+
+def own_rig(given: Plant | Scenario, names: Sequence[str]) -> OwnRig:
+    """Return the rig of a plant or a scenario whose quantities are the named paths."""
+    base = given if isinstance(given, Scenario) else Scenario.recorded(plant=given, law="none")
+    paths = resolved(base, names)
+    ends = column_ends(base.plant)
+    inputs = tuple(f"u{end}" for end in ends[: base.plant.driven])
+
+    def machine(values: Values) -> Fields:
+        return of_runs(rig, values)
+
+    rig = OwnRig(
+        name=base.plant.name,
+        label=base.plant.label or base.plant.name,
+        quantities=paths.quantities,
+        machine=machine,
+        columns=Columns(
+            x=tuple(f"x{end}" for end in ends), u=inputs[0], reference=f"r{ends[0]}", inputs=inputs
+        ),
+        free=tuple(names),
+        base=base,
+        plant=paths.plant,
+        places=paths.parts,
+    )
+    return rig
+
+
+def of_runs(rig: OwnRig, values: Values) -> Fields:
+    """Return the fields of a Scenario of the machine with some values: in runs a delay is a whole
+    number of physics steps, and gain and offset are a Fault from the start.
+    """
+    base = rig.base
+    fields = rig.numbers_of(values)
+    for name in SETTINGS:
+        if (value := getattr(base, name)) is not None:
+            fields[name] = value
+    if late := vars(values).get(DELAY, base.input_delay):
+        step = base.control_period / math.ceil(base.control_period / RUN_STEP - 1e-9)
+        fields |= {DELAY: round(late / step) * step, "physics_step": step}
+    for joint in driven_names(rig.plant):
+        gain = vars(values).get(f"{joint}.gain", 1.0)
+        bias = vars(values).get(f"{joint}.offset", 0.0)
+        alone = f"{joint}.offset" not in rig.not_in_runs and f"{joint}.gain" not in rig.not_in_runs
+        if (gain, bias) != (1.0, 0.0) and alone:
+            on = joint if rig.plant.driven > 1 else None
+            fields["fault"] = Fault(at=0.0, gain=gain, bias=bias, on=on)
+    return fields
+
+
+def condition_fields(rig: OwnRig) -> Fields:
+    """Return the fields of a condition under which the user's own machine has a rig's values: those
+    of the model as a mismatch, which a law does not know.
+    """
+    fields = of_runs(rig, Values(**rig.values))
+    before = rig.plant.parameters
+    mismatch = {}
+    for name, value in fields.pop("plant").parameters.items():
+        change = value if name in rig.plant.added else value / before[name]
+        if change != (0.0 if name in rig.plant.added else 1.0):
+            mismatch[name] = change
+    kept = (*FIELDS, "fault", DELAY, "physics_step")
+    found = {name: fields[name] for name in kept if name in fields}
+    return found | ({"mismatch": mismatch} if mismatch else {})

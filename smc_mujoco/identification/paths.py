@@ -1,0 +1,237 @@
+"""Paths to the numbers of a user's machine, which identification finds: where each enters, where
+its search starts and within which range.
+
+    shoulder.damping, .frictionloss, .armature, .stiffness    of a joint in the model
+    shoulder.gain, .offset    force = gain u + offset, from the recorded command of its motor
+    shoulder.zero             what its encoder reads at 0, rad or m
+    input_delay               s, from a recorded command to its force
+    m, grav                   parameters of the plant
+    friction.elbow.kc         a number of a part of the scenario: FIELD.JOINT.NAME, or FIELD.NAME
+
+Dry friction with another level in each direction is frictionloss and offset: the levels are
+frictionloss - offset and frictionloss + offset.
+"""
+
+import copy
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from smc_mujoco.common.constraints import Number, of_fields
+from smc_mujoco.common.errors import ScenarioError, shown, unknown
+from smc_mujoco.identification.rig import Quantity
+from smc_mujoco.mechanisms.custom.joint_numbers import joint_numbers, with_joint_numbers
+from smc_mujoco.mechanisms.hardware.joint_force import of_joint
+from smc_mujoco.mechanisms.hardware.part import Friction, Part
+from smc_mujoco.mechanisms.layout import channel_names, driven_names
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.scenario import Scenario
+
+DELAY = "input_delay"
+MAX_DELAY = 0.05  # s, up to which a delay is looked for; chosen
+MAX_ZERO = 0.5  # rad or m, of an encoder; chosen
+MIN_GAIN = 1e-6  # chosen: a motor that does nothing cannot be found
+LEAST_ABOVE_ZERO = 1e-9  # SI units, of a number that must be greater than 0
+# Frictions and inertias of the library's plants, which are 0 or more
+NATURAL = frozenset(("b", "bq", "b1", "b2", "cf", "cfq", "cf1", "cf2", "delta", "J", "Jc"))
+# Fields of a scenario whose parts have numbers to find
+FIELDS = "friction", "actuator", "sensor", "contact", "disturbance"
+
+
+class PartNumber(NamedTuple):
+    """A number of a part of a scenario."""
+
+    field: str
+    part: int  # its index in the field
+    name: str
+    joint: int  # which of the part's joints, where each has a number; else -1
+
+    def of(self, parts: Sequence[Any]) -> Any:
+        """Return the number."""
+        value = getattr(parts[self.part], self.name)
+        return value if self.joint < 0 else value[self.joint]
+
+    def put(self, parts: Sequence[Any], value: float) -> tuple[Any, ...]:
+        """Return the parts with another number, unchecked: a search keeps within its range."""
+        made = copy.copy(parts[self.part])
+        if self.joint >= 0:
+            every = list(getattr(made, self.name))
+            every[self.joint] = value
+            object.__setattr__(made, self.name, tuple(every))
+        else:
+            object.__setattr__(made, self.name, value)
+        return *parts[: self.part], made, *parts[self.part + 1 :]
+
+
+class Paths(NamedTuple):
+    """The numbers that names stand for."""
+
+    plant: Plant  # with the numbers of its joints among its parameters
+    quantities: dict[str, Quantity]
+    parts: dict[str, PartNumber]  # those of parts
+
+
+def resolved(base: Scenario, names: Sequence[str]) -> Paths:
+    """Return the numbers of a scenario that names stand for.
+
+    Raises:
+      ScenarioError: there is no such number, or it is not given in the scenario.
+    """
+    plant = base.plant
+    of_joints = joint_numbers(plant)
+    quantities: dict[str, Quantity] = {}
+    places: dict[str, PartNumber] = {}
+    for name in names:
+        field = str(name).partition(".")[0]
+        if name in of_joints:
+            known = of_joints[name]
+            quantities[name] = Quantity(known.value, known.unit, "the model", 0.0)
+        elif name in plant.parameters:
+            least = _open(plant.constraint(name).low)
+            if name in NATURAL:
+                least = 0.0
+            quantities[name] = Quantity(plant.parameters[name], "", "the plant", least)
+        elif quantity := _of_signals(base, str(name)):
+            quantities[name] = quantity
+        elif field in FIELDS and "." in name:
+            places[name], quantities[name] = _of_part(base, name)
+        else:
+            raise unknown(f"number of {plant.name}", name, known_paths(base))
+    return Paths(with_joint_numbers(plant, of_joints.keys() & quantities), quantities, places)
+
+
+def known_paths(base: Scenario) -> list[str]:
+    """Return every path to a number of a scenario."""
+    plant = base.plant
+    paths = [*plant.parameters, DELAY, *joint_numbers(plant)]
+    paths += [f"{joint}.{kind}" for joint in driven_names(plant) for kind in ("gain", "offset")]
+    paths += [f"{joint}.zero" for joint in channel_names(plant)]
+    for field in FIELDS:
+        paths += _paths_of_parts(base, field)
+    return paths
+
+
+def _of_signals(base: Scenario, name: str) -> Quantity | None:
+    """Return a number of the signals between machine and log; None if the name is no such."""
+    if name == DELAY:
+        return Quantity(base.input_delay, "s", "the scenario", 0.0, MAX_DELAY)
+    joint, _, kind = name.rpartition(".")
+    if joint in driven_names(base.plant):
+        i = driven_names(base.plant).index(joint)
+        if kind == "gain":
+            return Quantity(1.0, "", "nominal", MIN_GAIN)
+        if kind == "offset":
+            return Quantity(0.0, base.plant.efforts[i], "nominal")
+    if joint in channel_names(base.plant) and kind == "zero":
+        unit = base.plant.units[channel_names(base.plant).index(joint)]
+        return Quantity(0.0, unit, "nominal", -MAX_ZERO, MAX_ZERO)
+    return None
+
+
+def parts_of(base: Scenario, field: str) -> tuple[Any, ...]:
+    """Return the parts of a field of a scenario."""
+    parts = getattr(base, field)
+    if parts is None:
+        return ()
+    return parts if isinstance(parts, tuple) else (parts,)
+
+
+def _names_of(part: Any) -> list[str]:
+    """Return the names of a part's numbers: of those declared as such, and of floats."""
+    declared = of_fields(type(part))
+    found = []
+    for field in dataclasses.fields(part):
+        is_number = any(_numbers(declared.get(field.name)))
+        if is_number or isinstance(getattr(part, field.name), float):
+            found.append(field.name)
+    return found
+
+
+def _paths_of_parts(base: Scenario, field: str) -> list[str]:
+    """Return every path to a number of a field's parts."""
+    paths = []
+    for part in parts_of(base, field):
+        joints = [f".{joint}" for joint in getattr(part, "on", ())] or [""]
+        paths += [f"{field}{joint}.{name}" for joint in joints for name in _names_of(part)]
+    return paths
+
+
+def _of_part(base: Scenario, path: str) -> tuple[PartNumber, Quantity]:
+    """Return where a number of a part is, with its value and the range of its type."""
+    field, *joint, name = path.split(".")
+    found = []
+    for i, part in enumerate(parts_of(base, field)):
+        if not dataclasses.is_dataclass(part) or name not in _names_of(part):
+            continue
+        joints = _joints_of(part, base.plant)
+        if joint and ".".join(joint) not in joints:
+            continue
+        each = isinstance(getattr(part, name), tuple)
+        if each and not joint:
+            continue
+        found.append(PartNumber(field, i, name, joints.index(".".join(joint)) if each else -1))
+    if len(found) != 1:
+        known = known_paths(base)
+        if not found:
+            raise unknown(f"number of {base.plant.name}", path, known)
+        raise ScenarioError(
+            f"{path} is a number of {len(found)} parts: name the joint, as {field}.JOINT.{name}"
+        )
+    place = found[0]
+    part = parts_of(base, field)[place.part]
+    value = place.of(parts_of(base, field))
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        raise ScenarioError(
+            f"{path} is {shown(value)}: give it a number in the scenario, where the search starts"
+        )
+    least, most = -math.inf, math.inf
+    for number in _numbers(of_fields(type(part)).get(name)):
+        least = _open(number.low) if number.above != 0.0 else LEAST_ABOVE_ZERO
+        most = math.inf if number.high >= 1e12 else number.high
+    return place, Quantity(float(value), "", "the scenario", least, most)
+
+
+def _joints_of(part: Part, plant: Plant) -> list[str]:
+    """Return the joints that a part of a scenario acts on."""
+    names = channel_names(plant)
+    if hasattr(part, "channels"):
+        return [names[i] for i in part.channels(plant) if i >= 0]
+    return list(names)
+
+
+def _open(least: float) -> float:
+    """Return the low end of a range; minus infinity for one that bounds nothing."""
+    return -math.inf if least <= -1e12 else least
+
+
+def _numbers(constraint: Any) -> Iterator[Number]:
+    """Yield the Number in a constraint, which may be that of each joint."""
+    while constraint is not None:
+        if isinstance(constraint, Number):
+            yield constraint
+        constraint = getattr(constraint, "one", None)
+
+
+def steady_force(part: Friction, v: np.ndarray, i: int) -> np.ndarray:
+    """Return the force with which a friction resists its joint i at steady speeds v, (K,)."""
+    if part.steady is None:
+        raise ScenarioError(
+            f"{type(part).__name__} has no force at a steady speed: identify without it, or give "
+            "Coulomb, Viscous, LuGre or ServoFriction"
+        )
+    numbers = [of_joint(getattr(part, name), i) for name in part.names]
+    p = np.rec.array([tuple(numbers)], dtype=[(name, float) for name in part.names])[0]
+    return np.array([part.steady(SimpleNamespace(v=float(speed)), p, None) for speed in v])
+
+
+def slope(part: Friction, place: PartNumber, v: np.ndarray, i: int) -> np.ndarray:
+    """Return how a friction's force at steady speeds v depends on one of its numbers, (K,)."""
+    alone = place._replace(part=0)
+    value = alone.of((part,))
+    step = 1e-3 * abs(value) or 1e-3
+    (moved,) = alone.put((part,), value + step)
+    return (steady_force(moved, v, i) - steady_force(part, v, i)) / step

@@ -1,0 +1,126 @@
+"""Numbers of the joints of a user's model, such as shoulder.damping, as parameters of its plant.
+
+    Scenario(plant=arm, mismatch={"shoulder.damping": 1.5, "elbow.armature": 0.02})
+
+A mismatch or a jump multiplies such a number. One that is 0 in the model it adds, in the number's
+unit.
+"""
+
+import dataclasses
+from collections.abc import Callable, Iterable, Iterator
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.aliases import Names
+from smc_mujoco.common.data import frozen_data
+from smc_mujoco.common.errors import unknown
+from smc_mujoco.mechanisms.custom.model_constraints import SOFT_SOLREF
+from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF
+from smc_mujoco.mechanisms.layout import all_joints, loaded
+from smc_mujoco.mechanisms.plant import Field, Plant, Values
+
+SLIDE = mujoco.mjtJoint.mjJNT_SLIDE.value
+
+
+class JointField(NamedTuple):
+    """A number that every joint of a model has."""
+
+    field: str  # of the MjModel
+    hinge: str  # unit for a hinge
+    slide: str  # unit for a slide
+
+
+KINDS = {
+    "damping": JointField("dof_damping", "N m s/rad", "N s/m"),
+    "frictionloss": JointField("dof_frictionloss", "N m", "N"),
+    "armature": JointField("dof_armature", "kg m^2", "kg"),
+    "stiffness": JointField("jnt_stiffness", "N m/rad", "N/m"),
+}
+
+
+class JointNumber(NamedTuple):
+    """A number of a joint."""
+
+    joint: str
+    kind: str
+    value: float  # in the model
+    unit: str
+
+
+def joint_numbers(plant: Plant) -> dict[str, JointNumber]:
+    """Return JOINT.KIND -> the number, for all joints of a user's model; empty for other plants."""
+    if not plant.is_user_model:
+        return {}
+    model = loaded(plant)
+    found = {}
+    for joint in all_joints(plant):
+        slides = model.jnt_type[model.joint(joint).id] == SLIDE
+        for name, kind in KINDS.items():
+            value = float(np.ravel(getattr(model, kind.field)[_place(model, joint, name)])[0])
+            unit = kind.slide if slides else kind.hinge
+            found[f"{joint}.{name}"] = JointNumber(joint, name, value, unit)
+    return found
+
+
+def with_joint_numbers(plant: Plant, names: Iterable[str]) -> Plant:
+    """Return the plant with numbers of its joints among its parameters.
+
+    Raises:
+      ScenarioError: no joint of the model has a number of this name.
+    """
+    known = joint_numbers(plant)
+    added = {}
+    for name in names:
+        if name in plant.parameters:
+            continue
+        if name not in known:
+            raise unknown(f"parameter of {plant.name}", name, [*plant.parameters, *known])
+        added[name] = known[name]
+    if not added:
+        return plant
+    of_joints = tuple((one.joint, one.kind) for one in added.values())
+    fields = JointFields(plant.fields, of_joints)
+    nominal = plant.nominal
+    if plant.by_mujoco:
+        nominal = dataclasses.replace(nominal, fields=fields)
+    absent = {name: one.unit for name, one in added.items() if not one.value}
+    return dataclasses.replace(
+        plant,
+        parameters=dict(plant.parameters) | {name: one.value for name, one in added.items()},
+        fields=fields,
+        nominal=nominal,
+        added=dict(plant.added) | absent,
+        rubs=plant.rubs or any(one.kind == "frictionloss" for one in added.values()),
+    )
+
+
+@frozen_data
+class JointFields:
+    """Plant.fields of a plant with numbers of joints among its parameters."""
+
+    inner: Callable[[mujoco.MjModel, Values], Iterator[Field]]
+    numbers: tuple[tuple[str, str], ...]  # joint and kind of each
+
+    def __call__(self, model: mujoco.MjModel, p: Values) -> Iterator[Field]:
+        yield from self.inner(model, p)
+        for joint, kind in self.numbers:
+            at = _place(model, joint, kind)
+            yield Field(KINDS[kind].field, at, vars(p)[f"{joint}.{kind}"])
+            # dry friction that the model does not have yet is as hard as Coulomb's
+            if kind == "frictionloss" and tuple(model.dof_solref[at]) == SOFT_SOLREF:
+                yield Field("dof_solref", at, HARD_SOLREF)
+                yield Field("dof_solimp", at, HARD_SOLIMP)
+
+
+def _place(model: mujoco.MjModel, joint: str, kind: str) -> int:
+    """Return where the number of a joint is in its field."""
+    if KINDS[kind].field.startswith("jnt"):
+        return model.joint(joint).id
+    return int(model.joint(joint).dofadr[0])
+
+
+def dotted(names: Iterable[str]) -> Names:
+    """Return those of the names that may be numbers of joints."""
+    return tuple(name for name in names if "." in str(name))
