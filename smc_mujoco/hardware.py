@@ -2,11 +2,12 @@
 
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import RateLimit
+from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
 from smc_mujoco.mechanisms.hardware.friction import LuGre
 from smc_mujoco.mechanisms.hardware.joint_force import actuator_function, friction_function
 from smc_mujoco.mechanisms.hardware.servos import ServoFriction, servo
 from smc_mujoco.mechanisms.hardware.sliding import Sigmoid
 from smc_mujoco.mechanisms.hardware.stepper import Stepper
 
-__all__ = ["Contact", "LuGre", "RateLimit", "ServoFriction", "Sigmoid", "Stepper"]
+__all__ = ["Contact", "ElasticJoint", "LuGre", "RateLimit", "ServoFriction", "Sigmoid", "Stepper"]
 __all__ += ["actuator_function", "friction_function", "servo"]

@@ -417,6 +417,9 @@ def actuator(random: Random) -> list:
         lambda: changed(random, smc.DCMotor, [], motor),
         lambda: changed(random, smc.Backlash, ["gap"], ["rotor_inertia", "rotor_damping"]),
         lambda: changed(
+            random, smc.hardware.ElasticJoint, ["stiffness"], ["damping", "rotor_inertia"]
+        ),
+        lambda: changed(
             random, smc.hardware.Stepper, [], ["teeth", "torque", "gear", "ramp", "queue", "refill"]
         ),
     ]

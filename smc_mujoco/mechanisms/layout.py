@@ -17,7 +17,7 @@ from smc_mujoco.mechanisms.plant import Plant
 
 PASSIVE = "passive:"
 ROTOR = "rotor:"
-PLAY = "play:"  # a tendon of length rotor - joint
+LEAD = "lead:"  # a tendon of length rotor - joint
 POSE = "smc:pose"  # site at the origin of a free body whose pose is the channels
 OWN = "smc:"  # begins the names of bodies that obstacles add
 BASE = "smc:base"  # such a site where the pose is only measured, beside driven joints
@@ -40,8 +40,9 @@ def joints(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
     found = [spec.joint(actuator.target.removeprefix(ROTOR)) for actuator in drive_actuators(spec)]
     names = [joint.name for joint in found]
     for sensor in spec.sensors:
-        if sensor.type == mujoco.mjtSensor.mjSENS_JOINTPOS and sensor.objname not in names:
-            found.append(spec.joint(sensor.objname))
+        joint = sensor.objname.removeprefix(ROTOR)
+        if sensor.type == mujoco.mjtSensor.mjSENS_JOINTPOS and joint not in names:
+            found.append(spec.joint(joint))
         elif sensor.name == f"{BASE}:x":
             found += [spec.site(BASE).parent.joints[0]] * len(PLACES)
     return found
@@ -107,9 +108,10 @@ def joint_ids(model: mujoco.MjModel) -> np.ndarray:
     if free_joint(model) >= 0:
         return np.array(joints, int)
     base = base_joint(model)
+    rotors = model.actuator_trnid[drive_ids(model), 0].tolist()
     for i in range(model.nsensor):
         if model.sensor_type[i] == mujoco.mjtSensor.mjSENS_JOINTPOS:
-            if model.sensor_objid[i] not in joints:
+            if model.sensor_objid[i] not in (*joints, *rotors):
                 joints.append(model.sensor_objid[i])
         elif base >= 0 and model.sensor(i).name == f"{BASE}:x":
             joints += [base] * len(PLACES)

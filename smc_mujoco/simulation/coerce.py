@@ -436,7 +436,7 @@ def _placed(name: str, part: P, plant: Plant, joints: Sequence[str]) -> P:
 
 def actuator(name: str, value: Actuators | None, s: Any) -> tuple[Actuator, ...]:
     """Return the actuators, from one, several or None, or by joint: at most two drives of a joint
-    in the given order, then a Backlash.
+    in the given order, then an ElasticJoint or a Backlash.
     """
     if value is None:
         return ()
@@ -445,8 +445,10 @@ def actuator(name: str, value: Actuators | None, s: Any) -> tuple[Actuator, ...]
     for chain in dict.fromkeys(chains(items, driven)):
         drives = tuple(part for part in chain if part.drives)
         others = [type(part).__name__ for part in chain if not part.drives]
-        if len(others) > len(set(others)):
-            raise ScenarioError(f"{name} has {joined(others)}: give one of a kind")
+        if len(others) > 1:
+            raise ScenarioError(
+                f"{name} has {joined(others)}, and a joint has one rotor beside it: give one"
+            )
         if len(drives) > 2 or (len(drives) == 2 and not drives[0].leads):
             raise ScenarioError(
                 f"{name} has the drives {shown(drives)}: give one drive, or (smc.Lag(0.01), "

@@ -54,7 +54,7 @@ def resolves(part: Actuator | Friction) -> bool:
     step.
     """
     if isinstance(part, Actuator):
-        return part.drives
+        return part.smooth
     return not part.keeps_state and part.force is None
 
 
@@ -86,7 +86,7 @@ def longest_step(s: Any) -> float:
     slower: a step of half of it is enough. A force that follows u at once sets no limit.
     """
     bounds = [s.clock.jitter / MIN_JITTER_STEPS or MAX_STEP]
-    bounds += [part.longest_step for part in s.actuator]
+    bounds += [part.longest_step(s.plant) for part in s.actuator]
     bounds.append(_step_of_mechanism(s))
     longest = min(MAX_STEP, *bounds)
     if bounds[-1] == REALISTIC_STEP:  # which resolves drives, too

@@ -204,8 +204,10 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
             "hinge_body": 3 * body,
             "anchor": 3 * joint,
         }
+    sides = [joint] if drive < 0 else [joint, model.actuator_trnid[drive, 0]]
     for field, kind in SENSORS.items():
-        sensors = np.flatnonzero((model.sensor_type == int(kind)) & (model.sensor_objid == joint))
+        on_it = np.isin(model.sensor_objid, sides)
+        sensors = np.flatnonzero((model.sensor_type == int(kind)) & on_it)
         if not len(sensors):
             raise ScenarioError(
                 f"the joint of {name} has no {kind.name[7:].lower()} sensor: add one"

@@ -81,9 +81,9 @@ def _exert(address, sim, data, part):
     y.load = data.qfrc_spring[joint] - data.qfrc_bias[joint]
     y.load += data.qfrc_constraint[joint] + pushed
     held = data.qfrc_constraint[joint]
-    # the stops of a play pass on the drive's force: on shaft and joint they cancel
+    # a play or a spring passes on the drive's force: on shaft and joint it cancels
     if channel.shaft >= 0 and channel.shaft != joint:
-        y.load += data.qfrc_constraint[channel.shaft]
+        y.load += data.qfrc_constraint[channel.shaft] + data.qfrc_spring[channel.shaft]
         held += data.qfrc_constraint[channel.shaft]
     if part.row >= 0:  # without what dry friction took of the constraints' force
         y.load -= min(max(held, -state.level), state.level)

@@ -109,10 +109,11 @@ class Scenario:
       physics_step: s; must divide the control period. Default: the largest such step up to 0.25 ms
         with friction (without `exact_friction`), contact, a mechanism or a plant that is not
         `smooth`, half of that with a Backlash, else up to 1 ms; always up to a quarter of the
-        clock's jitter. On your own model only friction needs 0.25 ms, a contact 0.5 ms; fast poles
-        and hard constraints need as much, see docs/accuracy.md. Where 1 ms holds, a drive whose
-        force changes within a control period may lower it, to a quarter of that period or half of
-        the drive's time constant, whichever is longer.
+        clock's jitter, and as fine as the oscillation of an ElasticJoint needs. On your own model
+        only friction needs 0.25 ms, a contact 0.5 ms; fast poles and hard constraints need as much,
+        see docs/accuracy.md. Where 1 ms holds, a drive whose force changes within a control period
+        may lower it, to a quarter of that period or half of the drive's time constant, whichever is
+        longer.
       u_max: bound on |u|, N or N m; may be infinite. Default: 6; of your own model the limit of the
         strongest motor, or what a joint without a limit needs: twice its load, (60/s^2 M + 8/s D)
         times its way, and 1.5 times its dry friction. A motor's own limit holds too: see `limits`.
@@ -150,9 +151,9 @@ class Scenario:
         hardware.Contact of one; Stops, a Wall, a Ball, which any plant takes; several; or "none".
       mechanism: "equation", or the name of another mechanism that the plant offers.
       actuator: what is between command and joint: a drive (Lag, RateLimit, DCMotor), or a Lag and
-        another drive; a Backlash may follow. None: the command is the force. u is limited to u_max
-        before the drives. By name, {"shoulder": DCMotor(), "elbow": Lag(0.01)}, a driven joint has
-        its own.
+        another drive; a Backlash or an ElasticJoint may follow. None: the command is the force. u
+        is limited to u_max before the drives. By name, {"shoulder": DCMotor(), "elbow": Lag(0.01)},
+        a driven joint has its own.
       sensor: an Encoder, or None: position and velocity as they are, with `noise`. By name, too.
       condition: name of the run's condition in a grid, set by `named`; dataclasses.replace drops
         it.
@@ -356,7 +357,7 @@ class Scenario:
         if self.friction or self.contact or self.mechanism != "equation":
             return False
         smooth = self.plant.smooth and not self.plant.rubs
-        return smooth and all(part.drives for part in self.actuator)
+        return smooth and all(part.smooth for part in self.actuator)
 
     @property
     def exact_friction(self) -> bool:

@@ -63,7 +63,8 @@ class Trace:
       d: disturbances on the joint's body, as a generalised force on the joint, (K + 1, n), N or N
         m.
       r: reference, (K + 1, n); free joints have none, and get the plant's goal.
-      force: of the actuator on the joint, or on the rotor of a Backlash, (K + 1, n), N or N m.
+      force: of the actuator on the joint, or on the rotor of a Backlash or an ElasticJoint,
+        (K + 1, n), N or N m.
       reaction: what friction, contacts and stops exert on the joint, (K + 1, n), N or N m, with
         the damping of Viscous and of your own file's joint. So that no blow is missed, force and
         reaction are means over the physics steps of the control period that ends at t_k; at t = 0

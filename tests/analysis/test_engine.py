@@ -12,7 +12,7 @@ from smc_mujoco.analysis.engine import cpu, group
 from smc_mujoco.analysis.engine.form import FAILED_STEP, FAILURE, LOGGED, SCORES, SETTING
 from smc_mujoco.analysis.engine.scores import RESTING, names
 from smc_mujoco.control.law import catalogue as laws
-from smc_mujoco.hardware import RateLimit, Sigmoid
+from smc_mujoco.hardware import ElasticJoint, RateLimit, Sigmoid
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.metrics.conventions import folded
 from smc_mujoco.metrics.fold import Fold
@@ -155,6 +155,19 @@ OTHERS = {  # plant, law, and what else the scenario has
     "C": ("duffing", "boundary_layer", {}),
     "cart": ("cart_pole", "hierarchical", {}),
     "arm": ("furuta", "rotary_swing_up", {"x0": (0.0, 3.0)}),
+    "elastic": (
+        smc.plant("inverted_pendulum_network", n=3),
+        "boundary_layer",
+        {"actuator": {"p2/hinge": ElasticJoint(3e3, 1.0, 0.01, 1e-3)}, "v0": (0.1, 0.2, 0.3)},
+    ),
+    "rotor": (
+        "duffing",
+        "boundary_layer",
+        {
+            "actuator": (smc.Lag(0.01), ElasticJoint(4e3, 4.0, 0.1)),
+            "sensor": smc.Encoder(math.inf, side="motor", delay=2e-3),
+        },
+    ),
     "torque": ("pendulum_network", smc.law("pid").on_computed_torque(), {"model": "nominal"}),
 }
 
@@ -162,8 +175,8 @@ OTHERS = {  # plant, law, and what else the scenario has
 SLOW = [pytest.param(kind, marks=pytest.mark.slow) for kind in ("cart", "arm", "torque")]
 
 
-@pytest.mark.parametrize("kind", ["joints", "C", *SLOW])
-def test_a_law_called_by_address_or_of_more_joints_runs_as_in_mujoco(kind, tmp_path):
+@pytest.mark.parametrize("kind", ["joints", "C", "elastic", "rotor", *SLOW])
+def test_a_law_or_a_machine_of_another_kind_runs_as_in_mujoco(kind, tmp_path):
     plant, law, fields = OTHERS[kind]
     if kind == "C":
         path = tmp_path / "mine.c"

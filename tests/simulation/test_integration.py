@@ -12,7 +12,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.errors import ScenarioWarning
-from smc_mujoco.hardware import LuGre
+from smc_mujoco.hardware import ElasticJoint, LuGre
 from smc_mujoco.mechanisms.custom import poles
 from smc_mujoco.simulation import integration
 
@@ -74,6 +74,7 @@ def of_file(level_1, level_2):
         ({"text": of_file(0.5, 0.2), "friction": smc.Viscous(0.01)}, "RK4", 2.5e-4),
         ({"joint": RANGE, "friction": LuGre(0.3, 0.4, 0.1, 300.0)}, "implicitfast", 2.5e-4),
         ({"joint": RANGE, "actuator": smc.Backlash(0.01, 0.01)}, "implicitfast", 1.25e-4),
+        ({"joint": RANGE, "actuator": ElasticJoint(200.0, 0.0, 0.1)}, "RK4", 1e-3 / 3),
         ({"joint": RANGE, "integrator": "Euler"}, "Euler", 2.5e-4),
     ],
     ids=str,

@@ -78,6 +78,10 @@ PARTS = {
     "backlash": {"actuator": smc.Backlash(0.02)},
     "motor and backlash": {"actuator": (MOTOR, smc.Backlash(0.02))},
     "backlash and lugre": {"actuator": (smc.Lag(0.01), smc.Backlash(0.02)), "friction": LUGRE},
+    "elastic joint": {
+        "actuator": (MOTOR, smc.hardware.ElasticJoint(500.0, 0.1, 0.01)),
+        "sensor": smc.Encoder(500, side="motor", delay=1e-3),
+    },
     "encoder": {
         "sensor": smc.Encoder(
             500,

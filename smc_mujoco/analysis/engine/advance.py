@@ -6,7 +6,7 @@ under the implicitfast of frictions whose force is held over a step.
 from typing import Any
 
 from smc_mujoco.analysis.engine.calls import Compiler, acting, array_in, reader
-from smc_mujoco.analysis.engine.form import SETTING, STATES, ChannelFunction, Form, layout
+from smc_mujoco.analysis.engine.form import SETTING, STATES, ChannelFunction, Form, Spring, layout
 from smc_mujoco.common.jit import always, inlined, record_in
 from smc_mujoco.mechanisms.hardware.drives import KEPT
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, JointState
@@ -18,11 +18,13 @@ state_in = record_in(CHANNEL_STATE)
 def advancing(form: Form, between: Any, compile_user: Compiler) -> Any:
     """Return a function (view, k, within, step): a physics step of RK4."""
     n = form.n
+    bodies = form.bodies
     driven = form.driven
     rubs = bool(form.frictions)
     # a signal without memory is the same at the third stage as at the second
     remembers = any(kind.memory for kind in form.disturbances)
     drive = _driving(form)
+    bend = _bending(form)
     friction = _rubbing(form, compile_user)
     nominal = compile_user(form.nominal.function)
     values = _valuing(form)
@@ -35,9 +37,9 @@ def advancing(form: Form, between: Any, compile_user: Compiler) -> Any:
         xs = array_in(work, work_at.x, n)
         vs = array_in(work, work_at.v, n)
         p = values(row, step)
-        for i in range(n):
-            work[work_at.x0 + i] = xs[i]
-            work[work_at.v0 + i] = vs[i]
+        for i in range(bodies):
+            work[work_at.x0 + i] = work[work_at.x + i]
+            work[work_at.v0 + i] = work[work_at.v + i]
             work[work_at.sum_v + i] = 0.0
             work[work_at.sum_a + i] = 0.0
         for stage in range(4):
@@ -45,6 +47,7 @@ def advancing(form: Form, between: Any, compile_user: Compiler) -> Any:
                 between(view, k, within, stage)
             for i in range(driven):
                 work[work_at.motor + i] = drive(view, i, stage)
+            bend(view)
             for i in range(n):
                 f, g = nominal(xs, vs, i, p)
                 actuator = i
@@ -57,16 +60,16 @@ def advancing(form: Form, between: Any, compile_user: Compiler) -> Any:
                 work[work_at.a + i] = f + g * force
             weight = 1.0 if stage % 3 == 0 else 2.0
             reach = h if stage == 2 else 0.5 * h
-            for i in range(n):
-                speed = vs[i]
+            for i in range(bodies):
+                speed = work[work_at.v + i]
                 change = work[work_at.a + i]
                 work[work_at.sum_v + i] += weight * speed
                 work[work_at.sum_a + i] += weight * change
-                xs[i] = work[work_at.x0 + i] + reach * speed
-                vs[i] = work[work_at.v0 + i] + reach * change
-        for i in range(n):
-            xs[i] = work[work_at.x0 + i] + h / 6.0 * work[work_at.sum_v + i]
-            vs[i] = work[work_at.v0 + i] + h / 6.0 * work[work_at.sum_a + i]
+                work[work_at.x + i] = work[work_at.x0 + i] + reach * speed
+                work[work_at.v + i] = work[work_at.v0 + i] + reach * change
+        for i in range(bodies):
+            work[work_at.x + i] = work[work_at.x0 + i] + h / 6.0 * work[work_at.sum_v + i]
+            work[work_at.v + i] = work[work_at.v0 + i] + h / 6.0 * work[work_at.sum_a + i]
 
     return advance
 
@@ -124,6 +127,36 @@ def _driving(form: Form) -> Any:
         return force
 
     return drive
+
+
+def _bending(form: Form) -> Any:
+    """Return a function (view): accelerate the rotors, and put what their springs pass on in the
+    place of the drives' force.
+    """
+    if not form.elastic:
+        return always(None)
+    elastic = form.elastic
+    rotors = len(elastic)
+    first = form.n
+    width = len(Spring._fields)
+    spring_at = reader(Spring._fields)
+    row_at, work_at = layout(form)[:2]
+
+    @inlined
+    def bend(view):
+        row, _, work = view
+        for k in range(rotors):
+            spring = spring_at(row, row_at.springs + width * k)
+            joint = elastic[k]
+            rotor = first + k
+            speed = work[work_at.v + rotor]
+            force = spring.stiffness * (work[work_at.x + rotor] - work[work_at.x + joint])
+            force += spring.damping * (speed - work[work_at.v + joint])
+            drive = work[work_at.motor + joint] - force - spring.rotor_damping * speed
+            work[work_at.a + rotor] = drive / spring.rotor_inertia
+            work[work_at.motor + joint] = force
+
+    return bend
 
 
 def _rubbing(form: Form, compile_user: Compiler) -> Any:

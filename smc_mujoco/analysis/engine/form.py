@@ -72,6 +72,8 @@ class Form(NamedTuple):
     surface: ChannelFunction | None
     sensor: ChannelFunction | None
     drive: ChannelFunction | None  # between command and force
+    elastic: tuple[int, ...]  # channels whose drive turns a rotor behind a spring
+    motor_side: tuple[int, ...]  # those of them whose sensor reads the rotor
     frictions: tuple[ChannelFunction, ...]
     compensated: tuple[ChannelFunction, ...]  # frictions
     on_reference: bool  # whether they are compensated at the speed of the reference
@@ -89,6 +91,20 @@ class Form(NamedTuple):
     slots: int  # commands that are under way
     past: int  # physics steps whose states a sensor may read; 0 if it reads the present one
     metrics: Names
+
+    @property
+    def bodies(self) -> int:
+        """How many positions it integrates: of all channels, then of their rotors."""
+        return self.n + len(self.elastic)
+
+
+class Spring(NamedTuple):
+    """What is between a rotor and its joint, and the rotor, see `ElasticJoint`."""
+
+    stiffness: Any
+    damping: Any
+    rotor_inertia: Any
+    rotor_damping: Any
 
 
 class PartAt(NamedTuple):
@@ -121,6 +137,7 @@ class RowPlaces(NamedTuple):
     after: int
     damping: int  # this and `levels` only with frictions
     levels: int  # of dry friction
+    springs: int  # a Spring of each rotor
     hinges: int  # whether a joint is one; only with a sensor
     periods: int  # s between readings, and until one arrives; only with a past
     delays: int
@@ -131,7 +148,7 @@ class RowPlaces(NamedTuple):
 class WorkPlaces(NamedTuple):
     """Where a run's state is; n numbers of each, where it says no other."""
 
-    x: int
+    x: int  # of all bodies, as are the next six: of all channels, then of their rotors
     v: int
     a: int  # of the stages of a step, as are the next four
     x0: int
@@ -150,7 +167,7 @@ class WorkPlaces(NamedTuple):
     before: int  # LOG at the sample before
     states: int  # CHANNEL_STATE of each channel
     ring: int  # commands of `slots` samples
-    past: int  # x and v of all channels, in each of `past` steps
+    past: int  # x and v of all bodies, in each of `past` steps
     measured: int  # what a law in C reads
     commanded: int  # its u and s, 2 n
 
@@ -237,6 +254,7 @@ def _row_places(form: Form, row: Places) -> RowPlaces:
         after=row.take(values),
         damping=row.take(n if form.frictions else 0),
         levels=row.take(n if form.frictions else 0),
+        springs=row.take(len(Spring._fields) * len(form.elastic)),
         hinges=row.take(n if form.sensor else 0),
         periods=row.take(n if form.past else 0),
         delays=row.take(n if form.past else 0),
@@ -249,13 +267,13 @@ def _work_places(form: Form, work: Places) -> WorkPlaces:
     n = form.n
     in_c = any(law.function is None for law in form.laws)
     return WorkPlaces(
-        x=work.take(n),
-        v=work.take(n),
-        a=work.take(n),
-        x0=work.take(n),
-        v0=work.take(n),
-        sum_v=work.take(n),
-        sum_a=work.take(n),
+        x=work.take(form.bodies),
+        v=work.take(form.bodies),
+        a=work.take(form.bodies),
+        x0=work.take(form.bodies),
+        v0=work.take(form.bodies),
+        sum_v=work.take(form.bodies),
+        sum_a=work.take(form.bodies),
         rest=work.take(n),
         unit=work.take(n if form.implicit else 0),
         matrix=work.take(n * n if form.implicit else 0),
@@ -268,7 +286,7 @@ def _work_places(form: Form, work: Places) -> WorkPlaces:
         before=work.take(WIDTH * n),
         states=work.take(STATES * n),
         ring=work.take(form.slots * n),
-        past=work.take(form.past * 2 * n),
+        past=work.take(form.past * 2 * form.bodies),
         measured=work.take(measured_places(form) if in_c else 0),
         commanded=work.take(2 * n if in_c else 0),
     )

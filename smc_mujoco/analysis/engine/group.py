@@ -18,6 +18,7 @@ from smc_mujoco.analysis.engine.form import (
     PartAt,
     Settings,
     SignalAt,
+    Spring,
     layout,
 )
 from smc_mujoco.analysis.engine.scores import RESTING, summed_up
@@ -26,6 +27,7 @@ from smc_mujoco.common.aliases import Fields
 from smc_mujoco.common.jit import AtAddress, Uncompiled
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.hardware.drives import advanced
+from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
 from smc_mujoco.mechanisms.layout import moves_alone
 from smc_mujoco.metrics.conventions import SETTLING_BAND, groups, settling_band
 from smc_mujoco.metrics.fold import first_sample
@@ -60,8 +62,9 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
         "it has MuJoCo's friction, contacts or another mechanism": not (
             s.plain_equation or (s.exact_friction and not plant.free) or rubs_by_force(s)
         ),
-        "it has an actuator other than lags and rate limits": not all(
-            part.in_callback and part.force is None for part in s.actuator
+        "it has an actuator other than lags, rate limits and elastic joints": not all(
+            isinstance(part, ElasticJoint) or (part.in_callback and part.force is None)
+            for part in s.actuator
         ),
         f"its integrator is {s.integrator}": s.integrator
         != ("implicitfast" if rubs_by_force(s) else "RK4"),
@@ -117,6 +120,16 @@ def key(scenario: Scenario) -> Hashable:
     return form_of(scenario.resolved)._replace(**VARYING, disturbances=())
 
 
+def _springs(s: Resolved) -> dict[int, Spring]:
+    """Return the spring behind the rotor of each channel that has one."""
+    found = {}
+    for i, chain in enumerate(s.chains):
+        for part in chain:
+            if isinstance(part, ElasticJoint):
+                found[i] = Spring(*(getattr(part, name) for name in Spring._fields))
+    return found
+
+
 def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
     """Return the form of one run."""
     every = tuple(range(s.plant.n))
@@ -137,6 +150,8 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
     for part in s.compensated:
         channels = tuple(part.channels(s.plant))
         compensated.append(ChannelFunction(part.steady, part.names, part.memory, channels))
+    elastic = tuple(_springs(s))
+    motor_side = [i for part in s.sensors if part.side == "motor" for i in part.channels(s.plant)]
     clock = not s.clock.regular
     slots = 1
     while slots < s.delay_steps // s.steps + 1 + clock:  # few sizes, each of which is compiled
@@ -156,6 +171,8 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
         surface=s.surface and _part(s.surface),
         sensor=sensors[0] if sensors else None,
         drive=drives[0] if drives else None,
+        elastic=elastic,
+        motor_side=tuple(i for i in elastic if i in motor_side),
         frictions=tuple(frictions),
         compensated=tuple(compensated),
         on_reference=bool(compensation(s).get("on_reference")),
@@ -297,6 +314,8 @@ class FormGroup:
         if s.compensated:
             numbers = compensation(s)
             _put(row, self.layout.row.compensation, (numbers["share"], numbers["eps"]))
+        for k, spring in enumerate(_springs(s).values()):
+            _put(row, self.layout.row.springs + len(spring) * k, spring)
         places = self.layout.row.damping, self.layout.row.levels
         for part in s.friction:
             for first, value in zip(places, part.added_to_model, strict=True):

@@ -72,6 +72,8 @@ def simulation(form: Form, compile_user: Compiler) -> Any:
     else:
         advance = advancing(form, between, compile_user)
     remember = _remembering(form)
+    elastic = form.elastic
+    rotors = len(elastic)
     record = _recording(form)
     n = form.n
     row_at, work_at = layout(form)[:2]
@@ -88,6 +90,10 @@ def simulation(form: Form, compile_user: Compiler) -> Any:
         for i in range(n):
             work[work_at.x + i] = row[row_at.x0 + i]
             work[work_at.v + i] = row[row_at.v0 + i]
+        if rotors:
+            for k in range(rotors):
+                work[work_at.x + n + k] = row[row_at.x0 + elastic[k]]
+                work[work_at.v + n + k] = row[row_at.v0 + elastic[k]]
         for k in range(samples + 1):
             for within in range(steps):
                 step = k * steps + within
@@ -165,24 +171,36 @@ def _remembering(form: Form) -> Any:
     """Return a function (view, step): keep the state for a sensor that is late."""
     if not form.past:
         return always(None)
-    n = form.n
+    bodies = form.bodies
     past = form.past
     work_at = layout(form).work
 
     @inlined
     def remember(view, step):
-        at = work_at.past + step % past * 2 * n
-        for i in range(n):
+        at = work_at.past + step % past * 2 * bodies
+        for i in range(bodies):
             view.work[at + i] = view.work[work_at.x + i]
-            view.work[at + n + i] = view.work[work_at.v + i]
+            view.work[at + bodies + i] = view.work[work_at.v + i]
 
     return remember
 
 
+def _siding(form: Form) -> Any:
+    """Return a function (i) -> the body whose position the sensor of channel i gives."""
+    if not form.motor_side:
+        return inlined(lambda i: i)
+    bodies = list(range(form.n))
+    for i in form.motor_side:
+        bodies[i] = form.n + form.elastic.index(i)
+    read = tuple(bodies)
+    return inlined(lambda i: read[i])
+
+
 def _late_sensing(form: Form) -> Fields:
     """Return the moments of a sensor that reads at its own times, or gives the past."""
-    n = form.n
+    bodies = form.bodies
     past = form.past
+    side = _siding(form)
     row_at, work_at = layout(form)[:2]
 
     @inlined
@@ -197,8 +215,8 @@ def _late_sensing(form: Form) -> Fields:
         if period != 0.0:
             time = reading(view, i, 0, t) * period
         step = max(0, math.floor(time / h + 0.5))
-        at = work_at.past + step % past * 2 * n + i
-        return view.work[at], view.work[at + n]
+        at = work_at.past + step % past * 2 * bodies + side(i)
+        return view.work[at], view.work[at + bodies]
 
     return {"reading": reading, "sense": sense}
 
@@ -208,15 +226,21 @@ def _sensing(form: Form, compile_user: Compiler) -> Fields:
     at = layout(form)
     row_at, work_at = at[:2]
     estimator = estimating(at.estimator, compile_user)
+    side = _siding(form)
 
     @inlined
     def estimate(view, i, x, v):
         v, a = estimator(view, Reading(view.row[SETTING.period], x, v), i)
         return False, v, a
 
+    @inlined
+    def sense(view, i, t):
+        body = side(i)
+        return view.work[work_at.x + body], view.work[work_at.v + body]
+
     found: Fields = {
         "errors": always((-0.0, -0.0)),  # which change no bit
-        "sense": inlined(lambda view, i, t: (view.work[work_at.x + i], view.work[work_at.v + i])),
+        "sense": sense,
         "estimate": estimate,
     }
     if form.past:
@@ -240,13 +264,13 @@ def _sensing(form: Form, compile_user: Compiler) -> Fields:
 
 def _forces(form: Form, compile_user: Compiler) -> Fields:
     """Return the moments of a physics step: the state, and the forces that act on it."""
-    n = form.n
+    bodies = form.bodies
     work_at = layout(form).work
 
     @inlined
     def diverged(view):
         work = view.work
-        for i in range(n):
+        for i in range(bodies):
             if not (abs(work[work_at.x + i]) < MAX_STATE and abs(work[work_at.v + i]) < MAX_STATE):
                 return True
         return False

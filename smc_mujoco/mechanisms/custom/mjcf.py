@@ -19,7 +19,7 @@ import numpy as np
 from smc_mujoco.common import libmujoco, mjcb, process
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.mechanisms.custom import urdf
-from smc_mujoco.mechanisms.layout import PLAY, ROTOR
+from smc_mujoco.mechanisms.layout import LEAD, ROTOR
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER
 
 FOLDERS = ("meshdir", "texturedir", "assetdir")  # where a <compiler> may say that assets lie
@@ -27,7 +27,7 @@ XML = (".xml", ".mjcf", ".urdf")
 DIGITS = 17  # of numbers in the XML of an MjSpec: enough for any float64
 ROUNDING = 1e-12  # relative and absolute: change of a model's numbers when it is written and read
 
-RESERVED = ("smc:", PLAY, ROTOR)  # prefixes of names of this package's parts
+RESERVED = ("smc:", LEAD, ROTOR)  # prefixes of names of this package's parts
 # kinds of object that this package's parts add
 RESERVED_KINDS = ("BODY", "JOINT", "GEOM", "TENDON", "TEXT")
 # Parts of names of fields that do not affect the motion, or that MuJoCo computes.

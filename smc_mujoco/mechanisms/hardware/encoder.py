@@ -13,17 +13,17 @@ measures no velocity: by default the controller differentiates the positions.
 # (a constant of the base class is a function or a property here)
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from typing import Annotated
 
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.constraints import Finite, Natural, Positive, Probability, Whole
+from smc_mujoco.common.constraints import Finite, Natural, OneOf, Positive, Probability, Whole
 from smc_mujoco.common.errors import ScenarioError, number
 from smc_mujoco.mechanisms.hardware.moments import Run
 from smc_mujoco.mechanisms.hardware.part import OnJoints
-from smc_mujoco.mechanisms.layout import joint_ids
+from smc_mujoco.mechanisms.layout import ROTOR, joint_ids, moving_joints
 from smc_mujoco.mechanisms.plant import Field, Plant
 
 # Share of a physics step by which readings are taken early, because MuJoCo compares times, which
@@ -33,6 +33,8 @@ MAX_COUNT = 2.0**52  # a larger number is whole
 MAX_READINGS = 100_000  # under way in a delay: chosen, 6 MB per channel
 # readings in a history are a multiple of this, so that runs with other delays share a model; chosen
 READINGS_STEP = 64
+SIDES = "link", "motor"
+KINDS = mujoco.mjtSensor.mjSENS_JOINTPOS, mujoco.mjtSensor.mjSENS_JOINTVEL
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,6 +53,10 @@ class Encoder(OnJoints):
         than that of the channel before, as on a bus on which the last channel is read first. Not
         with `period`.
 
+      side: "link": it reads the joint; "motor": it reads the rotor beside it, of an ElasticJoint or
+        a Backlash. Without one, both sides are the same. Angles are those at the joint: an encoder
+        of c counts on a motor behind a gear g has g c counts.
+
     With the velocity estimator "measured" there is also a tachometer, with the same period, delay
     and losses.
     """
@@ -61,6 +67,7 @@ class Encoder(OnJoints):
     period: Positive | None = None
     delay: Natural = 0.0
     skew: Natural = 0.0
+    side: Annotated[str, OneOf(names=SIDES)] = "link"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -97,6 +104,16 @@ class Encoder(OnJoints):
 
     def channels(self, plant: Plant) -> Sequence[int]:
         return super().channels(plant) if self.on else range(plant.n)
+
+    def structure(self) -> tuple[Hashable, ...]:
+        return *super().structure(), self.side
+
+    def edit(self, spec: mujoco.MjSpec) -> None:
+        for sensor in spec.sensors if self.side == "motor" else ():
+            rotor = ROTOR + sensor.objname
+            read = sensor.type in KINDS and (not self.on or sensor.objname in self.on)
+            if read and spec.joint(rotor) is not None:
+                sensor.objname = rotor
 
     def quantum(self, hinge: bool) -> float:
         """Return one count, rad of a hinge or m of a slide; 0 without quantisation."""
@@ -139,13 +156,12 @@ class Encoder(OnJoints):
         """Yield the fields of delay and period of its channels' two sensors."""
         if model.nhistory:
             at = sensor_ids(model)
-            channels = joint_ids(model).tolist()
+            of_each = moving_joints(model)[:, None] == model.sensor_objid[at, None]
+            channels = of_each.any(axis=0).argmax(axis=1)
             if self.on:
-                named = [model.joint(name).id for name in self.on]
-                at = at[np.isin(model.sensor_objid[at], named)]
-            delays = self.delay + self.skew * np.array(
-                [channels.index(joint) for joint in model.sensor_objid[at]]
-            )
+                named = np.isin(joint_ids(model), [model.joint(name).id for name in self.on])
+                at, channels = at[named[channels]], channels[named[channels]]
+            delays = self.delay + self.skew * channels
             yield Field(
                 "sensor_delay", at, np.maximum(0.0, delays - EARLY_SHARE * model.opt.timestep)
             )
@@ -154,10 +170,8 @@ class Encoder(OnJoints):
 
 def sensor_ids(model: mujoco.MjModel) -> np.ndarray:
     """Return the indices of the channels' position and velocity sensors, (2n,)."""
-    kinds = np.isin(
-        model.sensor_type, [mujoco.mjtSensor.mjSENS_JOINTPOS, mujoco.mjtSensor.mjSENS_JOINTVEL]
-    )
-    return np.flatnonzero(kinds & np.isin(model.sensor_objid, joint_ids(model)))
+    kinds = np.isin(model.sensor_type, KINDS)
+    return np.flatnonzero(kinds & np.isin(model.sensor_objid, moving_joints(model)))
 
 
 def remember(model: mujoco.MjModel, data: mujoco.MjData) -> None:

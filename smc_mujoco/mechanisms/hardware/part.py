@@ -228,7 +228,7 @@ class Actuator(OnJoints):
     stall: ClassVar[float | None] = None  # N m (N), the largest force at rest; None: any
     has_moment: ClassVar[bool] = False  # whether RK4 gets the first moment of its force, too
     even: ClassVar[bool] = False  # whether `mujoco_torque` is all that it does
-    longest_step: ClassVar[float] = math.inf  # s, of the default physics step
+    smooth: ClassVar[bool] = True  # whether RK4 may integrate it
     nominal: ClassVar[NominalDrive] = NominalDrive()  # what the law's model knows of it
 
     def drives_of(self, spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:
@@ -244,6 +244,11 @@ class Actuator(OnJoints):
         ids = drive_ids(model)
         named = [model.joint(name).id for name in self.on]
         return ids[np.isin(driven_ids(model), named)] if named else ids
+
+    def longest_step(self, plant: Plant) -> float:
+        """Return the longest default physics step beside it, s."""
+        del plant
+        return math.inf
 
     def mujoco_torque(self, step: float, rk4: bool) -> Torque:
         """Return how MuJoCo computes its force in a physics step, s."""

@@ -24,7 +24,7 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.jit import floats, pointer, record_at
 from smc_mujoco.mechanisms.hardware.moments import Run, channel_at, state_at
 from smc_mujoco.mechanisms.hardware.part import Actuator, Natural, Positive
-from smc_mujoco.mechanisms.plant import Field
+from smc_mujoco.mechanisms.plant import Field, Plant
 
 LONGEST_STEP = 2.5e-4  # s, of physics; chosen
 MAX_QUEUED = 100_000  # steps of one motor; chosen, 1.6 MB
@@ -92,7 +92,6 @@ class Stepper(Actuator):
     accelerates = True
     is_drive = True
     sums_force = True
-    longest_step = LONGEST_STEP
 
     steps: Annotated[float, Whole(low=1, high=10**9, infinite=True)] = 1600
     teeth: Positive = 50.0
@@ -149,6 +148,9 @@ class Stepper(Actuator):
     def bound(self) -> float:
         """The default of u_max, rad/s^2 (m/s^2)."""
         return self.ramp
+
+    def longest_step(self, plant: Plant) -> float:
+        return LONGEST_STEP
 
     def suits(self, s: Any, chain: Sequence[Actuator]) -> None:
         if s.fault is not None:

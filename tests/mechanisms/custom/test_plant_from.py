@@ -938,7 +938,7 @@ HARM = {  # what the model has, and words of the sentence
         "arm.xml has a text 'smc:direct', and names that b",
     ),
     "tendon": (
-        '<tendon><fixed name="play:elbow"><joint joint="elbow" coef="1"/></fixed></tendon>',
+        '<tendon><fixed name="lead:elbow"><joint joint="elbow" coef="1"/></fixed></tendon>',
         "arm.xml has a tendon 'play:elbow', and names that begin with .*, play:, rotor: are smc",
     ),
 }

@@ -8,7 +8,7 @@ from helpers.own_parts import worn
 
 import smc_mujoco as smc
 from smc_mujoco.common.files import to_json
-from smc_mujoco.hardware import RateLimit, Stepper
+from smc_mujoco.hardware import ElasticJoint, RateLimit, Stepper
 from smc_mujoco.simulation import conditions, scenario_json
 
 TWO = """<mujoco><compiler angle="radian"/><worldbody>
@@ -27,6 +27,7 @@ ACTUATORS = [
     ((smc.Lag(0.01), VOLTS), (smc.DCMotor(inductance=0.0, cogging=0.01), smc.Backlash(0.01))),
     (worn(), smc.DCMotor(command="voltage", gear=20.0, inductance=0.0, ripple=0.1)),
     (worn(zone=0.3), None),
+    (ElasticJoint(90.0, 0.1, 0.02), (smc.Lag(0.01), ElasticJoint(50.0))),
 ]
 FINE = smc.Encoder(4096)
 SENSORS = [
@@ -92,7 +93,14 @@ def test_they_survive_text_json_and_the_order_of_a_mapping(field, pair):
         ({"sensor": (FINE, {"b": FINE})}, "two parts on joint 'b': give one"),
         ({"actuator": (smc.DCMotor(), {"b": smc.Lag(0.1)})}, "give one drive"),
         ({"actuator": {"b": (smc.Lag(0.1), Stepper())}}, "Stepper is behind Lag"),
-        ({"actuator": {"b": (smc.Backlash(0.1), smc.Backlash(0.2))}}, "give one of a kind"),
+        (
+            {"actuator": {"b": (smc.Backlash(0.1), smc.Backlash(0.2))}},
+            "one rotor beside it: give one",
+        ),
+        (
+            {"actuator": {"b": (smc.Backlash(0.1), ElasticJoint(1e3))}},
+            "Backlash and ElasticJoint",
+        ),
         ({"actuator": {"b": worn(zone=(0.1, 0.2))}}, "acts on 1 joint of two: give one number"),
     ],
 )
