@@ -85,7 +85,7 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
         values = {"measured": measured} | values
     if model["keyframe"] is not None:
         values = {"keyframe": model["keyframe"].strip()} | values
-    return plant_from(folder / path, channels or {"": None}, **values)  # an error names the joints
+    return plant_from(folder / path, channels or None, **values)  # an error names the joints
 
 
 def _channel(text: str) -> tuple[str, Any]:

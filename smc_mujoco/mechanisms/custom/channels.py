@@ -80,6 +80,7 @@ class Channel:
 
 
 Pairs = tuple[tuple[str, Channel], ...]  # each a joint and its Channel
+UNNAMED: Pairs = (("", Channel()),)  # of a user who names no joint
 
 
 def coerce(channels: object) -> Pairs:
@@ -170,8 +171,8 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
     named = [name for name in names if name]
     if joints == [""] and named:
         raise ScenarioError(
-            f"{label} names no joint: give some, as {label}:{'+'.join(named[:2])}; it has "
-            f"{one_line(', '.join(named))}"
+            f"{label} names no joint: give some, as {label}:{'+'.join(named[:2])} or "
+            f"channels={named[:2]}; it has {one_line(', '.join(named))}"
         )
     for joint in joints:
         kind = mujoco.mjtJoint(model.jnt_type[pick(label, "joint", joint, names)])

@@ -37,16 +37,21 @@ def overlap(plant: Plant, x: Floats) -> Overlap:
     return deepest(plant, model, data)
 
 
-def deepest(plant: Plant, model: mujoco.MjModel, data: mujoco.MjData) -> Overlap:
+def deepest(
+    plant: Plant, model: mujoco.MjModel, data: mujoco.MjData, ground: bool = True
+) -> Overlap:
     """Return the deepest overlap of what the channels move and what they do not, among the
-    contacts of `data`.
+    contacts of `data`; without `ground`, of those with nothing that is fixed to the world.
     """
     moved = _moved(plant, model)
+    counts = np.full(model.nbody, True) if ground else model.body_weldid != 0
     found = Overlap()
     for contact in data.contact:
         geoms = contact.geom.tolist()
         bodies = model.geom_bodyid[geoms]
-        if min(geoms) >= 0 and moved[bodies[0]] != moved[bodies[1]] and -contact.dist > found.depth:
+        if min(geoms) < 0 or not counts[bodies].all():
+            continue
+        if moved[bodies[0]] != moved[bodies[1]] and -contact.dist > found.depth:
             names = tuple(map(model.body, bodies.tolist()))
             shown = [model.geom(i).name or body.name for i, body in zip(geoms, names, strict=True)]
             named = [name or f"geom {i}" for name, i in zip(shown, geoms, strict=True)]

@@ -95,8 +95,13 @@ def edit(
     for i, servo in servos.items():
         goal = -servo.biasprm[1] * data.actuator_length[i]
         if keyframe is not None and np.any(data.ctrl):
-            goal = servo.gainprm[0] * data.ctrl[model.actuator_ctrladr[i]]
-        servo.biasprm[0] += goal  # its ctrl stays at 0
+            ctrl = data.ctrl[model.actuator_ctrladr[i]]
+            if model.actuator_ctrllimited[i]:
+                ctrl = np.clip(ctrl, *model.actuator_ctrlrange[i])
+            goal = servo.gainprm[0] * ctrl
+        servo.biasprm[0] += goal
+        # its ctrl stays at 0, which its range may leave out, as a knee's does
+        servo.ctrllimited = servo.actlimited = False
     if others == "held":
         _hold(spec, model, data, limp(spec, seen))
     if others == "locked":

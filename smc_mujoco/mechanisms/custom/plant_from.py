@@ -61,7 +61,7 @@ DCMOTOR = mujoco.mjtDyn.mjDYN_DCMOTOR.value
 @constrained
 def plant_from(
     path: "str | os.PathLike | mujoco.MjSpec | RootElement",
-    channels: Mapping[str, Channel | Mapping | None] | Iterable[str],
+    channels: Mapping[str, Channel | Mapping | None] | Iterable[str] | None = None,
     name: str | None = None,
     keyframe: str | None = None,
     assets: Mapping[str, bytes | str] | None = None,
@@ -79,7 +79,7 @@ def plant_from(
         mjcf.RootElement of dm_control.
       channels: joint -> Channel, a dict of its fields, or None for the defaults; or a list of
         joints' names. The plant's channels have the same order. A free joint without a name has
-        that of its body.
+        that of its body. Left out, the error names the joints that the file has.
       name: name of the plant, in tables and pictures; default: the file's. Pictures write it as the
         model does where that is the same name.
       keyframe: name of the model's keyframe with the initial positions, which is the default goal;
@@ -119,7 +119,10 @@ def plant_from(
     # laws and gains refer to plants by name
     if name is not None and catalogue().taken(errors.name("name", name)):
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
-    pairs = own.coerce(channels)
+    if channels is None:
+        pairs: Pairs = own.UNNAMED  # refused with the joints that there are
+    else:
+        pairs = own.coerce(channels)
     made = _plant(source, pairs, name, keyframe, tip, others or "", measured)
     spec = source.spec()
     model = mjcf.as_it_is(source)

@@ -147,8 +147,8 @@ def _held(
 
 @functools.lru_cache(maxsize=32)
 def rises(plant: Plant, x: Floats) -> bool:
-    """Return whether a robot on a free base comes out of what it stands in with its channels at x,
-    (n,) rad or m, and stands while its joints are held there.
+    """Return whether a robot on a free base stands while its joints are held at x, (n,) rad or m,
+    and then has nothing inside it. How deep its feet stand in the ground is their softness.
     """
     model, data = _at(plant, x)
     if not (base := _free_base(model)):
@@ -159,7 +159,7 @@ def rises(plant: Plant, x: Floats) -> bool:
     _, strayed = _held(model, data, base, load, M)
     if strayed > 1.0 or tips_over(model, data):
         return False
-    return deepest(plant, model, data).depth <= DEPTH
+    return deepest(plant, model, data, ground=False).depth <= DEPTH
 
 
 def falls(plant: Plant) -> str:

@@ -156,3 +156,7 @@ def test_a_plant_is_named_by_its_file_and_joints(tmp_path, monkeypatch):
     ):
         with pytest.raises(smc.ScenarioError, match=words):
             as_plant(text)
+    with pytest.raises(
+        smc.ScenarioError, match=r"channels=\['pan', 'lift'\]; it has pan, lift, elbow"
+    ):
+        smc.plant_from("arm.xml")
