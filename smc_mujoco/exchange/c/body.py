@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.exchange.c.translate import Kind
+from smc_mujoco.exchange.c.translation.values import Kind
 from smc_mujoco.mechanisms.layout import PLACES
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.rotation import mix, put_attitude_error, rotation_vector

@@ -17,15 +17,10 @@ from smc_mujoco.control.component import Component, Template, gain_at, gain_text
 from smc_mujoco.control.law import FREE_BODY, catalogue, known_laws
 from smc_mujoco.control.laws import observer_free_q15 as q15
 from smc_mujoco.exchange.c import body, build
-from smc_mujoco.exchange.c.translate import (
-    JOINTS,
-    MATH,
-    SLOTS,
-    Untranslatable,
-    plain,
-    rows,
-    translate,
-)
+from smc_mujoco.exchange.c.translation.c_text import MATH, plain, rows
+from smc_mujoco.exchange.c.translation.functions import translate
+from smc_mujoco.exchange.c.translation.python_source import Untranslatable
+from smc_mujoco.exchange.c.translation.values import JOINTS, SLOTS
 from smc_mujoco.mechanisms.layout import PLACES
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce

@@ -26,7 +26,8 @@ from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.exchange.c import export_c
-from smc_mujoco.exchange.c.translate import JOINTS, plain
+from smc_mujoco.exchange.c.translation.c_text import plain
+from smc_mujoco.exchange.c.translation.values import JOINTS
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.model import mixer
 from smc_mujoco.simulation.step import MAX_CONTROL
