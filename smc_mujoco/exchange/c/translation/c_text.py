@@ -184,7 +184,7 @@ class Lines:
 
     def begin(self) -> None:
         """Forget all lines, but not the kinds of variables and results."""
-        self.lines = list[str]()
+        self.lines: list[str] = []
         self.temporaries = dict[str, Kind]()
         self.counts = itertools.count(1)
         self.counters = set[str]()  # variables of the present loops that are never negative
@@ -280,9 +280,11 @@ class Lines:
 
     def captured(self, translate: Callable[[Any], Any], node: Any) -> tuple[Any, list[str]]:
         """Return what a method makes of some code, and the lines that it writes."""
-        lines, self.lines = self.lines, []
+        before = self.lines
+        self.lines = []
         made = translate(node)
-        own, self.lines = self.lines, lines
+        own = self.lines
+        self.lines = before
         return made, own
 
     def alone(self, translate: Callable[[Any], Any], node: ast.expr) -> Any:
