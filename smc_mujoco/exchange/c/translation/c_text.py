@@ -12,7 +12,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import shown
 from smc_mujoco.control.component import Component
-from smc_mujoco.exchange.c.translation.python_source import PythonFunction, Untranslatable, refuse
+from smc_mujoco.exchange.c.translation.python_source import PythonSource, Untranslatable, refuse
 from smc_mujoco.exchange.c.translation.values import TYPES, WIDTHS, Kind, Value, array_at, literal
 
 INDICES = (*"ijklmn", "row", "column", "element_1", "element_2")  # of loops over arrays
@@ -160,7 +160,7 @@ class Lines:
     def __init__(
         self,
         program: Program,
-        source: PythonFunction,
+        source: PythonSource,
         kinds: Sequence[Kind],
         constants: Mapping[str, float],
         entry: bool,

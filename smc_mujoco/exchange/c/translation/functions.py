@@ -12,7 +12,7 @@ from typing import Any
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.component import Component
 from smc_mujoco.exchange.c.translation.c_text import Program
-from smc_mujoco.exchange.c.translation.python_source import PythonFunction, refuse
+from smc_mujoco.exchange.c.translation.python_source import PythonSource, refuse
 from smc_mujoco.exchange.c.translation.statements import Statements
 from smc_mujoco.exchange.c.translation.values import Kind, Value, gathered
 
@@ -35,13 +35,11 @@ def translate(
     slots = [joints, component.memory] if joints else [component.memory]
     kinds = Kind("y"), Kind("gains"), Kind("memory", tuple(slots))
     texts = [
-        Function(program, PythonFunction(component.function), kinds, entry=True).text(
-            program.symbol
-        )
+        Function(program, PythonSource(component.function), kinds, entry=True).text(program.symbol)
     ]
     for name, (function, kinds) in others.items():
         texts.append(
-            Function(program, PythonFunction(function), kinds).text(name).removeprefix("static ")
+            Function(program, PythonSource(function), kinds).text(name).removeprefix("static ")
         )
     for name, text in reversed(program.texts.items()):
         if re.search(rf"\b{name}\b", "".join(texts)):  # earlier, narrower drafts are called no more
@@ -55,7 +53,7 @@ class Function(Statements):
     def __init__(
         self,
         program: Program,
-        source: PythonFunction,
+        source: PythonSource,
         kinds: Sequence[Kind],
         constants: Mapping[str, float] = frozen({}),
         entry: bool = False,
@@ -123,7 +121,7 @@ class Function(Statements):
         A literal exponent is not an argument in C: each exponent gives its own function.
         """
         program = self.program
-        source = PythonFunction(function)
+        source = PythonSource(function)
         exponents = source.exponents()
         constants = {}
         for name, number in zip(source.arguments, literals, strict=False):

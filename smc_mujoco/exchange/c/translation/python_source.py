@@ -22,7 +22,7 @@ class Untranslatable(ScenarioError):
     """A piece of Python has no translation into C."""
 
 
-class PythonFunction:
+class PythonSource:
     """One function of Python: its tree, and what it does with its names."""
 
     def __init__(self, function: Any):
