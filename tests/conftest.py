@@ -46,9 +46,13 @@ def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginMa
 
 def pytest_configure(config: pytest.Config) -> None:
     """Take no record for unused where only first cases run, or none: syrupy tells tests apart, not
-    their cases.
+    their cases. The records of a missing annex are unused, too.
     """
-    partly = config.getoption("quick") or config.getoption("collectonly")
+    from helpers.annexes import HERE
+
+    from smc_mujoco.common.annexes import ANNEXES
+
+    partly = config.getoption("quick") or config.getoption("collectonly") or HERE != ANNEXES
     config.option.disable_unused_snapshots |= partly
 
 

@@ -8,6 +8,7 @@ import contextlib
 import functools
 import inspect
 import io
+import operator
 from collections.abc import Callable
 from pathlib import Path
 from random import Random
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 import typer
 import wild
+from helpers import annexes
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main
@@ -143,7 +145,7 @@ def text(random: Random) -> str:
 
 def line(random: Random) -> list[str]:
     """A command line with odd values."""
-    name = random.choice(sorted(LINES))
+    name = random.choice(sorted(annexes.here(LINES)))
     words = [name]
     for word in random.choice(LINES[name]).split():
         words.append(text(random) if word == "?" else word)
@@ -180,51 +182,54 @@ def commands(random: Random, sentence: Callable[[str], None]) -> str:
 
 
 SHORT = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.01)
-# function -> its right arguments, which cost little; ... for what is always odd
-CALLS: dict[Callable, dict[str, Any]] = {
-    smc.tune: {"plant": ..., "law": "pid", "budget": 1, "searches": 1, "objective": "balanced"},
-    smc.compare: {"laws": ..., "plants": "duffing", "conditions": "nominal", "seeds": 1},
-    smc.which: {"plant": "duffing", "needs": ..., "laws": "pid", "conditions": "nominal"},
-    smc.margins: {"plants": "duffing", "laws": "pid", "kinds": ..., "gains": "default"},
-    smc.worst_case: {
+# public name -> its right arguments, which cost little; ... for what is always odd
+ARGUMENTS: dict[str, dict[str, Any]] = {
+    "tune": {"plant": ..., "law": "pid", "budget": 1, "searches": 1, "objective": "balanced"},
+    "compare": {"laws": ..., "plants": "duffing", "conditions": "nominal", "seeds": 1},
+    "which": {"plant": "duffing", "needs": ..., "laws": "pid", "conditions": "nominal"},
+    "margins": {"plants": "duffing", "laws": "pid", "kinds": ..., "gains": "default"},
+    "worst_case": {
         "scenario": SHORT,
         "metric": "peak",
         "within": smc.Uncertainty(disturbance=1.0),
         "budget": 1,
         "seed": 0,
     },
-    smc.sensitivity: {"scenario": SHORT, "metric": "peak", "points": ..., "seed": 0},
-    smc.design.basin: {"plant": "duffing", "law": ..., "points": (2, 2), "duration": 0.1},
-    smc.design.objective: {"plant": "duffing", "law": ..., "objective": "balanced", "search": 0},
-    smc.design.chattering: {"law": SHORT, "channel": 0},
-    smc.grid: {"plants": "duffing", "laws": "pid", "conditions": "nominal", "seeds": 1},
-    smc.study: {"scenarios": [SHORT], "out": ...},
-    smc.leaderboard: {"table": ..., "metrics": ["itae"]},
-    smc.Table.read: {"path": "a.csv"},
-    smc.load: {"path": "trace.npz"},
-    smc.law: {"text": "pid", "kp": 3.0},
-    smc.surface: {"name": "linear", "c": 3.0},
-    smc.estimator: {"name": "levant"},
-    smc.laws: {"plant": "duffing"},
-    smc.plant: {"name": "duffing", "M": 1.0, "set": None},
-    smc.condition: {"name": "noise"},
-    smc.starts: {"x0": 0.3},
-    smc.law_from: {"source": np.array([[3.0, 1.0]]), "name": "x"},
-    smc.law_function: {"function": lambda y, gains, memory: (0.0, 0.0), "gains": {"k": 1.0}},
-    smc.results: {"source": ...},
-    smc.problem: {"name": "duffing/noise@1"},
-    smc.rig: {"name": "emps"},
-    smc.identify: {"machine": "emps", "logs": ...},
-    smc.policy: {"act": lambda y: 0.0},
-    smc.plot: {"table": ..., "path": "p.pdf"},
-    smc.figure: {"traces": ..., "path": "f.pdf"},
-    smc.film: {"traces": ..., "path": "f.mp4"},
-    smc.plant_from: {"path": "a.xml", "channels": ["shoulder"]},
-    smc.Uncertainty: {"mass": (0.9, 1.1), "disturbance": 1.0},
-    smc.Channel: {"x0": 0.1},
-    smc.scores: {"trace": ...},
-    smc.score: {"trace": ...},
+    "sensitivity": {"scenario": SHORT, "metric": "peak", "points": ..., "seed": 0},
+    "design.basin": {"plant": "duffing", "law": ..., "points": (2, 2), "duration": 0.1},
+    "design.objective": {"plant": "duffing", "law": ..., "objective": "balanced", "search": 0},
+    "design.chattering": {"law": SHORT, "channel": 0},
+    "grid": {"plants": "duffing", "laws": "pid", "conditions": "nominal", "seeds": 1},
+    "study": {"scenarios": [SHORT], "out": ...},
+    "leaderboard": {"table": ..., "metrics": ["itae"]},
+    "Table.read": {"path": "a.csv"},
+    "load": {"path": "trace.npz"},
+    "law": {"text": "pid", "kp": 3.0},
+    "surface": {"name": "linear", "c": 3.0},
+    "estimator": {"name": "levant"},
+    "laws": {"plant": "duffing"},
+    "plant": {"name": "duffing", "M": 1.0, "set": None},
+    "condition": {"name": "noise"},
+    "starts": {"x0": 0.3},
+    "law_from": {"source": np.array([[3.0, 1.0]]), "name": "x"},
+    "law_function": {"function": lambda y, gains, memory: (0.0, 0.0), "gains": {"k": 1.0}},
+    "results": {"source": ...},
+    "problem": {"name": "duffing/noise@1"},
+    "rig": {"name": "emps"},
+    "identify": {"machine": "emps", "logs": ...},
+    "policy": {"act": lambda y: 0.0},
+    "plot": {"table": ..., "path": "p.pdf"},
+    "figure": {"traces": ..., "path": "f.pdf"},
+    "film": {"traces": ..., "path": "f.mp4"},
+    "plant_from": {"path": "a.xml", "channels": ["shoulder"]},
+    "Uncertainty": {"mass": (0.9, 1.1), "disturbance": 1.0},
+    "Channel": {"x0": 0.1},
+    "scores": {"trace": ...},
+    "score": {"trace": ...},
 }
+CALLS: dict[Callable, dict[str, Any]] = {}
+for name in annexes.here(ARGUMENTS):
+    CALLS[operator.attrgetter(name)(smc)] = ARGUMENTS[name]
 
 
 PARAMETERS: dict[Callable, list[str]] = {}

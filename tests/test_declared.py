@@ -16,6 +16,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from helpers import annexes
 from helpers.words import recorded
 
 import smc_mujoco as smc
@@ -311,11 +312,20 @@ def test_whoever_declares_an_argument_refuses_it():
     assert len(FUNCTIONS) > 25
 
 
-def test_the_declarations_are_those_recorded(snapshot):
+def room(owner):
+    """The annex of a class or a function that declares something, or the core."""
+    if owner in CLASSES:
+        owner = CLASSES[owner].__module__.removeprefix("smc_mujoco.")
+    return (annexes.of(owner) if "." in owner else "") or "core"
+
+
+@pytest.mark.parametrize("of", ["core", *annexes.HERE])
+def test_the_declarations_are_those_recorded(of, snapshot):
     alike: dict[tuple[str, str], list[str]] = {}
     for name, (thing, one, _) in THINGS.items():
         owner = re.split(rf"(?:\.|\(|'s ){thing}", name)[0]
-        alike.setdefault((owner, reported(one)), []).append(thing)
+        if room(owner) == of:
+            alike.setdefault((owner, reported(one)), []).append(thing)
     known = recorded(__file__, dict.fromkeys(owner for owner, _ in alike))
     lines = [
         f"{owner}({', '.join(names)}): {what}"

@@ -15,7 +15,6 @@ from smc_mujoco.analysis.engine import outcome
 from smc_mujoco.analysis.tuning import objective, search, search_space, stages
 from smc_mujoco.common import constraints
 from smc_mujoco.envs import tasks
-from smc_mujoco.evidence.accuracy import scaling
 from smc_mujoco.metrics import catalogue, conventions, fold, limit_cycle, tip
 from smc_mujoco.robustness import region_of_attraction as region
 from smc_mujoco.robustness import uncertainty
@@ -115,8 +114,6 @@ SAID = {
         f"costs {objective.Objective().weight * 2.0 / conditions.CONTROL_PERIOD:g} s^2",
     ],
     differ: [f"are more than {percent(differ.MAX_CHANGE)} apart"],
-    scaling: [f"by more than a factor of {scaling.TREND:g} from each"],
-    scaling.Scaling: [f"its {percent(scaling.CONFIDENCE)} interval"],
     ranking: [
         f"there are {ranking.MIN_LEVEL_UNITS} units or more",
         f"lies within {percent(ranking.LEVEL_SHARE)}",

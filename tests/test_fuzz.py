@@ -9,6 +9,7 @@ import attack
 import numpy as np
 import pytest
 import wild
+from helpers.machines import AXIS
 
 import smc_mujoco as smc
 
@@ -43,13 +44,12 @@ def test_calls_with_odd_arguments_end_well_or_in_a_sentence(part, cases, tmp_pat
 def test_arrays_and_others_where_a_list_a_table_or_a_flag_belongs_are_refused():
     many = np.ones(3)
     for call in (
-        lambda: smc.results(many),  # type: ignore[arg-type]
         lambda: smc.leaderboard(many),  # type: ignore[arg-type]
         lambda: smc.plot(many),  # type: ignore[arg-type]
         lambda: smc.which("duffing", needs=many),  # type: ignore[arg-type]
         lambda: smc.margins("duffing", "pid", quick=many),  # type: ignore[arg-type]
         lambda: smc.compare("pid", np.zeros(0)),  # type: ignore[arg-type]
-        lambda: smc.identify("emps", {}, columns=many),  # type: ignore[arg-type]
+        lambda: smc.identify(AXIS, {}, columns=many),  # type: ignore[arg-type]
         lambda: smc.design.chattering("pid", many, plant="duffing"),  # type: ignore[arg-type]
     ):
         with pytest.raises(smc.ScenarioError, match=r": (give|choose)"):

@@ -29,7 +29,6 @@ REFUSED = {
     "gain masked": (lambda: smc.law("pid", kp=MASKED), "kp is masked"),
     "delay below a step": (lambda: case(input_delay=1e-9), "input_delay 1e-09"),
     "sum of a number": (lambda: smc.signals.Sum(np.inf), "Sum is inf"),
-    "paper": (lambda: smc.audit(paper=None), "paper is None"),
     "report": (lambda: smc.margins("duffing", "pid", report=()), r"report is \(\)"),
     "no traces": (lambda: step_halving(5), "traces is 5"),
     "film of a name": (lambda: smc.film("duffing", "a.mp4"), "'duffing', no trace"),

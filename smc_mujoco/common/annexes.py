@@ -11,14 +11,19 @@ def module(name: str, what: str) -> ModuleType:
     """Return a module of the package; `what` needs it, as the error says if its annex is
     missing.
     """
-    annex = name.split(".")[1]
-    if annex in ANNEXES and not installed(annex):
+    if annex := missing(name):
         from smc_mujoco.common.extras import MissingPackageError
 
         raise MissingPackageError(
             f"{what} needs smc_mujoco.{annex}, which is missing here: install all of smc-mujoco"
         )
     return importlib.import_module(name)
+
+
+def missing(name: str) -> str:
+    """Return the annex of a module of the package if it is not installed, else nothing."""
+    annex = name.split(".")[1]
+    return annex if annex in ANNEXES and not installed(annex) else ""
 
 
 def installed(annex: str) -> bool:

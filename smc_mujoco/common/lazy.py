@@ -22,7 +22,7 @@ MOVED = {  # public modules of versions before the first release
 
 class LazyModule(NamedTuple):
     """What a package's `__init__.py` defines; `modules` are public modules, by the names that they
-    have here.
+    have here. Without an annex its names are in neither, and say what is missing when used.
     """
 
     getattr: Callable[[str], object]
@@ -59,6 +59,9 @@ def lazy_module(package: str) -> LazyModule:
         return value
 
     def names() -> list[str]:
-        return sorted({*origins, *modules, "__doc__"})
+        return sorted({*here(origins), *here(modules), "__doc__"})
 
-    return LazyModule(imported, names, origins, modules)
+    def here(found: dict[str, str]) -> dict[str, str]:
+        return {name: module for name, module in found.items() if not annexes.missing(module)}
+
+    return LazyModule(imported, names, here(origins), here(modules))

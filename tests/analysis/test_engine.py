@@ -152,7 +152,6 @@ def test_a_run_of_other_parts_is_that_of_mujoco(plant, law, condition):
 
 OTHERS = {  # plant, law, and what else the scenario has
     "joints": ("inverted_pendulum_network", "passivity_based", {"model": "nominal"}),
-    "C": ("duffing", "boundary_layer", {}),
     "cart": ("cart_pole", "hierarchical", {}),
     "arm": ("furuta", "rotary_swing_up", {"x0": (0.0, 3.0)}),
     "elastic": (
@@ -175,13 +174,9 @@ OTHERS = {  # plant, law, and what else the scenario has
 SLOW = [pytest.param(kind, marks=pytest.mark.slow) for kind in ("cart", "arm", "torque")]
 
 
-@pytest.mark.parametrize("kind", ["joints", "C", "elastic", "rotor", *SLOW])
-def test_a_law_or_a_machine_of_another_kind_runs_as_in_mujoco(kind, tmp_path):
+@pytest.mark.parametrize("kind", ["joints", "elastic", "rotor", *SLOW])
+def test_a_law_or_a_machine_of_another_kind_runs_as_in_mujoco(kind):
     plant, law, fields = OTHERS[kind]
-    if kind == "C":
-        path = tmp_path / "mine.c"
-        path.write_text(smc.exchange.law_to_c(law))
-        law = smc.law_from(path)
     noisy = {"noise": smc.Noise(1e-4, 5e-4), "disturbance": SINE, "input_delay": 2e-3}
     check(plant, law, {"plain": fields, "noise": fields | noisy}, duration=2.0)
 

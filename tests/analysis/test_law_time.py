@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.plants_ab import called
+from helpers.python_laws import acting
 
 import smc_mujoco as smc
 from smc_mujoco.analysis import law_time
@@ -32,7 +33,7 @@ def test_the_law_is_given_what_it_measures_in_its_run():
 
 
 @pytest.mark.parametrize(
-    "law", [smc.policy(lambda seen: -0.1 * seen[0]), smc.law("observer_free_joint")]
+    "law", [acting(lambda seen: -0.1 * seen[0]), smc.law("observer_free_joint")]
 )
 def test_a_law_in_python_or_of_many_joints_has_none(law):
     assert (

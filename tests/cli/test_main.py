@@ -292,7 +292,7 @@ REFUSED = {  # command line -> what the sentence names
     "which arm.xm:shoulder --quick": ("'arm.xm'", ".xml"),
 }
 for option in ("--no-tune", "--quick", "--device cuda"):
-    REFUSED[f"compare --rig emps {option}"] = ("--rig",)
+    REFUSED[f"compare --rig axis {option}"] = ("--rig",)
 
 
 @pytest.mark.usefixtures("coarse_grid", "scene", "trace")

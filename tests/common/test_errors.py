@@ -182,14 +182,16 @@ def test_a_missing_package_is_named_with_its_cure(monkeypatch):
 
 
 def test_a_missing_annex_is_named_and_no_other_module(monkeypatch):
-    monkeypatch.setattr(annexes, "installed", lambda annex: annex != "evidence")
+    monkeypatch.setattr(annexes, "ANNEXES", ("metrics", "letters"))
+    assert annexes.missing("smc_mujoco.letters.post") == "letters"
+    assert annexes.missing("smc_mujoco.metrics.fold") == ""
     with pytest.raises(extras.MissingPackageError) as missing:
-        annexes.module("smc_mujoco.evidence.audit.audit", "a claim")
+        annexes.module("smc_mujoco.letters.post", "a letter")
     assert (
         str(missing.value)
-        == "a claim needs smc_mujoco.evidence, which is missing here: install all of smc-mujoco"
+        == "a letter needs smc_mujoco.letters, which is missing here: install all of smc-mujoco"
     )
-    assert annexes.module("smc_mujoco.exchange", "C").__name__ == "smc_mujoco.exchange"
+    assert annexes.module("smc_mujoco.metrics", "C").__name__ == "smc_mujoco.metrics"
     assert annexes.module("smc_mujoco.common.text", "a number").__name__ == "smc_mujoco.common.text"
 
 

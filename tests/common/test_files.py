@@ -6,7 +6,6 @@ import contextlib
 import dataclasses
 import json
 import math
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +22,6 @@ from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common import files
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.files import from_json, plain, reading, replacing, to_json, writable
-from smc_mujoco.evidence.audit.audit import document
-from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.robustness.region_of_attraction import Basin
 from smc_mujoco.robustness.region_of_attraction import load_basin as load_map
 from smc_mujoco.simulation import scenario_json
@@ -100,21 +97,6 @@ def test_tunings(tmp_path):
     assert result.load_tuned(tmp_path / "a.json").history == odd.history
 
 
-def test_claims():
-    words = dict.fromkeys(("id", "text", "where", "measured", "holds_if", "note"), "NaN")
-    beside = {"tuned": {"x": math.inf}}
-    claim = Claim(
-        **words,
-        verdict="refuted",
-        numbers={},
-        beside=beside,
-        verdicts={},
-        flips=False,
-    )
-    (reported,) = strict(to_json(document([claim])))["claims"]
-    assert reported["beside"] == {"tuned": {"x": "Infinity"}}
-
-
 def test_rows_of_a_study(tmp_path):
     scenario = smc.Scenario(plant="duffing", law=smc.law("super_twisting"), duration=0.01)
     table = smc.study([scenario], tmp_path)
@@ -148,22 +130,6 @@ def test_a_table_that_unpacks_to_too_much_is_refused_before(tmp_path):
     pq.write_table(many, tmp_path / "results.parquet", use_dictionary=False, compression="zstd")
     with pytest.raises(smc.ScenarioError, match="it unpacks to 560 MB, and 500 MB are allowed"):
         smc.Table.read(tmp_path / "results.parquet")
-
-
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: smc.exchange.law_to_fmu("pid", "a.fmu"),
-    ],
-)
-def test_without_room_for_temporary_files_there_is_one_sentence(make, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
-    with pytest.raises(
-        smc.ScenarioError,
-        match=r"no temporary file can be written \(.*\): make room, or set TMPDIR",
-    ):
-        make()
 
 
 @pytest.mark.parametrize("damage", ["", "[", "5", "[[]]", "[" * 10**5, '[{"plant": 1}]'])

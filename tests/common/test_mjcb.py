@@ -15,6 +15,8 @@ import numba
 import numpy as np
 import pytest
 from helpers.commands import python
+from helpers.pages import ROOT
+from helpers.python_laws import acting
 from numba import types
 
 import smc_mujoco as smc
@@ -121,11 +123,11 @@ def test_within_a_policy_every_model_compiles_and_the_run_goes_on(what, own, tmp
     def alone(observation):
         return [-0.5 * observation[0]]
 
-    beside = run_of(smc.policy(act))
+    beside = run_of(acting(act))
     assert beside.failure is None
     assert all(found)
     assert len(found) == 1
-    np.testing.assert_array_equal(beside.x, run_of(smc.policy(alone)).x)
+    np.testing.assert_array_equal(beside.x, run_of(acting(alone)).x)
 
 
 def in_thread(work):
@@ -150,7 +152,7 @@ def test_another_thread_compiles_during_the_run_of_a_policy():
         assert let.wait(60)
         return [0.0]
 
-    over = in_thread(lambda: failures.append(run_of(smc.policy(act)).failure))
+    over = in_thread(lambda: failures.append(run_of(acting(act)).failure))
     assert asked.wait(60)
     assert in_thread(lambda: smc.plant("duffing").load()).wait(60)
     let.set()
@@ -234,6 +236,7 @@ def test_a_user_s_clock_is_kept_in_a_forked_child():
 IMPORTS = """
 import threading, time, warnings
 import smc_mujoco as smc
+from helpers.python_laws import acting
 warnings.simplefilter("ignore")
 asked = threading.Event()
 def other():
@@ -247,13 +250,13 @@ def act(observation):
         time.sleep(0.5)
         import smc_mujoco.envs.vector_env
     return [0.0]
-print(smc.run(smc.Scenario(plant="duffing", law=smc.policy(act), duration=0.003)).failure)
+print(smc.run(smc.Scenario(plant="duffing", law=acting(act), duration=0.003)).failure)
 thread.join()
 """
 
 
 def test_a_policy_and_another_thread_may_import_the_batches_at_once():
-    done = python("-c", IMPORTS)
+    done = python("-c", IMPORTS, path=os.pathsep.join(map(str, (ROOT, ROOT / "tests"))))
     assert done.stdout == "None\n"
     assert done.stderr == ""
 
@@ -341,7 +344,7 @@ def test_a_run_during_which_other_code_sets_any_callback_fails(name, law, monkey
         return [0.0]
 
     if law == "python":
-        trace = smc.run(dataclasses.replace(scenario, law=smc.policy(set_it)))
+        trace = smc.run(dataclasses.replace(scenario, law=acting(set_it)))
     else:
         ((_, trace),) = smc.stream([scenario], report=set_it)
     assert getattr(mujoco, f"get_mjcb_{name}")() is None
@@ -374,7 +377,7 @@ def test_a_callback_that_is_set_and_cleared_within_a_slice_fails_the_run(name, i
             slots["passive"].value = gone_after_ten_calls.address
         return [0.0]
 
-    law = smc.policy(act)
+    law = acting(act)
     run = smc.Scenario(plant="duffing", law=law, duration=0.05, integrator=integrator)
     trace = smc.run(run)
     assert calls[0] == 10
@@ -396,7 +399,7 @@ def test_a_law_that_clears_the_callback_fails_its_run(integrator):
     trace = smc.run(
         smc.Scenario(
             plant="duffing",
-            law=smc.policy(act),
+            law=acting(act),
             duration=0.02,
             integrator=integrator,
         )

@@ -90,9 +90,3 @@ def test_other_systems_than_linux_keep_mujoco_s_own_choice_of_opengl(platform, m
     finally:
         gl.choice.cache_clear()
     assert "MUJOCO_GL" not in os.environ
-
-
-def test_a_law_in_c_is_one_sentence_on_windows(monkeypatch):
-    monkeypatch.setattr(sys, "platform", "win32")
-    with pytest.raises(smc.ScenarioError, match=r"law\.c' on Windows: run it on Linux, or in WSL"):
-        smc.exchange.law_from_c("law.c")

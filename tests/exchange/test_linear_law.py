@@ -7,7 +7,7 @@ import control
 import numpy as np
 import pytest
 import scipy.signal
-from helpers.compiler import needs_compiler
+from exchange.helpers.compiler import needs_compiler
 
 import smc_mujoco as smc
 from smc_mujoco.simulation.prepare import prepare

@@ -6,7 +6,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from helpers.compiler import needs_compiler
+from exchange.helpers.compiler import needs_compiler
 from helpers.pages import ROOT
 
 import smc_mujoco as smc

@@ -1,22 +1,25 @@
 """Identification returns what made the records, and says what records cannot tell."""
 
 import csv
+import dataclasses
 import math
 
 import numpy as np
 import pytest
+from helpers import machines
+from helpers.machines import AXIS, PENDULUM
 from matplotlib.figure import Figure
 from scipy.stats import chi2
 
 import smc_mujoco as smc
 from smc_mujoco.identification import records, standard_errors
+from smc_mujoco.identification import rig as rigs
 from smc_mujoco.identification.own_rig import own_rig
 from smc_mujoco.identification.replays import Point, Replays
 from smc_mujoco.identification.residual_figure import residual_figure
-from smc_mujoco.identification.rig import Fall
+from smc_mujoco.identification.rig import Fall, Quantity
 
-AXIS = smc.rig("emps")
-PENDULUM = smc.rig("simple_pendulum_ak80")
+FIXED = dataclasses.replace(AXIS, name="fixed", free=())
 
 
 def carriage(x, v, force, time, m, b, dry, constant):
@@ -187,15 +190,16 @@ def test_parameters_that_cannot_be_told_apart_are_named(swung):
 @pytest.mark.parametrize(
     ("rig", "names", "words"),
     [
-        ("emps", ["weight"], "unknown quantity of emps 'weight': "),
-        ("emps", ["mass", "mass"], "quantities have mass 2 times"),
-        ("emps", [], "emps has no quantities to find"),
-        ("srv02", None, "srv02 has no quantities to find"),
+        ("axis", ["weight"], "unknown quantity of axis 'weight': "),
+        ("axis", ["mass", "mass"], "quantities have mass 2 times"),
+        ("axis", [], "axis has no quantities to find"),
+        (FIXED, None, "fixed has no quantities to find"),
         ("servo_axis", None, "servo_axis has no numbers to find: name some, of M, b, cf, offset"),
         (3, None, "cannot identify 3: give a plant"),
     ],
 )
-def test_what_cannot_be_found_is_named(rig, names, words):
+def test_what_cannot_be_found_is_named(rig, names, words, monkeypatch):
+    monkeypatch.setattr(rigs, "catalogue", machines.catalogue)
     with pytest.raises(smc.ScenarioError, match=words):
         smc.identify(rig, {"t": [0]}, names)
 
@@ -206,16 +210,16 @@ def test_records_of_two_kinds_and_none_are_refused(moved):
         [moved, {"t": [0]}],
     ):
         with pytest.raises(smc.ScenarioError, match=r"logs|records"):
-            smc.identify("emps", records_given)
+            smc.identify(AXIS, records_given)
 
 
 def test_a_search_stays_within_its_ranges_to_the_last_bit():
     """1e-4 / 0.042 * 0.042 is less than 1e-4."""
-    made = Replays(
-        smc.rig("qube_servo", back_emf=0.042), ["back_emf"], [], True, lambda count: None
-    )
+    known = dict(AXIS.quantities) | {"coulomb": Quantity(0.042, "N", "chosen", 1e-4, 1.0)}
+    twin = dataclasses.replace(AXIS, quantities=known)
+    made = Replays(twin, ["coulomb"], [], True, lambda count: None)
     assert (made.low * made.scales)[0] < 1e-4
-    assert made.rig(Point(made.low, made.start.states)).values["back_emf"] == 1e-4
+    assert made.rig(Point(made.low, made.start.states)).values["coulomb"] == 1e-4
 
 
 CARRIAGE = {
@@ -390,7 +394,7 @@ def test_values_that_are_only_tried_warn_of_nothing(moved, recwarn):
     It holds an offset of 340 N, and not the greater ones that the search tries.
     """
     smc.identify(
-        smc.rig("emps", offset=-340.0),
+        AXIS.with_values({"offset": -340.0}),
         moved,
         ["offset"],
         starts=6,

@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers.machines import AXIS, PENDULUM
 from helpers.sketch import made
 
 import smc_mujoco as smc
@@ -150,9 +151,8 @@ def test_a_run_becomes_the_record_that_the_machine_would_write():
     np.testing.assert_allclose(found["f"], 0.3 * np.sin(9.0 * trace.t))
 
 
-def found(rig="emps", correlation=0.0, **changes):
+def found(twin=AXIS, correlation=0.0, **changes):
     """An identification of a rig with values and errors of no doubt, but for the changes."""
-    twin = smc.rig(rig)
     correlations = np.eye(len(twin.free))
     correlations[0, 1] = correlations[1, 0] = correlation
     plain = {
@@ -177,8 +177,8 @@ def test_a_fall_is_a_text_in_a_file(tmp_path):
     ]
 
 
-FREE = {name: smc.rig("emps").values[name] for name in smc.rig("emps").free}
-PENDULUM = {"rig": "simple_pendulum_ak80"}
+FREE = {name: AXIS.values[name] for name in AXIS.free}
+OPEN = {"twin": PENDULUM}  # its loop is not closed
 
 
 @pytest.mark.parametrize(
@@ -197,13 +197,13 @@ PENDULUM = {"rig": "simple_pendulum_ak80"}
         ),
         ({"fits": ({"x": 80.0},)}, {"fits": ({"x": 79.9},)}, POOR),
         ({"fits": ({"x": 80.0},)}, {"fits": ({"x": Fall(8.44)},)}, POOR),
-        (PENDULUM | {"independent": 60.0}, PENDULUM | {"independent": 59.0}, SLOW),
+        (OPEN | {"independent": 60.0}, OPEN | {"independent": 59.0}, SLOW),
         (
-            PENDULUM | {"independent": 9.0, "fits": ({"x": 99.995},)},
-            PENDULUM | {"independent": 9.0},
+            OPEN | {"independent": 9.0, "fits": ({"x": 99.995},)},
+            OPEN | {"independent": 9.0},
             SLOW,
         ),
-        ({"independent": 9.0}, PENDULUM | {"independent": 9.0}, SLOW),  # the loop is closed
+        ({"independent": 9.0}, OPEN | {"independent": 9.0}, SLOW),  # the loop is closed
     ],
 )
 def test_what_to_doubt_is_said_from_each_bound_on(quiet, loud, note):

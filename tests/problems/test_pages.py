@@ -194,3 +194,8 @@ def test_a_forged_result_is_left_out_and_the_others_stand(tmp_path, forge, words
 def test_a_folder_without_results_is_told(tmp_path):
     with pytest.raises(ScenarioError, match="enter a law first"):
         pages.build(tmp_path, tmp_path / "site")
+
+
+def test_an_array_is_no_source_of_results():
+    with pytest.raises(smc.ScenarioError, match=r": (give|choose)"):
+        smc.results(np.ones(3))  # type: ignore[arg-type]

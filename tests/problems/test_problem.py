@@ -189,3 +189,12 @@ def test_a_failed_run_reaches_nothing():
     assert found.pop("accuracy") == math.inf
     assert found.pop("calm") == math.inf
     assert [name for name, value in found.items() if value < math.inf] == []
+
+
+@pytest.mark.parametrize("contact", ['Wall("pendulum", (1, 0, 0), 0.2)', 'Ball("pendulum")'])
+def test_a_text_is_a_cell_of_a_problem(contact, monkeypatch):
+    more = {"conditions": ["hit"], "texts": {"hit": f"contact={contact}"}}
+    rules = {**problems.rules(1), **more}
+    monkeypatch.setattr(problems, "rules", lambda version: rules)
+    runs = smc.problem("inverted_pendulum/hit@1").scenarios("pid", instances=[0, 1])
+    assert {type(run.contact[0]).__name__ for run in runs} == {contact.partition("(")[0]}

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers import reference
+from helpers.machines import AXIS
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine import scored_runs
@@ -254,9 +255,8 @@ def test_the_class_where_none_is_given_is_what_the_machine_leaves_open():
     assert own.disturbance == 0.0
     assert own.parameters["payload"] == (0.0, 2.0)
     # its u is a voltage: the force is that of the motor at rest under 10 V
-    rig = smc.rig("qube_servo")
-    assert default_class(rig.scenario("none")).disturbance == pytest.approx(
-        10.0 * rig.values["torque_per_volt"] / 6
+    assert default_class(AXIS.scenario("none")).disturbance == pytest.approx(
+        10.0 * AXIS.values["force_per_volt"] / 6
     )
 
 

@@ -9,6 +9,7 @@ import math
 import numpy as np
 import pytest
 from helpers import arms, reference
+from helpers.python_laws import acting
 from helpers.runs import assert_same, plainly
 
 import smc_mujoco as smc
@@ -144,7 +145,7 @@ def own_equation():
 
 
 RUNS = {
-    "a policy with state": network(law=smc.policy(Remembers())),
+    "a policy with state": network(law=acting(Remembers())),
     "a law with memory": network(law=integrates(), input_delay=3e-3),
     "gains of each channel": network(law=integrates(k=(1.0, 2.0, 3.0))),
     "a law that raises": network(law=raises()),

@@ -3,7 +3,6 @@
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.studies import scene
 
 pytestmark = pytest.mark.quick
@@ -12,7 +11,6 @@ RUN = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.5)
 
 
 OTHER = smc.Scenario(plant="van_der_pol", law=smc.law("classical"))
-PERIOD = Condition("slow", lambda plant, duration: {"control_period": 0.01})
 SCENES = [
     {"title": ""},
     {"title": 3},
@@ -48,15 +46,6 @@ REFUSED = {
         {"needs": "accurate, robst"},
         {"needs": "two-gains", "laws": "pid"},
     ],
-    smc.accuracy.orders: [
-        {"periods": [1e-3]},
-        {"periods": [1e-3, 1e-3]},
-        {"periods": [1e-3, 0.0]},
-        {"seeds": 0},
-        {"seeds": 10_001},
-        {"conditions": PERIOD},
-        {"conditions": "nois"},
-    ],
     smc.worst_case: [
         {"scenario": "duffing"},
         {"scenario": []},
@@ -74,7 +63,6 @@ GIVEN = {
     smc.study: {"scenarios": [RUN], "out": "study"},
     smc.which: {"plant": "duffing"},
     smc.compare: {"laws": "classical", "plants": "duffing", "conditions": "nominal"},
-    smc.accuracy.orders: {"laws": "classical", "plants": "duffing"},
     smc.worst_case: {"scenario": RUN},
     smc.Scene: {"title": "Two", "conditions": {"nominal": {"a": RUN}}},
 }

@@ -1,4 +1,4 @@
-"""What worst cases, accuracies, needs and kept files say and are named, of made-up numbers."""
+"""What worst cases, needs and kept files say and are named, of made-up numbers."""
 
 import dataclasses
 from pathlib import Path
@@ -8,7 +8,6 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.common import cache
-from smc_mujoco.evidence.accuracy import orders as accuracies
 from smc_mujoco.robustness import worst_case
 from smc_mujoco.robustness.worst_case import WorstCase, default_budget
 from smc_mujoco.simulation import run_key
@@ -73,25 +72,6 @@ def test_a_default_budget_is_as_many_runs_as_take_the_time_of_that_many_steps():
     assert default_budget(network, WITHIN) == 2_500_000 // (8000 * 6)
     assert default_budget(dataclasses.replace(RUN, duration=500.0), WITHIN) == 24
     assert default_budget(dataclasses.replace(RUN, duration=0.5), WITHIN) == 1024
-
-
-PROMISED = [  # change of the run, what keeps theory from promising an order
-    ({"actuator": smc.Lag(0.01)}, "drive"),
-    ({"input_delay": 1e-3}, "delay"),
-    ({"clock": smc.Clock(jitter=1e-4)}, "late"),
-    ({"noise": smc.Noise(1e-3)}, "noise"),
-    ({"sensor": smc.Encoder(counts=4096)}, "encoder"),
-    ({"velocity": smc.estimator("filtered_difference")}, "velocity"),
-    ({"law": smc.law("nested_third_order")}, "relative degree"),
-]
-
-
-@pytest.mark.parametrize(("change", "reason"), PROMISED, ids=lambda given: str(given)[:20])
-def test_theory_promises_an_order_only_to_ideal_channels_of_the_law_s_relative_degree(
-    change, reason
-):
-    assert reason in accuracies._why_no_promise(dataclasses.replace(RUN, **change))
-    assert not accuracies._why_no_promise(RUN)
 
 
 def test_names_of_files():

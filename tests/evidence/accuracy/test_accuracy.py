@@ -8,6 +8,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.control.law import catalogue, known_laws
 from smc_mujoco.evidence.accuracy import orders
+from smc_mujoco.simulation.conditions import Condition
 
 PERIODS = (4e-3, 2e-3, 1e-3, 5e-4)
 SHORT = {"periods": PERIODS, "seeds": 1, "duration": 8.0}
@@ -153,3 +154,43 @@ def test_laws_without_tuned_gains_get_their_defaults_and_the_table_says_so():
 
     beside = type(table)([table[0], dataclasses.replace(table[0], law="pid", gains="shipped")])
     assert "gains: default for hierarchical, shipped for pid" in " ".join(str(beside).split())
+
+
+IDEAL = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=8.0)
+PROMISED = [  # change of the run, what keeps theory from promising an order
+    ({"actuator": smc.Lag(0.01)}, "drive"),
+    ({"input_delay": 1e-3}, "delay"),
+    ({"clock": smc.Clock(jitter=1e-4)}, "late"),
+    ({"noise": smc.Noise(1e-3)}, "noise"),
+    ({"sensor": smc.Encoder(counts=4096)}, "encoder"),
+    ({"velocity": smc.estimator("filtered_difference")}, "velocity"),
+    ({"law": smc.law("nested_third_order")}, "relative degree"),
+]
+
+
+@pytest.mark.parametrize(("change", "reason"), PROMISED, ids=lambda given: str(given)[:20])
+def test_theory_promises_an_order_only_to_ideal_channels_of_the_law_s_relative_degree(
+    change, reason
+):
+    assert reason in orders._why_no_promise(dataclasses.replace(IDEAL, **change))
+    assert not orders._why_no_promise(IDEAL)
+
+
+PERIOD = Condition("slow", lambda plant, duration: {"control_period": 0.01})
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"periods": [1e-3]},
+        {"periods": [1e-3, 1e-3]},
+        {"periods": [1e-3, 0.0]},
+        {"seeds": 0},
+        {"seeds": 10_001},
+        {"conditions": PERIOD},
+        {"conditions": "nois"},
+    ],
+    ids=str,
+)
+def test_what_has_no_order_is_refused(change, refused):
+    refused(lambda: smc.accuracy.orders(**{"laws": "classical", "plants": "duffing"} | change))

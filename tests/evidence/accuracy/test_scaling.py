@@ -2,11 +2,13 @@
 count.
 """
 
+import inspect
 import math
 
 import numpy as np
 import pytest
 
+from smc_mujoco.evidence.accuracy import scaling as module
 from smc_mujoco.evidence.accuracy.scaling import fit, scaling
 
 pytestmark = pytest.mark.quick
@@ -88,3 +90,10 @@ def test_an_order_that_is_not_the_promised_one_has_a_remark(errors, theory, why)
     found = measured(errors, theory=theory).why
     assert why in found
     assert bool(why) == bool(found)
+
+
+def test_its_explanation_has_the_numbers_of_the_code():
+    said = " ".join((inspect.getdoc(module) or "").split())
+    assert f"by more than a factor of {module.TREND:g} from each" in said
+    kind = " ".join((inspect.getdoc(module.Scaling) or "").split())
+    assert f"its {100.0 * module.CONFIDENCE:g} % interval" in kind

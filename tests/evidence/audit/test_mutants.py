@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.broken_laws import BLIND, KEPT, MUTANTS, survivors
+from evidence.helpers.broken_laws import BLIND, KEPT, MUTANTS, survivors
 
 import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError

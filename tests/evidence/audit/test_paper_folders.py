@@ -11,7 +11,7 @@ import pytest
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.evidence.audit import evidence
-from smc_mujoco.evidence.audit.audit import claims
+from smc_mujoco.evidence.audit.audit import audit, claims
 from smc_mujoco.evidence.audit.claim_runs import ClaimRuns
 from smc_mujoco.evidence.audit.paper import CODE_FILE, PAPER_FILE, new, paper
 from smc_mujoco.evidence.audit.variants import with_gains
@@ -33,6 +33,11 @@ function = "small"
 holds_if = { size = "< 2" }
 """
 SMALL = "def small(runs):\n    return {'size': 1.0}\n"
+
+
+def test_no_paper_is_refused():
+    with pytest.raises(ScenarioError, match="paper is None"):
+        audit(paper=None)  # type: ignore[arg-type]
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ Mutants of all claims take minutes: `smc-mujoco claims --paper NAME --quick --mu
 """
 
 import pytest
-from helpers.broken_laws import survivors
+from evidence.helpers.broken_laws import survivors
 
 from smc_mujoco.evidence.audit.paper import paper, shipped
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers.broken_laws import survivors
+from evidence.helpers.broken_laws import survivors
 from papers.acary_2012.claims import observed_twisting_60
 from papers.aldana_lopez_2019.claims import (
     BAND,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.compiler import needs_compiler
+from exchange.helpers.compiler import needs_compiler
 from helpers.sources import strange
 from numba import njit
 
@@ -484,3 +484,15 @@ def test_the_command_writes_the_one_law_of_a_file(tmp_path, capsys):
     with pytest.raises(SystemExit):
         cli.main(["export", str(file), str(tmp_path / "a.c")])
     assert f"{file} has several laws, mine, other: give a file with one" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:no set of gains tried")
+def test_a_tuning_is_exported_as_its_law(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    tuned = smc.tune("duffing", smc.law("boundary_layer", k=0.01), budget=4, searches=1)
+    tuned.save("st.json")
+    assert smc.exchange.law_to_c("st.json") == smc.exchange.law_to_c(tuned.law)
+    with pytest.raises(SystemExit) as end:
+        cli.main(["export", "st.json", "st.fmu", "--no-binary"])
+    assert not end.value.code

@@ -4,8 +4,8 @@ import subprocess
 
 import numpy as np
 import pytest
-from helpers.compiler import needs_compiler
-from helpers.flights import MEASUREMENT, recorded, scenarios
+from exchange.helpers.compiler import needs_compiler
+from exchange.helpers.flights import MEASUREMENT, recorded, scenarios
 
 import smc_mujoco as smc
 from smc_mujoco.control.law import FREE_BODY, joint_catalogue

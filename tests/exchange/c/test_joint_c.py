@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from exchange.helpers.compiler import needs_compiler
 from helpers import arms, reference
-from helpers.compiler import needs_compiler
 from helpers.runs import assert_same
 from helpers.sources import strange
 from numba import njit

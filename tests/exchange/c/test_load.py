@@ -6,13 +6,16 @@ import copy
 import pickle
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from analysis.test_engine import SINE, check
+from common.test_children import ENDS, assert_none_outlives
+from exchange.helpers.compiler import needs_compiler
 from helpers import reference
 from helpers.commands import python
-from helpers.compiler import needs_compiler
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main
@@ -415,3 +418,24 @@ def test_nothing_is_left_behind(file):
     ).stdout.strip()
     assert folder
     assert not Path(folder).exists()
+
+
+def test_a_law_in_c_is_one_sentence_on_windows(monkeypatch):
+    monkeypatch.setattr(sys, "platform", "win32")
+    with pytest.raises(smc.ScenarioError, match=r"law\.c' on Windows: run it on Linux, or in WSL"):
+        smc.exchange.law_from_c("law.c")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="it reads who lives from /proc")
+@pytest.mark.parametrize("how", ENDS)
+def test_a_compiler_does_not_outlive_who_started_it(how, tmp_path):
+    code = "os.environ['CC'] = './cc'; smc.exchange.law_from_c('law.c')"
+    assert_none_outlives(code, how, tmp_path)
+
+
+def test_the_engine_calls_a_law_in_c_as_mujoco_does(tmp_path):
+    path = tmp_path / "mine.c"
+    path.write_text(smc.exchange.law_to_c("boundary_layer"))
+    noisy = {"noise": smc.Noise(1e-4, 5e-4), "disturbance": SINE, "input_delay": 2e-3}
+    check("duffing", smc.law_from(path), {"plain": {}, "noise": noisy}, duration=2.0)

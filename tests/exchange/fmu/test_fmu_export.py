@@ -5,6 +5,7 @@ one process.
 import itertools
 import subprocess
 import sys
+import tempfile
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -14,9 +15,9 @@ import pytest
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', is not installed")
 
+from exchange.helpers.compiler import needs_compiler  # noqa: E402
+from exchange.helpers.fmu import Importer  # noqa: E402
 from fmpy.validation import validate_fmu  # noqa: E402
-from helpers.compiler import needs_compiler  # noqa: E402
-from helpers.fmu import Importer  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.control import estimator, surface  # noqa: E402
@@ -434,3 +435,13 @@ def test_what_cannot_be_an_fmu_is_one_sentence(tmp_path, monkeypatch):
             call()
         assert "\n" not in str(error.value)
         assert list(tmp_path.iterdir()) == []
+
+
+def test_without_room_for_temporary_files_there_is_one_sentence(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
+    with pytest.raises(
+        smc.ScenarioError,
+        match=r"no temporary file can be written \(.*\): make room, or set TMPDIR",
+    ):
+        smc.exchange.law_to_fmu("pid", "a.fmu")

@@ -12,8 +12,8 @@ import pytest
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', is not installed")
 
-from helpers import fmu as helper  # noqa: E402
-from helpers.compiler import needs_compiler  # noqa: E402
+from exchange.helpers import fmu as helper  # noqa: E402
+from exchange.helpers.compiler import needs_compiler  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.control.law import Measurement  # noqa: E402

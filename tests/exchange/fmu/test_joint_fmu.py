@@ -7,11 +7,11 @@ import pytest
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', is not installed")
 
+from exchange.helpers.compiler import needs_compiler  # noqa: E402
+from exchange.helpers.flights import recorded, scenarios  # noqa: E402
+from exchange.helpers.fmu import Importer  # noqa: E402
 from fmpy.validation import validate_fmu  # noqa: E402
 from helpers import arms  # noqa: E402
-from helpers.compiler import needs_compiler  # noqa: E402
-from helpers.flights import recorded, scenarios  # noqa: E402
-from helpers.fmu import Importer  # noqa: E402
 from helpers.python_controller import Controller  # noqa: E402
 from numba import njit  # noqa: E402
 

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.control.written import state_feedback
 
 POLES = """<mujoco model="poles"><option timestep=".001"/>
 <default><geom type="capsule" size=".02" contype="0" conaffinity="0"/></default><worldbody><body>
@@ -56,7 +57,7 @@ def test_a_gain_matrix_drives_the_machine_as_in_plain_mujoco(make, tilt, gains):
     plant = make()
     K = np.array(gains[make.__name__])
     settings = {"physics_step": 1e-3, "integrator": "Euler", "duration": 2.0, "u_max": 9.0}
-    law = smc.law_from(K.tolist())
+    law = state_feedback(K, "balance")
     trace = smc.run(
         smc.Scenario(
             plant=plant,
@@ -158,7 +159,7 @@ def test_a_law_reads_the_whole_mass_matrix_and_gives_u_of_the_driven():
 
 def test_where_a_base_is_counts_only_if_the_reference_says_where_it_should_be(gains):
     plant = wheels()
-    law = smc.law_from(gains["wheels"])
+    law = state_feedback(np.array(gains["wheels"]), "balance")
     kept = smc.Constant(0.0)
     asked = {"left": kept, "right": kept, "base_x": smc.Constant(0.3)}
     bounds = []
@@ -195,7 +196,7 @@ def test_joints_that_cannot_be_measured_are_refused_by_name(measured, named):
 @pytest.mark.parametrize("K", [np.ones((1, 4)), np.ones((2, 6)), np.full((1, 6), np.inf)])
 def test_a_gain_matrix_that_does_not_fit_is_refused(K):
     with pytest.raises(smc.ScenarioError):
-        smc.Scenario(plant=poles(), law=smc.law_from(K))
+        smc.Scenario(plant=poles(), law=state_feedback(K, "balance"))
 
 
 def test_laws_of_driven_joints_alone_are_not_for_measured_ones():

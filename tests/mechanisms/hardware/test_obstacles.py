@@ -11,7 +11,6 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.metrics.tip import contacts
-from smc_mujoco.problems import problem
 from smc_mujoco.simulation import conditions
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.run import states
@@ -325,12 +324,3 @@ def test_a_text_is_a_condition_of_compare(name, tmp_path):
         **runs,
     )
     assert "stopped" in str(compared)
-
-
-@pytest.mark.parametrize("contact", ['Wall("pendulum", (1, 0, 0), 0.2)', 'Ball("pendulum")'])
-def test_a_text_is_a_cell_of_a_problem(contact, monkeypatch):
-    more = {"conditions": ["hit"], "texts": {"hit": f"contact={contact}"}}
-    rules = {**problem.rules(1), **more}
-    monkeypatch.setattr(problem, "rules", lambda version: rules)
-    runs = smc.problem("inverted_pendulum/hit@1").scenarios("pid", instances=[0, 1])
-    assert {type(run.contact[0]).__name__ for run in runs} == {contact.partition("(")[0]}

@@ -13,6 +13,7 @@ from helpers.runs import assert_same
 
 import smc_mujoco as smc
 from smc_mujoco.control.units import Gain
+from smc_mujoco.control.written import state_feedback
 from smc_mujoco.mechanisms.hardware.servos import SERVOS
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.plants.double_pendulum import accelerations
@@ -218,7 +219,7 @@ def test_a_joint_that_moves_with_others_rests_where_mujocos_set_valued_friction_
     load, kp, kd, level
 ):
     crane = smc.plant("overhead_crane", M=1.0, m=load)
-    law = smc.law_from(np.array([[kp, 0.0, kd, 0.0]]), name="pd")
+    law = state_feedback(np.array([[kp, 0.0, kd, 0.0]]), "pd")
     runs = []
     for part in (Curious(level, 0.0, 0.0), smc.Coulomb(level)):
         on = {"slide": part}
@@ -294,7 +295,7 @@ def test_joints_that_move_together_rest_where_a_set_valued_integration_does(seed
     part = None if file else Stribeck(tuple(c), tuple(static))
     start = random.uniform(-0.5, 0.5, 2)
     values = [v for name, v in plant.parameters.items() if not name.startswith("cf")]
-    law = smc.law_from(np.hstack([kp * np.eye(2), kd * np.eye(2)]), name="pd")
+    law = state_feedback(np.hstack([kp * np.eye(2), kd * np.eye(2)]), "pd")
     fields = {"law": law, "friction": part, "x0": tuple(start), "u_max": 6.0, "duration": 2.0}
     plant = of_a_file(plant, c) if file else plant
     trace = smc.run(smc.Scenario(plant=plant, **fields))
