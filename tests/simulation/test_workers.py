@@ -152,7 +152,7 @@ def test_a_law_of_other_code_on_a_worker_is_named(refused):
     (scenario, *_) = runs()
     refused(lambda: batches.scored([scenario], ["another key"]), "classical")
     made_of = smc.plant("duffing"), smc.law("pid"), Objective(**SHORT), 1, 0, False
-    refused(lambda: searched(*made_of, 0, "", "other code"), "pid")
+    refused(lambda: searched(*made_of, False, "other code", 0, "", 0), "pid")
 
 
 def test_a_law_without_a_module_is_sent_by_value(monkeypatch, refused):
