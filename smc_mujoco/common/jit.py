@@ -111,7 +111,16 @@ class NotCompilable(Exception):
 
 def always(value: Any) -> Callable:
     """Return a compiled function that returns this value, whatever its arguments."""
-    return inlined(lambda *arguments: value)
+    kind = typeof(value)
+
+    @intrinsic
+    def constant(typingctx, *arguments):
+        def codegen(context, builder, signature, args):
+            return context.get_constant_generic(builder, kind, value)
+
+        return kind(types.StarArgTuple.from_types(arguments)), codegen
+
+    return constant
 
 
 def _at(kind: types.Type) -> Callable:

@@ -187,6 +187,11 @@ def _read(view, i, j, x, v):
 
 
 @inlined
+def _noise(view, i, j):
+    return philox.normals(view.sim.seed, i, philox.MEASUREMENT, j)
+
+
+@inlined
 def _estimate(view, i, x, v):
     address, sim, _ = view
     sim.reading.x = x
@@ -505,6 +510,7 @@ MOMENTS = Moments(
     sense=_sense,
     reading=_reading,
     read=_read,
+    noise=_noise,
     estimate=_estimate,
     feedforward=_feedforward,
     ask=_ask,

@@ -35,16 +35,20 @@ _ONE = np.uint64(1)
 
 
 @intrinsic
-def _mulhi(typingctx, a, b):
-    """Return the high 64 bits of the 128-bit product of two uint64."""
+def _multiplied(typingctx, a, b):
+    """Return the high and the low 64 bits of the product of two uint64, by one multiplication."""
     from llvmlite import ir
+
+    pair = types.UniTuple(types.uint64, 2)
 
     def codegen(context, builder, signature, args):
         wide = ir.IntType(128)
         product = builder.mul(builder.zext(args[0], wide), builder.zext(args[1], wide))
-        return builder.trunc(builder.lshr(product, ir.Constant(wide, 64)), ir.IntType(64))
+        high = builder.lshr(product, ir.Constant(wide, 64))
+        halves = [builder.trunc(half, ir.IntType(64)) for half in (high, product)]
+        return context.make_tuple(builder, pair, halves)
 
-    return types.uint64(types.uint64, types.uint64), codegen
+    return pair(types.uint64, types.uint64), codegen
 
 
 @njit(error_model="numpy")
@@ -57,23 +61,32 @@ def block(seed, channel, stream, k):
     key0 = np.uint64(seed)
     key1 = np.uint64(channel)
     for _ in range(10):
-        c0, c1, c2, c3 = (
-            _mulhi(_M1, c2) ^ c1 ^ key0,
-            _M1 * c2,
-            _mulhi(_M0, c0) ^ c3 ^ key1,
-            _M0 * c0,
-        )
+        high0, low0 = _multiplied(_M0, c0)
+        high1, low1 = _multiplied(_M1, c2)
+        c0, c1, c2, c3 = high1 ^ c1 ^ key0, low1, high0 ^ c3 ^ key1, low0
         key0, key1 = key0 + _W0, key1 + _W1
     return c0, c1, c2, c3
 
 
 @njit(error_model="numpy")
-def normals(seed, channel, stream, k):
-    """Return two independent standard normal numbers from block k."""
+def polar(seed, channel, stream, k):
+    """Return the radius and the angle, in [0, 2 pi), of two normal numbers from block k."""
     a, b, _, _ = block(seed, channel, stream, k)
     radius = math.sqrt(-2.0 * math.log(((a >> _SHIFT) + _ONE) * 2.0**-53))  # argument in (0, 1]
-    angle = 2.0 * math.pi * ((b >> _SHIFT) * 2.0**-53)
+    return radius, 2.0 * math.pi * ((b >> _SHIFT) * 2.0**-53)
+
+
+@njit(error_model="numpy")
+def cartesian(radius, angle):
+    """Return the two normal numbers of a radius and an angle."""
     return radius * math.cos(angle), radius * math.sin(angle)
+
+
+@njit(error_model="numpy")
+def normals(seed, channel, stream, k):
+    """Return two independent standard normal numbers from block k."""
+    radius, angle = polar(seed, channel, stream, k)
+    return cartesian(radius, angle)
 
 
 @njit(error_model="numpy")

@@ -59,6 +59,7 @@ class Moments(NamedTuple):
     # a sample
     errors: Any  # (view, t) -> errors of position and velocity
     sense: Any  # (view, i, t) -> x and v at the sensor
+    noise: Any  # (view, i, j) -> normal numbers of reading j, of position and velocity
     estimate: Any  # (view, i, x, v) -> raised, v and a
     feedforward: Any  # (view, t) -> raised, value; before the laws
     ask: Any  # (view, k, t, i) -> failure, u and s of channel i; see `asking`
@@ -236,6 +237,7 @@ def _measuring(of: Moments) -> Any:
     read = of.read
     estimate = of.estimate
     noisy = of.noisy
+    noise = of.noise
 
     @inlined
     def measure(view, k, t):
@@ -248,9 +250,9 @@ def _measuring(of: Moments) -> Any:
             v += v_error
             j = reading(view, i, k, t)
             if noisy and (settings.sigma_x != 0.0 or settings.sigma_v != 0.0):
-                z = philox.normals(settings.seed, i, philox.MEASUREMENT, j)
-                x += settings.sigma_x * z[0]
-                v += settings.sigma_v * z[1]
+                x_noise, v_noise = noise(view, i, j)
+                x += settings.sigma_x * x_noise
+                v += settings.sigma_v * v_noise
             raised, x, v = read(view, i, j, x, v)
             if raised:
                 return RAISED

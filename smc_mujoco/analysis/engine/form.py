@@ -15,6 +15,7 @@ from smc_mujoco.simulation.state import LOG
 
 LOGGED = ("x", "v", "u", "s", "d", "r")  # of a channel at a sample, in a log
 FAILURE, FAILED_STEP, SCORES = range(3)  # places in the scores of a run; metrics follow
+UNDER_WAY = -1  # the failure of a run that has not ended; others are of state.py
 ACTIVE, STREAM, PARAMETERS = range(3)  # places in the numbers of a signal
 WIDTH = len(LOG.names or ())  # numbers of a sample of a channel
 STATES = len(CHANNEL_STATE.names or ())
@@ -143,6 +144,7 @@ class RowPlaces(NamedTuple):
     delays: int
     compensation: int  # 1 + error and eps; only with compensated frictions
     reach: int  # 4 numbers of an `outcome`
+    draw: int  # address of what draws noise on the processor; only with noise
 
 
 class WorkPlaces(NamedTuple):
@@ -260,6 +262,7 @@ def _row_places(form: Form, row: Places) -> RowPlaces:
         delays=row.take(n if form.past else 0),
         compensation=row.take(2 if form.compensated else 0),
         reach=row.take(4),
+        draw=row.take(1 if form.noise else 0),
     )
 
 

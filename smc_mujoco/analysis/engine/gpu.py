@@ -24,7 +24,9 @@ with extra("gpu", "device 'cuda'"):
     from numba import cuda, float64, njit, types
     from numba.extending import intrinsic
 
-from smc_mujoco.analysis.engine.form import SCORES, Form, layout
+from smc_mujoco.analysis.engine import noise
+from smc_mujoco.analysis.engine.calls import View
+from smc_mujoco.analysis.engine.form import FAILURE, SCORES, UNDER_WAY, Form, layout
 from smc_mujoco.analysis.engine.loop import simulation
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.numba_internals import cgutils
@@ -46,7 +48,7 @@ def _pointer(typingctx, array):
 
 def kernel(form: Form) -> Any:
     """Return the kernel of a form in Python, (rows, tables, scores)."""
-    simulate = simulation(form, njit(error_model="numpy"))
+    start, take = simulation(form, njit(error_model="numpy"), noise.drawn)
     row_size = layout(form).row_size
     work_size = layout(form).work_size
     score_size = SCORES + len(form.metrics)
@@ -62,7 +64,12 @@ def kernel(form: Form) -> Any:
             row[i] = rows[run, i]
         for i in range(score_size):
             kept[i] = np.nan
-        simulate(_pointer(row), _pointer(tables), _pointer(work), _pointer(kept), _pointer(kept))
+        view = View(_pointer(row), _pointer(tables), _pointer(work))
+        samples = start(view, _pointer(kept))
+        for k in range(samples + 1):
+            take(view, _pointer(kept), _pointer(kept), k)
+            if kept[FAILURE] != UNDER_WAY:
+                break
         for i in range(score_size):
             scores[run, i] = kept[i]
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.analysis.engine import noise
 from smc_mujoco.analysis.engine.form import (
     FAILED_STEP,
     FAILURE,
@@ -281,6 +282,8 @@ class FormGroup:
         _put(row, at.known, known_values(s))
         _put(row, at.before, [*vars(s.plant.values(s.factors(0))).values()])
         _put(row, at.after, [*vars(s.plant.values(s.factors(max(s.jump_step, 0)))).values()])
+        if self.form.noise:
+            row[at.draw] = noise.drawing().address
         if s.sensors:
             _put(row, at.hinges, [unit == "rad" for unit in s.plant.units])
         self._fill_law(row, s)

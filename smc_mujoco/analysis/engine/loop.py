@@ -1,4 +1,4 @@
-"""The run of a form, written out as one loop that numba compiles for every target.
+"""A sample of a form's run, written out as one function that numba compiles for every target.
 
 The order of a step is that of `simulation.step`, as in the control callback. Here are its moments:
 a run reads its numbers from its row, and keeps its state in `work`, see `form.layout`.
@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 from smc_mujoco.analysis.engine.advance import advancing, advancing_implicitly
 from smc_mujoco.analysis.engine.calls import (
     Compiler,
-    View,
     acting,
     added,
     array_in,
@@ -29,6 +28,7 @@ from smc_mujoco.analysis.engine.form import (
     LOGGED,
     SETTING,
     STATES,
+    UNDER_WAY,
     WIDTH,
     Form,
     PartAt,
@@ -43,7 +43,7 @@ from smc_mujoco.control.joint_law import begin_measurement, put_channel
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, JointState, Sight
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.controller import MAX_STATE
-from smc_mujoco.simulation.state import FINE, RAISED
+from smc_mujoco.simulation.state import FINE
 from smc_mujoco.simulation.step import Asked, Moments, asking, lateness, order, reading_at
 
 state_in = record_in(CHANNEL_STATE)
@@ -60,13 +60,16 @@ class PlainDrive(NamedTuple):
     accelerates: float = 0.0
 
 
-def simulation(form: Form, compile_user: Compiler) -> Any:
-    """Return the compiled run of a form, simulate(row, tables, work, scores, log).
+def simulation(form: Form, compile_user: Compiler, noise: Any) -> Any:
+    """Return two compiled functions: start(view, scores) begins a run of the form and returns its
+    number of periods K, take(view, scores, log, k) takes its sample k, from 0 to K, and the steps
+    of that period.
 
-    All are pointers to numbers; `log` has the numbers `form.LOGGED` of every channel at every
-    sample, if the row says `logging`.
+    The run has ended once its failure among the scores is not UNDER_WAY. `log`, a pointer, has the
+    numbers `form.LOGGED` of every channel at every sample, if the row says `logging`. `noise` is a
+    moment, see `noise`.
     """
-    begin, between = order(_moments(form, compile_user))
+    begin, between = order(_moments(form, compile_user, noise))
     if form.implicit:
         advance = advancing_implicitly(form, compile_user)
     else:
@@ -80,13 +83,10 @@ def simulation(form: Form, compile_user: Compiler) -> Any:
     size = layout(form).work_size
 
     @inlined
-    def simulate(row, tables, work, scores, log):
-        view = View(row, tables, work)
+    def start(view, scores):
+        row, _, work = view
         for j in range(size):
             work[j] = 0.0
-        scores[FAILURE] = RAISED
-        samples = int(row[SETTING.samples])
-        steps = int(row[SETTING.steps])
         for i in range(n):
             work[work_at.x + i] = row[row_at.x0 + i]
             work[work_at.v + i] = row[row_at.v0 + i]
@@ -94,25 +94,33 @@ def simulation(form: Form, compile_user: Compiler) -> Any:
             for k in range(rotors):
                 work[work_at.x + n + k] = row[row_at.x0 + elastic[k]]
                 work[work_at.v + n + k] = row[row_at.v0 + elastic[k]]
-        for k in range(samples + 1):
-            for within in range(steps):
-                step = k * steps + within
-                scores[FAILED_STEP] = step
-                remember(view, step)
-                failure = begin(view, k, within, step)
-                if failure != FINE:
-                    scores[FAILURE] = failure
-                    return
-                if k == samples:
-                    break
-                advance(view, k, within, step)
-            record(view, scores, log, k)  # at the end of its period: the sample may come late
-        scores[FAILURE] = FINE
+        scores[FAILURE] = UNDER_WAY
+        return int(row[SETTING.samples])
 
-    return simulate
+    @inlined
+    def take(view, scores, log, k):
+        samples = int(view.row[SETTING.samples])
+        steps = int(view.row[SETTING.steps])
+        last = samples * steps
+        for within in range(steps):
+            step = k * steps + within
+            scores[FAILED_STEP] = step
+            remember(view, step)
+            failure = begin(view, k, within, step)
+            if failure != FINE:
+                scores[FAILURE] = failure
+                return
+            if step == last:
+                break
+            advance(view, k, within, step)
+        record(view, scores, log, k)  # at the end of its period: the sample may come late
+        if k == samples:
+            scores[FAILURE] = FINE
+
+    return start, take
 
 
-def _moments(form: Form, compile_user: Compiler) -> Moments:
+def _moments(form: Form, compile_user: Compiler, noise: Any) -> Moments:
     """Return what a run of the form does at each moment."""
     moments = Moments(
         **_records(form),
@@ -121,6 +129,7 @@ def _moments(form: Form, compile_user: Compiler) -> Moments:
         feedforward=_feeding(form, compile_user),
         compensate=_compensating(form, compile_user),
         ask=None,
+        noise=noise,
         noisy=form.noise,
         clock=form.clock,
         delayed=form.delay,
