@@ -13,6 +13,7 @@ from smc_mujoco.analysis.engine.form import FAILED_STEP, FAILURE, LOGGED, SCORES
 from smc_mujoco.analysis.engine.scores import RESTING, names
 from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.hardware import ElasticJoint, RateLimit, Sigmoid
+from smc_mujoco.mechanisms.plant import Field
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.metrics.conventions import folded
 from smc_mujoco.metrics.fold import Fold
@@ -148,6 +149,66 @@ def test_a_run_is_that_of_mujoco_at_every_sample(plant):
 )
 def test_a_run_of_other_parts_is_that_of_mujoco(plant, law, condition):
     check(plant, law, {condition: APART[condition]}, duration=4.0)
+
+
+ROW = smc.plant("pendulum_network", n=2)
+
+
+def damped_fields(model, p):
+    yield from ROW.fields(model, p)
+    yield Field("tendon_damping", model.tendon("coupling0").id, p.kd)
+
+
+def damped(x, v, i, p):
+    inertia = p.m * p.l**2
+    pull = p.kc * (x[1 - i] - x[i]) + p.kd * (v[1 - i] - v[i])
+    return (pull - p.b * v[i] - p.m * p.grav * p.l * math.sin(x[i])) / inertia, 1.0 / inertia
+
+
+def test_a_damper_between_joints_acts_as_in_mujoco_under_an_own_friction():
+    """At kd = 2 N m s/rad a step that also solved for the other joint's speed was 6e-5 rad apart."""
+    plant = dataclasses.replace(
+        ROW,
+        name="damped_row",
+        parameters={**ROW.parameters, "kd": 2.0},
+        fields=damped_fields,
+        nominal=damped,
+    )
+    check(plant, "pid", {"own friction": {"friction": dahl(level=0.1)}}, duration=0.5)
+
+
+@smc.law_function(gains={"k": 30.0, "reach": math.inf})
+def raising(y, gains, memory):
+    if abs(y.x) > gains.reach:
+        raise ValueError("too far")
+    return -gains.k * (y.e + y.de), y.e
+
+
+def test_a_run_beside_another_is_that_run_alone():
+    """Runs take turns and draw noise for many samples: one that ends, fails or raises leaves the
+    others as they are.
+    """
+    base = smc.Scenario(plant="duffing", law=raising(), duration=0.5, noise=smc.Noise(1e-3, 5e-3))
+    short, raises = 0.03, raising(reach=0.0)
+    cases = []
+    for seed, fields in enumerate(
+        (
+            {"duration": short},
+            {"duration": short, "law": raises},
+            {},
+            {"law": raises},
+            {"x0": 9e5, "law": raising(k=-1e3)},
+            {},
+            {"duration": short},
+        )
+    ):
+        cases.append(dataclasses.replace(base, seed=seed, **fields))
+    made = group.FormGroup(cases, ("itae", "tv"))
+    together = made.run(made.rows, threads=1)
+    alone = [made.run(made.rows[i : i + 1])[0] for i in range(len(cases))]
+    np.testing.assert_array_equal(together, alone)
+    fine, raised, diverged = state.FINE, state.RAISED, state.DIVERGED
+    assert together[:, FAILURE].tolist() == [fine, raised, fine, raised, diverged, fine, fine]
 
 
 OTHERS = {  # plant, law, and what else the scenario has

@@ -219,18 +219,18 @@ def _and_friction(part: ChannelFunction, others: Any, force: Any) -> Any:
 
 def advancing_implicitly(form: Form, compile_user: Compiler) -> Any:
     """Return a function (view, k, within, step): a physics step h of MuJoCo's implicitfast, for
-    frictions whose force F is held over it:
+    frictions whose force F is held over it. Of joint i, which moves alone:
 
-        (1 - h df/dv) a = f(x, v) + g (u + d + F),   v += h a,   x += h v
+        (1 - h df_i/dv_i) a_i = f_i(x, v) + g_i (u_i + d_i + F_i),   v_i += h a_i,   x_i += h v_i
 
-    f is linear in v, so its slopes are differences from rest: what the plant's dampers do is that
-    of the step's end, between joints, too.
+    f is linear in v, so its slope is a difference from rest. A damper between two joints acts by
+    the speeds of the step's start in the other joint's equation: MuJoCo keeps no derivative where
+    the inertia matrix has no entry.
     """
     n = form.n
     values = _valuing(form)
     nominal = compile_user(form.nominal.function)
     rub = _rubbing_held(form, compile_user)
-    solve = _solving(n, layout(form).work.matrix, layout(form).work.a)
     row_at, work_at = layout(form)[:2]
 
     @inlined
@@ -244,15 +244,12 @@ def advancing_implicitly(form: Form, compile_user: Compiler) -> Any:
         for i in range(n):
             f, g = nominal(xs, vs, i, p)
             at_rest = nominal(xs, array_in(work, work_at.rest, n), i, p)[0]
+            unit[i] = 1.0
+            slope = nominal(xs, unit, i, p)[0] - at_rest
+            unit[i] = 0.0
             damping = row[row_at.damping + i]
-            for j in range(n):
-                unit[j] = 1.0
-                slope = nominal(xs, unit, i, p)[0] - at_rest
-                unit[j] = 0.0
-                work[work_at.matrix + i * n + j] = -h * slope
-            work[work_at.matrix + i * n + i] += 1.0 + h * damping * g
             work[work_at.a + i] = f + g * (rub(view, i, step, at_rest / g) - damping * vs[i])
-        solve(work)
+            work[work_at.a + i] /= 1.0 + h * damping * g - h * slope
         for i in range(n):
             vs[i] += h * work[work_at.a + i]
             xs[i] += h * vs[i]
@@ -295,26 +292,3 @@ def _rubbing_held(form: Form, compile_user: Compiler) -> Any:
         return force + state.delayed + pushed
 
     return rub
-
-
-def _solving(n: int, matrix: int, a: int) -> Any:
-    """Return a function (work): solve for n numbers from place `a` on, with the matrix from place
-    `matrix` on. Dampers make it dominated by its diagonal, so that no rows are exchanged.
-    """
-
-    @inlined
-    def solve(work):
-        for i in range(n):
-            for j in range(i + 1, n):
-                share = work[matrix + j * n + i] / work[matrix + i * n + i]
-                if share != 0.0:
-                    for c in range(i, n):
-                        work[matrix + j * n + c] -= share * work[matrix + i * n + c]
-                    work[a + j] -= share * work[a + i]
-        for back in range(n):
-            i = n - 1 - back
-            for c in range(i + 1, n):
-                work[a + i] -= work[matrix + i * n + c] * work[a + c]
-            work[a + i] /= work[matrix + i * n + i]
-
-    return solve

@@ -158,8 +158,7 @@ class WorkPlaces(NamedTuple):
     sum_v: int
     sum_a: int
     rest: int  # velocities of 0
-    unit: int  # and of 1 in one joint; this and the next only in an implicit step
-    matrix: int  # 1 - h df/dv, n^2
+    unit: int  # and of 1 in one joint; only in an implicit step
     motor: int  # force of a drive at a stage
     d: int  # the disturbances' force
     seen_x: int
@@ -279,7 +278,6 @@ def _work_places(form: Form, work: Places) -> WorkPlaces:
         sum_a=work.take(form.bodies),
         rest=work.take(n),
         unit=work.take(n if form.implicit else 0),
-        matrix=work.take(n * n if form.implicit else 0),
         motor=work.take(n),
         d=work.take(n),
         seen_x=work.take(n),

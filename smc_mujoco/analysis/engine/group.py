@@ -39,7 +39,6 @@ from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import Constant, Push, Signal
 from smc_mujoco.simulation.state import FINE
 
-MAX_IMPLICIT = 8  # joints, chosen: an implicit step solves for all of them
 # fields in which forms of one key may differ, at their least
 VARYING: Fields = {
     "noise": False,
@@ -105,13 +104,13 @@ def _indexes_within(user: tuple[Any, int]) -> bool:
 
 
 def rubs_by_force(s: Resolved) -> bool:
-    """Return whether its friction is functions whose force is held over a step, and dampers, of few
+    """Return whether its friction is functions whose force is held over a step, and dampers, of
     joints that move alone.
     """
     if s.contact or s.mechanism != "equation" or s.actuator or s.exact_friction:
         return False
     held = [part for part in s.friction if not part.smooth]
-    if not held or s.plant.rubs or s.plant.n > MAX_IMPLICIT:
+    if not held or s.plant.rubs:
         return False
     return all(part.force is not None for part in held) and moves_alone(s.plant)
 

@@ -20,7 +20,7 @@ AHEAD = 64  # readings, chosen
 EIGHTHS = 8  # of a turn: within one, sin and cos take the same branches for nearly all angles
 # Of the state, whole numbers: where the list of each eighth ends, and the lists.
 LISTS = EIGHTHS * (1 + AHEAD)
-# Of the state, for each channel: the seed of what is drawn, its first reading plus 1, and the noise.
+# Of the state, for each channel: the seed of its noise, 1 + the first reading, and the noise.
 KEPT = 2 + 2 * AHEAD
 
 
