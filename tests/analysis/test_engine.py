@@ -177,7 +177,7 @@ def test_a_damper_between_joints_acts_as_in_mujoco_under_an_own_friction():
     check(plant, "pid", {"own friction": {"friction": dahl(level=0.1)}}, duration=0.5)
 
 
-@smc.law_function(gains={"k": 30.0, "reach": math.inf})
+@smc.law_function(gains={"k": 0.5, "reach": math.inf})
 def raising(y, gains, memory):
     if abs(y.x) > gains.reach:
         raise ValueError("too far")
