@@ -18,13 +18,15 @@ gear, the lag that of a hydraulic valve, and the counts, per revolution or metre
 inexpensive encoder. On a free body and on a user's model, whose size may be any, a disturbance is
 the same share of the largest force as it is of u_max in the study. The play, the counts and the
 motor of a user's model are as large beside its joints as those of the study, and its stepper is
-refused where a rig's steps and rates do not suit it. Under "contact" a joint has stops about its
-goal, and a blow drives it there whatever u does, see `blow`. Under "jitter" samples are late by up
-to half of the suite's control period. Under "missed" one sample in ten does not run. Under
-"stepper" u is the wanted acceleration, so gains for a force do not suit it: tune under it. Its
-rates are those of the firmware of rig stepper_furuta; it is 30 times as strong as other drives,
-near that machine's ratio of torque to inertia, as one of their strength loses steps here. Under
-"fault" every actuator loses half of its force at 2 s.
+refused where a rig's steps and rates do not suit it. Under "elastic" a spring is between each joint
+and its rotor, with a resonance of 68 Hz on the study's pendulum, and elsewhere as much faster than
+what the bound on u can do; under "motor_side" the controller reads the rotors. Under "contact" a
+joint has stops about its goal, and a blow drives it there whatever u does, see `blow`. Under
+"jitter" samples are late by up to half of the suite's control period. Under "missed" one sample in
+ten does not run. Under "stepper" u is the wanted acceleration, so gains for a force do not suit it:
+tune under it. Its rates are those of the firmware of rig stepper_furuta; it is 30 times as strong
+as other drives, near that machine's ratio of torque to inertia, as one of their strength loses
+steps here. Under "fault" every actuator loses half of its force at 2 s.
 """
 
 import ast
@@ -54,6 +56,7 @@ from smc_mujoco.mechanisms.hardware import obstacles, servos  # noqa: F401
 from smc_mujoco.mechanisms.hardware.backlash import MIN_INERTIA, Backlash
 from smc_mujoco.mechanisms.hardware.contact import Obstacle
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag
+from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
@@ -108,6 +111,10 @@ STUDY_ACCELERATION, ROTOR_SHARE = 48.0, 0.008
 STEPPER_ACCELERATIONS, SHORTEST_WAY_OF_STEPS = (5.0, 500.0), 0.15
 SINE = Sine(amplitude=0.2, omega=5.0)
 SENSOR_NOISE = Noise(position=0.01, velocity=0.05)
+# of an elastic joint, chosen: its rotor's share of the inertia, as of a geared arm; its resonance
+# over the joint's own rate, sqrt(bound/(inertia way)), which is 68 Hz on the study's pendulum, ten
+# times its loop; and the share of critical damping
+ELASTIC_ROTOR, RESONANCE, STRUCTURAL_DAMPING = 0.5, 43.6, 0.01
 DIFFERENCED = estimator("filtered_difference", tau=5e-3)
 
 
@@ -510,7 +517,7 @@ def _bristles(level: float, plant: Plant) -> Friction:
 
 
 class Own(NamedTuple):
-    """The size of a driven joint of a user's model."""
+    """The size of a driven joint."""
 
     limit: float  # N m or N, bound on u
     inertia: float  # kg m^2 or kg, at the goal
@@ -518,7 +525,7 @@ class Own(NamedTuple):
 
 
 def _own_joints(plant: Plant) -> list[Own]:
-    """Return the sizes of the driven joints of a user's model."""
+    """Return the sizes of the driven joints."""
     at = at_goal(plant)
     inertias = np.diag(at.M)[at.dofs].tolist()
     ways = np.abs(np.subtract(usual_start(plant), plant.origin))[: plant.driven].tolist()
@@ -547,6 +554,33 @@ def _backlash(joint: Own) -> Backlash:
     """Return the study's play and rotor as shares of the way and of the inertia."""
     rotor = max(ROTOR_SHARE * joint.inertia, MIN_INERTIA)
     return Backlash(0.01 * min(1.0, joint.way / BESIDE), rotor_inertia=rotor)
+
+
+def _elastic(plant: Plant, duration: float) -> Data:
+    """Return springs between joints and rotors: with the resonance of the study's, as a multiple of
+    the rate at which the bound moves the joint by the longest way of all.
+    """
+    if plant.pose:
+        return {"actuator": ElasticJoint(1.0)}  # which the caller refuses
+    parts = []
+    joints = _own_joints(plant)
+    way = max(joint.way for joint in joints)
+    for joint in joints:
+        rotor = max(ELASTIC_ROTOR * joint.inertia, MIN_INERTIA)
+        moving = rotor * joint.inertia / (rotor + joint.inertia)
+        omega = RESONANCE * math.sqrt(joint.limit / (joint.inertia * way))
+        damping = 2.0 * STRUCTURAL_DAMPING * omega * moving
+        numbers = (moving * omega**2, damping, rotor)
+        parts.append(ElasticJoint(*(float(f"{number:.3g}") for number in numbers)))
+    if len(set(parts)) == 1:
+        return {"actuator": parts[0]}
+    return {"actuator": dict(zip(channel_names(plant), parts, strict=False))}
+
+
+def _motor_side(plant: Plant, duration: float) -> Data:
+    """Return the same, where the controller reads the rotors, without error."""
+    seen = {"sensor": Encoder(counts=math.inf, side="motor"), "velocity": estimator("measured")}
+    return _elastic(plant, duration) | seen
 
 
 def _encoder(plant: Plant, duration: float) -> Data:
@@ -594,6 +628,8 @@ REAL: dict[str, Recipe] = {
     "dc_motor": _fitted(DCMotor(), _motor),
     "stepper": _stepper,
     "backlash": _fitted(Backlash(0.01), _backlash),
+    "elastic": _elastic,
+    "motor_side": _motor_side,
     "encoder": _encoder,
     "jitter": {"clock": Clock(jitter=0.5e-3)},
     "missed": {"clock": Clock(missed=0.1)},

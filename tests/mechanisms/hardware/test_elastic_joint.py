@@ -1,7 +1,10 @@
 """ElasticJoint against its equations, integrated without MuJoCo's springs, and what reads its rotor."""
 
 import math
+import re
+from pathlib import Path
 
+import elastic
 import mujoco
 import numpy as np
 import pytest
@@ -10,6 +13,7 @@ from scipy.linalg import expm
 
 import smc_mujoco as smc
 from smc_mujoco.hardware import ElasticJoint
+from smc_mujoco.simulation.conditions import NAMED
 
 INERTIA, DRAG, START = 0.125, 0.05, 0.3
 AXIS = smc.plant("servo_axis", M=INERTIA, b=DRAG, cf=0.0, offset=0.0)
@@ -155,3 +159,38 @@ def test_a_sensor_on_the_motor_side_reads_the_rotor_late_and_by_name():
     for late in (skewed, by_elbow):
         np.testing.assert_array_equal(late.s[:, 0], late.x[:, 0])
         np.testing.assert_array_equal(late.s[2:, 1], at_once.s[:-2, 1])
+
+
+OWN = """<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="a" axis="0 1 0"/>
+<geom size="0.01" pos="0.2 0 0" mass="{:g}"/></body></worldbody>
+<actuator><motor joint="a" ctrllimited="true" ctrlrange="-{:g} {:g}"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize(("mass", "limit"), [(1.0, 2.0), (1.0, 8.0), (1e-4, 8e-4), (500.0, 40.0)])
+def test_the_condition_has_a_resonance_beside_what_the_motor_can_do(mass, limit):
+    plant = smc.plant_from(OWN.format(mass, limit, limit), ["a"], name="own")
+    part = NAMED["elastic"].on(plant, 1.0)["actuator"]
+    inertia = mass * (0.2**2 + 0.4 * 0.01**2)
+    assert part.rotor_inertia == pytest.approx(0.5 * inertia, rel=0.01)
+    resonance = math.sqrt(part.stiffness * (1.0 / inertia + 1.0 / part.rotor_inertia))
+    assert resonance == pytest.approx(43.6 * math.sqrt(limit / inertia / 0.3), rel=0.01)
+    decay = part.damping * (1.0 / inertia + 1.0 / part.rotor_inertia) / 2.0
+    assert decay == pytest.approx(0.01 * resonance, rel=0.02)
+
+
+def test_the_conditions_differ_in_what_the_controller_reads_alone():
+    pendulum = smc.plant("inverted_pendulum")
+    link, motor = (NAMED[name].on(pendulum, 1.0) for name in ("elastic", "motor_side"))
+    assert motor.pop("sensor") == smc.Encoder(math.inf, side="motor")
+    assert motor.pop("velocity").name == "measured"
+    assert link == motor
+    k, J, rotor = link["actuator"].stiffness, 0.125, link["actuator"].rotor_inertia
+    assert math.sqrt(k * (1.0 / J + 1.0 / rotor)) / math.tau == pytest.approx(68.0, rel=0.01)
+
+
+@pytest.mark.slow
+def test_the_page_has_what_a_spring_does_to_the_order_of_laws():
+    page = Path("docs/mechanisms.md").read_text()
+    for law, values in elastic.bounds().items():
+        cells = re.search(rf"^\| `{law}` \| (.*) \|$", page, re.M)[1].replace("*", "").split(" | ")
+        assert values == pytest.approx(list(map(float, cells)), rel=0.2)
