@@ -12,7 +12,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis import differ, ranking
 from smc_mujoco.analysis.engine import outcome
-from smc_mujoco.analysis.tuning import objective, search, search_space, stages
+from smc_mujoco.analysis.tuning import objective, quick_search, search, search_space, stages
 from smc_mujoco.common import constraints
 from smc_mujoco.envs import tasks
 from smc_mujoco.metrics import catalogue, conventions, fold, limit_cycle, tip
@@ -27,6 +27,7 @@ from smc_mujoco.simulation import (
     signals,
     time_series,
 )
+from smc_mujoco.studies import race
 from smc_mujoco.testing import golden, plugin
 
 pytestmark = pytest.mark.quick
@@ -105,6 +106,17 @@ SAID = {
         f"lower J by less than {percent(stages.PATIENCE)}",
         f"differ by more than {percent(search.AGREEMENT)}",
         f"rounded to {WORDS[stages.GAIN_DIGITS]} digits",
+    ],
+    quick_search: [
+        f"{quick_search.BUDGET} evaluations a gain are enough",
+        f"{WORDS[quick_search.WIDER]} times the usual size",
+        f"at least {WORDS[quick_search.FEWEST]} sets",
+        f"best {WORDS[quick_search.DECIDED]} sets are decided",
+    ],
+    race: [
+        f"After {WORDS[race.FIRST]} sets a law is dropped",
+        f"judged after {race.LOOKS[0]} sets, and if none wins, after {race.LOOKS[1]}",
+        f"more than {race.WITHIN} are needed",
     ],
     search_space: [f"10^-{search_space.HALF_WIDTH:g} .. 10^{search_space.HALF_WIDTH:g}"],
     search_space.at_bound: [f"within {percent(search_space.BOUND_MARGIN)} of a bound"],

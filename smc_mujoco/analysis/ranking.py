@@ -131,6 +131,9 @@ class Comparison:
       halves, trends: y' and rho of each run, NaN where they are not known. Default: nowhere.
       arrived: whether each run has arrived. Default: all have.
       first_order: whether the integrator of all blocks, or of each, is of first order.
+      rivals: the number of a law's rivals for which levels are corrected, even if it has fewer.
+      looks: how often the laws may be judged, each time with more units; every look has an equal
+        share of the errors.
     """
 
     @constrained
@@ -146,6 +149,8 @@ class Comparison:
         trends: Mapping[str, ArrayLike] | None = None,
         arrived: Mapping[str, ArrayLike] | None = None,
         first_order: ArrayLike = False,
+        rivals: int = RIVALS,
+        looks: int = 1,
     ):
         self.laws = tuple(sorted(scores))
         self.shares = shares
@@ -197,8 +202,9 @@ class Comparison:
         self.p = p_values(self.leads - self.beyond)
         self.p[self.both_below] = 1.0
         # the largest p-values with which a law is better than another, and wins a block
-        self.limit = BEST_ERROR / max(count - 1, RIVALS)
-        self.winning = self.first = WIN_ERROR  # after Holm's last step, and after his first
+        self.limit = BEST_ERROR / looks / max(count - 1, rivals)
+        self.error = WIN_ERROR / looks  # of any wrong winner
+        self.winning = self.first = self.error  # after Holm's last step, and after his first
         corrected([self])
 
     def _cube(self, by_law: Mapping[str, ArrayLike] | None, unknown: ArrayLike) -> np.ndarray:
@@ -460,10 +466,10 @@ def corrected(comparisons: Sequence[Comparison]) -> None:
     several = [one for one in comparisons if len(one.laws) > 1]
     blocks = sum(len(one.floors) for one in several)
     for one in several:
-        one.first = WIN_ERROR / blocks
+        one.first = one.error / blocks
     p = [one.winner_p.min(axis=1) for one in several]
     for one in several:
-        one.winning = holm(np.concatenate(p), WIN_ERROR)
+        one.winning = holm(np.concatenate(p), one.error)
 
 
 def holm(p: np.ndarray, error: float) -> float:

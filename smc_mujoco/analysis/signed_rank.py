@@ -20,6 +20,7 @@ LEAD_RESAMPLES = 400  # for the least visible lead; chosen
 # of resamples that must see it, so that on average POWER of new samples do; chosen by samples of 51
 # shapes and confirmed on shapes drawn later, see docs/winners.md
 OWN_SHARE = 0.95
+MEDIAN_DISTANCE = 0.954  # of two units of a normal sample, in its standard deviations
 MAX_SUMS = 10_000_000  # of pairs, in memory at once
 
 
@@ -101,6 +102,31 @@ def _distribution(n: int) -> np.ndarray:
         share[rank:] += share[: share.size - rank].copy()
         share /= 2
     return np.cumsum(share[::-1])[::-1]
+
+
+def units_needed(leads: ArrayLike, error: float, relevant: float) -> float:
+    """Return the number of units with which the test would see these leads with a probability of
+    80 %, if more units are like them; inf if their centre is no more than what is relevant.
+
+    It is that of a normal sample. Its standard deviation is the median distance of two units over
+    0.954, and pi / 3 times as many units as a t-test takes are enough for the signed ranks.
+
+    Args:
+      leads: d of the units, NaN for none, at least two.
+      error: one-sided level of the test.
+      relevant: r.
+    """
+    from scipy.special import ndtri
+
+    known = _finite(leads)
+    i, j = np.triu_indices(known.size, 1)
+    deviation = float(np.median(np.abs(known[i] - known[j]))) / MEDIAN_DISTANCE
+    centre = interval(known, error)[0] + math.log1p(-relevant)
+    if not centre > 0.0:
+        return math.inf
+    deviations = float(ndtri(1.0 - error) + ndtri(POWER))
+    least = math.ceil(-math.log2(error))
+    return max(least, math.ceil(math.pi / 3.0 * (deviations * deviation / centre) ** 2))
 
 
 def least_visible_lead(leads: ArrayLike, error: float, relevant: float) -> float:

@@ -1,5 +1,5 @@
-"""Margins: the largest delay, disturbance, friction, mass ratio, noise, jitter and lost gain that a
-law tolerates on a plant.
+"""Margins: the largest delay, disturbance, friction, mass ratio, blow, noise, jitter and lost gain
+that a law tolerates on a plant.
 
 A run tolerates a level if it does not fail and its ultimate bound after 10 s is at most 5 % of its
 scale (`conventions`). As a run starts at the scale, its envelope has then shrunk, which the paper's
@@ -30,6 +30,7 @@ import numpy as np
 from smc_mujoco.analysis import linear_theory as theory
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns
+from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.common.constraints import Boolean, Called, constrained
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find
@@ -46,7 +47,7 @@ from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import DURATION, Condition
 from smc_mujoco.simulation.grid import START_CURE, Starts, case, listed, listed_laws
 from smc_mujoco.simulation.scenario import Scenario, default_u_max
-from smc_mujoco.simulation.signals import Constant, Fault, Noise
+from smc_mujoco.simulation.signals import Constant, Fault, Impulse, Noise
 from smc_mujoco.simulation.trace import Trace, warn_of_broken
 
 TOLERATED_ERROR = 0.05  # of the scale: the audit's threshold for an ultimate bound
@@ -57,6 +58,7 @@ MAX_MASS_RATIO, MAX_NOISE = 64.0, 2.048  # mass ratio; rad or m: chosen, far abo
 FORCES, NOISES = (
     tuple(largest * 2.0 ** (i - 8) for i in range(9)) for largest in (MAX_FORCE, MAX_NOISE)
 )
+BLOWS = tuple(2.0 ** (i - 5) for i in range(9))  # of F T of the plant's scales; chosen
 MASS_RATIOS = tuple(np.geomspace(1.0, MAX_MASS_RATIO, 10)[1:].tolist())
 JITTERS = tuple(i / JITTER_SHARES for i in range(1, JITTER_SHARES))  # of the control period
 DELAYS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # s
@@ -128,8 +130,8 @@ class MarginKind:
     put: Callable[[Scenario, float], Scenario]  # the scenario with a level
     none: float = 0.0  # the level without any effect
     signed: bool = False  # whether a level is tolerated only if its negative is, too
-    # whether levels are forces, which scale with the bound on u of a user's own model
-    forces: bool = False
+    # by what the levels are multiplied for a scenario
+    size: Callable[[Scenario], float] = lambda base: 1.0
     # of which a level is a multiple; 0: any level
     quantum: Callable[[Scenario], float] = lambda base: 0.0
     # largest level by linear theory, if there is any
@@ -157,9 +159,7 @@ class MarginKind:
             return LevelSearch(
                 levels=levels, resolution=lambda low: step, rounded=rounded, low=self.none
             )
-        size = 1.0
-        if self.forces and base.plant.is_user_model:
-            size = default_u_max(base.plant) / MAX_FORCE
+        size = self.size(base)
         levels = [size * level for level in self.levels]
         return LevelSearch(
             levels=levels, resolution=lambda low: resolution * max(low, levels[0]), low=self.none
@@ -218,6 +218,27 @@ def _tolerated_force(base: Scenario) -> float | None:
     return theory.tolerated_force(base.plant, base.law, largest_error, min(base.limits))
 
 
+def _size_of_force(base: Scenario) -> float:
+    """Return the bound on u of a user's own model over that of the study; 1 for other plants."""
+    if base.plant.is_user_model:
+        return default_u_max(base.plant) / MAX_FORCE
+    return 1.0
+
+
+def _size_of_blow(base: Scenario) -> float:
+    """Return F T of the plant's scales: the momentum that u stops in the time T."""
+    bound = min(base.limits)
+    per_u = None if base.accelerates else base.nominal_drives[0].gain
+    far = np.abs(np.subtract(base.resolved.x0, base.plant.origin)).max()
+    scales = search_space.scales(base.plant, bound, float(far), per_u)
+    return scales["F"] * scales["T"]
+
+
+def _with_blow(base: Scenario, level: float) -> Scenario:
+    blow = Impulse(level, time=base.duration / 2)
+    return dataclasses.replace(base, disturbance=(*base.disturbance, blow))
+
+
 def _with_mass(base: Scenario, level: float) -> Scenario:
     """Return the scenario with `level` times the nominal mass; the mismatch may call it "mass" or
     by its own name.
@@ -266,7 +287,7 @@ MARGIN_KINDS: dict[str, MarginKind] = {
         levels=FORCES,
         put=_with_force,
         signed=True,
-        forces=True,
+        size=_size_of_force,
         theory=_tolerated_force,
     ),
     "friction": MarginKind(
@@ -274,10 +295,18 @@ MARGIN_KINDS: dict[str, MarginKind] = {
         unit="{u}",
         levels=FORCES,
         put=with_friction,
-        forces=True,
+        size=_size_of_force,
         theory=_tolerated_force,
     ),
     "mass": MarginKind(label="mass", unit="1", levels=MASS_RATIOS, put=_with_mass, none=1.0),
+    "blow": MarginKind(
+        label="blow at half time, on every driven joint",
+        unit="{u} s",
+        levels=BLOWS,
+        put=_with_blow,
+        signed=True,
+        size=_size_of_blow,
+    ),
     "noise": MarginKind(label="position noise", unit="{x}", levels=NOISES, put=_with_noise),
     "jitter": MarginKind(
         label="largest delay of a sample, of the control period",
@@ -357,10 +386,10 @@ def margins(
 
     Args:
       plants, laws: names, or your own plants and laws, one or several.
-      kinds: one or several of "delay", "disturbance", "friction", "mass", "noise"; and of "jitter"
-        and "missed", of the controller's clock, and "gain", the share of its gain that an actuator
-        has lost from the start on, which are left out by default. All actuators lose it, or the one
-        that the condition's fault is on.
+      kinds: one or several of "delay", "disturbance", "friction", "mass", "noise"; and of "blow",
+        at half time, "jitter" and "missed", of the controller's clock, and "gain", the share of its
+        gain that an actuator has lost from the start on, which are left out by default. All
+        actuators lose it, or the one that the condition's fault is on.
       gains: set of gains, one of `gain_sets.SETS`, or "default".
       quick: whether to make runs of 5 s and search to within 5 control periods or 10 %, for a first
         look.

@@ -37,6 +37,7 @@ from smc_mujoco.simulation.workers import Workers
 from smc_mujoco.studies.board import Boards
 from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, Holdout, leaderboard, objective_boards
+from smc_mujoco.studies.race import LOOKS
 from smc_mujoco.studies.study import FULL, QUICK
 from smc_mujoco.studies.table import Table
 
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     from matplotlib.figure import Figure
 
-QUICK_SEARCHES = 6  # the fewest from which a verdict can follow, if it is the only one asked for
+QUICK_SEARCHES = LOOKS[0]
 # plants times conditions that have a table each; if there are more, each plant has one table
 MAX_BLOCKS = 12
 MAX_SEED = 10**6
@@ -312,10 +313,12 @@ def compare(
       starts: where runs begin, see `starts`. Default: within 20 % of the plant's own x0.
       gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
       searches: independent searches of a tuning. Laws with fewer shipped sets of gains are tuned
-        too; of laws with more, that many sets run. Default: 12, or 6 if quick, from which few
-        verdicts follow, and shipped sets as they are.
+        too; of laws with more, that many sets run. Default: 12, or 7 if quick, from which few
+        verdicts follow but that on J, and shipped sets as they are.
       budget: largest number of sets of gains that a search tries, for each gain.
-      quick: shorter runs and fewer searches; by default three plants and three conditions.
+      quick: shorter runs and fewer searches; by default three plants and three conditions. On a
+        plant for which no law has shipped gains, the searches are those of `which` within minutes,
+        under the conditions asked for.
       threads, progress: as in `run`.
       seed: another one draws other instances, starts and noise. The files are the same in every
         call, with any number of threads.
@@ -351,6 +354,7 @@ def compare(
         defaults=defaults,
         asked=searches,
         usual=QUICK_SEARCHES if quick else SEARCHES,
+        quick=quick,
         budget=budget,
         tune=tune and gains == "tuned",
         gain_set=gains,

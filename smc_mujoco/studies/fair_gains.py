@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis.ranking import needed_to_win
-from smc_mujoco.analysis.tuning import result, search, search_space
+from smc_mujoco.analysis.tuning import quick_search, result, search, search_space
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Objective, objectives
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import AnyPath
@@ -49,8 +49,8 @@ from smc_mujoco.studies.leaderboard import Holdout
 from smc_mujoco.studies.study import REPEATED_SEEDS, study
 from smc_mujoco.studies.table import Table
 
-# what gains for a machine of one's own are searched by for a first answer; chosen
-BRIEF = Objective(conditions=(NAMED["nominal"], NAMED["noise"], NAMED["heavy"]), duration=2.0)
+NOISE = "noise"  # a quick search adds it where no condition that was asked for has any
+SEARCHED = 2 / 3  # of the duration of a run: that of the runs of a quick search; chosen
 NOT_TUNED = "not tuned: "  # at the start of a remark
 Laws = Sequence[Component | Template]  # those without given gains are templates
 
@@ -103,7 +103,7 @@ def _without_search(
     if isinstance(law, Component):
         return Candidate(law, (law,))
     if not law.gains or gains == "default":
-        return _default(law)
+        return default_of(law)
     library = plants_known().get(plant.name)
     of_library = library is not None and library.parameters == plant.parameters
     ours = of_library and catalogue().get(law.name) is law
@@ -120,10 +120,18 @@ def _without_search(
     return None
 
 
-def _default(law: Component | Template, remark: str = "") -> Candidate:
+def default_of(law: Component | Template, remark: str = "") -> Candidate:
     """Return a law with its default gains."""
     made = coerce.law(law)
     return Candidate(made, (made,), remark)
+
+
+class GainRule(NamedTuple):
+    """How gains are searched on a plant."""
+
+    goal: Objective
+    budget: int  # sets of gains that a search tries at most, for each gain
+    quick: bool  # whether by `quick_search`
 
 
 class Trial(NamedTuple):
@@ -146,7 +154,9 @@ class Trial(NamedTuple):
     tune: bool = True  # whether laws without gains are tuned
     gain_set: str = "tuned"  # of the package's gains
     seed: int = 0  # another one draws other instances, noise and starts
-    brief: bool = False  # whether searches have BRIEF as objective
+    # whether gains are searched by `quick_search`, under the trial's conditions and with noise, on
+    # plants for which the package has no gains of its laws
+    quick: bool = False
     device: str = "cpu"  # on which the fast engine searches
     executor: Workers | None = None  # where searches and runs are made
 
@@ -213,33 +223,41 @@ class Trial(NamedTuple):
           ScenarioError: none of several laws can be tuned on a plant, so that there could be no
             winner, unless `defaults`. It is raised before the first search.
         """
-        known: dict[str, list[Candidate | None]] = {}
-        starts: dict[str, Starts | None] = {}
-        for plant in self.plants:
-            asked = self.asked if self.tune else None
-            candidates = [
-                _without_search(plant, law, self.gain_set, asked) for law in laws[plant.name]
-            ]
-            kinds = {candidate.law.source.kind for candidate in candidates if candidate}
-            known[plant.name] = candidates
-            if source.SHIPPED in kinds:
-                starts[plant.name] = None
-            else:
-                starts[plant.name] = self.starts
-            if self.tune and not self.defaults:
-                self._check_tunable(plant, laws[plant.name], candidates, starts[plant.name])
+        known = {plant.name: self.known(plant, laws[plant.name]) for plant in self.plants}
         if self.progress:
             for plant in self.plants:
                 self._say_if_few(known[plant.name], seeds)
         made: dict[str, list[Candidate]] = {}
         for plant in self.plants:
             made[plant.name] = []
+            rule = self.rule(plant, known[plant.name])
             for law, found in zip(laws[plant.name], known[plant.name], strict=True):
-                candidate = found or _default(law)
+                candidate = found or default_of(law)
                 if found is None and self.tune:
-                    candidate = self.search_gains(plant, law, starts[plant.name])
+                    candidate = self.search_gains(plant, law, rule)
                 made[plant.name].append(candidate)
         return made
+
+    def known(self, plant: Plant, laws: Laws) -> list[Candidate | None]:
+        """Return the laws whose gains on a plant are known, None for each of the others.
+
+        Raises:
+          ScenarioError: see `candidates`.
+        """
+        asked = self.asked if self.tune else None
+        known = [_without_search(plant, law, self.gain_set, asked) for law in laws]
+        if self.tune and not self.defaults:
+            self._check_tunable(plant, laws, known, self.rule(plant, known).goal)
+        return known
+
+    def rule(self, plant: Plant, known: Sequence[Candidate | None]) -> GainRule:
+        """Return how the gains of the other laws are searched: as those of the package, from the
+        same starts, if some laws have these.
+        """
+        shipped = source.SHIPPED in {one.law.source.kind for one in known if one}
+        if self.quick and not shipped:
+            return GainRule(self.asked_goal(plant), quick_search.BUDGET, True)
+        return GainRule(self._goal(plant, None if shipped else self.starts), self.budget, False)
 
     def _say_if_few(self, known: Sequence[Candidate | None], seeds: int) -> None:
         """Say before minutes of tuning that so few sets of gains or runs can name no winner."""
@@ -263,7 +281,7 @@ class Trial(NamedTuple):
         plant: Plant,
         laws: Laws,
         known: Sequence[Candidate | None],
-        starts: Starts | None,
+        goal: Objective,
     ) -> None:
         """Raise ScenarioError, with the first reason, if none of several laws can be tuned on a
         plant.
@@ -273,7 +291,7 @@ class Trial(NamedTuple):
             if candidate:
                 reason = candidate.remark
             else:
-                reason = self._why_not(plant, law, starts)
+                reason = search.why_not(plant, law, goal)
             if not reason:
                 return
             reasons.append(reason)
@@ -283,24 +301,34 @@ class Trial(NamedTuple):
                 "gains"
             )
 
-    def _why_not(self, plant: Plant, law: Component | Template, starts: Starts | None) -> str:
-        """Return why a law cannot be tuned on a plant, or ""."""
-        return search.why_not(plant, law, self._goal(plant, starts))
+    def asked_goal(self, plant: Plant) -> Objective:
+        """Return the objective under the trial's conditions, and noise where none of them has any,
+        in shorter runs. Events are at half of these, too.
+        """
+        conditions = list(self.conditions)
+        noisy = any("noise" in one.on(plant, self.duration) for one in conditions)
+        if not noisy and applicable([NOISE], [plant], self.duration):
+            conditions.append(NAMED[NOISE])
+        usual = Objective()
+        return dataclasses.replace(
+            usual,
+            conditions=tuple(conditions),
+            starts=self.starts or usual.starts,
+            duration=SEARCHED * self.duration,
+        )
 
     def _goal(self, plant: Plant, starts: Starts | None) -> Objective:
-        """Return the objective of searches on a plant."""
-        usual = BRIEF if self.brief else Objective()
+        """Return the objective of whole searches on a plant."""
+        usual = Objective()
         fit = applicable([c.name for c in usual.conditions], [plant], usual.duration)
         conditions = tuple(c for c in usual.conditions if c.name in fit)
         return dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
 
-    def search_gains(
-        self, plant: Plant, law: Component | Template, starts: Starts | None
-    ) -> Candidate:
+    def search_gains(self, plant: Plant, law: Component | Template, rule: GainRule) -> Candidate:
         """Return a law with gains that searches find, or found in an earlier call, or with its
         defaults if it cannot be tuned.
         """
-        goal = self._goal(plant, starts)
+        goal = rule.goal
         default = coerce.law(law)
         if isinstance(law, Template):
             template = law
@@ -317,7 +345,7 @@ class Trial(NamedTuple):
                 return search.tune(
                     plant,
                     law,
-                    self.budget,
+                    rule.budget,
                     0,
                     goal,
                     self.threads,
@@ -326,14 +354,15 @@ class Trial(NamedTuple):
                     folder=folder / "searches",
                     device=self.device,
                     executor=self.executor,
+                    quick=rule.quick,
                 )
 
         try:
             first = goal.scenarios(plant, default)[0]
             code = fingerprint.of((default.function, ranges))
             tuned = cached(
-                folder / f"{plant.name}-{law.name}-{self.searches}-{self.budget}.json",
-                [run_key.key(first), goal.describe(), code],
+                folder / f"{plant.name}-{law.name}-{self.searches}-{rule.budget}.json",
+                [run_key.key(first), goal.describe(), code, rule.quick],
                 searched,
                 lambda made, path: made.save(path),
                 lambda path: result.load_tuned(path, plant),
@@ -341,7 +370,7 @@ class Trial(NamedTuple):
         except BrokenLawError:
             raise
         except ScenarioError as error:
-            return _default(law, f"{NOT_TUNED}{error}")
+            return default_of(law, f"{NOT_TUNED}{error}")
         if self.progress:
             for words in known:
                 print(words, file=sys.stderr)
@@ -383,6 +412,8 @@ class Trial(NamedTuple):
         with bar(words, laws, self.progress, counted=True) as shown:
             for plant in self.plants:
                 goal = self._goal(plant, self.starts)
+                if self.rule(plant, candidates[plant.name]).quick:
+                    goal = self.asked_goal(plant)
                 least = len(goal.conditions) * goal.duration**2 / 2.0
                 runs = Holdout({}, {}, {}, {}, least)
                 with contextlib.suppress(ScenarioError):

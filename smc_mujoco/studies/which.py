@@ -5,9 +5,11 @@ A need is a metric to compare, such as "fast", or a property that each law must 
 settles most often is not compared, because a law that does nothing would be the calmest. The others
 stand by the number of their runs that fail, then by their mean rank over all needs and conditions,
 see `Boards.order`. This order is not tested; the last line of the answer says how sure it is.
+
+Within minutes the laws race instead, see `race` and `advise`.
 """
 
-import dataclasses
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
@@ -19,9 +21,8 @@ from smc_mujoco.analysis.paired_runs import SETTLES, values
 from smc_mujoco.analysis.ranking import RELEVANT, Relevant
 from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find
-from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.control import gain_sets
-from smc_mujoco.control.component import Component, Template, gain_text
+from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.properties import PROPERTIES, suitable
 from smc_mujoco.mechanisms.custom.scales import falls
 from smc_mujoco.mechanisms.named import as_plant
@@ -30,7 +31,8 @@ from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import Starts, listed, listed_laws
 from smc_mujoco.simulation.workers import Workers
-from smc_mujoco.studies.board import Boards
+from smc_mujoco.studies.advice import Advice
+from smc_mujoco.studies.advise import advise
 from smc_mujoco.studies.compare import DrawSeed
 from smc_mujoco.studies.fair_gains import Laws, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import leaderboard
@@ -39,90 +41,10 @@ from smc_mujoco.studies.table import Table
 NEEDS: Mapping[str, str] = {metric.need: metric.name for metric in metrics() if metric.need}
 DEFAULT_NEEDS = ("fast", "accurate", "calm")
 DEFAULT_CONDITIONS = ("nominal", "noise", "sine")
-RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
 MIN_SETTLED = 0.5  # of the share of runs that settle under the best law; chosen
-# laws that go on where quick tunes all of them first, and the seeds of their first runs; chosen
-FINALISTS, FEW = 5, 6
-QUICK_SEARCHES, QUICK_BUDGET = 3, 16  # budget: evaluations of a search for each gain
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Advice(Tables):
-    """Laws compared for a plant, best first, and which to use; `print` shows it."""
-
-    table: Table  # the runs of all laws
-    leaderboard: Boards  # of the laws that settle often enough, a board for each need
-    laws: tuple[Component, ...]  # with their gains: those of the boards, best first
-    settles: Mapping[str, float]  # law -> the least share of its runs that settle in a condition
-    left_out: Sequence[str] = ()  # laws that did not go on after one search and FEW runs
-
-    @property
-    def law(self) -> Component:
-        """The first law, with its gains."""
-        return self.laws[0]
-
-    @property
-    def second(self) -> Component | None:
-        """The second law, with its gains; None if there is no other."""
-        return self.laws[1] if len(self.laws) > 1 else None
-
-    @property
-    def answer(self) -> list[str]:
-        """Four lines: the law, its gains, the second, and the evidence."""
-        first = self.law
-        gains = ", ".join(f"{name}={gain_text(value)}" for name, value in first.gains.items())
-        return [
-            f"Use: {self._name}",
-            f"Gains: {gains or 'none'}, {first.source}",
-            f"Second: {self.second or 'none'}",
-            f"Evidence: {self._sure}",
-        ]
-
-    @property
-    def _name(self) -> str:
-        """The first law's name, or a sentence if it does not settle reliably."""
-        if self.settles[self.law.name] < RELIABLE:
-            return f"no law settles reliably; the nearest is {self.law.name}"
-        return self.law.name
-
-    @property
-    def _sure(self) -> str:
-        boards = self.leaderboard
-        settles = self.settles[self.law.name]
-        if settles < RELIABLE:
-            share = f"{100 * settles:.0f} % of its runs in its worst condition"
-            return f"no law is reliable here; this one settles in {share}"
-        if len(self.laws) < 2:
-            return "there is no second law"
-        if barred := [law for board in boards for law in board.barred if law != self.law.name]:
-            return f"first so far; --defaults lets a law win over {barred[0]}'s default gains"
-        if all(board.too_few for board in boards):
-            return f"first so far; {boards[0].too_few}"
-        name = self.law.name
-        blocks = sum(len(board.blocks) for board in boards)
-        wins = sum(len(board.wins(name)) for board in boards)
-        losses = sum(len(board.losses(name)) for board in boards)
-        text = f"it wins {wins} of {blocks} comparisons, and another law wins {losses}"
-        if wins:
-            return text
-        return f"first so far; {text}"
-
-    @property
-    def tables(self) -> list[Tabular]:
-        """The tables of the `leaderboard`, with the answer below the last."""
-        *others, last = self.leaderboard.tables
-        notes = [*last.notes, ""]
-        if self.left_out:
-            notes.append(
-                f"Left out after one search and {FEW} runs in each condition, though the best may "
-                f"be among them (run without quick, or name five laws): {', '.join(self.left_out)}"
-            )
-        if rare := sorted(self.settles.keys() - {law.name for law in self.laws}):
-            notes.append(
-                "Not compared, as they settle in fewer than half as many runs as another law: "
-                f"{', '.join(rare)}"
-            )
-        return [*others, dataclasses.replace(last, notes=notes + self.answer)]
+SEEDS, RACE_SEEDS = 24, 14  # runs of a law in each condition, of a whole comparison and of a race
+QUICK_MINUTES = 10.0
+RACED = 0.7  # of the minutes: the share in which searches begin; chosen
 
 
 @constrained
@@ -131,7 +53,7 @@ def which(
     conditions: str | Condition | Sequence[str | Condition] | None = None,
     needs: str | Sequence[str] = DEFAULT_NEEDS,
     laws: str | Component | Template | Sequence[str | Component | Template] | None = None,
-    seeds: Annotated[int, Whole(low=1, high=10_000)] = 24,
+    seeds: Annotated[int, Whole(low=1, high=10_000)] | None = None,
     duration: Positive | None = None,
     starts: Starts | None = None,
     out: Annotated[str | Path, FilePath()] = "which",
@@ -144,6 +66,7 @@ def which(
     device: Device = "cpu",
     executor: Workers | None = None,
     falling: Boolean = False,
+    minutes: Positive | None = None,
 ) -> Advice:
     """Recommend a law for a plant: compare all laws that suit, with gains for the plant, and say
     how certain the answer is.
@@ -155,72 +78,67 @@ def which(
         "gentle", "frugal", "no-overshoot"; by default fast, accurate and calm. And what every law
         must have: "continuous" and the other names of `smc_mujoco.control.properties.PROPERTIES`.
       laws: the laws to compare, by name or with your own gains. Default: all that suit.
-      seeds: runs of a law in each condition, each with another start and other noise.
-      duration: of a run, s. Default: 5, or 3 if quick.
+      seeds: runs of a law in each condition, each with another start and other noise. Default: 24,
+        or 14 with minutes.
+      duration: of a run, s. Default: 5, or 3 with minutes.
       out: folder for gains and runs, which another call reads.
-      quick: shorter runs, three searches of 16 evaluations a gain in place of 12 of 64. On your own
-        model also a shorter objective, and by default the usual laws. There
-        one search and six runs in each condition come first, and the best five laws go on.
+      quick: the same as minutes=10.
       defaults: whether a law may win over rivals whose gains are their defaults.
       falling: whether to go on where the base of your model falls while its joints are held, so
         that no law of a joint can be judged.
+      minutes: how long the whole may take. Then laws race: their gains are searched under the
+        conditions asked for and noise, a quarter as long, in turn over the laws until one has the
+        lowest J, at most 12 sets a law. The clock may change how many sets there are, and with
+        them the answer; with the same sets it is the same to the last bit. After a stop, the same
+        call goes on with the sets that the folder has. The `RaceAdvice` that comes back has the
+        `margins` of the first law and its `worst_run`, too. Default: a whole comparison, which no
+        clock stops.
       starts, relevant, threads, progress, seed, device, executor: as in `compare`.
 
     Raises:
       ScenarioError: an unknown name, no law that suits, a need without a number on this plant, or
         a base that falls.
     """
+    began = time.monotonic()
+    if quick and minutes is None:
+        minutes = QUICK_MINUTES
     machine = as_plant(plant)
     if not falling and (why := falls(machine)):
         raise ScenarioError(f"{why}; falling=True (--falling) goes on all the same")
     compared, properties = _asked(machine, needs)
-    brief = quick and machine.is_user_model
     chosen = _suited(machine, properties, laws)
-    if brief and laws is None:
+    if minutes and machine.is_user_model and laws is None:
         known = [law for law in chosen if law.name in gain_sets.COMPARED]
         chosen = known or chosen
-    length = duration or (3.0 if quick else 5.0)
     trial = Trial.of(
         [machine],
         conditions,
         DEFAULT_CONDITIONS,
-        length,
+        duration or (3.0 if minutes else 5.0),
         out,
         starts=starts,
         threads=threads,
         progress=progress,
         defaults=defaults,
         seed=seed,
-        brief=brief,
+        quick=minutes is not None,
         device=device,
         executor=executor,
     )
-    if quick:
-        trial = trial._replace(usual=QUICK_SEARCHES, budget=QUICK_BUDGET)
     trial.check({machine.name: chosen})
-
-    def judged(table: Table) -> tuple[dict[str, float], Boards]:
-        settles, fit = _fit(table)
-        boards = leaderboard(table.select(law=fit), compared, defaults=defaults, relevant=relevant)
-        if not boards:
-            raise ScenarioError(
-                f"no need has a number in any run on {machine.name}: ask for others"
-            )
-        return settles, boards
-
-    left_out: list[str] = []
-    if brief and len(chosen) > FINALISTS:
-        first = trial._replace(usual=1).candidates({machine.name: chosen}, FEW)
-        _, boards = judged(trial.run(first, min(FEW, seeds), half_steps=False))
-        best = boards.order[:FINALISTS]
-        left_out = [law.name for law in chosen if law.name not in best]
-        chosen = [law for law in chosen if law.name in best]
-    candidates = trial.candidates({machine.name: chosen}, seeds)
-    table = trial.run(candidates, seeds)
-    settles, boards = judged(table)
+    if minutes:
+        until = began + RACED * 60.0 * minutes
+        return advise(trial, machine, chosen, compared, seeds or RACE_SEEDS, until, relevant)
+    count = seeds or SEEDS
+    candidates = trial.candidates({machine.name: chosen}, count)
+    table = trial.run(candidates, count)
+    settles, fit = _fit(table)
+    boards = leaderboard(table.select(law=fit), compared, defaults=defaults, relevant=relevant)
+    if not boards:
+        raise ScenarioError(f"no need has a number in any run on {machine.name}: ask for others")
     found = {law.name: law for law, _, _ in candidates[machine.name]}
     ordered = tuple(found[name] for name in boards.order)
-    return Advice(table=table, leaderboard=boards, laws=ordered, settles=settles, left_out=left_out)
+    return Advice(table=table, leaderboard=boards, laws=ordered, settles=settles)
 
 
 def _asked(plant: Plant, needs: str | Sequence[str]) -> tuple[list[str], list[str]]:

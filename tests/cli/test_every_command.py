@@ -58,7 +58,7 @@ CALLS = {
     "which duffing --needs calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 "
     "--x0 0.4 "
     "--relevant 0.05 --out there --defaults --seed 5 --json w.json --threads 2 --device cuda "
-    "--executor dask://h:1 --falling": ["studies.which.which"],
+    "--executor dask://h:1 --minutes 2 --no-film --falling": ["studies.which.which"],
     "tune duffing pid": ["analysis.tuning.search.tune"],
     "tune duffing pid --device cuda --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
     "--condition noise --x0 0.4 --json j.json --threads 2": ["analysis.tuning.search.tune"],
@@ -137,7 +137,7 @@ FLAGS = {
 }
 FLAGS |= {"--no-binary"}
 # which function does the work; --needs and --plant of `list`
-SWITCHES = {"--rig", "--needs", "--plant"}
+SWITCHES = {"--rig", "--needs", "--plant", "--no-film"}
 AFTER = {"--figure", "--latex", "--json", "--out"}  # of what is done after the function
 FOLDERS = {"run", "compare", "which"}  # whose --out is a folder
 ALIASES = {  # option -> arguments that it may change, besides the one of its name

@@ -8,13 +8,14 @@ import types
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.control.law import catalogue, law_function
 from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
-from smc_mujoco.simulation.conditions import NAMED
+from smc_mujoco.simulation.conditions import NAMED, find_condition
 from smc_mujoco.studies import fair_gains
 from smc_mujoco.studies.fair_gains import Candidate, Trial
 
@@ -29,8 +30,8 @@ def trial(folder, plants=(), starts=None, **search) -> Trial:
 def test_laws_are_tuned_from_the_starts_of_the_packages_gains_where_these_are_compared(monkeypatch):
     asked = []
 
-    def search_gains(self, plant, law, starts):
-        asked.append(starts)
+    def search_gains(self, plant, law, rule):
+        asked.append(rule.goal.starts)
 
     monkeypatch.setattr(Trial, "search_gains", search_gains)
     other = smc.starts(x0=0.5)
@@ -38,7 +39,7 @@ def test_laws_are_tuned_from_the_starts_of_the_packages_gains_where_these_are_co
     laws = [catalogue()["classical"], mine]
     for plant in (DUFFING, smc.plant("duffing", M=2.0)):
         trial(Path("gains"), [plant], other, defaults=True).candidates({"duffing": laws}, 12)
-    assert asked == [None, other, other]
+    assert asked == [Objective().starts, other, other]
 
 
 def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(tmp_path, monkeypatch):
@@ -92,13 +93,14 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
     fixed = Gain(1.0, FORCE_PER_SPEED, held=True)
     held = dataclasses.replace(my_spring, gains={**my_spring.gains, "kd": fixed})
     other = dataclasses.replace(DUFFING, build=build)
+    rule = trial(tmp_path).rule(DUFFING, [])
     for plant, law in (
         (DUFFING, my_spring),
         (DUFFING, my_spring),
         (DUFFING, held),
         (other, held),
     ):
-        trial(tmp_path).search_gains(plant, law, None)
+        trial(tmp_path).search_gains(plant, law, rule)
     assert asked[0] == asked[1]
     assert len(set(asked)) == 3
 
@@ -119,17 +121,37 @@ def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(tmp_path, monke
     )
     monkeypatch.setattr(fair_gains, "cached", lambda *rest: tuned)
     default = smc.law("observer_free")
-    own = trial(tmp_path).search_gains(DUFFING, default, None)
+    rule = trial(tmp_path).rule(DUFFING, [])
+    own = trial(tmp_path).search_gains(DUFFING, default, rule)
     assert own.law == default
     assert own.remark == "its defaults, better than those tried"
     assert own.law.source.kind == FAST.source.kind
     tuned.before = 3.0
-    found = trial(tmp_path).search_gains(DUFFING, default, None)
+    found = trial(tmp_path).search_gains(DUFFING, default, rule)
     assert found.law == FAST
     assert found.remark == ""
     # also with another seed of the comparison run i has the gains of search i
     for first in (0, 1_000_000):
         assert [found(first + i).gains["k1"] for i in range(3)] == [2.0, 2.5, 2.0]
+
+
+def test_quick_searches_are_under_what_is_asked_for_and_noise_where_no_gains_are_shipped():
+    """A condition that has noise needs no other; where some gains are shipped, all are as these."""
+    machine = dataclasses.replace(smc.plant("duffing", M=2.0), name="mine")
+    other = smc.starts(x0=0.5)
+    for given, searched in (
+        (("friction", "delay_10ms"), ["friction", "delay_10ms", "noise"]),
+        (("noise + friction",), ["noise + friction"]),
+    ):
+        asked = [find_condition(name) for name in given]
+        quick = trial(Path("gains"), [machine], other, quick=True)._replace(conditions=asked)
+        rule = quick.rule(machine, [None])
+        assert [one.name for one in rule.goal.conditions] == searched
+        assert rule.goal.duration == pytest.approx(quick.duration * 2 / 3)
+        assert (rule.goal.starts, rule.quick, rule.budget) == (other, True, 16)
+    shipped = quick.known(DUFFING, [catalogue()["pid"]])
+    whole = quick.rule(DUFFING, [*shipped, None])
+    assert (whole.goal.starts, whole.quick) == (Objective().starts, False)
 
 
 def test_a_law_with_fewer_shipped_sets_than_searches_asked_for_is_tuned_too(monkeypatch):

@@ -2,16 +2,19 @@
 
 import dataclasses
 import re
+from pathlib import Path
 
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.tuning import search
+from smc_mujoco.analysis.tuning import quick_search, search
 from smc_mujoco.cli import main
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.properties import searched
+from smc_mujoco.studies import advice as advice_module
+from smc_mujoco.studies import race
 from smc_mujoco.studies import which as module
 from smc_mujoco.studies.board import Boards
 
@@ -134,24 +137,80 @@ def test_properties_choose_laws_and_laws_with_given_gains_keep_them(tmp_path):
 MASS = """<mujoco model="mass"><worldbody><body><joint name="slide" type="slide" axis="1 0 0"/>
 <geom size=".1" mass="2" contype="0" conaffinity="0"/></body></worldbody><actuator>
 <motor joint="slide" ctrlrange="-9 9"/></actuator></mujoco>"""
+HOLDING = [smc.law("pid", kp=60.0, ki=1.0, kd=kd).named(f"of{kd:g}") for kd in (20.0, 60.0)]
 
 
-@pytest.mark.parametrize("kept", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_quick_drops_laws_after_few_runs_and_keeps_the_order(kept, tmp_path, monkeypatch):
+@pytest.fixture(scope="module")
+def raced(tmp_path_factory):
+    """A law that is tuned for a mass and two with given gains, the last of which is slow."""
+    folder = tmp_path_factory.mktemp("raced")
     plant = smc.plant_from(MASS, ["slide"])
-    laws = []
-    for kd in (8.0, 12.0, 40.0, 90.0):
-        laws.append(smc.law("pid", kp=40.0, ki=1.0, kd=kd).named(f"of{kd:g}"))
-    run = {"laws": laws, "needs": "fast", "quick": True, "conditions": ["nominal", "noise"]}
-    whole = smc.which(plant, **run, out=tmp_path / "all")
-    monkeypatch.setattr(module, "FINALISTS", kept)
-    found = smc.which(plant, **run, out=tmp_path / "few")
-    assert found.laws == whole.laws[:kept]
-    dropped = [law.name for law in laws if law not in found.laws]
-    assert found.left_out == dropped
-    assert len(found.table) == 2 * 24 * kept
-    note = found.tables[-1].notes[-5]
-    assert all(name in note for name in ("may be", *found.left_out))
+    asked = {
+        "conditions": ["coulomb"],
+        "laws": ["observer_free", *HOLDING],
+        "out": folder,
+        "seeds": 4,
+    }
+    return asked, smc.which(plant, **asked, quick=True, duration=1.5), plant
+
+
+def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(raced):
+    _, advice, _ = raced
+    lines = dict(line.split(": ", 1) for line in advice.answer)
+    assert [*lines][:5] == ["Use", "However tuned", "With these gains", "Settles", "Tolerates"]
+    assert lines["Use"] == advice.law.name
+    assert smc.law(lines["Gains"].split(", tuned here")[0]).gains == advice.law.gains
+    assert [margin.kind for margin in advice.margins] == ["delay", "friction", "mass", "blow"]
+    assert advice.worst_run.law == advice.law
+    assert advice.worst_run.condition == "coulomb"
+    assert len(advice.table) == 4 * len(advice.laws)
+    text = str(advice)
+    assert "too few" not in text
+    assert "J over coulomb and noise on mass" in text
+    assert "*" not in text
+
+
+def test_a_race_that_is_asked_for_again_gives_the_same_answer_from_its_folder(raced, monkeypatch):
+    asked, advice, plant = raced
+    monkeypatch.setattr(search.TuningTask, "search", None)
+    again = smc.which(plant, **asked, minutes=1e-6, duration=1.5)
+    assert str(again) == str(advice)
+
+
+def test_the_clock_may_end_a_race_before_the_first_look(raced, tmp_path):
+    asked, _, plant = raced
+    short = smc.which(plant, **asked | {"out": tmp_path}, minutes=1e-6, duration=1.5)
+    assert short.race.stopped
+    assert {len(one.values) for one in short.race.entrants.values()} == {1}
+    (however,) = (line for line in short.answer if line.startswith("However tuned"))
+    assert "open; 1 set of gains of each law" in however
+    assert "7 can name a winner" in however
+
+
+def test_a_law_that_does_not_settle_is_not_advised_without_saying_where(raced):
+    _, advice, _ = raced
+    name = advice.law.name
+    rare = dataclasses.replace(
+        advice, settles={**advice.settles, name: 0.5}, settled={name: {"coulomb": (2, 4)}}
+    )
+    lines = dict(line.split(": ", 1) for line in rare.answer)
+    assert lines["Use"] == f"{name}, which does not settle reliably in every condition"
+    assert lines["Settles"] == "not reliably: in 2 of 4 under coulomb runs"
+
+
+def test_the_page_has_the_numbers_of_the_code():
+    page = (Path(__file__).parents[2] / "docs" / "which.md").read_text()
+    for words in (
+        f"`--quick` is `--minutes {module.QUICK_MINUTES:g}`",
+        f"in how many of {module.RACE_SEEDS} more runs",
+        f"fewer than {100 * advice_module.RELIABLE:g} %",
+        f"{quick_search.BUDGET} evaluations a gain",
+        f"after {race.LOOKS[0]} sets the laws are compared",
+        f"again after {race.LOOKS[1]}, unless the {race.LOOKS[0]} say that more than {race.WITHIN} ",
+        f"the first {100 * module.RACED:g} % of the minutes",
+        f"each condition from {module.SEEDS} seeds",
+    ):
+        assert words in page
 
 
 REFUSED = [

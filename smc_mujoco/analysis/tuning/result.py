@@ -116,6 +116,10 @@ class Tuned(Tables):
         """Return the tuning with a law that names these searches as the source of its gains."""
         return dataclasses.replace(self, law=self.law.sourced(source.TUNED, self.search))
 
+    def of_law(self, law: Component) -> "Tuned":
+        """Return the tuning with another of its sets of gains as that of the law."""
+        return dataclasses.replace(self, law=law)
+
     @property
     def search(self) -> source.GainSearch:
         """The searches: their rule, their number, their evaluations, and how far their J differ."""

@@ -13,6 +13,7 @@ from smc_mujoco.common.interrupts import delay_signals
 from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
+    from smc_mujoco.studies.advice import RaceAdvice
     from smc_mujoco.studies.table import Table
 
 
@@ -35,9 +36,14 @@ def which(
     ] = None,
     law: options.Laws = None,
     quick: options.Quick = False,
-    seeds: Annotated[int, typer.Option(min=1, help="Runs of each law in each condition.")] = 24,
+    seeds: Annotated[
+        int | None,
+        typer.Option(
+            min=1, help="Runs of each law in each condition; default 24, or 14 with --minutes."
+        ),
+    ] = None,
     duration: Annotated[
-        float | None, typer.Option(help="Duration of a run, s; default 5, or 3 with --quick.")
+        float | None, typer.Option(help="Duration of a run, s; default 5, or 3 with --minutes.")
     ] = None,
     x0: options.X0 = None,
     relevant: options.Relevant = RELEVANT,
@@ -51,14 +57,24 @@ def which(
     falling: Annotated[
         bool, typer.Option("--falling", help="Go on where the base of your model falls.")
     ] = False,
+    minutes: Annotated[
+        float | None,
+        typer.Option(
+            help="Answer within about so many minutes; --quick is --minutes 10. Laws race under "
+            "the conditions asked for, until one has the lowest J."
+        ),
+    ] = None,
+    film: Annotated[
+        bool, typer.Option(help="Whether to film the advised law's worst run, with --minutes.")
+    ] = True,
 ) -> None:
     """Recommend a law for a plant. Report its gains, the second-best law, and how certain the
     choice is.
 
     All laws that suit the plant are compared by the rules of `compare`, with the package's gains
     or with gains that are tuned now. On a model of your own, tuning takes minutes for each law.
-    --quick takes a sixteenth of that time. --law names the laws to try. A stopped command resumes
-    when you start it again.
+    --quick takes ten minutes for all at most: it also writes the gains, a figure and a film of the
+    worst run. --law names the laws to try. A stopped command resumes when you start it again.
 
     Example: smc-mujoco which duffing --condition noise,coulomb --needs calm,fast
 
@@ -66,6 +82,7 @@ def which(
     sensor=Encoder(counts=4096)" --needs accurate
     """
     with delay_signals():
+        from smc_mujoco.studies.advice import RaceAdvice
         from smc_mujoco.studies.which import which as advise
 
     terminal = Terminal(json)
@@ -87,9 +104,36 @@ def which(
         device=device,
         executor=executor,
         falling=falling,
+        minutes=minutes,
     )
     terminal.print(advice)
+    if isinstance(advice, RaceAdvice):
+        _save(advice, out, film, terminal)
     _finish(advice.table, out, terminal)
+
+
+def _save(advice: "RaceAdvice", out: Path, film: bool, terminal: Terminal) -> None:
+    """Write the gains of the first law, and a figure and a film of its worst run."""
+    from smc_mujoco.draw import figure, page
+    from smc_mujoco.simulation.run import run
+
+    if advice.tuned:
+        file = advice.tuned.save(out / "advised.json")
+        terminal.wrote(file)
+        terminal.note(f"--law {advice.law.name}  with these gains: --law {file}")
+    trace = run(advice.worst_run)
+    figure.figure([trace], out / "worst_run")
+    terminal.wrote(*page.files(out / "worst_run"))
+    if not film:
+        return
+    from smc_mujoco.draw.film import film as films
+
+    try:
+        films.film([trace], out / "worst_run.mp4")
+    except ScenarioError as error:  # the answer stands without it
+        terminal.note(f"no film: {error}", wrap=True)
+    else:
+        terminal.wrote(out / "worst_run.mp4")
 
 
 def compare(

@@ -1,0 +1,256 @@
+"""Advice: which law to use on a plant, with its gains, and how certain that is, in words."""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+
+from smc_mujoco.analysis.ranking import Comparison
+from smc_mujoco.analysis.step_halving import UNTRIED
+from smc_mujoco.analysis.tuning.result import Tuned
+from smc_mujoco.common.tabular import Cell, Tables, Tabular
+from smc_mujoco.common.text import capital, counted, joined, number
+from smc_mujoco.control.component import Component, gain_text
+from smc_mujoco.robustness.margins import Margin
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.studies.board import MAX_LEAD, MEDIANS, Boards, Lead
+from smc_mujoco.studies.race import FIRST, LOOKS, Race, needed
+from smc_mujoco.studies.table import Table
+
+RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Advice(Tables):
+    """Laws compared for a plant, best first, and which to use; `print` shows it."""
+
+    table: Table  # the runs of all laws
+    leaderboard: Boards  # of the laws that settle often enough, a board for each need
+    laws: tuple[Component, ...]  # with their gains: those of the boards, best first
+    settles: Mapping[str, float]  # law -> the least share of its runs that settle in a condition
+
+    @property
+    def law(self) -> Component:
+        """The first law, with its gains."""
+        return self.laws[0]
+
+    @property
+    def second(self) -> Component | None:
+        """The second law, with its gains; None if there is no other."""
+        return self.laws[1] if len(self.laws) > 1 else None
+
+    @property
+    def answer(self) -> list[str]:
+        """Four lines: the law, its gains, the second, and the evidence."""
+        first = self.law
+        gains = ", ".join(f"{name}={gain_text(value)}" for name, value in first.gains.items())
+        return [
+            f"Use: {self._name}",
+            f"Gains: {gains or 'none'}, {first.source}",
+            f"Second: {self.second or 'none'}",
+            f"Evidence: {self._sure}",
+        ]
+
+    @property
+    def _name(self) -> str:
+        """The first law's name, or a sentence if it does not settle reliably."""
+        if self.settles[self.law.name] < RELIABLE:
+            return f"no law settles reliably; the nearest is {self.law.name}"
+        return self.law.name
+
+    @property
+    def _sure(self) -> str:
+        boards = self.leaderboard
+        settles = self.settles[self.law.name]
+        if settles < RELIABLE:
+            share = f"{100 * settles:.0f} % of its runs in its worst condition"
+            return f"no law is reliable here; this one settles in {share}"
+        if len(self.laws) < 2:
+            return "there is no second law"
+        if barred := [law for board in boards for law in board.barred if law != self.law.name]:
+            return f"first so far; --defaults lets a law win over {barred[0]}'s default gains"
+        if all(board.too_few for board in boards):
+            return f"first so far; {boards[0].too_few}"
+        name = self.law.name
+        blocks = sum(len(board.blocks) for board in boards)
+        wins = sum(len(board.wins(name)) for board in boards)
+        losses = sum(len(board.losses(name)) for board in boards)
+        text = f"it wins {wins} of {blocks} comparisons, and another law wins {losses}"
+        if wins:
+            return text
+        return f"first so far; {text}"
+
+    @property
+    def tables(self) -> list[Tabular]:
+        """The tables of the `leaderboard`, with the answer below the last."""
+        *others, last = self.leaderboard.tables
+        notes = [*last.notes, ""]
+        if rare := sorted(self.settles.keys() - {law.name for law in self.laws}):
+            notes.append(
+                "Not compared, as they settle in fewer than half as many runs as another law: "
+                f"{', '.join(rare)}"
+            )
+        return [*others, dataclasses.replace(last, notes=notes + self.answer)]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class RaceAdvice(Advice):
+    """Advice within minutes: laws that raced, those that may be best first, and which to use."""
+
+    race: Race
+    # of `laws` with these gains, by J of the same unseen runs; None for one law
+    fixed: Comparison | None
+    # law -> condition -> the numbers of its runs that settle, and of all
+    settled: Mapping[str, Mapping[str, tuple[int, int]]]
+    margins: Sequence[Margin]  # of the first law with its gains, without other conditions
+    worst_run: Scenario  # of the first law in the condition where it fares worst
+    tuned: Tuned | None  # the searches for the gains of the first law; None if they were known
+    left_out: Mapping[str, str]  # law -> why it could not be tuned
+    judged: str  # what J is of, in words
+
+    @property
+    def answer(self) -> list[str]:
+        """The law, its gains, the second, and the evidence, a line each."""
+        lines = [f"Use: {self._name}"]
+        searched = any(one.task or one.count > 1 for one in self.race.entrants.values())
+        if searched and self.race.comparison:
+            lines.append(f"However tuned: {self._however}")
+        if self.fixed:
+            lines.append(
+                f"With these gains: {_verdict(self.fixed, [one.name for one in self.laws])}"
+            )
+        lines += [f"Settles: {self._where}", f"Tolerates: {self._margins}"]
+        for name, share in self.race.dropped.items():
+            least = f"its lowest J was {number(share)} times the highest of the law that led"
+            lines.append(f"Dropped after {FIRST} sets, not tested: {name}; {least}")
+        for name, why in self.left_out.items():
+            lines.append(f"Left out: {name}, {why}")
+        lines.append(f"Second: {self.second or 'none'}")
+        lines.append(f"Gains: {self.law}, {self.law.source}")
+        return lines
+
+    @property
+    def _name(self) -> str:
+        if self.settles[self.law.name] < RELIABLE:
+            return f"{self.law.name}, which does not settle reliably in every condition"
+        return self.law.name
+
+    @property
+    def _however(self) -> str:
+        """What the sets of gains say of the laws."""
+        race, comparison = self.race, self.race.comparison
+        assert comparison is not None
+        text = _verdict(comparison, race.running)
+        if race.winner:
+            return text
+        if race.sets < LOOKS[0]:
+            more = (LOOKS[0] - race.sets) * race.seconds / 60.0
+            return (
+                f"open; {counted(race.sets, 'set')} of gains of each law were searched in the "
+                f"time, {LOOKS[0]} can name a winner, and the same call goes on with them; it "
+                f"takes about {math.ceil(more)} more minutes"
+            )
+        return f"{text}; {self._takes}"
+
+    @property
+    def _takes(self) -> str:
+        """What it would take to name a winner of sets of gains."""
+        race, comparison = self.race, self.race.comparison
+        assert comparison is not None
+        first, *others = race.running
+        sets = needed(comparison)
+        seen = max(comparison.visible(0, first, other) for other in others)
+        resolved = "no lead"
+        if seen < MAX_LEAD:
+            resolved = f"a lead of {100.0 * seen:.2g} %"
+        text = f"{race.sets} sets resolve {resolved}"
+        if math.isinf(sets):
+            return f"{text}, and the laws are too close for any number of sets to tell"
+        if race.stopped and sets <= LOOKS[-1]:
+            return f"{text}; about {sets:.0f} would decide, and the same call goes on with them"
+        return f"{text}; if the lead stays as it is, about {sets:.0f} would decide"
+
+    @property
+    def _where(self) -> str:
+        """In how many runs of which conditions the first law settles."""
+        found = self.settled[self.law.name]
+        rare = {name: pair for name, pair in found.items() if pair[0] < RELIABLE * pair[1]}
+        runs = next(iter(found.values()))[1]
+        if rare:
+            parts = [f"{done} of {of} under {name}" for name, (done, of) in rare.items()]
+            return f"not reliably: in {joined(parts)} runs"
+        least = min(done for done, _ in found.values())
+        return f"in at least {least} of {runs} unseen runs in {_each(len(found))}"
+
+    @property
+    def _margins(self) -> str:
+        if not self.margins:
+            return "not tried, as runs start at the goal"
+        parts = []
+        for margin in self.margins:
+            unit = "times" if margin.unit == "1" else margin.unit
+            level = f"{margin.text} {unit}".strip()
+            if math.isnan(margin.value):
+                return "nothing more: without changes it does not end within 5 % of its start"
+            parts.append(f"{margin.kind} {level}")
+        return f"{joined(parts)}, one at a time, within 5 % of the start at the end"
+
+    @property
+    def tables(self) -> list[Tabular]:
+        """J of the laws' sets of gains; the needs by condition, of the gains in the answer."""
+        shown = [self._objectives]
+        for table in self.leaderboard.tables:
+            rows = [[_unmarked(cell) for cell in row] for row in table.rows]
+            shown.append(dataclasses.replace(table, rows=rows, notes=()))
+        notes = [*self.leaderboard.failures, *self.leaderboard.untouched]
+        notes.append(
+            f"{MEDIANS} Nothing here is tested: what is, stands below. {capital(UNTRIED)}."
+        )
+        shown[-1] = dataclasses.replace(shown[-1], notes=[*notes, "", *self.answer])
+        return shown
+
+    @property
+    def _objectives(self) -> Tabular:
+        """The table of J of each law's sets of gains."""
+        rows = []
+        for name in (*self.race.running, *self.race.dropped):
+            values = sorted(self.race.entrants[name].values)
+            middle = number((values[(len(values) - 1) // 2] + values[len(values) // 2]) / 2.0)
+            cell = Cell(middle, f"{number(values[0])}–{number(values[-1])}")
+            rows.append([name, cell, f"{len(values)}"])
+        return Tabular(
+            headings=["law", "J (s^2)", "runs"],
+            rows=rows,
+            title=f"J {self.judged}",
+            notes=[
+                "Median and range over sets of gains, each on unseen runs of its own. J is the "
+                "time-weighted relative error plus the weighted variation of u, added up over "
+                "the conditions."
+            ],
+        )
+
+
+def _each(count: int) -> str:
+    return "its condition" if count == 1 else f"each of {count} conditions"
+
+
+def _unmarked(cell: Cell | str) -> Cell | str:
+    return cell if isinstance(cell, str) else cell._replace(strong=False)
+
+
+def _verdict(comparison: Comparison, order: Sequence[str]) -> str:
+    """Return which law has the lower J in a comparison of one block; `order` has laws by J."""
+    winner = comparison.winners[0]
+    names = [law for law in order if law in comparison.laws]
+    first = winner or names[0]
+    effects = {law: comparison.effect(0, first, law) for law in names if law != first}
+    rival = max(effects, key=lambda law: effects[law].high)
+    at = comparison.laws.index(first), comparison.laws.index(rival)
+    p = number(float(comparison.p[0][at]), 2)
+    lead = f"{Lead(first, rival, effects[rival]).words} (p {p})"
+    if winner:
+        return f"{winner} wins; its J is {lead}"
+    beaten = dict(zip(comparison.laws, comparison.worse[:, 0], strict=True))
+    best = [law for law in names if not beaten[law]]
+    if len(best) == 1:
+        return f"{best[0]} is undefeated, but does not beat every rival; its J is {lead}"
+    return f"open: {joined(best)} may have the lowest J; {first}'s is {lead}"

@@ -1,0 +1,193 @@
+"""Advice within minutes: a race over sets of gains, then runs with the gains that are advised.
+
+The race says which law has the lowest J however it is tuned. Of each law that may be the best, the
+three sets of the lowest J run on the same two unseen instances, which choose one. Eight others say
+which law has the lowest J with these gains, as their units are runs. The tables, the share of runs
+that settle, and the margins are of these gains, too, on runs of their own.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from smc_mujoco.analysis.paired_runs import SETTLES, values
+from smc_mujoco.analysis.ranking import Comparison
+from smc_mujoco.analysis.tuning import search
+from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective
+from smc_mujoco.analysis.tuning.result import Tuned
+from smc_mujoco.common.errors import BrokenLawError, ScenarioError
+from smc_mujoco.common.text import joined
+from smc_mujoco.control import source
+from smc_mujoco.control.component import Component
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.robustness.margins import COARSE, Margin, margins_of
+from smc_mujoco.simulation import coerce
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.studies.advice import RELIABLE, RaceAdvice
+from smc_mujoco.studies.fair_gains import NOT_TUNED, Candidate, Laws, Trial, default_of
+from smc_mujoco.studies.leaderboard import leaderboard
+from smc_mujoco.studies.race import Entrant, Race, compared, race, unseen
+from smc_mujoco.studies.table import Table
+
+SHOWN = 5  # laws in the tables by condition, at most; chosen
+CONSIDERED = 3  # sets of gains of a law, those of the lowest J; chosen
+CHOOSING = range(1001, 1003)  # unseen instances that choose one of them
+DECIDING = range(2000, 2008)  # and that compare laws with these; chosen
+KINDS = ("delay", "friction", "mass", "blow")  # of the margins
+KINDS_OF_POSES = ("delay", "disturbance", "mass", "blow")  # of a free body
+Settled = dict[str, dict[str, tuple[int, int]]]
+
+
+def advise(
+    trial: Trial,
+    plant: Plant,
+    laws: Laws,
+    metrics: Sequence[str],
+    seeds: int,
+    until: float,
+    relevant: float,
+) -> RaceAdvice:
+    """Race laws on a plant until a time of `time.monotonic`, s, and advise one of them; `metrics`
+    are those of the tables, from that many seeds.
+    """
+    goal = trial.asked_goal(plant)
+    entrants, left_out = _entrants(trial, plant, laws)
+    raced = race(trial, plant, entrants, goal, until, relevant)
+    shown = raced.first
+    if raced.winner:
+        shown = raced.running[:1] if len(raced.running) == 1 else [*raced.first, _next(raced)]
+    chosen, tuned = _chosen(trial, plant, raced, shown[:SHOWN], goal)
+    fixed = _fixed(trial, plant, chosen, goal, relevant)
+    candidates = {plant.name: [Candidate(law, (law,)) for law in chosen.values()]}
+    table = trial.run(candidates, seeds, half_steps=False)
+    settled = _settled(table)
+    shares = {law: min(n / of for n, of in found.values()) for law, found in settled.items()}
+    order = sorted(chosen, key=lambda law: shares[law] < RELIABLE)
+    boards = leaderboard(table, metrics, defaults=True, relevant=relevant)
+    if not boards:
+        raise ScenarioError(f"no need has a number in any run on {plant.name}: ask for others")
+    first = chosen[order[0]]
+    return RaceAdvice(
+        table=table,
+        leaderboard=boards,
+        laws=tuple(chosen[law] for law in order),
+        settles=shares,
+        race=raced,
+        fixed=fixed,
+        settled=settled,
+        margins=_margins(trial, plant, first),
+        worst_run=_worst_run(table, first.name),
+        tuned=tuned.get(first.name),
+        left_out=left_out,
+        judged=f"over {joined([one.name for one in goal.conditions])} on {plant.name}",
+    )
+
+
+def _next(raced: Race) -> str:
+    """Return the law of the lowest J beside the winner."""
+    return next(law for law in raced.running if law != raced.winner)
+
+
+def _entrants(trial: Trial, plant: Plant, laws: Laws) -> tuple[list[Entrant], dict[str, str]]:
+    """Return the laws that race, and why others cannot be tuned, by name."""
+    known = trial.known(plant, laws)
+    rule = trial.rule(plant, known)
+    entrants = []
+    left_out: dict[str, str] = {}
+    for law, found in zip(laws, known, strict=True):
+        made = coerce.law(law)
+        task = None
+        if found is None:
+            try:
+                task = search.task_of(plant, made, rule.goal, rule.budget, 0, trial.threads)
+                task = task._replace(quick=rule.quick, device=trial.device)
+            except BrokenLawError:
+                raise
+            except ScenarioError as error:
+                left_out[made.name] = f"{NOT_TUNED}{error}"
+        if found or task:
+            entrants.append(Entrant(found, task))
+        elif trial.defaults or len(laws) == 1:
+            entrants.append(Entrant(default_of(law), None))
+    return entrants, left_out
+
+
+def _chosen(
+    trial: Trial, plant: Plant, raced: Race, names: Sequence[str], goal: Objective
+) -> tuple[dict[str, Component], dict[str, Tuned]]:
+    """Return the laws with the set of gains that has the lowest J on the same unseen instances, and
+    their searches.
+    """
+    chosen, tunings = {}, {}
+    for name in names:
+        one = raced.entrants[name]
+        law = one.gains(0)
+        if one.count > 1:
+            order = np.argsort(one.values[: one.count], kind="stable")[:CONSIDERED].tolist()
+            sets = [one.gains(k) for k in order]
+            laws = [law for law in sets for _ in CHOOSING]
+            J, _ = unseen(trial, plant, laws, goal, [*CHOOSING] * len(sets))
+            law = sets[int(np.log(J).reshape(len(sets), -1).sum(axis=1).argmin())]
+        if one.task:
+            tuned = search.result_of(one.task, tuple(one.found)).sourced()
+            law = law.sourced(source.TUNED, tuned.search)
+            tunings[name] = tuned.of_law(law)
+        chosen[name] = law
+    return chosen, tunings
+
+
+def _fixed(
+    trial: Trial,
+    plant: Plant,
+    chosen: Mapping[str, Component],
+    goal: Objective,
+    relevant: float,
+) -> Comparison | None:
+    """Return the comparison of laws with these gains; None for one law."""
+    if len(chosen) < 2:
+        return None
+    J, halves, one, fine = {}, {}, {}, {}
+    for name, law in chosen.items():
+        J[name], halves[name] = unseen(trial, plant, [law] * len(DECIDING), goal, DECIDING)
+        one[name] = np.zeros(len(DECIDING))
+        fine[name] = J[name] < FAILURE_COST
+    return compared(J, goal, halves, one, fine, relevant)
+
+
+def _settled(table: Table) -> Settled:
+    """Return law -> condition -> the numbers of runs that settle, and of all."""
+    found: Settled = {}
+    columns = table.column("law").tolist(), table.column("condition").tolist()
+    for law, condition, missed in zip(*columns, values(table, SETTLES).tolist(), strict=True):
+        done, of = found.setdefault(law, {}).get(condition, (0, 0))
+        found[law][condition] = done + (not missed), of + 1
+    return found
+
+
+def _worst_run(table: Table, law: str) -> Scenario:
+    """Return the run of a law that settles last, or never, in the condition in which it settles in
+    the fewest runs, or latest.
+    """
+    times = values(table, "settling_time")
+    own = table.column("law") == law
+    worst, rank = 0, (-1.0, -1.0)
+    for condition in dict.fromkeys(table.column("condition").tolist()):
+        rows = np.flatnonzero(own & (table.column("condition") == condition))
+        late = float(np.isinf(times[rows]).mean()), float(np.median(times[rows]))
+        if late > rank:
+            worst, rank = int(rows[np.argmax(times[rows])]), late
+    return table.scenario(worst)
+
+
+def _margins(trial: Trial, plant: Plant, law: Component) -> list[Margin]:
+    """Return what a law tolerates beside no other condition, or beside the first one asked for
+    where that has other commands; none where it starts at its goal.
+    """
+    base = trial.case(plant, law, "nominal")
+    first = trial.case(plant, law, trial.conditions[0])
+    if base.efforts != first.efforts:
+        base = first
+    if not math.dist(base.resolved.x0, plant.origin):
+        return []
+    return margins_of([base], KINDS_OF_POSES if plant.pose else KINDS, COARSE, trial.threads)

@@ -1,0 +1,314 @@
+"""A race: sets of gains in turn over the laws, until one law wins, on one plant.
+
+Every law gets its first set of gains, then every law its second, so that laws have equal numbers
+wherever the race stops. J of a set is that of unseen runs of all conditions, in one number, so that
+neither more laws nor more conditions ask for more sets. This is a race in the sense of O. Maron,
+A. W. Moore, "Hoeffding races" (NIPS 6, 1994), by the tests of `analysis.ranking`.
+
+- After three sets a law is dropped whose best J is more than twice the worst one of the law that
+  leads. It is not tested against the others. Two laws always stay.
+- A search is made once more, from another draw, if its J in training is more than twice the least
+  of its law's others: it was stuck. The better of both is the set.
+- The laws are judged after 7 sets, and if none wins, after 12, unless the 7 say that probably
+  more than 24 are needed. Each look has half of the errors: one of two equal laws wins in at most
+  5 % of races, one of more laws in fewer, and the best law is taken for a worse one in at most 5 %.
+  A race that does not go on makes errors only rarer.
+"""
+
+import math
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from smc_mujoco.analysis.paired_runs import EPS
+from smc_mujoco.analysis.ranking import Comparison
+from smc_mujoco.analysis.signed_rank import units_needed
+from smc_mujoco.analysis.tuning import search
+from smc_mujoco.analysis.tuning.evaluator import with_gains
+from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective, objectives
+from smc_mujoco.analysis.tuning.result import SearchResult
+from smc_mujoco.common.aliases import Array
+from smc_mujoco.common.files import writable
+from smc_mujoco.common.progress import Bar, bar
+from smc_mujoco.control.component import Component
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.workers import called, opened
+from smc_mujoco.studies.fair_gains import Candidate, Trial
+from smc_mujoco.studies.study import REPEATED_SEEDS
+
+LOOKS = (7, 12)  # numbers of sets after which the laws are judged
+WITHIN = 24  # sets that would decide, above which a race ends at the first look; chosen
+FIRST = 3  # sets after which a law may be dropped; chosen
+FAR = 2.0  # times the leader's worst J, above which it is; chosen
+STUCK = 2.0  # times the least J of its law's others, above which a search is made again; chosen
+
+
+class Unseen(NamedTuple):
+    """J of a set of gains on unseen runs, s^2."""
+
+    value: float
+    half: float  # at half the physics step, NaN where it was not computed
+
+
+class Entrant:
+    """A law in a race: its sets of gains, which searches find or which are known, and their J."""
+
+    def __init__(self, known: Candidate | None, task: search.TuningTask | None):
+        self.known = known
+        self.task = task
+        self.law: Component = known.law if known else task.law  # pyright: ignore[reportOptionalMemberAccess]
+        self.failure = search.failure_of_law(task) if task else ""
+        self.found: list[SearchResult] = []
+        self.again: set[int] = set()  # searches that were made once more
+        self.J: list[Unseen | None] = []
+
+    def gains(self, k: int) -> Component:
+        """Return the law with set k of its gains."""
+        if self.task is None:
+            return self.known(k)  # pyright: ignore[reportOptionalCall]
+        return with_gains(self.task.law, tuple(self.task.box), self.found[k].best.gains)
+
+    def search(self, k: int, draw: int) -> SearchResult:
+        """Make search k, from a draw."""
+        assert self.task is not None
+        return self.task.search(k, self.failure, lambda count: None, draw)
+
+    @property
+    def count(self) -> int:
+        """The number of sets that differ; 1 for a law with given gains."""
+        return len(self.known.sets) if self.known else len(self.found)
+
+    @property
+    def values(self) -> list[float]:
+        """J of each set."""
+        return [one.value for one in self.J if one]
+
+
+class Race(NamedTuple):
+    """How laws stand after a race."""
+
+    entrants: Mapping[str, Entrant]  # by name, those that were dropped, too
+    # law -> its best J over the worst of the leader's, of laws that were dropped
+    dropped: Mapping[str, float]
+    comparison: Comparison | None  # of the others, by J of their sets; None for one law
+    sets: int  # of each law that was not dropped
+    stopped: bool  # whether the time was over before a winner or the last look
+    seconds: float  # that the last set of each law took together
+
+    @property
+    def running(self) -> list[str]:
+        """The laws that were not dropped, those of lower J first."""
+        names = [name for name in self.entrants if name not in self.dropped]
+        return sorted(names, key=lambda name: (float(np.median(self.entrants[name].values)), name))
+
+    @property
+    def winner(self) -> str | None:
+        """The law that wins, if there is one."""
+        return self.comparison.winners[0] if self.comparison else None
+
+    @property
+    def first(self) -> list[str]:
+        """The winner; without one, the laws than which no other is better."""
+        if self.winner:
+            return [self.winner]
+        if self.comparison is None:
+            return self.running
+        beaten = dict(zip(self.comparison.laws, self.comparison.worse[:, 0], strict=True))
+        return [law for law in self.running if not beaten[law]]
+
+
+def race(
+    trial: Trial,
+    plant: Plant,
+    entrants: Sequence[Entrant],
+    goal: Objective,
+    until: float,
+    relevant: float,
+) -> Race:
+    """Race laws on a plant by J of `goal` until a time of `time.monotonic`, s; inf: until the end.
+    `relevant` is as in `ranking`.
+
+    The folder of the trial keeps each search. Sets that it has are taken even if the time is over.
+    """
+    running = {one.law.name: one for one in entrants}
+    everyone = dict(running)
+    dropped: dict[str, float] = {}
+    comparison, seconds, stopped = None, 0.0, False
+    with bar("set of gains", LOOKS[0] * len(running), trial.progress, counted=True) as shown:
+        for k in range(LOOKS[-1]):
+            start = time.monotonic()
+            pieces = [(one, k, 0) for one in running.values() if one.task]
+            over = k > 0 and start + seconds > until
+            if over and any(_file(trial, *piece).read() is None for piece in pieces):
+                stopped = True
+                break
+            for one, made in _searched(trial, pieces):
+                one.found.append(made)
+                shown.advance(1.0)
+            _again(trial, running.values())
+            _judge(trial, plant, list(running.values()), goal, k + 1)
+            seconds = time.monotonic() - start
+            if k + 1 == FIRST:
+                values = {name: one.values for name, one in running.items()}
+                dropped = hopeless(values)
+                running = {name: running[name] for name in running if name not in dropped}
+            _expect(shown, k + 1, len(running))
+            if k + 1 in LOOKS:
+                comparison = judged(running, goal, relevant)
+                if comparison is None or comparison.winners[0] or needed(comparison) > WITHIN:
+                    break
+    count = len(next(iter(running.values())).J)
+    if count not in LOOKS:
+        comparison = judged(running, goal, relevant)
+    return Race(everyone, dropped, comparison, count, stopped, seconds)
+
+
+def _expect(shown: Bar, done: int, laws: int) -> None:
+    """Set the work done and the whole work of the bar, in sets of gains of laws that go on."""
+    last = next(look for look in (*LOOKS, math.inf) if look > done or look == LOOKS[-1])
+    shown.reached(done * laws, last * laws)
+
+
+def hopeless(J: Mapping[str, Sequence[float]]) -> dict[str, float]:
+    """Return the laws to drop, law -> its least J over the largest one of the law that leads, which
+    is more than FAR. Two laws stay.
+    """
+    lead = min(max(values) for values in J.values())
+    shares = {law: min(values) / lead for law, values in J.items()}
+    order = sorted(shares, key=lambda law: (shares[law], law))
+    return {law: shares[law] for law in order[2:] if shares[law] > FAR}
+
+
+def stuck(J: Sequence[float]) -> list[int]:
+    """Return the searches of a law whose J in training is more than STUCK times the least of the
+    others.
+    """
+    found = []
+    for k, value in enumerate(J):
+        others = [*J[:k], *J[k + 1 :]]
+        if others and value > STUCK * min(others):
+            found.append(k)
+    return found
+
+
+def judged(running: Mapping[str, Entrant], goal: Objective, relevant: float) -> Comparison | None:
+    """Return the comparison of laws by J of their sets; None for one law."""
+    if len(running) < 2:
+        return None
+    values, halves, numbers, fine = {}, {}, {}, {}
+    for name, one in running.items():
+        J = [unseen for unseen in one.J if unseen]
+        values[name] = np.array([unseen.value for unseen in J])
+        halves[name] = np.array([unseen.half for unseen in J])
+        numbers[name] = np.arange(len(J)) % one.count
+        fine[name] = values[name] < FAILURE_COST
+    return compared(values, goal, halves, numbers, fine, relevant, looks=len(LOOKS))
+
+
+def needed(comparison: Comparison) -> float:
+    """Return the number of sets with which the law in front would probably win, if further sets
+    were like those that there are; inf for any number.
+    """
+    first, *others = np.argsort(np.median(comparison.cells[:, 0], axis=1), kind="stable").tolist()
+    return max(
+        units_needed(comparison.leads[0, first, other], comparison.error, comparison.relevant)
+        for other in others
+    )
+
+
+def compared(
+    values: Mapping[str, Array],
+    goal: Objective,
+    halves: Mapping[str, Array],
+    sets: Mapping[str, Array],
+    fine: Mapping[str, Array],
+    relevant: float,
+    looks: int = 1,
+) -> Comparison:
+    """Return the comparison of laws, all of them chosen beforehand, by J."""
+    least = EPS * len(goal.conditions) * goal.duration**2 / 2.0
+    return Comparison(
+        values,
+        least,
+        sets=sets,
+        relevant=relevant,
+        halves=halves,
+        arrived=fine,
+        rivals=1,
+        looks=looks,
+    )
+
+
+def _file(trial: Trial, one: Entrant, k: int, draw: int):
+    """Return the file of a search."""
+    assert one.task is not None
+    return one.task.file(k, trial.folder / "gains" / "searches", draw)
+
+
+def _searched(
+    trial: Trial, pieces: Sequence[tuple[Entrant, int, int]]
+) -> Iterator[tuple[Entrant, SearchResult]]:
+    """Yield the search k of each entrant, of a draw, in order, as the folder keeps it."""
+    files = [_file(trial, *piece) for piece in pieces]
+    found = [file.read() for file in files]
+    missing = [i for i, made in enumerate(found) if made is None]
+    writable(*(files[i].path for i in missing))
+    if missing and trial.executor is not None:
+        calls = []
+        for one, k, draw in (pieces[i] for i in missing):
+            calls.append(one.task.call(k, one.failure, draw))
+        with opened(trial.executor) as pool:
+            for j, made in called(pool, search.searched, calls):
+                found[missing[j]] = files[missing[j]].keep(made)
+    for (one, k, draw), file, made in zip(pieces, files, found, strict=True):
+        yield one, made or file.keep(one.search(k, draw))
+
+
+def _again(trial: Trial, running: Sequence[Entrant]) -> None:
+    """Make stuck searches once more, and keep the better ones."""
+    pieces = []
+    for one in running:
+        for k in stuck([made.best.objective for made in one.found]):
+            if k not in one.again:
+                one.again.add(k)
+                pieces.append((one, k, 1))
+    for (one, k, _), (_, made) in zip(pieces, _searched(trial, pieces), strict=True):
+        if made.best.objective < one.found[k].best.objective:
+            one.found[k] = made
+            if k < len(one.J):
+                one.J[k] = None
+
+
+def _judge(
+    trial: Trial, plant: Plant, running: Sequence[Entrant], goal: Objective, count: int
+) -> None:
+    """Compute J of the first sets, on unseen runs, where it is not known."""
+    wanted = []
+    for one in running:
+        one.J += [None] * (count - len(one.J))
+        wanted += [(one, k) for k in range(count) if one.J[k] is None]
+    laws = [one.gains(k) for one, k in wanted]
+    values, halves = unseen(trial, plant, laws, goal, [k for _, k in wanted])
+    for (one, k), value, half in zip(wanted, values.tolist(), halves.tolist(), strict=True):
+        one.J[k] = Unseen(value, half)
+
+
+def unseen(
+    trial: Trial, plant: Plant, laws: Sequence[Component], goal: Objective, numbers: Sequence[int]
+) -> tuple[Array, Array]:
+    """Return J of laws on unseen instances, and of one instance in four at half the physics step,
+    NaN elsewhere, (laws,) s^2.
+    """
+    (first,) = trial.seeds(1)
+    instances = [first + k for k in numbers]
+    values, _ = objectives(plant, laws, goal, instances, trial.threads)
+    halves = np.full(len(laws), math.nan)
+    again = [i for i, k in enumerate(numbers) if k % REPEATED_SEEDS == 0]
+    if again:
+        some = [laws[i] for i in again]
+        halves[again], _ = objectives(
+            plant, some, goal, [instances[i] for i in again], trial.threads, halved=True
+        )
+    return values, halves
