@@ -50,8 +50,8 @@ def commands(text: str) -> list[str]:
 
 
 BY_NUMBERS = "mathematics.md"  # test_docs.py runs its code, and compares what it prints
-CODE = [
-    (page, i, block)
+CODE = [  # interpreters that a block starts take seconds, and test_workers.py has such
+    pytest.param(page, i, block, marks=[pytest.mark.slow] if '"spawn"' in block else [])
     for page in PAGES
     for i, block in enumerate(blocks(page.read_text(), "python"))
     if page.name != BY_NUMBERS
@@ -123,7 +123,8 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(
         played = contextlib.nullcontext()
     out = io.TextIOWrapper(io.BytesIO(), "utf-8")
     with beside(page, tmp_path), contextlib.redirect_stdout(out) as said, played as end:
-        runpy.run_path("block.py", run_name="__main__")
+        # whole, as interpreters that a block starts look for it from where pytest was started
+        runpy.run_path(str(tmp_path / "block.py"), run_name="__main__")
     said.seek(0)
     assert end is None or not end.value.code
     assert ("print(" in block or end is not None) == (said.read().strip() != "")
