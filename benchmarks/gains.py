@@ -24,8 +24,8 @@ from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.search import RULE, SEARCHES
 from smc_mujoco.common.files import read_json, replacing, to_json
 from smc_mujoco.control import gain_sets
+from smc_mujoco.simulation.force_bounds import U_MAX
 from smc_mujoco.simulation.gaber_study import PLANTS
-from smc_mujoco.simulation.scenario import U_MAX
 
 PROCESSES = 2
 # searches of a law that is not on the first page, and of the set "tracking": too few for a verdict

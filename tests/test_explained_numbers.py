@@ -22,6 +22,7 @@ from smc_mujoco.robustness import worst_case_search as attack
 from smc_mujoco.simulation import (
     conditions,
     controller,
+    force_bounds,
     integration,
     scenario,
     signals,
@@ -137,7 +138,7 @@ SAID = {
         f"friction within {percent(1.0 - uncertainty.DEFAULT_FRICTION_SCALE[0])}",
     ],
     smc.Scenario: [
-        f"Default: {scenario.U_MAX:g}; of your own model the limit of the",
+        f"Default: {force_bounds.U_MAX:g}; of your own model the limit of the",
         f"else up to {1e3 * integration.MAX_STEP:g} ms",
         f"only friction needs {1e3 * integration.REALISTIC_STEP:g} ms",
         f"a contact {1e3 * integration.BLOW_STEP:g} ms",
@@ -147,7 +148,7 @@ SAID = {
         f"0 .. 2^{math.log2(constraints.MAX_SEED + 1):g} - 1",
     ],
     conditions: [
-        f"{scenario.U_MAX / conditions.BOUNDS_PER_FRICTION:g} N m or N in the study",
+        f"{force_bounds.U_MAX / conditions.BOUNDS_PER_FRICTION:g} N m or N in the study",
         f"late by up to {part(under('jitter')['clock'].jitter / conditions.CONTROL_PERIOD)} of the",
         f"one sample in {round(1 / under('missed')['clock'].missed)} does".replace("10", "ten"),
     ],

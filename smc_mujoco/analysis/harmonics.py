@@ -136,7 +136,7 @@ class Loop:
             for part in s.actuator
             if isinstance(part, DCMotor)
         ]
-        chain = s.chains[self.channel]
+        chain = s.drive_train.chains[self.channel]
         ideal = dataclasses.replace(
             self.scenario,
             actuator=motors,
@@ -163,7 +163,7 @@ class Loop:
                 model, dataclasses.replace(ideal, x0=0.0, v0=0.0)
             )
             self.a, b = transition(model, data, chain)
-            self.b = b[:, drive_ids(model)[self.channel]] * s.scales[self.channel]
+            self.b = b[:, drive_ids(model)[self.channel]] * s.drive_train.scales[self.channel]
             self.rows = dof_ids(model)
             self.nv = model.nv
             self.gap = self._joint_gap(gear, model, data) if gear else 0.0
@@ -277,7 +277,7 @@ class Loop:
         mujoco.mj_forward(model, data)
         mujoco.mj_solveM(model, data, mobility[None], force[None])
         rotor = gear.rotor_inertia
-        for part in self.scenario.chains[self.channel]:
+        for part in self.scenario.drive_train.chains[self.channel]:
             if isinstance(part, DCMotor):
                 rotor += part.gear**2 * part.rotor_inertia
         return gear.gap * rotor * float(mobility[dof])

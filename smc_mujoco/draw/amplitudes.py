@@ -30,7 +30,9 @@ PAGE_HEIGHT = 4.6  # inches
 
 def lag(scenario: Scenario) -> float:
     """Return the sum of all delays and time constants between command and force, s."""
-    lags = [sum(part.delay for part in chain if part.drives) for chain in scenario.chains]
+    lags = []
+    for chain in scenario.drive_train.chains:
+        lags.append(sum(part.delay for part in chain if part.drives))
     return scenario.resolved.input_delay + max(lags)
 
 

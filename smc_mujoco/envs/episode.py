@@ -124,7 +124,7 @@ class Setting:
         self.ctrl = table["ctrl"][: plant.driven]
         # the largest commands, (driven,), and the actuators' inputs per unit of them
         self.limits = np.array(self.scenario.limits)
-        self.scale = np.array(self.scenario.scales)
+        self.scale = np.array(self.scenario.drive_train.scales)
         # the channels that the task treats differently, (n,) of bool
         self.selected = self.task.selected(plant)
         self.rest_x = rest(plant)  # from where positions count in errors, (n,)

@@ -30,8 +30,9 @@ from smc_mujoco.control.law import Law
 from smc_mujoco.identification import inverse_dynamics, records
 from smc_mujoco.identification.records import Columns, Record
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.force_bounds import default_u_max
 from smc_mujoco.simulation.run import run
-from smc_mujoco.simulation.scenario import Scenario, default_u_max
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.time_series import TimeSeries
 from smc_mujoco.simulation.trace import Trace
 

@@ -138,7 +138,7 @@ def contacts(trace: Trace) -> Contacts:
     rates = model.jnt_dofadr[joints]
     drives = model.actuator_ctrladr[drive_ids(model)]
     n = scenario.plant.driven
-    scale = np.array(scenario.scales)
+    scale = np.array(scenario.drive_train.scales)
     pushes = [
         (model.body(d.body).id, d)
         for d in scenario.disturbance

@@ -45,8 +45,9 @@ from smc_mujoco.metrics.conventions import by_group, scale
 from smc_mujoco.robustness.uncertainty import JITTER_SHARES, with_friction, with_jitter
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import DURATION, Condition
+from smc_mujoco.simulation.force_bounds import default_u_max
 from smc_mujoco.simulation.grid import START_CURE, Starts, case, listed, listed_laws
-from smc_mujoco.simulation.scenario import Scenario, default_u_max
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, Fault, Impulse, Noise
 from smc_mujoco.simulation.trace import Trace, warn_of_broken
 

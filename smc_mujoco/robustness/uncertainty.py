@@ -170,7 +170,7 @@ def strength(scenario: Scenario) -> float:
     """Return the largest force that every drive can hold, N or N m."""
     if scenario.accelerates:
         return min(part.stall for part in scenario.actuator if part.stall is not None)
-    drives = zip(scenario.limits, scenario.nominal_drives, strict=False)
+    drives = zip(scenario.limits, scenario.drive_train.nominal, strict=False)
     return min(limit * drive.gain for limit, drive in drives)
 
 

@@ -69,12 +69,9 @@ from smc_mujoco.simulation import (
     time_series,  # noqa: F401
 )
 from smc_mujoco.simulation.blow import bump
-from smc_mujoco.simulation.scenario import (
-    NOT_OF_FREE_BODIES,
-    U_MAX,
-    Scenario,
-    default_u_max,
-)
+from smc_mujoco.simulation.force_bounds import U_MAX, default_u_max
+from smc_mujoco.simulation.law_checks import NOT_OF_FREE_BODIES
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import (
     Clock,
     Constant,

@@ -25,8 +25,9 @@ from smc_mujoco.simulation.conditions import (  # noqa: F401
     SINE,
     Condition,
 )
+from smc_mujoco.simulation.force_bounds import U_MAX  # noqa: F401
 from smc_mujoco.simulation.grid import case
-from smc_mujoco.simulation.scenario import U_MAX, Scenario  # noqa: F401
+from smc_mujoco.simulation.scenario import Scenario
 
 # The four laws that the paper compares; its higher-order one is the last.
 LAWS = ("observer_free", "classical", "adaptive", "super_twisting")

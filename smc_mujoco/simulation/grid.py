@@ -51,8 +51,9 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, DURATION, Condition, find_condition
+from smc_mujoco.simulation.force_bounds import U_MAX
 from smc_mujoco.simulation.model import compile_model, initial_state, with_values
-from smc_mujoco.simulation.scenario import U_MAX, Scenario
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Noise
 
 LawOfSeed = Callable[[int], Law]  # seed -> the law of that run

@@ -91,7 +91,7 @@ def longest_step(s: Any) -> float:
     longest = min(MAX_STEP, *bounds)
     if bounds[-1] == REALISTIC_STEP:  # which resolves drives, too
         return longest
-    alone = all(len(chain) < 2 for chain in s.chains)
+    alone = all(len(chain) < 2 for chain in s.drive_train.chains)
     if alone and all(part.has_moment for part in s.actuator):
         return longest
     for part in s.actuator:

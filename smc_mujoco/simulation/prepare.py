@@ -458,7 +458,7 @@ def _joint_measurement(
         fields["handle"] = {
             **s.plant.nominal.handles(),
             "parameters": functions["dynamics"]["parameters"],
-            "units": buffer.put(drive.gain for drive in s.nominal_drives),
+            "units": buffer.put(drive.gain for drive in s.drive_train.nominal),
         }
     return fields
 
@@ -554,11 +554,11 @@ def _drives(s: Resolved) -> list[dict[str, Any]]:
             summed |= {*part.channels(s.plant)}
     limits = [*s.limits, *[0.0] * s.plant.free]
     rows = []
-    for i, nominal in enumerate(s.nominal_drives):
+    for i, nominal in enumerate(s.drive_train.nominal):
         row = {"limit": limits[i], "scale": 1.0, "sums_force": i in summed}
         if i < s.plant.driven:
-            row |= {"scale": s.scales[i], "torque": s.torques[i]._asdict()}
-            row["accelerates"] = s.motors[i].accelerates
+            row |= {"scale": s.drive_train.scales[i], "torque": s.drive_train.torques[i]._asdict()}
+            row["accelerates"] = s.drive_train.motors[i].accelerates
         rows.append(row | nominal._asdict())
     return rows
 

@@ -168,7 +168,7 @@ class NominalDynamics:
         if nominal is None:
             return np.zeros(len(self.x))
         values = Values(**self.scenario.plant.parameters)
-        units = np.array([drive.gain for drive in self.scenario.nominal_drives])
+        units = np.array([drive.gain for drive in self.scenario.drive_train.nominal])
         return nominal.coriolis(self.x, self.v, w, values) / units
 
     def jacobian(self) -> np.ndarray:

@@ -15,7 +15,8 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import scenario_json
 from smc_mujoco.simulation.codes import Hashes, code_hashes
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, find_condition
-from smc_mujoco.simulation.scenario import U_MAX, Scenario
+from smc_mujoco.simulation.force_bounds import U_MAX
+from smc_mujoco.simulation.scenario import Scenario
 
 # Fields of a description that belong to the plant, the law or the run, and not to the condition.
 NOT_OF_CONDITION = (

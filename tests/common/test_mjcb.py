@@ -26,7 +26,7 @@ from smc_mujoco.envs.gymnasium_env import PlantEnv
 from smc_mujoco.envs.tasks import tasks, toppling
 from smc_mujoco.envs.vector_env import BatchEnv
 from smc_mujoco.mechanisms.custom.nominal_model import prepared
-from smc_mujoco.simulation import callback, scenario
+from smc_mujoco.simulation import callback, scenario_checks
 from smc_mujoco.simulation import run as runs
 
 pytestmark = pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")
@@ -109,7 +109,11 @@ COMPILES = {
 def test_within_a_policy_every_model_compiles_and_the_run_goes_on(what, own, tmp_path):
     trace = run_of("none", own)
     trace.save(tmp_path / "own.npz")
-    for kept in (scenario.mechanism_model, prepared, toppling):  # as the first time in a process
+    for kept in (
+        scenario_checks.mechanism_model,
+        prepared,
+        toppling,
+    ):  # as the first time in a process
         kept.cache_clear()
     asked = []
     found = []

@@ -164,7 +164,7 @@ class Controller:
                 else:
                     force += math.copysign(part.level, speed)
         share = (1.0 + given.error) * math.tanh(abs(speed) / given.eps)
-        return share * force / self.scenario.nominal_drives[i].gain
+        return share * force / self.scenario.drive_train.nominal[i].gain
 
     def measurement(
         self, x: np.ndarray, v: np.ndarray, t: float, motion: np.ndarray, i: int
@@ -248,7 +248,7 @@ class Controller:
             and min(abs(u), limit) * max(1.0, self.scale) < MAX_CONTROL
         ):
             raise Failure(f"{self.law.name} returned u = {u:g}, s = {s:g} in channel {i}")
-        gain, drag = self.scenario.nominal_drives[i]
+        gain, drag = self.scenario.drive_train.nominal[i]
         self.last_u[i] = gain * bounded - drag * self.speeds[i]
         return bounded
 
@@ -262,7 +262,7 @@ class Controller:
             self.values,
             self.last_u + self.reported,
         )
-        gain, drag = self.scenario.nominal_drives[0]
+        gain, drag = self.scenario.drive_train.nominal[0]
         return f - drag * v[driven] * g + self.reported[i] * g, gain * g
 
 
@@ -309,7 +309,7 @@ def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:
         M = np.diag(1.0 / per_u)
         h = -f / per_u
         g = -f_at_rest / per_u_at_rest
-    gain, drag = scenario.nominal_drives[0]
+    gain, drag = scenario.drive_train.nominal[0]
     return Dynamics(M / gain, (h + drag * v) / gain, g / gain)
 
 

@@ -135,7 +135,7 @@ class Loop:
         # sums over a control period: of the drives, of friction and contacts
         self.forces = np.zeros((2, n))
         self.drive_step = drive_step(
-            scenario.chains[0], scenario.resolved.physics_step, scenario.stages > 1
+            scenario.drive_train.chains[0], scenario.resolved.physics_step, scenario.stages > 1
         )
         if self.drive_step:  # both states of the drives
             self.first, self.second = self.drive_step.start(self.data.qvel[self.channels["shaft"]])
@@ -499,7 +499,9 @@ class Loop:
         for i, dof in enumerate(at["qvel"]):
             v = float(data.qvel[dof])
             if self.driven[i]:
-                drive = torque(self.scenario.torques[i], float(data.ctrl[at["ctrl"][i]]), v)
+                drive = torque(
+                    self.scenario.drive_train.torques[i], float(data.ctrl[at["ctrl"][i]]), v
+                )
             else:
                 drive = 0.0
             load = float(data.qfrc_spring[dof] - data.qfrc_bias[dof]) + d[i]

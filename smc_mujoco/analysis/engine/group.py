@@ -123,7 +123,7 @@ def key(scenario: Scenario) -> Hashable:
 def _springs(s: Resolved) -> dict[int, Spring]:
     """Return the spring behind the rotor of each channel that has one."""
     found = {}
-    for i, chain in enumerate(s.chains):
+    for i, chain in enumerate(s.drive_train.chains):
         for part in chain:
             if isinstance(part, ElasticJoint):
                 found[i] = Spring(*(getattr(part, name) for name in Spring._fields))

@@ -85,12 +85,13 @@ from smc_mujoco.metrics.conventions import leans
 from smc_mujoco.simulation import coerce, scenario_json
 from smc_mujoco.simulation.codes import code_hashes
 from smc_mujoco.simulation.conditions import Condition
+from smc_mujoco.simulation.force_bounds import default_u_max
 from smc_mujoco.simulation.grid import Starts
 from smc_mujoco.simulation.integration import stepped_by_mujoco
 from smc_mujoco.simulation.model import with_values
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import run
-from smc_mujoco.simulation.scenario import Scenario, default_u_max
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.simulation.workers import Workers, called, opened
 
@@ -415,7 +416,7 @@ def task_of(
     if first.accelerates:
         per_u = None
     else:
-        per_u = first.nominal_drives[0].gain
+        per_u = first.drive_train.nominal[0].gain
     scales = search_space.scales(first.plant, bound, reach, per_u)
     box = search_space.box(first.law, scales)
     low, high = np.log10(list(box.values())).T

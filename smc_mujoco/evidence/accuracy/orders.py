@@ -39,10 +39,11 @@ from smc_mujoco.evidence.accuracy.scaling import QUANTITIES, Accuracy, scaling
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.conventions import last_part
+from smc_mujoco.simulation.coerce import MIN_TIME
 from smc_mujoco.simulation.conditions import Condition, find_condition
 from smc_mujoco.simulation.grid import DURATION, Starts, case, listed, listed_laws
 from smc_mujoco.simulation.run import stream
-from smc_mujoco.simulation.scenario import MIN_TIME, Scenario
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Noise
 from smc_mujoco.simulation.trace import Trace
 

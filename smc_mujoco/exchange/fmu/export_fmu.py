@@ -34,7 +34,8 @@ from smc_mujoco.exchange.fmu import contents, description
 from smc_mujoco.exchange.fmu.contents import ExportedLaw
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
-from smc_mujoco.simulation.scenario import Scenario, check_surface
+from smc_mujoco.simulation.law_checks import check_surface
+from smc_mujoco.simulation.scenario import Scenario
 
 FOLDER = Path(__file__).parent
 FMI_HEADERS = ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h")  # of the standard

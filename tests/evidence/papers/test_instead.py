@@ -13,7 +13,7 @@ from helpers.pages import ROOT
 import smc_mujoco as smc
 from smc_mujoco.control import gain_sets
 from smc_mujoco.evidence.audit.paper import paper
-from smc_mujoco.simulation.scenario import U_MAX
+from smc_mujoco.simulation.force_bounds import U_MAX
 
 pytestmark = pytest.mark.quick
 

@@ -56,7 +56,7 @@ def test_a_drive_gets_the_u_that_gives_the_force(joint):
     motor = smc.DCMotor()
     feedforward = smc.Feedforward(smc.Coulomb(0.02))
     trace = run(joint, feedforward, actuator=motor, friction=None, duration=0.02)
-    gain = trace.scenario.nominal_drives[0].gain
+    gain = trace.scenario.drive_train.nominal[0].gain
     assert trace.compensation[1, 0] == pytest.approx(0.02 / gain, rel=1e-6)
 
 

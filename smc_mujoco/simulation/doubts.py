@@ -1,0 +1,147 @@
+"""What a scenario warns of: a value that may be in another unit, a motor that is too weak, bristles
+that are too stiff, a bound that was assumed.
+
+Here `s` is a scenario with its defaults, whose module imports this one.
+"""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from smc_mujoco.common.text import joined
+from smc_mujoco.mechanisms.hardware.friction import LuGre
+from smc_mujoco.mechanisms.layout import channel_names, loaded
+from smc_mujoco.simulation.signals import Constant
+
+LOST_SHARE = 0.05  # of a duration that is no whole number of periods, before it is told; chosen
+MAX_LATENESS = 0.3  # stiffness times step over damping of bristles; chosen: joints rest 20 % off
+MAX_ANGLE = (
+    3.0 * math.pi
+)  # rad: chosen; swing-ups stay below 1.5 turns, and a larger number may be degrees
+MAX_DEGREES = 720.0  # chosen; a number above this is not taken for degrees
+LONG_TIME = 1.0  # s; chosen: an input delay or a control period that is as long may be in ms
+LARGE_FACTORS = 15.0, 1000.0  # chosen: a mismatch between them may be in percent
+
+
+def _doubtful_units(s: Any) -> Iterator[str]:
+    """Yield a sentence about each number that may be in ms or percent."""
+    for what in ("input_delay", "control_period"):
+        if (seconds := getattr(s, what)) >= LONG_TIME:
+            yield f"{what} is {seconds:g} s: if it is {seconds:g} ms, give {seconds / 1e3:g}"
+    for name, factor in s.mismatch.items():
+        low, high = LARGE_FACTORS
+        if low <= factor <= high and name not in s.plant.added:
+            fact = f"the true {name} of {s.plant.name} is {factor:g} times the nominal one"
+            yield f"{fact}: if it is {factor:g} % more, give {1.0 + factor / 100.0:g}"
+
+
+def _unreachable_goals(s: Any) -> Iterator[str]:
+    """Yield a sentence about each obstacle that a constant reference runs into."""
+    constant = all(isinstance(signal, Constant) for signal in s.references)
+    if not constant or s.law.name == "none":
+        return
+    goal = [signal.parameters()["amplitude"] for signal in s.references]
+    goal += s.plant.goal or s.plant.origin[s.plant.driven :]
+    for part in s.contact:
+        if met := part.meets(s.plant, goal):
+            yield (
+                f"the reference of {s.plant.name} has {met}, so that it is not reached: give "
+                "another reference or more room, unless it is to lean there"
+            )
+
+
+def _stiff_bristles(s: Any) -> Iterator[str]:
+    """Yield a sentence about bristles that are too stiff for the physics step."""
+    for part in s.friction:
+        # of the library's plants, softer bristles are those of a named condition or of a rig
+        if not isinstance(part, LuGre):
+            continue
+        if part.stiffness <= LuGre.stiffness and not s.plant.is_user_model:
+            continue
+        damping = part.damping
+        if damping is None:
+            model = loaded(s.plant)
+            damping = part.default_damping(model.dof_M0[part.dofs(model)].min())
+        if part.stiffness * s.physics_step > MAX_LATENESS * damping:
+            yield (
+                f"LuGre's bristles of stiffness {part.stiffness:g} and damping {damping:.3g} "
+                f"are too stiff for a physics step of {s.physics_step:g} s: MuJoCo bends them "
+                "a step late, and joints rest at wrong places. Give a physics_step of "
+                f"{0.1 * MAX_LATENESS * damping / part.stiffness:.1g} or less, or softer ones"
+            )
+
+
+def _broken_period(s: Any) -> Iterator[str]:
+    """Yield a sentence about a duration that is no whole number of control periods."""
+    lasts = s.samples * s.control_period
+    if abs(lasts - s.duration) > LOST_SHARE * s.duration:
+        yield (
+            f"duration {s.duration:g} s is not a whole number of control periods of "
+            f"{s.control_period:g} s, so the run lasts {lasts:g} s: give a duration of "
+            f"{lasts:g} or {lasts + s.control_period:g} s"
+        )
+
+
+def _degrees(s: Any) -> Iterator[str]:
+    """Yield a sentence about each angle that may be in degrees."""
+    # ramps may have many turns
+    amplitudes = [signal.parameters().get("amplitude", 0.0) for signal in s.references]
+    for what, values in (("x0", s.x0), ("the reference's amplitude", amplitudes)):
+        for unit, value in zip(s.plant.units, values, strict=False):
+            if unit == "rad" and MAX_ANGLE < abs(value) <= MAX_DEGREES:
+                fact = f"{what} is {value:g} rad, {abs(value) / math.tau:.1f} turns"
+                yield f"{fact}: if it is {value:g} degrees, give math.radians({value:g})"
+
+
+def _weak_motors(s: Any) -> Iterator[str]:
+    """Yield a sentence about each motor that cannot hold its joint at the start."""
+    for i, chain in enumerate(s.drive_train.chains):
+        for motor in chain:
+            if motor.stall is None:
+                continue
+            with np.errstate(all="ignore"):
+                f, g = s.plant.nominal(np.array(s.x0), np.zeros(s.plant.n), i, s.plant.values({}))
+            need = abs(f) / abs(g) if g else 0.0
+            if motor.stall < need and (need <= s.limits[i] or not s.force_command):
+                yield (
+                    f"{type(motor).__name__} gives at most {motor.stall:.3g} {s.plant.efforts[i]} "
+                    f"at rest, and channel {i} of {s.plant.name} needs {need:.3g} to hold its "
+                    "start: give a stronger motor, or more gear"
+                )
+
+
+def of_values(s: Any) -> Iterator[str]:
+    """Yield a sentence about each value that may be in another unit, or that makes a run other than
+    it seems.
+    """
+    yield from _stiff_bristles(s)
+    yield from _broken_period(s)
+    yield from _doubtful_units(s)
+    yield from _unreachable_goals(s)
+    yield from _degrees(s)
+    yield from _weak_motors(s)
+
+
+def of_assumed_bound(s: Any) -> str:
+    """Return a sentence on the joints of your own model whose force a default limits, or ""."""
+    plant = s.plant
+    limits = s.limits
+    if not plant.is_user_model or not s.force_command or s.law.name == "none":
+        return ""
+    suggested = plant.suggested.get("u_max", (None,) * plant.driven)
+    own = plant.limits or (math.inf,) * plant.driven
+    free = [i for i, limit in enumerate(own) if limit == math.inf and suggested[i] is None]
+    if not free:
+        return ""
+    joints = joined(repr(channel_names(plant)[i]) for i in free)
+    bounds = joined(dict.fromkeys(f"{limits[i]:g} {plant.efforts[i]}" for i in free))
+    what = "joint" if len(free) == 1 else "joints"
+    example = f"u_max={limits[free[0]]:g}"
+    if plant.driven > 1:
+        example = f"smc.Channel({example}) for each"
+    return (
+        f"nothing limits the force on {what} {joints} of {plant.name}; |u| <= {bounds} is assumed "
+        f"from its load and inertia: give u_max, the limit of your motor, such as {example}"
+    )

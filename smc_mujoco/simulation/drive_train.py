@@ -1,0 +1,107 @@
+"""The drives between the command and the joints of a scenario, by driven channel."""
+
+import math
+from typing import Any
+
+from smc_mujoco.common.cached import cached_property
+from smc_mujoco.mechanisms.hardware.moments import Torque
+from smc_mujoco.mechanisms.hardware.part import Actuator, NominalDrive, chains
+from smc_mujoco.mechanisms.layout import driven_names
+
+
+class DriveTrain:
+    """What is between the command u of each driven channel and the force on its joint.
+
+        smc.Scenario(plant="duffing", law="pid", actuator=smc.Lag(0.01)).drive_train.scales
+
+    Attributes:
+      scenario: the Scenario whose drives they are.
+    """
+
+    def __init__(self, scenario: Any):
+        self.scenario = scenario
+        self.plant = scenario.plant
+        self.actuator = scenario.actuator
+
+    @cached_property
+    def chains(self) -> list[tuple[Actuator, ...]]:
+        """The actuators of each driven channel, in series."""
+        if not self.actuator:
+            return [()] * self.plant.driven
+        return chains(self.actuator, driven_names(self.plant))
+
+    @cached_property
+    def motors(self) -> list[Actuator]:
+        """The motor of each driven channel whose u is no force; else an Actuator that does
+        nothing.
+        """
+        found = []
+        for chain in self.chains:
+            special = (part for part in chain if part.unit or part.accelerates)
+            found.append(next(special, Actuator()))
+        return found
+
+    @property
+    def accelerates(self) -> bool:
+        """Whether u is an acceleration, of any joint."""
+        return any(part.accelerates for part in self.actuator)
+
+    @property
+    def force_command(self) -> bool:
+        """Whether u is a force."""
+        return not any(part.unit or part.accelerates for part in self.actuator)
+
+    @property
+    def efforts(self) -> tuple[str, ...]:
+        """Unit of u in each channel, (n,): that of the joint's force, "V", or that of its
+        acceleration.
+        """
+        efforts = list(self.plant.efforts)
+        for i, motor in enumerate(self.motors):
+            efforts[i] = motor.unit or efforts[i]
+            if motor.accelerates:
+                efforts[i] = f"{self.plant.units[i]}/s^2"
+        return tuple(efforts)
+
+    @cached_property
+    def limits(self) -> tuple[float, ...]:
+        """The bound on |u| of each driven channel, in the unit of u: the lesser of u_max and the
+        motor's limit.
+        """
+        bounds = self.scenario.resolved.u_max
+        if not isinstance(bounds, tuple):
+            bounds = (bounds,) * self.plant.driven
+        limits = self.plant.limits or bounds
+        found = []
+        for motor, bound, limit in zip(self.motors, bounds, limits, strict=True):
+            if motor.accelerates:  # the plant's limits are of a force
+                found.append(bound)
+            elif motor.unit:
+                found.append(min(bound, motor.bound or math.inf))
+            else:
+                found.append(min(bound, limit))
+        return tuple(found)
+
+    @property
+    def torques(self) -> list[Torque]:
+        """What MuJoCo's actuator of each driven channel makes of its control in a step with
+        `exact_friction`.
+        """
+        step = self.scenario.resolved.physics_step
+        found = []
+        for chain in self.chains:
+            even = next((part for part in chain if part.even), None)
+            found.append(Torque() if even is None else even.mujoco_torque(step, True))
+        return found
+
+    @property
+    def scales(self) -> list[float]:
+        """The control of the actuator of each driven channel, per unit of u."""
+        return [math.prod(part.scale for part in chain) for chain in self.chains]
+
+    @cached_property
+    def nominal(self) -> list[NominalDrive]:
+        """The actuator of each channel, (n,), in the nominal model: its force is gain u - drag
+        v.
+        """
+        return [motor.nominal for motor in self.motors] + [NominalDrive()] * self.plant.free

@@ -1,0 +1,64 @@
+"""The bound on |u| where a scenario gives none.
+
+Here `s` is a Scenario, which imports this module.
+"""
+
+import math
+from typing import Any
+
+from smc_mujoco.mechanisms.plant import Plant
+
+U_MAX = 6.0  # N or N m, chosen: the bound of every study here
+
+
+def default_bound(s: Any) -> float | tuple[float, ...]:
+    """Return the default of u_max: of each joint that of its motor, or what the plant suggests."""
+    suggested = suggested_u_max(s.plant)
+    if not any(part.bound is not None for part in s.actuator):
+        return suggested
+    bounds = list(suggested) if isinstance(suggested, tuple) else [suggested] * s.plant.driven
+    for i, motor in enumerate(s.drive_train.motors):
+        bounds[i] = bounds[i] if motor.bound is None else motor.bound
+    return tuple(bounds) if len(set(bounds)) > 1 else bounds[0]
+
+
+def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:
+    """Return what the plant's channels suggest, or the default bound; one number if all channels
+    have the same.
+    """
+    given = plant.suggested.get("u_max", (None,) * plant.driven)
+    limits = [default_u_max(plant)] * len(given)
+    # the bound of one joint's motor is no other's
+    if _unbounded(plant):
+        limits = _limits(plant)
+    bounds = []
+    for limit, bound in zip(limits, given, strict=True):
+        bounds.append(limit if bound is None else bound)
+    return tuple(bounds) if len(set(bounds)) > 1 else bounds[0]
+
+
+def default_u_max(plant: Plant) -> float:
+    """Return the bound on |u| where none is given, N or N m: the limit of the plant's strongest
+    motor, else 6, or what a user's joint needs.
+    """
+    return max(_limits(plant), default=U_MAX)
+
+
+def _limits(plant: Plant) -> list[float]:
+    """Return the limits of the plant's motors; where a user's model has none, what a joint
+    needs.
+    """
+    if not _unbounded(plant):
+        return [limit for limit in plant.limits if limit < math.inf]
+    from smc_mujoco.mechanisms.custom.scales import needs
+
+    limits = plant.limits or (math.inf,) * plant.driven
+    return [
+        n if limit == math.inf else limit for n, limit in zip(needs(plant), limits, strict=True)
+    ]
+
+
+def _unbounded(plant: Plant) -> bool:
+    """Return whether nothing bounds the force on some joint of a user's model."""
+    bounded = plant.limits and math.inf not in plant.limits
+    return plant.is_user_model and not plant.pose and not bounded

@@ -1,0 +1,231 @@
+"""Whether the fields of a scenario fit together: its times, signals, obstacles and parts.
+
+Here `s` is a scenario with its defaults, whose module imports this one.
+"""
+
+import functools
+import itertools
+from typing import Any
+
+import mujoco
+
+from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.mechanisms.hardware.contact import kinds
+from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
+from smc_mujoco.mechanisms.hardware.rotors import flies
+from smc_mujoco.mechanisms.layout import loaded
+from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant, check_ranges
+from smc_mujoco.simulation.law_checks import check_inertia, check_law
+from smc_mujoco.simulation.signals import (
+    Dryden,
+    Impulse,
+    OrnsteinUhlenbeck,
+    PerChannel,
+    Push,
+    Signal,
+    extremes,
+)
+
+MAX_STEPS = 100_000_000  # per run: minutes of computing
+MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
+
+
+def check(s: Any) -> None:
+    """Raise ScenarioError for fields that do not fit together."""
+    check_clock(s)
+    check_signals(s)
+    check_law(s)
+    check_mechanism(s)
+
+
+def check_start(s: Any) -> None:
+    """Raise ScenarioError for what the plant cannot have at the start, or on its way.
+
+    Runs that were recorded before these checks are read without them.
+    """
+    check_ranges(s.plant.name, s.plant.ranges, s.x0)
+    check_reference_ranges(s)
+    check_inertia(s)
+    check_obstacles(s)
+    check_names(s)
+
+
+def check_clock(s: Any) -> None:
+    """Check that the delay is a whole number of steps, the jump is within the run, and the trace
+    fits into memory.
+    """
+    delay = s.input_delay / s.physics_step
+    if abs(delay - round(delay)) > 1e-6 or (delay > 0.0 and round(delay) == 0):
+        raise ScenarioError(
+            f"input_delay {s.input_delay:g} s is not a whole number of physics steps of "
+            f"{s.physics_step:g} s: give a physics_step that divides it"
+        )
+    if s.samples < 1:
+        raise ScenarioError(
+            f"duration {s.duration:g} s is shorter than one control period of {s.control_period:g} "
+            "s: give a longer one"
+        )
+    if s.samples * s.steps > MAX_STEPS or (s.samples + 1) * s.plant.n > MAX_VALUES:
+        raise ScenarioError(
+            f"duration {s.duration:g} s is {s.samples:.3g} control samples of {s.plant.n} channels "
+            f"and {s.samples * s.steps:.3g} physics steps: give a shorter duration or longer "
+            f"periods (at most {MAX_VALUES:.0e} values and {MAX_STEPS:.0e} steps)"
+        )
+    times = {"jump": s.jump and s.jump.time, "fault": s.fault and s.fault.at}
+    for name, time in times.items():
+        if time is not None and time >= s.duration:
+            raise ScenarioError(
+                f"{name} at {time:g} s comes after the end of the run at {s.duration:g} s: give an "
+                "earlier time"
+            )
+    s.failing()  # refuses an unknown one
+    for sensor in s.sensors:
+        sensor.check(s.physics_step)
+    s.clock.check(s.control_period, s.physics_step)
+
+
+def check_signals(s: Any) -> None:
+    """Check that the signals can be disturbances and a reference, and that none is shorter than a
+    step.
+    """
+    for d in s.disturbance:
+        shortest = s.plant.n * s.duration / max(MAX_STEPS, s.work)  # between knots, s
+        if isinstance(d, OrnsteinUhlenbeck | Dryden) and d.dt < shortest:
+            raise ScenarioError(
+                f"{type(d).__name__}'s dt {d.dt:g} s makes too many knots: give {shortest:.3g} s "
+                "or more"
+            )
+        if isinstance(d, Impulse) and d.width < s.physics_step:
+            raise ScenarioError(
+                f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it"
+            )
+    for signal in (*s.disturbance, s.known_signal):
+        if getattr(signal, "about", ""):
+            raise ScenarioError(f"{shown(signal)} is about the goal: only a reference may be")
+    if any(isinstance(signal, PerChannel) for signal in (*s.disturbance, s.known_signal)):
+        raise ScenarioError(
+            "only a reference may have a signal for each channel: give one signal for all"
+        )
+    for d in s.disturbance:
+        if d.air and not flies(s.plant):
+            raise ScenarioError(
+                f"disturbance {shown(d)} is a wind, and {s.plant.name} has no drag: give a force, "
+                "or plant 'quadrotor'"
+            )
+    for push in [d for d in s.disturbance if isinstance(d, Push)]:
+        find(f"body of {s.plant.name} in a Push", push.body, dict.fromkeys(bodies(s.plant)))
+    forces = [d for d in s.disturbance if d.cartesian and not isinstance(d, Push)]
+    if forces and s.plant.direct and not s.plant.pose:
+        raise ScenarioError(
+            f"disturbance {shown(forces[0])} is a force on a body, and disturbances of "
+            f"{s.plant.name} act on its joints: give another signal"
+        )
+    for signal in dict.fromkeys(s.references):
+        check_function_of_time("reference", signal, "a smooth signal")
+    if s.known_signal:
+        check_function_of_time("feedforward", s.known_signal, "a known signal of u")
+
+
+def check_reference_ranges(s: Any) -> None:
+    """Check that each reference stays within its joint's range."""
+    if not s.plant.ranges:
+        return
+    for (joint, low, high), signal in zip(s.plant.ranges, s.references, strict=False):
+        least, most = extremes(signal, s.duration)
+        if not low - MAX_EXCESS <= least <= most <= high + MAX_EXCESS:
+            raise ScenarioError(
+                f"the reference of joint {joint!r} of {s.plant.name} goes from {least:.4g} to "
+                f"{most:.4g}, beyond its range from {low:g} to {high:g}: give another reference"
+            )
+
+
+def check_function_of_time(name: str, signal: Signal, cure: str) -> None:
+    """Check that a signal is a number that only time decides."""
+    kinds = {
+        "a force": signal.cartesian,
+        "a wind": signal.air,
+        "noise": signal.random,
+        "one that sees the loop": signal.sees,
+    }
+    for kind, applies in kinds.items():
+        if applies:
+            raise ScenarioError(f"{name} is {type(signal).__name__}, which is {kind}: give {cure}")
+
+
+@functools.lru_cache(maxsize=32)
+def bodies(plant: Plant) -> tuple[str, ...]:
+    """Return the names of a plant's bodies."""
+    model = loaded(plant)
+    return tuple(name for i in range(1, model.nbody) if (name := model.body(i).name))
+
+
+def check_obstacles(s: Any) -> None:
+    """Check that a run does not start beyond a stop or in a wall, nor a user's model inside what
+    it does not start in by itself.
+    """
+    if s.plant.is_user_model and s.x0 != s.plant.x0:
+        from smc_mujoco.mechanisms.custom.clearance import DEPTH, overlap
+
+        inside = overlap(s.plant, s.x0)
+        if inside.depth > max(DEPTH, overlap(s.plant, s.plant.x0).depth):
+            raise ScenarioError(
+                f"x0 {shown(s.x0)} of {s.plant.name} has {inside}: give another x0, or starts "
+                "with less spread"
+            )
+    for part in s.contact:
+        if met := part.meets(s.plant, s.x0):
+            raise ScenarioError(f"x0 of {s.plant.name} has {met}: give another x0, or more room")
+
+
+def check_names(s: Any) -> None:
+    """Check that no parameter is named twice, once by its own name and once as the mass."""
+    for name, factors in (("mismatch", s.mismatch), ("Jump", s.jump.factors if s.jump else {})):
+        if s.plant.mass != "mass" and {"mass", s.plant.mass} <= factors.keys():
+            both = f"{s.plant.mass} {factors[s.plant.mass]:g} and mass {factors['mass']:g}"
+            raise ScenarioError(
+                f"{name} has {both}, which are the same parameter of {s.plant.name}: give one of "
+                "them"
+            )
+
+
+def check_mechanism(s: Any) -> None:
+    """Check that the integrator suits the parts, and that mechanism and contact suit the parameters
+    at any time.
+    """
+    states = [part for part in s.friction if part.keeps_state or part.force is not None]
+    if s.integrator == "RK4" and states and not s.exact_friction:
+        raise ScenarioError(
+            f"integrator RK4 has four stages in a step, and the state of {shown(states[0])} moves "
+            "once a step: leave the integrator out"
+        )
+    for chain in dict.fromkeys(s.drive_train.chains):
+        for part in chain:
+            part.suits(s, chain)
+    for part in s.friction:
+        part.check(s.plant)
+    if isinstance(s.feedforward, Feedforward):
+        s.feedforward.check(s.plant)
+        if s.accelerates:
+            raise ScenarioError(
+                "Feedforward gives a force, and u is an acceleration: leave feedforward out"
+            )
+    for step in (0, s.samples * s.steps):
+        values = s.plant.values(s.factors(step))  # raises for those that the plant cannot have
+        if s.mechanism != "equation":
+            model = mechanism_model(s.plant, s.mechanism)
+            list(s.plant.mechanisms[s.mechanism].fields(model, values))  # raises, too
+        for (name, value), kind in itertools.product(s.plant.placed.items(), kinds(s.contact)):
+            if (present := getattr(values, name)) != value:
+                raise ScenarioError(
+                    f"the obstacles of contact {kind!r} of {s.plant.name} are placed for "
+                    f"{name} = {value:g}, and {name} is {present:g}: leave {name} as it is"
+                )
+
+
+@functools.lru_cache(maxsize=16)
+def mechanism_model(plant: Plant, name: str) -> mujoco.MjModel:
+    """Return the model of a mechanism that a plant offers."""
+    spec = plant.spec()
+    plant.mechanisms[name].edit(spec)
+    return compiled(spec)
