@@ -24,7 +24,6 @@ from smc_mujoco.simulation import (
     controller,
     force_bounds,
     integration,
-    scenario,
     signals,
     time_series,
 )
