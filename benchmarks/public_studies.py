@@ -134,8 +134,8 @@ def combined(y, gains, memory):
 def pushing(y, p, memory):
     """A force along the velocity, as the study's code has it."""
     if y.v == 0.0:
-        return 0.0
-    return p.level * math.copysign(1.0, y.v)
+        return 0.0, 0.0, 0.0
+    return -p.level * math.copysign(1.0, y.v), 0.0, 0.0
 
 
 @smc.law_function(gains={"la": 5.0, "Kd": 10.0, "epsilon": 0.1})

@@ -4,7 +4,7 @@ from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import RateLimit
 from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
 from smc_mujoco.mechanisms.hardware.friction import LuGre
-from smc_mujoco.mechanisms.hardware.joint_force import actuator_function, friction_function
+from smc_mujoco.mechanisms.hardware.part_functions import actuator_function, friction_function
 from smc_mujoco.mechanisms.hardware.servos import ServoFriction, servo
 from smc_mujoco.mechanisms.hardware.sliding import Sigmoid
 from smc_mujoco.mechanisms.hardware.stepper import Stepper

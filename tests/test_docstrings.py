@@ -47,7 +47,7 @@ def example(function) -> str:
 
 
 PUBLIC = functions()
-for changing in ("smc.identify", "smc.which", "smc.hardware.friction_function"):
+for changing in ("smc.identify", "smc.which"):
     del PUBLIC[changing]
 
 

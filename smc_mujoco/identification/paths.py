@@ -16,7 +16,6 @@ import copy
 import dataclasses
 import math
 from collections.abc import Iterator, Sequence
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,6 +25,7 @@ from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.identification.rig import Quantity
 from smc_mujoco.mechanisms.custom.joint_numbers import joint_numbers, with_joint_numbers
 from smc_mujoco.mechanisms.hardware.joint_force import of_joint
+from smc_mujoco.mechanisms.hardware.moments import JointState
 from smc_mujoco.mechanisms.hardware.part import Friction, Part
 from smc_mujoco.mechanisms.layout import channel_names, driven_names
 from smc_mujoco.mechanisms.plant import Plant
@@ -225,7 +225,9 @@ def steady_force(part: Friction, v: np.ndarray, i: int) -> np.ndarray:
         )
     numbers = [of_joint(getattr(part, name), i) for name in part.names]
     p = np.rec.array([tuple(numbers)], dtype=[(name, float) for name in part.names])[0]
-    return np.array([part.steady(SimpleNamespace(v=float(speed)), p, None) for speed in v])
+    memory = np.zeros(part.memory)
+    at = JointState(*[0.0] * 7)
+    return np.array([part.steady(at._replace(v=float(speed)), p, memory) for speed in v])
 
 
 def slope(part: Friction, place: PartNumber, v: np.ndarray, i: int) -> np.ndarray:

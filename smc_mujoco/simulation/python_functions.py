@@ -415,8 +415,9 @@ def of_part(part: Part, kind: str) -> PythonFunction:
             values = as_floats(name, [out], "a force", 1)
         else:
             values = as_floats(name, out, "numbers", OF_JOINTS[kind][1])
-        if kind in ("force", "steady") and not math.isfinite(values[0]):
-            raise Failure(f"{name} returned {values[0]:g}", channel=0)
+        if kind != "read" and not all(map(math.isfinite, values)):
+            unfit = next(value for value in values if not math.isfinite(value))
+            raise Failure(f"{name} returned {unfit:g}", channel=0)
         return values
 
     return PythonFunction(body)

@@ -17,7 +17,8 @@ from smc_mujoco.common import jit
 from smc_mujoco.mechanisms.hardware import stepper
 from smc_mujoco.mechanisms.hardware.drives import DriveStep, advanced, drive_step, rippled
 from smc_mujoco.mechanisms.hardware.friction import dry_step
-from smc_mujoco.mechanisms.hardware.moments import torque
+from smc_mujoco.mechanisms.hardware.moments import JointState, torque
+from smc_mujoco.mechanisms.hardware.own_friction import OwnFriction
 from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED, Sliding
 from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.simulation import model as models
@@ -62,9 +63,23 @@ def evaluate_friction(
 ) -> tuple[float, float, float]:
     """Return the sliding friction of joint i by a formula, and its bounds at rest."""
     try:
+        if isinstance(formula, OwnFriction):
+            return by_function(formula, numbers, v, motor, load)
         return type(formula).value(v, motor, load, numbers)
     except Exception as error:
         raise failure_of(f"friction {type(formula).__name__}", error, channel=i) from error
+
+
+def by_function(
+    part: OwnFriction, numbers: tuple, v: float, motor: float, load: float
+) -> tuple[float, float, float]:
+    """Return the friction of a user's function of speed and load, and its bounds at rest."""
+    y = JointState(0.0, 0.0, 0.0, v, 0.0, motor, load)
+    found = type(part).function(y, numbers, np.zeros(0))
+    if isinstance(found, tuple):
+        return found
+    rest = abs(type(part).function(y._replace(v=0.0), numbers, np.zeros(0)))
+    return math.copysign(found, v), -rest, rest
 
 
 def advance(

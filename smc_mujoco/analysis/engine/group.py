@@ -93,7 +93,7 @@ def _users(s: Resolved) -> list[tuple[Any, int]]:
     signals = (*s.references, *s.disturbance, s.known_signal, *s.noise.errors)
     found += [(type(one).value, one.memory) for one in signals if one is not None]
     found += [(part.read, part.memory) for part in s.sensors]
-    found += [(part.stage_force, part.memory) for part in s.exact_parts]
+    found += [part.written for part in s.exact_parts]
     found += [(part.steady, part.memory) for part in s.compensated]
     found += [(part.force, part.memory) for part in _held(s)]
     return [(function, memory) for function, memory in found if not fingerprint.ours(function)]

@@ -7,7 +7,7 @@ actuator. Under RK4 the callback simulates dry friction on joints that move alon
 # pyright: reportIncompatibleVariableOverride=false
 # (a constant of the base class is a function or a property here)
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import mujoco
 import numpy as np
@@ -201,6 +201,11 @@ class DryFriction(Part):
     """
 
     memory = HIGH + 1
+
+    @property
+    def written(self) -> tuple[Callable, int]:
+        """Its function, and the numbers that it may index."""
+        return self.stage_force, self.memory
 
     def behind(self, actuator: Actuator) -> bool:
         """Return whether it knows the force of a drive within a step."""

@@ -1,34 +1,16 @@
-"""A friction or a drive that is one function of a joint's speed, load and command.
-
-    @smc.hardware.friction_function(numbers={"stiffness": 500.0, "level": 0.3}, memory=1)
-    def dahl(y, p, memory):
-        bend = math.copysign(p.level / p.stiffness, y.v)
-        force = -p.stiffness * memory[0]
-        memory[0] = bend + (memory[0] - bend) * math.exp(-abs(y.v) * y.h / abs(bend))
-        return force
-
-    smc.Scenario(plant="cart_pole", law="hierarchical", friction=dahl(level=(0.5, 0.01)))
-
-The function is compiled as a law is. It is called once a physics step for each joint, and its
-force, N m (N), is held over the step. y is a JointState, p has the numbers of the joint by name,
-and memory is the joint's own, 0 at the start. A force on y.v must be weak: a step times its slope
-stays below the joint's inertia. Keep states by their solution over y.h, as here: Euler's step of
-this friction diverges where stiffness |y.v| y.h exceeds 2 level.
-"""
+"""Parts that are one function of a joint: of its speed, its load and its command."""
 
 # pyright: reportIncompatibleVariableOverride=false
 # (a constant of the base class is a function or a property here)
 import dataclasses
-import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Annotated, Any
 
-from smc_mujoco.common.aliases import Fields, Floats, Names, Numbers
+from smc_mujoco.common.aliases import Floats, Names
 from smc_mujoco.common.constraints import Each, Number
 from smc_mujoco.common.data import frozen_data
-from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
-from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.common.text import counted
 from smc_mujoco.mechanisms.hardware.moments import Run
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
@@ -37,7 +19,6 @@ from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Plant
 
 PerJoint = float | Sequence[float]  # one number for all joints, or one for each
 NumberPerJoint = Annotated[PerJoint, Each(one=Number(low=-MAX_PARAMETER, high=MAX_PARAMETER))]
-MAX_MEMORY = 1000  # numbers of a joint; chosen
 
 
 def of_joint(value: Any, i: int) -> float:
@@ -116,71 +97,3 @@ class Drive(JointPart, Actuator):
                 "the command itself: give it alone, or with what follows a drive"
             )
         self.check_lengths(s.plant, len(self.channels(s.plant)))
-
-
-def friction_function(
-    *, numbers: Numbers | None = None, memory: int = 0
-) -> Callable[[Callable], Callable[..., JointForce]]:
-    """Turn a function (y, p, memory) -> force on a joint, N m (N), into a kind of friction.
-
-    The force is held over a step: y.h times its slope in y.v must stay below the joint's inertia.
-
-    Args:
-      numbers: names of the numbers that it reads as p, with their defaults. In the friction each is
-        one number, or one for each joint.
-      memory: how many numbers it keeps for each joint, 0 or more.
-
-    Raises:
-      ScenarioError: for a name or a number that cannot be one.
-    """
-    return functools.partial(_made, JointForce, numbers, memory, {})
-
-
-def actuator_function(
-    *, numbers: Numbers | None = None, memory: int = 0, delay: float = 0.0
-) -> Callable[[Callable], Callable[..., Drive]]:
-    """Turn a function (y, p, memory) -> force of a drive, N m (N), into a kind of actuator.
-
-        @smc.hardware.actuator_function(numbers={"dead": 0.1})
-        def dead_zone(y, p, memory):
-            return y.u if abs(y.u) > p.dead else 0.0
-
-    Args:
-      numbers, memory: as in `friction_function`.
-      delay: s, the time constant with which the force follows y.u, 0 or more. The default physics
-        step resolves it.
-
-    Returns:
-      A decorator. The decorated function, called with its numbers, returns the actuator of a
-      Scenario.
-
-    Raises:
-      ScenarioError: for a name or a number that cannot be one.
-    """
-    number("delay", delay, low=0.0)
-    return functools.partial(_made, Drive, numbers, memory, {"delay": delay})
-
-
-def _made(
-    base: type[JointPart],
-    numbers: Numbers | None,
-    memory: int,
-    space: Fields,
-    function: Callable,
-) -> Any:
-    name = function.__name__
-    taken = set(dir(base))
-    fields = []
-    for key, value in frozen({} if numbers is None else numbers).items():
-        if not (isinstance(key, str) and key.isidentifier()) or key in taken:
-            raise ScenarioError(f"{name} has the number {shown(key)}: give it another name")
-        default = number(f"{key} of {name}", value, low=-MAX_PARAMETER, high=MAX_PARAMETER)
-        fields.append((key, NumberPerJoint, dataclasses.field(default=default)))
-    space = space | {
-        "memory": int(number(f"memory of {name}", memory, low=0, high=MAX_MEMORY)),
-        "force": staticmethod(function),
-        "__doc__": function.__doc__,
-        "__module__": function.__module__,
-        "__qualname__": function.__qualname__,
-    }
-    return dataclasses.make_dataclass(name, fields, bases=(base,), namespace=space, frozen=True)

@@ -29,11 +29,12 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Hashable, Iterator
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import mujoco
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
 from smc_mujoco.common.constraints import Each, Number
 from smc_mujoco.common.errors import ScenarioError
@@ -46,7 +47,7 @@ from smc_mujoco.mechanisms.hardware.friction import (
     with_rise,
 )
 from smc_mujoco.mechanisms.hardware.joint_force import JointForce, PerJoint
-from smc_mujoco.mechanisms.hardware.moments import Run
+from smc_mujoco.mechanisms.hardware.moments import JointState, Run
 from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF, Actuator
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 
@@ -82,19 +83,29 @@ class Sliding(JointForce):
         raise NotImplementedError
 
     @property
+    def formula(self) -> "Formula":
+        """F and its bounds as functions that compiled code calls."""
+        return _by_value(type(self).value)
+
+    @property
+    def written(self) -> tuple[Callable, int]:
+        """The function that its author wrote, and the numbers that it may index."""
+        return type(self).value, 0
+
+    @property
     def brake(self) -> Callable:
         """The friction that MuJoCo holds over a step."""
-        return _brake(type(self).value)
+        return _brake(self.formula)
 
     @property
     def stage_force(self) -> Callable:
         """The friction at a stage of RK4."""
-        return _at_stages(type(self).value)
+        return _at_stages(self.formula)
 
     @property
     def steady(self) -> Callable:
         """F at a steady speed, without a load."""
-        return _steady(type(self).value)
+        return _steady(self.formula)
 
     @property
     def exact(self) -> "Sliding":
@@ -152,79 +163,124 @@ def _dry_joints(model: mujoco.MjModel) -> list[int]:
     return np.where(dry, data.efc_id, -1).tolist()
 
 
+class Formula(NamedTuple):
+    """A friction as compiled code calls it, at the speed v of a joint whose state is y.
+
+    `once` is whether this is the call of the step that may move the memory of its author.
+    """
+
+    force: Callable  # (y, v, p, memory, once) -> F
+    bounded: Callable  # (y, v, p, memory, once) -> F, low and high
+    module: str  # of the author
+
+
 @functools.cache
-def _steady(formula: Callable) -> Callable:
+def _by_value(value: Callable) -> Formula:
+    """Return a formula of speed and load."""
+    value = njit(value)
+
+    @njit
+    def force(y, v, p, memory, once):
+        return value(v, y.motor, y.load, p)[0]
+
+    @njit
+    def bounded(y, v, p, memory, once):
+        return value(v, y.motor, y.load, p)
+
+    return Formula(force, bounded, value.py_func.__module__)
+
+
+def _authored(formula: Formula, function: Callable) -> Callable:
+    """Return a function as one of the formula's author, whose code is compared with its Python."""
+    function.__module__ = formula.module
+    return function
+
+
+@functools.cache
+def _steady(formula: Formula) -> Callable:
     """Return the force that resists a joint at a steady speed, without a load."""
-    formula = njit(formula)
+    force = formula.force
 
     def steady(y, p, memory):
-        return formula(y.v, 0.0, 0.0, p)[0]
+        return force(unloaded(y), y.v, p, memory, False)
 
-    return steady
+    return _authored(formula, steady)
+
+
+@register_jitable
+def unloaded(y):
+    """Return the state of a joint on which no other force acts."""
+    return JointState(y.t, y.h, y.x, y.v, y.u, 0.0, 0.0)
 
 
 @functools.cache
-def _brake(formula: Callable) -> Callable:
+def _brake(formula: Formula) -> Callable:
     """Return the force on a joint that slides by a formula, the level of its dry friction, and
     how far it is from where it came to rest.
     """
-    formula = njit(formula)
+    bounded = formula.bounded
 
     def brake(y, p, memory):
-        f, low, high = formula(y.v, y.motor, y.load, p)
+        f, low, high = bounded(y, y.v, p, memory, True)
         slow = abs(y.v) < STICKING_SPEED or y.v * memory[SPEED] < 0.0
         memory[SPEED] = y.v
         if not low < high:  # nothing holds it
             return -f, 0.0, 0.0
         if not slow:
             memory[STUCK] = 0.0
+            if f * y.v < 0.0:  # it drives the joint
+                return -f, 0.0, 0.0
             return 0.0, abs(f), 0.0
         if memory[STUCK] == 0.0:
             memory[STUCK], memory[STUCK_AT] = 1.0, y.x
         return -0.5 * (low + high), 0.5 * (high - low), y.x - memory[STUCK_AT]
 
-    return brake
+    return _authored(formula, brake)
 
 
 @functools.cache
-def _at_stages(formula: Callable) -> Callable:
+def _at_stages(formula: Formula) -> Callable:
     """Return the force at a stage of RK4 on a joint that slides by a formula, or stops or rests in
     the step.
     """
-    formula = njit(formula)
+    force, bounded, _ = formula
 
     def stage_force(y, p, memory):
         held = 0.0
         if y.stage == 0.0:
             smooth = y.others + y.mean
-            f, low, high = formula(y.v, y.motor, y.load, p)
-            sliding = -f
+            f = force(y, y.v, p, memory, True)
+            if not math.isfinite(f):  # which ends the run
+                return -f, 0.0
             before = memory[STAGE_SPEED]
             slow = abs(y.v) < STICKING_SPEED and (
                 memory[WAS_HELD] != 0.0 or abs(y.v) <= abs(before)
             )
             memory[STAGE_SPEED] = y.v
-            stops = abs(y.v) <= -math.copysign(y.h * y.mobility, y.v) * (smooth + sliding)
-            if not low < high or not (slow or stops or y.v == 0.0):
+            stops = abs(y.v) <= -math.copysign(y.h * y.mobility, y.v) * (smooth - f)
+            low = high = 0.0
+            if slow or stops or y.v == 0.0:
+                _, low, high = bounded(y, y.v, p, memory, False)
+            if not low < high:
                 memory[SLIDES], memory[WAS_HELD], memory[RISE] = 1.0, 0.0, 0.0
+                return -f, 0.0
+            if slow:
+                sliding = -high if y.v > 0.0 else -low
             else:
-                if slow:
-                    sliding = -high if y.v > 0.0 else -low
-                else:
-                    sliding = -formula(0.5 * y.v, y.motor, y.load, p)[0]
-                start = math.copysign(STICKING_SPEED, smooth)
-                starting = -formula(start, y.motor, y.load, p)[0]
-                # friction that holds less than it exerts in motion would start no joint
-                if smooth * (smooth + starting) <= 0.0:
-                    low = min(low, smooth)
-                    high = max(high, smooth)
-                held = begin_step(y, memory, sliding, starting, low, high)
-                memory[SLIDES], memory[WAS_HELD] = 0.0, held
+                sliding = -force(y, 0.5 * y.v, p, memory, False)
+            start = math.copysign(STICKING_SPEED, smooth)
+            starting = -force(y, start, p, memory, False)
+            # friction that holds less than it exerts in motion would start no joint
+            if smooth * (smooth + starting) <= 0.0:
+                low = min(low, smooth)
+                high = max(high, smooth)
+            held = begin_step(y, memory, sliding, starting, low, high)
+            memory[SLIDES], memory[WAS_HELD] = 0.0, held
         if memory[SLIDES] != 0.0:
-            return with_rise(y, memory, -formula(y.v, y.motor, y.load, p)[0]), held
+            return with_rise(y, memory, -force(y, y.v, p, memory, False)), held
         return at_stage(y, memory), held
 
-    return stage_force
+    return _authored(formula, stage_force)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -27,7 +27,7 @@ def grease(y, p, memory):
     return -b * y.v
 
 
-@friction_function(numbers={"scale": 1e-9})
+@friction_function(numbers={"scale": 1e-9}, memory=1)
 def seen(y, p, memory):
     """A force that tells the command."""
     return p.scale * y.u

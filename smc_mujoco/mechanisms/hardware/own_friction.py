@@ -1,0 +1,229 @@
+"""Friction of a user's own, by a function that says how large it is, and which holds at rest.
+
+    @smc.hardware.friction_function(numbers={"coulomb": 0.2, "static": 0.5, "speed": 0.1})
+    def stribeck(y, p, memory):
+        return p.coulomb + (p.static - p.coulomb) * math.exp(-((y.v / p.speed) ** 2))
+
+    smc.Scenario(plant="duffing", law="pid", friction=stribeck(static=0.3))
+
+The function returns one of two things:
+
+- its level at the speed y.v, N m (N), 0 or more. Friction has the sign that resists. At rest it
+  holds any force up to the level at y.v = 0. Only the size counts: `-p.b * y.v` is viscous
+  friction, too.
+- F, low, high: the force F, with its sign, that a joint needs to move against it, and the bounds of
+  the force that it holds at rest. If it holds none, low and high are 0.
+
+How a joint then stops, rests and breaks away is in sliding.py.
+
+With a memory, F, low and high may depend on what the function keeps, such as a temperature. The
+function moves its memory once a step. If a function with a memory returns one number, this is a
+force on the joint, with its sign, that is held over the step: see `joint_force.HeldForce`.
+"""
+
+# pyright: reportIncompatibleVariableOverride=false
+# (a constant of the base class is a function or a property here)
+import functools
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from numba import njit, types
+from numba.extending import overload, register_jitable
+
+from smc_mujoco.common.data import frozen_data
+from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.jit import named
+from smc_mujoco.mechanisms.hardware.joint_force import JointForce
+from smc_mujoco.mechanisms.hardware.moments import JointState
+from smc_mujoco.mechanisms.hardware.sliding import SLIDES, STICKING_SPEED, Formula, Sliding
+from smc_mujoco.mechanisms.plant import Plant
+
+OWN = SLIDES + 1  # where the memory of the function begins; a copy for further calls follows it
+# of a friction at ten times STICKING_SPEED: one that has more at this speed has a step at rest
+STEP_SHARE = 0.5
+
+
+@frozen_data
+class OwnFriction(Sliding):
+    """Base of frictions whose function returns a level, or F, low and high."""
+
+    function: ClassVar[Callable]
+    own_memory: ClassVar[int] = 0
+
+    @property
+    def formula(self) -> Formula:
+        """F and its bounds as functions that compiled code calls."""
+        return _by_function(type(self).function, self.own_memory)
+
+    @property
+    def written(self) -> tuple[Callable, int]:
+        """The user's function, and the numbers that it may index."""
+        return type(self).function, self.own_memory
+
+    @property
+    def steady(self) -> Callable | None:
+        return None if self.own_memory else super().steady
+
+    def check(self, plant: Plant) -> None:
+        super().check(plant)
+        for function in _beside_rest(self, self.own_memory, len(self.joint_names(plant)), 1.0):
+            _check_signs(type(self).__name__, function)
+
+
+@frozen_data
+class HeldForce(JointForce):
+    """Base of frictions whose function, with a memory, returns a force that is held over a step."""
+
+    def check(self, plant: Plant) -> None:
+        super().check(plant)
+        for function in _beside_rest(self, self.memory, len(self.joint_names(plant)), 0.0):
+            ahead, back = function(STICKING_SPEED), function(-STICKING_SPEED)
+            if not isinstance(ahead, tuple) and ahead * back and _step(function, ahead):
+                raise ScenarioError(
+                    f"friction {type(self).__name__} is {ahead:g} just above v = 0 and {back:g} "
+                    "just below, and a force that is held over a step holds no joint at rest: "
+                    "return F, low, high, the force F that resists and the bounds of what it holds"
+                )
+
+
+@functools.cache
+def _by_function(function: Callable, size: int) -> Formula:
+    """Return the formula of a user's function with a memory of some numbers."""
+    function = njit(function)
+
+    @njit
+    def found(y, v, p, memory, once):
+        own = memory[OWN : OWN + size]
+        if size > 0 and not once:
+            own = memory[OWN + size : OWN + 2 * size]
+            own[:] = memory[OWN : OWN + size]
+        return function(at_speed(y, v), p, own)
+
+    @njit
+    def force(y, v, p, memory, once):
+        return _force(found(y, v, p, memory, once), v)
+
+    @njit
+    def bounded(y, v, p, memory, once):
+        return _with_bounds(found(y, v, p, memory, once), v, found(y, 0.0, p, memory, False))
+
+    return Formula(force, bounded, function.py_func.__module__)
+
+
+@register_jitable
+def at_speed(y, v):
+    """Return the state of a joint as if its speed were v."""
+    return JointState(
+        y.t, y.h, y.x, v, y.u, y.motor, y.load, y.stage, y.others, y.mean, y.level, y.mobility
+    )
+
+
+@register_jitable
+def resisting(found, v):
+    """Return the level that was found with the sign that resists the speed v."""
+    if found < 0.0 and v < 0.0:
+        raise ValueError("it pushes along the motion: a level is 0 or more")
+    return math.copysign(found, v)
+
+
+def _force(found, v):
+    """Return F of what a user's function returned at the speed v."""
+    return found[0] if isinstance(found, tuple) else resisting(found, v)
+
+
+def _with_bounds(found, v, resting):
+    """Return F, low and high of what a user's function returned at the speed v, and at rest."""
+    if isinstance(found, tuple):
+        return found
+    return resisting(found, v), -abs(resting), abs(resting)
+
+
+@overload(_force)
+def _force_of(found, v):
+    if isinstance(found, types.BaseTuple):
+        return lambda found, v: found[0]
+    return resisting
+
+
+@overload(_with_bounds)
+def _bounds_of(found, v, resting):
+    if isinstance(found, types.BaseTuple):
+        return lambda found, v, resting: found
+    return lambda found, v, resting: (resisting(found, v), -abs(resting), abs(resting))
+
+
+def returns_bounds(function: Callable, numbers: Mapping[str, float], memory: int) -> bool:
+    """Return whether a function returns F, low, high; False if it raises, which its run says."""
+    try:
+        p = named(tuple(numbers))(*(numbers.values() or (0.0,)))
+        return isinstance(function(_state(0.1, 1.0), p, np.zeros(memory)), tuple)
+    except Exception:
+        return False
+
+
+def _state(v: float, load: float) -> JointState:
+    """Return a joint at a speed and under a load, at which a function is looked at before a run."""
+    return JointState(t=0.0, h=1e-3, x=load, v=v, u=load, motor=load, load=load)
+
+
+def _beside_rest(
+    part: Any, memory: int, joints: int, load: float
+) -> Iterator[Callable[[float], Any]]:
+    """Yield for each joint a function: speed -> what the user's function returns of it in Python
+    under a load, with a fresh memory; none if that raises, which the run says.
+    """
+    function = getattr(part, "function", None) or type(part).force
+    for i in range(joints):
+        p = named(part.names)(*(part.parameters(i) or (0.0,)))
+
+        def at(v: float, p: Any = p) -> Any:
+            found = function(_state(v, load), p, np.zeros(memory))
+            if np.shape(found) not in ((), (3,)) or not np.all(np.isreal(found)):
+                raise ScenarioError(
+                    f"friction {type(part).__name__} returns {shown(found)}: return its level, or "
+                    "F, low, high"
+                )
+            return found
+
+        try:
+            at(STICKING_SPEED)
+            at(0.0)
+        except ScenarioError:
+            raise
+        except Exception:
+            continue
+        yield at
+
+
+def _step(function: Callable[[float], float], ahead: float) -> bool:
+    """Return whether a friction is a step at rest, from its value at STICKING_SPEED."""
+    return abs(ahead) > STEP_SHARE * abs(function(10.0 * STICKING_SPEED))
+
+
+def _check_signs(name: str, function: Callable[[float], Any]) -> None:
+    """Raise ScenarioError for what cannot be a friction that holds, by its values beside rest."""
+    ahead, back, rest = (function(v) for v in (STICKING_SPEED, -STICKING_SPEED, 0.0))
+    if isinstance(ahead, tuple):
+        if ahead[1] > ahead[2]:
+            raise ScenarioError(
+                f"friction {name} returns low {ahead[1]:g} and high {ahead[2]:g}: give F, low, "
+                "high, with low <= high"
+            )
+        return
+    if ahead * back < 0.0 and _step(function, ahead):
+        raise ScenarioError(
+            f"friction {name} flips from {back:g} to {ahead:g} at v = 0, and a force holds no "
+            "joint at rest: return its level without the sign, and the joint is held up to it"
+        )
+    if back < 0.0:
+        raise ScenarioError(
+            f"friction {name} is {back:g} just below v = 0, along the motion: return a level of 0 "
+            "or more; a force with a sign of its own is F, low, high"
+        )
+    if rest == 0.0 and ahead > 0.0 and _step(function, ahead):
+        raise ScenarioError(
+            f"friction {name} is {ahead:g} just above v = 0 and 0 at v = 0, so it holds no joint "
+            "at rest: return the level at v = 0, too"
+        )
