@@ -29,8 +29,9 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
+from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
 from smc_mujoco.mechanisms.hardware.part import Actuator
-from smc_mujoco.mechanisms.layout import dof_ids, drive_ids
+from smc_mujoco.mechanisms.layout import dof_ids, drive_ids, moving_joints
 from smc_mujoco.simulation import cfunctions
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
@@ -131,15 +132,21 @@ class Loop:
         gaps.
         """
         s = self.scenario.resolved
-        motors = [
+        motors: list[Actuator] = [
             dataclasses.replace(part, inductance=0.0)
             for part in s.actuator
             if isinstance(part, DCMotor)
         ]
+        motors += [part for part in s.actuator if isinstance(part, ElasticJoint)]
+        gears = [part for part in s.actuator if isinstance(part, Backlash)]
+        friction = s.friction
+        if gears:  # the rotor is rigid on the joint here
+            friction = [dataclasses.replace(part, side="link") for part in friction]
         chain = s.drive_train.chains[self.channel]
         ideal = dataclasses.replace(
             self.scenario,
             actuator=motors,
+            friction=friction,
             contact="none",
             x0=None,
             v0=None,
@@ -150,8 +157,7 @@ class Loop:
         with installed(None):
             model = models.with_values(models.compile_model(ideal), ideal)
             model.opt.disableflags |= NONLINEAR_FLAGS
-            gears = [part for part in s.actuator if isinstance(part, Backlash)]
-            for gear in gears:  # the rotor is rigid on the joint here
+            for gear in gears:
                 driven = dof_ids(model)[gear.channels(s.plant)]
                 model.dof_armature[driven] += gear.rotor_inertia
                 model.dof_damping[driven] += gear.rotor_damping
@@ -165,6 +171,11 @@ class Loop:
             self.a, b = transition(model, data, chain)
             self.b = b[:, drive_ids(model)[self.channel]] * s.drive_train.scales[self.channel]
             self.rows = dof_ids(model)
+            shafts = model.jnt_dofadr[moving_joints(model)[1]]
+            for sensor in s.sensors:
+                if sensor.side == "motor":
+                    read = [*sensor.channels(s.plant)]
+                    self.rows[read] = shafts[read]
             self.nv = model.nv
             self.gap = self._joint_gap(gear, model, data) if gear else 0.0
 

@@ -134,7 +134,8 @@ def has_dry_friction(scenario: Scenario) -> bool:
     plant = scenario.plant
     if plant.rubs or any(plant.parameters[name] > 0.0 for name in plant.dry):
         return True
-    if any((isinstance(f, Coulomb) and f.level > 0.0) or f.keeps_state for f in scenario.friction):
+    on_joints = [part for part in scenario.friction if part.side == "link"]
+    if any((isinstance(f, Coulomb) and f.level > 0.0) or f.keeps_state for f in on_joints):
         return True
     if not scenario.contact:
         return False

@@ -366,7 +366,7 @@ def _stuck(trace: Trace) -> dict[str, Array]:
         return {}
     bends = {}
     for part in trace.scenario.friction:
-        for i in part.channels(plant):
+        for i in part.channels(plant) if part.side == "link" else ():
             stuck = part.sticks(trace.v[:, i], trace.holding[:, i])
             if stuck is not None:
                 bends[i] = stuck

@@ -25,7 +25,8 @@ def forces(scenario: Scenario, x: Array) -> Array:
     """
     coefficients = of_file(scenario.plant).copy()
     for part in scenario.friction:
-        if b := part.added_to_model.damping:
+        b = part.added_to_model.damping
+        if b and part.side == "link":
             named = part.joint_names(scenario.plant)  # some may be no channels
             coefficients[0, np.isin(channel_names(scenario.plant), named)] += b
     found = np.zeros(x.shape)

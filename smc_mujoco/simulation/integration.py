@@ -69,8 +69,8 @@ def fastest_pole(s: Any) -> float:
         mass *= factors.get("mass", 1.0) * factors.get(s.plant.mass, 1.0)
         least = min(least, mass)
     parts = (
-        *(part for part in s.friction if part.smooth),
         *(part for part in s.actuator if not part.in_callback),
+        *(part for part in s.friction if part.smooth),
     )
     return poles.fastest_pole(s.plant, parts) / max(least, MIN_MASS)
 

@@ -60,8 +60,10 @@ OBSTACLE = "the obstacle"
 
 def parts(scenario: Scenario) -> tuple[Part, ...]:
     """Return the scenario's parts, in the order in which they are added to the model."""
-    added: list[Part] = [*scenario.contact, *scenario.friction]
+    added: list[Part] = [*scenario.contact]
+    added += [part for part in scenario.friction if part.side == "link"]
     added += [part for part in scenario.actuator if not part.in_callback]
+    added += [part for part in scenario.friction if part.side == "motor"]  # on rotors
     return (*added, *scenario.sensors)
 
 

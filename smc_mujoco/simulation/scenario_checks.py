@@ -13,8 +13,9 @@ from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.mechanisms.hardware.contact import kinds
 from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
+from smc_mujoco.mechanisms.hardware.part import Friction
 from smc_mujoco.mechanisms.hardware.rotors import flies
-from smc_mujoco.mechanisms.layout import loaded
+from smc_mujoco.mechanisms.layout import driven_names, loaded
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant, check_ranges
 from smc_mujoco.simulation.law_checks import check_inertia, check_law
 from smc_mujoco.simulation.signals import (
@@ -204,6 +205,8 @@ def check_mechanism(s: Any) -> None:
             part.suits(s, chain)
     for part in s.friction:
         part.check(s.plant)
+        if part.side == "motor":
+            check_rotors(s, part)
     if isinstance(s.feedforward, Feedforward):
         s.feedforward.check(s.plant)
         if s.accelerates:
@@ -221,6 +224,18 @@ def check_mechanism(s: Any) -> None:
                     f"the obstacles of contact {kind!r} of {s.plant.name} are placed for "
                     f"{name} = {value:g}, and {name} is {present:g}: leave {name} as it is"
                 )
+
+
+def check_rotors(s: Any, part: Friction) -> None:
+    """Check that the joints of a friction on the motor side have rotors beside them."""
+    chains = dict(zip(driven_names(s.plant), s.drive_train.chains, strict=True))
+    for joint in part.joint_names(s.plant):
+        if all(one.drives for one in chains.get(joint, ())):
+            raise ScenarioError(
+                f"{type(part).__name__} is on side 'motor' of joint {joint!r} of {s.plant.name}, "
+                "which has no rotor beside it: give actuator=smc.hardware.ElasticJoint(...) or "
+                "smc.Backlash(...)"
+            )
 
 
 @functools.lru_cache(maxsize=16)

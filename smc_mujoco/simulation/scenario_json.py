@@ -33,6 +33,7 @@ FOLDERS = (
 )  # of the parts and signals of this package
 # Fields that older records lack -> their defaults, which are not written either
 LATER = {"fault": None, "tracks": "position"}
+LATER_OF_PARTS = ("side",)
 RESOLVED = tuple(
     Resolved.__annotations__
 )  # fields that are None if left out, with a default that `resolved` has
@@ -73,8 +74,9 @@ def _data(value: Any) -> Any:  # noqa: PLR0911  # a table
         case Signal() | Part() | Feedforward():
             values = {}
             for f in dataclasses.fields(value):
-                if f.init:
-                    values[f.name] = _data(getattr(value, f.name))
+                content = getattr(value, f.name)
+                if f.init and not (f.name in LATER_OF_PARTS and content == f.default):
+                    values[f.name] = _data(content)
             if not isinstance(value, Friction) and not values.get("on", True):
                 del values["on"]
             return {

@@ -95,8 +95,9 @@ def fitted(scenario, omega):
             "input_delay": 0.004,
             "control_period": 2e-3,
         },
+        {"actuator": (smc.Lag(5e-3), smc.hardware.ElasticJoint(900.0, 1.0, 0.02))},
     ],
-    ids=["two lags", "motor", "lag and delay"],
+    ids=["two lags", "motor", "lag and delay", "elastic joint"],
 )
 def test_the_response_of_the_loop_is_that_of_a_run_under_a_sine(fields):
     omega = math.tau * 17.0
@@ -114,6 +115,26 @@ def test_the_response_of_the_loop_is_that_of_a_run_under_a_sine(fields):
         omega * scenario.resolved.physics_step
     ) ** 2 / 12.0  # of positions, because forces are means over steps
     assert Loop(scenario).response(omega) == pytest.approx(fitted(scenario, omega), rel=1e-5 + late)
+
+
+def test_an_encoder_on_the_motor_answers_as_the_rotor():
+    """Joint over rotor is the spring's force over that of spring and joint."""
+    omega, d, k = 20.0, 0.3, 90.0
+    plant = smc.plant("duffing", M=1.5, alpha=4.0, beta=0.0, delta=3.0)
+    joint, rotor = (
+        Loop(
+            smc.Scenario(
+                plant=plant,
+                law="none",
+                actuator=smc.hardware.ElasticJoint(k, d, 0.02),
+                sensor=smc.Encoder(side=side),
+            )
+        ).response(omega)
+        for side in ("link", "motor")
+    )
+    spring = k + 1j * omega * d
+    expected = spring / (spring + 4.0 + 3.0j * omega - 1.5 * omega**2)
+    assert joint / rotor == pytest.approx(expected, rel=2e-3)
 
 
 @smc.law_function(gains=dict.fromkeys(("x", "v", "f", "q", "dq", "fq"), 0.0))

@@ -11,7 +11,8 @@ from smc_mujoco.draw import states
 from smc_mujoco.draw.decimate import windows
 from smc_mujoco.draw.film import arrows, world
 from smc_mujoco.draw.film.pace import FilmClock
-from smc_mujoco.mechanisms.layout import ROTOR, joint_ids
+from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
+from smc_mujoco.mechanisms.layout import ROTOR, joint_ids, moving_joints
 from smc_mujoco.metrics.conventions import ChannelGroup
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.run import poses
@@ -58,8 +59,7 @@ class MachineTrack:
         self.states = states.timeline(trace, times, clock.played)
         self.x = sampled(trace, trace.x[:, :n], times)
         self.r = sampled(trace, trace.r[:, :n], times)
-        gap = states.backlash_gap(trace.scenario)  # rotors lead their joints by half of it
-        self.ahead = 0.5 * gap * windows(trace.t, states.flanks(trace), edges).mean[:, :n]
+        self.ahead = leads(trace, times, edges)[:, :n]
 
     def rest(self, time: float) -> Array | None:
         """Return the pose at a time, s, (nq,), for joints that have no channel."""
@@ -68,6 +68,19 @@ class MachineTrack:
     def failed(self, time: float) -> bool:
         """Return whether the run has failed by a time, s."""
         return self.trace.diverged_at is not None and time >= self.trace.diverged_at
+
+
+def leads(trace: Trace, times: Array, edges: Array) -> Array:
+    """Return how far each rotor is ahead of its joint in the frames at times in s, (times, n): half
+    of a play, or what a spring is bent by, which a trace lacks.
+    """
+    if any(isinstance(part, ElasticJoint) for part in trace.scenario.actuator):
+        model = models.compile_model(trace.scenario)
+        joints, shafts = model.jnt_qposadr[moving_joints(model)]
+        moved = poses(trace, times)
+        return moved[:, shafts] - moved[:, joints]
+    gap = states.backlash_gap(trace.scenario)
+    return 0.5 * gap * windows(trace.t, states.flanks(trace), edges).mean
 
 
 def sampled(trace: Trace, values: Array, times: Array) -> Array:

@@ -22,7 +22,7 @@ import numpy as np
 from smc_mujoco.common.constraints import Finite, Natural, OneOf, Positive, Probability, Whole
 from smc_mujoco.common.errors import ScenarioError, number
 from smc_mujoco.mechanisms.hardware.moments import Run
-from smc_mujoco.mechanisms.hardware.part import OnJoints
+from smc_mujoco.mechanisms.hardware.part import SIDES, OnJoints
 from smc_mujoco.mechanisms.layout import ROTOR, joint_ids, moving_joints
 from smc_mujoco.mechanisms.plant import Field, Plant
 
@@ -33,7 +33,6 @@ MAX_COUNT = 2.0**52  # a larger number is whole
 MAX_READINGS = 100_000  # under way in a delay: chosen, 6 MB per channel
 # readings in a history are a multiple of this, so that runs with other delays share a model; chosen
 READINGS_STEP = 64
-SIDES = "link", "motor"
 KINDS = mujoco.mjtSensor.mjSENS_JOINTPOS, mujoco.mjtSensor.mjSENS_JOINTVEL
 
 
@@ -67,7 +66,7 @@ class Encoder(OnJoints):
     period: Positive | None = None
     delay: Natural = 0.0
     skew: Natural = 0.0
-    side: Annotated[str, OneOf(names=SIDES)] = "link"
+    side: Annotated[str, OneOf(names=SIDES)] = dataclasses.field(default="link", kw_only=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -203,7 +203,7 @@ class JointState(NamedTuple):
     u: float  # the command of its channel after its delay; 0 without an actuator
     motor: float  # force of the joint's drive: in the step before, or at this stage
     # the other forces: gravity, gyration, springs, disturbances; contacts of the step before, but
-    # not the stops of a play, which pass on the motor's force
+    # not a play or a spring, which passes on the motor's force
     load: float
     # the rest is only of joints that move alone, for forces at every stage
     stage: float = 0.0  # 0 to 3

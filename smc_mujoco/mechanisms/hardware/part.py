@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.constraints import Number, constrain
+from smc_mujoco.common.constraints import Number, OneOf, constrain
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.text import stated
 from smc_mujoco.mechanisms.hardware.moments import Run, Torque
@@ -30,6 +30,7 @@ from smc_mujoco.mechanisms.layout import (
 )
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
 
+SIDES = "link", "motor"  # of an ElasticJoint or a Backlash
 P = TypeVar("P", bound="OnJoints")
 
 # The hardest constraint that MuJoCo offers: it reads a time constant of less than two steps as two
@@ -144,7 +145,12 @@ class Added(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Friction(OnJoints):
-    """Base of frictions, which resist a joint's motion beside the plant's own damping."""
+    """Base of frictions, which resist a joint's motion beside the plant's own damping.
+
+    Attributes:
+      side: "link": on the joint; "motor": on the rotor beside it, of an ElasticJoint or a Backlash,
+        for Viscous, Coulomb and LuGre.
+    """
 
     # Whether it keeps a state by which it holds a joint at rest: bristles, or the place where it
     # stuck. Not Coulomb, which is MuJoCo's alone. One at most on a joint.
@@ -155,6 +161,19 @@ class Friction(OnJoints):
     steady: ClassVar[Callable[..., float] | None] = None
     added_to_model: ClassVar[Added] = Added()
 
+    side: Annotated[str, OneOf(names=SIDES)] = dataclasses.field(default="link", kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.side == "motor" and not (self.force is None and self.brake is None):
+            raise ScenarioError(
+                f"{type(self).__name__} acts on the joint, not on side 'motor': leave side out, or "
+                "give Viscous, Coulomb or LuGre there"
+            )
+
+    def structure(self) -> tuple[Hashable, ...]:
+        return *super().structure(), self.side
+
     def numbers(self, run: Run) -> list[Sequence[float]]:
         if self.steady is None:
             return super().numbers(run)
@@ -163,10 +182,18 @@ class Friction(OnJoints):
     def joints(self, spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
         """Return the joints that it acts on."""
         named = [spec.joint(name) for name in self.on]
-        return named or joints(spec)[: len(drive_actuators(spec))]
+        found = named or joints(spec)[: len(drive_actuators(spec))]
+        if self.side == "motor":
+            return [spec.joint(ROTOR + joint.name) for joint in found]
+        return found
 
     def dofs(self, model: mujoco.MjModel) -> np.ndarray:
         """Return the degrees of freedom that it acts on."""
+        if self.side == "motor":
+            shafts = model.actuator_trnid[drive_ids(model), 0]
+            driven = driven_ids(model)
+            named = [model.joint(name).id for name in self.on] or driven
+            return model.jnt_dofadr[shafts[np.isin(driven, named)]]
         named = [model.joint(name).dofadr[0] for name in self.on]
         return np.array(named or dof_ids(model)[: len(drive_ids(model))], int)
 

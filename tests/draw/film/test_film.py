@@ -315,6 +315,17 @@ def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
     ahead = MachineTrack(slack, "#0072B2", clock, slack.t[:2], {}).ahead
     assert ahead[pushed + 1, 0] == pytest.approx(0.1)
     assert np.abs(ahead).max() <= 0.1
+    soft = smc.hardware.ElasticJoint(20.0, 0.1, 0.01)
+    bent = realistic(plant="inverted_pendulum", actuator=soft, contact="none", duration=0.3)
+    clock = FilmClock(bent.t, np.ones(len(bent.t)))
+    ahead = MachineTrack(bent, "#0072B2", clock, bent.t[:2], {}).ahead[:, 0]
+    # at the sample before: the spring's force is what moves the joint, beside gravity
+    accelerations = np.gradient(bent.v[:, 0], bent.t)
+    p = bent.scenario.plant.parameters
+    weight = p["m"] * p["grav"] * p["l"] * np.sin(bent.x[:, 0])
+    force = p["m"] * p["l"] ** 2 * accelerations - weight
+    assert np.corrcoef(ahead[10:-10], force[10:-10])[0, 1] > 0.9
+    assert np.abs(ahead).max() > 0.02
     resting = realistic(contact="floor", duration=0.2)
     with staged(resting, (480, 170)) as shown:
         shown.arrange(np.array([0.4]))

@@ -161,6 +161,53 @@ def test_a_sensor_on_the_motor_side_reads_the_rotor_late_and_by_name():
         np.testing.assert_array_equal(late.s[2:, 1], at_once.s[:-2, 1])
 
 
+def test_friction_on_the_motor_side_is_on_the_rotor():
+    fields = {"plant": AXIS, "x0": START, "feedforward": SHAKEN, "duration": 0.5}
+    fields |= {"law": watch(), "sensor": smc.Encoder(**PERFECT, side="motor")}
+    fields |= {"integrator": "implicitfast", "physics_step": 2e-4}
+    soft = {"stiffness": 50.0, "rotor_inertia": 0.02}
+    part, built_in, held = smc.run(
+        [
+            smc.Scenario(
+                actuator=ElasticJoint(**soft), friction=smc.Viscous(0.4, side="motor"), **fields
+            ),
+            smc.Scenario(actuator=ElasticJoint(**soft, rotor_damping=0.4), **fields),
+            smc.Scenario(
+                actuator={"slide": ElasticJoint(**soft)},
+                friction={"slide": smc.Coulomb(30.0, side="motor")},
+                **fields | {"v0": 0.5, "feedforward": smc.Constant(3.0)},
+            ),
+        ]
+    )
+    np.testing.assert_array_equal(part.x, built_in.x)
+    np.testing.assert_array_equal(part.s, built_in.s)
+    assert not part.reaction.any()
+    # the rotor sticks, and the joint swings on its spring; the first sample is before it stopped
+    assert np.ptp(held.s[1:]) < 1e-5
+    crossings = np.flatnonzero(np.diff(np.sign(held.v[:, 0]))) * held.scenario.control_period
+    period = 2.0 * np.diff(crossings).mean()
+    assert period == pytest.approx(math.tau * math.sqrt(INERTIA / 50.0), rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("friction", "actuator"),
+    [
+        (smc.Coulomb(0.1, side="motor"), None),
+        (smc.Coulomb(0.1, side="motor"), smc.Lag(0.01)),
+        ({"hinge": smc.Viscous(0.1, side="motor")}, ElasticJoint(500.0)),
+    ],
+    ids=str,
+)
+def test_the_motor_side_of_a_rigid_joint_takes_no_friction(friction, actuator, refused):
+    refused(
+        lambda: smc.Scenario(plant="cart_pole", law="none", friction=friction, actuator=actuator)
+    )
+
+
+def test_a_formula_is_on_the_joint(refused):
+    refused(lambda: smc.hardware.Sigmoid(0.4, 50.0, side="motor"))
+
+
 OWN = """<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="a" axis="0 1 0"/>
 <geom size="0.01" pos="0.2 0 0" mass="{:g}"/></body></worldbody>
 <actuator><motor joint="a" ctrllimited="true" ctrlrange="-{:g} {:g}"/></actuator></mujoco>"""
