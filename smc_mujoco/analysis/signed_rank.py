@@ -21,6 +21,7 @@ LEAD_RESAMPLES = 400  # for the least visible lead; chosen
 # shapes and confirmed on shapes drawn later, see docs/winners.md
 OWN_SHARE = 0.95
 MEDIAN_DISTANCE = 0.954  # of two units of a normal sample, in its standard deviations
+MAX_UNITS = 1000  # of a sample that would see a lead; chosen
 MAX_SUMS = 10_000_000  # of pairs, in memory at once
 
 
@@ -106,17 +107,18 @@ def _distribution(n: int) -> np.ndarray:
 
 def units_needed(leads: ArrayLike, error: float, relevant: float) -> float:
     """Return the number of units with which the test would see these leads with a probability of
-    80 %, if more units are like them; inf if their centre is no more than what is relevant.
+    80 %, if more units are like them; inf if their centre is no more than what is relevant, or if
+    more than MAX_UNITS are needed.
 
-    It is that of a normal sample. Its standard deviation is the median distance of two units over
-    0.954, and pi / 3 times as many units as a t-test takes are enough for the signed ranks.
+    It is that of a normal sample: pi / 3 times as many units as a t-test takes are enough for the
+    signed ranks. The standard deviation is the median distance of two units over 0.954.
 
     Args:
       leads: d of the units, NaN for none, at least two.
       error: one-sided level of the test.
       relevant: r.
     """
-    from scipy.special import ndtri
+    from scipy.special import stdtrit
 
     known = _finite(leads)
     i, j = np.triu_indices(known.size, 1)
@@ -124,9 +126,11 @@ def units_needed(leads: ArrayLike, error: float, relevant: float) -> float:
     centre = interval(known, error)[0] + math.log1p(-relevant)
     if not centre > 0.0:
         return math.inf
-    deviations = float(ndtri(1.0 - error) + ndtri(POWER))
-    least = math.ceil(-math.log2(error))
-    return max(least, math.ceil(math.pi / 3.0 * (deviations * deviation / centre) ** 2))
+    for n in range(max(2, math.ceil(-math.log2(error))), MAX_UNITS + 1):
+        deviations = float(stdtrit(n - 1, 1.0 - error) + stdtrit(n - 1, POWER))
+        if n >= math.pi / 3.0 * (deviations * deviation / centre) ** 2:
+            return n
+    return math.inf
 
 
 def least_visible_lead(leads: ArrayLike, error: float, relevant: float) -> float:

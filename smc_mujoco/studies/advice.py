@@ -164,7 +164,7 @@ class RaceAdvice(Advice):
             resolved = f"a lead of {100.0 * seen:.2g} %"
         text = f"{race.sets} sets resolve {resolved}"
         if math.isinf(sets):
-            return f"{text}, and the laws are too close for any number of sets to tell"
+            return f"{text}, and the laws are too close for more sets to tell them apart"
         if race.stopped and sets <= LOOKS[-1]:
             return f"{text}; about {sets:.0f} would decide, and the same call goes on with them"
         return f"{text}; if the lead stays as it is, about {sets:.0f} would decide"

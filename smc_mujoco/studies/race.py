@@ -75,10 +75,15 @@ class Entrant:
         assert self.task is not None
         return self.task.search(k, self.failure, lambda count: None, draw)
 
+    def call(self, k: int, draw: int) -> tuple:
+        """Return the arguments with which a worker makes search k."""
+        assert self.task is not None
+        return self.task.call(k, self.failure, draw)
+
     @property
     def count(self) -> int:
         """The number of sets that differ; 1 for a law with given gains."""
-        return len(self.known.sets) if self.known else len(self.found)
+        return len(self.found) if self.task else len(self.known.sets)  # pyright: ignore[reportOptionalMemberAccess]
 
     @property
     def values(self) -> list[float]:
@@ -147,7 +152,7 @@ def race(
             for one, made in _searched(trial, pieces):
                 one.found.append(made)
                 shown.advance(1.0)
-            _again(trial, running.values())
+            _again(trial, list(running.values()))
             _judge(trial, plant, list(running.values()), goal, k + 1)
             seconds = time.monotonic() - start
             if k + 1 == FIRST:
@@ -258,7 +263,7 @@ def _searched(
     if missing and trial.executor is not None:
         calls = []
         for one, k, draw in (pieces[i] for i in missing):
-            calls.append(one.task.call(k, one.failure, draw))
+            calls.append(one.call(k, draw))
         with opened(trial.executor) as pool:
             for j, made in called(pool, search.searched, calls):
                 found[missing[j]] = files[missing[j]].keep(made)

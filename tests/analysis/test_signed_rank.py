@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import rankdata
 
 from smc_mujoco.analysis import signed_rank
-from smc_mujoco.analysis.signed_rank import interval, p_values
+from smc_mujoco.analysis.signed_rank import interval, p_values, units_needed
 
 pytestmark = pytest.mark.quick
 
@@ -78,3 +78,19 @@ def test_more_samples_than_are_enumerated_have_the_normal_approximation(monkeypa
 
 def test_four_samples_reject_no_centre_at_five_percent():
     assert interval([0.1, 0.3, 0.2, 0.4], 0.05)[1:] == (-np.inf, np.inf)
+
+
+@pytest.mark.parametrize(("spread", "lead"), [(0.25, 0.3), (0.1, 0.08)])
+def test_so_many_units_as_are_said_to_be_needed_see_a_lead_in_four_of_five_samples(spread, lead):
+    """With far fewer it is seen seldom, and a lead that is not relevant with no number."""
+    error, relevant = 0.0125, 0.03
+    random = np.random.default_rng(3)
+    needed = units_needed(lead + spread * random.standard_normal(400), error, relevant)
+    seen = []
+    for n in (needed, needed // 2):
+        leads = lead + spread * random.standard_normal((2000, int(n)))
+        seen.append(np.mean(p_values(leads + np.log1p(-relevant)) <= error))
+    assert 0.7 < seen[0] < 0.9
+    assert seen[1] < 0.5
+    assert units_needed([0.02, 0.03, 0.01], error, relevant) == np.inf
+    assert units_needed([9.0, 9.1, 9.2], error, relevant) == 7  # 2^-7 is below the level

@@ -278,3 +278,17 @@ def test_levels_of_force_are_shares_of_the_bound_of_ones_own_machine(size):
     assert all(0.0 < m.value < 6.0 for m in ours)
     (run,) = smc.grid(*mass(size), "sine")
     assert run.disturbance[0].amplitude == pytest.approx(0.2 * size)
+
+
+def test_a_blow_comes_at_half_time_in_shares_of_the_momentum_that_u_stops_in_its_time():
+    """F T = sqrt(M X F), here with the pendulum's m l^2 about its hinge."""
+    kind = margins.MARGIN_KINDS["blow"]
+    (level, *_) = kind.search(BASE, COARSE).levels
+    inertia = 1.0 / abs(BASE.plant.nominal(np.zeros(1), np.zeros(1), 0, BASE.plant.values({}))[1])
+    whole = np.sqrt(inertia * abs(BASE.resolved.x0[0]) * BASE.limits[0])
+    assert level == pytest.approx(margins.BLOWS[0] * whole)
+    blows = [one.disturbance[-1] for one in kind.scenarios(BASE, level)]
+    assert [(blow.impulse, blow.time) for blow in blows] == [
+        (level, BASE.duration / 2),
+        (-level, BASE.duration / 2),
+    ]

@@ -33,8 +33,6 @@ class Drawn(module.Entrant):
         self.lead, self.random = lead, random
         self.outcome = {}
 
-    count = property(lambda self: len(self.found))
-
     def search(self, k, draw):
         trained, J = drawn(self.random, self.lead)
         self.outcome[k, trained] = J
@@ -48,13 +46,11 @@ class Drawn(module.Entrant):
 @pytest.fixture
 def run(monkeypatch):
     """Return what races laws, name -> lead, whose searches are drawn."""
-    made = []
     nothing = types.SimpleNamespace(read=lambda: None, keep=lambda found: found, path=None)
     monkeypatch.setattr(module, "_file", lambda *piece: nothing)
     monkeypatch.setattr(module, "writable", lambda *paths: None)
 
     def unseen(trial, plant, values, goal, numbers):
-        made.append(list(numbers))
         return np.array(values), np.full(len(values), math.nan)
 
     monkeypatch.setattr(module, "unseen", unseen)
@@ -65,7 +61,6 @@ def run(monkeypatch):
         entrants = [Drawn(name, lead, random) for name, lead in leads.items()]
         return module.race(trial, None, entrants, GOAL, until, RELEVANT)
 
-    raced.judged = made
     return raced
 
 

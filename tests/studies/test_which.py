@@ -1,9 +1,11 @@
 """Which law: the order follows from the runs, and the last line says where they cannot decide."""
 
 import dataclasses
+import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import smc_mujoco as smc
@@ -14,7 +16,7 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.properties import searched
 from smc_mujoco.studies import advice as advice_module
-from smc_mujoco.studies import race
+from smc_mujoco.studies import advise, race
 from smc_mujoco.studies import which as module
 from smc_mujoco.studies.board import Boards
 
@@ -244,3 +246,34 @@ def test_the_command_prints_the_tables_and_the_answer(folder, capsys, monkeypatc
     assert re.search(r"Use: fast\nGains: lam=6, k1=2, yours\nSecond: slow\(", printed)
     seeds = smc.Table.read(folder).column("seed")
     assert seeds.min() == 1_000_000
+
+
+class Columns:
+    """Runs of two laws in two conditions: when they settle."""
+
+    times = {  # noqa: RUF012
+        ("a", "nominal"): [0.5, 0.9],
+        ("a", "noise"): [math.inf, 0.2],
+        ("b", "nominal"): [math.inf, math.inf],
+        ("b", "noise"): [0.1, 0.1],
+    }
+
+    def column(self, name):
+        rows = [(*key, time) for key, times in self.times.items() for time in times]
+        law, condition, time = map(np.array, zip(*rows, strict=True))
+        fine = np.full(len(rows), None), np.full(len(rows), math.nan), np.full(len(rows), True)
+        named = dict(zip(("failure", "diverged_at", "arrived"), fine, strict=True))
+        named |= {"law": law, "condition": condition, "settling_time": time}
+        return named.get(name, np.full(len(rows), "mass"))
+
+    def scenario(self, row):
+        return row
+
+
+def test_the_worst_run_is_of_the_condition_in_which_the_law_settles_least_and_then_latest():
+    assert advise._settled(Columns()) == {
+        "a": {"nominal": (2, 2), "noise": (1, 2)},
+        "b": {"nominal": (0, 2), "noise": (2, 2)},
+    }
+    assert advise._worst_run(Columns(), "a") == 2
+    assert advise._worst_run(Columns(), "b") == 4
