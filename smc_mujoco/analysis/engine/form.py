@@ -88,6 +88,7 @@ class Form(NamedTuple):
     delay: bool
     clock: bool
     fails: bool
+    drops: bool  # whether a sensor loses readings
     implicit: bool  # whether a step is implicitfast's, not RK4's
     slots: int  # commands that are under way
     past: int  # physics steps whose states a sensor may read; 0 if it reads the present one

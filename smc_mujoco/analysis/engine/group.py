@@ -46,6 +46,7 @@ VARYING: Fields = {
     "delay": False,
     "clock": False,
     "fails": False,
+    "drops": False,
     "slots": 1,
 }
 
@@ -186,6 +187,7 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
         delay=bool(s.delay_steps),
         clock=clock,
         fails=s.fault is not None,
+        drops=any(part.dropout for part in s.sensors),
         implicit=rubs_by_force(s),
         slots=slots,
         past=past,

@@ -259,10 +259,13 @@ def _sensing(form: Form, compile_user: Compiler) -> Fields:
         found["errors"] = inlined(lambda view, t: (of_x(view, t, 0)[0], of_v(view, t, 0)[0]))
     if at.sensor:
         sensor = acting(at.sensor, compile_user)
+        drops = form.drops
 
         @inlined
         def read(view, i, j, x, v):
-            chance = philox.uniform(view.row[SETTING.seed], i, philox.DROPOUT, j)
+            chance = 1.0
+            if drops:
+                chance = philox.uniform(view.row[SETTING.seed], i, philox.DROPOUT, j)
             sight = Sight(x, v, float(j), view.row[row_at.hinges + i], chance)
             x, v = sensor(view, sight, i)
             return False, x, v
@@ -511,7 +514,7 @@ def _recording(form: Form) -> Any:
     @inlined
     def record(view, scores, log, k):
         row, _, work = view
-        tally(row, work, scores, k)
+        tally(row, work, scores, k, k == int(row[SETTING.samples]))
         for i in range(n):
             sample = work_at.now + WIDTH * i
             if row[SETTING.logging] != 0.0:

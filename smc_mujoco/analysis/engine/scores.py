@@ -64,8 +64,8 @@ def _fold(name: str) -> Fold | None:
 
 
 def tallying(form: Form) -> Any:
-    """Return a compiled function (row, work, scores, k): take sample k into all metrics, and give
-    the scores after the last.
+    """Return a compiled function (row, work, scores, k, ends): take sample k into all metrics, and
+    give the scores if the run `ends` with it.
     """
     work_at = layout(form).work
     samples = Samples(form.driven, work_at.now, work_at.before)
@@ -89,11 +89,11 @@ def _and(others: Any, metric: tuple[Any, Any], i: int) -> Any:
     take, score = metric
 
     @inlined
-    def tally(row, work, scores, k):
+    def tally(row, work, scores, k, ends):
         take(row, work, k)
-        if k == int(row[SETTING.samples]):
+        if ends:
             scores[SCORES + i] = score(row, work)
-        others(row, work, scores, k)
+        others(row, work, scores, k, ends)
 
     return tally
 
@@ -244,7 +244,7 @@ def _over_samples(folds: tuple[Fold, ...], n: int) -> Any:
             for j in range(width):
                 work[before + j] = work[now + j]
                 work[now + j] = samples[k, j]
-            tally(row, work, scores, k)
+            tally(row, work, scores, k, k == len(samples) - 1)
 
     return cached(scored)
 
