@@ -81,6 +81,7 @@ def test_margins_are_printed_in_their_unit(printed):
         words = row(block, "duffing", "pid")
         assert near(words[2], one["value"])
         assert near(words[3], one["resolution"])
+        assert one["resolution"] >= 0.0
         assert words[-1] == one["unit"]
 
 

@@ -201,3 +201,9 @@ def test_mujoco_without_its_library_is_named(tmp_path, monkeypatch):
         libmujoco.path()
     (tmp_path / "libmujoco.so.3").write_text("")
     assert libmujoco.path() == tmp_path / "libmujoco.so.3"
+
+
+def test_a_long_message_keeps_its_start_and_its_cure():
+    said = str(ScenarioError("a" * 2000 + "b" * 500))
+    assert said == "a" * 997 + "..." + "b" * 500
+    assert len(str(ScenarioError("a" * 1500))) == 1500

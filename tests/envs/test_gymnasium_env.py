@@ -5,6 +5,7 @@ are found.
 import copy
 import dataclasses
 import pickle
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from helpers.own_parts import dahl, worn
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.envs import registration, tasks
+from smc_mujoco.envs import law_agent, registration, tasks
 
 gymnasium = pytest.importorskip(
     "gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'"
@@ -35,13 +36,30 @@ def test_films_of_an_environment_run_at_the_rate_of_its_controller():
 
 
 @pytest.mark.quick
-@pytest.mark.parametrize(("reach", "applies"), [(4.0, True), (1.0, False)])
+@pytest.mark.parametrize(("reach", "applies"), [(1.0, False), (4.0, True)])
 def test_a_swing_up_needs_every_toppling_joint_to_hang(reach, applies, monkeypatch):
     plant = smc.plant("inverted_pendulum")
     ranges = np.array([-4.0, -reach]), np.array([4.0, reach])
     monkeypatch.setattr(tasks, "toppling", lambda plant: np.array([True, True]))
     monkeypatch.setattr(tasks, "_ranges", lambda plant: ranges)
     assert tasks.SwingUp().applies_to(plant) == applies
+
+
+@pytest.mark.quick
+def test_the_torque_of_a_swing_up_is_measured_by_the_heaviest_pendulum(monkeypatch):
+    monkeypatch.setattr(tasks, "toppling", lambda plant: np.array([True, True]))
+    pulls = [(3.0, 1.0), (-8.0, 2.0)]  # f and g
+    two = SimpleNamespace(free=(), parameters={}, nominal=lambda x, v, i, p: pulls[i])
+    torque = tasks.SwingUp().fields(two)["u_max"]
+    assert torque == pytest.approx(4.0 * tasks.SWING_UP_TORQUE)
+
+
+@pytest.mark.quick
+def test_an_observation_that_is_too_short_is_refused(refused):
+    read = law_agent._positions_and_velocities
+    refused(lambda: read(np.zeros(3), 2), "give what the environment returned")
+    x, v = read(np.array([1.0, 2.0, 3.0, 4.0]), 2)
+    assert (x.tolist(), v.tolist()) == ([1.0, 2.0], [3.0, 4.0])
 
 
 # the physics are the benchmark's

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import control
 import numpy as np
 import pytest
+from helpers.sketch import made
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,7 +18,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.plant import plant
 from smc_mujoco.metrics import catalogue as m
 from smc_mujoco.metrics import limit_cycle
-from smc_mujoco.metrics.conventions import scale, turns
+from smc_mujoco.metrics.conventions import group_trace, groups, scale, turns
 from smc_mujoco.simulation.trace import Trace
 
 pytestmark = pytest.mark.quick
@@ -951,3 +952,11 @@ def test_a_run_that_starts_near_the_noise_settles_within_five_of_its_deviations(
     assert (m.settling_time(made) < math.inf) == settles
     if settles:
         assert m.settling_time(made) == pytest.approx(0.5)
+
+
+def test_positions_of_a_pose_are_those_whose_distance_is_its_error():
+    trace = made(smc.Scenario(plant="quadrotor", law=smc.laws(kind="joint")[0], duration=0.05))
+    for group in groups(trace.scenario.plant):
+        part = group_trace(trace, group)
+        columns = [i for i in group.channels if i in trace.scenario.scored_channels]
+        np.testing.assert_allclose(part.x - part.r, trace.e[:, columns], atol=1e-12)

@@ -65,3 +65,12 @@ def test_a_batch_is_finished_while_the_next_one_runs_and_what_that_raises_is_hea
 
         with pytest.raises(smc.ScenarioError, match="no room"):
             batches.compute(made, 1, full)
+
+
+@pytest.mark.quick
+def test_a_batch_has_as_many_runs_as_its_work_and_the_greatest_number_allow(monkeypatch):
+    scenarios = grid(["duffing"], ["none"], ["nominal"], 5, "study", 0.05)
+    monkeypatch.setattr(batches, "MAX_RUNS", 2)
+    assert [len(batch) for batch in batches.batches(scenarios)] == [2, 2, 1]
+    monkeypatch.setattr(batches, "MAX_WORK", 1)
+    assert [len(batch) for batch in batches.batches(scenarios)] == [1] * 5

@@ -1,9 +1,13 @@
 """Step responses of the laws of the study, tested with the plugin as users test their laws."""
 
+import json
+
 import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.testing import golden
 
 pytestmark = pytest.mark.quick
 
@@ -86,3 +90,19 @@ def test_an_arm_steps_from_its_rest_on_every_joint(step_response):
     np.testing.assert_allclose(trace.r - rest, 0.1)
     assert r.settling_time < 0.8
     assert np.abs(trace.x[-1] - rest - 0.1).max() < 1e-3
+
+
+def test_a_metric_that_a_response_lacks_is_no_attribute(step_response):
+    r = step_response("duffing", law("duffing", "boundary_layer"), STEP, duration=0.5)
+    assert r.itae == r.metrics["itae"]
+    assert "spread_bound" in CATALOGUE
+    assert not hasattr(r, "spread_bound")
+
+
+def test_with_tolerances_only_their_metrics_count(step_response, tmp_path):
+    r = step_response("duffing", law("duffing", "boundary_layer"), STEP, duration=0.5)
+    known = {"itae": {"value": r.itae, "tolerance": 0.0}, "max_u": {"value": 0.0, "tolerance": 0.0}}
+    (tmp_path / "a.json").write_text(json.dumps({"one": known}))
+    golden.compare(tmp_path / "a.json", "one", r, {"itae": 1e-9})
+    with pytest.raises(AssertionError, match="max_u"):
+        golden.compare(tmp_path / "a.json", "one", r, {})

@@ -55,6 +55,8 @@ def test_a_jump_of_position_is_slow_and_a_rest_fast(base):
     """
     trace = moving(base, lambda t: np.clip((t - 2.0) / 0.1, 0.0, 1.0))
     assert at(trace, (0.5, 1.8, 2.05, 2.3, 3.0)) == [4.0, 1.0, 0.125, 1.0, 4.0]
+    found = pace.clock([trace], FPS)  # a frame lasts as long as its speed says, but for the last
+    np.testing.assert_allclose((np.diff(found.times) * FPS)[:-1], found.speeds[:-2])
 
 
 @pytest.mark.parametrize(
