@@ -21,6 +21,7 @@ from typer.models import OptionInfo
 import smc_mujoco as smc
 from smc_mujoco.analysis import engine
 from smc_mujoco.cli import main
+from smc_mujoco.common import gl
 from smc_mujoco.common.constraints import of_parameters
 from smc_mujoco.identification import rig
 
@@ -220,6 +221,7 @@ def reached(words: list[str], paths: list[str]) -> dict[str, str]:
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MUJOCO_GL", "disabled")
+    monkeypatch.setattr(gl, "missing", lambda: "not here")  # else it is kept for later tests
     monkeypatch.setattr("warnings.showwarning", None)
     return tmp_path
 
