@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -10,55 +10,62 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_signals
 
+if TYPE_CHECKING:
+    from smc_mujoco.control.law import Law
+
+What = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="[LAW] OUT",
+        autocompletion=options.LAWS,
+        help="A law, and OUT.c or OUT.fmu.",
+        show_default=False,
+    ),
+]
+Numbers = Annotated[
+    str,
+    typer.Option(
+        "--type",
+        metavar="double|float|q15",
+        help="C: type of numbers; q15 for observer_free only.",
+    ),
+]
+Surface = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME|TEXT", help="FMU: a surface, as linear(c=3); default the law's own."
+    ),
+]
+Velocity = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME|TEXT",
+        help="FMU: a velocity estimator, as levant(L=4800); default v is an input.",
+    ),
+]
+UMax = Annotated[float, typer.Option("--u-max", help="FMU: bound on |u|, N or N m.")]
+Model = Annotated[
+    str | None,
+    typer.Option(
+        metavar="none|nominal",
+        help="FMU: nominal: f and g of x'' = f + g u are inputs; default as needed.",
+    ),
+]
+Binary = Annotated[bool, typer.Option(help="FMU: whether to compile a binary for this machine.")]
+
 
 def export(
     ctx: typer.Context,
-    what: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="[LAW] OUT",
-            autocompletion=options.LAWS,
-            help="A law, and OUT.c or OUT.fmu.",
-            show_default=False,
-        ),
-    ],
+    what: What,
     gains: options.GainValues = "",
     joints: options.Joints = None,
-    numbers: Annotated[
-        str,
-        typer.Option(
-            "--type",
-            metavar="double|float|q15",
-            help="C: type of numbers; q15 for observer_free only.",
-        ),
-    ] = "double",
-    surface: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|TEXT", help="FMU: a surface, as linear(c=3); default the law's own."
-        ),
-    ] = None,
-    velocity: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|TEXT",
-            help="FMU: a velocity estimator, as levant(L=4800); default v is an input.",
-        ),
-    ] = None,
+    numbers: Numbers = "double",
+    surface: Surface = None,
+    velocity: Velocity = None,
     period: Annotated[float, typer.Option(help="FMU: control period, s.")] = 1e-3,
-    u_max: Annotated[
-        float, typer.Option("--u-max", help="FMU: bound on |u|, N or N m.")
-    ] = math.inf,
-    model: Annotated[
-        str | None,
-        typer.Option(
-            metavar="none|nominal",
-            help="FMU: nominal: f and g of x'' = f + g u are inputs; default as needed.",
-        ),
-    ] = None,
-    binary: Annotated[
-        bool, typer.Option(help="FMU: whether to compile a binary for this machine.")
-    ] = True,
+    u_max: UMax = math.inf,
+    model: Model = None,
+    binary: Binary = True,
 ) -> None:
     """Export a law as C or as an FMU: to OUT.c or OUT.fmu.
 
@@ -85,29 +92,19 @@ def export(
     Example: smc-mujoco export super_twisting controller.fmu --gains k1=5,k2=8 --velocity levant
     --u-max 6
     """
-    *laws, last = what
-    out = Path(last)
-    if out.suffix not in (".c", ".fmu"):
-        raise ScenarioError(f"cannot write {last}: end its name in .c or .fmu")
-    if len(laws) > 1:
-        raise ScenarioError(f"{len(laws)} laws for {out}: give one")
+    name, out = _law_and_file(what)
     of_fmu = "surface", "velocity", "period", "u_max", "model", "binary"
     options.only_for(ctx, ("numbers",), out.suffix == ".c", "OUT.c")
     options.only_for(ctx, of_fmu, out.suffix == ".fmu", "OUT.fmu")
     with delay_signals():
         from smc_mujoco.control import from_text
     chosen = from_text.law(
-        laws[0] if laws else out.stem,
+        name,
         **from_text.parsed_gains(gains, "--gains"),  # pyright: ignore[reportArgumentType]
     )
     with delay_signals():
         if out.suffix == ".c":
-            from smc_mujoco.common.files import replacing
-            from smc_mujoco.exchange.c.export_c import law_to_c
-
-            text = law_to_c(chosen, numbers, joints)
-            with replacing(out) as part:
-                part.write_text(text, "utf-8")
+            _write_c(out, chosen, numbers, joints)
             what_it_is = "C99"
         else:
             from smc_mujoco.exchange.fmu.export_fmu import law_to_fmu
@@ -125,6 +122,27 @@ def export(
             )
             what_it_is = f"FMI 3.0, Co-Simulation, every {period:g} s"
     print(f"{out}, {out.stat().st_size / 1024:.0f} kB; {what_it_is}")
+
+
+def _law_and_file(what: list[str]) -> tuple[str, Path]:
+    """Return the text of the law and the file to write, from the command's arguments."""
+    *laws, last = what
+    out = Path(last)
+    if out.suffix not in (".c", ".fmu"):
+        raise ScenarioError(f"cannot write {last}: end its name in .c or .fmu")
+    if len(laws) > 1:
+        raise ScenarioError(f"{len(laws)} laws for {out}: give one")
+    return laws[0] if laws else out.stem, out
+
+
+def _write_c(out: Path, law: "Law", numbers: str, joints: int | None) -> None:
+    """Write a law as C."""
+    from smc_mujoco.common.files import replacing
+    from smc_mujoco.exchange.c.export_c import law_to_c
+
+    text = law_to_c(law, numbers, joints)
+    with replacing(out) as part:
+        part.write_text(text, "utf-8")
 
 
 # heading in the help -> commands

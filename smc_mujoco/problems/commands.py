@@ -1,7 +1,8 @@
 """The command of the benchmark: enter a law in a suite."""
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -9,34 +10,44 @@ from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.interrupts import delay_signals
 
+if TYPE_CHECKING:
+    from smc_mujoco.problems.results import Results
+
+Folder = Annotated[
+    str, typer.Argument(metavar="FOLDER", help="A law and entry.toml, or a law of the library.")
+]
+Seed = Annotated[
+    int, typer.Option(min=0, help="Seed of the instances; 0: those that everybody can see.")
+]
+Instances = Annotated[
+    int | None, typer.Option(min=1, help="Instances of each problem, in place of 15.")
+]
+Verify = Annotated[
+    bool, typer.Option("--verify", help="Run again, and compare with the result that is there.")
+]
+Against = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="RESULTS",
+        help="Earlier results, a folder or .zip: say what changed; exit 1 if worse.",
+    ),
+]
+Site = Annotated[
+    bool, typer.Option("--site", help="Also build static pages of all results, in site.")
+]
+
 
 def enter(
-    folder: Annotated[
-        str, typer.Argument(metavar="FOLDER", help="A law and entry.toml, or a law of the library.")
-    ],
+    folder: Folder,
     suite: Annotated[str, typer.Option(metavar="SUITE", help="Suite of problems.")] = "smc-30@1",
-    seed: Annotated[
-        int, typer.Option(min=0, help="Seed of the instances; 0: those that everybody can see.")
-    ] = 0,
+    seed: Seed = 0,
     results: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the results.")] = Path(
         "results"
     ),
-    instances: Annotated[
-        int | None, typer.Option(min=1, help="Instances of each problem, in place of 15.")
-    ] = None,
-    verify: Annotated[
-        bool, typer.Option("--verify", help="Run again, and compare with the result that is there.")
-    ] = False,
-    against: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="RESULTS",
-            help="Earlier results, a folder or .zip: say what changed; exit 1 if worse.",
-        ),
-    ] = None,
-    site: Annotated[
-        bool, typer.Option("--site", help="Also build static pages of all results, in site.")
-    ] = False,
+    instances: Instances = None,
+    verify: Verify = False,
+    against: Against = None,
+    site: Site = False,
 ) -> None:
     """Enter a law in a benchmark: run it on a suite of problems, and say where it stands.
 
@@ -62,7 +73,6 @@ def enter(
     with delay_signals():
         from smc_mujoco.problems import enter as entering
         from smc_mujoco.problems import pages
-        from smc_mujoco.problems.results import TITLES
         from smc_mujoco.problems.results import results as load
 
     terminal = Terminal()
@@ -70,12 +80,8 @@ def enter(
     target = entering.enter(folder, suite, seed, results, instances, verify)
     found = load(target.parent)
     (name,) = [name for name, one in found.entries.items() if one.folder == target]
-    for question, board in found.boards().items():
-        for one in board.standings:
-            if one.entry == name:
-                place = f"place {one.place} of {len(board.standings)}"
-                reached = f"{100 * one.reached:.0f} % of the targets"
-                terminal.print(f"{TITLES[question]}: {place}, {reached}")
+    for place in _places(found, name):
+        terminal.print(place)
     about = found.entries[name].about
     for failure in about["failures"]:
         terminal.note(f"failed: {printable(failure)}")
@@ -92,6 +98,18 @@ def enter(
         terminal.print(str(changes))
         if changes.worse:
             raise typer.Exit(1)
+
+
+def _places(found: "Results", entry: str) -> Iterator[str]:
+    """Yield where an entry stands, in words, for each question."""
+    from smc_mujoco.problems.results import TITLES
+
+    for question, board in found.boards().items():
+        for one in board.standings:
+            if one.entry == entry:
+                place = f"place {one.place} of {len(board.standings)}"
+                reached = f"{100 * one.reached:.0f} % of the targets"
+                yield f"{TITLES[question]}: {place}, {reached}"
 
 
 GROUPS = {"Benchmark": [enter]}  # heading in the help -> commands

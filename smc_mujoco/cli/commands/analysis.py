@@ -1,6 +1,7 @@
 """Commands that ask one question about laws on a plant, and answer it by many runs."""
 
 import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +14,10 @@ from smc_mujoco.common.interrupts import delay_signals
 from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
+    from smc_mujoco.analysis.chattering import Chattering
+    from smc_mujoco.common.progress import Report
+    from smc_mujoco.control.law import Law
+    from smc_mujoco.mechanisms.plant import Plant as Machine
     from smc_mujoco.robustness.uncertainty import Uncertainty
     from smc_mujoco.simulation.scenario import Scenario
 
@@ -39,28 +44,32 @@ QUICK_MARGINS = {  # defaults of `margins --quick`
 }
 
 
+Objective = Annotated[
+    str, typer.Option(help="balanced: error and variation of u; tracking: error alone.")
+]
+Budget = Annotated[
+    int,
+    typer.Option(min=1, help="Number of sets of gains that a search may try, per gain."),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE.json",
+        help="Also write gains, history and provenance to a file, and each search beside it.",
+    ),
+]
+Condition = Annotated[list[str] | None, options.conditions_by_default("the seven named above")]
+
+
 def tune(
     plant: options.PlantName,
     law: options.LawText,
-    objective: Annotated[
-        str, typer.Option(help="balanced: error and variation of u; tracking: error alone.")
-    ] = "balanced",
+    objective: Objective = "balanced",
     searches: Annotated[int, typer.Option(min=1, help="Independent searches.")] = 12,
-    budget: Annotated[
-        int,
-        typer.Option(min=1, help="Number of sets of gains that a search may try, per gain."),
-    ] = 64,
+    budget: Budget = 64,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the searches and of the noise.")] = 0,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.json",
-            help="Also write gains, history and provenance to a file, and each search beside it.",
-        ),
-    ] = None,
-    condition: Annotated[
-        list[str] | None, options.conditions_by_default("the seven named above")
-    ] = None,
+    out: Out = None,
+    condition: Condition = None,
     x0: options.X0 = None,
     json: options.Json = None,
     threads: options.Threads = None,
@@ -106,23 +115,27 @@ def tune(
     terminal.finish()
 
 
+Kinds = Annotated[
+    str | None,
+    typer.Option(
+        help="Any of delay, disturbance, friction, mass, noise, blow, jitter, missed and "
+        "gain, separated by commas; default: the first five."
+    ),
+]
+Quick = Annotated[
+    bool,
+    typer.Option(
+        "--quick", help="Shorter runs, coarser results; default: 2 plants, 4 laws, 2 kinds."
+    ),
+]
+
+
 def margins(
     plants: options.Plants = None,
     law: options.Laws = None,
-    kinds: Annotated[
-        str | None,
-        typer.Option(
-            help="Any of delay, disturbance, friction, mass, noise, blow, jitter, missed and "
-            "gain, separated by commas; default: the first five."
-        ),
-    ] = None,
+    kinds: Kinds = None,
     gains: options.Gains = "tuned",
-    quick: Annotated[
-        bool,
-        typer.Option(
-            "--quick", help="Shorter runs, coarser results; default: 2 plants, 4 laws, 2 kinds."
-        ),
-    ] = False,
+    quick: Quick = False,
     condition: options.Condition = "nominal",
     x0: options.X0 = None,
     json: options.Json = None,
@@ -146,12 +159,10 @@ def margins(
         from smc_mujoco.cli import tables
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
-        from smc_mujoco.control.source import in_words
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.robustness.margins import KINDS
         from smc_mujoco.robustness.margins import margins as search
         from smc_mujoco.simulation.conditions import PLANTS
-        from smc_mujoco.simulation.grid import case
 
     terminal = Terminal(json)
     machines = [
@@ -176,40 +187,52 @@ def margins(
         )
     for name in kind:
         terminal.print(tables.margins(name, [margin for margin in results if margin.kind == name]))
-    sources = {}
-    for machine in machines:
-        for item in chosen:
-            used = case(machine, item, gains=gains).law
-            sources.setdefault(used.name, []).append(used.source)
-    words = [counted(len(results), "margin"), in_words(sources), f"{terminal.seconds:.0f} s"]
+    sources = _sources(machines, chosen, gains)
+    words = [counted(len(results), "margin"), sources, f"{terminal.seconds:.0f} s"]
     terminal.note(", ".join(filter(None, words)), "dim", wrap=True)
     terminal.finish([dataclasses.asdict(margin) for margin in results])
 
 
+def _sources(machines: "Sequence[Machine]", laws: "Sequence[Law | str]", gains: str) -> str:
+    """Return in words where the laws' gains on some plants are from."""
+    from smc_mujoco.control.source import in_words
+    from smc_mujoco.simulation.grid import case
+
+    sources = {}
+    for machine in machines:
+        for law in laws:
+            used = case(machine, law, gains=gains).law
+            sources.setdefault(used.name, []).append(used.source)
+    return in_words(sources)
+
+
+Plant = Annotated[
+    str,
+    typer.Argument(
+        metavar="PLANT|RIG",
+        autocompletion=options.PLANTS,
+        help="A plant, FILE.xml:joint+joint, or a rig's sets.",
+    ),
+]
+Duration = Annotated[
+    float,
+    typer.Option(help="Duration of the runs, s; the error of the first quarter does not count."),
+]
+WorstBudget = Annotated[
+    int | None, typer.Option(min=1, help="Runs of a search; default: about 10 s a law.")
+]
+
+
 def worst(
-    plant: Annotated[
-        str,
-        typer.Argument(
-            metavar="PLANT|RIG",
-            autocompletion=options.PLANTS,
-            help="A plant, FILE.xml:joint+joint, or a rig's sets.",
-        ),
-    ],
+    plant: Plant,
     law: options.Laws = None,
     disturbance: options.Disturbance = None,
     bound: Bound = None,
     metric: Metric = "rms_error",
     gains: options.Gains = "tuned",
     condition: options.Condition = "nominal",
-    duration: Annotated[
-        float,
-        typer.Option(
-            help="Duration of the runs, s; the error of the first quarter does not count."
-        ),
-    ] = 8.0,
-    budget: Annotated[
-        int | None, typer.Option(min=1, help="Runs of a search; default: about 10 s a law.")
-    ] = None,
+    duration: Duration = 8.0,
+    budget: WorstBudget = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search.")] = 0,
     out: Annotated[Path | None, options.picture("the worst runs")] = None,
     json: options.Json = None,
@@ -360,22 +383,26 @@ def _attacked_cases(
     return [[case(machine, attacked, condition, duration, gains)] for attacked in chosen]
 
 
+Actuator = Annotated[
+    str | None,
+    typer.Option(
+        metavar="PART:NUMBERS",
+        help="What drives the joints, as lag:0.01, ratelimit:200 or dcmotor.",
+    ),
+]
+ChatterDuration = Annotated[
+    float, typer.Option(min=0.1, help="Duration of the runs that measure it, s.")
+]
+
+
 def chatter(
     plant: options.PlantName,
     law: options.Laws = None,
-    actuator: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PART:NUMBERS",
-            help="What drives the joints, as lag:0.01, ratelimit:200 or dcmotor.",
-        ),
-    ] = None,
+    actuator: Actuator = None,
     condition: options.Condition = "nominal",
     gains: options.Gains = "tuned",
     channel: Annotated[int, typer.Option(min=0, help="The driven channel.")] = 0,
-    duration: Annotated[
-        float, typer.Option(min=0.1, help="Duration of the runs that measure it, s.")
-    ] = 8.0,
+    duration: ChatterDuration = 8.0,
     out: Annotated[Path | None, options.picture("Nyquist plots and runs")] = None,
     json: options.Json = None,
     threads: options.Threads = None,
@@ -394,7 +421,7 @@ def chatter(
     chatter
     """
     with delay_signals():
-        from smc_mujoco.analysis.chattering import chattering, rows
+        from smc_mujoco.analysis.chattering import rows
         from smc_mujoco.analysis.step_halving import step_halving
         from smc_mujoco.cli import tables
         from smc_mujoco.common.progress import bar
@@ -414,10 +441,7 @@ def chatter(
     machine = jointed(plant, "chattering")
     cases = [case(machine, law, condition, duration, gains, changes=fields) for law in chosen]
     with bar("chattering") as progress:
-        cycles = []
-        for done, scenario in enumerate(cases):
-            progress.reached(done, len(cases) + 1)
-            cycles.append(chattering(scenario, channel))
+        cycles = _cycles(cases, channel, progress.reached)
         traces = run(cases, threads=threads)
         measured = [channel_cycle(trace, channel) for trace in traces]
         changes = step_halving(traces, channel, threads)
@@ -432,3 +456,14 @@ def chatter(
 
         nyquist(cases, channel, cycles, traces, changes, out)
         terminal.wrote(*pictures)
+
+
+def _cycles(cases: "Sequence[Scenario]", channel: int, report: "Report") -> "list[Chattering]":
+    """Return the limit cycles that harmonic balance predicts, a case after the other."""
+    from smc_mujoco.analysis.chattering import chattering
+
+    cycles = []
+    for done, scenario in enumerate(cases):
+        report(done, len(cases) + 1)
+        cycles.append(chattering(scenario, channel))
+    return cycles

@@ -15,30 +15,35 @@ KINDS = ("plants", "laws", "surfaces", "estimators", "scenes", "conditions", "me
 C_TIME = 10.0  # s, that compiler and trial of a law in C may take, each; chosen
 
 
+Name = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="NAME|FILE",
+        autocompletion=options.LAWS,
+        help="A law, surface, velocity estimator, plant, scene, condition or metric, a file "
+        "with a law, or a kind, such as scenes; by default all of these.",
+    ),
+]
+Needs = Annotated[
+    str | None,
+    typer.Option(
+        help="Only laws with these properties, as a,b: no-velocity, no-model, continuous "
+        "(u), finite-time (of the error), one-gain, two-gains (at most)."
+    ),
+]
+Plant = Annotated[
+    str | None,
+    typer.Option(
+        metavar="PLANT", autocompletion=options.PLANTS, help="Only laws that suit a plant."
+    ),
+]
+
+
 def list_(
     ctx: typer.Context,
-    name: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="NAME|FILE",
-            autocompletion=options.LAWS,
-            help="A law, surface, velocity estimator, plant, scene, condition or metric, a file "
-            "with a law, or a kind, such as scenes; by default all of these.",
-        ),
-    ] = None,
-    needs: Annotated[
-        str | None,
-        typer.Option(
-            help="Only laws with these properties, as a,b: no-velocity, no-model, continuous "
-            "(u), finite-time (of the error), one-gain, two-gains (at most)."
-        ),
-    ] = None,
-    plant: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PLANT", autocompletion=options.PLANTS, help="Only laws that suit a plant."
-        ),
-    ] = None,
+    name: Name = None,
+    needs: Needs = None,
+    plant: Plant = None,
     json: options.Json = None,
 ) -> None:
     """List plants, laws, surfaces, velocity estimators, scenes and conditions, or show a law in

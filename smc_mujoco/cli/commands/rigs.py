@@ -13,43 +13,48 @@ from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_signals
 
+Name = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="RIG",
+        help=("A rig, such as qube_servo. Without one: lists the rigs."),
+    ),
+]
+Files = Annotated[
+    list[Path] | None,
+    typer.Argument(
+        metavar="FILE",
+        help="Record: a CSV or npz file of columns.",
+    ),
+]
+Sets = Annotated[
+    str | None,
+    typer.Option(help="Published parameter sets to show too, separated by commas; default: none."),
+]
+Start = Annotated[
+    float | None,
+    typer.Option(
+        min=0.0, help="Where the film starts, s of the record; default the rig's own start."
+    ),
+]
+Duration = Annotated[
+    float | None,
+    typer.Option(help="Duration of the film, s; default to the end of the record."),
+]
+Film = Annotated[
+    Path | None, typer.Option(help="Also film machine and twins side by side, to a .mp4 file.")
+]
+
 
 def rig(
-    name: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="RIG",
-            help=("A rig, such as qube_servo. Without one: lists the rigs."),
-        ),
-    ] = None,
-    files: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            metavar="FILE",
-            help="Record: a CSV or npz file of columns.",
-        ),
-    ] = None,
+    name: Name = None,
+    files: Files = None,
     columns: options.Columns = None,
     figure: Annotated[Path | None, options.picture("the (first) record and its residuals")] = None,
-    sets: Annotated[
-        str | None,
-        typer.Option(
-            help="Published parameter sets to show too, separated by commas; default: none."
-        ),
-    ] = None,
-    start: Annotated[
-        float | None,
-        typer.Option(
-            min=0.0, help="Where the film starts, s of the record; default the rig's own start."
-        ),
-    ] = None,
-    duration: Annotated[
-        float | None,
-        typer.Option(help="Duration of the film, s; default to the end of the record."),
-    ] = None,
-    film: Annotated[
-        Path | None, typer.Option(help="Also film machine and twins side by side, to a .mp4 file.")
-    ] = None,
+    sets: Sets = None,
+    start: Start = None,
+    duration: Duration = None,
+    film: Film = None,
     json: options.Json = None,
 ) -> None:
     """Compare a record of a real machine with its simulation.

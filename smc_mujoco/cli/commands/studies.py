@@ -1,7 +1,7 @@
 """smc-mujoco compare, which: questions that many runs of many laws answer."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -136,57 +136,64 @@ def _save(advice: "RaceAdvice", out: Path, film: bool, terminal: Terminal) -> No
         terminal.wrote(out / "worst_run.mp4")
 
 
+Condition = Annotated[
+    list[str] | None,
+    options.conditions_by_default(
+        "twelve, one of each kind; with --quick nominal, noise and coulomb"
+    ),
+]
+Seeds = Annotated[
+    int, typer.Option(min=1, help="Runs of each law on each plant in each condition.")
+]
+Tune = Annotated[bool, typer.Option(help="Whether to tune laws that have no gains for a plant.")]
+Searches = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        help="Number of searches that tune a law; default 12. With --rig, laws are tuned only "
+        "if you give this.",
+    ),
+]
+Worst = Annotated[bool, typer.Option("--worst", help="Also search for the worst case of each law.")]
+Duration = Annotated[
+    float | None, typer.Option(help="Duration of a run, s; default 10, or 3 with --quick.")
+]
+Metrics = Annotated[
+    str | None,
+    typer.Option(
+        help="What to compare, separated by commas: scores that `smc-mujoco show` lists, or "
+        '"settles", the share of settled runs. Default: settles, settling_time, '
+        "ultimate_bound, itae, tv_rate."
+    ),
+]
+Latex = Annotated[
+    Path | None, typer.Option(metavar="FILE.tex", help="Also write the tables as LaTeX.")
+]
+Rig = Annotated[
+    str | None,
+    typer.Option(help="A rig from `smc-mujoco rig`, instead of plants and conditions."),
+]
+
+
 def compare(
     plants: options.Plants = None,
     law: options.Laws = None,
-    condition: Annotated[
-        list[str] | None,
-        options.conditions_by_default(
-            "twelve, one of each kind; with --quick nominal, noise and coulomb"
-        ),
-    ] = None,
-    seeds: Annotated[
-        int, typer.Option(min=1, help="Runs of each law on each plant in each condition.")
-    ] = 12,
-    tune: Annotated[
-        bool, typer.Option(help="Whether to tune laws that have no gains for a plant.")
-    ] = True,
-    searches: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            help="Number of searches that tune a law; default 12. With --rig, laws are tuned only "
-            "if you give this.",
-        ),
-    ] = None,
-    worst: Annotated[
-        bool, typer.Option("--worst", help="Also search for the worst case of each law.")
-    ] = False,
+    condition: Condition = None,
+    seeds: Seeds = 12,
+    tune: Tune = True,
+    searches: Searches = None,
+    worst: Worst = False,
     quick: options.Quick = False,
     gains: options.Gains = "tuned",
-    duration: Annotated[
-        float | None, typer.Option(help="Duration of a run, s; default 10, or 3 with --quick.")
-    ] = None,
+    duration: Duration = None,
     x0: options.X0 = None,
-    metrics: Annotated[
-        str | None,
-        typer.Option(
-            help="What to compare, separated by commas: scores that `smc-mujoco show` lists, or "
-            '"settles", the share of settled runs. Default: settles, settling_time, '
-            "ultimate_bound, itae, tv_rate."
-        ),
-    ] = None,
+    metrics: Metrics = None,
     relevant: options.Relevant = RELEVANT,
     defaults: options.Defaults = False,
     out: options.Folder = Path("compared"),
     figure: Annotated[Path | None, options.picture("the medians")] = None,
-    latex: Annotated[
-        Path | None, typer.Option(metavar="FILE.tex", help="Also write the tables as LaTeX.")
-    ] = None,
-    rig: Annotated[
-        str | None,
-        typer.Option(help="A rig from `smc-mujoco rig`, instead of plants and conditions."),
-    ] = None,
+    latex: Latex = None,
+    rig: Rig = None,
     seed: Seed = 0,
     json: options.Json = None,
     threads: options.Threads = None,
@@ -217,11 +224,7 @@ def compare(
         from smc_mujoco.studies.compare import compare as run
         from smc_mujoco.studies.leaderboard import METRICS
 
-        pictures = []
-        if figure:  # matplotlib takes 3 % of a short comparison
-            from smc_mujoco.draw.page import files
-
-            pictures = files(figure)
+        pictures = _pictures(figure)
     terminal = Terminal(json)
     shared = {
         "out": out,
@@ -241,17 +244,7 @@ def compare(
                 "--condition, --gains, --worst, --quick, --no-tune, --figure, --latex, --seed, "
                 "--device and --executor"
             )
-        from smc_mujoco.identification import ensemble
-        from smc_mujoco.identification.rig import rig as find_rig
-
-        machine = find_rig(rig)
-        chosen = options.laws(law, of_rig=machine.laws) or None
-        table, boards, found = ensemble.compare(machine, chosen, seeds, **shared)
-        terminal.print(boards)
-        for candidate in found:
-            terminal.note(f"{candidate.law} {candidate.remark}".strip(), wrap=True)
-        terminal.note(ensemble.verdict(boards))
-        _finish(table, out, terminal)
+        _compare_on_rig(rig, law, seeds, shared, terminal)
         return
     latex = latex and with_ending(latex, ".tex")
     options.check_files(None, latex, *pictures)
@@ -278,6 +271,32 @@ def compare(
         comparison.plot(figure)
         terminal.wrote(*pictures)
     _finish(comparison.table, out, terminal)
+
+
+def _compare_on_rig(
+    name: str, law: list[str] | None, seeds: int, shared: dict[str, Any], terminal: Terminal
+) -> None:
+    """Compare laws on the parameter sets of a rig. `shared`: what other comparisons take, too."""
+    from smc_mujoco.identification import ensemble
+    from smc_mujoco.identification.rig import rig
+
+    machine = rig(name)
+    chosen = options.laws(law, of_rig=machine.laws) or None
+    table, boards, found = ensemble.compare(machine, chosen, seeds, **shared)
+    terminal.print(boards)
+    for candidate in found:
+        terminal.note(f"{candidate.law} {candidate.remark}".strip(), wrap=True)
+    terminal.note(ensemble.verdict(boards))
+    _finish(table, shared["out"], terminal)
+
+
+def _pictures(figure: Path | None) -> list[Path]:
+    """Return the files of a figure; none without one."""
+    if figure is None:
+        return []
+    from smc_mujoco.draw.page import files  # matplotlib takes 3 % of a short comparison
+
+    return files(figure)
 
 
 def _finish(table: "Table", out: Path, terminal: Terminal) -> None:

@@ -1,7 +1,7 @@
 """smc-mujoco claims: audits of the claims of papers."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -9,44 +9,54 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.interrupts import delay_signals
 
+if TYPE_CHECKING:
+    from smc_mujoco.evidence.audit.paper import Paper as AuditedPaper
+
+Ids = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="ID", help="Claims, such as 3 18; default: all.", show_default=False),
+]
+Gains = Annotated[
+    str | None,
+    typer.Option(help="Sets of gains, separated by commas; default: all of the paper's."),
+]
+Quick = Annotated[
+    bool, typer.Option("--quick", help="Coarser grids and shorter runs; one set of gains.")
+]
+Paper = Annotated[
+    str | None,
+    typer.Option(metavar="NAME|FOLDER", help="A paper of --papers; default Gaber's."),
+]
+Evidence = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE.json", help="Also write runs, numbers and verdicts, sealed."),
+]
+Listed = Annotated[
+    bool, typer.Option("--list", help="List the claims with their sentences instead.")
+]
+New = Annotated[
+    Path | None,
+    typer.Option("--new", metavar="FOLDER", help="Write a template of your own paper instead."),
+]
+Check = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE.json", help="Check the seal of a file of --evidence instead."),
+]
+
 
 def claims(
     ctx: typer.Context,
-    ids: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="ID", help="Claims, such as 3 18; default: all.", show_default=False
-        ),
-    ] = None,
-    gains: Annotated[
-        str | None,
-        typer.Option(help="Sets of gains, separated by commas; default: all of the paper's."),
-    ] = None,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Coarser grids and shorter runs; one set of gains.")
-    ] = False,
-    paper: Annotated[
-        str | None,
-        typer.Option(metavar="NAME|FOLDER", help="A paper of --papers; default Gaber's."),
-    ] = None,
+    ids: Ids = None,
+    gains: Gains = None,
+    quick: Quick = False,
+    paper: Paper = None,
     json: options.Json = None,
-    evidence: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.json", help="Also write runs, numbers and verdicts, sealed."),
-    ] = None,
+    evidence: Evidence = None,
     threads: options.Threads = None,
-    listed: Annotated[
-        bool, typer.Option("--list", help="List the claims with their sentences instead.")
-    ] = False,
+    listed: Listed = False,
     papers: Annotated[bool, typer.Option("--papers", help="List the papers instead.")] = False,
-    new: Annotated[
-        Path | None,
-        typer.Option("--new", metavar="FOLDER", help="Write a template of your own paper instead."),
-    ] = None,
-    check: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.json", help="Check the seal of a file of --evidence instead."),
-    ] = None,
+    new: New = None,
+    check: Check = None,
 ) -> None:
     """Audit a paper's claims: test each against a threshold that was fixed before any run.
 
@@ -74,7 +84,6 @@ def claims(
         _papers(papers, new, check, Terminal(json))
         return
     with delay_signals():
-        from smc_mujoco.cli.tables import catalogue
         from smc_mujoco.common.files import with_ending, writable
         from smc_mujoco.common.progress import bar
         from smc_mujoco.evidence.audit.audit import DEFAULT_PAPER, audit, document
@@ -84,9 +93,7 @@ def claims(
     terminal = Terminal(json)
     about = find_paper(paper or DEFAULT_PAPER)
     if listed:
-        rows = [(id, claim.text) for id, claim in about.claims.items()]
-        terminal.print(catalogue(f"{about.authors}: {about.title}", rows))
-        terminal.finish()
+        _list_claims(about, terminal)
         return
     sets = None if gains is None else options.names(gains)
     writable(evidence and with_ending(evidence, ".json"))
@@ -95,12 +102,26 @@ def claims(
     if evidence:
         evidence = done.save(evidence)
     claim_tables.print_claims(done.claims, terminal, full=bool(ids))
+    _finish(document(done.claims), quick, evidence, terminal)
+
+
+def _list_claims(paper: "AuditedPaper", terminal: Terminal) -> None:
+    """Print the claims of a paper, and end the command."""
+    from smc_mujoco.cli.tables import catalogue
+
+    rows = [(id, claim.text) for id, claim in paper.claims.items()]
+    terminal.print(catalogue(f"{paper.authors}: {paper.title}", rows))
+    terminal.finish()
+
+
+def _finish(claims: Any, quick: bool, evidence: Path | None, terminal: Terminal) -> None:
+    """Print how long the audit took and where its evidence is, and end the command."""
     terminal.note(f"{terminal.seconds:.0f} s", "dim")
     if quick:
         terminal.note("quick: coarser grids than the claims say, and fewer sets of gains", "dim")
     if evidence:
         terminal.wrote(evidence)
-    terminal.finish(document(done.claims))
+    terminal.finish(claims)
 
 
 def _papers(listed: bool, new: Path | None, check: Path | None, terminal: Terminal) -> None:
