@@ -72,7 +72,6 @@ def enter(
     """
     with delay_signals():
         from smc_mujoco.problems import enter as entering
-        from smc_mujoco.problems import pages
         from smc_mujoco.problems.results import results as load
 
     terminal = Terminal()
@@ -89,10 +88,7 @@ def enter(
     terminal.note(f"{runs}, {terminal.seconds:.0f} s", "dim")
     terminal.wrote(target)
     if site:
-        page, left_out = pages.build(results, results / "site")
-        for why in left_out:
-            terminal.note(f"left out: {printable(why)}", wrap=True)
-        terminal.wrote(page)
+        _write_site(results, terminal)
     if earlier is not None:
         changes = found.compare(earlier)
         terminal.print(str(changes))
@@ -110,6 +106,16 @@ def _places(found: "Results", entry: str) -> Iterator[str]:
                 place = f"place {one.place} of {len(board.standings)}"
                 reached = f"{100 * one.reached:.0f} % of the targets"
                 yield f"{TITLES[question]}: {place}, {reached}"
+
+
+def _write_site(results: Path, terminal: Terminal) -> None:
+    """Write the pages of all results."""
+    from smc_mujoco.problems import pages
+
+    page, left_out = pages.build(results, results / "site")
+    for why in left_out:
+        terminal.note(f"left out: {printable(why)}", wrap=True)
+    terminal.wrote(page)
 
 
 GROUPS = {"Benchmark": [enter]}  # heading in the help -> commands

@@ -172,7 +172,6 @@ def margins(
     chosen = options.laws(law, QUICK_MARGINS["laws"] if quick else gain_sets.LAWS)
     kind = options.names(kinds, QUICK_MARGINS["kinds"] if quick else KINDS)
     with bar("margins") as progress:
-        start = options.starts(x0)
         results = search(
             machines,
             chosen,
@@ -182,7 +181,7 @@ def margins(
             threads,
             progress.reached,
             condition,
-            start,
+            options.starts(x0),
             device,
         )
     for name in kind:
@@ -446,8 +445,7 @@ def chatter(
         measured = [channel_cycle(trace, channel) for trace in traces]
         changes = step_halving(traces, channel, threads)
     terminal.print(tables.chattering(cases, channel, cycles, measured, changes))
-    assumed = dict.fromkeys(words for cycle in cycles for words in cycle.assumptions)
-    terminal.note("assumed: " + "; ".join(assumed), wrap=True)
+    terminal.note(f"assumed: {_assumed(cycles)}", wrap=True)
     sources = {scenario.law.name: [scenario.law.source] for scenario in cases}
     terminal.note(f"{in_words(sources)}, {terminal.seconds:.0f} s", "dim", wrap=True)
     terminal.finish(rows(cases, cycles, measured, changes))
@@ -456,6 +454,14 @@ def chatter(
 
         nyquist(cases, channel, cycles, traces, changes, out)
         terminal.wrote(*pictures)
+
+
+def _assumed(cycles: "Sequence[Chattering]") -> str:
+    """Return each assumption of some predictions once."""
+    assumed = {}
+    for cycle in cycles:
+        assumed |= dict.fromkeys(cycle.assumptions)
+    return "; ".join(assumed)
 
 
 def _cycles(cases: "Sequence[Scenario]", channel: int, report: "Report") -> "list[Chattering]":

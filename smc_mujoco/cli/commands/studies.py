@@ -175,7 +175,23 @@ Rig = Annotated[
 ]
 
 
+NOT_OF_RIGS = [
+    "plants",
+    "condition",
+    "gains",
+    "worst",
+    "quick",
+    "tune",
+    "figure",
+    "latex",
+    "seed",
+    "device",
+    "executor",
+]
+
+
 def compare(
+    ctx: typer.Context,
     plants: options.Plants = None,
     law: options.Laws = None,
     condition: Condition = None,
@@ -237,13 +253,8 @@ def compare(
         "threads": threads,
     }
     if rig is not None:
-        own = (plants, condition, worst, quick, not tune, figure, latex, seed)
-        if any(own) or gains != "tuned" or device != "cpu" or executor:
-            raise ScenarioError(
-                "--rig brings its own plant, parameter sets and gains: leave out the plants, "
-                "--condition, --gains, --worst, --quick, --no-tune, --figure, --latex, --seed, "
-                "--device and --executor"
-            )
+        without = "comparisons without --rig, which brings its own plant and gains: leave it out"
+        options.only_for(ctx, NOT_OF_RIGS, False, without)
         _compare_on_rig(rig, law, seeds, shared, terminal)
         return
     latex = latex and with_ending(latex, ".tex")
