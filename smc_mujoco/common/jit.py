@@ -348,12 +348,16 @@ def compile_for(made: Any, arguments: tuple[Any, ...], key: Key | None) -> None:
 def _in_thread(work: Callable, *arguments: Any) -> None:
     """Let numba compile in a thread of its own, as it may lose Ctrl-C halfway, or break at it.
 
-    The thread goes on after Ctrl-C, and leaves its result on the disk.
+    The thread goes on after Ctrl-C, and leaves its result on the disk. What numba raises in it is
+    NotCompilable; what the handler of a signal raises meanwhile is not.
     """
 
     def compiling() -> None:
-        with _compiling():
-            work(*arguments)
+        try:
+            with _compiling():
+                work(*arguments)
+        except Exception as error:  # numba raises many types
+            raise NotCompilable(reason(error)) from None
 
     attended([compiling], bool)
 
@@ -526,10 +530,7 @@ class CompiledFunction:
     differs = ""
 
     def __init__(self, body: Callable, key: Key | None = None):
-        try:
-            self._cfunc = compiled(SIGNATURE, body, key)
-        except Exception as error:  # numba raises many types
-            raise NotCompilable(reason(error)) from None
+        self._cfunc = compiled(SIGNATURE, body, key)
         self.address: int = self._cfunc.address  # pyright: ignore[reportAttributeAccessIssue] numba's own
 
 

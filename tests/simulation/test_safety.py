@@ -916,6 +916,34 @@ def test_ctrl_c_that_comes_while_numba_compiles_is_heard_when_it_is_done(monkeyp
     assert signal.signal(signal.SIGINT, before) is signal.default_int_handler
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGALRM"), reason="no alarm")
+def test_what_a_handler_raises_while_a_law_compiles_is_no_fault_of_the_law(monkeypatch):
+    """A time limit by SIGALRM raises an Exception, which is not one of numba's."""
+
+    def handler(number, frame):
+        raise TimeoutError("up")
+
+    def law(y, gains, memory):
+        return -y.e, y.e
+
+    made = numba_internals.CFunc.compile
+
+    def interrupted(self):
+        signal.pthread_kill(threading.main_thread().ident, signal.SIGALRM)
+        made(self)
+
+    case = smc.Scenario(plant="duffing", law=smc.law_function(law), duration=0.1)
+    before = signal.signal(signal.SIGALRM, handler)
+    try:
+        with monkeypatch.context() as patched:
+            patched.setattr(numba_internals.CFunc, "compile", interrupted)
+            with pytest.raises(TimeoutError, match="up"):
+                smc.run(case)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert smc.run(case).failure is None  # compiled now: a PlainLoopWarning is an error here
+
+
 def test_memory_that_runs_out_is_said_in_one_sentence(monkeypatch, refused):
     for error in (
         MemoryError("std::bad_alloc"),
