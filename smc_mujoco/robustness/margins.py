@@ -229,7 +229,7 @@ def _size_of_force(base: Scenario) -> float:
 def _size_of_blow(base: Scenario) -> float:
     """Return F T of the plant's scales: the momentum that u stops in the time T."""
     bound = min(base.limits)
-    per_u = None if base.accelerates else base.nominal_drives[0].gain
+    per_u = None if base.accelerates else base.drive_train.nominal[0].gain
     far = np.abs(np.subtract(base.resolved.x0, base.plant.origin)).max()
     scales = search_space.scales(base.plant, bound, float(far), per_u)
     return scales["F"] * scales["T"]

@@ -140,6 +140,9 @@ class RaceAdvice(Advice):
         race, comparison = self.race, self.race.comparison
         assert comparison is not None
         text = _verdict(comparison, race.running)
+        ranked = dict(zip(comparison.laws, comparison.ranked[:, 0], strict=True))
+        if race.sets >= LOOKS[0] and (few := [law for law in race.running if not ranked[law]]):
+            text += f"; {joined(few)} cannot be told from others, with fewer than {LOOKS[0]} sets"
         if race.winner:
             return text
         if race.sets < LOOKS[0]:
