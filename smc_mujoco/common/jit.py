@@ -111,7 +111,7 @@ class NotCompilable(Exception):
 
 def always(value: Any) -> Callable:
     """Return a compiled function that returns this value, whatever its arguments."""
-    kind = typeof(value)
+    kind: Any = typeof(value)
 
     @intrinsic
     def constant(typingctx, *arguments):
