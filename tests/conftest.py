@@ -50,8 +50,10 @@ def pytest_configure(config: pytest.Config) -> None:
     """
     from helpers.annexes import HERE
 
+    from smc_mujoco.common import gl
     from smc_mujoco.common.annexes import ANNEXES
 
+    gl.choice()  # the first call decides, and some tests set MUJOCO_GL
     partly = config.getoption("quick") or config.getoption("collectonly") or HERE != ANNEXES
     config.option.disable_unused_snapshots |= partly
 
