@@ -8,6 +8,8 @@ from smc_mujoco.mechanisms.hardware.part_functions import actuator_function, fri
 from smc_mujoco.mechanisms.hardware.servos import ServoFriction, servo
 from smc_mujoco.mechanisms.hardware.sliding import Sigmoid
 from smc_mujoco.mechanisms.hardware.stepper import Stepper
+from smc_mujoco.mechanisms.hardware.stribeck import Stribeck
 
-__all__ = ["Contact", "ElasticJoint", "LuGre", "RateLimit", "ServoFriction", "Sigmoid", "Stepper"]
+__all__ = ["Contact", "ElasticJoint", "LuGre", "RateLimit", "ServoFriction", "Sigmoid"]
+__all__ += ["Stepper", "Stribeck"]
 __all__ += ["actuator_function", "friction_function", "servo"]

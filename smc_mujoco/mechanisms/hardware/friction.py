@@ -119,8 +119,8 @@ def dry_step(v, smooth, sliding, starting, low, high, mobility, h):
       v: speed at the start of the step, rad/s (m/s).
       smooth: sum of the other forces on the joint, N m (N).
       sliding: friction on the joint while it moves as at v, N m (N).
-      starting: friction on it when it then moves as `smooth` pushes, N m (N); with `smooth` out of
-        the bounds it must be less than that.
+      starting: friction on it when it then moves, N m (N); with `smooth` out of the bounds their
+        sum must push the joint beyond the bound that was passed.
       low, high: bounds of the `smooth` that friction holds at rest, N m (N).
       mobility: 1 over the joint's inertia, 1/(kg m^2) (1/kg).
       h: s.
@@ -141,7 +141,7 @@ def dry_step(v, smooth, sliding, starting, low, high, mobility, h):
             held = left
         else:
             force = sliding if v != 0.0 else starting
-            direction = math.copysign(1.0, v if v != 0.0 else smooth)
+            direction = math.copysign(1.0, v if v != 0.0 else smooth + force)
             slowing = -direction * (smooth + force) * mobility
             if abs(v) < slowing * left:
                 span = abs(v) / slowing

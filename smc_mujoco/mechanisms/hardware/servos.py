@@ -1,5 +1,5 @@
-"""Servos whose friction grows with the load on their gearbox: models M1 to M6; Dynamixel MX-64 and
-MX-106 as presets.
+"""Servos whose friction grows with the load on their gearbox: models M1 to M6, and the servos whose
+numbers are published as presets.
 
     servo = smc.hardware.servo("mx106", "m4")
     parts = {"actuator": servo.motor, "friction": servo.friction}
@@ -104,9 +104,10 @@ def servo(name: str, model: str = "m4", command: str = "torque") -> Servo:
         smc.Scenario(plant="inverted_pendulum", law="pid", actuator=servo.motor)
 
     Args:
-      name: "mx64" or "mx106", for Dynamixel MX-64 and MX-106.
-      model: "m1" to "m6", see `ServoFriction`. Each was fitted on its own, with its own numbers of
-        the motor.
+      name: "mx64", "mx106", "xl320" or "xl330" (Dynamixel), "sts3215" (Feetech, 7.4 V) or
+        "erob80_50" (eRob 80, gearbox 50 to 1).
+      model: "m1" to "m6", see `ServoFriction`; "sts3215" has "m1" only. Each was fitted on its own,
+        with its own numbers of the motor.
       command: what u is, as in `DCMotor`: "torque" or "voltage".
 
     Returns:
@@ -117,7 +118,7 @@ def servo(name: str, model: str = "m4", command: str = "torque") -> Servo:
     """
     models = find("servo", name, SERVOS)
     fitted = find(f"model of {name}", model, models)
-    limits = {"voltage": VOLTAGE, "current": math.inf, "command": command}
+    limits = SUPPLIES[name]._asdict() | {"command": command}
     motor = DCMotor(
         fitted["R"], 0.0, fitted["kt"], gear=1.0, rotor_inertia=fitted["armature"], **limits
     )
@@ -129,7 +130,22 @@ def servo(name: str, model: str = "m4", command: str = "torque") -> Servo:
     return Servo(motor, ServoFriction(**numbers))
 
 
-VOLTAGE = 15.0 * 0.9625  # V: the supply times the largest duty cycle; bam/dynamixel/actuator.py
+class Supply(NamedTuple):
+    """What bounds a servo's motor."""
+
+    voltage: float  # V: the supply times the largest duty cycle
+    current: float = math.inf  # A
+
+
+# Of Rhoban/bam, bam/dynamixel/actuator.py, bam/feetech/actuator.py and bam/erob/actuator.py
+SUPPLIES = {
+    "mx64": Supply(15.0 * 0.9625),
+    "mx106": Supply(15.0 * 0.9625),
+    "xl320": Supply(7.5),
+    "xl330": Supply(7.5),
+    "sts3215": Supply(7.4 * 0.97),
+    "erob80_50": Supply(48.0, 12.0),
+}
 BAM_FIELDS = {  # name of a number in Rhoban/bam -> fields of ServoFriction
     "friction_viscous": ("kv",),
     "friction_base": ("kc",),
@@ -145,8 +161,9 @@ BAM_FIELDS = {  # name of a number in Rhoban/bam -> fields of ServoFriction
     "dtheta_stribeck": ("vs",),
     "alpha": ("alpha",),
 }
-# Servo -> model -> numbers of Rhoban/bam (Apache-2.0), params/mx64 and params/mx106: kt in N m/A, R
-# in ohm, armature in kg m^2, and the keys of BAM_FIELDS in the units of ServoFriction.
+# Servo -> model -> numbers of Rhoban/bam (Apache-2.0, commit 1b5a1ce), bam/params/NAME, for sts3215
+# feetech_sts3215_7_4V: kt in N m/A, R in ohm, armature in kg m^2, and the keys of BAM_FIELDS in the
+# units of ServoFriction.
 SERVOS: Mapping[str, Mapping[str, Mapping[str, float]]] = read_json(
     Path(__file__).with_name("servos.json")
 )

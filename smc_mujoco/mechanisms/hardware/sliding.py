@@ -269,9 +269,11 @@ def _at_stages(formula: Formula) -> Callable:
             else:
                 sliding = -force(y, 0.5 * y.v, p, memory, False)
             start = math.copysign(STICKING_SPEED, smooth)
+            if smooth > high or smooth < low:  # an offset may leave 0 out of the bounds
+                start = math.copysign(STICKING_SPEED, smooth - high)
             starting = -force(y, start, p, memory, False)
             # friction that holds less than it exerts in motion would start no joint
-            if smooth * (smooth + starting) <= 0.0:
+            if start * (smooth + starting) <= 0.0:
                 low = min(low, smooth)
                 high = max(high, smooth)
             held = begin_step(y, memory, sliding, starting, low, high)

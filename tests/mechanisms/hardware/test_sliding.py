@@ -444,9 +444,8 @@ def published(model, fitted, motor, external, v):
 
 
 def test_servo_friction_is_the_published_code_on_a_grid_of_speed_and_load():
-    for name in ("mx64", "mx106"):
-        for model in ("m1", "m2", "m3", "m4", "m5", "m6"):
-            fitted = SERVOS[name][model]
+    for name, models in SERVOS.items():
+        for model, fitted in models.items():
             assert (len(fitted) - 3) == {
                 "m1": 2,
                 "m2": 5,

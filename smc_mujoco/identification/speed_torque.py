@@ -1,0 +1,280 @@
+"""Friction from pairs of speed and torque, as most published studies of friction have them.
+
+    found = smc.identify_friction(speed, torque)
+    print(found)
+    smc.Scenario(plant="duffing", law="pid", friction=found.part)
+
+The torque is what friction alone needs: measured, less gravity and inertia. Five models are fitted
+by least squares, from a level alone to a level with a Stribeck drop. The one nonlinear number, a
+speed, is found by a scan. Taken is the smallest model whose error on blocks of time that were left
+out is within one standard error of the best (L. Breiman et al., Classification and Regression
+Trees, 1984, section 3.4.3).
+"""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from smc_mujoco.common.aliases import Array, Numbers
+from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.identification import number_text
+from smc_mujoco.mechanisms.hardware.stribeck import Stribeck
+
+# Model -> its terms, from the smallest on
+MODELS = {
+    "level": ("level",),
+    "level, viscous": ("level", "viscous"),
+    "level, viscous, offset": ("level", "viscous", "offset"),
+    "smooth level, viscous, offset": ("smooth", "viscous", "offset"),
+    "level, drop, viscous, offset": ("level", "drop", "viscous", "offset"),
+}
+NATURAL = "level", "smooth", "drop", "viscous"  # terms whose number is 0 or more
+SPEED_OF = {"smooth": "width", "drop": "stribeck"}  # the speed of a term, rad/s (m/s)
+UNITS = {"level": "N m", "drop": "N m", "offset": "N m", "viscous": "N m s/rad"}
+UNITS |= {"width": "rad/s", "stribeck": "rad/s"}
+MOVING = 0.01  # of the largest speed: slower pairs may be of a joint at rest
+BLOCKS = 20  # of time, each of which counts once: neighbouring pairs depend on each other
+SCAN = 40  # speeds that are tried, from twice the slowest pair to half of the fastest; chosen
+MIN_PAIRS = 100  # that move, five in a block; chosen
+MIN_R2 = 0.5  # of the variation of torque: below there is no friction in it
+FITTED = 2 / 3  # of the pairs; what follows is held out, unless another log is given
+Pairs = tuple[Array, Array]  # speeds and torques, (K,) each
+
+
+@dataclasses.dataclass(frozen=True)
+class FrictionFit:
+    """A model of friction that was fitted to pairs of speed and torque."""
+
+    model: str
+    numbers: Numbers  # level, viscous, offset, drop, N m (N) or N m s/rad; width or stribeck, rad/s
+    errors: Numbers  # their standard errors: those of blocks of time, or of white noise if larger
+    rms: float  # N m (N), of the residuals
+    held_out: float  # N m (N), the same on pairs that were not used
+    r2: float  # share of the variation of torque that it explains
+    at_zero: tuple[str, ...] = ()  # numbers that would be negative
+
+    @property
+    def part(self) -> Stribeck:
+        """It as a part of a scenario."""
+        number = self.numbers.get
+        level = number("level", 0.0)
+        drop = number("drop", 0.0)
+        return Stribeck(
+            level,
+            level + drop if drop else None,
+            self.numbers["stribeck"] if drop else None,
+            viscous=number("viscous", 0.0),
+            offset=number("offset", 0.0),
+            width=number("width", 0.0),
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class FrictionFound:
+    """Friction in pairs of speed and torque: every model, and the one that is taken."""
+
+    fits: dict[str, FrictionFit]  # by model, from the smallest on
+    best: FrictionFit
+
+    @property
+    def part(self) -> Stribeck:
+        """The friction that is taken, for `friction` of a scenario.
+
+        Raises:
+          ScenarioError: there is no friction in the pairs.
+        """
+        if self.best.r2 < MIN_R2:
+            raise ScenarioError(
+                f"{self.no_friction}: give the torque that friction alone needs (measured, less "
+                "gravity and inertia), in N m, without spikes"
+            )
+        return self.best.part
+
+    @property
+    def no_friction(self) -> str:
+        """A sentence if no model explains half of the variation of torque; else ""."""
+        if self.best.r2 >= MIN_R2:
+            return ""
+        return f"no friction in it: {self.best.model} explains {self.best.r2:.2f} of the variation"
+
+    def __str__(self) -> str:
+        heads = f"{'model':<30} {'rms':>8} {'held out':>8} {'R2':>6}"
+        rows = [heads]
+        for fit in self.fits.values():
+            mark = "*" if fit is self.best else " "
+            rows.append(f"{fit.model:<29}{mark} {fit.rms:8.4f} {fit.held_out:8.4f} {fit.r2:6.3f}")
+        rows += ["", *number_text.table(self.best.numbers, self.best.errors, UNITS)]
+        rows += [f"{name} would be negative, and is 0" for name in self.best.at_zero]
+        return "\n".join([*rows, *filter(None, [self.no_friction])])
+
+
+def identify_friction(speed: Any, torque: Any, held_out: Any = None) -> FrictionFound:
+    """Find friction in pairs of speed and torque.
+
+        speed = np.sin(np.linspace(0.0, 9.0, 500))
+        found = smc.identify_friction(speed, 0.3 * np.sign(speed) + 0.1 * speed)
+        found.best.numbers["level"], found.part
+
+    Args:
+      speed: of the joint, rad/s (m/s), (K,), in the order of time.
+      torque: that friction needs at this speed, N m (N), (K,): measured, less gravity and inertia.
+      held_out: (speed, torque) of another log, on which `held_out` of the fits is. None: the last
+        third of the pairs.
+
+    Returns:
+      A `FrictionFound`: `fits` by model with numbers, standard errors, rms and held-out rms, `best`
+      of them, and its `part`.
+
+    Raises:
+      ScenarioError: pairs that are no numbers, too few that move, or of one direction alone.
+    """
+    pairs = _moving(speed, torque, "the pairs")
+    other = None if held_out is None else _moving(*held_out, "held_out")
+    fits = {}
+    errors = []
+    for model, terms in MODELS.items():
+        fits[model], errors_of_blocks = _fitted(model, terms, pairs, other)
+        errors.append(errors_of_blocks)
+    losses = np.array(errors)
+    least = losses[int(losses.mean(axis=1).argmin())]
+    for fit, loss in zip(fits.values(), losses, strict=True):
+        worse = loss - least
+        if worse.mean() <= worse.std(ddof=1) / np.sqrt(len(worse)):
+            return FrictionFound(fits, fit)
+    raise AssertionError("the best model is not worse than itself")
+
+
+def _moving(speed: Any, torque: Any, what: str) -> Pairs:
+    """Return the pairs of a joint that moves."""
+    try:
+        v, force = np.asarray(speed, float), np.asarray(torque, float)
+    except (TypeError, ValueError):
+        v = force = np.empty((0, 0))
+    if v.ndim != 1 or v.shape != force.shape:
+        raise ScenarioError(
+            f"{what} are speeds {shown(speed)} and torques {shown(torque)}: give one number of "
+            "each for each sample"
+        )
+    if wrong := int(np.sum(~(np.isfinite(v) & np.isfinite(force)))):
+        raise ScenarioError(f"{wrong} of {what} are not finite: leave those samples out")
+    moves = np.abs(v) > MOVING * np.abs(v).max(initial=0.0)
+    if moves.sum() < MIN_PAIRS:
+        raise ScenarioError(f"{moves.sum()} of {what} move: give {MIN_PAIRS} or more")
+    v = v[moves]
+    if not v.min() < 0.0 < v.max():
+        raise ScenarioError(
+            f"{what} have speeds of one sign, and a level cannot be told from an offset: give "
+            "pairs of both directions"
+        )
+    return v, force[moves]
+
+
+def _columns(terms: tuple[str, ...], v: Array, speed: float) -> Array:
+    """Return what each term is at speeds v per unit of its number, (K, terms)."""
+    sign = np.sign(v)
+    known = {
+        "level": lambda: sign,
+        "smooth": lambda: np.tanh(v / speed),
+        "drop": lambda: sign * np.exp(-((v / speed) ** 2)),
+        "viscous": lambda: v,
+        "offset": lambda: np.ones_like(v),
+    }
+    return np.column_stack([known[term]() for term in terms])
+
+
+def _solved(terms: tuple[str, ...], v: Array, force: Array, speed: float) -> Array:
+    """Return the numbers of the terms by least squares; 0 for what would be negative, (terms,)."""
+    columns = _columns(terms, v, speed)
+    free = list(range(len(terms)))
+    while True:
+        numbers = np.zeros(len(terms))
+        numbers[free] = np.linalg.lstsq(columns[:, free], force, rcond=None)[0]
+        negative = [i for i in free if terms[i] in NATURAL and numbers[i] < 0.0]
+        if not negative:
+            return numbers
+        free.remove(min(negative, key=lambda i: numbers[i]))
+
+
+def _speed(terms: tuple[str, ...], v: Array, force: Array) -> float:
+    """Return the speed of a smooth or dropping term with the least squares; 1 without one."""
+    from scipy.optimize import minimize_scalar
+
+    if not set(terms) & SPEED_OF.keys():
+        return 1.0
+
+    def loss(logarithm: float) -> float:
+        speed = float(np.exp(logarithm))
+        numbers = _solved(terms, v, force, speed)
+        return float(np.sum((force - _columns(terms, v, speed) @ numbers) ** 2))
+
+    low, high = 2.0 * np.abs(v).min(), 0.5 * np.abs(v).max()
+    grid = np.linspace(*np.log((low, max(high, 2.0 * low))), SCAN)
+    best = int(np.argmin([loss(one) for one in grid]))
+    around = grid[max(best - 1, 0)], grid[min(best + 1, SCAN - 1)]
+    return float(np.exp(minimize_scalar(loss, bounds=around, method="bounded").x))
+
+
+def _fitted(
+    model: str, terms: tuple[str, ...], pairs: Pairs, other: Pairs | None
+) -> tuple[FrictionFit, Array]:
+    """Return the fit of a model, and the mean squares of its errors on blocks that were left out,
+    (BLOCKS,).
+    """
+    v, force = pairs
+    speed = _speed(terms, v, force)
+    numbers = _solved(terms, v, force, speed)
+    residual = force - _columns(terms, v, speed) @ numbers
+    first, last = pairs, other
+    if last is None:
+        cut = round(FITTED * len(v))
+        first, last = (v[:cut], force[:cut]), (v[cut:], force[cut:])
+    used = _speed(terms, *first)
+    rest = last[1] - _columns(terms, last[0], used) @ _solved(terms, *first, used)
+    names = ["level" if term == "smooth" else term for term in terms]
+    found = dict(zip(names, numbers.tolist(), strict=True))
+    speeds = [SPEED_OF[term] for term in terms if term in SPEED_OF]
+    found |= dict.fromkeys(speeds, speed)
+    errors, losses = _errors(terms, pairs, numbers, speed, bool(speeds))
+    fit = FrictionFit(
+        model,
+        found,
+        dict(zip(found, errors.tolist(), strict=True)),
+        float(np.sqrt(np.mean(residual**2))),
+        float(np.sqrt(np.mean(rest**2))),
+        float(1.0 - np.sum(residual**2) / np.sum((force - force.mean()) ** 2)),
+        tuple(name for name in names if name != "offset" and found[name] == 0.0),
+    )
+    return fit, losses
+
+
+def _errors(
+    terms: tuple[str, ...], pairs: Pairs, numbers: Array, speed: float, has_speed: bool
+) -> tuple[Array, Array]:
+    """Return standard errors of the numbers and of the speed, if there is one, and the mean squares
+    of the errors on each block that was left out.
+
+    The numbers without a block follow from the slopes at the fit. Numbers at 0 stay there.
+    """
+    v, force = pairs
+    slopes = _columns(terms, v, speed)
+    residual = force - slopes @ numbers
+    if has_speed:
+        step = 1e-4 * speed
+        faster, slower = (_columns(terms, v, speed + sign * step) for sign in (1.0, -1.0))
+        slopes = np.column_stack([slopes, (faster - slower) @ numbers / (2.0 * step)])
+    free = np.any(slopes != 0.0, axis=0)
+    free[: len(terms)] &= (numbers != 0.0) | np.array([term == "offset" for term in terms])
+    slopes = slopes[:, free]
+    whole = slopes.T @ slopes
+    moved = np.zeros((BLOCKS, slopes.shape[1]))
+    losses = np.zeros(BLOCKS)
+    for b, block in enumerate(np.array_split(np.arange(len(v)), BLOCKS)):
+        own, left = slopes[block], residual[block]
+        moved[b] = -np.linalg.lstsq(whole - own.T @ own, own.T @ left, rcond=None)[0]
+        losses[b] = np.mean((left - own @ moved[b]) ** 2)
+    by_blocks = (BLOCKS - 1) / BLOCKS * np.sum((moved - moved.mean(axis=0)) ** 2, axis=0)
+    white = np.sum(residual**2) / max(len(v) - slopes.shape[1], 1) * np.diag(np.linalg.pinv(whole))
+    errors = np.zeros(len(free))
+    errors[free] = np.sqrt(np.maximum(by_blocks, white))
+    return errors, losses
