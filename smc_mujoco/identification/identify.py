@@ -38,8 +38,8 @@ from smc_mujoco.identification.rig import rig as find_rig
 from smc_mujoco.identification.standard_errors import (
     BLOCKS,
     MAX_CORRELATION,
+    between,
     check_told_apart,
-    left_out,
     statistics,
 )
 from smc_mujoco.mechanisms.custom import mjcf
@@ -121,9 +121,9 @@ class Identified:
             notes.append(SLOW)
         if worst < POOR_FIT:
             notes.append(POOR)
-        if isinstance(self.rig, OwnRig) and (left_out_names := self.rig.not_in_runs):
+        if isinstance(self.rig, OwnRig) and (absent := self.rig.not_in_runs):
             notes.append(
-                f"replays have {', '.join(left_out_names)}, and runs of the machine leave it out: "
+                f"replays have {', '.join(absent)}, and runs of the machine leave it out: "
                 "a scenario has one Fault, and zeros of encoders are of their log"
             )
         return notes
@@ -303,8 +303,8 @@ def identify(
         fits_before = twin.fits(data, **steps)
     scatter = {}
     if len(data) > 1:
-        between = left_out(slopes, [piece.record for piece in replays.pieces]) * replays.scales
-        scatter = dict(zip(names, between.tolist(), strict=True))
+        deviation = between(slopes, [piece.record for piece in replays.pieces]) * replays.scales
+        scatter = dict(zip(names, deviation.tolist(), strict=True))
     return Identified(
         rig=fitted,
         before=twin,

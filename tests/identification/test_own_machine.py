@@ -227,3 +227,49 @@ def test_two_gains_are_left_out_of_runs_and_said_so(found):
     assert rig.not_in_runs == ("j1.gain", "j2.gain")
     told = dataclasses.replace(found, rig=rig, values={}, errors={}, correlations=np.zeros((0, 0)))
     assert any("j1.gain, j2.gain" in note for note in told.notes)
+
+
+def test_a_chirp_is_recommended_and_a_staircase_is_last_because_it_rests(arm, tmp_path):
+    names = ["j1.damping", "j1.frictionloss"]
+    guess = {name: TRUTH[name] for name in names}
+    fields = {"u_max": 5.0, "v_max": 4.0, "duration": 6.0, "rate": 250.0}
+    advice = smc.design.excitation(arm, names, guess=guess, **fields)
+    assert advice.motions[0].name == "chirp from 0.2 to 3 Hz"
+    last = advice.motions[-1]
+    assert last.name == "staircase"
+    assert last.rest > 0.4
+    assert {*last.worst_pair[:2]} == {*names}
+    assert "staircase is last: its errors are" in str(advice)
+    for motion in advice.motions:
+        assert motion.largest_u <= 5.0
+        assert np.abs(np.gradient(motion.positions[0], motion.times)).max() <= 4.0
+    with advice.save(tmp_path / "motion.csv").open() as file:
+        assert file.readline() == "t,r\n"
+        assert len(file.readlines()) == 1501
+
+
+def test_a_motion_stays_within_range_and_speed_and_an_unknown_one_is_refused(tmp_path):
+    limited = smc.plant_from(ONE.replace('name="j1"', 'name="j1" range="-.2 .3"'), ["j1"])
+    advice = smc.design.excitation(limited, ["j1.damping"], u_max=5.0, duration=2.0, rate=250.0)
+    for motion in advice.motions:
+        assert np.abs(motion.positions[0]).max() <= 0.9 * 0.2 + 1e-12
+    with pytest.raises(smc.ScenarioError, match="unknown motion 'jump'"):
+        advice.save(tmp_path / "motion.csv", "jump")
+
+
+@pytest.mark.slow
+def test_expected_errors_are_those_that_a_log_of_the_motion_tells():
+    """Within a factor of 2, fixed before; of a log by the other simulation."""
+    arm = smc.plant_from(ONE, ["j1"])
+    advice = smc.design.excitation(arm, list(TRUTH), guess=TRUTH, u_max=20.0, duration=6.0)
+    motion = next(one for one in advice.motions if one.name.startswith("three sines"))
+    t, r = np.array(motion.times), np.array(motion.positions[0])
+    dr = np.gradient(r, t)
+
+    def reference(time):
+        return np.array([np.interp(time, t, r)]), np.array([np.interp(time, t, dr)])
+
+    run = log(ONE, TRUTH, reference, 8.4, 0.94, duration=6.0)
+    found = smc.identify(arm, run, list(TRUTH))
+    for name, error in found.errors.items():
+        assert 0.5 < error / motion.errors[name] < 2.0, name

@@ -1,0 +1,444 @@
+"""What to record, so that numbers of a machine can be told apart: candidate motions, best first.
+
+    advice = smc.design.excitation(arm, ["shoulder.damping", "shoulder.frictionloss"], u_max=5.0)
+    print(advice)
+    advice.save("motion.csv")
+
+Each motion is as large as range, speed and force allow, is run under a PD law on the model with
+typical numbers, and its log's slopes give the errors that white noise of the encoder would leave.
+What a wrong model adds is not in them. Source of the idea: J. Swevers, C. Ganseman, D. B. Tukel, J.
+De Schutter and H. Van Brussel, Optimal robot excitation and identification, IEEE Transactions on
+Robotics and Automation 13(5), 1997; here the motions are given, and only their sizes are found.
+"""
+
+import csv
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.aliases import AnyPath, Array, Floats, Numbers
+from smc_mujoco.common.constraints import Natural, Positive, constrained
+from smc_mujoco.common.data import named_data
+from smc_mujoco.common.errors import ScenarioError, find, items_of, number, shown
+from smc_mujoco.common.files import as_path, replacing
+from smc_mujoco.control.from_text import law as find_law
+from smc_mujoco.identification.own_rig import RUN_STEP, OwnRig, own_rig
+from smc_mujoco.identification.paths import DELAY
+from smc_mujoco.identification.replays import Point, Replays
+from smc_mujoco.identification.rig import Values
+from smc_mujoco.identification.standard_errors import check_told_apart, statistics
+from smc_mujoco.mechanisms.hardware.encoder import Encoder
+from smc_mujoco.mechanisms.layout import (
+    channel_names,
+    column_ends,
+    dof_ids,
+    driven_names,
+    joint_ids,
+)
+from smc_mujoco.mechanisms.named import jointed
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.force_bounds import suggested_u_max
+from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.signals import Noise
+from smc_mujoco.simulation.time_series import TimeSeries
+from smc_mujoco.simulation.trace import Trace
+
+# Hz and damping ratio of the PD law, which has no gravity compensation; chosen
+BANDWIDTH, DAMPING_RATIO = 2.0, 0.7
+SOFT_START = 0.5  # s
+BISECTIONS = 10  # of the size of a motion
+AMPLITUDE = {"rad": 0.5, "m": 0.1}  # of a joint, where its range allows it; chosen
+OF_RANGE = 0.9  # of the way to a limit of the joint's range; chosen
+OF_FORCE = 0.7  # of the bound on u, that the motion itself may take; chosen
+SLOPE_STEP = 2e-3  # s, longest physics step for slopes: errors need no more; chosen
+# Typical numbers where the model has 0: of the bound on u, of a joint's inertia, s; chosen
+FRICTION_SHARE, ARMATURE_SHARE, TYPICAL_DELAY = 0.03, 0.2, 0.004
+SLOW = 0.02  # of the largest speed of a joint: below it the joint counts as at rest; chosen
+HOLD, RAMP = 0.6, 0.15  # s, of a stair
+
+
+@named_data
+class ExcitingMotion:
+    """A motion, and what its log would tell.
+
+    Attributes:
+      name: what it is.
+      times: s, (K,).
+      positions: of each driven joint, rad or m, (driven, K).
+      condition: number of the scaled slopes of the log.
+      errors: quantity -> expected standard error, in its unit.
+      values: quantity -> the number that it has in the simulation.
+      largest_u, largest_v: of all joints.
+      worst_pair: the two quantities that are told apart worst, and the correlation of their errors.
+      rest: share of the time at which every joint is below 2 % of its largest speed.
+    """
+
+    name: str
+    times: Floats
+    positions: tuple[Floats, ...]
+    condition: float
+    errors: Numbers
+    values: Numbers
+    largest_u: float
+    largest_v: float
+    worst_pair: tuple[str, str, float]
+    rest: float
+
+    @property
+    def reference(self) -> tuple[TimeSeries, ...]:
+        """The signal of each driven joint."""
+        return tuple(TimeSeries(self.times, row) for row in self.positions)
+
+    def share(self, name: str) -> float:
+        """Return the expected error of a quantity over its value."""
+        return self.errors[name] / max(abs(self.values[name]), 1e-300)
+
+    @property
+    def mean_share(self) -> float:
+        """The geometric mean of the expected errors over their values."""
+        return math.exp(sum(math.log(self.share(name)) for name in self.errors) / len(self.errors))
+
+
+@named_data
+class Excitation:
+    """Candidate motions, best first: that whose relative errors have the least geometric mean."""
+
+    motions: tuple[ExcitingMotion, ...]
+    columns: tuple[str, ...]  # of a file: references of the driven joints
+
+    def __str__(self) -> str:
+        """Return a line for each motion, and why the last is last."""
+        lines = []
+        for motion in self.motions:
+            errors = [f"{name} {100.0 * motion.share(name):.2g} %" for name in motion.errors]
+            lines.append(
+                f"{motion.name}: condition number {motion.condition:.3g}; expected errors "
+                f"{', '.join(errors)}; |u| up to {motion.largest_u:.3g}, |v| up to "
+                f"{motion.largest_v:.3g}"
+            )
+        best, last = self.motions[0], self.motions[-1]
+        first, second, correlation = last.worst_pair
+        why = (
+            f"{last.name} is last: its errors are {last.mean_share / best.mean_share:.2g} times "
+            f"those of the best, and it rests for {100.0 * last.rest:.0f} % of the time"
+        )
+        if second:
+            why += f"; {first} and {second} are told apart worst (correlation {correlation:.2f})"
+        return "\n".join([*lines, why])
+
+    def save(self, path: AnyPath, name: str | None = None) -> Path:
+        """Write the reference of a motion as CSV, the best by default: t, and r or r_JOINT, rad or
+        m. Return the path.
+        """
+        known = {motion.name: motion for motion in self.motions}
+        motion = self.motions[0] if name is None else find("motion", name, known)
+        with replacing(as_path(path)) as part, part.open("w", newline="", encoding="utf-8") as file:
+            rows = csv.writer(file)
+            rows.writerow(["t", *self.columns])
+            rows.writerows(zip(motion.times, *motion.positions, strict=True))
+        return as_path(path)
+
+
+@constrained
+def excitation(
+    machine: Plant | Scenario | str,
+    names: Sequence[str],
+    *,
+    u_max: Positive | None = None,
+    v_max: Positive | None = None,
+    amplitude: float | Sequence[float] | None = None,
+    guess: Mapping[str, float] | None = None,
+    duration: Positive = 8.0,
+    rate: Positive = 500.0,
+    noise: Natural = 2e-4,
+) -> Excitation:
+    """Recommend a motion to record, from which numbers of a machine can be told apart.
+
+        print(smc.design.excitation("arm.xml:shoulder", ["shoulder.damping"], u_max=5.0))
+
+    Args:
+      machine, names: as of `smc.identify`.
+      u_max: bound on |u| of each motor, N m or N; default: the model's.
+      v_max: bound on the speed of each joint, rad/s or m/s; default: none.
+      amplitude: largest way from the goal to each side, rad or m: one for all driven joints, or one
+        for each. Default: 0.5 rad, 0.1 m, or 0.9 of the way to a limit of the joint's range.
+      guess: quantity -> about its value. Where the model has 0, the default is typical: friction
+        3 % of u_max, armature a fifth of the inertia, a delay of 4 ms.
+      duration: s, of each motion.
+      rate: Hz, of the log.
+      noise: standard deviation of the positions in the log, rad or m.
+
+    Returns:
+      The motions, best first, with condition numbers, expected errors and the worst pair. `save`
+      writes the CSV to play.
+
+    Raises:
+      ScenarioError: as `smc.identify` of paths; no motion that the machine can follow.
+    """
+    base = machine if isinstance(machine, Scenario) else jointed(machine, "excitation")
+    rig = own_rig(base, names)
+    plant = rig.plant
+    bounds = _bounds(plant, u_max)
+    rig = rig.with_values(typical(rig, bounds) | dict(guess or {}), "typical")
+    shapes = candidate_shapes(plant.driven, duration, rate)
+    ways = _ways(plant, amplitude)
+    goal = np.array(plant.rest or (0.0,) * plant.n)[: plant.driven]
+    moved = {}
+    for name, shape in shapes.items():
+        size = largest_size(rig, goal, ways[:, None] * shape, 1.0 / rate, bounds, v_max)
+        moved[name] = goal[:, None] + size * ways[:, None] * shape
+    found = _motions(rig, list(names), moved, 1.0 / rate, bounds, noise)
+    if not found:
+        raise ScenarioError(
+            f"{plant.name} follows none of {', '.join(shapes)}: give a smaller amplitude"
+        )
+    ends = column_ends(plant)[: plant.driven]
+    ranked = sorted(found, key=lambda motion: motion.mean_share)
+    return Excitation(motions=tuple(ranked), columns=tuple(f"r{end}" for end in ends))
+
+
+def _bounds(plant: Plant, u_max: float | None) -> Array:
+    """Return the bound on |u| of each motor, (driven,)."""
+    bounds = np.broadcast_to(np.asarray(suggested_u_max(plant), float), (plant.driven,))
+    if plant.limits:
+        bounds = np.minimum(bounds, plant.limits)
+    if u_max is not None:
+        bounds = np.full(plant.driven, u_max)
+        if plant.limits:
+            bounds = np.minimum(bounds, plant.limits)
+    return bounds
+
+
+def _ways(plant: Plant, amplitude: float | Sequence[float] | None) -> Array:
+    """Return the largest way of each driven joint to each side of its goal, (driven,)."""
+    if amplitude is not None:
+        given = items_of("amplitude", amplitude) if np.ndim(amplitude) else [amplitude]
+        ways = np.array([number("amplitude", way, above=0.0) for way in given])
+        if len(ways) not in (1, plant.driven):
+            raise ScenarioError(f"amplitude has {len(ways)} values: give one, or {plant.driven}")
+        return np.broadcast_to(ways, (plant.driven,)).copy()
+    ways = np.array([AMPLITUDE.get(unit, 0.5) for unit in plant.units[: plant.driven]])
+    goal = plant.rest or (0.0,) * plant.n
+    names = channel_names(plant)
+    for joint, low, high in plant.ranges:
+        if (i := names.index(joint)) < plant.driven:
+            ways[i] = min(ways[i], OF_RANGE * min(goal[i] - low, high - goal[i]))
+    return ways
+
+
+def typical(rig: OwnRig, bounds: Array) -> dict[str, float]:
+    """Return quantity -> a typical value, of those that the model has as 0."""
+    model = rig.plant.load()
+    inertia = dict(zip(channel_names(rig.plant), model.dof_M0[dof_ids(model)], strict=True))
+    force = dict(zip(driven_names(rig.plant), bounds.tolist(), strict=True))
+    values = {}
+    for name, quantity in rig.quantities.items():
+        joint, _, kind = name.rpartition(".")
+        if quantity.value:
+            continue
+        if kind in ("damping", "frictionloss"):
+            values[name] = FRICTION_SHARE * force.get(joint, min(force.values()))
+        elif kind == "armature":
+            values[name] = ARMATURE_SHARE * float(inertia.get(joint, 0.0))
+        elif name == DELAY:
+            values[name] = TYPICAL_DELAY
+        elif kind == "offset":
+            values[name] = FRICTION_SHARE * force[joint]
+    return values
+
+
+def candidate_shapes(joints: int, duration: float, rate: float) -> dict[str, Array]:
+    """Return name -> a motion of each joint between -1 and 1, (joints, K): what people record."""
+    t = np.arange(round(duration * rate) + 1) / rate
+    rng = np.random.default_rng(1)
+
+    def sines(frequencies: Sequence[float], shares: Sequence[float]) -> Array:
+        rows = []
+        for i in range(joints):
+            y = np.zeros_like(t)
+            for frequency, share in zip(frequencies, shares, strict=True):
+                phase = rng.uniform(0.0, 2.0 * math.pi)
+                y += share * np.sin(2.0 * math.pi * frequency * (1.0 + 0.07 * i) * t + phase)
+            rows.append(y / np.abs(y).max())
+        return np.array(rows)
+
+    def chirp(low: float, high: float) -> Array:
+        phase = 2.0 * math.pi * (low * t + 0.5 * (high - low) / duration * t * t)
+        return np.array([np.sin(phase + 0.9 * i) for i in range(joints)])
+
+    def stairs() -> Array:
+        k = np.floor(t / HOLD).astype(int)
+        levels = np.array([0.0, 0.5, 1.0, 0.5, 0.0, -0.5, -1.0, -0.5])
+        s = np.clip((t - k * HOLD) / RAMP, 0.0, 1.0)
+        y = levels[k % 8] + (levels[(k + 1) % 8] - levels[k % 8]) * s * s * (3.0 - 2.0 * s)
+        return np.array([y * (-1.0) ** i for i in range(joints)])
+
+    shapes = {
+        "slow sine of 0.2 Hz": sines([0.2], [1.0]),
+        "one sine of 0.7 Hz": sines([0.7], [1.0]),
+        "three sines of 0.4, 1.1 and 2.7 Hz": sines([0.4, 1.1, 2.7], [1.0, 0.6, 0.3]),
+        "chirp from 0.2 to 3 Hz": chirp(0.2, 3.0),
+        "staircase": stairs(),
+    }
+    soft = np.minimum(1.0, t / SOFT_START)
+    half = len(t) // 2
+    first = stairs()[:, :half] * soft[:half] * soft[:half][::-1]
+    second = chirp(0.2, 3.0)[:, half:] * soft[: len(t) - half]
+    shapes = {name: shape * soft for name, shape in shapes.items()}
+    return shapes | {"half staircase, half chirp": np.concatenate([first, second], axis=1)}
+
+
+def largest_size(
+    rig: OwnRig, goal: Array, shape: Array, step: float, bounds: Array, v_max: float | None
+) -> float:
+    """Return the factor up to 1 on a motion (driven, K) about the goal, with which speeds and the
+    forces that it takes stay within their bounds.
+    """
+
+    def fits(size: float) -> bool:
+        speed = float(np.abs(np.gradient(size * shape, step, axis=1)).max())
+        forces = motion_forces(rig, goal[:, None] + size * shape, step)
+        slow = v_max is None or speed <= v_max
+        return slow and bool(np.all(np.abs(forces).max(axis=1) <= OF_FORCE * bounds))
+
+    if fits(1.0):
+        return 1.0
+    low, high = 0.0, 1.0
+    for _ in range(BISECTIONS):
+        size = 0.5 * (low + high)
+        low, high = (size, high) if fits(size) else (low, size)
+    if not low:
+        raise ScenarioError(
+            f"u_max {shown(bounds.tolist())} moves {rig.name} from its goal by less than "
+            f"{high:.1g} of its amplitude: give more, or another keyframe"
+        )
+    return low
+
+
+def motion_forces(rig: OwnRig, positions: Array, step: float) -> Array:
+    """Return the forces of the driven joints in a motion, (driven, K'), every tenth sample."""
+    plant = rig.numbers_of(Values(**rig.values))["plant"]
+    model = plant.load()
+    data = mujoco.MjData(model)
+    places = model.jnt_qposadr[joint_ids(model)]
+    dofs = dof_ids(model)
+    driven = len(positions)
+    v = np.gradient(positions, step, axis=1)
+    a = np.gradient(v, step, axis=1)
+    data.qpos[places] = plant.rest or (0.0,) * plant.n
+    forces = []
+    for k in range(0, positions.shape[1], 10):
+        data.qpos[places[:driven]] = positions[:, k]
+        data.qvel[dofs[:driven]] = v[:, k]
+        data.qacc[dofs[:driven]] = a[:, k]
+        mujoco.mj_inverse(model, data)
+        forces.append(data.qfrc_inverse[dofs[:driven]].copy())
+    return np.array(forces).T
+
+
+def _motions(
+    rig: OwnRig,
+    names: list[str],
+    moved: Mapping[str, Array],
+    period: float,
+    bounds: Array,
+    noise: float,
+) -> list[ExcitingMotion]:
+    """Return what a log of each motion would tell; without those that the machine does not
+    follow.
+    """
+    plant = rig.plant
+    model = plant.load()
+    w = 2.0 * math.pi * BANDWIDTH
+    laws = []
+    for inertia in model.dof_M0[dof_ids(model)][: plant.driven].tolist():
+        kd = 2.0 * DAMPING_RATIO * w * inertia
+        laws.append(find_law("pid", kp=inertia * w * w, ki=0.0, kd=kd))
+    scenarios = []
+    for positions in moved.values():
+        times = (period * np.arange(positions.shape[1])).tolist()
+        start = list(plant.rest or (0.0,) * plant.n)
+        start[: plant.driven] = positions[:, 0].tolist()
+        fields = rig.machine(Values(**rig.values)) | {
+            "law": laws,
+            "reference": [TimeSeries(times, row.tolist()) for row in positions],
+            "duration": times[-1],
+            "control_period": period,
+            "x0": tuple(start),
+            "noise": Noise(position=noise),
+            "sensor": rig.base.sensor or Encoder(),
+            "u_max": tuple(bounds.tolist()),
+        }
+        step = period / math.ceil(period / RUN_STEP - 1e-9)
+        late = round(fields.pop(DELAY, 0.0) / step) * step
+        fields |= {DELAY: late, "physics_step": step}
+        scenarios.append(Scenario.recorded(**fields))
+    found = []
+    for (name, positions), trace in zip(moved.items(), run(scenarios), strict=True):
+        if not trace.failure:
+            told = _told(rig, names, trace)
+            found.append(
+                ExcitingMotion(
+                    name=name,
+                    times=tuple(trace.t.tolist()),
+                    positions=tuple(tuple(row) for row in positions.tolist()),
+                    values={one: rig.values[one] for one in names},
+                    largest_u=float(np.abs(trace.u).max()),
+                    largest_v=float(np.abs(trace.v).max()),
+                    rest=_rest(trace.v),
+                    **told,
+                )
+            )
+    return found
+
+
+def _told(rig: OwnRig, names: list[str], trace: Trace) -> dict[str, Any]:
+    """Return the condition number, the expected errors and the worst pair of a log."""
+    _, data = rig.reading([trace])
+    replays = Replays(rig, names, data, False)
+    control = replays.rig(replays.start).repeated(replays.pieces[0].part).control_period  # pyright: ignore[reportArgumentType]
+    replays.steps = {"physics_step": control / math.ceil(control / SLOPE_STEP - 1e-9)}
+    states, noise = _of_run(replays, rig, trace)
+    slopes = replays.slopes(Point(replays.start.values, states))
+    check_told_apart(replays, slopes)
+    # what is left by the true machine is noise and counts, without errors by steps
+    slopes = dataclasses.replace(slopes, residuals=noise)
+    J = np.concatenate(slopes.freed(slopes.by_values))
+    r = np.concatenate(slopes.freed(slopes.residuals))
+    solved = slopes.stepped(-np.linalg.lstsq(J, r, rcond=None)[0])
+    errors, correlations, _ = statistics(replays, solved, np.zeros(len(names)))
+    singular = np.linalg.svd(J / np.linalg.norm(J, axis=0), compute_uv=False)
+    apart = correlations - np.eye(len(names))
+    i, j = np.unravel_index(np.argmax(np.abs(apart)), apart.shape)
+    worst = (names[i], names[j] if len(names) > 1 else "", float(apart[i, j]))
+    condition = float(singular[0] / max(singular[-1], 1e-300))
+    errors = {name: math.inf if math.isnan(error) else error for name, error in errors.items()}
+    return {"condition": condition, "errors": errors, "worst_pair": worst}
+
+
+def _of_run(replays: Replays, rig: OwnRig, trace: Trace) -> tuple[Array, list[Array]]:
+    """Return the moves of the pieces' states to those that the machine had, and the noise of each
+    piece as residuals.
+    """
+    true = np.hstack([trace.x + rig.zeros, trace.v])
+    states, noise = [], []
+    first = 0
+    for piece in replays.pieces:
+        assert piece.part is not None
+        states.append((true[first] - piece.part.state) / piece.scales)
+        count = len(next(iter(piece.measured.values())))
+        exact = dict(zip(piece.measured, true[first : first + count].T, strict=False))
+        noise.append(replays.relative(piece, exact))
+        first += count - 1
+    return np.array(states), noise
+
+
+def _rest(v: Array) -> float:
+    """Return the share of samples at which every joint is slow, of speeds (K, n)."""
+    return float(np.mean(np.all(np.abs(v) <= SLOW * np.abs(v).max(axis=0), axis=1)))
