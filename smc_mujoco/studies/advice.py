@@ -139,19 +139,19 @@ class RaceAdvice(Advice):
         """What the sets of gains say of the laws."""
         race, comparison = self.race, self.race.comparison
         assert comparison is not None
-        text = _verdict(comparison, race.running)
-        ranked = dict(zip(comparison.laws, comparison.ranked[:, 0], strict=True))
-        if race.sets >= LOOKS[0] and (few := [law for law in race.running if not ranked[law]]):
-            text += f"; {joined(few)} cannot be told from others, with fewer than {LOOKS[0]} sets"
-        if race.winner:
-            return text
-        if race.sets < LOOKS[0]:
+        if race.sets < LOOKS[0] and not race.winner:
             more = (LOOKS[0] - race.sets) * race.seconds / 60.0
             return (
                 f"open; {counted(race.sets, 'set')} of gains of each law were searched in the "
                 f"time, {LOOKS[0]} can name a winner, and the same call goes on with them; it "
                 f"takes about {math.ceil(more)} more minutes"
             )
+        text = _verdict(comparison, race.running)
+        ranked = _ranked(comparison, race.running)
+        if few := [law for law in race.running if law not in ranked]:
+            text += f"; {joined(few)} cannot be told from others, with fewer than {LOOKS[0]} sets"
+        if race.winner or len(ranked) < 2:
+            return text
         return f"{text}; {self._takes}"
 
     @property
@@ -159,7 +159,7 @@ class RaceAdvice(Advice):
         """What it would take to name a winner of sets of gains."""
         race, comparison = self.race, self.race.comparison
         assert comparison is not None
-        first, *others = race.running
+        first, *others = _ranked(comparison, race.running)
         sets = needed(comparison)
         seen = max(comparison.visible(0, first, other) for other in others)
         resolved = "no lead"
@@ -240,10 +240,18 @@ def _unmarked(cell: Cell | str) -> Cell | str:
     return cell if isinstance(cell, str) else cell._replace(strong=False)
 
 
+def _ranked(comparison: Comparison, order: Sequence[str]) -> list[str]:
+    """Return the laws with sets or runs enough to be told from others, in an order of laws."""
+    enough = dict(zip(comparison.laws, comparison.ranked[:, 0], strict=True))
+    return [law for law in order if enough.get(law)]
+
+
 def _verdict(comparison: Comparison, order: Sequence[str]) -> str:
     """Return which law has the lower J in a comparison of one block; `order` has laws by J."""
     winner = comparison.winners[0]
-    names = [law for law in order if law in comparison.laws]
+    names = _ranked(comparison, order)
+    if not names:
+        return "open: no law has sets or runs enough"
     first = winner or names[0]
     effects = {law: comparison.effect(0, first, law) for law in names if law != first}
     rival = max(effects, key=lambda law: effects[law].high)

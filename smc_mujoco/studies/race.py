@@ -216,7 +216,11 @@ def needed(comparison: Comparison) -> float:
     """Return the number of sets with which the law in front would probably win, if further sets
     were like those that there are; inf for any number.
     """
-    first, *others = np.argsort(np.median(comparison.cells[:, 0], axis=1), kind="stable").tolist()
+    middles = np.where(comparison.ranked[:, 0], np.median(comparison.cells[:, 0], axis=1), np.inf)
+    count = int(comparison.ranked[:, 0].sum())
+    if count < 2:
+        return math.inf
+    first, *others = np.argsort(middles, kind="stable")[:count].tolist()
     return max(
         units_needed(comparison.leads[0, first, other], comparison.error, comparison.relevant)
         for other in others

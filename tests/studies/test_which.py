@@ -277,3 +277,14 @@ def test_the_worst_run_is_of_the_condition_in_which_the_law_settles_least_and_th
     }
     assert advise._worst_run(Columns(), "a") == 2
     assert advise._worst_run(Columns(), "b") == 4
+
+
+def test_a_law_with_few_shipped_sets_is_said_not_to_be_told_from_others(tmp_path):
+    """And the lead in words is over a law that is."""
+    laws = ["pid", "adrc", "fixed_time"]
+    found = smc.which("duffing", "noise", laws=laws, out=tmp_path, seeds=2, minutes=5, duration=1.5)
+    counts = {name: one.count for name, one in found.race.entrants.items()}
+    assert counts["fixed_time"] < race.LOOKS[0] < counts["pid"]
+    (however,) = (line for line in found.answer if line.startswith("However tuned"))
+    assert "fixed_time cannot be told from others, with fewer than 7 sets" in however
+    assert "fixed_time's" not in however
