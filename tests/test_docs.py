@@ -43,17 +43,22 @@ NUMBER = r"\d+(?:\.\d+)?"
 
 
 @pytest.fixture
-def generator(monkeypatch):
+def whole():
+    """The site is that of the whole package."""
+    if set(annexes.HERE) != set(annexes.annexes.ANNEXES):
+        pytest.skip("an annex is missing")
+
+
+@pytest.fixture
+def generator(monkeypatch, whole):
     """The module that writes the pages of laws and plants."""
     monkeypatch.syspath_prepend(str(DOCS / "site"))
     return importlib.import_module("catalogue")
 
 
 @pytest.fixture
-def known(monkeypatch):
-    """The module that writes what the package knows into pages; the site is of the whole package."""
-    if set(annexes.HERE) != set(annexes.annexes.ANNEXES):
-        pytest.skip("an annex is missing")
+def known(monkeypatch, whole):
+    """The module that writes what the package knows into pages."""
     monkeypatch.syspath_prepend(str(DOCS / "site"))
     return importlib.import_module("known")
 

@@ -61,7 +61,13 @@ ON_HOST = "../../actions/"  # pages of the repository's host, beside its files: 
 LINKS = [
     (page, link) for page in PAGES for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text())
 ]
-RELATIVE = [pair for pair in LINKS if "://" not in pair[1] and not pair[1].startswith(ON_HOST)]
+RELATIVE = [
+    (page, link)
+    for page, link in LINKS
+    if "://" not in link
+    and not link.startswith(ON_HOST)
+    and annexes.here([link.partition("smc_mujoco/")[2]])
+]
 
 
 # What is asked for less of than a page does: as much code runs, in a tenth of the time.
