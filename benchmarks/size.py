@@ -4,7 +4,8 @@
     python benchmarks/size.py --release 0.1.0   # also keeps these numbers, as that release's
 
 Size is counted in tokens of code, without comments and docstrings, as layout cannot change it.
-Density is tokens for each thousand lines of code. No test asks for a total: see CONTRIBUTING.md.
+Density is tokens for each thousand lines of code, and comprehensions are counted so, too. No test
+asks for a total: see CONTRIBUTING.md.
 """
 
 import argparse
@@ -19,6 +20,7 @@ ROOT = Path(__file__).parents[1]
 RELEASE = Path(__file__).with_name("size.json")
 FOLDERS = ("tests", "benchmarks", "scenes", "docs")
 LISTED = 10  # files, and functions
+LONG = 60  # lines of a function, from its `def` to its end
 LAYOUT = {
     tokenize.COMMENT,
     tokenize.NL,
@@ -54,6 +56,14 @@ def count(text: str) -> Counter:
     return Counter(tokens=tokens, lines=len(lines))
 
 
+COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
+
+
+def comprehensions(text: str) -> int:
+    """Count comprehensions and generator expressions."""
+    return sum(isinstance(node, COMPREHENSIONS) for node in ast.walk(ast.parse(text)))
+
+
 def functions(text: str) -> dict[str, int]:
     """Return the length in lines of each function, from its `def` to its end; of several that share
     a name, that of the longest.
@@ -83,6 +93,7 @@ def measure() -> dict[str, dict[str, int]]:
         for path in sorted((ROOT / folder).rglob("*.py")):
             text = path.read_text(encoding="utf-8")
             counted = count(text)
+            counted["comprehensions"] = comprehensions(text)
             rooms.setdefault(room(path), Counter()).update(counted)
             name = path.relative_to(ROOT).as_posix()
             files[name] = counted["tokens"]
@@ -93,11 +104,20 @@ def measure() -> dict[str, dict[str, int]]:
         if name.startswith("smc_mujoco"):
             total.update(counted)
     rooms["the package"] = total
-    measured = {"tokens": {}, "density": {}}
+    measured = {"tokens": {}, "density": {}, "comprehensions": {}}
     for name, counted in sorted(rooms.items()):
         measured["tokens"][name] = counted["tokens"]
         measured["density"][name] = round(1000 * counted["tokens"] / counted["lines"])
+        measured["comprehensions"][name] = round(
+            1000 * counted["comprehensions"] / counted["lines"]
+        )
+    measured["long"] = {"of the package": long_functions(lengths)}
     return measured | {"files": largest(files), "functions": largest(lengths)}
+
+
+def long_functions(lengths: dict[str, int]) -> int:
+    """Count the package's functions of more than LONG lines."""
+    return sum(name.startswith("smc_mujoco/") and n > LONG for name, n in lengths.items())
 
 
 def largest(sizes: dict[str, int]) -> dict[str, int]:
@@ -111,6 +131,8 @@ def show(measured: dict[str, dict[str, int]], release: str, before: dict) -> Non
     titles = {
         "tokens": "tokens of code",
         "density": "tokens for each 1,000 lines of code",
+        "comprehensions": "comprehensions for each 1,000 lines of code",
+        "long": f"functions of more than {LONG} lines",
         "files": "largest files, tokens",
         "functions": "longest functions, lines",
     }

@@ -14,4 +14,5 @@ def f(x):
     return [y for y in (2,)]
 '''
     assert size.count(text) == {"tokens": 17, "lines": 2}
+    assert size.comprehensions(text) == 1
     assert size.functions(text) == {"f": 3}

@@ -110,28 +110,40 @@ def chattering_parts(y: Array, width: int) -> list[slice]:
     extends to the end of y if that is as close. It extends to the start only if that is within a
     quarter of `width`, because a y that rests there longer does not chatter yet.
     """
+    near = width // 4
+    first, last = reversals(y)
+    seeds = []
+    for part in close_reversals(first, last, near):
+        if len(part) >= MIN_REVERSALS:
+            seeds.append(first[part[0]] + 1)
+    result = []
+    for part in close_reversals(first, last, width):
+        start = first[part[0]] + 1
+        stop = last[part[-1]] + 1
+        if not any(start <= seed <= stop for seed in seeds):
+            continue
+        if start <= near:
+            start = 0
+        if stop >= len(y) - width:
+            stop = len(y)
+        result.append(slice(start, stop))
+    return result
+
+
+def reversals(y: Array) -> tuple[Array, Array]:
+    """Return the indices of the two moves of each reversal of y (K+1,)."""
     step = np.diff(y)
     moving = np.flatnonzero(np.abs(step) > MIN_MOVE * np.abs(y).max())
     turns = np.flatnonzero(np.diff(np.sign(step[moving])))
-    first = moving[turns]
-    last = moving[turns + 1]
+    return moving[turns], moving[turns + 1]
 
-    def sequences(near: int) -> list[Array]:
-        """Return the indices of the reversals in each row of `near`-close ones."""
-        brief = np.flatnonzero(last - first <= near)
-        parts = np.split(brief, np.flatnonzero(first[brief[1:]] - last[brief[:-1]] > near) + 1)
-        return [part for part in parts if len(part)]
 
-    seeds = np.array(
-        [first[part[0]] + 1 for part in sequences(width // 4) if len(part) >= MIN_REVERSALS]
-    )
-    result = []
-    for part in sequences(width):
-        a = first[part[0]] + 1
-        b = last[part[-1]] + 1
-        if ((seeds >= a) & (seeds <= b)).any():
-            result.append(slice(a if a > width // 4 else 0, b if b < len(y) - width else len(y)))
-    return result
+def close_reversals(first: Array, last: Array, near: int) -> list[Array]:
+    """Return the indices of the reversals in each row of `near`-close ones."""
+    brief = np.flatnonzero(last - first <= near)
+    pauses = first[brief[1:]] - last[brief[:-1]]
+    parts = np.split(brief, np.flatnonzero(pauses > near) + 1)
+    return [part for part in parts if len(part)]
 
 
 def smooth(y: Array, width: int) -> Array:
@@ -152,12 +164,11 @@ def smooth(y: Array, width: int) -> Array:
         means = np.pad(triangular_mean(line[part], half), half - 1, "edge")
         for values, mean in ((line[part], means), (line[part][::-1], means[::-1])):  # from each end
             start = values[: 2 * half - 1]
-            if (
-                detrend(start).var() < (1.0 - TREND_SHARE) * start.var()
-            ):  # it moves more than it varies
-                mean[: half - 1] = [
-                    triangular_mean(values[: 2 * k - 1], k)[0] for k in range(1, half)
-                ]
+            moves = detrend(start).var() < (1.0 - TREND_SHARE) * start.var()
+            if not moves:
+                continue
+            for k in range(1, half):
+                mean[k - 1] = triangular_mean(values[: 2 * k - 1], k)[0]
         line[part] = means
     return line
 

@@ -117,7 +117,10 @@ def _joint_gains(names: tuple[str, ...], shared: tuple[str, ...]) -> Callable:
     vector = "carray(pointer(address + 8 * n * {0}), (n,))"
     read = []
     for i, name in enumerate(names or ("unused",)):
-        read.append((vector + "[0]" * (name in shared)).format(i))
+        gain = vector.format(i)
+        if name in shared:
+            gain += "[0]"
+        read.append(gain)
     space = {
         "carray": carray,
         "pointer": pointer,

@@ -781,27 +781,23 @@ class Clock:
         """Raise ScenarioError for a jitter that reaches the next sample, or is shorter than a
         physics step.
         """
-        late = self.jitter >= control_period
-        if late or (
-            self.jitter
-            and not 1 <= self.jitter_steps(physics_step) < round(control_period / physics_step)
-        ):
-            room = round(control_period / physics_step) > 1
-            if room:
-                finer = ""
-            else:
-                finer = (
-                    f"give a physics_step of {control_period / 4.0:g} s, for example, and a jitter "
-                    "of "
-                )
-            raise ScenarioError(
-                f"Clock's jitter is {self.jitter:g} s: {finer or 'give '}at least a physics "
-                f"step{f', {physics_step:g} s' * room}, and less than the control period, "
-                f"{control_period:g} s, and missed=... for samples that do not run"
+        steps = round(control_period / physics_step)
+        shorter = self.jitter < control_period
+        if not self.jitter or (shorter and 1 <= self.jitter_steps(physics_step) < steps):
+            return
+        if steps > 1:
+            cure = f"give at least a physics step, {physics_step:g} s,"
+        else:
+            cure = (
+                f"give a physics_step of {control_period / 4.0:g} s, for example, and a jitter of "
+                "at least a physics step,"
             )
+        raise ScenarioError(
+            f"Clock's jitter is {self.jitter:g} s: {cure} and less than the control period, "
+            f"{control_period:g} s, and missed=... for samples that do not run"
+        )
 
 
-@suggesting
 @frozen_data
 class Sum(Signal):
     """The sum of constants, sines, steps, ramps and moves of minimum jerk."""

@@ -42,9 +42,8 @@ if TYPE_CHECKING:
 Scores = dict[str, float]
 Name = TypeVar("Name")
 Value = TypeVar("Value")
-Substitute = Mapping[
-    str, Callable[[Component], Component]
-]  # law's name -> function from the law to its mutant
+# law's name -> function from the law to its mutant
+Substitute = Mapping[str, Callable[[Component], Component]]
 
 
 class RunResult(NamedTuple):
@@ -87,18 +86,12 @@ class ClaimRuns:
     quick: bool = False  # whether a claim measures less: coarser grids, shorter runs
     substitute: Substitute = dataclasses.field(default_factory=dict)
     threads: int | None = None
-    table: dict[str, RunResult] = dataclasses.field(
-        default_factory=dict
-    )  # key -> run that is not made again
-    shared: dict[str, RunResult] = dataclasses.field(
-        default_factory=dict
-    )  # key -> run, for the ClaimRuns of all sets
-    used: dict[str, Used] = dataclasses.field(
-        default_factory=dict
-    )  # key -> run that the claim has used
-    scored: dict[str, RunResult] = dataclasses.field(
-        default_factory=dict
-    )  # key -> run whose scores any claim has used
+    # by key: runs that are not made again, those for the ClaimRuns of all sets, those that the
+    # claim has used, and those whose scores any claim has used
+    table: dict[str, RunResult] = dataclasses.field(default_factory=dict)
+    shared: dict[str, RunResult] = dataclasses.field(default_factory=dict)
+    used: dict[str, Used] = dataclasses.field(default_factory=dict)
+    scored: dict[str, RunResult] = dataclasses.field(default_factory=dict)
     plants: Names = ()  # names of the claim's plants; below, of its laws and conditions
     laws: Names = ()
     conditions: Names = ("nominal",)

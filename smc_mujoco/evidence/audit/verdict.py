@@ -344,7 +344,9 @@ class Claims(list[Claim]):
                 decided = claim.decided(list(claim.verdicts)[-1])
             else:
                 decided = claim.note
-            words = f"{MARKS[claim.verdict]} {claim.verdict}{', flips' * claim.flips}"
+            words = f"{MARKS[claim.verdict]} {claim.verdict}"
+            if claim.flips:
+                words += ", flips"
             rows.append((claim.id, claim.text, claim.source, html.strong(words), decided))
         heads = ("id", "claim", "whose, read", "verdict", "decided by")
         return html.table(heads, rows, note=summary(self), max_rows=99)

@@ -310,10 +310,10 @@ def _about(
         errors.find(f"gain of {file}", name, stated)
     for name, gain in named.items():
         if isinstance(gain.default, tuple) and len(gain.default) != joints:
-            choice = f", or {joints}" * bool(joints)
-            raise ScenarioError(
-                f"gain {name} of {file} is {gain_text(gain.default)}: give it one number{choice}"
-            )
+            cure = "give it one number"
+            if joints:
+                cure += f", or {joints}"
+            raise ScenarioError(f"gain {name} of {file} is {gain_text(gain.default)}: {cure}")
     for name in filter(None, facts.get("smc_law_shared", "").split(",")):
         gain = errors.find(f"shared gain of {file}", name, named)
         if isinstance(gain.default, tuple):

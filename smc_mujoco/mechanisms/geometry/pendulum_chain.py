@@ -23,12 +23,10 @@ PITCH = 0.22  # m between neighbours: chosen, so that bobs of 0.13 m pass each o
 HEIGHT = 0.8  # m, the shaft above the floor, as for the single pendulum
 HUB = 0.02  # m, half the length of a hub, where a spring's wire ends
 COUPLING = 0.5  # N m/rad: chosen for the paper study
-# pendulums; springs of longer chains are not drawn, for each has a thousand vertices
-MAX_DRAWN = 50
+MAX_DRAWN = 50  # pendulums whose springs are drawn, each of a thousand vertices
 HOOK_ARM = 0.25  # m from pivot to real spring: chosen, half a rod
 
-# m between pivots side by side: chosen, so that hanging bobs of 0.13 m leave a gap of 0.03 m
-ROW_PITCH = 0.16
+ROW_PITCH = 0.16  # m between pivots side by side: chosen, hanging bobs leave a gap of 0.03 m
 BOB_RESTITUTION = 0.95  # of steel balls, chosen: 0.9 to 0.97 in Newton's cradles
 BEAM_Y = (0.085, 0.125)  # m, y of the beam behind the bobs that carries the pivots side by side
 
@@ -192,12 +190,11 @@ def bobs(spec):
     for skin in list(spec.skins):
         spec.delete(skin)
     for i in range(n - 1):
-        for pair in itertools.product(
-            (f"p{i}/bob", f"p{i}/rod"), (f"p{i + 1}/bob", f"p{i + 1}/rod")
-        ):
-            hit(
-                spec, pair, BOB_RESTITUTION, both_move=True
-            )  # beyond 54 degrees bobs pass each other, and meet rods
+        own = f"p{i}/bob", f"p{i}/rod"
+        next_one = f"p{i + 1}/bob", f"p{i + 1}/rod"
+        # beyond 54 degrees bobs pass each other, and meet rods
+        for pair in itertools.product(own, next_one):
+            hit(spec, pair, BOB_RESTITUTION, both_move=True)
         draw_between_rods(spec, i, side * (HOOK_ARM if hooked else 0.10))
 
 
