@@ -172,7 +172,7 @@ def race(
 
 def _expect(shown: Bar, done: int, laws: int) -> None:
     """Set the work done and the whole work of the bar, in sets of gains of laws that go on."""
-    last = next(look for look in (*LOOKS, math.inf) if look > done or look == LOOKS[-1])
+    last = next(look for look in LOOKS if look >= done)
     shown.reached(done * laws, last * laws)
 
 

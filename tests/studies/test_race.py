@@ -94,14 +94,30 @@ def test_laws_have_equal_numbers_of_sets_and_a_clear_lead_ends_the_race_at_the_f
 
 
 def test_a_stuck_search_is_made_once_more_and_the_better_one_is_judged(run):
-    raced = run({"a": 0.0, "b": 0.3}, seed=1)
-    again = [(one, k) for one in raced.entrants.values() for k in one.again]
+    again = 0
+    for seed in range(10):
+        for one in run({"a": 0.0, "b": 0.3}, seed).entrants.values():
+            again += len(one.again)
+            for k, made in enumerate(one.found):
+                tried = [trained for number, trained in one.outcome if number == k]
+                assert len(tried) == 1 + (k in one.again)
+                assert made.best.objective == min(tried)
+                assert one.values[k] == one.outcome[k, min(tried)]
     assert again
-    for one, k in again:
-        tried = [trained for number, trained in one.outcome if number == k]
-        assert len(tried) == 2
-        assert one.found[k].best.objective == min(tried)
-        assert one.values[k] == one.outcome[k, min(tried)]
+
+
+def test_a_race_goes_on_after_the_first_look_only_if_it_may_be_decided(run):
+    """Each look has half of the errors, for as many rivals as there are."""
+    ended = {}
+    for seed in range(30):
+        raced = run({"a": 0.0, "b": 0.4, "c": 0.5}, seed)
+        levels = raced.comparison.error, raced.comparison.limit
+        assert levels == pytest.approx((0.0125, 0.025 / (len(raced.running) - 1)))
+        far = raced.winner is None and module.needed(raced.comparison) > module.WITHIN
+        ended.setdefault(raced.sets, []).append((raced.winner is not None, far))
+    assert [*sorted(ended)] == [7, 12]
+    assert all(won or far for won, far in ended[7])
+    assert any(far for _, far in ended[7])
 
 
 def test_the_clock_ends_a_race_between_two_rounds(run, monkeypatch):
