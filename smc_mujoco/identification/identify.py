@@ -51,7 +51,7 @@ from smc_mujoco.simulation.scenario import Scenario
 POOR_FIT = 80.0  # percent: a fit below may mean that the search ended in a wrong place; chosen
 PERFECT_FIT = 99.99  # percent: residuals beyond it are the simulation's; chosen
 FLOOR = 0.05  # of a value, by which drawn sets differ at least; chosen: friction warms up by more
-PIECE_STEPS = 4  # of the search for the starts of pieces of a log that was not used; chosen
+PIECE_STEPS = 12  # of the search for the starts of pieces of a log that was not used; chosen
 Log = Source | AnyPath  # also a data frame
 Count = Annotated[int, Whole(low=1, high=1000)]
 SLOW = (

@@ -87,8 +87,8 @@ class OwnRig(Rig):
         if rate < SLOWEST:
             raise ScenarioError(
                 f"the record of {self.name} has {rate:.3g} samples a second, and what the motors "
-                f"did between them is not in it: record {SLOWEST:g} or more a second, or fit "
-                "friction alone, to pairs of speed and torque"
+                f"did between them is not in it: record {SLOWEST:g} or more a second, or find "
+                "friction alone from pairs of speed and torque, by smc.identify_friction"
             )
         moved = max(float(np.std(data[name])) for name in self.columns.x)
         if moved <= STILL * records.noise(data, self.columns):

@@ -7,11 +7,15 @@ import dataclasses
 import numpy as np
 import pytest
 from helpers.machine_logs import chain, log, sines
+from typer.testing import CliRunner
 
 import smc_mujoco as smc
+from smc_mujoco.cli.main import app
 from smc_mujoco.identification.first_guess import first_guess
+from smc_mujoco.identification.friction_figure import curve_error, friction
 from smc_mujoco.identification.own_rig import own_rig
 from smc_mujoco.mechanisms.hardware.servos import ServoFriction
+from smc_mujoco.simulation.conditions import from_file
 
 ONE = chain([0.4], [1.0])
 TRUTH = {"j1.damping": 0.3, "j1.frictionloss": 0.4, "j1.armature": 0.02, "input_delay": 0.004}
@@ -83,8 +87,6 @@ def test_numbers_found_are_a_condition_that_files_and_runs_take(found, arm, tmp_
     assert fields["mismatch"]["j1.damping"] == pytest.approx(found.values["j1.damping"])
     assert fields["input_delay"] == pytest.approx(0.004)
     path = found.save(tmp_path / "found.txt")
-    from smc_mujoco.simulation.conditions import from_file
-
     (read,) = from_file(path)
     assert read.on(arm, 1.0) == fields
     law = smc.law("pid", kp=20.0, ki=0.0, kd=1.5)
@@ -273,3 +275,31 @@ def test_expected_errors_are_those_that_a_log_of_the_motion_tells():
     found = smc.identify(arm, run, list(TRUTH))
     for name, error in found.errors.items():
         assert 0.5 < error / motion.errors[name] < 2.0, name
+
+
+def test_the_command_takes_joints_from_a_log_and_writes_a_figure_and_a_condition(run, tmp_path):
+    (tmp_path / "arm.xml").write_text(ONE)
+    rows = np.column_stack([run["t"], run["x"], run["u"]])[:700]
+    np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header="t,x_j1,u_j1", comments="")
+    files = [str(tmp_path / name) for name in ("arm.xml", "run.csv")]
+    options = ["--for", "j1.damping,j1.frictionloss,input_delay", "--held-out", files[1]]
+    written = ["--figure", str(tmp_path / "fit"), "--out", str(tmp_path / "found.txt")]
+    done = CliRunner().invoke(app, ["identify", *files, *options, *written])
+    assert done.exit_code == 0, done.output
+    assert "held out" in done.output
+    assert (tmp_path / "fit.png").stat().st_size > 10_000
+    assert "input_delay=" in (tmp_path / "found.txt").read_text()
+    wrong = CliRunner().invoke(app, ["identify", *files, "--for", "nothing.here"])
+    assert wrong.exit_code == 2
+    assert "choose from grav, input_delay, j1.armature" in " ".join(wrong.output.split())
+
+
+def test_the_friction_s_curve_is_the_model_s_and_its_parts_with_the_errors_of_both(arm):
+    """By hand: (b + B) v + (f + F) sign v, and sqrt((s_b v)^2 + s_f^2)."""
+    machine = smc.Scenario(plant=arm, law="none", friction=smc.Viscous(0.2))
+    rig = own_rig(machine, ["j1.damping", "j1.frictionloss", "friction.b"])
+    rig = rig.with_values({"j1.damping": 0.1, "j1.frictionloss": 0.4, "friction.b": 0.3})
+    v = np.array([-2.0, 0.5])
+    np.testing.assert_allclose(friction(rig, rig.values, 0, v), 0.4 * v + 0.4 * np.sign(v))
+    error = curve_error(rig, np.diag([0.01**2, 0.02**2, 0.0]), 0, v)
+    np.testing.assert_allclose(error, np.hypot(0.01 * v, 0.02), rtol=1e-6)
