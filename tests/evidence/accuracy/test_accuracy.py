@@ -190,7 +190,7 @@ PERIOD = Condition("slow", lambda plant, duration: {"control_period": 0.01})
         {"conditions": PERIOD},
         {"conditions": "nois"},
     ],
-    ids=str,
+    ids="".join,
 )
 def test_what_has_no_order_is_refused(change, refused):
     refused(lambda: smc.accuracy.orders(**{"laws": "classical", "plants": "duffing"} | change))

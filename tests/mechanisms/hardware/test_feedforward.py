@@ -44,14 +44,6 @@ STEADY = [
 ]
 
 
-@pytest.mark.parametrize(("friction", "steady"), STEADY, ids=lambda it: type(it).__name__)
-def test_it_adds_the_force_of_a_steady_speed(joint, friction, steady):
-    trace = run(joint, smc.Feedforward(friction, eps=0.1, error=-0.2), friction=None, duration=0.3)
-    v = 0.9 * np.cos(3.0 * trace.t)
-    expected = [0.8 * math.tanh(one / 0.1) * steady(one) for one in v.tolist()]
-    np.testing.assert_allclose(trace.compensation[:, 0], expected, rtol=1e-9)
-
-
 def test_a_drive_gets_the_u_that_gives_the_force(joint):
     motor = smc.DCMotor()
     feedforward = smc.Feedforward(smc.Coulomb(0.02))
@@ -91,6 +83,22 @@ def test_a_grid_draws_its_error_by_seed(joint):
     assert errors.max() > 0.2
     tuned = smc.tune(joint, PD, budget=1, searches=1, conditions=condition)
     assert tuned.definition.conditions == (condition,)
+
+
+@smc.hardware.friction_function(numbers={"level": 0.3, "drop": 0.2})
+def own(y, p, memory):
+    return p.level + p.drop * math.exp(-abs(y.v) / 0.1)
+
+
+STEADY.append((own(level=0.4), lambda v: 0.4 + 0.2 * math.exp(-v / 0.1)))
+
+
+@pytest.mark.parametrize(("friction", "steady"), STEADY, ids=lambda it: type(it).__name__)
+def test_it_adds_the_force_of_a_steady_speed(joint, friction, steady):
+    trace = run(joint, smc.Feedforward(friction, eps=0.1, error=-0.2), friction=None, duration=0.3)
+    v = 0.9 * np.cos(3.0 * trace.t)
+    expected = [0.8 * math.tanh(one / 0.1) * steady(one) for one in v.tolist()]
+    np.testing.assert_allclose(trace.compensation[:, 0], expected, rtol=1e-9)
 
 
 @smc.hardware.friction_function(numbers={"level": 0.3}, memory=1)
