@@ -179,10 +179,11 @@ class RaceAdvice(Advice):
         rare = {name: pair for name, pair in found.items() if pair[0] < RELIABLE * pair[1]}
         runs = next(iter(found.values()))[1]
         if rare:
-            parts = [f"{done} of {of} under {name}" for name, (done, of) in rare.items()]
-            return f"not reliably: in {joined(parts)} runs"
+            parts = [f"{done} of {of} runs under {name}" for name, (done, of) in rare.items()]
+            return f"not reliably: in {joined(parts)}"
         least = min(done for done, _ in found.values())
-        return f"in at least {least} of {runs} unseen runs in {_each(len(found))}"
+        share = f"all {runs}" if least == runs else f"at least {least} of {runs}"
+        return f"in {share} unseen runs in {_each(len(found))}"
 
     @property
     def _margins(self) -> str:

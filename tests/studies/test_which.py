@@ -1,6 +1,7 @@
 """Which law: the order follows from the runs, and the last line says where they cannot decide."""
 
 import dataclasses
+import json
 import math
 import re
 from pathlib import Path
@@ -197,12 +198,18 @@ def test_a_law_that_does_not_settle_is_not_advised_without_saying_where(raced):
     )
     lines = dict(line.split(": ", 1) for line in rare.answer)
     assert lines["Use"] == f"{name}, which does not settle reliably in every condition"
-    assert lines["Settles"] == "not reliably: in 2 of 4 under coulomb runs"
+    assert lines["Settles"] == "not reliably: in 2 of 4 runs under coulomb"
 
 
 def test_the_page_has_the_numbers_of_the_code():
     page = (Path(__file__).parents[2] / "docs" / "which.md").read_text()
+    file = Path(__file__).parents[2] / "benchmarks" / "quick_searches.json"
+    found = json.loads(file.read_text())
+    medians = [row["median"] for row in found]
+    assert 0.2 < np.median([row["time"] for row in found]) < 0.3
     for words in (
+        f"had {min(medians):.2f} to {max(medians):.2f} times the J of whole searches, the worst "
+        f"{max(row['worst'] for row in found):.2f} times",
         f"`--quick` is `--minutes {module.QUICK_MINUTES:g}`",
         f"in how many of {module.RACE_SEEDS} more runs",
         f"fewer than {100 * advice_module.RELIABLE:g} %",
