@@ -6,7 +6,8 @@ sentence.
     python tests/attack.py files --seed 7 --start 1234 --cases 1      # one case, as it prints it
 
 Parts: `scenarios` (wild fields, run to a trace that is sound), `batches` (several together, the
-same bits as alone), `files` (damaged ones), `calls` (of functions with odd arguments), `commands`.
+same bits as alone), `interrupts` (Ctrl-C, after which nothing is lost), `files` (damaged ones),
+`calls` (of functions with odd arguments), `commands`.
 Found is: an exception that is not ours, a sentence that is none, a trace with a number that was not
 computed, a crash, and a case that takes longer than LIMIT. Every case is made of its part, the seed
 and its number alone. Exit code 1 where something was found.
@@ -14,6 +15,7 @@ and its number alone. Exit code 1 where something was found.
 
 import argparse
 import concurrent.futures
+import contextlib
 import dataclasses
 import faulthandler
 import functools
@@ -23,6 +25,7 @@ import os
 import random
 import re
 import select
+import signal
 import subprocess
 import sys
 import tempfile
@@ -50,7 +53,14 @@ SLICE = 10_000  # cases a process at most; each process compiles its laws again,
 MOST = 400  # physics steps times channels of a run that is played
 SCRIPT = __file__  # what a child runs
 # 10 minutes on two cores
-CASES = {"scenarios": 40_000, "batches": 2_000, "files": 8_000, "calls": 5_000, "commands": 5_000}
+CASES = {
+    "scenarios": 40_000,
+    "batches": 2_000,
+    "interrupts": 200,
+    "files": 8_000,
+    "calls": 5_000,
+    "commands": 5_000,
+}
 
 
 class Found(AssertionError):
@@ -202,6 +212,83 @@ def batches(random: Random) -> str:
     return "ran"
 
 
+# interrupts
+
+KEPT = {  # what keeps its pieces in a folder -> its call, and what it gives in a word
+    "study": lambda folder: (
+        smc.study(
+            smc.grid("duffing", ["classical", "pid"], ["nominal", "dc_motor"], 4, duration=1.0),
+            folder,
+        ).data
+    ),
+    "tune": lambda folder: (
+        smc.tune(
+            "duffing", "pid", budget=1, objective=Objective(duration=0.2), searches=4, folder=folder
+        ).sets
+    ),
+}
+
+
+@functools.cache
+def undisturbed(kind: str) -> tuple[Any, float]:
+    """What a call gives that nobody stops, and how long it takes when all is compiled, s."""
+    for folder in ("compiling", "undisturbed"):
+        begun = time.monotonic()
+        found = KEPT[kind](Path(folder, kind))
+    return found, time.monotonic() - begun
+
+
+def pressed(random: Random, call: Callable[[], Any], longest: float) -> Any:
+    """What a call gives that is stopped one to three times, after at most so many seconds; None
+    where it does not come to its end.
+    """
+    left = random.randint(1, 3)
+
+    def press(number: int, frame: Any) -> None:
+        nonlocal left
+        left -= 1
+        if left <= 0:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, press)
+    found = None
+    with contextlib.suppress(KeyboardInterrupt):  # the second may come while the first is caught
+        try:
+            signal.setitimer(signal.ITIMER_REAL, random.uniform(1e-3, longest), 0.05)
+            found = call()
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+    signal.signal(signal.SIGALRM, before)
+    return found
+
+
+def interrupts(random: Random) -> str:
+    """A call that Ctrl-C stops, again and again, until it comes to its end in the same folder: what
+    was kept is there, is not made again, and the end is that of a call that nobody stopped.
+    """
+    kind = random.choice(sorted(KEPT))
+    whole, seconds = undisturbed(kind)
+    found = None
+    kept: dict[Path, int] = {}
+    stops = 0
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        while found is None:
+            found = pressed(random, lambda: KEPT[kind](folder), seconds)
+            stops += found is None
+            files = [path for path in folder.rglob("*") if path.is_file()]
+            if odd := [path.name for path in files if path.name.startswith(".")]:
+                raise Found(f"{kind} leaves {odd}")
+            now = {path: path.stat().st_mtime_ns for path in files if path.stem != "results"}
+            if not kept.items() <= now.items():
+                raise Found(f"{kind} loses what was kept, or makes it again")
+            kept = now
+    if found != whole:
+        raise Found(f"{kind} ends with something else after {stops} stops")
+    return "stopped" if stops else "ran"
+
+
 # files
 
 
@@ -347,6 +434,7 @@ def files(random: Random) -> str:
 PARTS: dict[str, Callable[[Random], str]] = {
     "scenarios": scenarios,
     "batches": batches,
+    "interrupts": interrupts,
     "files": files,
     "calls": functools.partial(odd_calls.calls, sentence=sentence),
     "commands": functools.partial(odd_calls.commands, sentence=sentence),

@@ -3,6 +3,7 @@ thousand.
 """
 
 import re
+import signal
 from random import Random
 
 import attack
@@ -27,6 +28,15 @@ def test_wild_scenarios_are_refused_or_run_to_sound_traces(part, cases, tmp_path
     ended = [attack.case(part, 0, i) for i in range(cases)]
     assert [why for _, why in ended if why] == []
     assert sum(how != "refused" for how, _ in ended) > cases / 20
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers")
+def test_what_was_kept_is_there_and_used_after_ctrl_c(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ended = [attack.case("interrupts", 0, i) for i in range(6)]
+    assert [why for _, why in ended if why] == []
+    assert "stopped" in {how for how, _ in ended}
 
 
 def test_wild_files_end_well_or_in_a_sentence(tmp_path, monkeypatch):

@@ -30,7 +30,10 @@ REFUSED = {
     "delay below a step": (lambda: case(input_delay=1e-9), "input_delay 1e-09"),
     "sum of a number": (lambda: smc.signals.Sum(np.inf), "Sum is inf"),
     "report": (lambda: smc.margins("duffing", "pid", report=()), r"report is \(\)"),
-    "no traces": (lambda: step_halving(5), "traces is 5"),
+    "no traces": (lambda: step_halving(5), "traces is 5"),  # pyright: ignore[reportArgumentType]
+    "one that is none": (lambda: step_halving([5]), "traces has 5"),  # pyright: ignore
+    "bound masked": (lambda: case(u_max=MASKED), "u_max is None"),
+    "one weight": (lambda: smc.design.lqr("duffing", q=1), "q is 1"),  # pyright: ignore
     "film of a name": (lambda: smc.film("duffing", "a.mp4"), "'duffing', no trace"),
     "numbers": (
         lambda: smc.hardware.friction_function(numbers=np.zeros(2))(lambda y, p, m: 0.0),

@@ -59,9 +59,10 @@ def lqr(
         without a command.
     """
     plant = as_plant(plant)
+    q = items_of("q", q)
     if not plant.free:
         return nominal_gains.lqr(plant, (q[0], q[1]) if len(q) == 2 else q, r)  # pyright: ignore[reportArgumentType] refused there
-    weights = [number("q", weight, low=0.0) for weight in items_of("q", q)]
+    weights = [number("q", weight, low=0.0) for weight in q]
     if len(weights) not in (2, 2 * plant.n):
         raise ScenarioError(f"q is {shown(q)}: give two weights, or {2 * plant.n}")
     number("r", r, above=0.0)

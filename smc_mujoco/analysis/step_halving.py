@@ -19,7 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from smc_mujoco.analysis.differ import MAX_CHANGE, relative_range
-from smc_mujoco.common.errors import ScenarioError, items_of
+from smc_mujoco.common.errors import ScenarioError, items_of, shown
 from smc_mujoco.common.text import number
 from smc_mujoco.metrics.conventions import last_part
 from smc_mujoco.metrics.limit_cycle import channel_cycle, largest_cycle
@@ -142,6 +142,9 @@ def step_halving(
       A list of `StepChange`, one for each trace, which prints as a table.
     """
     traces = items_of("traces", traces)
+    for trace in traces:
+        if not isinstance(trace, Trace):
+            raise ScenarioError(f"traces has {shown(trace)}: give what smc.run returns")
     scenarios = [repetitions(trace) for trace in traces]
     again = iter(run(list(itertools.chain(*scenarios)), threads=threads))
     changes = []

@@ -164,10 +164,10 @@ def one_per_channel(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
 
 def bound(name: str, value: float | ByChannel[float] | None, s: Any) -> float | Floats | None:
     """Return the bound on |u| of all channels, or of each driven one if they differ."""
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
     if value is None:
         return None
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
     items: list[Any] = [value]
     if isinstance(value, Mapping | list | tuple):
         items = one_per_channel(name, value, s.plant)
