@@ -113,7 +113,7 @@ class Scenario:
       integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation,
         also behind a Lag, a RateLimit or a DCMotor, with `exact_friction`, and for your own model;
         else implicitfast, as with LuGre, a Backlash, or poles of your model that make RK4 unstable.
-      friction: in addition to the plant's own: Viscous, Coulomb, LuGre, Sigmoid, or several of
+      friction: in addition to the plant's own: Viscous, Coulomb, Stribeck, LuGre, or several of
         them, on the joints that an actuator drives, with their numbers in the unit of each. By
         name, {"slide": Coulomb(0.1), "hinge": Viscous(1e-4)}, any joint has its own, and "*" is all
         of them.

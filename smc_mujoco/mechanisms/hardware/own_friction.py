@@ -137,7 +137,7 @@ def _with_bounds(found, v, resting):
     """Return F, low and high of what a user's function returned at the speed v, and at rest."""
     if isinstance(found, tuple):
         return found
-    return resisting(found, v), -abs(resting), abs(resting)
+    return resisting(found, v), -resting, resting
 
 
 @overload(_force)
@@ -151,7 +151,7 @@ def _force_of(found, v):
 def _bounds_of(found, v, resting):
     if isinstance(found, types.BaseTuple):
         return lambda found, v, resting: found
-    return lambda found, v, resting: (resisting(found, v), -abs(resting), abs(resting))
+    return lambda found, v, resting: (resisting(found, v), -resting, resting)
 
 
 def returns_bounds(function: Callable, numbers: Mapping[str, float], memory: int) -> bool:

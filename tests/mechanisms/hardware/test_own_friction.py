@@ -112,6 +112,18 @@ def test_a_smooth_force_against_the_motion_is_its_level():
     np.testing.assert_allclose(trace.v[:, 0], np.exp(-0.4 * trace.t), rtol=1e-10)
 
 
+@friction_function(numbers={"cold": 0.4, "warm": 0.1, "after": 1.0})
+def gearbox(y, p, memory):
+    return p.warm if y.t >= p.after else p.cold
+
+
+def test_a_level_may_fall_in_mid_run():
+    trace = cart(friction=gearbox(), feedforward=smc.Constant(0.3), duration=2.0)
+    free = np.maximum(trace.t - 1.0, 0.0)
+    np.testing.assert_allclose(trace.x[:, 0], 0.5 * 0.2 * free**2, atol=3e-4)
+    assert np.abs(trace.x[:1000]).max() < 1e-12
+
+
 def test_a_memory_moves_once_a_step():
     trace = cart(friction=warming(), v0=2.0, duration=1.0)
     expected = -0.4 * np.exp(-trace.t[:-1])
