@@ -28,9 +28,9 @@ The names by task, those of a first script first; `help(smc.run)` tells what a n
 
 What is needed less often is in modules: `smc.signals` (pushes, paths, gusts, series),
 `smc.hardware` (more friction, servos), `smc.design` (gains from theory, chattering, regions of
-attraction), `smc.accuracy` (orders, half steps), `smc.metrics` (of joints and tips),
-`smc.exchange` (laws from and to C and FMUs), `smc.envs` (environments for agents), `smc.errors`
-(warnings) and `smc.paper`.
+attraction, what to record), `smc.accuracy` (orders, half steps), `smc.metrics` (of joints and
+tips), `smc.exchange` (laws from and to C and FMUs), `smc.envs` (environments for agents),
+`smc.errors` (warnings) and `smc.paper`.
 
 `__init__.pyi` has the modules of the names. A name is loaded when it is first used, so that
 importing the package costs nothing. Types that are only returned are in their modules, such as

@@ -218,8 +218,10 @@ def _bounds(plant: Plant, u_max: float | None) -> Array:
 def _ways(plant: Plant, amplitude: float | Sequence[float] | None) -> Array:
     """Return the largest way of each driven joint to each side of its goal, (driven,)."""
     if amplitude is not None:
-        given = items_of("amplitude", amplitude) if np.ndim(amplitude) else [amplitude]
-        ways = np.array([number("amplitude", way, above=0.0) for way in given])
+        given: Any = [amplitude] if np.ndim(amplitude) == 0 else amplitude
+        ways = np.array(
+            [number("amplitude", way, above=0.0) for way in items_of("amplitude", given)]
+        )
         if len(ways) not in (1, plant.driven):
             raise ScenarioError(f"amplitude has {len(ways)} values: give one, or {plant.driven}")
         return np.broadcast_to(ways, (plant.driven,)).copy()

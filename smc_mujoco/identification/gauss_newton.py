@@ -75,7 +75,7 @@ def by_halving(replays: Replays, slopes: Slopes) -> Array:
     point = slopes.point
     if not replays.free.size:
         return np.zeros(len(replays.names))  # records of simulated runs have the same steps
-    plain = replays.rig(point).repeated(replays.pieces[0].part)
+    plain = replays.rig(point).repeated(replays._part(0))
     steps, replays.steps = replays.steps, {"physics_step": plain.resolved.physics_step / 2.0}
     (residuals,) = replays.residuals([point])
     replays.steps = steps

@@ -26,7 +26,7 @@ from smc_mujoco.identification.rig import Quantity
 from smc_mujoco.mechanisms.custom.joint_numbers import joint_numbers, with_joint_numbers
 from smc_mujoco.mechanisms.hardware.joint_force import of_joint
 from smc_mujoco.mechanisms.hardware.moments import JointState
-from smc_mujoco.mechanisms.hardware.part import Friction, Part
+from smc_mujoco.mechanisms.hardware.part import Friction
 from smc_mujoco.mechanisms.layout import channel_names, driven_names
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.scenario import Scenario
@@ -195,7 +195,7 @@ def _of_part(base: Scenario, path: str) -> tuple[PartNumber, Quantity]:
     return place, Quantity(float(value), "", "the scenario", least, most)
 
 
-def _joints_of(part: Part, plant: Plant) -> list[str]:
+def _joints_of(part: Any, plant: Plant) -> list[str]:
     """Return the joints that a part of a scenario acts on."""
     names = channel_names(plant)
     if hasattr(part, "channels"):

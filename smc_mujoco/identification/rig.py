@@ -15,7 +15,7 @@ import functools
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -151,7 +151,7 @@ class Rig:
         """Quantity -> its value."""
         return {name: quantity.value for name, quantity in self.quantities.items()}
 
-    def with_values(self, values: Numbers, source: str = "given") -> "Rig":
+    def with_values(self, values: Numbers, source: str = "given") -> Self:
         """Return the rig with other values of some quantities, SI units, from a source."""
         changed = dict(self.quantities)
         for name, value in frozen(values).items():

@@ -263,6 +263,33 @@ def test_slow_residuals_widen_standard_errors_where_the_blocks_of_the_jackknife_
         assert (np.sqrt(np.mean(np.square(blocks))) > 2.0) == (memory > 0.0)
 
 
+def test_groups_that_agree_scatter_as_white_noise_and_one_that_does_not_widens_the_errors():
+    """Of 200 slopes of a line; the last of three groups has most of the information. The root mean
+    square is then that of least squares, within four of its own errors.
+    """
+    random = np.random.default_rng(5)
+    J = np.concatenate([np.full(50, 1.0), np.full(50, 1.0), np.full(50, 4.0)])[:, None]
+    exact = 1.0 / np.linalg.norm(J)
+    found = []
+    for _ in range(200):
+        found.append(_scatter(J, random.normal(size=150)))
+    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(exact, rel=0.25)
+    odd = random.normal(size=150)
+    odd[:50] += 5.0
+    assert _scatter(J, odd) > 3.0 * exact
+    one = Slopes(Point(np.zeros(1), np.zeros((1, 0))), [odd], [J], [np.zeros((150, 0))], 1, 1)
+    assert standard_errors.between(one, [0]).tolist() == [0.0]
+
+
+def _scatter(J, noise):
+    """Deviation of the slope of a line by the scatter between three groups."""
+    left = noise - J @ np.linalg.lstsq(J, noise, rcond=None)[0]
+    pieces = np.split(left, 3)
+    none = [np.zeros((50, 0))] * 3
+    slopes = Slopes(Point(np.zeros(1), np.zeros((3, 0))), pieces, np.split(J, 3), none, 1, 1)
+    return standard_errors.between(slopes, [0, 1, 2])[0]
+
+
 @pytest.mark.parametrize(
     ("value", "least", "most", "scale"),
     [
