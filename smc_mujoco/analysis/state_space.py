@@ -1,5 +1,6 @@
 """The linear model of a mechanism: A and B of its rates, from MuJoCo."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import mujoco
@@ -72,30 +73,25 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     names = channel_names(plant)
     if plant.pose:
         labels = names
-    else:
-        labels = []
-        for i in order[: model.nv]:
-            labels.append(model.joint(int(model.dof_jntid[i])).name)
-    states = []
-    for kind in ("x", "v"):
-        for name in labels:
-            states.append(f"{kind}[{name}]")
-    if plant.pose:
         drives = [model.actuator(i).name for i in driven]
     else:
+        labels = [model.joint(int(model.dof_jntid[i])).name for i in order[: model.nv]]
         drives = names[: plant.driven]
-    inputs = [f"u[{name}]" for name in drives]
-    outputs = [f"x[{name}]" for name in names]
     return StateSpace(
         a,
         b,
         np.eye(plant.n, n),
         0.0,
-        states=states,
-        inputs=inputs,
-        outputs=outputs,
+        states=[*_of("x", labels), *_of("v", labels)],
+        inputs=_of("u", drives),
+        outputs=_of("x", names),
         name=plant.name,
     )
+
+
+def _of(kind: str, names: Sequence[str]) -> list[str]:
+    """Return the names of signals of one kind, such as x[hinge]."""
+    return [f"{kind}[{name}]" for name in names]
 
 
 def _hold(model: mujoco.MjModel, data: mujoco.MjData, driven: Array, name: str) -> None:

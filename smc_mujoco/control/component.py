@@ -495,6 +495,40 @@ def decorated(
     return decorate(function)
 
 
+def _check_names(given: Mapping[str, Any]) -> None:
+    """Refuse an option that is not several names."""
+    for option, names in given.items():
+        if isinstance(names, str) or not isinstance(names, Iterable):
+            raise ScenarioError(
+                f"{option} is {shown(names)}: give several names, such as ('a', 'b')"
+            )
+
+
+def _check_conditions(given: Mapping[str, Any]) -> None:
+    """Refuse an option that is not functions of the gains by their words."""
+    for option, tests in given.items():
+        if not isinstance(tests, Mapping | None) or not all(map(callable, (tests or {}).values())):
+            raise ScenarioError(
+                f"{option} is {shown(tests)}: give functions of the gains by their words, such as "
+                "{'a < b': lambda g: g.a < g.b}"
+            )
+
+
+def _check_options(options: dict[str, Any]) -> None:
+    """Refuse an accuracy, a colour or a finite time that is none."""
+    for option, keys in OPTION_KEYS.items():
+        value = options.get(option, {})
+        if not isinstance(value, Mapping) or not value.keys() <= {*keys}:
+            names = " and ".join(map(repr, keys))
+            raise ScenarioError(
+                f"{option} is {shown(value)}: give numbers, or functions of the gains, for {names}"
+            )
+    if not re.fullmatch("(#[0-9a-fA-F]{6})?", str(options.get("colour", ""))):
+        raise ScenarioError(f"colour is {shown(options['colour'])}: give one like '#0072B2'")
+    if str(options.get("finite_time", "")) not in FINITE_TIME:
+        raise ScenarioError(f"finite_time is {shown(options['finite_time'])}: give 's', 'e' or ''")
+
+
 @constrained
 def template_decorator(
     kind: str,
@@ -510,34 +544,12 @@ def template_decorator(
 ) -> Callable[[Callable], Template]:
     """Return a decorator that turns a function into a Template."""
     checked = as_gains(gains)
-    for option, names in {
-        "plants": plants,
-        "positive": positive,
-        "nonnegative": nonnegative,
-    }.items():
-        if isinstance(names, str) or not isinstance(names, Iterable):
-            raise ScenarioError(
-                f"{option} is {shown(names)}: give several names, such as ('a', 'b')"
-            )
-    for option, tests in {"conditions": conditions, "advice": advice}.items():
-        if not isinstance(tests, Mapping | None) or not all(map(callable, (tests or {}).values())):
-            raise ScenarioError(
-                f"{option} is {shown(tests)}: give functions of the gains by their words, such as "
-                "{'a < b': lambda g: g.a < g.b}"
-            )
+    _check_names({"plants": plants, "positive": positive, "nonnegative": nonnegative})
+    _check_conditions({"conditions": conditions, "advice": advice})
     order = options.get("accuracy")
     if isinstance(order, int | float) or callable(order):
         options["accuracy"] = {"s": order, "e": order}
-    for option, keys in OPTION_KEYS.items():
-        if not isinstance(value := options.get(option, {}), Mapping) or not value.keys() <= {*keys}:
-            names = " and ".join(map(repr, keys))
-            raise ScenarioError(
-                f"{option} is {shown(value)}: give numbers, or functions of the gains, for {names}"
-            )
-    if not re.fullmatch("(#[0-9a-fA-F]{6})?", str(options.get("colour", ""))):
-        raise ScenarioError(f"colour is {shown(options['colour'])}: give one like '#0072B2'")
-    if str(options.get("finite_time", "")) not in FINITE_TIME:
-        raise ScenarioError(f"finite_time is {shown(options['finite_time'])}: give 's', 'e' or ''")
+    _check_options(options)
     for name in positive:
         gain = find("gain that is positive", name, checked)
         checked[name] = dataclasses.replace(gain, positive=True)

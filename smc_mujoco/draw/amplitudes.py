@@ -50,6 +50,16 @@ def crossover(lags: Sequence[float], one: Sequence[float], other: Sequence[float
     return math.nan
 
 
+def mark_crossover(ax: Axes, equal: float) -> None:
+    """Draw a line at the lag, ms, at which two laws chatter equally; none at NaN."""
+    if math.isnan(equal):
+        return
+    ax.axvline(equal, color=style.RULE, lw=style.points(1.0), ls=(0, (4, 3)))
+    words = f"equal at {style.short(equal)} ms"
+    place = (equal, 0.0), (-4, 4), ("data", "axes fraction"), "offset points"
+    ax.annotate(words, *place, ha="right", va="bottom")
+
+
 def amplitudes(
     traces: Mapping[str, Mapping[str, Trace]],
     path: AnyPath | None = None,
@@ -101,12 +111,7 @@ def amplitudes(
             handles.append(pages.entry(words, colour))
         if len(predicted) == 2:
             (lags, one), (_, other) = predicted
-            equal = crossover(lags, one, other)
-            if not math.isnan(equal):
-                ax.axvline(equal, color=style.RULE, lw=style.points(1.0), ls=(0, (4, 3)))
-                words = f"equal at {style.short(equal)} ms"
-                place = (equal, 0.0), (-4, 4), ("data", "axes fraction"), "offset points"
-                ax.annotate(words, *place, ha="right", va="bottom")
+            mark_crossover(ax, crossover(lags, one, other))
         dot = {"marker": "o", "lw": 0.0}
         handles.append(pages.entry("predicted", lw=style.points(1.5)))
         handles.append(pages.entry("run", **dot))

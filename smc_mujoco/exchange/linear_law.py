@@ -14,7 +14,7 @@ which is compiled and exported like any other law.
 import contextlib
 import dataclasses
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -173,18 +173,7 @@ def law_from_control(
     system = _checked(_system(K))
     states = len(system.a)
     count = system.b.shape[1]
-    if inputs is None:
-        names = DEFAULT_INPUTS[:count]
-    elif isinstance(inputs, str):
-        names = (inputs,)
-    else:
-        names = tuple(inputs)
-    for input_name in names:
-        errors.find("input of a controller", input_name, INPUTS)
-    if len(names) != count:
-        raise ScenarioError(
-            f"K has {count} inputs, and {len(names)} are named: give inputs=, such as ['r', 'x']"
-        )
+    names = _names(inputs, count)
     a = system.a
     b = system.b
     c = system.c
@@ -211,6 +200,23 @@ def law_from_control(
         continuous=True,
     )
     return decorate(function)()
+
+
+def _names(inputs: str | Iterable[str] | None, count: int) -> tuple[str, ...]:
+    """Return the names of a controller's inputs."""
+    if inputs is None:
+        names = DEFAULT_INPUTS[:count]
+    elif isinstance(inputs, str):
+        names = (inputs,)
+    else:
+        names = tuple(inputs)
+    for name in names:
+        errors.find("input of a controller", name, INPUTS)
+    if len(names) != count:
+        raise ScenarioError(
+            f"K has {count} inputs, and {len(names)} are named: give inputs=, such as ['r', 'x']"
+        )
+    return names
 
 
 def _of_all_channels(K: Any) -> Array | None:

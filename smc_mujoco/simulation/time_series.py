@@ -287,6 +287,29 @@ def _number(cell: str) -> float | None:
         return None
 
 
+def _places(points: Sequence[Sequence[float]]) -> Array:
+    """Return points in space, (N, 3), m."""
+    try:
+        array = np.asarray(points, float)
+    except (TypeError, ValueError, OverflowError):  # no numbers, or rows of unequal lengths
+        array = np.asarray(math.nan)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ScenarioError(
+            f"points are {shown(points)}: give positions (x, y, z) in m, one a time"
+        )
+    return array
+
+
+def _knots(first: float, last: float) -> Array:
+    """Return the times at which inverse kinematics computes the joints, s."""
+    steps = (last - first) / KNOT_SPACING
+    if steps > MAX_KNOTS:
+        raise ScenarioError(
+            f"times span {last - first:g} s: give a path of {MAX_KNOTS * KNOT_SPACING:g} s at most"
+        )
+    return np.linspace(first, last, max(2, int(np.ceil(steps - 1e-9)) + 1))
+
+
 def cartesian_path(
     plant: Plant | str,
     times: Sequence[float],
@@ -329,24 +352,12 @@ def cartesian_path(
         raise ScenarioError(
             f"site is {shown(site)} and body is {shown(body)}: give the name of one of them"
         )
-    try:
-        array = np.asarray(points, float)
-    except (TypeError, ValueError, OverflowError):  # no numbers, or rows of unequal lengths
-        array = np.asarray(math.nan)
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise ScenarioError(
-            f"points are {shown(points)}: give positions (x, y, z) in m, one a time"
-        )
+    array = _places(points)
     path = [Waypoints(times, array[:, i].tolist()) for i in range(3)]
-    first = path[0].times[0]
-    last = path[0].times[-1]
-    steps = (last - first) / KNOT_SPACING
-    if steps > MAX_KNOTS:
-        raise ScenarioError(
-            f"times span {last - first:g} s: give a path of {MAX_KNOTS * KNOT_SPACING:g} s at most"
-        )
-    knots = np.linspace(first, last, max(2, int(np.ceil(steps - 1e-9)) + 1))
-    positions = np.array([[Waypoints.value(t, None, axis.data)[0] for axis in path] for t in knots])
+    knots = _knots(path[0].times[0], path[0].times[-1])
+    positions = []
+    for t in knots:
+        positions.append([Waypoints.value(t, None, axis.data)[0] for axis in path])
     if x0 is None:
         start = plant.x0
     else:
@@ -359,5 +370,5 @@ def cartesian_path(
     else:
         kind = "body"
         name = body
-    joints = solve(plant, kind, str(name), positions, start)
+    joints = solve(plant, kind, str(name), np.array(positions), start)
     return [Waypoints(knots.tolist(), joints[:, i].tolist()) for i in range(plant.n)]

@@ -168,19 +168,9 @@ def orders(
     setups = []
     for plant in listed("plants", plants):
         for condition in listed("conditions", conditions):
-            setups.extend(
-                _setup(
-                    as_plant(plant),
-                    find_condition(condition),
-                    law,
-                    descending,
-                    numbers,
-                    gains,
-                    duration,
-                    starts,
-                )
-                for law in listed_laws(laws)
-            )
+            at = as_plant(plant), find_condition(condition)
+            for law in listed_laws(laws):
+                setups.append(_setup(*at, law, descending, numbers, gains, duration, starts))
     scenarios = []
     for setup in setups:
         scenarios += setup.scenarios
@@ -194,6 +184,11 @@ def orders(
         last = first + len(setup.scenarios)
         rows.append(_row(setup, [runs[k] for k in range(first, last)]))
         first = last
+    return _ordered(rows)
+
+
+def _ordered(rows: AccuracyTable) -> AccuracyTable:
+    """Return the rows of each plant and condition from the most accurate law on."""
     ordered = AccuracyTable()
     for group in rows.groups.values():
         ordered += sorted(group, key=lambda row: row.place)

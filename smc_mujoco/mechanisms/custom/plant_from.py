@@ -21,7 +21,7 @@ import dataclasses
 import math
 import os
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -140,20 +140,27 @@ def plant_from(
             "the middle of it: give a keyframe or a reference for another one"
         )
     seen = [*joints_of(pairs), *(measured or ())]
+    doubts += _doubts_of_others(source.label, spec, model, seen, others)
+    for doubt in doubts:
+        warnings.warn(doubt, ScenarioWarning, users_stacklevel())
+    return made
+
+
+def _doubts_of_others(
+    label: str, spec: mujoco.MjSpec, model: mujoco.MjModel, seen: list[str], others: str | None
+) -> Iterator[str]:
+    """Yield a sentence on what moves, or is left out, beside the joints that are `seen`."""
     if others is None and (names := limp(spec, seen)):
-        doubts.append(
-            f"joints of {source.label} have motors that nothing commands, "
+        yield (
+            f"joints of {label} have motors that nothing commands, "
             f"{joined(map(repr, names))}: give others='held' (+held after the joints in a text), "
             "'locked', or 'file' if they should move freely"
         )
     if others == "locked" and np.any(ties(model, seen)[1]):
-        doubts.append(
-            f"equality constraints of {source.label} tie its channels to what is locked, and are "
+        yield (
+            f"equality constraints of {label} tie its channels to what is locked, and are "
             "left out: give others='held' to keep them"
         )
-    for doubt in doubts:
-        warnings.warn(doubt, ScenarioWarning, users_stacklevel())
-    return made
 
 
 def _overlaps(label: str, made: Plant, of_urdf: bool) -> list[str]:
