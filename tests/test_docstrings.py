@@ -47,8 +47,7 @@ def example(function) -> str:
 
 
 PUBLIC = functions()
-for changing in ("smc.identify", "smc.which"):
-    del PUBLIC[changing]
+del PUBLIC["smc.which"]
 
 
 @pytest.mark.parametrize("name", PUBLIC)

@@ -160,7 +160,7 @@ def excitation(
 ) -> Excitation:
     """Recommend a motion to record, from which numbers of a machine can be told apart.
 
-        print(smc.design.excitation("arm.xml:shoulder", ["shoulder.damping"], u_max=5.0))
+        print(smc.design.excitation("arm.xml:elbow", ["elbow.damping"], u_max=5.0, duration=2.0))
 
     Args:
       machine, names: as of `smc.identify`.

@@ -261,6 +261,12 @@ def identify(
 ) -> Identified:
     """Find numbers of a machine from logs: friction, armature, delay, masses and more.
 
+        arm = smc.plant_from("arm.xml", ["elbow"])
+        push = smc.Sine(1.5, 4.0)
+        true = {"plant": arm, "mismatch": {"elbow.damping": 0.2}}
+        run = smc.run(smc.Scenario(**true, law="none", feedforward=push, duration=2.0))
+        print(smc.identify(arm, run, ["elbow.damping"]))
+
     Args:
       machine: your own machine as a plant, or as a scenario whose parts have numbers to find, such
         as a friction; or the name of either's plant, as "arm.xml:shoulder+elbow". Or a rig or its
@@ -280,6 +286,11 @@ def identify(
       seed: of these starts. The same seed gives the same result.
       most: largest number of steps of the search.
       progress: whether to show a progress bar.
+
+    Returns:
+      An Identified, which prints as a table: `values` and `errors` by name in SI units, `notes` on
+      what to doubt, fits, `rig` for runs of the machine, `condition()` for other commands, `drawn`
+      for an ensemble, `figure` and `save`.
 
     Raises:
       ScenarioError: an unknown path, which lists what there is; a log without a column, too slow,
