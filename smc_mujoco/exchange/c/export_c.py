@@ -64,6 +64,11 @@ def law_to_c(
             raise ScenarioError(
                 "a scenario has its own joints: leave joints out, or give its law instead"
             )
+        if law.compensated:
+            raise ScenarioError(
+                "the scenario has a Feedforward, which is not written in C: give its law, and add "
+                "the compensation where you call it"
+            )
         plant, law = law.resolved.plant, law.resolved.law
         joints = plant.n if law.joint else None
     law = writable(law)

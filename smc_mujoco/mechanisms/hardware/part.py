@@ -67,6 +67,11 @@ class Part:
     def __post_init__(self) -> None:
         constrain(self)
 
+    @property
+    def written(self) -> tuple[Any, int]:
+        """The function of every stage that its author wrote, and the numbers that it may index."""
+        return self.stage_force, self.memory
+
     def numbers(self, run: Run) -> list[Sequence[float]]:
         """Return the numbers of each joint, (n, names), or one row for all."""
         del run

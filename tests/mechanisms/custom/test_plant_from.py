@@ -939,7 +939,7 @@ HARM = {  # what the model has, and words of the sentence
     ),
     "tendon": (
         '<tendon><fixed name="lead:elbow"><joint joint="elbow" coef="1"/></fixed></tendon>',
-        "arm.xml has a tendon 'play:elbow', and names that begin with .*, play:, rotor: are smc",
+        "arm.xml has a tendon 'lead:elbow', and names that begin with .*, lead:, .*rotor: are smc",
     ),
 }
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.engine.group import why_not
 from smc_mujoco.hardware import LuGre, ServoFriction, Sigmoid
 
 # a joint that only friction resists
@@ -99,6 +100,13 @@ def test_it_adds_the_force_of_a_steady_speed(joint, friction, steady):
     v = 0.9 * np.cos(3.0 * trace.t)
     expected = [0.8 * math.tanh(one / 0.1) * steady(one) for one in v.tolist()]
     np.testing.assert_allclose(trace.compensation[:, 0], expected, rtol=1e-9)
+
+
+def test_the_fast_engine_asks_what_compensated_and_dry_frictions_index(joint):
+    scenario = smc.Scenario(
+        plant="duffing", law=PD, friction=RUBS, feedforward=smc.Feedforward(RUBS)
+    )
+    assert why_not(scenario, device="cuda") == ""
 
 
 @smc.hardware.friction_function(numbers={"level": 0.3}, memory=1)
