@@ -12,9 +12,11 @@ from helpers import annexes
 import smc_mujoco as smc
 
 ROOMS = annexes.here(["accuracy", "design", "envs", "exchange", "hardware", "metrics", "signals"])
-ARM = """<mujoco><worldbody><body><joint name="elbow" axis="0 1 0"/>
-<geom type="capsule" fromto="0 0 0 0 0 -.4" size=".03" mass="1"/></body></worldbody>
-<actuator><motor joint="elbow" ctrlrange="-10 10"/></actuator></mujoco>"""
+ARM = """<mujoco><worldbody><body><joint name="shoulder" axis="0 1 0" damping=".1"/>
+<geom type="capsule" fromto="0 0 0 0 0 -.4" size=".03" mass="1"/><body pos="0 0 -.4">
+<joint name="elbow" axis="0 1 0" damping=".1"/><geom type="capsule" fromto="0 0 0 0 0 -.3" size=".03" mass=".5"/>
+</body></body></worldbody><actuator><motor joint="shoulder" ctrlrange="-20 20"/>
+<motor joint="elbow" ctrlrange="-10 10"/></actuator></mujoco>"""
 PERSONAL = {  # calls that need a person, a paper of one's own, another package's object or hours
     "smc.audit": "a paper of one's own",
     "smc.claims": "all claims of a paper take minutes",

@@ -298,8 +298,12 @@ def attempting(count: int, estimates: bool = False) -> Callable:
 
 @functools.cache
 def named(names: tuple[str, ...]) -> type:
-    """Return the NamedTuple type with these fields; with one unused field if there are none."""
-    return namedtuple("Parameters", names or ("unused",))
+    """Return the NamedTuple type with these fields; with one unused field if there are none.
+
+    A number whose name is a path, such as "elbow.damping", has a place that compiled code does not
+    name.
+    """
+    return namedtuple("Parameters", names or ("unused",), rename=True)
 
 
 @functools.cache
