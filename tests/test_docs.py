@@ -131,7 +131,7 @@ def test_the_tutorial_s_comparison_prints_what_the_page_shows(tmp_path, monkeypa
 def test_the_tutorial_s_tests_pass_and_tell_a_law_that_is_too_soft(tmp_path):
     for name, text in titled(TUTORIAL).items():
         (tmp_path / name).write_text(text)
-        soft = text.replace('"width": 0.3', '"width": 3.0').replace("my_law", "soft_law")
+        soft = text.replace('"width": Gain(0.3', '"width": Gain(3.0').replace("my_law", "soft_law")
         (tmp_path / name.replace("my_law", "soft_law")).write_text(soft)
     asked = ("test_my_law.py", "test_soft_law.py::test_it_settles", "--smc-out=failed")
     done = python("-m", "pytest", *PLUGIN, *asked, folder=tmp_path, fine=False)

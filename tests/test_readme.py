@@ -96,7 +96,6 @@ def named(value: object) -> str:
     return str(value)[:40]
 
 
-@pytest.mark.filterwarnings("ignore:gains .* have no unit")  # the tutorial's law has none
 @pytest.mark.parametrize(("page", "i", "block"), CODE, ids=named)
 def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(
     page, i, block, tmp_path, monkeypatch
