@@ -20,10 +20,12 @@ from smc_mujoco.analysis.tuning.evaluator import with_gains
 from smc_mujoco.analysis.tuning.objective import BUDGET, Objective, objectives
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
+from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.studies.race import LOOKS, stuck
 
 FILE = Path(__file__).with_suffix(".json")
-GOAL = Objective(conditions=("noise", "friction", "delay_10ms", "contact"), duration=2.0)
+CONDITIONS = tuple(map(find_condition, ("noise", "friction", "delay_10ms", "contact")))
+GOAL = Objective(conditions=CONDITIONS, duration=2.0)
 LAWS, WHOLE, INSTANCES = ("super_twisting", "adrc", "pid"), 2, 3
 LIFT = """<mujoco model="lift"><compiler angle="radian"/><default>
 <geom type="capsule" size=".03" contype="0" conaffinity="0"/></default><worldbody>

@@ -130,7 +130,7 @@ def identify_friction(speed: Any, torque: Any, held_out: Any = None) -> Friction
       ScenarioError: pairs that are no numbers, too few that move, or of one direction alone.
     """
     pairs = _moving(speed, torque, "the pairs")
-    other = None if held_out is None else _moving(*held_out, "held_out")
+    other = None if held_out is None else _moving(held_out[0], held_out[1], "held_out")
     fits = {}
     errors = []
     for model, terms in MODELS.items():
@@ -209,10 +209,11 @@ def _speed(terms: tuple[str, ...], v: Array, force: Array) -> float:
         return float(np.sum((force - _columns(terms, v, speed) @ numbers) ** 2))
 
     low, high = 2.0 * np.abs(v).min(), 0.5 * np.abs(v).max()
-    grid = np.linspace(*np.log((low, max(high, 2.0 * low))), SCAN)
+    grid = np.linspace(np.log(low), np.log(max(high, 2.0 * low)), SCAN)
     best = int(np.argmin([loss(one) for one in grid]))
     around = grid[max(best - 1, 0)], grid[min(best + 1, SCAN - 1)]
-    return float(np.exp(minimize_scalar(loss, bounds=around, method="bounded").x))
+    found: Any = minimize_scalar(loss, bounds=around, method="bounded")
+    return float(np.exp(found.x))
 
 
 def _fitted(

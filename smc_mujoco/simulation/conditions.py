@@ -577,7 +577,7 @@ def _elastic(plant: Plant, duration: float) -> Data:
 def _motor_side(plant: Plant, duration: float) -> Data:
     """Return the same, where the controller reads the rotors, without error."""
     seen = {"sensor": Encoder(counts=math.inf, side="motor"), "velocity": estimator("measured")}
-    return _elastic(plant, duration) | seen
+    return {**_elastic(plant, duration), **seen}
 
 
 def _encoder(plant: Plant, duration: float) -> Data:

@@ -405,7 +405,7 @@ def from_log(scenario: Scenario, log: Array, failed_step: int, failure: str | No
         end = len(t)
     else:
         end = math.ceil(failed_step / scenario.steps)
-    names = list(LOGGED)
+    names: list[str] = list(LOGGED)
     if scenario.exact_friction:
         names.append("held")
     if scenario.compensated:

@@ -97,7 +97,7 @@ def unit_texts(law: Component, names: Sequence[str], plant: Plant) -> dict[str, 
     for name in names:
         gain = _gain(law, name)
         channel = 3 if gain.turns else 0
-        unit = gain.unit or Unit()
+        unit = gain.unit if isinstance(gain.unit, Unit) else Unit()
         texts[name] = unit.text(plant.efforts[channel], plant.units[channel])
     return texts
 

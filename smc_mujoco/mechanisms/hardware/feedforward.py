@@ -47,9 +47,10 @@ class Feedforward:
 
     def check(self, plant: Plant) -> None:
         """Raise ScenarioError if it does not suit the plant."""
-        if not self.friction:
+        parts: tuple[Friction, ...] = self.friction  # pyright: ignore[reportAssignmentType] a scenario has converted it
+        if not parts:
             raise ScenarioError("Feedforward has no friction: give one, such as smc.Coulomb(0.05)")
-        for part in self.friction:
+        for part in parts:
             part.check(plant)
             if part.steady is None:
                 raise ScenarioError(

@@ -118,9 +118,14 @@ def servo(name: str, model: str = "m4", command: str = "torque") -> Servo:
     """
     models = find("servo", name, SERVOS)
     fitted = find(f"model of {name}", model, models)
-    limits = SUPPLIES[name]._asdict() | {"command": command}
     motor = DCMotor(
-        fitted["R"], 0.0, fitted["kt"], gear=1.0, rotor_inertia=fitted["armature"], **limits
+        fitted["R"],
+        0.0,
+        fitted["kt"],
+        gear=1.0,
+        rotor_inertia=fitted["armature"],
+        command=command,
+        **SUPPLIES[name]._asdict(),
     )
     numbers = {}
     for theirs, several in BAM_FIELDS.items():

@@ -103,7 +103,7 @@ class Sliding(JointForce):
         return _at_stages(self.formula)
 
     @property
-    def steady(self) -> Callable:
+    def steady(self) -> Callable | None:
         """F at a steady speed, without a load."""
         return _steady(self.formula)
 
