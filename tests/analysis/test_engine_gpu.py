@@ -34,7 +34,7 @@ FULL = {
     "clock": smc.Clock(missed=0.1),
     "jump": smc.Jump(0.5, {"mass": 2.0}),
     "actuator": smc.Lag(0.01),
-    "sensor": smc.Encoder(4096, dropout=0.1),
+    "sensor": smc.Encoder(4096, dropout=0.1, delay=2e-3),
 }
 DRY = (smc.Coulomb(0.1), smc.Viscous(0.1))
 FRICTION = {  # of plants whose joints move alone
@@ -63,6 +63,13 @@ def code(monkeypatch, plant, law, metrics=("settling_time",), **fields):
 def test_every_plant_compiles_for_a_device_with_all_parts(monkeypatch, plant, law):
     friction = FRICTION.get(plant, ())
     assert ".entry" in code(monkeypatch, plant, law, tuple(names()), **FULL, friction=friction)
+
+
+@with_cuda
+def test_rotors_behind_springs_compile_for_a_device(monkeypatch):
+    sprung = {"p1/hinge": smc.hardware.ElasticJoint(900.0)}
+    read = smc.Encoder(4096, delay=2e-3, side="motor")
+    assert ".entry" in code(monkeypatch, "pendulum_network", "pid", actuator=sprung, sensor=read)
 
 
 @with_cuda

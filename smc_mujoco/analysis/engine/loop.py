@@ -223,7 +223,7 @@ def _late_sensing(form: Form) -> Fields:
         period = view.row[row_at.periods + i]
         if period != 0.0:
             time = reading(view, i, 0, t) * period
-        step = max(0, math.floor(time / h + 0.5))
+        step = max(0, int(math.floor(time / h + 0.5)))  # on CUDA, floor gives a float
         at = work_at.past + step % past * 2 * bodies + side(i)
         return view.work[at], view.work[at + bodies]
 

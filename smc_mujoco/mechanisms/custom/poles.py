@@ -75,8 +75,6 @@ def _drawn(model: mujoco.MjModel, start: Array, rng: np.random.Generator) -> Arr
             low, high = model.jnt_range[i]
             low, high = max(low, start[at] - MAX_REACH), min(high, start[at] + MAX_REACH)
         qpos[at] = rng.uniform(low, max(low, high))
-    joints, shafts = model.jnt_qposadr[moving_joints(model)]
-    qpos[shafts] = qpos[joints]  # no spring to a rotor is bent
     return qpos
 
 

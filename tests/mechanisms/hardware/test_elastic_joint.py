@@ -189,6 +189,27 @@ def test_friction_on_the_motor_side_is_on_the_rotor():
     assert period == pytest.approx(math.tau * math.sqrt(INERTIA / 50.0), rel=0.01)
 
 
+@smc.hardware.friction_function(numbers={"share": 0.1})
+def of_load(y, p, memory):
+    return p.share * y.load
+
+
+def test_the_load_of_a_friction_is_what_neither_drive_nor_spring_exerts():
+    trace = smc.run(
+        smc.Scenario(
+            plant=AXIS,
+            law="none",
+            x0=START,
+            feedforward=SHAKEN,
+            disturbance=smc.Constant(2.0),
+            actuator=ElasticJoint(300.0),
+            friction=of_load(),
+            duration=0.3,
+        )
+    )
+    np.testing.assert_allclose(trace.reaction[1:], -0.2, rtol=1e-9)  # it resists
+
+
 @pytest.mark.parametrize(
     ("friction", "actuator"),
     [
