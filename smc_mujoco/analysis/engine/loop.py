@@ -223,7 +223,8 @@ def _late_sensing(form: Form) -> Fields:
         period = view.row[row_at.periods + i]
         if period != 0.0:
             time = reading(view, i, 0, t) * period
-        step = max(0, int(math.floor(time / h + 0.5)))  # on CUDA, floor gives a float
+        # on CUDA, floor gives a float
+        step = max(0, int(math.floor(time / h + 0.5)))  # noqa: RUF046
         at = work_at.past + step % past * 2 * bodies + side(i)
         return view.work[at], view.work[at + bodies]
 
