@@ -216,8 +216,11 @@ class _Dask(Executor):
 
 def _translated(error: BaseException) -> BaseException:
     """Return dask's own errors as those that every Executor has."""
+    from distributed.comm import CommClosedError  # pyright: ignore[reportMissingImports]
     from distributed.scheduler import KilledWorker  # pyright: ignore[reportMissingImports]
 
+    if isinstance(error, CommClosedError):  # its scheduler ended while a result was on its way
+        return BrokenExecutor("dask is no longer there")
     if isinstance(error, KilledWorker):
         return BrokenExecutor(f"{error} The workers' logs may say why")
     if isinstance(error, RuntimeError) and isinstance(error.__cause__, ImportError):
