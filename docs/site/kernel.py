@@ -42,15 +42,14 @@ def main() -> None:
 
 
 def _shown(shell: InteractiveShell, code: str) -> list[dict[str, str]]:
-    """Run a cell and return its outputs, without those that are updated while it runs: progress
-    bars.
+    """Run a cell and return its outputs, without those that are updated while it runs, progress
+    bars, and without warnings.
     """
     # run_cell would set its own hook in place of the capture
     with shell.display_trap, capture_output() as caught:
         done = shell.run_cell(code)
-    sys.stderr.write(caught.stderr)
     if not done.success:
-        sys.exit(caught.stdout)
+        sys.exit(caught.stderr + caught.stdout)
     if caught.stdout:
         printed = [{"text/plain": caught.stdout}]
     else:

@@ -307,6 +307,9 @@ class Claim(Statement):
             parts["instead"] = f"{self.instead} ({self.shown_by})"
         return {name: text for name, text in parts.items() if text}
 
+    def _repr_html_(self) -> str:
+        return Claims([self])._repr_html_()
+
     def checks(self, gains: str) -> list[Check]:
         """Return the checks under a set of gains."""
         return [Check(what, **numbers) for what, numbers in self.numbers[gains].items()]
