@@ -43,6 +43,7 @@ def friction_figure(
     handles = [
         Line2D([], [], color=style.INK, label="log"),
         Line2D([], [], color=colour, label="found"),
+        Line2D([], [], color=colour, lw=6.0, alpha=0.25, label="± 2 standard errors"),
     ]
     joints = channel_names(rig.plant)
     with style.page():
@@ -84,7 +85,7 @@ def _friction(
         ax.plot(v, curve, color=colour, lw=1.2)
         ax.fill_between(v, curve - error, curve + error, color=colour, alpha=0.25, lw=0.0)
     effort = rig.plant.efforts[i]
-    ax.set_title(f"friction ± 2 errors ({effort})")
+    ax.set_title(f"friction ({effort})")
 
 
 def friction(rig: OwnRig, values: Numbers, i: int, v: Array) -> Array:

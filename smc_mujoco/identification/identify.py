@@ -58,6 +58,10 @@ SLOW = (
     "the residuals are slow, as where a force was not recorded: true errors may be several "
     "standard errors"
 )
+LEFT = (
+    "a whole log is left in an open loop, as an arm under gravity leaves it however good its "
+    "numbers are: judge by the pieces of 1 s"
+)
 POOR = (
     "the fit is poor: the model lacks something, a column is another one or in another unit "
     "(angles are in rad), or the search ended in a local minimum: start from other values, with "
@@ -121,6 +125,8 @@ class Identified:
             notes.append(SLOW)
         if worst < POOR_FIT:
             notes.append(POOR)
+        elif self.by_pieces and min(min(fit.values()) for fit in self.fits) < POOR_FIT:
+            notes.append(LEFT)
         if isinstance(self.rig, OwnRig) and (absent := self.rig.not_in_runs):
             notes.append(
                 f"replays have {', '.join(absent)}, and runs of the machine leave it out: "

@@ -51,6 +51,14 @@ def test_one_joint_s_friction_armature_and_delay_are_found_without_a_start(found
     assert not found.notes
 
 
+def test_a_log_that_an_open_loop_leaves_is_told_apart_from_a_poor_fit(found):
+    left = tuple(dict.fromkeys(fit, -210.0) for fit in found.fits)
+    (note,) = dataclasses.replace(found, fits=left).notes
+    assert "judge by the pieces" in note
+    (note,) = dataclasses.replace(found, fits=left, by_pieces=left).notes
+    assert note.startswith("the fit is poor")
+
+
 def test_a_first_guess_is_within_a_fifth_without_a_simulation(arm, run):
     """15 % from 3 s of a log, as a pilot had; delays are tried in steps of 1 ms."""
     guess = first_guess(own_rig(arm, list(TRUTH)), [run])
