@@ -49,7 +49,6 @@ def example(function) -> str:
 
 
 PUBLIC = functions()
-del PUBLIC["smc.which"]
 
 
 @pytest.mark.parametrize("name", PUBLIC)

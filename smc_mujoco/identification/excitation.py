@@ -165,7 +165,8 @@ def excitation(
     Args:
       machine, names: as of `smc.identify`.
       u_max: bound on |u| of each motor, N m or N; default: the model's.
-      v_max: bound on the speed of each joint, rad/s or m/s; default: none.
+      v_max: bound on the speed of the motion that is asked of each joint, rad/s or m/s; the joint
+        may go some per cent beyond, see |v| in the answer. Default: none.
       amplitude: largest way from the goal to each side, rad or m: one for all driven joints, or one
         for each. Default: 0.5 rad, 0.1 m, or 0.9 of the way to a limit of the joint's range.
       guess: quantity -> about its value. Where the model has 0, the default is typical: friction

@@ -1,4 +1,4 @@
-"""The figure of an identified machine: for each joint its log beside the prediction in pieces, the
+"""The figure of an identified machine: for each joint its log beside the open-loop prediction, the
 residual over speed, and the friction with its error over the forces of the log.
 """
 
@@ -56,7 +56,7 @@ def friction_figure(
             left, middle, right = axes[i]
             left.plot(t, measured[name], color=style.INK, lw=1.6)
             left.plot(t, predicted[name], color=colour, lw=0.9)
-            left.set_title(f"fit of the whole log, %: {fit[name]:.1f}")
+            left.set_title(f"whole log in an open loop, fit {fit[name]:.1f} %")
             left.set_ylabel(f"{name} ({unit})")
             speed = records.rate(measured[name], records.step_of(t))
             middle.axhline(0.0, color=style.RULE, lw=0.8)

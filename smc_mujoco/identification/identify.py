@@ -28,6 +28,7 @@ from smc_mujoco.common.constraints import Natural, Seed, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import replacing, write_json
 from smc_mujoco.common.progress import bar
+from smc_mujoco.common.text import joined
 from smc_mujoco.identification import first_guess, gauss_newton, number_text, records
 from smc_mujoco.identification.own_rig import OwnRig, condition_fields, own_rig
 from smc_mujoco.identification.paths import known_paths
@@ -280,7 +281,7 @@ def identify(
       logs: one log or several, of any controller, at 40 Hz or more: the path of a CSV or npz file,
         a data frame, columns by name, or traces. A log has t in s, and x (rad or m) and u (in the
         unit of the machine's command) of the joint, or x_JOINT and u_JOINT of each.
-      names: paths of the numbers, see identification/paths.py: "shoulder.damping", .frictionloss,
+      names: paths of the numbers: "shoulder.damping", .frictionloss,
         .armature, .stiffness, .gain, .offset, .zero, "input_delay", "m", "friction.elbow.kc". None:
         the rig's `free`. Nobody gives a start: it comes from least squares of forces.
       held_out: a log that is not used, to check the numbers on.
@@ -400,7 +401,8 @@ def _read(
 
 def _named_plant(text: str, logs: Sequence[Any]) -> Plant:
     """Return a plant by its name. FILE.xml alone has the joints of the first log's columns: those
-    with a command u_JOINT are driven, and those with a position x_JOINT alone are measured.
+    with a command u_JOINT are driven, and those with a position x_JOINT alone are measured. Raise
+    ScenarioError for positions without any command.
     """
     model = MODEL.fullmatch(text)
     if model is None or model["joints"] is not None or not isinstance(logs[0], Mapping):
@@ -408,6 +410,12 @@ def _named_plant(text: str, logs: Sequence[Any]) -> Plant:
     driven = [name[2:] for name in logs[0] if name.startswith("u_")]
     seen = [name[2:] for name in logs[0] if name.startswith("x_")]
     joints = driven + [f"{joint}(measured)" for joint in seen if joint not in driven]
+    if seen and not driven:
+        wanted = joined(f"u_{joint}" for joint in seen)
+        raise ScenarioError(
+            f"the log has {joined(f'x_{joint}' for joint in seen)} and no command: give {wanted}, "
+            "the motors' commands, too"
+        )
     if not driven:
         joints = [joint.name for joint in mjcf.source(text).spec().joints if joint.name]
         if len(joints) != 1:

@@ -40,8 +40,8 @@ def _of_scenario(s: Scenario) -> Iterator[str]:
             part = next(p for p in parts if not integration.resolves(p))
             kind = type(part).__name__
             yield (
-                f"{how}, of first order, as {kind} has a state that moves once a step: numbers may "
-                f"be some percent off. Give physics_step={step / 4:g} for a quarter of the error"
+                f"{how}, of first order, as {kind} acts once a step: numbers may be some percent "
+                f"off. Give physics_step={step / 4:g} for less error"
             )
         return
     pole = integration.fastest_pole(s)

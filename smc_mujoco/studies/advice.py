@@ -115,9 +115,7 @@ class RaceAdvice(Advice):
         if searched and self.race.comparison:
             lines.append(f"However tuned: {self._however}")
         if self.fixed:
-            lines.append(
-                f"With these gains: {_verdict(self.fixed, [one.name for one in self.laws])}"
-            )
+            lines.append(f"With these gains: {self._with_these}")
         lines += [f"Settles: {self._where}", f"Tolerates: {self._margins}"]
         for name, share in self.race.dropped.items():
             least = f"its lowest J was {number(share)} times the highest of the law that led"
@@ -153,6 +151,15 @@ class RaceAdvice(Advice):
         if race.winner or len(ranked) < 2:
             return text
         return f"{text}; {self._takes}"
+
+    @property
+    def _with_these(self) -> str:
+        """What runs say of the laws with the gains printed, which may not be all that raced."""
+        names = [one.name for one in self.laws]
+        text = _verdict(self.fixed, names)  # pyright: ignore[reportArgumentType]
+        if len(names) < len(self.race.entrants):
+            return f"of {joined(names)}, {text}"
+        return text
 
     @property
     def _takes(self) -> str:

@@ -71,6 +71,10 @@ def which(
     """Recommend a law for a plant: compare all laws that suit, with gains for the plant, and say
     how certain the answer is.
 
+        advice = smc.which("duffing", "friction", laws=["pid", "adrc"], minutes=1)
+        print(advice)
+        print(advice.law)
+
     Args:
       plant: a name, a Plant, or your own MJCF and its joints, as "arm.xml:shoulder,elbow".
       conditions: names, texts or Conditions, see `condition`. Default: nominal, noise and sine.
@@ -94,6 +98,10 @@ def which(
         `margins` of the first law and its `worst_run`, too. Default: a whole comparison, which no
         clock stops.
       starts, relevant, threads, progress, seed, device, executor: as in `compare`.
+
+    Returns:
+      An `Advice`, which prints as tables and lines: `law` has the gains to use, `second` is the
+      next law, `table` has a row a run.
 
     Raises:
       ScenarioError: an unknown name, no law that suits, a need without a number on this plant, or

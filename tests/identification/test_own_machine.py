@@ -183,6 +183,13 @@ def test_a_motor_s_column_that_is_missing_is_named():
         smc.identify(arm, columns, ["m"])
 
 
+def test_a_log_without_any_command_is_not_taken_for_a_file_without_joints(run, tmp_path):
+    (tmp_path / "arm.xml").write_text(ONE)
+    positions = {"t": run["t"], "x_j1": run["x"]}
+    with pytest.raises(smc.ScenarioError, match="has x_j1 and no command: give u_j1"):
+        smc.identify(str(tmp_path / "arm.xml"), positions, ["j1.damping"])
+
+
 def test_a_command_in_milliamperes_is_doubted_unless_its_gain_is_asked_for(arm, run):
     """Of a motor of 0.1 N m/A."""
     in_mA = run | {"u": run["u"] * 1e4}

@@ -162,6 +162,9 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     lines = dict(line.split(": ", 1) for line in advice.answer)
     assert [*lines][:5] == ["Use", "However tuned", "With these gains", "Settles", "Tolerates"]
     assert lines["Use"] == advice.law.name
+    compared = [law.name for law in advice.laws]
+    assert len(compared) < len(advice.race.entrants)  # so the sentence says which
+    assert lines["With these gains"].startswith(f"of {compared[0]} and {compared[1]}, ")
     assert smc.law(lines["Gains"].split(", tuned here")[0]).gains == advice.law.gains
     assert [margin.kind for margin in advice.margins] == ["delay", "friction", "mass", "blow"]
     assert advice.worst_run.law == advice.law
