@@ -88,49 +88,55 @@ def rig(
     terminal.finish()
 
 
+Machine = Annotated[
+    str,
+    typer.Argument(
+        metavar="MACHINE",
+        help=(
+            "FILE.xml:joint+joint; FILE.xml alone has the joints of the logs' columns. "
+            "Or a plant or a rig by its name."
+        ),
+    ),
+]
+Logs = Annotated[
+    list[Path],
+    typer.Argument(metavar="LOG...", help="CSV or npz files of columns, or traces."),
+]
+Paths = Annotated[
+    str | None,
+    typer.Option(
+        "--for",
+        metavar="PATH,...",
+        help="Numbers to find, as shoulder.damping,elbow.frictionloss,input_delay,m; "
+        "default: those that a rig's records determine.",
+    ),
+]
+HeldOut = Annotated[
+    Path | None, typer.Option(help="A log that is not used, to check the numbers on.")
+]
+FoundFile = Annotated[
+    Path | None, typer.Option(help="File for --condition of compare, which and tune: FILE.txt.")
+]
+Corrected = Annotated[
+    bool, typer.Option("--corrected", help="Correct for the errors of the simulation's steps.")
+]
+Starts = Annotated[int, typer.Option(min=1, help="How many sets the search may start from.")]
+StartsSeed = Annotated[int, typer.Option(min=0, help="Seed of these starts.")]
+
+
 def identify(
-    machine: Annotated[
-        str,
-        typer.Argument(
-            metavar="MACHINE",
-            help=(
-                "FILE.xml:joint+joint; FILE.xml alone has the joints of the logs' columns. "
-                "Or a plant or a rig by its name."
-            ),
-        ),
-    ],
-    files: Annotated[
-        list[Path],
-        typer.Argument(metavar="LOG...", help="CSV or npz files of columns, or traces."),
-    ],
-    names: Annotated[
-        str | None,
-        typer.Option(
-            "--for",
-            metavar="PATH,...",
-            help="Numbers to find, as shoulder.damping,elbow.frictionloss,input_delay,m; "
-            "default: those that a rig's records determine.",
-        ),
-    ] = None,
-    held_out: Annotated[
-        Path | None, typer.Option(help="A log that is not used, to check the numbers on.")
-    ] = None,
+    machine: Machine,
+    files: Logs,
+    names: Paths = None,
+    held_out: HeldOut = None,
     columns: options.Columns = None,
     figure: Annotated[
         Path | None, options.picture("prediction over log, residuals and frictions")
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="File for --condition of compare, which and tune: FILE.txt."),
-    ] = None,
-    corrected: Annotated[
-        bool,
-        typer.Option("--corrected", help="Correct for the errors of the simulation's steps."),
-    ] = False,
-    starts: Annotated[
-        int, typer.Option(min=1, help="How many sets the search may start from.")
-    ] = 1,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of these starts.")] = 0,
+    out: FoundFile = None,
+    corrected: Corrected = False,
+    starts: Starts = 1,
+    seed: StartsSeed = 0,
     json: options.Json = None,
 ) -> None:
     """Find numbers of a machine from its logs: friction, armature, delay, masses, with errors.

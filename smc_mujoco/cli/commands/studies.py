@@ -20,31 +20,50 @@ if TYPE_CHECKING:
 Seed = Annotated[int, typer.Option(min=0, help="Seed of initial states, noise and phases.")]
 
 
+Needs = Annotated[
+    str,
+    typer.Option(
+        help="What to compare, separated by commas: fast (settling time), accurate (ultimate "
+        "bound), on-track (ITAE), calm (TV rate of u), gentle (largest u), frugal (integral of "
+        "u^2), no-overshoot. Any name of `smc-mujoco list --needs`, such as no-velocity, is a "
+        "property that the law must have."
+    ),
+]
+AdviceCondition = Annotated[
+    list[str] | None, options.conditions_by_default("nominal, noise and sine")
+]
+AdviceSeeds = Annotated[
+    int | None,
+    typer.Option(
+        min=1, help="Runs of each law in each condition; default 24, or 14 with --minutes."
+    ),
+]
+AdviceDuration = Annotated[
+    float | None, typer.Option(help="Duration of a run, s; default 5, or 3 with --minutes.")
+]
+Falling = Annotated[
+    bool, typer.Option("--falling", help="Go on where the base of your model falls.")
+]
+Minutes = Annotated[
+    float | None,
+    typer.Option(
+        help="Answer within about so many minutes; --quick is --minutes 10. Laws race under "
+        "the conditions asked for, until one has the lowest J."
+    ),
+]
+Film = Annotated[
+    bool, typer.Option(help="Whether to film the advised law's worst run, with --minutes.")
+]
+
+
 def which(
     plant: options.PlantName,
-    needs: Annotated[
-        str,
-        typer.Option(
-            help="What to compare, separated by commas: fast (settling time), accurate (ultimate "
-            "bound), on-track (ITAE), calm (TV rate of u), gentle (largest u), frugal (integral of "
-            "u^2), no-overshoot. Any name of `smc-mujoco list --needs`, such as no-velocity, is a "
-            "property that the law must have."
-        ),
-    ] = "fast,accurate,calm",
-    condition: Annotated[
-        list[str] | None, options.conditions_by_default("nominal, noise and sine")
-    ] = None,
+    needs: Needs = "fast,accurate,calm",
+    condition: AdviceCondition = None,
     law: options.Laws = None,
     quick: options.Quick = False,
-    seeds: Annotated[
-        int | None,
-        typer.Option(
-            min=1, help="Runs of each law in each condition; default 24, or 14 with --minutes."
-        ),
-    ] = None,
-    duration: Annotated[
-        float | None, typer.Option(help="Duration of a run, s; default 5, or 3 with --minutes.")
-    ] = None,
+    seeds: AdviceSeeds = None,
+    duration: AdviceDuration = None,
     x0: options.X0 = None,
     relevant: options.Relevant = RELEVANT,
     out: options.Folder = Path("which"),
@@ -54,19 +73,9 @@ def which(
     threads: options.Threads = None,
     device: options.Device = "cpu",
     executor: options.Executor = None,
-    falling: Annotated[
-        bool, typer.Option("--falling", help="Go on where the base of your model falls.")
-    ] = False,
-    minutes: Annotated[
-        float | None,
-        typer.Option(
-            help="Answer within about so many minutes; --quick is --minutes 10. Laws race under "
-            "the conditions asked for, until one has the lowest J."
-        ),
-    ] = None,
-    film: Annotated[
-        bool, typer.Option(help="Whether to film the advised law's worst run, with --minutes.")
-    ] = True,
+    falling: Falling = False,
+    minutes: Minutes = None,
+    film: Film = True,
 ) -> None:
     """Recommend a law for a plant. Report its gains, the second-best law, and how certain the
     choice is.

@@ -213,37 +213,29 @@ def _plant(
     own.check(label, model, pairs)
     seen = own.measured_joints(label, model, pairs, measured)
     joints = [*joints_of(pairs), *seen]
-    if keyframe is not None:
-        mjcf.pick(label, "keyframe", keyframe, [model.key(i).name for i in range(model.nkey)])
-    if tip is not None:
-        mjcf.pick(label, "site", tip, [model.site(i).name for i in range(model.nsite)])
-    file = label.removesuffix(".xml")
-    if catalogue().taken(file):  # a plant of the library has this name
-        file = label
-    plant_name = file if name is None else name
+    _check_names(label, model, keyframe, tip)
+    plant_name = _name(label) if name is None else name
     units, special = _places(plant_name, model, joints, pairs, keyframe)
     if tip and special.get("base", -1) >= 0:
         raise ScenarioError(f"the base of {label} is measured: leave the tip out")
     build = UserModel(source, keyframe, pairs, (), tip or "", others=others, measured=seen)
     if others in ("held", "locked"):
         model = source.compiled(build.edited())
-    motors = ()
-    thrusters = ()
     if is_free(model, joints[0]):
         if tip or scenarios:
             cure = "leave the tip out" if tip else f"give {', '.join(scenarios)} to the scenario"
             raise ScenarioError(f"joint {joints[0]!r} of {label} is a free joint: {cure}")
-        thrusters = tuple(own.thrusters(model, joints[0]))
+        build = dataclasses.replace(build, thrusters=tuple(own.thrusters(model, joints[0])))
         limits = own.reach_of(label, model, joints[0])
         special["pose"] = own.held_pose(label, model, joints[0])
     else:
         motors = tuple(own.motor_of(label, model, joint, channel) for joint, channel in pairs)
+        build = dataclasses.replace(build, motors=motors)
         limits = tuple(motor.limit for motor in motors)
-    build = dataclasses.replace(build, motors=motors, thrusters=thrusters)
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields = UserFields(mass, gravity)
-    why_not = missing(model, joints, motors)
+    why_not = missing(model, joints, build.motors)
     rubs = default_friction(model)
     return Plant(
         name=plant_name,
@@ -268,6 +260,20 @@ def _plant(
         label=title if title.lower().replace(" ", "_") == plant_name.lower() else "",
         **special,
     )
+
+
+def _check_names(label: str, model: mujoco.MjModel, keyframe: str | None, tip: str | None) -> None:
+    """Raise ScenarioError for a keyframe or a site that the model does not have."""
+    if keyframe is not None:
+        mjcf.pick(label, "keyframe", keyframe, [model.key(i).name for i in range(model.nkey)])
+    if tip is not None:
+        mjcf.pick(label, "site", tip, [model.site(i).name for i in range(model.nsite)])
+
+
+def _name(label: str) -> str:
+    """Return the name of the plant of a file, which is none of the library's."""
+    file = label.removesuffix(".xml")
+    return label if catalogue().taken(file) else file
 
 
 def _places(
