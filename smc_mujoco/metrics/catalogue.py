@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, unknown
+from smc_mujoco.common.errors import ScenarioError, find, unknown
 from smc_mujoco.metrics import conventions, limit_cycle
 from smc_mujoco.metrics.conventions import (
     ARRIVAL_BAND,
@@ -37,6 +37,7 @@ from smc_mujoco.metrics.conventions import (
 from smc_mujoco.metrics.fold import Fold
 
 if TYPE_CHECKING:
+    from smc_mujoco.mechanisms.plant import Plant
     from smc_mujoco.simulation.trace import Trace
 
 # rows that tuning and problems read, too
@@ -51,6 +52,16 @@ ROUNDING_SHARE = 1e-12  # of max |u|, and of a frequency: smaller differences ar
 def metrics() -> tuple[Metric, ...]:
     """Return every metric, in the order of tables."""
     return tuple(CATALOGUE.values())
+
+
+def metric_of(plant: Plant, name: object) -> Metric:
+    """Return the metric of a name. Raise ScenarioError if there is none, or if it has no single
+    value for the plant.
+    """
+    found = find("metric", name, CATALOGUE)
+    if why := found.refusal(plant):
+        raise ScenarioError(why)
+    return found
 
 
 class UnknownMetric(ScenarioError, KeyError):

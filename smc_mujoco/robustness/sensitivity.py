@@ -20,22 +20,23 @@ median found, in the same way.
 import dataclasses
 import math
 import os
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 
 from smc_mujoco.analysis.bootstrap import Interval, share_interval
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns, worth_compiling
+from smc_mujoco.common.aliases import Array, ArrayPair
 from smc_mujoco.common.constraints import Seed, Whole, constrained
-from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
-from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.metrics.conventions import by_group
+from smc_mujoco.metrics.catalogue import CATALOGUE, metric_of
+from smc_mujoco.metrics.conventions import Metric, by_group
 from smc_mujoco.robustness.margins import TOLERATED_ERROR, rest_share
 from smc_mujoco.robustness.sobol import (
     CHANCE,
@@ -237,58 +238,90 @@ def sensitivity(
         raise ScenarioError(
             f"within is {shown(within)}: give a class, such as smc.Uncertainty(delay=(0.0, 0.02))"
         )
-    entry = find("metric", metric, CATALOGUE)
-    if why := entry.refusal(scenario.plant):
-        raise ScenarioError(why)
+    entry = metric_of(scenario.plant, metric)
     space = Space(scenario, within)
-    k = len(space.names)
+    points = _checked_points(points, space)
+    design = designs(points, len(space.names), seed)
+    work = len(design) * scenario.work
+    formulas = {metric: lambda trace: _score(trace, metric), "rest_share": rest_share}
+    fast = ScoredRuns(formulas, device, threads, worth_compiling(work), by_group=True)
+    words = f"sensitivity of {scenario.law.name} on {scenario.plant.name}"
+    with bar(words, work, shown=progress) as drawn:
+        scores, held = _run(space, design, fast, drawn.advance)
+    unscored = ~np.isfinite(scores)
+    if unscored.all():
+        cure = "give longer runs, another metric or a narrower class"
+        if broken := fast.broken.get(scenario.law.name, ""):
+            cure = f"{broken}: correct the law"
+        raise ScenarioError(f"no run of {len(scores)} has a {metric}: {cure}")
+    runs = DesignRuns(design, np.where(unscored, scores[~unscored].max(), scores), unscored, ~held)
+    return _explained(entry, space, runs, points, seed, fast.checked())
+
+
+class DesignRuns(NamedTuple):
+    """The runs of Saltelli's design, A and B before the others."""
+
+    design: Array  # (N, axes), shares of the axes
+    scores: Array  # (N,), of a run without one the worst of the others
+    unscored: Array  # (N,) bool
+    failed: Array  # (N,) bool, whether it fails or ends beyond 5 % of its scale
+
+
+def _checked_points(points: int | None, space: Space) -> int:
+    """Return the number of points, by default `default_points`. Raise ScenarioError if it is no
+    power of 2.
+    """
     if points is None:
-        points = default_points(space.scenario_at(np.full(k, 0.5)), k)
+        axes = len(space.names)
+        points = default_points(space.scenario_at(np.full(axes, 0.5)), axes)
     if points & (points - 1):
         raise ScenarioError(
             f"points is {points}: give a power of 2, such as {1 << points.bit_length() - 1}"
         )
-    design = designs(points, k, seed)
+    return points
+
+
+def _run(
+    space: Space, design: Array, fast: ScoredRuns, advance: Callable[[int], None]
+) -> ArrayPair:
+    """Return the score of each run of a design, inf of one that failed, and whether it ends within
+    5 % of its scale, (N,) each.
+    """
     scores = np.empty(len(design))
     held = np.empty(len(design), bool)
-    work = len(design) * scenario.work
-    formulas = {metric: lambda trace: _score(trace, metric), "rest_share": rest_share}
-    runs = ScoredRuns(formulas, device, threads, worth_compiling(work), by_group=True)
-    words = f"sensitivity of {scenario.law.name} on {scenario.plant.name}"
-    with bar(words, work, shown=progress) as drawn:
-        for first in range(0, len(design), AT_ONCE):
-            cases = [space.scenario_at(row) for row in design[first : first + AT_ONCE]]
-            for i, ((score, share), failed) in enumerate(runs.scored(cases, drawn.advance), first):
-                scores[i] = math.inf if failed is not None else score
-                held[i] = failed is None and share <= TOLERATED_ERROR
-    if not (finite := np.isfinite(scores)).any():
-        if broken := runs.broken.get(scenario.law.name, ""):
-            cure = f"{broken}: correct the law"
-        else:
-            cure = "give longer runs, another metric or a narrower class"
-        raise ScenarioError(f"no run of {len(scores)} has a {metric}: {cure}")
-    scores[~finite] = scores[finite].max()
+    for first in range(0, len(design), AT_ONCE):
+        cases = [space.scenario_at(row) for row in design[first : first + AT_ONCE]]
+        for i, ((score, share), failed) in enumerate(fast.scored(cases, advance), first):
+            scores[i] = math.inf if failed is not None else score
+            held[i] = failed is None and share <= TOLERATED_ERROR
+    return scores, held
+
+
+def _explained(
+    entry: Metric, space: Space, runs: DesignRuns, points: int, seed: int, checked: str
+) -> Sensitivity:
+    """Return what explains the scores of runs, and where they fail."""
+    scenario = space.members.scenario
     halves = slice(0, 2 * points)  # A, which chooses, then B, which tells
-    shares = design[halves]
-    values = scores[halves]
-    failed = ~held[halves]
-    axes = indices(space, scores, points, shares, values, seed)
-    found = tuple(regions(space, shares, failed))
+    shares = runs.design[halves]
+    values = runs.scores[halves]
+    failed = runs.failed[halves]
+    axes = indices(space, runs.scores, points, shares, values, seed)
     return Sensitivity(
         scenario=scenario,
-        within=within,
-        metric=metric,
+        within=space.members.within,
+        metric=entry.name,
         unit=entry.unit_for(scenario.plant.units[0], scenario.efforts[0]),
         axes=tuple(sorted(axes, key=lambda axis: -axis.total.median)),
         space=space,
         shares=shares,
         values=values,
         failed=failed,
-        unscored=int((~finite[halves]).sum()),
-        regions=found,
+        unscored=int(runs.unscored[halves].sum()),
+        regions=tuple(regions(space, shares, failed)),
         improvement=improvement(space, shares, values, failed),
-        runs=len(design),
-        checked=runs.checked(),
+        runs=len(runs.design),
+        checked=checked,
     )
 
 

@@ -20,12 +20,13 @@ from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns, worth_compiling
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.constraints import Seed, Whole, constrained
-from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.draw.style import law_colour, law_name, plant_name
-from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.metrics.catalogue import CATALOGUE, metric_of
+from smc_mujoco.metrics.conventions import Metric
 from smc_mujoco.robustness.uncertainty import Members, Uncertainty, default_class, outside
 from smc_mujoco.robustness.worst_case_search import WorstCaseSearch
 from smc_mujoco.simulation import run_key, scenario_json
@@ -231,37 +232,42 @@ def worst_case(
     """
     scenarios = _listed(scenario)
     scenario = scenarios[0]
-    if within is None:
-        within = default_class(scenario)
-    if not isinstance(within, Uncertainty):
-        raise ScenarioError(
-            f"within is {shown(within)}: give a class, such as smc.Uncertainty(disturbance=2.0)"
-        )
-    if within.period != (1.0, 1.0):
-        raise ScenarioError(
-            "the adversary's forces have a value a sample, so period cannot differ: leave it out "
-            "of within"
-        )
-    entry = find("metric", metric, CATALOGUE)
-    if why := entry.refusal(scenario.plant):
-        raise ScenarioError(why)
+    within = _checked_class(scenario, within)
+    entry = metric_of(scenario.plant, metric)
     if budget is None:
         budget = default_budget(scenario, within)
     members = Members(scenarios, within)
     work = 2 * budget * scenario.work
-    with bar(
-        f"worst case of {scenario.law.name} on {scenario.plant.name}", work, shown=progress
-    ) as drawn:
-        formulas = {metric: entry.formula, "rms_error": CATALOGUE["rms_error"].formula}
-        fast = ScoredRuns(formulas, device, threads, worth_compiling(work), by_group=True)
-        drawing, search = (
-            WorstCaseSearch(members, entry, budget, fast, drawn.advance) for _ in range(2)
-        )
-        drawing.draw(np.random.default_rng([seed, 0]))
-        early = sorted(drawing.tried[:MIN_RUNS], key=lambda tried: tried.key, reverse=True)
-        search.search(np.random.default_rng([seed, 1]), early[:FIRST_MEMBERS])
-        drawing.confirm()
-        search.confirm()
+    formulas = {metric: entry.formula, "rms_error": CATALOGUE["rms_error"].formula}
+    fast = ScoredRuns(formulas, device, threads, worth_compiling(work), by_group=True)
+    words = f"worst case of {scenario.law.name} on {scenario.plant.name}"
+    with bar(words, work, shown=progress) as drawn:
+        drawing = WorstCaseSearch(members, entry, budget, fast, drawn.advance)
+        search = WorstCaseSearch(members, entry, budget, fast, drawn.advance)
+        _attack(drawing, search, seed)
+    return _worst_of(scenarios, entry, members, drawing, search, seed, fast.checked())
+
+
+def _attack(drawing: WorstCaseSearch, search: WorstCaseSearch, seed: int) -> None:
+    """Draw random members, then search from the worst of the first of them."""
+    drawing.draw(np.random.default_rng([seed, 0]))
+    early = sorted(drawing.tried[:MIN_RUNS], key=lambda tried: tried.key, reverse=True)
+    search.search(np.random.default_rng([seed, 1]), early[:FIRST_MEMBERS])
+    drawing.confirm()
+    search.confirm()
+
+
+def _worst_of(
+    scenarios: Sequence[Scenario],
+    entry: Metric,
+    members: Members,
+    drawing: WorstCaseSearch,
+    search: WorstCaseSearch,
+    seed: int,
+    checked: str,
+) -> WorstCase:
+    """Return the worst run of a search and of the random members beside it."""
+    scenario = scenarios[0]
     if broken := drawing.broken or search.broken:
         warn_of_broken({scenario.law.name: broken})
     known = [one for one in (*search.tried, *drawing.tried) if one.by_mujoco]
@@ -274,13 +280,31 @@ def worst_case(
         found_by=worst.member.kind,
         tried=drawing.runs + search.runs,
         nominal=scenario,
-        within=within,
-        metric=metric,
-        outside=outside(scenario, within),
+        within=members.within,
+        metric=entry.name,
+        outside=outside(scenario, members.within),
         seed=seed,
-        checked=fast.checked(),
+        checked=checked,
         sets=len(scenarios),
     )
+
+
+def _checked_class(scenario: Scenario, within: object) -> Uncertainty:
+    """Return the class, by default `default_class`. Raise ScenarioError for one that no adversary
+    can search.
+    """
+    if within is None:
+        return default_class(scenario)
+    if not isinstance(within, Uncertainty):
+        raise ScenarioError(
+            f"within is {shown(within)}: give a class, such as smc.Uncertainty(disturbance=2.0)"
+        )
+    if within.period != (1.0, 1.0):
+        raise ScenarioError(
+            "the adversary's forces have a value a sample, so period cannot differ: leave it out "
+            "of within"
+        )
+    return within
 
 
 def cached_worst_case(

@@ -27,7 +27,7 @@ from smc_mujoco.control.properties import PROPERTIES, suitable
 from smc_mujoco.mechanisms.custom.scales import falls
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
+from smc_mujoco.metrics.catalogue import metric_of, metrics
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import Starts, listed, listed_laws
 from smc_mujoco.simulation.workers import Workers
@@ -161,8 +161,7 @@ def _asked(plant: Plant, needs: str | Sequence[str]) -> tuple[list[str], list[st
         else:
             properties.append(name)
     for metric in compared:
-        if why := CATALOGUE[metric].refusal(plant):
-            raise ScenarioError(why)
+        metric_of(plant, metric)
     return compared or [NEEDS[name] for name in DEFAULT_NEEDS], properties
 
 
