@@ -230,6 +230,14 @@ OTHERS = {  # plant, law, and what else the scenario has
             "sensor": smc.Encoder(math.inf, side="motor", delay=2e-3),
         },
     ),
+    "bristles": (
+        smc.plant("pendulum_network", n=2),
+        "boundary_layer",
+        {
+            "friction": (smc.hardware.LuGre(0.1, 0.15, 0.05), smc.Viscous(0.1)),
+            "jump": smc.Jump(1.0, {"m": 2.0}),
+        },
+    ),
     "torque": ("pendulum_network", smc.law("pid").on_computed_torque(), {"model": "nominal"}),
 }
 
@@ -237,7 +245,7 @@ OTHERS = {  # plant, law, and what else the scenario has
 SLOW = [pytest.param(kind, marks=pytest.mark.slow) for kind in ("cart", "arm", "torque")]
 
 
-@pytest.mark.parametrize("kind", ["joints", "elastic", "rotor", *SLOW])
+@pytest.mark.parametrize("kind", ["joints", "elastic", "rotor", "bristles", *SLOW])
 def test_a_law_or_a_machine_of_another_kind_runs_as_in_mujoco(kind):
     plant, law, fields = OTHERS[kind]
     noisy = {"noise": smc.Noise(1e-4, 5e-4), "disturbance": SINE, "input_delay": 2e-3}

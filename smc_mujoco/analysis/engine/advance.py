@@ -221,9 +221,10 @@ def advancing_implicitly(form: Form, compile_user: Compiler) -> Any:
     """Return a function (view, k, within, step): a physics step h of MuJoCo's implicitfast, for
     frictions whose force F is held over it. Of joint i, which moves alone:
 
-        (1 - h df_i/dv_i) a_i = f_i(x, v) + g_i (u_i + d_i + F_i),   v_i += h a_i,   x_i += h v_i
+        (1 - h df_i/dv_i + h g_i b_i) a_i = f_i(x, v) + g_i (u_i + d_i + F_i)
+        v_i += h a_i,   x_i += h v_i
 
-    f is linear in v, so its slope is a difference from rest. A damper between two joints acts by
+    with b_i the damping of bristles. f is linear in v, so its slope is a difference from rest. A damper between two joints acts by
     the speeds of the step's start in the other joint's equation: MuJoCo keeps no derivative where
     the inertia matrix has no entry.
     """
@@ -249,7 +250,8 @@ def advancing_implicitly(form: Form, compile_user: Compiler) -> Any:
             unit[i] = 0.0
             damping = row[row_at.damping + i]
             work[work_at.a + i] = f + g * (rub(view, i, step, at_rest / g) - damping * vs[i])
-            work[work_at.a + i] /= 1.0 + h * damping * g - h * slope
+            counted = damping + row[row_at.counted + i]
+            work[work_at.a + i] /= 1.0 + h * counted * g - h * slope
         for i in range(n):
             vs[i] += h * work[work_at.a + i]
             xs[i] += h * vs[i]

@@ -139,6 +139,7 @@ class RowPlaces(NamedTuple):
     after: int
     damping: int  # this and `levels` only with frictions
     levels: int  # of dry friction
+    counted: int  # damping of bristles, as an implicit step counts it; only in such a step
     springs: int  # a Spring of each rotor
     hinges: int  # whether a joint is one; only with a sensor
     periods: int  # s between readings, and until one arrives; only with a past
@@ -256,6 +257,7 @@ def _row_places(form: Form, row: Places) -> RowPlaces:
         after=row.take(values),
         damping=row.take(n if form.frictions else 0),
         levels=row.take(n if form.frictions else 0),
+        counted=row.take(n if form.implicit else 0),
         springs=row.take(len(Spring._fields) * len(form.elastic)),
         hinges=row.take(n if form.sensor else 0),
         periods=row.take(n if form.past else 0),

@@ -113,7 +113,7 @@ def rubs_by_force(s: Resolved) -> bool:
     held = [part for part in s.friction if not part.smooth]
     if not held or s.plant.rubs:
         return False
-    return all(part.force is not None for part in held) and moves_alone(s.plant)
+    return all(part.held is not None for part in held) and moves_alone(s.plant)
 
 
 def key(scenario: Scenario) -> Hashable:
@@ -209,7 +209,9 @@ def _drives(s: Resolved) -> list[Any]:
 
 def _held(s: Resolved) -> list[Any]:
     """Return the frictions whose force is held over a step."""
-    return [part for part, kind in s.acting if kind == "force" and not part.is_drive]
+    if not rubs_by_force(s):
+        return []
+    return [part.held for part in s.friction if not part.smooth]
 
 
 def _oldest(s: Resolved) -> int:
@@ -310,7 +312,11 @@ class FormGroup:
             assert at is not None  # one loop's scenarios have the same parts
             names = len(part.names)
             table = row[at.numbers : at.numbers + self.form.n * names].reshape(-1, names)
-            table[[*part.channels(s.plant)]] = part.numbers(run_of(s, part))
+            channels = [*part.channels(s.plant)]
+            table[channels] = part.numbers(run_of(s, part))
+            if part.counted:
+                damping = table[channels, part.names.index(part.counted)]
+                row[np.add(self.layout.row.counted, channels)] += damping
         for part in s.sensors if self.form.past else ():
             for i in part.channels(s.plant):
                 row[self.layout.row.periods + i] = part.period or 0.0

@@ -7,7 +7,7 @@ actuator. Under RK4 the callback simulates dry friction on joints that move alon
 # pyright: reportIncompatibleVariableOverride=false
 # (a constant of the base class is a function or a property here)
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import mujoco
 import numpy as np
@@ -15,6 +15,7 @@ from numba import njit
 
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms.hardware.moments import Run
 from smc_mujoco.mechanisms.hardware.part import (
     HARD_SOLIMP,
     HARD_SOLREF,
@@ -26,7 +27,7 @@ from smc_mujoco.mechanisms.hardware.part import (
     Positive,
 )
 from smc_mujoco.mechanisms.layout import PASSIVE
-from smc_mujoco.mechanisms.plant import Field
+from smc_mujoco.mechanisms.plant import Field, Plant
 
 # Where a dcmotor's bristles lie in the compiled model.
 STIFFNESS, DAMPING = 5, 6  # of actuator_dynprm
@@ -222,6 +223,43 @@ class DryFriction(Part):
 
 
 @frozen_data
+class Bristles(Part):
+    """The force of LuGre's bristles, as MuJoCo's `dcmotor` exerts it under implicitfast: the bend z
+    is that of v held over the step, and the force is that of z and v at its start.
+    """
+
+    names = "coulomb", "static", "stribeck", "stiffness", "damping"
+    memory = 1
+    counted = "damping"
+
+    friction: "LuGre"
+
+    def channels(self, plant: Plant) -> Sequence[int]:
+        return self.friction.channels(plant)
+
+    def numbers(self, run: Run) -> list[Sequence[float]]:
+        model = run.model
+        rows = []
+        for dof in run.dofs:
+            bristles = model.actuator(PASSIVE + model.joint(int(model.dof_jntid[dof])).name).id
+            levels = model.actuator_biasprm[bristles, LEVELS]
+            rows.append([*levels, *model.actuator_dynprm[bristles, [STIFFNESS, DAMPING]]])
+        return rows
+
+    @staticmethod
+    def force(y, p, memory):
+        bend = memory[0]
+        speed = y.v / p.stribeck
+        level = p.coulomb + (p.static - p.coulomb) * math.exp(-speed * speed)
+        decay = -p.stiffness * abs(y.v) / level
+        rate = decay * bend + y.v
+        kept = math.exp(decay * y.h)
+        reach = y.h if decay == 0.0 else (kept - 1.0) / decay
+        memory[0] = kept * bend + reach * y.v
+        return -(p.stiffness * bend + p.damping * rate)
+
+
+@frozen_data
 class LuGre(Friction):
     """Friction of elastic bristles: stiction, the Stribeck drop with speed, and a stuck joint that
     does not creep.
@@ -273,6 +311,10 @@ class LuGre(Friction):
                 f"LuGre's static {self.static:g} is less than its coulomb {self.coulomb:g}: "
                 "give static >= coulomb"
             )
+
+    @property
+    def held(self) -> Part | None:
+        return Bristles(self) if self.side == "link" else None
 
     @staticmethod
     def steady(y, p, memory):

@@ -61,6 +61,8 @@ class Part:
     # names of its numbers, by which these functions read a row of `numbers`
     names: ClassVar[tuple[str, ...]] = ("unused",)
     memory: ClassVar[int] = 0  # numbers that it keeps for each joint
+    # name of its number that implicitfast counts as damping, beside a force that is held over a step
+    counted: ClassVar[str] = ""
     is_drive: ClassVar[bool] = False  # whether its function gives the force of the drive
     sums_force: ClassVar[bool] = False  # whether it then adds it to the sum of a channel's state
 
@@ -223,6 +225,11 @@ class Friction(OnJoints):
         None if it sticks where it is at rest.
         """
         del v, force
+
+    @property
+    def held(self) -> Any:
+        """The part whose `force`, held over a step, is this friction; None if there is none."""
+        return self if self.force is not None else None
 
     @property
     def exact(self) -> Any:
