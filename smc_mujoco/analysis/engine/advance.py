@@ -224,9 +224,9 @@ def advancing_implicitly(form: Form, compile_user: Compiler) -> Any:
         (1 - h df_i/dv_i + h g_i b_i) a_i = f_i(x, v) + g_i (u_i + d_i + F_i)
         v_i += h a_i,   x_i += h v_i
 
-    with b_i the damping of bristles. f is linear in v, so its slope is a difference from rest. A damper between two joints acts by
-    the speeds of the step's start in the other joint's equation: MuJoCo keeps no derivative where
-    the inertia matrix has no entry.
+    with b_i the damping of bristles. f is linear in v, so its slope is a difference from rest. A
+    damper between two joints acts by the speeds of the step's start in the other joint's equation:
+    MuJoCo keeps no derivative where the inertia matrix has no entry.
     """
     n = form.n
     values = _valuing(form)

@@ -61,7 +61,7 @@ class Part:
     # names of its numbers, by which these functions read a row of `numbers`
     names: ClassVar[tuple[str, ...]] = ("unused",)
     memory: ClassVar[int] = 0  # numbers that it keeps for each joint
-    # name of its number that implicitfast counts as damping, beside a force that is held over a step
+    # name of its number that implicitfast counts as damping, beside a force held over a step
     counted: ClassVar[str] = ""
     is_drive: ClassVar[bool] = False  # whether its function gives the force of the drive
     sums_force: ClassVar[bool] = False  # whether it then adds it to the sum of a channel's state
