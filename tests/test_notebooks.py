@@ -4,6 +4,7 @@ without outputs.
 
 import ast
 import json
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -34,6 +35,24 @@ SAID = {
         tv = {(b.group["condition"], e.law): e.interval for b in boards if b.metric == "tv_rate" for e in b.entries}
         assert tv["noise", "my_law"].low > 1e3 * tv["nominal", "my_law"].high
         assert any(board.winner for board in boards)
+    """,
+    "pid_against_sliding_mode": """
+        late = [trace.u[2001:, 0] - trace.u[2001:, 0].mean() for trace in loaded]
+        amplitudes = [2.0 * abs(np.fft.rfft(u)) / u.size for u in late]
+        assert 170 < amplitudes[1][:250].argmax() < 195 and amplitudes[2].argmax() == 250
+        assert amplitudes[0].max() < 1e-4 < amplitudes[2].max() < 0.1 < amplitudes[1].max()
+        assert max(smc.score(trace)["ultimate_bound"] for trace in noisy) < 0.002
+        for check, right, wrong in (
+            (check_offset, [0.0216], [0.0205, 0.03]),
+            (check_load, [1.576], [1.3, 2.0]),
+            (check_width, [2.0], [0.5, 4.0]),
+        ):
+            assert [check(answer)[:5] for answer in right] == ["Right"]
+            assert [check(answer)[:7] for answer in wrong] == ["Not yet"] * 2
+        told = " ".join(str(compared).split())
+        assert "J on unseen runs of inverted_pendulum: no winner; pid and super_twisting" in told
+        assert "ITAE on inverted_pendulum under nominal: pid wins" in told
+        assert "ITAE on inverted_pendulum under noise: super_twisting wins" in told
     """,
     "your_robot": """
         largest = [abs(t.x - t.r)[t.t > 2.0].max() for t in (*traces, *worse)]
@@ -83,7 +102,7 @@ def test_a_notebook_is_kept_without_outputs_as_jupyter_saves_it(path):
 def test_a_notebook_runs_and_shows_what_its_text_says(path, tmp_path):
     if any("smc.show(" in text for text in code(path)) and gl.missing():
         pytest.skip(str(gl.missing()))
-    said = "\n".join(line.strip() for line in SAID[path.stem].strip().splitlines())
+    said = textwrap.dedent(SAID[path.stem])
     done = python(KERNEL, path, "shown.json", QUICK, said, folder=tmp_path)
     assert done.stdout == ""
     shown = json.loads((tmp_path / "shown.json").read_text())

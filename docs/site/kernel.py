@@ -22,6 +22,9 @@ class ZMQInteractiveShell(InteractiveShell):
     one.
     """
 
+    def enable_gui(self, gui=None):
+        """Do nothing: figures are shown in cells, without a window."""
+
 
 def main() -> None:
     """Run the notebook in the current folder; end with status 1 at the first cell that fails."""
@@ -32,6 +35,7 @@ def main() -> None:
         InteractiveShell={"ipython_dir": str(Path.cwd())}, HistoryManager={"enabled": False}
     )
     shell = ZMQInteractiveShell.instance(config=config)
+    shell.enable_matplotlib("inline")
     _shown(shell, before)
     shown = []
     for cell in cells:
