@@ -28,6 +28,9 @@ from smc_mujoco.simulation.force_bounds import U_MAX
 from smc_mujoco.simulation.gaber_study import PLANTS
 
 PROCESSES = 2
+# with as many searches as the usual laws: a board of all of them has no place for one more, see
+# `analysis.ranking`, but docs/where_sliding_mode_loses.md ranks it
+RANKED = (*gain_sets.COMPARED, "hodob")
 # searches of a law that is not on the first page, and of the set "tracking": too few for a verdict
 OTHERS = 3
 
@@ -50,10 +53,8 @@ class Task(NamedTuple):
 
 def tasks() -> Iterator[Task]:
     """Every law on every plant: those of the first page first, in the set that ranks them."""
-    yield from (
-        Task("tuned", plant, law, SEARCHES) for law in gain_sets.COMPARED for plant in PLANTS
-    )
-    others = [law for law in gain_sets.general() if law not in gain_sets.COMPARED]
+    yield from (Task("tuned", plant, law, SEARCHES) for law in RANKED for plant in PLANTS)
+    others = [law for law in gain_sets.general() if law not in RANKED]
     yield from (Task("tuned", plant, law, OTHERS) for law in others for plant in PLANTS)
     yield from (Task("tracking", plant, law, OTHERS) for law in gain_sets.LAWS for plant in PLANTS)
 

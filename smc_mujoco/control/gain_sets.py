@@ -7,8 +7,8 @@
   light of results.
 - tuned: the gains that independent searches by `tuning` found, for every general law, with a cost
   of the variation of u. The runs of a study use their sets in turn, run i that of search i, so that
-  gains are part of the sample. The laws of COMPARED have twelve searches, all others three, too few
-  for a verdict.
+  gains are part of the sample. The laws of COMPARED and `hodob` have twelve searches, all others
+  three, too few for a verdict.
 - tracking: the same for the laws of LAWS, of three searches, without that cost.
 - default: the default gains of the law.
 

@@ -7,13 +7,13 @@ import math
 import mujoco
 import numpy as np
 import pytest
-from helpers.plants_ab import called, constant, measured, plant_b
+from helpers.plants_ab import called, constant, measured, plant_b, ramp, sine
 from scipy.linalg import expm, solve_continuous_are, solve_discrete_are
 
 import smc_mujoco as smc
 from smc_mujoco.control.laws import loop_shaping, lqi, mpc
 
-RIVALS = ("adrc", "pd_observer", "lqi", "mpc", "loop_shaping")
+RIVALS = ("adrc", "pd_observer", "hodob", "lqi", "mpc", "loop_shaping")
 UNIT = {"a1": 0.0, "a2": 0.0, "b": 1.0}  # the plant e'' = u
 # a1, a2, b
 PLANTS = (
@@ -63,7 +63,7 @@ def bounded(name):
     """The law with b = 1, on e'' = u where it knows a plant, and with an integral of a rate of 1 /
     s or more.
     """
-    if name in ("adrc", "pd_observer"):
+    if name in ("adrc", "pd_observer", "hodob"):
         gains = {}
     else:
         gains = UNIT
@@ -190,6 +190,65 @@ def test_pd_observer_is_incremental_dynamic_inversion():
         u = min(max(of_u + (v - of_a) / b, -5.0), 5.0)
         assert call(law, memory, e=e, de=de, limit=5.0) == pytest.approx(u, abs=1e-9)
         last = de
+
+
+# PD with an observer of second order
+
+
+def loop_of_hodob(wc, l, g, h):
+    """The matrix from one sample of e'' = g u to the next, of e, de and the memory of the law with
+    b = 1.
+    """
+    law = smc.law("hodob", wc=wc, l=l, b=1.0)
+
+    def after(state):
+        e, de, *kept = state
+        memory = np.array([1.0, *kept])
+        u, _ = called(law, measured(e=e, de=de, dt=h), memory)
+        return [e + h * de + h * h / 2.0 * g * u, de + h * g * u, *memory[1:]]
+
+    return np.array([after(unit) for unit in np.eye(6)]).T
+
+
+@pytest.mark.parametrize(("wc", "l", "h"), [(3.0, 8.0, 1e-3), (5.0, 40.0, 0.02)])
+def test_hodob_has_its_observer_s_two_poles_beside_those_of_the_pd(wc, l, h):
+    poles = np.sort_complex(np.linalg.eigvals(loop_of_hodob(wc, l, 1.0, h)))
+    A = np.array([[1.0, h], [0.0, 1.0]]) - np.outer([h * h / 2.0, h], [wc * wc, 2.0 * wc])
+    exact = [0.0, 0.0, *np.linalg.eigvals(A), math.exp(-l * h), math.exp(-l * h)]
+    np.testing.assert_allclose(poles, np.sort_complex(exact), atol=1e-6)
+
+
+@pytest.mark.parametrize(("wc", "l"), [(3.0, 6.0), (3.0, 40.0), (8.0, 2.0)])
+def test_hodob_is_stable_from_the_input_gain_of_its_docstring_on(wc, l):
+    """Slowly sampled, and slow about its observer, up to that of the observer's loop alone."""
+    least = wc * l / (wc * wc + 3.0 * wc * l + l * l)
+    P = math.exp(-1.0)
+    most = 1.0 + (1.0 + P) ** 2 / ((1.0 - P) * (3.0 + P))
+    for bound, inside, *its in ((least, 1.02, wc, l, 1e-4), (most, 0.98, 1e-3, 1.0, 1.0)):
+        for factor, holds in ((inside, True), (1.0 / inside, False)):
+            loop = loop_of_hodob(*its[:2], factor * bound, its[2])
+            assert (np.abs(np.linalg.eigvals(loop)).max() < 1.0) == holds
+
+
+@pytest.mark.parametrize("h", [1e-3, 5e-3])
+def test_hodob_leaves_no_error_under_a_disturbance_of_constant_rate(h):
+    """Sampled, it leaves what holding u leaves, d' h^2 / (6 wc); `pd_observer` d' / (wc^2 l)."""
+    wc, l, rate = 4.0, 25.0, 0.7
+    rests = {"hodob": -rate * h * h / (6.0 * wc), "pd_observer": rate / (wc * wc * l)}
+    for (name, rest), precision in zip(rests.items(), (1e-4, 0.2), strict=True):
+        law = smc.law(name, wc=wc, l=l, b=1.0)
+        run = plant_b(law, constant(0.3) + ramp(rate), h=h, duration=12.0)
+        assert run.x[-1, 0] == pytest.approx(rest, rel=precision)
+
+
+def test_hodob_passes_a_sinusoidal_disturbance_as_its_transfer_function_does():
+    wc, l, omega, h = 4.0, 30.0, 6.0, 1e-4
+    law = smc.law("hodob", wc=wc, l=l, b=1.0)
+    run = plant_b(law, sine(1.0, omega), h=h, duration=6.0)
+    late = run.x[-round(4.0 * math.pi / omega / h) :, 0]
+    p = 1j * omega
+    exact = abs(p**2 / ((p + wc) ** 2 * (p + l) ** 2))
+    assert np.abs(late).max() == pytest.approx(exact, rel=5e-3)
 
 
 # LQR with an integral
