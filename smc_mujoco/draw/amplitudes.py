@@ -10,6 +10,7 @@ the dot is hollow.
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -81,48 +82,70 @@ def amplitudes(
         sources.append([trace.scenario.law.source for trace in its])
     gains, shared = pages.gain_sources(sources)
     handles = []
-    predicted = []
-    ticks = set()
+    drawn = []
     with style.page():
         page = pages.blank(style.FULL_WIDTH, PAGE_HEIGHT)
         ax = page.subplots()
         ax.set(xscale="log", yscale="log")
-        for (label, its), colour, source in zip(
-            runs.items(), style.law_colours(laws), gains, strict=True
-        ):
-            lags = []
-            sizes = []
-            swings = []
-            for trace in its:
-                lags.append(1e3 * lag(trace.scenario))
-                sizes.append(predict(trace.scenario, ranges=False).amplitude)
-                swings.append(channel_cycle(trace)[0])
-            ticks.update(lags)
-            predicted.append((lags, sizes))
-            ax.plot(lags, sizes, color=colour, lw=style.points(2.0))
-            for at, size, change in zip(lags, swings, step_halving(its, 0), strict=True):
-                look: Fields = {"color": colour, "mec": style.PAPER}
-                if change.marked:
-                    look = {"color": style.PAPER, "mec": colour}
-                ax.plot(at, size, "o", ms=style.points(7.0), **look)
+        rows = zip(runs.items(), style.law_colours(laws), gains, strict=True)
+        for (label, its), colour, source in rows:
+            over_lag = amplitudes_of(its)
+            drawn.append(over_lag)
+            draw_law(ax, its, over_lag, colour)
             words = f"{style.label(label)}{source}"
-            if not np.nan_to_num([*sizes, *swings]).any():
+            if not over_lag.cycles:
                 words += ": no limit cycle"
             handles.append(pages.entry(words, colour))
-        if len(predicted) == 2:
-            (lags, one), (_, other) = predicted
-            mark_crossover(ax, crossover(lags, one, other))
+        if len(drawn) == 2:
+            one, other = drawn
+            mark_crossover(ax, crossover(one.lags, one.predicted, other.predicted))
         dot = {"marker": "o", "lw": 0.0}
         handles.append(pages.entry("predicted", lw=style.points(1.5)))
         handles.append(pages.entry("run", **dot))
         label = "run that differs when repeated"
         handles.append(pages.entry(label, style.PAPER, mec=style.MUTED, **dot))
-        factor, unit = style.prefixed(
-            ax.dataLim.ymax, f"{next(iter(runs.values()))[0].scenario.plant.unit}/s"
-        )
+        plant = next(iter(runs.values()))[0].scenario.plant
+        factor, unit = style.prefixed(ax.dataLim.ymax, f"{plant.unit}/s")
+        ticks = {tick for over_lag in drawn for tick in over_lag.lags}
         set_axes(ax, sorted(ticks), factor, unit)
         pages.set_head(page, style.FULL_WIDTH, title, handles, shared)
         return pages.write(page, pages.files(path))
+
+
+class OverLag(NamedTuple):
+    """The amplitudes of a law's runs, by lag."""
+
+    lags: list[float]  # ms
+    predicted: list[float]  # of s, 0 or NaN without a limit cycle
+    run: list[float]
+
+    @property
+    def cycles(self) -> bool:
+        """Whether any limit cycle is predicted or run."""
+        return bool(np.nan_to_num([*self.predicted, *self.run]).any())
+
+
+def amplitudes_of(traces: Sequence[Trace]) -> OverLag:
+    """Return the amplitudes of s of the first channel of a law's runs."""
+    lags = []
+    sizes = []
+    swings = []
+    for trace in traces:
+        lags.append(1e3 * lag(trace.scenario))
+        sizes.append(predict(trace.scenario, ranges=False).amplitude)
+        swings.append(channel_cycle(trace)[0])
+    return OverLag(lags, sizes, swings)
+
+
+def draw_law(ax: Axes, traces: Sequence[Trace], over_lag: OverLag, colour: str) -> None:
+    """Draw a line through the predicted amplitudes, and a dot for each run."""
+    ax.plot(over_lag.lags, over_lag.predicted, color=colour, lw=style.points(2.0))
+    changes = step_halving(traces, 0)
+    for at, size, change in zip(over_lag.lags, over_lag.run, changes, strict=True):
+        look: Fields = {"color": colour, "mec": style.PAPER}
+        if change.marked:
+            look = {"color": style.PAPER, "mec": colour}
+        ax.plot(at, size, "o", ms=style.points(7.0), **look)
 
 
 def set_axes(ax: Axes, lags: Sequence[float], factor: float, unit: str) -> None:

@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,13 +22,14 @@ from smc_mujoco.analysis.paired_runs import (
     unit_of_x,
 )
 from smc_mujoco.analysis.ranking import linked
-from smc_mujoco.common.aliases import AnyPath, Fields
+from smc_mujoco.common.aliases import AnyPath, Array, Fields
 from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
 from smc_mujoco.common.text import number
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Handle, Size
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.trace import Trace
 
@@ -81,23 +83,59 @@ def plot(
     check_table(table)
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
-    names = items_of("metrics", metrics)
-    for name in names:
+    dots = _dots(table, items_of("metrics", metrics), winners)
+    with style.page(width):
+        key, shared = _key(table, dots.looks, list(dots.intervals.values()), bool(dots.won))
+        across = 1 if width < pages.NARROW else len(dots.metrics)
+        tall = WORDS_HEIGHT + LINE_HEIGHT * dots.lines
+        heights = np.repeat(tall, len(dots.metrics) // across)
+        space = pages.head_height(width, key) + style.points(0.6)
+        page = pages.blank(width, height or space + style.points(heights.sum()), fig)
+        axes = page.subplots(len(heights), across, squeeze=False, height_ratios=heights.tolist())
+        by_plant = axes.reshape(len(dots.conditions), -1)
+        for plant, high, row in zip(dots.conditions, tall, by_plant, strict=True):
+            _draw_plant(row, dots, plant, across == 1)
+            words = ""
+            if title or len(dots.conditions) > 1:
+                words = style.plant_name(dots.labels[plant])
+            above = 1.0 + 1.7 * pages.TEXT_SIZE / 72 / (high - WORDS_HEIGHT)  # the note
+            row[0].set_title(words, y=above, parse_math=False)
+        pages.set_head(page, width, title or f"Medians: {dots.heading}", key, shared)
+        return pages.write(page, paths)
+
+
+class Dots(NamedTuple):
+    """What a page shows."""
+
+    metrics: list[str]
+    conditions: dict[str, list[str]]  # plant -> those in which it ran
+    looks: dict[str, Fields]  # law -> colour and mark
+    intervals: dict[Cell, Interval]
+    won: set[Cell]  # those with a ring
+    units: dict[str, str]  # plant -> unit of positions
+    labels: dict[str, Plant | str]  # plant -> what pictures call it
+    heading: str  # plants and conditions in words
+
+    @property
+    def lines(self) -> Array:
+        """The number of lines of each plant's panels, (plants,)."""
+        blocks = np.array(list(map(len, self.conditions.values())))
+        return (len(self.looks) + 1) * blocks
+
+
+def _dots(table: RunColumns, metrics: Sequence[str], winners: Collection[Cell]) -> Dots:
+    """Return what a page shows of a table. Raise ScenarioError for an unknown metric, or if nothing
+    is to be drawn.
+    """
+    for name in metrics:
         if name != SETTLES and name not in CATALOGUE:
             raise unknown("metric", name, [SETTLES, *CATALOGUE])
-    plants = list(dict.fromkeys(table.column("plant").tolist()))
-    laws = list(dict.fromkeys(table.column("law").tolist()))
-    conditions = list(dict.fromkeys(table.column("condition").tolist()))
-    if not plants or not names:
+    plants, laws, conditions = (_distinct(table, name) for name in ("plant", "law", "condition"))
+    if not plants or not metrics:
         raise ScenarioError(
             "no runs or no metrics to draw: give a table with rows, and at least one metric"
         )
-    looks = {}
-    for law, colour, mark in zip(
-        laws, style.law_colours(laws), itertools.cycle(style.MARKS), strict=False
-    ):
-        looks[law] = {"color": colour, "marker": mark, "mec": "none"}
-    intervals = _intervals(table, names)
+    intervals = _intervals(table, metrics)
     ran = set(zip(table.column("plant").tolist(), table.column("condition").tolist(), strict=True))
     conditions_of = {}
     for plant in plants:
@@ -106,32 +144,46 @@ def plot(
     labels = {}
     for group in groups(table, GROUPS[:1]):
         plant = group.name["plant"]
-        units[plant] = unit_of_x(plant, runs := scenarios(table, group))
+        runs = scenarios(table, group)
+        units[plant] = unit_of_x(plant, runs)
         labels[plant] = next((one.plant for one in runs if one), plant)
-    with style.page(width):
-        won = intervals.keys() & set(winners)
-        key, shared = _key(table, looks, list(intervals.values()), bool(won))
-        rows = (len(laws) + 1) * np.array(list(map(len, conditions_of.values())))
-        tall = WORDS_HEIGHT + LINE_HEIGHT * rows
-        space = pages.head_height(width, key) + style.points(0.6)
-        across = 1 if width < pages.NARROW else len(names)
-        heights = np.repeat(tall, len(names) // across)
-        page = pages.blank(width, height or space + style.points(heights.sum()), fig)
-        axes = page.subplots(len(heights), across, squeeze=False, height_ratios=heights.tolist())
-        for plant, high, of_plant in zip(plants, tall, axes.reshape(len(plants), -1), strict=True):
-            for ax, name in zip(of_plant, names, strict=True):
-                here = name, plant
-                of_panel = {cell[2:]: its for cell, its in intervals.items() if cell[:2] == here}
-                rings = [cell[2:] for cell in won if cell[:2] == here]
-                _panel(ax, of_panel, conditions_of[plant], looks, name, rings)
-                ax.set_xlabel(_label(name, units[plant]))
-                ax.tick_params(labelleft=across == 1 or ax is of_plant[0])
-            words = style.plant_name(labels[plant]) if title or len(plants) > 1 else ""
-            above = 1.0 + 1.7 * pages.TEXT_SIZE / 72 / (high - WORDS_HEIGHT)  # the note
-            of_plant[0].set_title(words, y=above, parse_math=False)
-        heading = style.heading([*labels.values()], conditions, short=len(plants) > 1)
-        pages.set_head(page, width, title or f"Medians: {heading}", key, shared)
-        return pages.write(page, paths)
+    return Dots(
+        metrics=list(metrics),
+        conditions=conditions_of,
+        looks=_looks(laws),
+        intervals=intervals,
+        won=intervals.keys() & set(winners),
+        units=units,
+        labels=labels,
+        heading=style.heading([*labels.values()], conditions, short=len(plants) > 1),
+    )
+
+
+def _distinct(table: RunColumns, column: str) -> list[str]:
+    """Return the values of a column in the order of the rows."""
+    return list(dict.fromkeys(table.column(column).tolist()))
+
+
+def _looks(laws: Sequence[str]) -> dict[str, Fields]:
+    """Return law -> the colour and the mark of its dots."""
+    looks = {}
+    marks = itertools.cycle(style.MARKS)
+    for law, colour in zip(laws, style.law_colours(laws), strict=True):
+        looks[law] = {"color": colour, "marker": next(marks), "mec": "none"}
+    return looks
+
+
+def _draw_plant(row: Sequence[Axes], dots: Dots, plant: str, named: bool) -> None:
+    """Draw a panel of each metric of a plant; laws are named at the first, or at all if
+    `named`.
+    """
+    for ax, name in zip(row, dots.metrics, strict=True):
+        here = name, plant
+        of_panel = {cell[2:]: its for cell, its in dots.intervals.items() if cell[:2] == here}
+        rings = [cell[2:] for cell in dots.won if cell[:2] == here]
+        _panel(ax, of_panel, dots.conditions[plant], dots.looks, name, rings)
+        ax.set_xlabel(_label(name, dots.units[plant]))
+        ax.tick_params(labelleft=named or ax is row[0])
 
 
 def _intervals(table: RunColumns, metrics: Sequence[str]) -> dict[Cell, Interval]:

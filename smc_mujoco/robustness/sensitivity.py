@@ -232,12 +232,7 @@ def sensitivity(
         raise ScenarioError(
             f"sensitivity is of a Scenario, not {shown(scenario)}: give smc.Scenario(...)"
         )
-    if within is None:
-        within = default_class(scenario)
-    if not isinstance(within, Uncertainty):
-        raise ScenarioError(
-            f"within is {shown(within)}: give a class, such as smc.Uncertainty(delay=(0.0, 0.02))"
-        )
+    within = _checked_class(within, scenario)
     entry = metric_of(scenario.plant, metric)
     space = Space(scenario, within)
     points = _checked_points(points, space)
@@ -248,13 +243,7 @@ def sensitivity(
     words = f"sensitivity of {scenario.law.name} on {scenario.plant.name}"
     with bar(words, work, shown=progress) as drawn:
         scores, held = _run(space, design, fast, drawn.advance)
-    unscored = ~np.isfinite(scores)
-    if unscored.all():
-        cure = "give longer runs, another metric or a narrower class"
-        if broken := fast.broken.get(scenario.law.name, ""):
-            cure = f"{broken}: correct the law"
-        raise ScenarioError(f"no run of {len(scores)} has a {metric}: {cure}")
-    runs = DesignRuns(design, np.where(unscored, scores[~unscored].max(), scores), unscored, ~held)
+    runs = _of_design(design, scores, held, metric, fast.broken.get(scenario.law.name, ""))
     return _explained(entry, space, runs, points, seed, fast.checked())
 
 
@@ -265,6 +254,17 @@ class DesignRuns(NamedTuple):
     scores: Array  # (N,), of a run without one the worst of the others
     unscored: Array  # (N,) bool
     failed: Array  # (N,) bool, whether it fails or ends beyond 5 % of its scale
+
+
+def _checked_class(within: object, scenario: Scenario) -> Uncertainty:
+    """Return the class, by default `default_class`."""
+    if within is None:
+        return default_class(scenario)
+    if not isinstance(within, Uncertainty):
+        raise ScenarioError(
+            f"within is {shown(within)}: give a class, such as smc.Uncertainty(delay=(0.0, 0.02))"
+        )
+    return within
 
 
 def _checked_points(points: int | None, space: Space) -> int:
@@ -295,6 +295,20 @@ def _run(
             scores[i] = math.inf if failed is not None else score
             held[i] = failed is None and share <= TOLERATED_ERROR
     return scores, held
+
+
+def _of_design(design: Array, scores: Array, held: Array, metric: str, broken: str) -> DesignRuns:
+    """Return the runs of a design. Raise ScenarioError if none has a score; `broken` says how the
+    law failed, or is "".
+    """
+    unscored = ~np.isfinite(scores)
+    if unscored.all():
+        cure = "give longer runs, another metric or a narrower class"
+        if broken:
+            cure = f"{broken}: correct the law"
+        raise ScenarioError(f"no run of {len(scores)} has a {metric}: {cure}")
+    ranked = np.where(unscored, scores[~unscored].max(), scores)
+    return DesignRuns(design, ranked, unscored, ~held)
 
 
 def _explained(
