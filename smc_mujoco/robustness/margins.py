@@ -433,56 +433,23 @@ def margins_of(
     device: str = "cpu",
 ) -> list[Margin]:
     """Return the margins of any scenarios, as `margins` does; the resolution is FINE or COARSE."""
-    cells = []
-    for base in bases:
-        for kind in kinds:
-            cells.append((base, find("kind of margin", kind, MARGIN_KINDS)))
-    searches = [kind.search(base, resolution) for base, kind in cells]
+    cells = Cells(bases, kinds, resolution, report)
     # a coarse search by MuJoCo takes less time than compiling its law for the fast engine
     runs = ScoredRuns({"rest_share": rest_share}, device, threads, resolution != COARSE)
-    done = 0
-
-    def tolerated(tried: Sequence[tuple[int, float | None]], runner: Callable) -> list[bool]:
-        """Return whether the levels of these searches are tolerated; None is the unchanged run."""
-        nonlocal done
-        scenarios = []
-        owners = []
-        for k, (i, level) in enumerate(tried):
-            base, kind = cells[i]
-            some = [base] if level is None else kind.scenarios(base, level)
-            scenarios += some
-            owners += [k] * len(some)
-        now = sum(scenario.work for scenario in scenarios)
-        expected = 0
-        for (base, kind), search in zip(cells, searches, strict=True):
-            signs = 2 if kind.signed else 1
-            expected += search.left * base.work * signs
-        results = [True] * len(tried)
-        scores = runner(scenarios, summed(report, done, done + max(now, expected)))
-        for k, ((share,), _) in zip(owners, scores, strict=True):
-            results[k] &= share <= TOLERATED_ERROR
-        done += now
-        return results
-
-    firsts = [(i, None) for i in range(0, len(cells), len(kinds))]
-    held = tolerated(firsts, runs.by_mujoco)
-    going = {i: search for i, search in enumerate(searches) if held[i // len(kinds)]}
-    find_boundaries(going, lambda tried: tolerated(tried, runs.scored))
-    ends = []  # MuJoCo has the last word on them
-    for i, search in going.items():
-        base, kind = cells[i]
-        for level in (search.low, search.high):
-            inside = kind.none < level < math.inf
-            if inside and runs.covers(kind.scenarios(base, level)[0]):
-                ends.append((i, level))
-    again = {}
-    for (i, level), good in zip(ends, tolerated(ends, runs.by_mujoco), strict=True):
+    unchanged = [(i, None) for i in range(0, len(cells.pairs), len(kinds))]
+    held = cells.tolerated(unchanged, runs.by_mujoco)
+    going = {i: one for i, one in enumerate(cells.searches) if held[i // len(kinds)]}
+    find_boundaries(going, lambda tried: cells.tolerated(tried, runs.scored))
+    again = {}  # MuJoCo has the last word on the ends
+    ends = cells.ends_by(going, runs.covers)
+    for (i, level), good in zip(ends, cells.tolerated(ends, runs.by_mujoco), strict=True):
         if good != (level == going[i].low):
-            again[i] = searches[i] = cells[i][1].search(cells[i][0], resolution)
-    find_boundaries(again, lambda tried: tolerated(tried, runs.by_mujoco))
+            again[i] = cells.begin(i)
+    find_boundaries(again, lambda tried: cells.tolerated(tried, runs.by_mujoco))
     warn_of_broken(runs.broken)
-    return [
-        Margin(
+    margins = []
+    for i, ((base, kind), search) in enumerate(zip(cells.pairs, cells.searches, strict=True)):
+        margin = Margin(
             plant=base.plant.name,
             law=base.law.name,
             kind=kinds[i % len(kinds)],
@@ -492,5 +459,68 @@ def margins_of(
             searched=search.levels[-1],
             theory=kind.expected(base),
         )
-        for i, ((base, kind), search) in enumerate(zip(cells, searches, strict=True))
-    ]
+        margins.append(margin)
+    return margins
+
+
+Tried = tuple[int, float | None]  # a cell and its level; None is the unchanged run
+
+
+class Cells:
+    """A search for the boundary of each kind of margin of each scenario."""
+
+    def __init__(
+        self, bases: Sequence[Scenario], kinds: Sequence[str], resolution: float, report: Report
+    ):
+        self.pairs = []  # scenario and kind, the kind varies faster
+        for base in bases:
+            for kind in kinds:
+                self.pairs.append((base, find("kind of margin", kind, MARGIN_KINDS)))
+        self.resolution = resolution
+        self.report = report
+        self.done = 0  # work
+        self.searches = [kind.search(base, resolution) for base, kind in self.pairs]
+
+    def begin(self, i: int) -> LevelSearch:
+        """Begin the search of a cell again, and return it."""
+        base, kind = self.pairs[i]
+        self.searches[i] = kind.search(base, self.resolution)
+        return self.searches[i]
+
+    @property
+    def left(self) -> int:
+        """The work that the searches may still need."""
+        left = 0
+        for (base, kind), search in zip(self.pairs, self.searches, strict=True):
+            signs = 2 if kind.signed else 1
+            left += search.left * base.work * signs
+        return left
+
+    def tolerated(self, tried: Sequence[Tried], runner: Callable) -> list[bool]:
+        """Return whether these levels are tolerated."""
+        scenarios = []
+        owners = []
+        for k, (i, level) in enumerate(tried):
+            base, kind = self.pairs[i]
+            some = [base] if level is None else kind.scenarios(base, level)
+            scenarios += some
+            owners += [k] * len(some)
+        now = sum(scenario.work for scenario in scenarios)
+        whole = self.done + max(now, self.left)
+        results = [True] * len(tried)
+        scores = runner(scenarios, summed(self.report, self.done, whole))
+        for k, ((share,), _) in zip(owners, scores, strict=True):
+            results[k] &= share <= TOLERATED_ERROR
+        self.done += now
+        return results
+
+    def ends_by(self, found: Mapping[int, LevelSearch], covers: Callable) -> list[Tried]:
+        """Return the ends of the intervals whose runs something covers."""
+        ends = []
+        for i, search in found.items():
+            base, kind = self.pairs[i]
+            for level in (search.low, search.high):
+                inside = kind.none < level < math.inf
+                if inside and covers(kind.scenarios(base, level)[0]):
+                    ends.append((i, level))
+        return ends
