@@ -164,11 +164,8 @@ class Comparison:
         self.floors = np.broadcast_to(np.asarray(floors, float), blocks)
         self.first_order = np.broadcast_to(np.asarray(first_order, bool), blocks)
         self.low, self.high = bounds(self.cells, self.halves, rises, self.floors, shares, relevant)
-        plain = self.cells
-        self.beyond = relevant  # what d must exceed
-        if not shares:
-            plain = _logarithms(self.cells, self.floors)
-            self.beyond = -math.log1p(-relevant)
+        plain = self.cells if shares else _logarithms(self.cells, self.floors)
+        self.beyond = relevant if shares else -math.log1p(-relevant)  # what d must exceed
         ran = ~np.isnan(self.cells[0])
         # runs that failed, have no value or have not arrived
         self.away = np.isinf(self.cells) | (self._cube(arrived, 1) == 0)
@@ -178,26 +175,19 @@ class Comparison:
         # d of the first law over the second by unit, then NaN; and without halves and trends
         self.leads = np.full((blocks, count, count, seeds), math.nan)
         self.plain = self.leads.copy()
-        charged = self.leads, self.low, self.high
-        as_run = self.plain, plain, plain
         for k in range(blocks):
             for a in range(count):
-                self.sets[a, k] = np.unique(gains[a, k, ran[k]]).size
-                alone = linked(gains[a, k, ran[k]])
-                self.units[a, k] = ran[k].sum() if alone is None else max(alone) + 1
+                self.sets[a, k], self.units[a, k] = _counted(gains[a, k, ran[k]])
                 # the law alone, then beside each other
                 for b in range(a + 1):
                     pair = sorted({a, b})
                     first = first_of_kind(results[pair, k][:, None], ran[[k]])[0]
                     units = linked(*gains[pair, k][:, first])
-                    if b == a and self.floors[k] > 0.0 and not shares:
-                        # of an even number, the median is above q if only half are at most q
-                        centre = middle(_by_unit(self.high[a, k, first], units, seeds))
-                        self.below[a, k] = centre <= math.log(self.floors[k])
-                    for i, j in itertools.permutations(pair, 2):
-                        for leads, low, high in charged, as_run:
-                            by_run = _difference(low[j, k], high[i, k])[first]
-                            leads[k, i, j] = _by_unit(by_run, units, seeds)
+                    if a == b:
+                        self.below[a, k] = self._is_below(a, k, first, units)
+                    else:
+                        self._lead(a, b, k, first, units, plain)
+                        self._lead(b, a, k, first, units, plain)
         # (blocks, laws, laws), one-sided p-value, not corrected, that a law is better; 1 of itself
         self.p = p_values(self.leads - self.beyond)
         self.p[self.both_below] = 1.0
@@ -206,6 +196,33 @@ class Comparison:
         self.error = WIN_ERROR / looks  # of any wrong winner
         self.winning = self.first = self.error  # after Holm's last step, and after his first
         corrected([self])
+
+    def _is_below(
+        self, law: int, block: int, runs: np.ndarray, units: tuple[int, ...] | None
+    ) -> bool:
+        """Return whether a law's high values are below the floor in more than half of its units."""
+        floor = self.floors[block]
+        if self.shares or floor <= 0.0:
+            return False
+        high = _by_unit(self.high[law, block, runs], units, self.cells.shape[2])
+        # of an even number, the median is above q if only half are at most q
+        return bool(middle(high) <= math.log(floor))
+
+    def _lead(
+        self,
+        law: int,
+        rival: int,
+        block: int,
+        runs: np.ndarray,
+        units: tuple[int, ...] | None,
+        plain: np.ndarray,
+    ) -> None:
+        """Set the lead of a law over a rival by unit, and that without halves and trends."""
+        seeds = self.cells.shape[2]
+        charged = _difference(self.low[rival, block], self.high[law, block])[runs]
+        as_run = _difference(plain[rival, block], plain[law, block])[runs]
+        self.leads[block, law, rival] = _by_unit(charged, units, seeds)
+        self.plain[block, law, rival] = _by_unit(as_run, units, seeds)
 
     def _cube(self, by_law: Mapping[str, ArrayLike] | None, unknown: ArrayLike) -> np.ndarray:
         if by_law:
@@ -418,6 +435,12 @@ def _by_unit(by_run: np.ndarray, units: tuple[int, ...] | None, size: int) -> np
         # between two opposite infinite values lies 0
         centres[unit] = np.nan_to_num(middle(of_unit), nan=0.0, posinf=np.inf, neginf=-np.inf)
     return centres
+
+
+def _counted(sets: np.ndarray) -> tuple[int, int]:
+    """Return the number of sets of gains and the number of units of a law's runs, (runs,)."""
+    units = linked(sets)
+    return np.unique(sets).size, sets.size if units is None else max(units) + 1
 
 
 def linked(*sets: np.ndarray) -> tuple[int, ...] | None:

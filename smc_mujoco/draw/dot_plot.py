@@ -95,9 +95,8 @@ def plot(
         by_plant = axes.reshape(len(dots.conditions), -1)
         for plant, high, row in zip(dots.conditions, tall, by_plant, strict=True):
             _draw_plant(row, dots, plant, across == 1)
-            words = ""
-            if title or len(dots.conditions) > 1:
-                words = style.plant_name(dots.labels[plant])
+            named = title or len(dots.conditions) > 1
+            words = style.plant_name(dots.labels[plant]) if named else ""
             above = 1.0 + 1.7 * pages.TEXT_SIZE / 72 / (high - WORDS_HEIGHT)  # the note
             row[0].set_title(words, y=above, parse_math=False)
         pages.set_head(page, width, title or f"Medians: {dots.heading}", key, shared)

@@ -159,65 +159,92 @@ def _composed_page(
     controls of single channels, and what is not over the same time.
     """
     width, height = size
-    traces = runs.traces
-    early = [drawing.until(trace, runs.span[0]) for trace in traces]
-    left: list[Panel] = []
-    right: list[Panel] = []
-    worst: list[Panel] = []
-    if "channels" in chosen:
-        worst = drawing.worst_first(early)
-        left += worst[:MAX_WORST]
-        right += _controls(left, early)
-    for name, quantity in TIME_PANELS.items():
-        if name in chosen:
-            panels = drawing.over_groups(early, quantity)
-            left += panels if name == "d" else _by_joint(panels)
-    groups = [Panel("x", *each) for each in style.split(traces).items()]
-    portraits = _by_joint(groups)
-    beside = []
-    for name in chosen:
-        if name in SIDE_PANELS:
-            beside += [name] * (len(portraits) if name == "phase" else 1)
-    handles, gains = pages.run_handles(traces, runs.names, runs.colours)
-    key = _key([*left, *right])
-    if right and len(worst) > MAX_WORST:
-        words = f"the {MAX_WORST} worst of {len(worst)} channels"
-        key.append(pages.entry(words, lw=0))
+    blocks = _blocks(runs, chosen)
+    handles, gains = pages.run_handles(runs.traces, runs.names, runs.colours)
+    key = _key([*blocks.left, *blocks.right])
+    if blocks.left_out:
+        key.append(pages.entry(blocks.left_out, lw=0))
     narrow = width < pages.NARROW
     if not narrow:
         handles += key
-    blocks = (
-        list(map(_height, left)),
-        list(map(_height, right)),
-        [SIDE_PANELS[name] for name in beside],
-    )
-    columns = [(0, 1, 2)] if narrow else [(0,), (1, 2)]  # of blocks
-    parts = {}
-    for column in columns:
-        if high := sum(sum(blocks[k]) for k in column):
-            parts[column] = high
-    if not parts:
+    columns = _columns(blocks, narrow)
+    if not columns:
         raise ScenarioError(
             f"panels is {list(chosen)}: give a panel that the plant has, or leave panels out"
         )
     least = 0.0
     if not narrow:
-        least = 4.0 if beside else 1.0
+        least = 4.0 if blocks.beside else 1.0
     space = pages.head_height(width, handles)
-    rows = max(*parts.values(), least)
-    tall = height or _usual_height(width, space, rows, sum(map(len, blocks)))
+    rows = max(*columns.values(), least)
+    heights = blocks.heights
+    tall = height or _usual_height(width, space, rows, sum(map(len, heights)))
     page = pages.blank(width, tall, fig)
     free = 72 * (page.bbox.height / page.dpi - space - 0.4)  # points
-    cells = _cells(page, list(parts), blocks)
-    for k, panels in ((0, left), (1, right)):
-        pitch = free / max(1.0, parts.get(columns[min(k, len(columns) - 1)], 0.0))
-        words = drawing.titles(panels, (pitch * np.array(blocks[k])).tolist())
+    cells = _cells(page, list(columns), heights)
+    for k, panels in ((0, blocks.left), (1, blocks.right)):
+        rows = next((high for column, high in columns.items() if k in column), 1.0)
+        pitch = free / max(1.0, rows)
+        words = drawing.titles(panels, (pitch * np.array(heights[k])).tolist())
         _draw_over_time(page, cells[k], list(zip(panels, words, strict=True)), runs, k == 0)
-    _draw_beside(page, cells[2], beside, (groups[0], *portraits), runs)
+    _draw_beside(page, cells[2], blocks.beside, blocks.places, runs)
     pages.set_head(page, width, title or runs.head, handles, gains)
     page.set_label("; ".join(str(one.get_label()) for one in key))
     pages.space_ticks(page)
     return page
+
+
+class Blocks(NamedTuple):
+    """The panels of a page in its three blocks."""
+
+    left: list[Panel]  # over time
+    right: list[Panel]  # over time, the controls of single channels
+    beside: list[str]  # names of SIDE_PANELS, what is not over the same time
+    places: list[Panel]  # of these: the first group, then the portraits
+    left_out: str  # channels that have no panel, in words
+
+    @property
+    def heights(self) -> tuple[list[float], list[float], list[float]]:
+        """The relative heights of the panels of each block."""
+        beside = [SIDE_PANELS[name] for name in self.beside]
+        return list(map(_height, self.left)), list(map(_height, self.right)), beside
+
+
+def _blocks(runs: DrawnRuns, chosen: Sequence[str]) -> Blocks:
+    """Return the chosen panels of traces."""
+    early = [drawing.until(trace, runs.span[0]) for trace in runs.traces]
+    left: list[Panel] = []
+    right: list[Panel] = []
+    left_out = ""
+    if "channels" in chosen:
+        worst = drawing.worst_first(early)
+        left += worst[:MAX_WORST]
+        right += _controls(left, early)
+        if right and len(worst) > MAX_WORST:
+            left_out = f"the {MAX_WORST} worst of {len(worst)} channels"
+    for name, quantity in TIME_PANELS.items():
+        if name in chosen:
+            panels = drawing.over_groups(early, quantity)
+            left += panels if name == "d" else _by_joint(panels)
+    groups = [Panel("x", *each) for each in style.split(runs.traces).items()]
+    portraits = _by_joint(groups)
+    beside = []
+    for name in chosen:
+        if name in SIDE_PANELS:
+            beside += [name] * (len(portraits) if name == "phase" else 1)
+    return Blocks(left, right, beside, [groups[0], *portraits], left_out)
+
+
+def _columns(blocks: Blocks, narrow: bool) -> dict[tuple[int, ...], float]:
+    """Return a page's columns, the numbers of their blocks, with their relative heights; those that
+    have panels.
+    """
+    sums = list(map(sum, blocks.heights))
+    if narrow:
+        columns = {(0, 1, 2): sum(sums)}
+    else:
+        columns = {(0,): sums[0], (1, 2): sums[1] + sums[2]}
+    return {column: high for column, high in columns.items() if high}
 
 
 def _usual_height(width: float, space: float, rows: float, panels: int) -> float:

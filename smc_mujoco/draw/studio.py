@@ -76,11 +76,7 @@ def view(
       ScenarioError: MuJoCo is older than 4.0.1, this process had a view already, or a law does not
         suit the machine.
     """
-    if importlib.util.find_spec("mujoco.studio") is None:
-        raise ScenarioError(
-            f"no view: MuJoCo {mujoco.__version__} has no Studio: it comes with MuJoCo 4.0.1, "
-            "which is not on the package index yet"
-        )
+    _check_studio()
     runs = runs_of(scenario, laws)
     from mujoco.studio import app, launch_web, viewer_protocol, web_viewer
     from mujoco.studio.web import web_server
@@ -93,6 +89,31 @@ def view(
     door.bind("", port)
     print(f"{door.address} answers once the laws are compiled, in up to 20 s", flush=True)
     session = Session(runs)
+    _serve_at(door, web_server, web_viewer)
+    config = viewer_protocol.ViewerConfig(
+        title="smc_mujoco", gfx="web", http_port=port, open_browser=open_browser
+    )
+    panel = StudioPanel(session)
+    # without what is of a simulation that is not ours
+    shell = app.App(app.Config(show_options=False, show_inspector=False))
+    with tempfile.TemporaryDirectory() as folder, contextlib.suppress(KeyboardInterrupt):
+        put_page(Path(web_server.__file__).parent / "dist", Path(folder))
+        with launch_web.launch(config, plugins=[shell, panel]) as page:
+            show(session, page, panel)
+    return session.scenarios
+
+
+def _check_studio() -> None:
+    """Raise ScenarioError if MuJoCo has no Studio."""
+    if importlib.util.find_spec("mujoco.studio") is None:
+        raise ScenarioError(
+            f"no view: MuJoCo {mujoco.__version__} has no Studio: it comes with MuJoCo 4.0.1, "
+            "which is not on the package index yet"
+        )
+
+
+def _serve_at(door: Door, web_server: Any, web_viewer: Any) -> None:
+    """Let Studio's modules serve their page at a door, and open its address."""
     web_server.bind_public_socket = door.bind
     web_server.bind_loopback_socket = door.bind_inner
     web_server.serve = door.serve
@@ -100,18 +121,6 @@ def view(
     web_viewer.webbrowser = types.SimpleNamespace(
         open=lambda url, new: webbrowser.open(door.address, new)
     )
-    config = viewer_protocol.ViewerConfig(
-        title="smc_mujoco", gfx="web", http_port=port, open_browser=open_browser
-    )
-    panel = StudioPanel(session)
-    shell = app.App(
-        app.Config(show_options=False, show_inspector=False)
-    )  # of a simulation that is not ours
-    with tempfile.TemporaryDirectory() as folder, contextlib.suppress(KeyboardInterrupt):
-        put_page(Path(web_server.__file__).parent / "dist", Path(folder))
-        with launch_web.launch(config, plugins=[shell, panel]) as page:
-            show(session, page, panel)
-    return session.scenarios
 
 
 def put_page(original: Path, folder: Path) -> None:

@@ -20,7 +20,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array, ArrayPair
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
 from smc_mujoco.control.law import FREE_BODY, law_function
-from smc_mujoco.envs.tasks import FLIGHT_TASKS, TASKS, rest, reward, starts, tasks
+from smc_mujoco.envs.tasks import FLIGHT_TASKS, TASKS, Task, rest, reward, starts, tasks
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant, check_ranges
 from smc_mujoco.simulation import callback, coerce, state
@@ -79,21 +79,7 @@ class Setting:
         that `flies` is a free body.
         """
         plant = as_plant(plant)
-        self.task = find("task", task, TASKS)
-        known = FLIGHT_TASKS if flies else tasks(plant)
-        if plant.pose and not flies:
-            raise ScenarioError(
-                f"{plant.name} is a free body: make its environment by gymnasium.make, and copies "
-                "by make_vec(..., vectorization_mode='sync')"
-            )
-        if flies and not plant.pose:
-            raise ScenarioError(
-                f"{plant.name} is no free body: make its environment by gymnasium.make"
-            )
-        if not isinstance(task, str) or task not in known:
-            raise ScenarioError(
-                f"task {shown(task)} is not for {plant.name}: choose from {', '.join(known)}"
-            )
+        self.task = _task(task, plant, flies)
         changes = _checked({} if changes is None else changes, task)
         # the run that equals an episode
         fields = {"plant": plant, "law": "none"} | self.task.fields(plant) | changes
@@ -111,17 +97,7 @@ class Setting:
         self.low, self.high = starts(self.task, plant)
         if changes.get("x0") is not None:
             self.low = self.high = np.array(self.scenario.x0)
-        spec = models.spec(self.scenario)
-        edit(spec)
-        base = models.compiled(spec, self.scenario, models.USERDATA)
-        self.model = models.with_values(base, self.scenario)
-        table = channels(self.model)
-        self.mechanism = models.Mechanism(base, table)
-        self.qpos = table["qpos"]  # addresses of the channels, (n,)
-        self.qvel = table["qvel"]
-        self.joints = models.moving_joints(self.model)
-        # addresses of the driven channels' actuators, (driven,)
-        self.ctrl = table["ctrl"][: plant.driven]
+        self._compile(edit)
         # the largest commands, (driven,), and the actuators' inputs per unit of them
         self.limits = np.array(self.scenario.limits)
         self.scale = np.array(self.scenario.drive_train.scales)
@@ -141,6 +117,20 @@ class Setting:
         self.rest_r = np.zeros(width)
         if plant.rest:
             self.rest_r[: width // 3] = self.rest_x[: width // 3]
+
+    def _compile(self, edit: Callable[[mujoco.MjSpec], None]) -> None:
+        """Compile the mechanism, and look up where its channels are."""
+        spec = models.spec(self.scenario)
+        edit(spec)
+        base = models.compiled(spec, self.scenario, models.USERDATA)
+        self.model = models.with_values(base, self.scenario)
+        table = channels(self.model)
+        self.mechanism = models.Mechanism(base, table)
+        self.qpos = table["qpos"]  # addresses of the channels, (n,)
+        self.qvel = table["qvel"]
+        self.joints = models.moving_joints(self.model)
+        # addresses of the driven channels' actuators, (driven,)
+        self.ctrl = table["ctrl"][: self.scenario.plant.driven]
 
     def command(self, action: Any, copies: tuple[int, ...] = ()) -> Array:
         """Return the commands of an action, (*copies, driven): its saturated values times the
@@ -317,6 +307,24 @@ class Episode:
 def bounded(observation: Array) -> Array:
     """Return the last observation of an episode that diverged, limited to the observation space."""
     return np.clip(np.nan_to_num(observation, nan=MAX_STATE), -MAX_STATE, MAX_STATE)
+
+
+def _task(name: Any, plant: Plant, flies: bool) -> Task:
+    """Return the task of a name. Raise ScenarioError if the plant does not have it."""
+    task = find("task", name, TASKS)
+    known = FLIGHT_TASKS if flies else tasks(plant)
+    if plant.pose and not flies:
+        raise ScenarioError(
+            f"{plant.name} is a free body: make its environment by gymnasium.make, and copies "
+            "by make_vec(..., vectorization_mode='sync')"
+        )
+    if flies and not plant.pose:
+        raise ScenarioError(f"{plant.name} is no free body: make its environment by gymnasium.make")
+    if not isinstance(name, str) or name not in known:
+        raise ScenarioError(
+            f"task {shown(name)} is not for {plant.name}: choose from {', '.join(known)}"
+        )
+    return task
 
 
 def _checked(changes: Mapping[str, Any], task: str) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from smc_mujoco.envs.episode import Episode
 from smc_mujoco.simulation import callback, python_functions, state
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import ScenarioBatch
+from smc_mujoco.simulation.scenario import Scenario
 
 
 def agent(
@@ -55,23 +56,32 @@ def agent(
         surface=surface,  # pyright: ignore[reportArgumentType]
         velocity=velocity,  # pyright: ignore[reportArgumentType]
     )
-    prepared = prepare(scenario)
-    call = callback.callback().ctypes
-    batch: Any = None
-    last_episode = 0  # number of the episode in which it acted last
+    return LawAgent(episode, scenario)
 
-    def act(observation: Any) -> Array:
+
+class LawAgent:
+    """A law as an agent, as `agent` returns it."""
+
+    def __init__(self, episode: Episode, scenario: Scenario):
+        self.episode = episode
+        self.scenario = scenario
+        self.prepared = prepare(scenario)
+        self.call = callback.callback().ctypes
+        self.last_episode = 0  # number of the episode in which it acted last
+
+    def __call__(self, observation: Any) -> Array:
         """Return the action for an observation: a TimeStep or mapping of dm_env, or an array of
         gymnasium.
         """
-        nonlocal batch, last_episode
-        k = episode.sample
-        if k == 0 or last_episode != episode.episodes:
-            last_episode = episode.episodes
+        k = self.episode.sample
+        if k == 0 or self.last_episode != self.episode.episodes:
+            self.last_episode = self.episode.episodes
             with callback.installed():
-                batch = ScenarioBatch([prepared], threads=1)
+                self.batch = ScenarioBatch([self.prepared], threads=1)
+        scenario = self.scenario
+        batch = self.batch
         data = batch.scratch
-        places = prepared.mechanism.channels
+        places = self.prepared.mechanism.channels
         x, v = _positions_and_velocities(observation, scenario.plant.n)
         data.sensordata[places["x_sensor"]] = x
         data.sensordata[places["v_sensor"]] = v
@@ -79,13 +89,11 @@ def agent(
         k = min(k, scenario.samples)
         batch.records["calls"] = k * scenario.steps * scenario.stages
         with python_functions.hearing_ctrl_c(batch.packed[0].python):
-            call(batch.model._address, data._address)
+            self.call(batch.model._address, data._address)
         if code := int(batch.records["failure"][0]):
             t = k * scenario.control_period
             raise ScenarioError(f"{batch.failure(0, code)}, at t = {t:.6g} s")
         return batch.logs[0]["u"][k, : scenario.plant.driven] / scenario.limits
-
-    return act
 
 
 def _episode(environment: Any) -> Episode:

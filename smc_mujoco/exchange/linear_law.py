@@ -174,15 +174,8 @@ def law_from_control(
     states = len(system.a)
     count = system.b.shape[1]
     names = _names(inputs, count)
-    a = system.a
-    b = system.b
-    c = system.c
     discrete = system.dt is not None
-    if states and not discrete:
-        from scipy.linalg import schur
-
-        a, basis, *_ = schur(a, output="real")
-        b, c = basis.T @ b, c @ basis
+    a, b, c = _state_space(system)
     function = LinearLaw(
         a=_rows(a),
         b=_rows(b),
@@ -200,6 +193,16 @@ def law_from_control(
         continuous=True,
     )
     return decorate(function)()
+
+
+def _state_space(system: System) -> tuple[Array, Array, Array]:
+    """Return A, B and C of a system; in continuous time A is in real Schur form."""
+    if system.dt is not None or not len(system.a):
+        return system.a, system.b, system.c
+    from scipy.linalg import schur
+
+    a, basis, *_ = schur(system.a, output="real")
+    return a, basis.T @ system.b, system.c @ basis
 
 
 def _names(inputs: str | Iterable[str] | None, count: int) -> tuple[str, ...]:

@@ -62,26 +62,15 @@ def enter(
     problems = suite.suite(name)
     count = instances or problem(problems[0]).visible
     target = Path(out) / suite.folder(name, seed) / slug(entry.name)
-    if (target / RESULT).exists() and not verify:
-        other = read_json(target / RESULT)["entry"]
-        if other["digest"] != entry.digest:
-            raise ScenarioError(
-                f"{target} is the result of another entry, {shown(other['name'])}: "
-                "give this one another name, or remove that folder"
-            )
+    if not verify:
+        _check_same_entry(target, entry.digest)
     with scratch() as temporary:
         table = temporary / TABLE
         parts = temporary if verify else target / PARTS
         report = run(folder, problems, count, seed, table, parts)
         content = table.read_bytes()
     if verify:
-        with reading(target / TABLE, "table of runs", "enter the law first") as file:
-            same = file.read_bytes() == content
-        if not same:
-            raise ScenarioError(
-                f"{target / TABLE} is not what {folder} gives here: enter it again, with the same "
-                "versions"
-            )
+        _check_same_runs(target, folder, content)
         return target
     with replacing(target / TABLE) as file:
         file.write_bytes(content)
@@ -97,6 +86,29 @@ def enter(
     write_json(target / RESULT, about | report)
     shutil.rmtree(target / PARTS)
     return target
+
+
+def _check_same_entry(target: Path, digest: str) -> None:
+    """Raise ScenarioError if a folder has the result of another entry."""
+    if not (target / RESULT).exists():
+        return
+    other = read_json(target / RESULT)["entry"]
+    if other["digest"] != digest:
+        raise ScenarioError(
+            f"{target} is the result of another entry, {shown(other['name'])}: "
+            "give this one another name, or remove that folder"
+        )
+
+
+def _check_same_runs(target: Path, folder: AnyPath, content: bytes) -> None:
+    """Raise ScenarioError if the table of a result is not `content`, which its entry gives here."""
+    with reading(target / TABLE, "table of runs", "enter the law first") as file:
+        same = file.read_bytes() == content
+    if not same:
+        raise ScenarioError(
+            f"{target / TABLE} is not what {folder} gives here: enter it again, with the same "
+            "versions"
+        )
 
 
 def made_under(problems: Sequence[str]) -> dict[str, str]:

@@ -155,19 +155,27 @@ def basin(
             f"condition {base.condition!r} sets {start[0]}, and a map starts everywhere: leave "
             "it out"
         )
-    reach = POSITION_REACH[base.plant.unit](base.plant)
-    if not reach and (x is None or v is None):
+    xs, vs = _default_axes(base.plant, points, needed=x is None or v is None)
+    return basin_of(base, xs if x is None else x, vs if v is None else v, threads, report, device)
+
+
+def _default_axes(plant: Plant, points: object, needed: bool) -> ArrayPair:
+    """Return the positions and the velocities of the default grid; if they are `needed`, raise
+    ScenarioError for a plant that gives them no size.
+    """
+    reach = POSITION_REACH[plant.unit](plant)
+    if not reach and needed:
         raise ScenarioError(
-            f"{base.plant.name} starts at 0, which gives the map no size: give positions x and "
+            f"{plant.name} starts at 0, which gives the map no size: give positions x and "
             "velocities v"
         )
-    if len(counts := items_of("points", points)) != 2:
+    counts = items_of("points", points)
+    if len(counts) != 2:
         raise ScenarioError(f"points is {shown(points)}: give two numbers of points, in x and v")
-    nx, nv = (whole(f"points in {axis}", n, 2, 1000) for axis, n in zip("xv", counts, strict=True))
-    positions = np.linspace(-reach, reach, nx) if x is None else x
+    nx = whole("points in x", counts[0], 2, 1000)
+    nv = whole("points in v", counts[1], 2, 1000)
     fastest = VELOCITY_RATIO * reach
-    velocities = np.linspace(-fastest, fastest, nv) if v is None else v
-    return basin_of(base, positions, velocities, threads, report, device)
+    return np.linspace(-reach, reach, nx), np.linspace(-fastest, fastest, nv)
 
 
 def basin_of(

@@ -215,9 +215,7 @@ def grid(
     Warns:
       ScenarioWarning: gains of a set that were tuned for other parameters of the plant.
     """
-    if not isinstance(seeds, Iterable):
-        seeds = range(whole("seeds", seeds, 1, MAX_ITEMS))
-    seeds = [whole("a seed", seed, 0, GRID_SEEDS - 1) for seed in listed("seeds", seeds)]
+    seeds = _seeds(seeds)
     plants = listed("plants", plants)
     laws = listed_laws(laws)
     conditions = listed("conditions", conditions)
@@ -231,14 +229,15 @@ def grid(
     def laws_on(plant: Plant) -> list[LawOfSeed]:
         return [lambda seed, law=law: _law(plant, law, gains, seed) for law in laws]
 
-    return all_combinations(
-        [as_plant(plant) for plant in plants],
-        laws_on,
-        conditions,
-        seeds,
-        duration,
-        starts,
-    )
+    machines = [as_plant(plant) for plant in plants]
+    return all_combinations(machines, laws_on, conditions, seeds, duration, starts)
+
+
+def _seeds(given: object) -> list[int]:
+    """Return seeds: those given, or as many as a number says."""
+    if not isinstance(given, Iterable):
+        given = range(whole("seeds", given, 1, MAX_ITEMS))
+    return [whole("a seed", seed, 0, GRID_SEEDS - 1) for seed in listed("seeds", given)]
 
 
 def all_combinations(

@@ -348,10 +348,7 @@ def cartesian_path(
         raise ScenarioError(
             f"{plant.name} has joints without an actuator: a path in space needs all of them driven"
         )
-    if (site is None) == (body is None):
-        raise ScenarioError(
-            f"site is {shown(site)} and body is {shown(body)}: give the name of one of them"
-        )
+    tip = _tip(site, body)
     array = _places(points)
     path = [Waypoints(times, array[:, i].tolist()) for i in range(3)]
     knots = _knots(path[0].times[0], path[0].times[-1])
@@ -364,11 +361,16 @@ def cartesian_path(
         start = tuple(number("x0", x) for x in items_of("x0", x0))
     if len(start) != plant.n:
         raise ScenarioError(f"x0 has {len(start)} values for {plant.n} channels: give {plant.n}")
-    if site is not None:
-        kind = "site"
-        name = site
-    else:
-        kind = "body"
-        name = body
-    joints = solve(plant, kind, str(name), np.array(positions), start)
+    joints = solve(plant, *tip, np.array(positions), start)
     return [Waypoints(knots.tolist(), joints[:, i].tolist()) for i in range(plant.n)]
+
+
+def _tip(site: str | None, body: str | None) -> tuple[str, str]:
+    """Return whether the tip is a site or a body, and its name."""
+    if (site is None) == (body is None):
+        raise ScenarioError(
+            f"site is {shown(site)} and body is {shown(body)}: give the name of one of them"
+        )
+    if site is not None:
+        return "site", str(site)
+    return "body", str(body)

@@ -87,34 +87,49 @@ def leaderboard(
     boards = Boards()
     boards.failures = paired_runs.failures(table)
     boards.untouched = paired_runs.untouched(table)
-    groups = paired_runs.groups(table, by)
-    ran = [paired_runs.scenarios(table, group) for group in groups]
-    sources = []
-    for group in groups:
-        sources.append(paired_runs.sources(table, group.rows[group.rows >= 0]))
-    made: dict[tuple[int, str], Board] = {}
+    ranked = []
+    for group in paired_runs.groups(table, by):
+        sources = paired_runs.sources(table, group.rows[group.rows >= 0])
+        ranked.append(RankedGroup(group, paired_runs.scenarios(table, group), sources))
+    by_metric = {}
     for metric in dict.fromkeys(metrics):
-        by_row = paired_runs.by_row(table, metric)
-        scores = [group.scores(by_row) for group in groups]
-        compared = {}
-        for i, of_group in enumerate(scores):
-            if of_group.blocks:
-                compared[i] = _compared(of_group, ran[i], metric, relevant)
-        corrected([*compared.values()])
-        family = _family(compared.values())
-        for i, comparison in compared.items():
-            made[i, metric] = _board(
-                groups[i],
-                scores[i],
-                ran[i],
-                metric,
-                comparison,
-                _untuned(sources[i], defaults),
-                sources[i],
-                family,
-            )
-    for i in range(len(groups)):
-        boards += [made[i, metric] for metric in dict.fromkeys(metrics) if (i, metric) in made]
+        by_metric[metric] = _boards_of(table, metric, ranked, defaults, relevant)
+    for i in range(len(ranked)):
+        boards += [made[i] for made in by_metric.values() if i in made]
+    return boards
+
+
+class RankedGroup(NamedTuple):
+    """A group whose laws are compared."""
+
+    group: RunGroup
+    ran: Sequence[Scenario | None]  # a scenario of each block
+    sources: Sources
+
+
+def _boards_of(
+    table: RunColumns,
+    metric: str,
+    ranked: Sequence[RankedGroup],
+    defaults: bool,
+    relevant: float,
+) -> dict[int, Board]:
+    """Return the board of a metric for each group, by its number, to which the metric applies.
+    Winners are corrected for all of them.
+    """
+    by_row = paired_runs.by_row(table, metric)
+    scores = [each.group.scores(by_row) for each in ranked]
+    compared = {}
+    for i, of_group in enumerate(scores):
+        if of_group.blocks:
+            compared[i] = _compared(of_group, ranked[i].ran, metric, relevant)
+    corrected([*compared.values()])
+    family = _family(compared.values())
+    boards = {}
+    for i, comparison in compared.items():
+        group, ran, sources = ranked[i]
+        untuned = _untuned(sources, defaults)
+        boards[i] = _board(group, scores[i], ran, metric, comparison, untuned, sources, family)
     return boards
 
 

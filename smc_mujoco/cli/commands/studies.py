@@ -13,7 +13,7 @@ from smc_mujoco.common.interrupts import delay_signals
 from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
-    from smc_mujoco.studies.advice import RaceAdvice
+    from smc_mujoco.studies.advice import Advice
     from smc_mujoco.studies.table import Table
 
 
@@ -91,7 +91,6 @@ def which(
     sensor=Encoder(counts=4096)" --needs accurate
     """
     with delay_signals():
-        from smc_mujoco.studies.advice import RaceAdvice
         from smc_mujoco.studies.which import which as advise
 
     terminal = Terminal(json)
@@ -116,13 +115,16 @@ def which(
         minutes=minutes,
     )
     terminal.print(advice)
-    if isinstance(advice, RaceAdvice):
-        _save(advice, out, film, terminal)
+    _save(advice, out, film, terminal)
     _finish(advice.table, out, terminal)
 
 
-def _save(advice: "RaceAdvice", out: Path, film: bool, terminal: Terminal) -> None:
-    """Write the gains of the first law, and a figure and a film of its worst run."""
+def _save(advice: "Advice", out: Path, film: bool, terminal: Terminal) -> None:
+    """Write the gains of the first law of a race, and a figure and a film of its worst run."""
+    from smc_mujoco.studies.advice import RaceAdvice
+
+    if not isinstance(advice, RaceAdvice):
+        return
     from smc_mujoco.draw import figure, page
     from smc_mujoco.simulation.run import run
 

@@ -258,8 +258,7 @@ def cut(machines: Sequence[mujoco.MjModel], points: Array, slides: Array, own: b
         turned = np.abs(data.geom_xmat[fixed].reshape(-1, 3, 3)[:, axis])
         least = corners[..., axis].min(axis=1)
         most = corners[..., axis].max(axis=1)
-        slender = sides[:, axis] > SLENDER * np.delete(sides, axis, axis=1).max(axis=1)
-        long = slender & (turned.max(axis=1) > 0.999)
+        long = _slender(sides, axis) & (turned.max(axis=1) > 0.999)
         upright = axis == 2
         wanted = own if upright else (np.abs(slides[:, axis]) > 0.9).any()
         if not long.any() or not wanted:
@@ -295,6 +294,11 @@ def cut(machines: Sequence[mujoco.MjModel], points: Array, slides: Array, own: b
     for other, name in itertools.product(machines[1:], CUT_FIELDS):
         getattr(other, name)[fixed] = getattr(model, name)[fixed]
     return raised
+
+
+def _slender(sides: Array, axis: int) -> Array:
+    """Return which boxes, (k, 3) m, are long and narrow along an axis, (k,)."""
+    return sides[:, axis] > SLENDER * np.delete(sides, axis, axis=1).max(axis=1)
 
 
 def lengthen(model: mujoco.MjModel, geom: int, side: int, longer: float) -> None:

@@ -171,20 +171,7 @@ def orders(
             at = as_plant(plant), find_condition(condition)
             for law in listed_laws(laws):
                 setups.append(_setup(*at, law, descending, numbers, gains, duration, starts))
-    scenarios = []
-    for setup in setups:
-        scenarios += setup.scenarios
-    counted = summed(report, 0.0, sum(scenario.work for scenario in scenarios))
-    runs = {}
-    for k, trace in stream(scenarios, threads, counted):
-        runs[k] = _measured(trace)
-    rows = AccuracyTable()
-    first = 0
-    for setup in setups:
-        last = first + len(setup.scenarios)
-        rows.append(_row(setup, [runs[k] for k in range(first, last)]))
-        first = last
-    return _ordered(rows)
+    return _ordered(_run(setups, threads, report))
 
 
 def _ordered(rows: AccuracyTable) -> AccuracyTable:
@@ -242,6 +229,24 @@ class Setup(NamedTuple):
     scenarios: list[Scenario]  # for each start one for each period
     periods: Floats  # s, longest first
     starts: int  # their number
+
+
+def _run(setups: Sequence[Setup], threads: int | None, report: Report) -> AccuracyTable:
+    """Run setups, and return a row for each."""
+    scenarios = []
+    for setup in setups:
+        scenarios += setup.scenarios
+    counted = summed(report, 0.0, sum(scenario.work for scenario in scenarios))
+    runs = {}
+    for k, trace in stream(scenarios, threads, counted):
+        runs[k] = _measured(trace)
+    rows = AccuracyTable()
+    first = 0
+    for setup in setups:
+        last = first + len(setup.scenarios)
+        rows.append(_row(setup, [runs[k] for k in range(first, last)]))
+        first = last
+    return rows
 
 
 def _setup(

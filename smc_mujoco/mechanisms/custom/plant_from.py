@@ -206,10 +206,7 @@ def _plant(
     model = mjcf.as_it_is(source)
     mjcf.check_model(label, model)
     scenarios = own.suggested(pairs)
-    pairs = tuple(
-        (joint, dataclasses.replace(channel, **dict.fromkeys(own.SUGGESTED)))
-        for joint, channel in pairs
-    )
+    pairs = _without_suggestions(pairs)
     own.check(label, model, pairs)
     seen = own.measured_joints(label, model, pairs, measured)
     joints = [*joints_of(pairs), *seen]
@@ -221,17 +218,9 @@ def _plant(
     build = UserModel(source, keyframe, pairs, (), tip or "", others=others, measured=seen)
     if others in ("held", "locked"):
         model = source.compiled(build.edited())
+    build, limits = _with_drives(build, label, model, scenarios)
     if is_free(model, joints[0]):
-        if tip or scenarios:
-            cure = "leave the tip out" if tip else f"give {', '.join(scenarios)} to the scenario"
-            raise ScenarioError(f"joint {joints[0]!r} of {label} is a free joint: {cure}")
-        build = dataclasses.replace(build, thrusters=tuple(own.thrusters(model, joints[0])))
-        limits = own.reach_of(label, model, joints[0])
         special["pose"] = own.held_pose(label, model, joints[0])
-    else:
-        motors = tuple(own.motor_of(label, model, joint, channel) for joint, channel in pairs)
-        build = dataclasses.replace(build, motors=motors)
-        limits = tuple(motor.limit for motor in motors)
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields = UserFields(mass, gravity)
@@ -260,6 +249,34 @@ def _plant(
         label=title if title.lower().replace(" ", "_") == plant_name.lower() else "",
         **special,
     )
+
+
+def _without_suggestions(pairs: Pairs) -> Pairs:
+    """Return channels without what they suggest to a scenario."""
+    bare = []
+    for joint, channel in pairs:
+        bare.append((joint, dataclasses.replace(channel, **dict.fromkeys(own.SUGGESTED))))
+    return tuple(bare)
+
+
+def _with_drives(
+    build: UserModel, label: str, model: mujoco.MjModel, suggested: Fields
+) -> tuple[UserModel, tuple[float, ...]]:
+    """Return a builder with its thrusters or motors, and the bounds on |u|, (driven,)."""
+    first = build.channels[0][0]
+    if is_free(model, first):
+        if build.tip or suggested:
+            cure = "leave the tip out"
+            if not build.tip:
+                cure = f"give {', '.join(suggested)} to the scenario"
+            raise ScenarioError(f"joint {first!r} of {label} is a free joint: {cure}")
+        thrusters = tuple(own.thrusters(model, first))
+        return dataclasses.replace(build, thrusters=thrusters), own.reach_of(label, model, first)
+    motors = []
+    for joint, channel in build.channels:
+        motors.append(own.motor_of(label, model, joint, channel))
+    limits = tuple(motor.limit for motor in motors)
+    return dataclasses.replace(build, motors=tuple(motors)), limits
 
 
 def _check_names(label: str, model: mujoco.MjModel, keyframe: str | None, tip: str | None) -> None:
