@@ -5,11 +5,12 @@ from smc_mujoco.mechanisms.hardware.drives import RateLimit
 from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
 from smc_mujoco.mechanisms.hardware.friction import LuGre
 from smc_mujoco.mechanisms.hardware.part_functions import actuator_function, friction_function
+from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
 from smc_mujoco.mechanisms.hardware.servos import ServoFriction, servo
 from smc_mujoco.mechanisms.hardware.sliding import Sigmoid
 from smc_mujoco.mechanisms.hardware.stepper import Stepper
 from smc_mujoco.mechanisms.hardware.stribeck import Stribeck
 
-__all__ = ["Contact", "ElasticJoint", "LuGre", "RateLimit", "ServoFriction", "Sigmoid"]
-__all__ += ["Stepper", "Stribeck"]
+__all__ = ["Contact", "ElasticJoint", "LuGre", "PositionServo", "RateLimit", "ServoFriction"]
+__all__ += ["Sigmoid", "Stepper", "Stribeck"]
 __all__ += ["actuator_function", "friction_function", "servo"]

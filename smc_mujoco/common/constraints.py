@@ -112,20 +112,28 @@ class Each(Constraint):
 
 @named_data
 class Range(Constraint):
-    """Two numbers, as `Number` declares them, the lowest first."""
+    """Two numbers, as `Number` declares them, the lowest first; also infinite ones if
+    `infinite`.
+    """
 
     above: float = -math.inf
     low: float = -math.inf
+    infinite: bool = False
 
     def __call__(self, what: str, value: Any) -> tuple[float, float]:
         if not isinstance(value, tuple | list) or len(value) != 2:
             raise ScenarioError(
                 f"{what} is {shown(value)}: give the lowest and the highest, as (0.7, 1.3)"
             )
-        low, high = (number(what, one, above=self.above, low=self.low) for one in value)
+        low, high = (self._end(what, one) for one in value)
         if low > high:
             raise ScenarioError(f"{what} is from {low:g} to {high:g}: give the lowest first")
         return low, high
+
+    def _end(self, what: str, value: Any) -> float:
+        if self.infinite and isinstance(value, float) and math.isinf(value):
+            return value
+        return number(what, value, above=self.above, low=self.low)
 
 
 @named_data

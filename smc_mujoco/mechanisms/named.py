@@ -103,7 +103,7 @@ def _channel(text: str) -> tuple[str, Any]:
     for item in filter(str.strip, (read["fields"] or "").split(",")):
         name, _, value = (part.strip() for part in item.partition("="))
         find(f"field of channel {read['joint']!r}", name, known)
-        if name == "motor":
+        if name in ("motor", "servo"):
             fields[name] = {"": True, "true": True, "false": False}.get(value.lower(), value)
         elif name == "partner":
             fields[name] = value

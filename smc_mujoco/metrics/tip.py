@@ -110,11 +110,11 @@ def knows_contacts(scenario: Scenario) -> bool:
 
 
 def _with_hidden_state(scenario: Scenario) -> list:
-    """Return the actuators with a state that a trace lacks."""
+    """Return the actuators with a state, or a force, that a trace lacks."""
     return [
         part
         for part in scenario.actuator
-        if part.in_callback or part.delay or part.accelerates or not part.drives
+        if part.in_callback or part.delay or part.act is not None or not part.drives
     ]
 
 

@@ -168,10 +168,7 @@ def default_class(scenario: Scenario) -> Uncertainty:
 
 def strength(scenario: Scenario) -> float:
     """Return the largest force that every drive can hold, N or N m."""
-    if scenario.accelerates:
-        return min(part.stall for part in scenario.actuator if part.stall is not None)
-    drives = zip(scenario.limits, scenario.drive_train.nominal, strict=False)
-    return min(limit * drive.gain for limit, drive in drives)
+    return min(scenario.drive_train.forces)
 
 
 def outside(scenario: Scenario, within: Uncertainty) -> str:

@@ -77,7 +77,7 @@ def _stopped(plant: Plant, rubs: float) -> list[Stopped]:
     inverse = np.linalg.inv(at.M)[at.dofs]
     gained = inverse @ _blown(plant, goal)  # speed of each joint for a unit of momentum on all
     inverse = inverse[:, at.dofs]
-    bounds = np.array(Scenario.recorded(plant=plant, law="none").limits)
+    bounds = np.array(Scenario.recorded(plant=plant, law="none").drive_train.forces)
     held = bounds * (1.0 + rubs) + np.abs(at.load) + at.dry
     names = channel_names(plant)
     found = []

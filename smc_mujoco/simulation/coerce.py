@@ -438,7 +438,7 @@ def actuator(name: str, value: Actuators | None, s: Any) -> tuple[Actuator, ...]
     """Return the actuators, from one, several or None, or by joint: at most two drives of a joint
     in the given order, then an ElasticJoint or a Backlash.
     """
-    if value is None:
+    if value is None and "actuator" not in s.plant.suggested:
         return ()
     driven = driven_names(s.plant)
     items = _by_joint(name, value, s, Actuator, "smc.Lag(0.01)", driven_names)
@@ -454,7 +454,21 @@ def actuator(name: str, value: Actuators | None, s: Any) -> tuple[Actuator, ...]
                 f"{name} has the drives {shown(drives)}: give one drive, or (smc.Lag(0.01), "
                 "another)"
             )
+    items = _kept(items, s.plant) + items
     return tuple(sorted(items, key=lambda part: not part.drives))
+
+
+def _kept(items: Sequence[Actuator], plant: Plant) -> list[Actuator]:
+    """Return the actuators of its file that a plant keeps, for joints to which `items` give none of
+    their kind.
+    """
+    found = []
+    for joint, part in zip(driven_names(plant), plant.suggested.get("actuator", ()), strict=False):
+        given = [one for one in items if type(one) is type(part) and joint in (one.on or (joint,))]
+        if part is not None and not given:
+            on = () if plant.driven == 1 else (joint,)
+            found.append(dataclasses.replace(part, on=on))
+    return found
 
 
 def sensor(name: str, value: Sensors | None, s: Any) -> Encoder | tuple[Encoder, ...] | None:

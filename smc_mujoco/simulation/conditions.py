@@ -488,7 +488,7 @@ def _each_joint(name: str, make: Callable[[float, Plant], Any]) -> Recipe:
     """Return a recipe for field `name`: one part per driven joint, made from its bound."""
 
     def fields(plant: Plant, duration: float) -> Data:
-        limits = Scenario.recorded(plant=plant, law="none").limits
+        limits = Scenario.recorded(plant=plant, law="none").drive_train.forces
         parts = [make(limit, plant) for limit in limits]
         if plant.pose or len(set(parts)) == 1:
             return {name: parts[0]}
@@ -516,7 +516,7 @@ def _bristles(level: float, plant: Plant) -> Friction:
 class Own(NamedTuple):
     """The size of a driven joint."""
 
-    limit: float  # N m or N, bound on u
+    limit: float  # N m or N, its largest force
     inertia: float  # kg m^2 or kg, at the goal
     way: float  # rad or m, from where runs start to the goal
 
@@ -526,7 +526,7 @@ def _own_joints(plant: Plant) -> list[Own]:
     at = at_goal(plant)
     inertias = np.diag(at.M)[at.dofs].tolist()
     ways = np.abs(np.subtract(usual_start(plant), plant.origin))[: plant.driven].tolist()
-    limits = Scenario.recorded(plant=plant, law="none").limits
+    limits = Scenario.recorded(plant=plant, law="none").drive_train.forces
     joints = zip(limits, inertias, ways, strict=True)
     return [Own(limit, inertia, way or BESIDE) for limit, inertia, way in joints]
 

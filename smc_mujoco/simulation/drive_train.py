@@ -37,7 +37,7 @@ class DriveTrain:
         """
         found = []
         for chain in self.chains:
-            special = (part for part in chain if part.unit or part.accelerates)
+            special = (part for part in chain if part.unit)
             found.append(next(special, Actuator()))
         return found
 
@@ -49,18 +49,16 @@ class DriveTrain:
     @property
     def force_command(self) -> bool:
         """Whether u is a force."""
-        return not any(part.unit or part.accelerates for part in self.actuator)
+        return not any(part.unit for part in self.actuator)
 
     @property
     def efforts(self) -> tuple[str, ...]:
         """Unit of u in each channel, (n,): that of the joint's force, "V", or that of its
-        acceleration.
+        acceleration or of its position.
         """
         efforts = list(self.plant.efforts)
         for i, motor in enumerate(self.motors):
-            efforts[i] = motor.unit or efforts[i]
-            if motor.accelerates:
-                efforts[i] = f"{self.plant.units[i]}/s^2"
+            efforts[i] = motor.unit.format(x=self.plant.units[i]) or efforts[i]
         return tuple(efforts)
 
     @cached_property
@@ -81,6 +79,12 @@ class DriveTrain:
             else:
                 found.append(min(bound, limit))
         return tuple(found)
+
+    @property
+    def forces(self) -> list[float]:
+        """The largest force of each driven channel at rest, N m or N."""
+        pairs = zip(self.motors, self.limits, strict=True)
+        return [motor.force_at(limit) for motor, limit in pairs]
 
     @property
     def torques(self) -> list[Torque]:

@@ -17,8 +17,11 @@ def default_bound(s: Any) -> float | tuple[float, ...]:
     if not any(part.bound is not None for part in s.actuator):
         return suggested
     bounds = list(suggested) if isinstance(suggested, tuple) else [suggested] * s.plant.driven
+    # what the plant suggests is for the servos that it keeps
+    kept = s.plant.suggested.get("actuator", (None,) * s.plant.driven)
     for i, motor in enumerate(s.drive_train.motors):
-        bounds[i] = bounds[i] if motor.bound is None else motor.bound
+        if motor.bound is not None and kept[i] is None:
+            bounds[i] = motor.bound
     return tuple(bounds) if len(set(bounds)) > 1 else bounds[0]
 
 

@@ -362,7 +362,7 @@ class Scenario:
     @property
     def efforts(self) -> tuple[str, ...]:
         """Unit of u in each channel, (n,): that of the joint's force, "V", or that of its
-        acceleration.
+        acceleration or of its position.
         """
         return self.drive_train.efforts
 

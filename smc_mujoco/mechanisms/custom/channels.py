@@ -25,8 +25,14 @@ from smc_mujoco.common.errors import (
     shown,
     users_stacklevel,
 )
-from smc_mujoco.mechanisms.custom.actuator_kinds import no_motor
+from smc_mujoco.mechanisms.custom.actuator_kinds import (
+    forcerange_of,
+    no_motor,
+    no_servo,
+    servo_of,
+)
 from smc_mujoco.mechanisms.custom.mjcf import pick
+from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
 from smc_mujoco.mechanisms.layout import BASE, PASSIVE, PLACES, POSE, unit_wrenches
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Range
 from smc_mujoco.mechanisms.rotation import rotation_vector
@@ -36,6 +42,7 @@ UNIT_OF_JOINT = {mujoco.mjtJoint.mjJNT_HINGE: "rad", mujoco.mjtJoint.mjJNT_SLIDE
 
 Place = Annotated[float, Number(low=-1e6, high=1e6)]  # rad or m
 SUGGESTED = ("law", "u_max", "reference")  # fields of a Channel that are defaults of scenarios
+Step = Annotated[float, Number(low=0.0, high=1e6)]  # rad or m
 # transmissions to one joint
 ONE_JOINT = (mujoco.mjtTrn.mjTRN_JOINT.value, mujoco.mjtTrn.mjTRN_JOINTINPARENT.value)
 FIXED = mujoco.mjtGain.mjGAIN_FIXED.value
@@ -46,6 +53,7 @@ FLIES = (
 )
 MOTOR_GROUP = 31  # actuator group of motors, which actuatorgroupdisable cannot turn off
 CURE = "give smc.Channel(motor=True), or JOINT(motor) in a text, for one ideal motor instead"
+KEEP = "give smc.Channel(servo=True), or JOINT(servo) in a text, to command its set-point"
 
 
 @named_data
@@ -56,6 +64,10 @@ class Channel:
       motor: whether to replace the joint's actuators, if it has any, by an ideal motor. It keeps
         their forcerange, a motor's ctrlrange, and the joint's actuatorfrcrange. Without it, the
         joint needs exactly one actuator: a motor.
+      servo: whether u is the set-point of the file's `<position>` servo, which stays as it is: kp,
+        kv, gear, forcerange and ctrlrange. u is in rad (m), and counts from the joint's default
+        goal. There is then no nominal model.
+      set_point_step: the servo rounds its set-point to multiples of this, rad (m); 0: it does not.
       partner: a joint without an actuator that moves with this one, such as a pole on its cart. It
         is measured and scored as a separate channel, after the driven ones. The law of this channel
         reads it in y.q, y.dq, y.fq and y.gq. If it has an actuator, a motor stays at 0, and a servo
@@ -68,6 +80,8 @@ class Channel:
     """
 
     motor: Boolean = False
+    servo: Boolean = False
+    set_point_step: Step = 0.0
     partner: str | None = None
     x0: Place | None = None
     partner_x0: Place | None = None
@@ -77,6 +91,16 @@ class Channel:
 
     def __post_init__(self) -> None:
         constrain(self)
+        if self.servo and self.motor:
+            raise ScenarioError(
+                "a Channel has motor=True and servo=True: give motor to replace the file's servo, "
+                "or servo to command it"
+            )
+        if self.set_point_step and not self.servo:
+            raise ScenarioError(
+                f"a Channel has set_point_step={self.set_point_step:g} and no servo: give "
+                "servo=True too"
+            )
 
 
 Pairs = tuple[tuple[str, Channel], ...]  # each a joint and its Channel
@@ -422,12 +446,14 @@ class Motor(NamedTuple):
     joint: str
     limit: float  # bound on its force, N m or N
     replaced: tuple[int, ...]  # indices of the actuators that it replaces
+    servo: PositionServo | None = None  # of the file, if a law commands its set-point
 
 
-def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) -> Motor:
-    """Return the motor that drives a joint."""
+def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel, goal: float) -> Motor:
+    """Return the motor that drives a joint, whose default goal is given."""
     joint_id = model.joint(joint).id
     bounds = []
+    servo = None
     if model.jnt_actfrclimited[joint_id]:
         bounds.append(tuple(map(float, model.jnt_actfrcrange[joint_id])))
     actuators = [i for i in range(model.nactuator) if model.actuator_trntype[i] in ONE_JOINT]
@@ -440,14 +466,39 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) ->
         raise ScenarioError(f"no actuator of {label} drives joint {joint!r} alone: {CURE}")
     elif len(actuators) > 1:
         raise ScenarioError(f"joint {joint!r} of {label} has the actuators {names}: {CURE}")
+    elif channel.servo:
+        if why := no_servo(model, actuators[0]):
+            raise ScenarioError(
+                f"actuator {names!r} of joint {joint!r} {why}, and servo=True is for a <position>: "
+                f"leave servo out, or {CURE}"
+            )
+        bounds.append(forcerange_of(model, actuators[0]))
     elif why := no_motor(model, actuators[0]):
+        cure = CURE if no_servo(model, actuators[0]) else f"{KEEP}, or {CURE}"
         raise ScenarioError(
-            f"actuator {names!r} of joint {joint!r} {why}, and a law commands a force: {CURE}"
+            f"actuator {names!r} of joint {joint!r} {why}, and a law commands a force: {cure}"
         )
     else:
         bounds.append(_of_actuator(model, actuators[0]))
     gives = f"actuator {names!r} gives joint {joint!r} of {label}"
-    return Motor(joint, _limit(gives, CURE, *bounds), tuple(actuators))
+    limit = _limit(gives, CURE, *bounds)
+    if channel.servo:
+        servo = servo_of(model, actuators[0], goal, channel.set_point_step)
+    return Motor(joint, limit, tuple(actuators), servo)
+
+
+def servo_bound(label: str, model: mujoco.MjModel, joint: str, servo: PositionServo) -> float:
+    """Return the default bound on |u| of a servo, rad or m: its ctrlrange about the goal, or the
+    joint's range.
+    """
+    if servo.bound is not None:
+        return servo.bound
+    for _, low, high in ranges(model, [joint]):
+        return max(high - servo.goal, servo.goal - low)
+    raise ScenarioError(
+        f"the servo of joint {joint!r} of {label} has no ctrlrange, and the joint no range: give "
+        "smc.Channel(servo=True, u_max=...), how far the set-point may be from the goal"
+    )
 
 
 def _limit(who: str, cure: str, *ranges: Floats) -> float:

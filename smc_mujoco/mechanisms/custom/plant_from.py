@@ -21,7 +21,7 @@ import dataclasses
 import math
 import os
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -216,15 +216,20 @@ def _plant(
     if tip and special.get("base", -1) >= 0:
         raise ScenarioError(f"the base of {label} is measured: leave the tip out")
     build = UserModel(source, keyframe, pairs, (), tip or "", others=others, measured=seen)
+    driven = [joint for joint, _ in pairs if not is_free(model, joint)]
+    goals = dict(zip(driven, own.goals(model, driven, keyframe)[0], strict=True))
     if others in ("held", "locked"):
         model = source.compiled(build.edited())
-    build, limits = _with_drives(build, label, model, scenarios)
+    build, limits = _with_drives(build, label, model, scenarios, goals)
     if is_free(model, joints[0]):
         special["pose"] = own.held_pose(label, model, joints[0])
+    scenarios |= _servos(label, model, build.motors, scenarios)
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields = UserFields(mass, gravity)
     why_not = missing(model, joints, build.motors)
+    if "actuator" in scenarios:
+        why_not = f"u is the set-point of a servo, and a nominal u is a force: {WITHOUT_MODEL}"
     rubs = default_friction(model)
     return Plant(
         name=plant_name,
@@ -260,9 +265,15 @@ def _without_suggestions(pairs: Pairs) -> Pairs:
 
 
 def _with_drives(
-    build: UserModel, label: str, model: mujoco.MjModel, suggested: Fields
+    build: UserModel,
+    label: str,
+    model: mujoco.MjModel,
+    suggested: Fields,
+    goals: Mapping[str, float],
 ) -> tuple[UserModel, tuple[float, ...]]:
-    """Return a builder with its thrusters or motors, and the bounds on |u|, (driven,)."""
+    """Return a builder with its thrusters or motors, and the bounds on their force, (driven,).
+    `goals` are those of the driven joints.
+    """
     first = build.channels[0][0]
     if is_free(model, first):
         if build.tip or suggested:
@@ -274,7 +285,7 @@ def _with_drives(
         return dataclasses.replace(build, thrusters=thrusters), own.reach_of(label, model, first)
     motors = []
     for joint, channel in build.channels:
-        motors.append(own.motor_of(label, model, joint, channel))
+        motors.append(own.motor_of(label, model, joint, channel, goals[joint]))
     limits = tuple(motor.limit for motor in motors)
     return dataclasses.replace(build, motors=tuple(motors)), limits
 
@@ -323,7 +334,23 @@ def without_model(x, v, i, p):
     return math.nan, math.nan
 
 
-def missing(model: mujoco.MjModel, joints: list[str], motors: tuple[Motor, ...]) -> str:
+def _servos(
+    label: str, model: mujoco.MjModel, motors: Sequence[Motor], given: Mapping[str, tuple]
+) -> dict[str, tuple]:
+    """Return what the servos that laws command suggest to scenarios: themselves, and bounds on u
+    where their channels give none.
+    """
+    servos = tuple(motor.servo for motor in motors)
+    if not any(servos):
+        return {}
+    bounds = list(given.get("u_max", (None,) * len(motors)))
+    for i, motor in enumerate(motors):
+        if motor.servo and bounds[i] is None:
+            bounds[i] = own.servo_bound(label, model, motor.joint, motor.servo)
+    return {"actuator": servos, "u_max": tuple(bounds)}
+
+
+def missing(model: mujoco.MjModel, joints: list[str], motors: Sequence[Motor]) -> str:
     """Return why there is no nominal model of the channels, or ""."""
     if np.any(model.eq_active0):
         return f"equality constraints hold its joints together: {WITHOUT_MODEL}"

@@ -10,7 +10,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.mechanisms.custom import channels as own
-from smc_mujoco.mechanisms.custom.channels import Motor, Pairs, joints_of
+from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs, joints_of
 from smc_mujoco.mechanisms.custom.mjcf import ModelSource
 from smc_mujoco.mechanisms.custom.model_constraints import harden
 from smc_mujoco.mechanisms.custom.others import edit
@@ -18,6 +18,16 @@ from smc_mujoco.mechanisms.layout import OWN, ROTOR, START
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Field
 
 SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
+
+
+def _stated(channel: Channel) -> dict:
+    """Return a channel as plain data, without fields of servos where it has none, as older records
+    are.
+    """
+    data = dataclasses.asdict(channel)
+    if not channel.servo:
+        del data["servo"], data["set_point_step"]
+    return data
 
 
 @frozen_data
@@ -88,7 +98,7 @@ class UserModel:
 
     def about(self) -> dict:
         """Return the arguments with which `restored` makes this plant again, as plain data."""
-        channels = {joint: dataclasses.asdict(channel) for joint, channel in self.channels}
+        channels = {joint: _stated(channel) for joint, channel in self.channels}
         data = {
             "path": self.source.path and self.source.label,  # without the folder, which is a user's
             "sha256": self.source.sha256,

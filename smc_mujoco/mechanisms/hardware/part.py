@@ -248,8 +248,8 @@ class NominalDrive(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Actuator(OnJoints):
-    """Base of actuators, which stand between the command u, the wanted force or a voltage, and the
-    joint.
+    """Base of actuators, which stand between the command u, such as the wanted force, a voltage or
+    a set-point, and the joint.
     """
 
     drives: ClassVar[bool] = True  # whether it turns u into force; else it stands after a drive
@@ -261,7 +261,8 @@ class Actuator(OnJoints):
         0.0  # s, time constant with which the force follows a held u; 0 for none
     )
     limited: ClassVar[bool] = False  # whether the rate of the force is limited
-    unit: ClassVar[str] = ""  # of u; "" for that of the joint's force, or of its acceleration
+    # of u, where {x} stands for that of the joint; "" for that of the joint's force
+    unit: ClassVar[str] = ""
     accelerates: ClassVar[bool] = False  # whether u is the acceleration of the joint
     bound: ClassVar[float | None] = None  # on u, in its unit, if u is no force
     stall: ClassVar[float | None] = None  # N m (N), the largest force at rest; None: any
@@ -283,6 +284,10 @@ class Actuator(OnJoints):
         ids = drive_ids(model)
         named = [model.joint(name).id for name in self.on]
         return ids[np.isin(driven_ids(model), named)] if named else ids
+
+    def force_at(self, bound: float) -> float:
+        """Return the largest force that a bound on |u| allows at rest, N m (N)."""
+        return bound * self.nominal.gain
 
     def longest_step(self, plant: Plant) -> float:
         """Return the longest default physics step beside it, s."""

@@ -89,6 +89,7 @@ class Stepper(Actuator):
         50 Hz.
     """
 
+    unit = "{x}/s^2"
     accelerates = True
     is_drive = True
     sums_force = True
@@ -148,6 +149,9 @@ class Stepper(Actuator):
     def bound(self) -> float:
         """The default of u_max, rad/s^2 (m/s^2)."""
         return self.ramp
+
+    def force_at(self, bound: float) -> float:
+        return self.stall
 
     def longest_step(self, plant: Plant) -> float:
         return LONGEST_STEP

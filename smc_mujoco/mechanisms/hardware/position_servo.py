@@ -1,0 +1,147 @@
+"""A position servo as an actuator of a user's file: u is its set-point.
+
+    force = kp (set-point - x) - kv v, within its forcerange, as MuJoCo computes it
+
+`smc.Channel(servo=True)` reads its numbers from a `<position>` of the file.
+"""
+
+# pyright: reportIncompatibleVariableOverride=false
+# (a constant of the base class is a function or a property here)
+import math
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any
+
+import mujoco
+from numba.extending import register_jitable
+
+from smc_mujoco.common.aliases import Pair
+from smc_mujoco.common.constraints import Range
+from smc_mujoco.common.data import frozen_data
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.jit import floats, record_at
+from smc_mujoco.mechanisms.hardware.moments import Run, channel_at, state_at
+from smc_mujoco.mechanisms.hardware.part import Actuator, Natural, NominalDrive, Offset, Positive
+from smc_mujoco.mechanisms.plant import Field
+
+Span = Annotated[Pair, Range(infinite=True)]
+UNBOUNDED = (-math.inf, math.inf)
+# Where the numbers lie in the compiled model, in actuator_gainprm and in actuator_biasprm
+STIFFNESS, BIAS = 0, slice(0, 3)
+
+
+@frozen_data
+class PositionServo(Actuator):
+    """Position servo: u is its set-point, counted from `goal`, rad (m on a slide).
+
+        smc.hardware.PositionServo(kp=17.8, kv=0.1, forcerange=(-2.94, 2.94), ctrlrange=(-1.9, 1.9))
+
+    MuJoCo computes the force kp (goal + u - x) - kv v at each stage of a step, as for the file's
+    own `<position>`. The set-point is cut to `ctrlrange`, the force to `forcerange`. u is 0 at the
+    goal, so that a law with one bound on |u| commands to both sides of it. An `input_delay` delays
+    the set-point alone. There is no nominal model for a law.
+
+    Attributes:
+      kp: N m/rad (N/m) at the joint, greater than 0.
+      kv: N m s/rad (N s/m) at the joint, 0 or more.
+      forcerange: lowest and highest force, N m (N) at the joint.
+      ctrlrange: lowest and highest set-point, rad (m) of the joint.
+      goal: position at which u is 0, rad (m) of the joint.
+      step: the set-point is rounded to multiples of this, rad (m) of the joint; 0: it is not.
+    """
+
+    unit = "{x}"
+    names = ("goal", "step")
+
+    kp: Positive
+    kv: Natural = 0.0
+    forcerange: Span = UNBOUNDED
+    ctrlrange: Span = UNBOUNDED
+    goal: Offset = 0.0
+    step: Natural = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        low, high = self.forcerange
+        if not low < 0.0 < high:
+            raise ScenarioError(
+                f"PositionServo's forcerange is {low:g} to {high:g}, but it pushes both ways: "
+                "give one about 0"
+            )
+
+    @property
+    def bound(self) -> float | None:
+        """The largest |u| that the ctrlrange takes, rad (m); None without one."""
+        low, high = self.ctrlrange
+        farthest = max(self.goal - low, high - self.goal)
+        return farthest if 0.0 < farthest < math.inf else None
+
+    @property
+    def stall(self) -> float | None:
+        """The largest force that it gives both ways, N m (N); None: any."""
+        low, high = self.forcerange
+        least = min(-low, high)
+        return least if least < math.inf else None
+
+    @property
+    def nominal(self) -> NominalDrive:
+        """Force per unit of u, and of the velocity. The spring to the goal is not in it."""
+        return NominalDrive(self.kp, self.kv)
+
+    def force_at(self, bound: float) -> float:
+        force = super().force_at(bound)
+        return force if self.stall is None else min(force, self.stall)
+
+    def suits(self, s: Any, chain: Sequence[Actuator]) -> None:
+        if len(drives := [part for part in chain if part.drives]) > 1:
+            other = next(part for part in drives if part is not self)
+            raise ScenarioError(
+                f"a PositionServo takes a set-point itself, and {type(other).__name__} is a drive, "
+                "too: leave that out, or give smc.Channel(motor=True) for an ideal motor instead"
+            )
+        if s.fault is not None and not s.fault.stuck:
+            raise ScenarioError(
+                "a Fault is less force or a bias of it, and u is the set-point of a PositionServo: "
+                "leave fault out, or give stuck=True"
+            )
+        if s.model != "none":
+            raise ScenarioError(
+                f"model is {s.model!r}, in which u is a force, and u is the set-point of a "
+                "PositionServo: give model='none', or smc.Channel(motor=True)"
+            )
+
+    def edit(self, spec: mujoco.MjSpec) -> None:
+        for actuator in self.drives_of(spec):
+            actuator.set_to_position(kp=1.0)
+            actuator.ctrllimited = True
+            actuator.ctrlrange = (-1.0, 1.0)
+            actuator.forcelimited = True
+            actuator.forcerange = (-1.0, 1.0)
+
+    def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
+        ids = self.drive_ids(model)
+        low, high = self.ctrlrange
+        yield Field("actuator_gainprm", (ids, STIFFNESS), self.kp)
+        yield Field("actuator_biasprm", (ids, BIAS), (self.kp * self.goal, -self.kp, -self.kv))
+        yield Field("actuator_ctrlrange", ids, (low - self.goal, high - self.goal))
+        yield Field("actuator_forcerange", ids, self.forcerange)
+
+    def numbers(self, run: Run) -> list[Sequence[float]]:
+        return [(self.goal, self.step)]
+
+    @property
+    def act(self) -> Any:
+        """The function that rounds the set-point; None if it is not rounded."""
+        return rounded if self.step else None
+
+
+numbers_at = record_at(floats(PositionServo.names))
+
+
+@register_jitable
+def rounded(sim, data, part):
+    """Give MuJoCo's servo the set-point as a multiple of the step, at the start of a step."""
+    if sim.stage == 0:
+        channel = channel_at(sim.channels, part.channel)
+        p = numbers_at(part.function.parameters, 0)
+        aim = p.goal + state_at(sim.states, part.channel).delayed
+        data.ctrl[channel.ctrl] = p.step * math.floor(aim / p.step + 0.5) - p.goal

@@ -1,0 +1,179 @@
+"""Position servos of a user's file that stay as they are: u is their set-point, about the goal."""
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.hardware import PositionServo
+
+ARM = """<mujoco model="arm"><compiler angle="radian"/><worldbody>
+  <body><joint name="a" axis="0 1 0" damping=".1" armature=".02"/>
+    <geom type="capsule" fromto="0 0 0 .3 0 0" size=".02" mass=".6" contype="0" conaffinity="0"/>
+    <body pos=".3 0 0"><joint name="b" axis="0 1 0" damping=".05" armature=".01" range="-2 2"/>
+      <geom type="capsule" fromto="0 0 0 .2 0 0" size=".02" mass=".3" contype="0" conaffinity="0"/>
+    </body></body></worldbody>
+  <actuator>
+    <position joint="a" kp="30" kv="1.5" gear="-2" ctrlrange="-2 1" forcerange="-4 3"/>
+    <position joint="b" kp="20" dampratio="1"/>
+  </actuator>
+  <keyframe><key name="home" qpos=".2 .4"/></keyframe></mujoco>"""
+# of the size of a hobby servo's arm: with its set-point at rest it hangs by load over kp
+HOBBY = """<mujoco model="hobby"><compiler angle="radian"/><worldbody><body>
+  <joint name="j" axis="0 -1 0" damping=".6" armature=".028" frictionloss=".052" range="-1.9 1.9"/>
+  <geom type="capsule" fromto="0 0 0 .2 0 0" size=".02" mass=".3" contype="0" conaffinity="0"/>
+  </body></worldbody><actuator>%s</actuator></mujoco>"""
+POSITION = '<position joint="j" kp="17.8" kv=".1" forcerange="-2.94 2.94" ctrlrange="-1.9 1.9"/>'
+LOAD, RUBS, KP = 0.3 * 9.81 * 0.1, 0.052, 17.8
+
+
+@smc.law_function(gains={"ki": 0.0, "kp": 0.0}, memory=1)
+def on_set_point(y, gains, memory):
+    """Command the reference as set-point, and correct it by an outer PI."""
+    memory[0] += y.e * y.dt
+    return y.r - gains.kp * y.e - gains.ki * memory[0], y.e
+
+
+def servo(xml, joint="j", name="servo", **fields):
+    return smc.plant_from(xml, {joint: smc.Channel(servo=True, **fields)}, name=name)
+
+
+def run(**fields):
+    (trace,) = smc.run([smc.Scenario(**fields)])
+    return trace
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
+@pytest.mark.parametrize("late", [0, 2])
+def test_a_servo_moves_as_that_of_the_file_whose_ctrl_is_the_set_point(integrator, late):
+    step = 0.01
+    channels = {
+        "a": smc.Channel(servo=True, x0=0.5),
+        "b": smc.Channel(servo=True, x0=-0.3, set_point_step=step),
+    }
+    arm = smc.plant_from(ARM, channels, keyframe="home")
+    law = on_set_point(kp=0.7, ki=2.0)
+    fields = {"reference": smc.Sine(0.6, 5.0), "control_period": 5e-3, "physics_step": 1e-3}
+    trace = run(
+        plant=arm,
+        law=law,
+        duration=2.0,
+        integrator=integrator,
+        input_delay=late * 5e-3,
+        **fields,
+    )
+    assert trace.failure is None
+    model = mujoco.MjModel.from_xml_string(ARM)
+    model.opt.timestep = 1e-3
+    model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.5, -0.3
+    for k in range(len(trace.t) - 1):
+        np.testing.assert_allclose(data.qpos, trace.x[k], rtol=0, atol=1e-12)
+        u = trace.u[k - late] if k >= late else np.zeros(2)
+        aim = np.array([0.2, 0.4]) + u
+        aim[1] = step * math.floor(aim[1] / step + 0.5)
+        data.ctrl[:] = -2.0 * aim[0], aim[1]
+        for _ in range(5):
+            mujoco.mj_step(model, data)
+    assert trace.force[:, 0].min() == -6.0  # gear times an end of the forcerange
+
+
+def test_a_servo_hangs_by_its_load_and_an_outer_integral_removes_that():
+    fields = {"plant": servo(HOBBY % POSITION), "reference": smc.Constant(0.0), "x0": 0.3}
+    alone = run(law=on_set_point(), duration=4.0, **fields)
+    assert abs(alone.x[-1, 0] + LOAD / KP) <= 1.01 * RUBS / KP  # -.0165 +- .0029
+    outer = run(law=on_set_point(kp=0.5, ki=5.0), control_period=0.02, duration=6.0, **fields)
+    assert abs(outer.x[-1, 0]) < 1e-6
+    assert outer.units()["u"] == "rad"
+    assert outer.units()["force"] == "N m"
+    late = run(law=on_set_point(), duration=0.1, input_delay=0.03, **fields | {"x0": 0.0})
+    assert late.scenario.efforts == ("rad",)
+
+
+def test_a_bound_and_a_goal_follow_from_the_file():
+    arm = smc.plant_from(
+        ARM, {"a": smc.Channel(servo=True), "b": smc.Channel(servo=True)}, keyframe="home"
+    )
+    a, b = smc.Scenario(plant=arm, law="pid").actuator
+    assert (a.kp, a.kv, a.forcerange, a.ctrlrange, a.goal) == (
+        120.0,
+        6.0,
+        (-6.0, 8.0),
+        (-0.5, 1.0),
+        0.2,
+    )
+    assert smc.Scenario(plant=arm, law="pid").limits == (
+        0.8,
+        2.4,
+    )  # ctrlrange or range, about the goal
+    assert b.kp == 20.0
+    assert b.kv > 0.0
+    assert b.bound is None
+    given = servo(HOBBY % POSITION, u_max=0.7)
+    assert smc.Scenario(plant=given, law="pid").limits == (0.7,)
+    assert arm.argument == "FILE.xml:a(servo)+b(servo)@home"
+
+
+FREE = '<position joint="j" kp="17.8"/>'
+REFUSED = {
+    "a motor": ('<motor joint="j"/>', {}, ["is a motor", "leave servo out"]),
+    "a lag": ('<position joint="j" kp="9" timeconst=".1"/>', {}, ["dynamics", "filterexact"]),
+    "a delay": ('<position joint="j" kp="9" delay=".02" nsample="10"/>', {}, ["delay of 0.02 s"]),
+    "another gain": (
+        '<general joint="j" gainprm="9" biastype="affine" biasprm="0 -8 0"/>',
+        {},
+        ["gain 9", "-8"],
+    ),
+    "one way": ('<position joint="j" kp="9" forcerange="0 3"/>', {}, ["0 to 3", "motor=True"]),
+    "two things": (POSITION, {"motor": True}, ["motor=True", "servo=True"]),
+    "a step without a servo": (POSITION, {"servo": False, "set_point_step": 0.1}, ["0.1", "servo"]),
+    "no bound": (FREE, {"range": ""}, ["no ctrlrange", "u_max="]),
+    "as a force": (POSITION, {"servo": False}, ["servo=True", "motor=True"]),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_servo_true_does_not_take_is_said(case):
+    actuator, fields, words = REFUSED[case]
+    xml = HOBBY % actuator
+    if "range" in fields:
+        xml = xml.replace('range="-1.9 1.9"/>', "/>")
+    channel = {"servo": True} | {name: one for name, one in fields.items() if name != "range"}
+    with pytest.raises(ScenarioError) as error:
+        smc.plant_from(xml, {"j": channel})
+    for word in words:
+        assert word in str(error.value)
+
+
+BESIDE = {
+    "nominal": ({"model": "nominal"}, "give model='none'"),
+    "of_model": ({"law": "mpc"}, "give model=.none."),
+    "lag": ({"actuator": smc.Lag(0.01)}, "Lag is a drive"),
+    "motor": ({"actuator": smc.DCMotor()}, "DCMotor is a drive"),
+    "fault": ({"fault": smc.Fault(at=1.0, gain=0.5)}, "stuck=True"),
+}
+
+
+@pytest.mark.parametrize("case", BESIDE)
+def test_what_a_servo_does_not_stand_beside_is_said(case):
+    fields, words = BESIDE[case]
+    with pytest.raises(ScenarioError, match=words):
+        smc.Scenario(plant=servo(HOBBY % POSITION), **{"law": "pid"} | fields)
+
+
+def test_a_trace_of_a_servo_is_read_back(tmp_path):
+    plant = servo(HOBBY % POSITION, set_point_step=0.01)
+    trace = run(plant=plant, law="pid", x0=0.3, duration=0.1, actuator=smc.Backlash(0.01))
+    back = smc.load(trace.save(tmp_path / "servo.npz"))
+    assert back.scenario == trace.scenario
+    assert [type(part) for part in back.scenario.actuator] == [PositionServo, smc.Backlash]
+    np.testing.assert_array_equal(run_again(back.scenario).x, trace.x)
+
+
+def run_again(scenario):
+    (trace,) = smc.run([scenario])
+    return trace
