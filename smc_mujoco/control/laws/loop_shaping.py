@@ -41,60 +41,92 @@ PHI, GAMMA, SLOTS = 12, 21, 30  # 3 x 3 matrices in the memory, by rows
 def design(a1, a2, b, k, wi):
     """Return F and Hs, three numbers each, in observable form of the shaped plant, and gamma."""
     # the shaped plant is (n1 s + n0) / (s^3 + d2 s^2 + d1 s)
-    n0, n1, d1, d2 = (b * k * wi, b * k, -a1, -a2)
+    n0 = b * k * wi
+    n1 = b * k
+    d1 = -a1
+    d2 = -a2
+    x11, x12, x13, x22, x23, x33 = riccati(n0, n1, d1, d2)
+    y11, y12, y13, y22, y23, y33 = observable(x11, x12, x13, x22, x23, x33, n1, wi, d1, d2)
+    # the product Y Z
+    m11, m12, m13 = row(y11, y12, y13, x11, x12, x13, x22, x23, x33)
+    m21, m22, m23 = row(y12, y22, y23, x11, x12, x13, x22, x23, x33)
+    m31, m32, m33 = row(y13, y23, y33, x11, x12, x13, x22, x23, x33)
+    rho = largest_eigenvalue(m11, m12, m13, m21, m22, m23, m31, m32, m33)
+    gamma = SUBOPTIMAL * math.sqrt(1.0 + rho)
+    # z W = B' for W = (1 - gamma^-2) I - gamma^-2 Y Z; then F = -z Y
+    g = 1.0 / (gamma * gamma)
+    z1, z2, z3 = left_solution(
+        n0,
+        n1,
+        1.0 - g - g * m11,
+        -g * m12,
+        -g * m13,
+        -g * m21,
+        1.0 - g - g * m22,
+        -g * m23,
+        -g * m31,
+        -g * m32,
+        1.0 - g - g * m33,
+    )
+    F1, F2, F3 = row(z1, z2, z3, y11, y12, y13, y22, y23, y33)
+    return -F1, -F2, -F3, -x13, -x23, -x33, gamma
+
+
+@njit
+def riccati(n0, n1, d1, d2):
+    """Return X of the controllable form, which is Z of the observable form: its upper triangle by
+    rows.
+    """
     p0 = abs(n0)
     p2, p1 = monic(p0, d1 * d1 + n1 * n1, d2 * d2 - 2.0 * d1)
-    # X of the controllable form, which is Z of the observable form
-    x13, x23, x33 = p0, p1 - d1, p2 - d2
-    x11, x12 = d1 * x13 + x13 * x23 - n0 * n1, d2 * x13 + x13 * x33
+    x13 = p0
+    x23 = p1 - d1
+    x33 = p2 - d2
+    x11 = d1 * x13 + x13 * x23 - n0 * n1
+    x12 = d2 * x13 + x13 * x33
     x22 = d2 * x23 - x13 + d1 * x33 + x23 * x33
+    return x11, x12, x13, x22, x23, x33
+
+
+@njit
+def observable(x11, x12, x13, x22, x23, x33, n1, wi, d1, d2):
+    """Return X of the observable form, Y = T' X T, from that of the controllable form: its upper
+    triangle by rows.
+    """
     # columns t, u, v of the matrix T that takes the observable form's states to those of the
     # controllable form
     t1 = 1.0 / (n1 * wi * (wi * wi + d1 - d2 * wi))
-    t2, t3 = -wi * t1, wi * wi * t1
-    u1, u2, u3 = t2, t3, -d1 * t2 - d2 * t3
-    v1, v2, v3 = u2, u3, -d1 * u2 - d2 * u3
-    # Y = T' X T, X of the observable form
-    at1, at2, at3 = (
-        x11 * t1 + x12 * t2 + x13 * t3,
-        x12 * t1 + x22 * t2 + x23 * t3,
-        x13 * t1 + x23 * t2 + x33 * t3,
+    t2 = -wi * t1
+    t3 = wi * wi * t1
+    u3 = -d1 * t2 - d2 * t3
+    v3 = -d1 * t3 - d2 * u3
+    at1, at2, at3 = row(t1, t2, t3, x11, x12, x13, x22, x23, x33)
+    au1, au2, au3 = row(t2, t3, u3, x11, x12, x13, x22, x23, x33)
+    av1, av2, av3 = row(t3, u3, v3, x11, x12, x13, x22, x23, x33)
+    y11 = t1 * at1 + t2 * at2 + t3 * at3
+    y12 = t1 * au1 + t2 * au2 + t3 * au3
+    y13 = t1 * av1 + t2 * av2 + t3 * av3
+    y22 = t2 * au1 + t3 * au2 + u3 * au3
+    y23 = t2 * av1 + t3 * av2 + u3 * av3
+    y33 = t3 * av1 + u3 * av2 + v3 * av3
+    return y11, y12, y13, y22, y23, y33
+
+
+@njit
+def row(a1, a2, a3, x11, x12, x13, x22, x23, x33):
+    """Return the row a X, X symmetric."""
+    return (
+        a1 * x11 + a2 * x12 + a3 * x13,
+        a1 * x12 + a2 * x22 + a3 * x23,
+        a1 * x13 + a2 * x23 + a3 * x33,
     )
-    au1, au2, au3 = (
-        x11 * u1 + x12 * u2 + x13 * u3,
-        x12 * u1 + x22 * u2 + x23 * u3,
-        x13 * u1 + x23 * u2 + x33 * u3,
-    )
-    av1, av2, av3 = (
-        x11 * v1 + x12 * v2 + x13 * v3,
-        x12 * v1 + x22 * v2 + x23 * v3,
-        x13 * v1 + x23 * v2 + x33 * v3,
-    )
-    y11, y12, y13 = (
-        t1 * at1 + t2 * at2 + t3 * at3,
-        t1 * au1 + t2 * au2 + t3 * au3,
-        t1 * av1 + t2 * av2 + t3 * av3,
-    )
-    y22, y23 = u1 * au1 + u2 * au2 + u3 * au3, u1 * av1 + u2 * av2 + u3 * av3
-    y33 = v1 * av1 + v2 * av2 + v3 * av3
-    # the product Y Z
-    m11, m12, m13 = (
-        y11 * x11 + y12 * x12 + y13 * x13,
-        y11 * x12 + y12 * x22 + y13 * x23,
-        y11 * x13 + y12 * x23 + y13 * x33,
-    )
-    m21, m22, m23 = (
-        y12 * x11 + y22 * x12 + y23 * x13,
-        y12 * x12 + y22 * x22 + y23 * x23,
-        y12 * x13 + y22 * x23 + y23 * x33,
-    )
-    m31, m32, m33 = (
-        y13 * x11 + y23 * x12 + y33 * x13,
-        y13 * x12 + y23 * x22 + y33 * x23,
-        y13 * x13 + y23 * x23 + y33 * x33,
-    )
-    # its largest eigenvalue: Newton's method on the cubic, whose roots are real, falls to it from
-    # their sum
+
+
+@njit
+def largest_eigenvalue(m11, m12, m13, m21, m22, m23, m31, m32, m33):
+    """Return the largest eigenvalue of a matrix whose eigenvalues are real: Newton's method on the
+    cubic falls to it from their sum.
+    """
     c2 = m11 + m22 + m33
     c1 = m11 * m22 - m12 * m21 + m11 * m33 - m13 * m31 + m22 * m33 - m23 * m32
     c0 = (
@@ -109,26 +141,24 @@ def design(a1, a2, b, k, wi):
         if lower >= rho:
             break
         rho = lower
-    gamma = SUBOPTIMAL * math.sqrt(1.0 + rho)
-    # z W = B' for W = (1 - gamma^-2) I - gamma^-2 Y Z, by determinants; then F = -z Y
-    g = 1.0 / (gamma * gamma)
-    w11, w12, w13 = 1.0 - g - g * m11, -g * m12, -g * m13
-    w21, w22, w23 = -g * m21, 1.0 - g - g * m22, -g * m23
-    w31, w32, w33 = -g * m31, -g * m32, 1.0 - g - g * m33
-    e11, e12, e13 = w22 * w33 - w23 * w32, w13 * w32 - w12 * w33, w12 * w23 - w13 * w22
-    e21, e22, e23 = w23 * w31 - w21 * w33, w11 * w33 - w13 * w31, w13 * w21 - w11 * w23
+    return rho
+
+
+@njit
+def left_solution(n0, n1, w11, w12, w13, w21, w22, w23, w31, w32, w33):
+    """Return z of z W = (n0, n1, 0), by determinants."""
+    e11 = w22 * w33 - w23 * w32
+    e12 = w13 * w32 - w12 * w33
+    e13 = w12 * w23 - w13 * w22
+    e21 = w23 * w31 - w21 * w33
+    e22 = w11 * w33 - w13 * w31
+    e23 = w13 * w21 - w11 * w23
     det = w11 * e11 + w12 * e21 + w13 * (w21 * w32 - w22 * w31)
-    z1, z2, z3 = (
+    return (
         (n0 * e11 + n1 * e21) / det,
         (n0 * e12 + n1 * e22) / det,
         (n0 * e13 + n1 * e23) / det,
     )
-    F1, F2, F3 = (
-        z1 * y11 + z2 * y12 + z3 * y13,
-        z1 * y12 + z2 * y22 + z3 * y23,
-        z1 * y13 + z2 * y23 + z3 * y33,
-    )
-    return -F1, -F2, -F3, -x13, -x23, -x33, gamma
 
 
 @njit
