@@ -247,9 +247,10 @@ def _compensation(view, k, t, i):
         if raised:
             return True, 0.0
     y = sim.joint_state
+    y.t = t
+    y.x = pointer(sim.seen.x)[i]
     y.v = v
-    y.motor = 0.0
-    y.load = 0.0
+    y.h = y.u = y.motor = y.load = 0.0
     force = 0.0
     for j in range(sim.compensated):
         part = part_at(sim.compensations, j)

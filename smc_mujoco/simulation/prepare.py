@@ -11,7 +11,7 @@ import contextlib
 import dataclasses
 import functools
 import re
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.properties import read_by
 from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, DRIVE, PART, READER, Run
-from smc_mujoco.mechanisms.hardware.part import Part
+from smc_mujoco.mechanisms.hardware.part import Friction, Part
 from smc_mujoco.mechanisms.plant import Native, Plant
 from smc_mujoco.simulation import agreement, cfunctions, philox, python_functions, state
 from smc_mujoco.simulation.model import (
@@ -531,18 +531,21 @@ def _parts(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
     return rows
 
 
+def compensations(scenario: Scenario) -> Iterator[tuple[Friction, int, Sequence[float]]]:
+    """Yield each friction that is compensated, each of its channels, and its numbers there."""
+    s = scenario.resolved
+    for part in s.compensated:
+        numbers = part.numbers(run_of(scenario, part))
+        for place, i in enumerate(part.channels(s.plant)):
+            yield part, i, numbers[place if len(numbers) > 1 else 0]
+
+
 def _compensations(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
     """Return the PARTs of the frictions that are compensated, one for each of their joints."""
-    s = prepared.scenario.resolved
     rows = []
-    for part in s.compensated:
-        numbers = part.numbers(run_of(prepared.scenario, part))
+    for part, i, numbers in compensations(prepared.scenario):
         compiled = buffer.part(part, "steady")
-        for place, i in enumerate(part.channels(s.plant)):
-            values = numbers[place if len(numbers) > 1 else 0]
-            rows.append(
-                {"function": _function(compiled, values, buffer, part.memory), "channel": i}
-            )
+        rows.append({"function": _function(compiled, numbers, buffer, part.memory), "channel": i})
     return rows
 
 

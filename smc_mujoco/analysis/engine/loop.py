@@ -363,7 +363,8 @@ def _compensating(form: Form, compile_user: Compiler) -> Any:
             v = refer(view, t, i)[1]
         share = view.row[row_at.compensation]
         eps = view.row[row_at.compensation + 1]
-        y = JointState(t, 0.0, 0.0, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        x = view.work[work_at.seen_x + i]
+        y = JointState(t, 0.0, x, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         return False, share * math.tanh(abs(v) / eps) * steady(view, i, y)
 
     return compensate

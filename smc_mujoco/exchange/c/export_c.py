@@ -5,6 +5,7 @@ compiled law bit for bit if both use the same C library. A division by zero rais
 gives inf or NaN, which ends a run too.
 """
 
+import dataclasses
 import inspect
 import math
 import re
@@ -16,7 +17,8 @@ from smc_mujoco.common.version import __version__
 from smc_mujoco.control.component import Component, Template, gain_at, gain_text
 from smc_mujoco.control.law import FREE_BODY, catalogue, known_laws
 from smc_mujoco.control.laws import observer_free_q15 as q15
-from smc_mujoco.exchange.c import body, build
+from smc_mujoco.exchange.c import body, build, compensation
+from smc_mujoco.exchange.c.compensation import Compensate
 from smc_mujoco.exchange.c.translation.c_text import MATH, plain, rows
 from smc_mujoco.exchange.c.translation.functions import translate
 from smc_mujoco.exchange.c.translation.python_source import Untranslatable
@@ -43,8 +45,9 @@ def law_to_c(
 
     Args:
       law: a Law, its Template, or its text, see `law`; or a Scenario, which then gives the number
-        of joints, what the law knows of its plant, and of a free body the function that gives its
-        actuators their commands.
+        of joints, what the law knows of its plant, of a free body the function that gives its
+        actuators their commands, and its Feedforward: u then has the compensation, with error=0,
+        and smc_compensation is what was added.
       numbers: "double", "float", or, only for the paper's law observer_free, "q15": words of 16
         bits.
       joints: the number of joints for which a law of many joints is written. Default: the number of
@@ -58,27 +61,27 @@ def law_to_c(
         that cannot be translated, which the error quotes.
     """
     find("type of numbers", numbers, NUMBER_BYTES)
-    plant = None
+    plant = compensate = None
     if isinstance(law, Scenario):
         if joints is not None:
             raise ScenarioError(
                 "a scenario has its own joints: leave joints out, or give its law instead"
             )
-        if law.compensated:
-            raise ScenarioError(
-                "the scenario has a Feedforward, which is not written in C: give its law, and add "
-                "the compensation where you call it"
-            )
+        compensate = compensation.compensate_of(law)
         plant, law = law.resolved.plant, law.resolved.law
         joints = plant.n if law.joint else None
     law = writable(law)
     joints = number_of_joints(law, joints)
     if numbers == "q15":
+        if compensate:
+            raise ScenarioError(
+                "a Feedforward is not written in words of 16 bits: write double or float numbers"
+            )
         law = _in_q15(law)
         slots = 0
         code = _fixed_point(law)
     else:
-        slots, code = translated(law, numbers == "float", joints, plant)
+        slots, code = translated(law, numbers == "float", joints, plant, compensate)
     return with_head(law, numbers, slots, code, joints)
 
 
@@ -142,24 +145,33 @@ def number_of_joints(law: Component, joints: int | None) -> int:
 
 
 def translated(
-    component: Component, single: bool = False, joints: int = 0, plant: Plant | None = None
+    component: Component,
+    single: bool = False,
+    joints: int = 0,
+    plant: Plant | None = None,
+    compensate: Compensate | None = None,
 ) -> tuple[int, str]:
     """Return the memory slots and the C of a component, of a law of many joints for a number of
     these.
 
-    Of a law of a free body, or for a plant that is one, it has `body.functions`, too.
+    Of a law of a free body, or for a plant that is one, it has `body.functions`, too. A law with a
+    compensation adds it to u.
     """
     if plant is not None and not plant.pose:
         plant = None
     others = {}
     if plant is not None or (joints and getattr(component, "plants", ()) == (FREE_BODY,)):
         others = body.functions(plant)
+    what = f"{component.kind} {component.name!r}"
+    if compensate:
+        what += " with the scenario's Feedforward"
+        others = others | compensation.function(compensate, joints)
+        together = compensation.compensated(component.function, compensate, joints)
+        component = dataclasses.replace(component, function=together)
     try:
         slots, code = translate(component, single, joints, others)
     except Untranslatable as error:
-        raise ScenarioError(
-            f"{component.kind} {component.name!r} cannot be written in C: {error}"
-        ) from None
+        raise ScenarioError(f"{what} cannot be written in C: {error}") from None
     if plant is not None:
         count = f"enum {{ SMC_ACTUATORS = {len(mixer(plant))} }};"
         code = f"{count} /* whose controls smc_actuators sets */\n\n{code}"
@@ -267,6 +279,8 @@ def _head(law: Component, numbers: str, slots: int, joints: int, code: str) -> s
         "licence": "use without restriction, without warranty",
         "build": "cc -std=c99 -O2 -ffp-contract=off, and -lm",
     }
+    if compensation.NAME in code:
+        facts["adds"] = "what the scenario's Feedforward with error=0 gives, smc_compensation, to u"
     if joints:
         facts["reads"] = ", ".join(dict.fromkeys(re.findall(r"->(?!plant)(\w+)", code)))
     title = f"{law.name}: a control law{many} in C99, written out by smc_mujoco {__version__}."

@@ -88,6 +88,10 @@ void smc_errors(const smc_real *x, const smc_real *v, const smc_real *r, const s
 void smc_actuators(const smc_measurement *y, const smc_real *u, smc_real *controls); /* of the plant: u within its limit */
 #endif
 
+/* What a scenario's Feedforward adds to u, a number for each joint, in files that smc_mujoco writes from such a scenario:
+ * smc_law has added it already. */
+void smc_compensation(const smc_measurement *y, smc_real *compensation);
+
 /* Optional definitions: */
 extern const char smc_law_gains[]; /* names and defaults of its gains: "lam=6,k1=3", or "k1=3 5" of two joints */
 extern const smc_real smc_law_defaults[]; /* those defaults, ready to be passed as gains[] */

@@ -25,7 +25,8 @@ from smc_mujoco.control.component import Component, gain_at
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
-from smc_mujoco.exchange.c import export_c
+from smc_mujoco.exchange.c import compensation, export_c
+from smc_mujoco.exchange.c.compensation import Compensate
 from smc_mujoco.exchange.c.translation.c_text import plain
 from smc_mujoco.exchange.c.translation.values import JOINTS
 from smc_mujoco.mechanisms.plant import Plant
@@ -61,6 +62,7 @@ JOINT_INPUTS = {
 # of the nominal model; C and J are what coriolis and jacobian need
 MODEL_INPUTS = {"f", "g", "fq", "gq", "M", "h"}
 OUTPUTS = ("u", "s")
+EXTRA_OUTPUTS = ("control", "compensation")  # of some FMUs
 SYMBOLS = (  # names that the linker sees
     "smc_law",
     "smc_surface",
@@ -76,6 +78,7 @@ SYMBOLS = (  # names that the linker sees
     "smc_pose",
     "smc_errors",
     "smc_actuators",
+    compensation.NAME,
 )
 
 
@@ -102,6 +105,7 @@ class ExportedLaw:
     modelled: bool  # whether the law reads the nominal model
     joints: int = 0  # of a law of many joints; 0 for a law of one channel
     plant: Plant | None = None  # of a free body the law commands the actuators
+    compensate: Compensate | None = None  # what is added to u
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -120,7 +124,9 @@ class ExportedLaw:
         code = {
             kind: export_c.translated(part) for kind, part in self.parts.items() if kind != "law"
         }
-        of_law = export_c.translated(self.law, joints=self.joints, plant=self.plant)
+        of_law = export_c.translated(
+            self.law, joints=self.joints, plant=self.plant, compensate=self.compensate
+        )
         return {"law": of_law, **code}
 
     @property
@@ -145,6 +151,8 @@ def variables(exported: ExportedLaw) -> list[Variable]:
             for index, start in _starts(name, exported).items():
                 listed.append(Variable(name + index, "SMC_INPUT", words, start))
     computed = {"u": "command, within u_max, N or N m", "s": "sliding variable"}
+    if exported.compensate:
+        computed["compensation"] = "what compensates friction, a part of u before u_max, N or N m"
     if exported.surface:
         computed["v_eq"] = "acceleration of the error that keeps s constant"
     if exported.estimator:
@@ -410,6 +418,8 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
             "    return SMC_NOT_FINITE;",
         ]
     )
+    if exported.compensate:
+        yield f"smc_compensation(&y, value + {place('compensation' + exported.places[0])});"
     if exported.actuators:
         yield f"smc_actuators(&y, out, value + {place('control[1]')});"
     yield "return 0;"

@@ -5,7 +5,7 @@ import xml.etree.ElementTree as xml
 from collections.abc import Iterable, Sequence
 
 from smc_mujoco.common.version import __version__
-from smc_mujoco.exchange.fmu.contents import OUTPUTS, ExportedLaw, Variable
+from smc_mujoco.exchange.fmu.contents import EXTRA_OUTPUTS, OUTPUTS, ExportedLaw, Variable
 
 # Kind of variable -> causality, variability, initial.
 VARIABLE_ROLES = {
@@ -61,7 +61,7 @@ def model_description(
 
 def is_output(variable: Variable) -> bool:
     """Return whether a variable is u, s or an actuator's control, or an element of u or s."""
-    return variable.name.partition("[")[0] in (*OUTPUTS, "control")
+    return variable.name.partition("[")[0] in (*OUTPUTS, *EXTRA_OUTPUTS)
 
 
 def _variable(reference: int, variable: Variable) -> xml.Element:

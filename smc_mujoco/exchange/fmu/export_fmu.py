@@ -29,6 +29,7 @@ from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.exchange.c import build
+from smc_mujoco.exchange.c.compensation import Compensate, compensate_of
 from smc_mujoco.exchange.c.export_c import number_of_joints, with_head, writable
 from smc_mujoco.exchange.fmu import contents, description
 from smc_mujoco.exchange.fmu.contents import ExportedLaw
@@ -74,7 +75,7 @@ def law_to_fmu(
 
     Args:
       law: a Law, its Template, its name, or a Scenario, which then gives surface, velocity,
-        control_period, u_max, model and the number of joints.
+        control_period, u_max, model, the number of joints, and its Feedforward with error=0.
       path: of the .fmu file. Default: the law's name, in the current folder.
       surface: a Surface or its name. None: the law's own, de + c e.
       velocity: an Estimator or its name. None: the FMU has the velocity as an input, v.
@@ -88,7 +89,8 @@ def law_to_fmu(
       binary: whether the FMU also contains a binary for this machine, compiled by $CC or cc.
 
     Inputs are x, v unless an estimator replaces it, the reference r and dr, and all that the law
-    reads besides, such as ddr. Outputs are u and s. All gains are tunable parameters. Many joints
+    reads besides, such as ddr. Outputs are u and s, and with a Feedforward compensation, which u
+    contains. All gains are tunable parameters. Many joints
     have x[1], x[2], M[1,1] and so on.
 
     Returns:
@@ -139,8 +141,8 @@ def _of_scenario(scenario: Scenario, chosen: Data) -> Fields:
     what = ""
     if len(limits) > 1 and not s.law.joint:
         what = "a bound for each channel"
-    elif s.feedforward is not None:
-        what = "a feedforward"
+    elif s.known_signal is not None:
+        what = "a feedforward that is a signal"
     elif s.accelerates:
         what = "a Stepper"
     if what:
@@ -148,6 +150,7 @@ def _of_scenario(scenario: Scenario, chosen: Data) -> Fields:
             f"the scenario has {what}, which an FMU cannot have: give its law, with u_max="
         )
     own = {name: getattr(s, name) for name in ("surface", "velocity", "control_period", "model")}
+    own["compensate"] = compensate_of(scenario)
     if s.law.joint:
         return own | {"u_max": list(scenario.limits), "joints": s.plant.n, "plant": s.plant}
     return own | {"u_max": limits.pop(), "joints": None}
@@ -162,6 +165,7 @@ def _exported(
     model: Any,
     joints: int | None,
     plant: Plant | None = None,
+    compensate: Compensate | None = None,
 ) -> ExportedLaw:
     """Return what is exported, checked. Arguments and errors as in `law_to_fmu`."""
     sliding = coerce.surface("surface", surface, None)
@@ -189,6 +193,7 @@ def _exported(
         modelled=chosen.requires_model or model == "nominal",
         joints=count,
         plant=plant,
+        compensate=compensate,
     )
 
 

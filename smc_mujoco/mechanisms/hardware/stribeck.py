@@ -73,7 +73,8 @@ class Stribeck(Sliding):
 
     @staticmethod
     def value(v, motor, load, p):
-        level = static = p.coulomb
+        level = p.coulomb
+        static = p.coulomb
         if not math.isnan(p.static):
             static = p.static
             level += (p.static - p.coulomb) * math.exp(-((v / p.stribeck) ** 2))

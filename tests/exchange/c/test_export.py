@@ -496,9 +496,3 @@ def test_a_tuning_is_exported_as_its_law(tmp_path, monkeypatch):
     with pytest.raises(SystemExit) as end:
         cli.main(["export", "st.json", "st.fmu", "--no-binary"])
     assert not end.value.code
-
-
-def test_code_of_a_scenario_with_a_feedforward_would_be_without_it(refused):
-    feedforward = smc.Feedforward(smc.Coulomb(0.1))
-    scenario = smc.Scenario(plant="duffing", law=smc.law("pid"), feedforward=feedforward)
-    refused(lambda: smc.exchange.law_to_c(scenario), "Feedforward")

@@ -104,6 +104,20 @@ def test_it_adds_the_force_of_a_steady_speed(joint, friction, steady):
     np.testing.assert_allclose(np.ravel(trace.compensation), expected, rtol=1e-9)
 
 
+@smc.hardware.friction_function(numbers={"level": 0.3})
+def warming(y, p, memory):
+    return p.level * (1.0 + y.t + y.x**2)
+
+
+def test_it_knows_the_time_and_the_place_of_the_joint(joint):
+    """Beside a part of the plant, which leaves a state of its own joint and time."""
+    trace = run(joint, smc.Feedforward(warming()), duration=0.3, x0=0.2)
+    v = 0.9 * np.cos(3.0 * trace.t)
+    level = 0.3 * (1.0 + trace.t + np.ravel(trace.x) ** 2)
+    expected = level * np.tanh(np.abs(v) / 0.005) * np.sign(v)
+    np.testing.assert_allclose(np.ravel(trace.compensation), expected, rtol=1e-9)
+
+
 def test_the_fast_engine_asks_what_compensated_and_dry_frictions_index(joint):
     scenario = smc.Scenario(
         plant="duffing", law=PD, friction=RUBS, feedforward=smc.Feedforward(RUBS)

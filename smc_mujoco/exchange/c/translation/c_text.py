@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.errors import shown
 from smc_mujoco.control.component import Component
 from smc_mujoco.exchange.c.translation.python_source import PythonSource, Untranslatable, refuse
@@ -38,6 +39,7 @@ HELPERS = {
     "lesser": "a <= b || a != a ? a : b",
     "greater": "a >= b || a != a ? a : b",
     "sign": "a > 0 ? 1 : a < 0 ? -1 : a",
+    "unknown": "a != a",  # NaN
 }
 
 SQUARE = "(a * a)"
@@ -146,7 +148,7 @@ class Program:
             self.constants[content] = self.unique_name(name)
         name = self.constants[content]
         self.texts[name] = f"static const {TYPES[of]} {name}{content}"
-        fields = () if isinstance(values, tuple) else None
+        fields = getattr(values, "_fields", ()) if isinstance(values, tuple) else None
         return array_at(name, Kind(of, data.shape, fields))
 
 
@@ -180,6 +182,7 @@ class Lines:
         for name in self.parameters:
             self.names[name] = self.named(name)
         self.results = list[Kind]()
+        self.fields: Names = ()  # names of its results, if it returns a named tuple
         self.begin()
 
     def begin(self) -> None:

@@ -3,6 +3,7 @@
 import ast
 import functools
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -80,6 +81,7 @@ arcsin arccos"""
 ELEMENTWISE = {getattr(np, name): name.replace("arc", "a") for name in NUMPY_NAMES.split()}
 ELEMENTWISE |= {np.abs: "fabs", abs: "fabs"}
 ELEMENTWISE |= {np.minimum: "lesser", np.maximum: "greater", np.sign: "sign"}
+ELEMENTWISE |= {math.isnan: "unknown"}
 
 
 class Expressions(Arrays):

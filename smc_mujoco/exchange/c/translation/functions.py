@@ -89,7 +89,7 @@ class Function(Statements):
         sources = frozenset[str]().union(*(values[i].sources for i in made.returned))
         items = self.results_in(made, arguments, sources)
         self.lines.append(f"{name}({', '.join(arguments)});")
-        return items[0] if len(items) == 1 else gathered(items)
+        return items[0] if len(items) == 1 else gathered(items, made.fields)
 
     def results_in(
         self, made: "Function", arguments: list[str], sources: frozenset[str]
@@ -100,7 +100,7 @@ class Function(Statements):
         kinds = made.results
         alike = len(kinds) > 1 and {*kinds} == {Kind(kinds[0].of)}
         if alike:
-            array = self.temporary(Kind(kinds[0].of, (len(kinds),), ()))
+            array = self.temporary(Kind(kinds[0].of, (len(kinds),), made.fields))
             arguments.append(array.pointer)
             arguments += [f"{array.pointer} + {i}" for i in range(1, len(kinds))]
             return [array._replace(sources=sources)]

@@ -120,6 +120,7 @@ class Statements(Expressions):
             values = value.elements()
         if self.entry and self.program.component.kind == "estimator" and len(values) == 1:
             values = (*values, Value("NAN", REAL, UNARY))
+        self.fields = value.kind.fields or ()
         self.results = self.results or [item.kind._replace(stride="1") for item in values]
         if len(values) != len(self.results):
             raise refuse(node, "another number of results")

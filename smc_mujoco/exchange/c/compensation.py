@@ -1,0 +1,140 @@
+"""What a Feedforward adds to a law's u, in C: Python that is translated, as the law's is.
+
+It has the operations of the control callback in their order, so that it gives the same bits. The
+share `error` of a Feedforward is left out: it says how wrong the compensation is of the true
+machine, which no controller knows. What is written is the Feedforward with error=0.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from smc_mujoco.common import jit
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.exchange.c.translation.values import Kind
+from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
+from smc_mujoco.mechanisms.hardware.moments import JointState
+from smc_mujoco.simulation.prepare import compensations
+from smc_mujoco.simulation.scenario import Scenario
+
+Compensate = Callable[..., None]  # (y, total) -> nothing; it sets total to what is added to u
+NAME = "smc_compensation"  # in C
+
+
+def compensate_of(scenario: Scenario) -> Compensate | None:
+    """Return what the Feedforward of a scenario adds to u; None without one.
+
+    Raises:
+      ScenarioError: a law of one channel, and a compensation that differs between the channels.
+    """
+    s = scenario.resolved
+    given = s.feedforward
+    if not isinstance(given, Feedforward):
+        return None
+    terms: list[list[tuple]] = [[] for _ in range(s.plant.driven)]
+    for part, i, numbers in compensations(scenario):
+        p = jit.named(part.names)(*numbers)
+        terms[i].append((part.steady, p, max(part.memory, 1)))
+    speed = {"reference": of_reference, "speed": of_joint}[given.on]
+    gains = [nominal.gain for nominal in s.drive_train.nominal[: s.plant.driven]]
+    if not s.law.joint:
+        if any(repr(one) != repr((terms[0], gains[0])) for one in zip(terms, gains, strict=True)):
+            raise ScenarioError(
+                "the scenario's Feedforward differs between its channels, and a law of one "
+                "channel is written once for all: give one that is the same for every channel"
+            )
+        return _of_channel(_added(terms[0], speed, given.eps, gains[0]))
+    compensate: Compensate = add_nothing
+    for i, (own, gain) in enumerate(zip(terms, gains, strict=True)):
+        if own:
+            compensate = _with_joint(compensate, _added(own, speed, given.eps, gain), i)
+    return compensate
+
+
+def function(compensate: Compensate, joints: int) -> dict[str, tuple[Compensate, list[Kind]]]:
+    """Return name in smc_law.h -> function, and the kinds of its arguments. `joints`: 0 for one
+    channel.
+    """
+    return {NAME: (compensate, [Kind("y"), Kind("real", (max(joints, 1),))])}
+
+
+def compensated(law: Callable, compensate: Compensate, joints: int) -> Callable:
+    """Return a law's function with the compensation in its u."""
+
+    def of_channel(y, gains, memory):
+        u, s = law(y, gains, memory)
+        added = np.zeros(1)
+        compensate(y, added)
+        return u + added[0], s
+
+    def of_joints(y, gains, memory):
+        u, s = law(y, gains, memory)
+        added = np.zeros(joints)
+        compensate(y, added)
+        return u + added, s
+
+    return of_joints if joints else of_channel
+
+
+def of_reference(v, dr):
+    """Return the speed of the reference."""
+    return dr
+
+
+def of_joint(v, dr):
+    """Return the speed that is measured or estimated."""
+    return v
+
+
+def no_force(y):
+    """Return the force of no friction."""
+    return 0.0
+
+
+def add_nothing(y, total):
+    """Set what is added to 0."""
+    total[:] = np.zeros(len(total))
+
+
+def _of_channel(added: Callable) -> Compensate:
+    def compensate(y, total):
+        total[0] = added(y.t, y.x, y.v, y.dr)
+
+    return compensate
+
+
+def _with_joint(others: Compensate, added: Callable, i: int) -> Compensate:
+    """Return others, and what is added to u of joint i."""
+
+    def compensate(y, total):
+        others(y, total)
+        total[i] = added(y.t, y.x[i], y.v[i], y.dr[i])
+
+    return compensate
+
+
+def _added(terms: Sequence[tuple], speed: Callable, eps: float, gain: float) -> Callable:
+    """Return what is added to u of one joint, by its time, position, speed and that of the
+    reference.
+    """
+    force = no_force
+    for steady, p, size in terms:
+        force = _with_friction(force, steady, p, size)
+
+    def added(t, x, v, dr):
+        v = speed(v, dr)
+        y = JointState(t, 0.0, x, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return math.tanh(abs(v) / eps) * force(y) / gain
+
+    return added
+
+
+def _with_friction(others: Callable, steady: Any, p: Any, size: int) -> Callable:
+    """Return the force of others and of a friction with the numbers p."""
+
+    def force(y):
+        return others(y) + steady(y, p, np.zeros(size))
+
+    return force
