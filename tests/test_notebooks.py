@@ -115,7 +115,7 @@ def test_a_notebook_runs_and_shows_what_its_text_says(path, tmp_path):
         for output in outputs:
             for kind in output:
                 kinds.add(kind)
-        if call in ("smc.figure", "smc.plot"):
+        if call in ("smc.figure", "smc.plot", "plt.show"):
             assert "image/png" in kinds, text
         elif call == "smc.show":
             assert any(output["text/html"].startswith("<video") for output in outputs), text
