@@ -240,10 +240,10 @@ def ultimate_bound(trace: Trace) -> float:
     ...
 
 
-@metric("{x}", late=True)
+@folded("{x}", Fold("e", "range", power=0, part="late"))
 def ripple(trace: Trace) -> float:
     """Peak-to-peak e in the last part, worst channel; what is left of a transient counts."""
-    return np.ptp(error(trace)[last_part(trace)], axis=0).max()
+    ...
 
 
 @folded("{x}", Fold("e", "mean", power=2, part="early"), label="rms error", error=True)
@@ -366,19 +366,33 @@ def chattering_frequency(trace: Trace) -> float:
     return limit_cycle.largest_cycle(trace)[1]
 
 
-@metric("s", realistic=True)
+@folded("s", Fold("held", "sum"), realistic=True)
 def stick_time(trace: Trace) -> float:
     """Time for which a channel is at rest, with a reaction of friction or contact; longest channel.
 
     Where dry friction ran by its moments, it is the time for which it held the joint, also within a
     control period. With LuGre friction it is the time for which bristles bend and do not slide.
     """
-    if trace.held is not None:
-        return trace.held.sum(axis=0).max()
-    rest = conventions.at_rest(
-        trace
-    )  # a sample's reaction is the mean over the control period before it
-    return (np.diff(trace.t) @ (rest[:-1] & rest[1:] & (trace.holding[1:] != 0.0))).max()
+    ...
+
+
+@folded("1/s", Fold("slips", "sum", part="late", rate=True), realistic=True)
+def slip_rate(trace: Trace) -> float:
+    """How often a second friction lets a joint go in the last part, worst channel.
+
+    A joint that hunts sticks and slips again and again. A joint that never sticks has no slips.
+    """
+    ...
+
+
+@folded("{x}", Fold("turned", "largest", part="early"), realistic=True)
+def reversal_error(trace: Trace) -> float:
+    """Largest |e| in the 0.15 s after the reference turns back, worst channel.
+
+    There dry friction changes its sign. It counts from a quarter of the run on; 0 where the
+    reference does not turn.
+    """
+    ...
 
 
 @folded("{force}", Fold("reaction", "largest"), realistic=True)

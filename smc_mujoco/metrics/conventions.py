@@ -43,6 +43,10 @@ project:
 - at rest: |v| <= 0.1 % of the group's largest |v|, or 1e-5 rad/s or m/s if that is larger. Joints
   held by Coulomb friction or contacts creep at 1e-6 or less. With LuGre friction they move as the
   bristles bend; there a joint sticks while these carry less than 99 % of what slides at its speed.
+- slip: a sample in whose control period friction held a joint at no time, after one in which it
+  did. It holds for the time that `held` of a trace says. Without it, that is a control period at
+  both ends of which the joint is at rest, with a reaction.
+- after a turn: the 0.15 s after the sample from which r moves back, also after a rest.
 - channels: errors and efforts that are integrals over time are summed over the group's channels;
   every other metric takes its worst channel, so that it does not grow with n.
 - commands are held between samples; states are not, their integrals use the trapezoid rule.
@@ -84,6 +88,8 @@ STRAIGHT = 1e-6  # of the steps of a reference: by less they differ on a straigh
 UNIT_OF_S = "unit of s"
 REST_SHARE = 1e-3  # of the run's largest |v|
 REST_SPEED = 1e-5  # rad/s or m/s: above the creep of stuck joints, see friction.py
+# s, chosen: friction's change of sign is over by then in loops of 5 Hz and more
+AFTER_TURN = 0.15
 
 CATALOGUE: dict[str, Metric] = {}  # filled by @metric, in order of definition
 
@@ -301,8 +307,7 @@ def folded(unit: str, fold: Fold, **flags: Any) -> Callable[[Callable], Callable
     def enter(described: Callable) -> Callable[[Trace], float]:
         @functools.wraps(described)
         def formula(trace: Trace) -> float:
-            signal = error(trace) if fold.signal == "e" else getattr(trace, fold.signal)
-            return fold.of(trace.t, signal)
+            return fold.of(trace.t, signal(trace, fold.signal))
 
         late = fold.part == "late"
         return metric(unit, fold=fold, late=late, command=fold.signal == "u", **flags)(formula)
@@ -336,6 +341,45 @@ def refuse(trace: Trace) -> None:
 def error(trace: Trace) -> Array:
     """Return e = x - r, (K+1, n)."""
     return trace.x - trace.r
+
+
+def signal(trace: Trace, name: str) -> Array:
+    """Return a signal of a group's trace that a fold names, (K + 1, n)."""
+    if name == "e":
+        return error(trace)
+    if name == "turned":
+        return np.where(_after_turns(trace), error(trace), 0.0)
+    if name == "held":
+        return _held(trace)
+    if name == "slips":
+        held = _held(trace) > 0.0
+        return np.vstack([np.zeros(held.shape[1]), held[:-1] & ~held[1:]])
+    return getattr(trace, name)
+
+
+def _held(trace: Trace) -> Array:
+    """Return the time for which friction or contact held each channel in the control period that
+    ends at t_k, (K + 1, n), s.
+    """
+    if trace.held is not None:
+        return trace.held
+    rest = at_rest(trace)
+    held = np.zeros(rest.shape)
+    # a sample's reaction is the mean over the control period before it
+    held[1:] = np.diff(trace.t)[:, None] * (rest[:-1] & rest[1:] & (trace.holding[1:] != 0.0))
+    return held
+
+
+def _after_turns(trace: Trace) -> Array:
+    """Return whether a sample is after a turn of the reference, (K + 1, n)."""
+    directions = np.sign(np.diff(trace.r, axis=0))
+    found = np.zeros(trace.r.shape, bool)
+    for i, channel in enumerate(directions.T):
+        moving = np.flatnonzero(channel)
+        turns = moving[1:][np.diff(channel[moving]) != 0.0]
+        for turn in turns:
+            found[turn + 1 :, i] |= trace.t[turn + 1 :] - trace.t[turn] <= AFTER_TURN * (1 + 1e-9)
+    return found
 
 
 def by_group(trace: Trace) -> dict[ChannelGroup, Trace]:

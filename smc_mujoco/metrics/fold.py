@@ -21,11 +21,13 @@ TRANSIENT_SHARE = 0.25  # of the run, which an "early" part leaves out
 class Fold(NamedTuple):
     """A metric as a row: what is taken of each sample, and how samples are put together."""
 
-    signal: str  # "e", or a column of a trace
-    # of the worst channel: "largest", "sum", "mean"; summed over the channels: "integral" by the
-    # trapezoid rule, "held" of a signal that is held between samples
-    how: Literal["largest", "sum", "mean", "integral", "held"]
-    power: int = 1  # of the signal's magnitude; of a mean 2 with its root, and 0 with its sign
+    # a column of a trace, or one that `conventions.signal` makes of some: "e", "turned", "slips"
+    signal: str
+    # of the worst channel: "largest", "range", "sum", "mean"; summed over the channels: "integral"
+    # by the trapezoid rule, "held" of a signal that is held between samples
+    how: Literal["largest", "range", "sum", "mean", "integral", "held"]
+    # of the signal's magnitude; of a mean 2 with its root; 0 takes the signal with its sign
+    power: int = 1
     part: Literal["", "early", "late"] = ""  # all samples; all but the transient; the last part
     change: bool = False  # whether it is of the change from the sample before
     timed: bool = False  # whether it is weighted by the time since the start
@@ -33,7 +35,7 @@ class Fold(NamedTuple):
 
     def of(self, t: Array, signal: Array) -> float:
         """Return the value for times t, (K + 1,), and a signal, (K + 1, n)."""
-        if self.how in ("largest", "sum", "mean"):
+        if self.how not in ("integral", "held"):
             return self.channels(t, signal).max()
         t, y = self._taken(t, signal)
         total = y.sum(axis=1)
@@ -46,6 +48,8 @@ class Fold(NamedTuple):
         t, y = self._taken(t, signal)
         if self.how == "largest":
             return y.max(axis=0, initial=0.0)
+        if self.how == "range":
+            return np.ptp(y, axis=0)
         if self.how == "mean":
             mean = y.mean(axis=0)
             return np.sqrt(mean) if self.power == 2 else np.abs(mean)

@@ -135,6 +135,10 @@ PULSE = [
     0,
     0,
 ]
+# r turns back at 0.4 s, and after a rest at 0.8 s
+TURNS = np.array([0, 1, 2, 3, 4, 3, 2, 1, 1, 2, 3])
+# the time for which friction held: two slips in the last part, one before, and two stops
+SLIPPING = np.array([0, 1, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 1, 0.5, 0, 0.0])[:, None]
 LAST = np.zeros((11, 2))
 # the last part is t = 8, 9, 10
 LAST[8:] = (
@@ -272,6 +276,15 @@ BY_HAND = [
         {"t": LONG, "v": STOPPED, "reaction": 1.0},
         "0.1 % of the largest speed is rest",
     ),
+    (m.slip_rate, 2 / 4, {"t": np.arange(21), "held": SLIPPING}, "from 16 s on, and no stop"),
+    (m.slip_rate, 0.0, {"t": np.arange(21), "held": 0 * SLIPPING}, "what never sticks"),
+    (
+        m.reversal_error,
+        5.0,
+        {"t": 0.1 * np.arange(11), "r": TURNS, "x": TURNS + [0, 9, 9, 9, 9, -5, 9, 9, 9, 3, 9]},
+        "in the sample after a turn, in neither sample beside it, and after a rest",
+    ),
+    (m.reversal_error, 0.0, {"x": [0, 1, 2, 3], "r": [0, 1, 1, 2]}, "a rest is no turn"),
     (
         m.stick_time,
         0.0,
@@ -583,9 +596,9 @@ def test_trends_are_of_the_metrics_of_the_last_part_alone():
     for metric in m.metrics():
         if metric.late:
             late.add(metric.name)
-    assert late == same - {"reversal_rate"}
+    assert late == same - {"reversal_rate", "reversal_error"}
     rho = m.trends(run(t, **plain))
-    assert rho.keys() == late
+    assert rho.keys() == late - {"slip_rate"}  # which is 0
     assert rho["ultimate_bound"] == pytest.approx(math.exp(6.4 - 8.0), rel=0.02)
 
 
@@ -730,6 +743,8 @@ def test_a_run_of_one_step_by_hand():
         "chattering_amplitude": None,  # no limit cycle
         "chattering_frequency": None,
         "stick_time": 0.0,
+        "slip_rate": 0.0,
+        "reversal_error": 0.0,
         "peak_reaction": 0.0,
         "reversal_rate": 0.0,
     }

@@ -165,9 +165,7 @@ def _rubbing(form: Form, compile_user: Compiler) -> Any:
     """
     total = always(0.0)
     for at in reversed(layout(form).frictions):
-        of_stage = acting(at, compile_user)
-        force = _first_of(of_stage)
-        total = _and_friction(at.part, total, force)
+        total = _and_friction(at.part, total, _holding(form, acting(at, compile_user)))
     row_at, work_at = layout(form)[:2]
 
     @inlined
@@ -198,9 +196,19 @@ def _rubbing(form: Form, compile_user: Compiler) -> Any:
     return friction
 
 
-def _first_of(of_stage: Any) -> Any:
-    """Return a function (view, y, i) -> the force alone of a friction that is of a stage."""
-    return inlined(lambda view, y, i: of_stage(view, y, i)[0])
+def _holding(form: Form, of_stage: Any) -> Any:
+    """Return a function (view, y, i) -> the force of a friction that is of a stage. It adds the
+    time for which friction holds the joint to that of the channel.
+    """
+    work_at = layout(form).work
+
+    @inlined
+    def force(view, y, i):
+        found, held = of_stage(view, y, i)
+        state_in(view.work, work_at.states + STATES * i).held += held
+        return found
+
+    return force
 
 
 def _and_friction(part: ChannelFunction, others: Any, force: Any) -> Any:

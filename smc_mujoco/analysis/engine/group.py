@@ -22,7 +22,7 @@ from smc_mujoco.analysis.engine.form import (
     Spring,
     layout,
 )
-from smc_mujoco.analysis.engine.scores import RESTING, summed_up
+from smc_mujoco.analysis.engine.scores import RESTING, holds, summed_up
 from smc_mujoco.common import fingerprint, indices
 from smc_mujoco.common.aliases import Fields
 from smc_mujoco.common.jit import AtAddress, Uncompiled
@@ -84,6 +84,9 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
         beyond[f"it does not sum up {name}"] = not summed_up(name)
         only = f"the engine sums up {name} only for a reference at rest"
         beyond[only] = name in RESTING and moving
+        beyond[f"{name} is of bristles or of an own friction's force, which a trace tells"] = holds(
+            name
+        ) and rubs_by_force(s)
     return next((words for words, holds in beyond.items() if holds), "")
 
 

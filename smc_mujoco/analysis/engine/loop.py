@@ -524,6 +524,6 @@ def _recording(form: Form) -> Any:
                     log[(k * n + i) * columns + j] = work[sample + LOGGED_COLUMNS[j]]
             now = log_in(work, sample)
             before = log_in(work, work_at.before + WIDTH * i)
-            before.u, before.s, before.r = now.u, now.s, now.r
+            before.u, before.s, before.r, before.held = now.u, now.s, now.r, now.held
 
     return record

@@ -2,8 +2,7 @@
 
 Those of the catalogue that are folds are made here of their rows; a few more are written out. A
 metric is two compiled functions: one takes a sample into its numbers in `work`, the other makes the
-score of them at the end. All but settling_time, rest_share and outcome are of the channels that
-have an actuator.
+score of them at the end. Those with a unit of x or u are of the channels that have an actuator.
 """
 
 import functools
@@ -25,7 +24,7 @@ from smc_mujoco.analysis.engine.form import (
 )
 from smc_mujoco.common.jit import always, inlined, record_in
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.metrics.conventions import SETTLING_BAND
+from smc_mujoco.metrics.conventions import AFTER_TURN, SETTLING_BAND
 from smc_mujoco.metrics.fold import Fold, first_sample
 from smc_mujoco.simulation.cfunctions import cached
 from smc_mujoco.simulation.state import LOG
@@ -33,6 +32,8 @@ from smc_mujoco.simulation.state import LOG
 log_in = record_in(LOG)
 COLUMN = {name: i for i, name in enumerate(LOG.names or ())}  # places in a sample
 RESTING = ("settling_time", "rest_share")  # of a reference that does not move
+MADE = "e", "turned"  # signals that are made of columns
+HOLDING = "held", "slips"  # those of friction that is exact, see `Scenario.exact_friction`
 
 
 class Samples(NamedTuple):
@@ -54,13 +55,19 @@ def names() -> list[str]:
 
 
 def _fold(name: str) -> Fold | None:
-    """Return the row of a metric that is of the driven channels alone, and of a signal that the
-    engine logs: what dampers exert is added to the reactions of a trace when its run is over.
+    """Return the row of a metric that is of a signal that the engine has: what dampers exert is
+    added to the reactions of a trace when its run is over.
     """
     entry = CATALOGUE.get(name)
-    if entry is None or entry.shared or entry.fold is None:
+    if entry is None or entry.fold is None:
         return None
-    return entry.fold if entry.fold.signal in ("e", *LOGGED) else None
+    return entry.fold if entry.fold.signal in (*MADE, *HOLDING, *LOGGED) else None
+
+
+def holds(name: str) -> bool:
+    """Return whether a metric is of the time for which friction held a joint."""
+    fold = _fold(name)
+    return fold is not None and fold.signal in HOLDING
 
 
 def tallying(form: Form) -> Any:
@@ -68,10 +75,11 @@ def tallying(form: Form) -> Any:
     give the scores if the run `ends` with it.
     """
     work_at = layout(form).work
-    samples = Samples(form.driven, work_at.now, work_at.before)
     metrics = []
     for name, at in zip(form.metrics, layout(form).metrics, strict=True):
         if fold := _fold(name):
+            n = form.n if CATALOGUE[name].shared else form.driven
+            samples = Samples(n, work_at.now, work_at.before)
             metrics.append(folding(fold, samples, at))
         else:
             metrics.append(WRITTEN_OUT[name](form, at))
@@ -102,14 +110,18 @@ def folding(fold: Fold, samples: Samples, at: int) -> tuple[Any, Any]:
     """Return a fold's two functions, take(row, work, k) and score(row, work). Its numbers are in
     `work` from place `at` on.
     """
-    values = _valuing(fold, samples)
+    values = _valuing(fold, samples, at)
     if fold.how in ("integral", "held"):
         return _pooling(fold, samples.n, values, at)
     return _worst(fold, samples.n, values, at)
 
 
-def _valuing(fold: Fold, samples: Samples) -> Any:
-    """Return a function (work, i) -> what a fold takes of a sample of channel i."""
+def _valuing(fold: Fold, samples: Samples, at: int) -> Any:
+    """Return a function (row, work, k, i) -> what a fold takes of sample k of channel i."""
+    if fold.signal == "slips":
+        return _slipping(samples)
+    if fold.signal == "turned":
+        return _turning(samples, at)
     power = fold.power
     change = fold.change
     of_error = fold.signal == "e"
@@ -118,7 +130,7 @@ def _valuing(fold: Fold, samples: Samples) -> Any:
     _, now, before = samples
 
     @inlined
-    def value(work, i):
+    def value(row, work, k, i):
         sample = now + WIDTH * i
         y = work[sample + column]
         if of_error:
@@ -135,6 +147,44 @@ def _valuing(fold: Fold, samples: Samples) -> Any:
     return value
 
 
+def _slipping(samples: Samples) -> Any:
+    """Return a function (row, work, k, i) -> 1 if friction let channel i go by sample k, else 0."""
+    _, now, before = samples
+
+    @inlined
+    def slips(row, work, k, i):
+        was = log_in(work, before + WIDTH * i).held
+        return 1.0 if was > 0.0 and log_in(work, now + WIDTH * i).held == 0.0 else 0.0
+
+    return slips
+
+
+def _turning(samples: Samples, at: int) -> Any:
+    """Return a function (row, work, k, i) -> |e| of channel i where its reference turned back a
+    short time before sample k, else 0. It keeps the direction, and the sample of the last turn,
+    behind the numbers of the fold.
+    """
+    n, now, before = samples
+    direction = at + 2 * n
+    last = direction + n
+
+    @inlined
+    def error(row, work, k, i):
+        sample = log_in(work, now + WIDTH * i)
+        step = sample.r - log_in(work, before + WIDTH * i).r if k > 0 else 0.0
+        if step != 0.0:
+            side = math.copysign(1.0, step)
+            if side * work[direction + i] < 0.0:
+                work[last + i] = k  # the turn's sample, counted from 1
+            work[direction + i] = side
+        turn = work[last + i]
+        if turn > 0.0 and (k - turn + 1.0) * row[SETTING.period] <= AFTER_TURN * (1.0 + 1e-9):
+            return abs(sample.x - sample.r)
+        return 0.0
+
+    return error
+
+
 def _first(fold: Fold) -> Any:
     """Return a function (row) -> the first sample of a fold's part."""
     if not fold.part:
@@ -147,20 +197,29 @@ def _worst(fold: Fold, n: int, value: Any, at: int) -> tuple[Any, Any]:
     """Return the functions of a fold of the worst channel."""
     first = _first(fold)
     change = fold.change
+    turned = fold.signal == "turned"
     largest = fold.how == "largest"
+    ranges = fold.how == "range"
     mean = fold.how == "mean"
     root = mean and fold.power == 2
     rate = fold.rate
 
     @inlined
     def take(row, work, k):
-        if k < first(row) or (change and k == first(row)):
+        begins = k == first(row)
+        if k < first(row) or (change and begins):
+            for i in range(n if turned else 0):
+                value(row, work, k, i)  # which keeps the turns of the reference
             return
         for i in range(n):
+            y = value(row, work, k, i)
             if largest:
-                work[at + i] = max(work[at + i], value(work, i))
+                work[at + i] = max(work[at + i], y)
+            elif ranges:
+                work[at + i] = y if begins else max(work[at + i], y)
+                work[at + n + i] = y if begins else min(work[at + n + i], y)
             else:
-                work[at + i] += value(work, i)
+                work[at + i] += y
 
     @inlined
     def score(row, work):
@@ -168,6 +227,8 @@ def _worst(fold: Fold, n: int, value: Any, at: int) -> tuple[Any, Any]:
         worst = 0.0
         for i in range(n):
             found = work[at + i]
+            if ranges:
+                found -= work[at + n + i]
             if mean:
                 found /= steps + 1.0
                 found = math.sqrt(found) if root else abs(found)
@@ -193,9 +254,9 @@ def _pooling(fold: Fold, n: int, value: Any, at: int) -> tuple[Any, Any]:
         now = 0.0
         for i in range(n):
             if held:
-                work[at] += value(work, i) * period
+                work[at] += value(row, work, k, i) * period
             else:
-                now += value(work, i)
+                now += value(row, work, k, i)
         if timed:
             now *= (k - first(row)) * period
         if not held:
