@@ -233,7 +233,11 @@ OTHERS = {  # plant, law, and what else the scenario has
             "sensor": smc.Encoder(math.inf, side="motor", delay=2e-3),
         },
     ),
-    "sticking": ("duffing", "pid", {"friction": smc.Coulomb(0.3), "reference": smc.Sine(0.3, 8.0)}),
+    "sticking": (
+        "duffing",
+        smc.law("pid", kp=60.0, ki=40.0, kd=8.0),
+        {"friction": smc.Coulomb(2.0), "reference": smc.Sine(0.1, 3.0), "x0": 0.0},
+    ),
     "bristles": (
         smc.plant("pendulum_network", n=2),
         "boundary_layer",

@@ -137,6 +137,7 @@ PULSE = [
 ]
 # r turns back at 0.4 s, and after a rest at 0.8 s
 TURNS = np.array([0, 1, 2, 3, 4, 3, 2, 1, 1, 2, 3])
+OFF = [0, 9, 9, 9, 9, -5, 9, 9, 9, 3, 9]
 # the time for which friction held: two slips in the last part, one before, and two stops
 SLIPPING = np.array([0, 1, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 1, 0.5, 0, 0.0])[:, None]
 LAST = np.zeros((11, 2))
@@ -281,7 +282,7 @@ BY_HAND = [
     (
         m.reversal_error,
         5.0,
-        {"t": 0.1 * np.arange(11), "r": TURNS, "x": TURNS + [0, 9, 9, 9, 9, -5, 9, 9, 9, 3, 9]},
+        {"t": 0.1 * np.arange(11), "r": TURNS, "x": TURNS + OFF},
         "in the sample after a turn, in neither sample beside it, and after a rest",
     ),
     (m.reversal_error, 0.0, {"x": [0, 1, 2, 3], "r": [0, 1, 1, 2]}, "a rest is no turn"),
