@@ -7,6 +7,8 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 
+NUMBERS = signal.valid_signals()  # asking for them takes longer than to delay them
+
 
 @contextlib.contextmanager
 def delay_signals() -> Iterator[Callable[[], None]]:
@@ -17,7 +19,7 @@ def delay_signals() -> Iterator[Callable[[], None]]:
     """
     handlers = {}
     if threading.current_thread() is threading.main_thread():
-        for number in signal.valid_signals():
+        for number in NUMBERS:
             if callable(handler := signal.getsignal(number)):
                 handlers[number] = handler
     arrived = []

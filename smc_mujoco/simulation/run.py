@@ -73,7 +73,8 @@ def check_arithmetic() -> None:
         )
 
 
-Report = Callable[[int], None]  # called with the number of steps since its last call
+# called with the number of steps since its last call, in the thread that steps
+Report = Callable[[int], None]
 
 
 class PlainLoopWarning(UserWarning):
@@ -154,6 +155,11 @@ def stream(
 
         for i, trace in smc.stream(smc.grid("duffing", "pid", seeds=4, duration=1.0)):
             print(i, smc.score(trace)["itae"])
+
+    Args:
+      scenarios: as in `run`.
+      threads: as in `run`.
+      report: called with the number of steps since its last call, in the thread that steps.
 
     Returns:
       An iterator over (index, Trace).
@@ -304,9 +310,11 @@ class ScenarioBatch:
         ]
         self.records = np.zeros(count, state.SIMULATION)
         self.packed = []  # the arrays whose addresses are in the records
+        self.called: list[Any] = []  # functions that are called in Python
         for i, (item, log) in enumerate(zip(prepared, self.logs, strict=True)):
             self.records[i], packed = pack(item, log, python)
             self.packed.append(packed)
+            self.called += packed.python
         # persistent: at a sample, mjData still holds the forces of this simulation's last step
         self.batch = Batch(self.model, count, min(threads, count), persistent=True)
         self.reset()
@@ -346,6 +354,7 @@ class ScenarioBatch:
         """
         count = len(self.scenarios)
         self.step = 0  # physics steps done
+        self.stopped = False
         self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         addresses = state.address(self.records) + np.arange(count) * self.records.itemsize
         self.batch.bind("userdata")[:] = np.column_stack(
@@ -359,13 +368,29 @@ class ScenarioBatch:
 
     def simulate(self, report: Report) -> None:
         """Simulate all scenarios to the end. Their samples are then in `logs`."""
-        self.advance_to(self.scenarios[0].samples * self.scenarios[0].steps, report)
-        self.run_alive(self.batch.forward, 1)  # the last sample, at the end of the run
+
+        def to_the_end() -> None:
+            self.advance_to(self.scenarios[0].samples * self.scenarios[0].steps, report)
+            self.run_alive(self.batch.forward, 1)  # the last sample, at the end of the run
+
+        self.attend(to_the_end)
+
+    def attend(self, job: Callable[[], None]) -> None:
+        """Do a job that steps, in one thread that Ctrl-C stops; in this one if laws are called in
+        Python.
+        """
+        if self.called:
+            job()
+        else:
+            attended([job], self.stop)
 
     def advance_to(self, end: int, report: Report = lambda steps: None) -> None:
         """Step all scenarios to a physics step, each with the parameters that hold from its jump
         on.
         """
+        self.attend(functools.partial(self._advance_to, end, report))
+
+    def _advance_to(self, end: int, report: Report) -> None:
         jumps = [s.jump_step for s in self.scenarios]
         for stop in sorted({end, *(step for step in jumps if self.step < step <= end)}):
             self.advance(stop - self.step, report)
@@ -420,15 +445,15 @@ class ScenarioBatch:
                 array[i] = getattr(data, name)
 
     def advance(self, steps: int, report: Report) -> None:
-        """Step the simulations that still run, in slices, so that the progress bar moves and Ctrl-C
-        works.
+        """Step the simulations that still run, in slices, so that the progress bar moves and
+        `stop` works.
         """
         first = self.scenarios[0]
         channels = len(self.scenarios) * first.plant.n
         slice_steps = max(1, SLICE_STEPS // channels)
         if first.plant.is_user_model:
             slice_steps = min(slice_steps, USER_MODEL_STEPS)
-        while steps:
+        while steps and not self.stopped:
             count = min(steps, slice_steps)
             step = functools.partial(self.batch.step, nstep=count)
             begin = time.perf_counter()
@@ -447,18 +472,10 @@ class ScenarioBatch:
         records = self.records
         alive = np.flatnonzero(records["failure"] == state.FINE).astype(np.int32)
         before, self.calls = self.calls, self.calls + calls
-        called = []
-        for packed in self.packed:
-            called += packed.python
         check_arithmetic()
         try:
-            if called:
-                from smc_mujoco.simulation import python_functions
-
-                with python_functions.hearing_ctrl_c(called):
-                    action(alive)
-            else:
-                attended([functools.partial(action, alive)], self.stop)
+            with self.hearing_ctrl_c():
+                action(alive)
         except SimulationError as error:
             for i in error.ids:
                 self.errors[int(i)] = " ".join(self.batch.error(int(i)).split())
@@ -476,8 +493,21 @@ class ScenarioBatch:
         records["failure"][interrupted] = state.INTERRUPTED
         records["failed_step"][interrupted] = before // self.scenarios[0].stages
 
+    def hearing_ctrl_c(self) -> contextlib.AbstractContextManager[None]:
+        """Return a block at whose end Ctrl-C is raised that came while a function was called in
+        Python.
+        """
+        if not self.called:
+            return contextlib.nullcontext()
+        from smc_mujoco.simulation import python_functions
+
+        return python_functions.hearing_ctrl_c(self.called)
+
     def stop(self) -> None:
-        """Let the callback do nothing more: it calls no law, and the slice soon ends."""
+        """Let the callback do nothing more: it calls no law. The slice soon ends, and is the
+        last.
+        """
+        self.stopped = True
         self.records["failure"] = state.INTERRUPTED
 
     def trace(self, i: int) -> Trace:

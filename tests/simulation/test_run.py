@@ -8,6 +8,7 @@ import math
 import re
 import signal
 import sys
+import threading
 import time
 
 import mujoco
@@ -398,6 +399,19 @@ def test_a_callback_that_was_installed_is_put_back():
     assert calls == []
     assert same(trace, smc.run(scenario()))
     assert same(plain, plainly(scenario(made(with_json, {"k": 2.0}))))
+
+
+def test_one_thread_steps_all_slices_of_a_run(monkeypatch):
+    """A thread for each slice cost a quarter of the time of a user's arm."""
+    monkeypatch.setattr(runs, "SLICE_STEPS", 2)
+    steppers = []
+    ((_, trace),) = smc.stream(
+        [scenario()], report=lambda steps: steppers.append(threading.current_thread())
+    )
+    assert trace.failure is None
+    assert len(steppers) > 5
+    assert {*steppers} == {steppers[0]}
+    assert steppers[0] is not threading.current_thread()
 
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers")
