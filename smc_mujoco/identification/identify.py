@@ -32,6 +32,7 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.identification import first_guess, gauss_newton, number_text, records
 from smc_mujoco.identification.own_rig import OwnRig, condition_fields, own_rig
 from smc_mujoco.identification.paths import known_paths
+from smc_mujoco.identification.presliding import presliding
 from smc_mujoco.identification.records import Record
 from smc_mujoco.identification.replays import Point, Replays, Slopes
 from smc_mujoco.identification.rig import Fall, Rig, Source, rigs
@@ -103,6 +104,7 @@ class Identified:
     scatter: Numbers = dataclasses.field(default_factory=dict)  # of values between logs, if several
     held_out: HeldOutFit | None = None  # of the log that was kept aside
     units_doubted: tuple[str, ...] = ()  # sentences on columns that may be in another unit
+    gives_way: str = ""  # as what dry friction gives way before it slides, and what to do
     data: tuple[Data, ...] = dataclasses.field(default=(), repr=False)  # the logs' columns
 
     @property
@@ -121,6 +123,11 @@ class Identified:
                 notes.append(f"{name} is at the end of its range")
             elif self.errors[name] > abs(value):
                 notes.append(f"{name} may as well be 0")
+        if self.gives_way:
+            notes.append(
+                f"dry friction gives way in the logs before it slides, as {self.gives_way}; the "
+                "errors have what that may change"
+            )
         worst = min(min(fit.values()) for fit in self.by_pieces or self.fits)
         if self.independent < BLOCKS[0] and worst < PERFECT_FIT and self.rig.controller is None:
             notes.append(SLOW)
@@ -312,7 +319,10 @@ def identify(
         replays, slopes, by_steps = _solved(
             twin, names, data, doubts, starts, seed, most, corrected, drawn.advance
         )
-        errors, correlations, independent = statistics(replays, slopes, by_steps)
+        giving = presliding(replays, slopes)
+        errors, correlations, independent = statistics(
+            replays, slopes, np.hypot(by_steps, giving.moved)
+        )
     values = replays.values(slopes.point)
     fitted = twin.with_values(values, "identified from records")
     states = _starting_states(fitted, data, replays, slopes.point)
@@ -338,6 +348,7 @@ def identify(
         scatter=scatter,
         held_out=None if held_out is None else check(fitted, held_out, columns),
         units_doubted=tuple(doubts),
+        gives_way=giving.way,
         data=tuple(data),
     )
 

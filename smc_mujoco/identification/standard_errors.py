@@ -41,12 +41,13 @@ SINGULAR_RATIO = 1e-6
 
 
 def statistics(
-    replays: Replays, slopes: Slopes, by_steps: Array
+    replays: Replays, slopes: Slopes, by_model: Array
 ) -> tuple[dict[str, float], Array, float]:
     """Return the standard error of each quantity, their correlations (p, p), and `independent`, at
     the solution.
 
-    `by_steps`: errors of the quantities that the simulation's steps cause, in their scales, (p,).
+    `by_model`: errors of the quantities that the simulation's steps and friction that gives way
+    cause, in their scales, (p,).
     """
     names = replays.names
     J = np.concatenate(slopes.freed(slopes.by_values))
@@ -60,7 +61,7 @@ def statistics(
     deviation = np.maximum(deviation, between(slopes, [piece.record for piece in replays.pieces]))
     if replays.closed:
         deviation = np.maximum(deviation, _fed_back(replays, slopes.point, J))
-    deviation = np.hypot(deviation, by_steps)
+    deviation = np.hypot(deviation, by_model)
     errors = dict(zip(names, (deviation * replays.scales).tolist(), strict=True))
     return errors, correlations, count
 

@@ -32,9 +32,14 @@ def chain(lengths: Sequence[float], masses: Sequence[float]) -> str:
 
 
 def compiled(
-    xml: str, numbers: Mapping[str, Mapping[str, float]], masses: Mapping[str, float]
+    xml: str,
+    numbers: Mapping[str, Mapping[str, float]],
+    masses: Mapping[str, float],
+    soft: bool = False,
 ) -> mujoco.MjModel:
-    """Return the model with numbers of joints, hard dry friction, and factors on bodies' masses."""
+    """Return the model with numbers of joints, hard dry friction (or `soft`, MuJoCo's default), and
+    factors on bodies' masses.
+    """
     spec = mujoco.MjSpec.from_string(xml)
     for joint in spec.joints:
         for name, value in numbers.get(joint.name, {}).items():
@@ -44,8 +49,9 @@ def compiled(
                 field[0] = value
             else:
                 setattr(joint, name, value)
-        joint.solref_friction[:] = (2.0 * STEP, 1.0)
-        joint.solimp_friction[:] = (0.99999, 0.99999, 0.001, 0.5, 2.0)
+        if not soft:
+            joint.solref_friction[:] = (2.0 * STEP, 1.0)
+            joint.solimp_friction[:] = (0.99999, 0.99999, 0.001, 0.5, 2.0)
     spec.option.timestep = STEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
     model = spec.compile()
@@ -82,13 +88,14 @@ def log(
     x0: Sequence[float] | None = None,
     seed: int = 0,
     masses: Mapping[str, float] | None = None,
+    soft: bool = False,
 ) -> dict[str, np.ndarray]:
     """Return the columns of a log: t, x and u of one joint, or x_JOINT and u_JOINT of each.
 
     `reference`: function of t that returns positions and speeds, (joints,) each.
     """
     seen = [*joints, *measured]
-    model = compiled(xml, split(truth, seen), masses or {})
+    model = compiled(xml, split(truth, seen), masses or {}, soft)
     data = mujoco.MjData(model)
     places = np.array([model.joint(joint).qposadr[0] for joint in seen])
     hinges = np.array([model.joint(joint).type[0] == mujoco.mjtJoint.mjJNT_HINGE for joint in seen])

@@ -16,7 +16,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import unknown
-from smc_mujoco.mechanisms.custom.model_constraints import SOFT_SOLREF
+from smc_mujoco.mechanisms.custom.model_constraints import SOFT_SOLREF, says_how_soft
 from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF
 from smc_mujoco.mechanisms.layout import all_joints, loaded
 from smc_mujoco.mechanisms.plant import Field, Plant, Values
@@ -86,13 +86,18 @@ def with_joint_numbers(plant: Plant, names: Iterable[str]) -> Plant:
     if plant.by_mujoco:
         nominal = dataclasses.replace(nominal, fields=fields)
     absent = {name: one.unit for name, one in added.items() if not one.value}
+    rubbing = [one.joint for one in added.values() if one.kind == "frictionloss"]
+    # as soft as the file says, which only MuJoCo's constraints are
+    model = loaded(plant)
+    soft = any(says_how_soft(model, _place(model, joint, "frictionloss")) for joint in rubbing)
     return dataclasses.replace(
         plant,
         parameters=dict(plant.parameters) | {name: one.value for name, one in added.items()},
         fields=fields,
         nominal=nominal,
         added=dict(plant.added) | absent,
-        rubs=plant.rubs or any(one.kind == "frictionloss" for one in added.values()),
+        rubs=not soft and (plant.rubs or bool(rubbing)),
+        smooth=plant.smooth and not soft,
     )
 
 

@@ -14,6 +14,7 @@ from smc_mujoco.mechanisms.layout import loaded, posed
 from smc_mujoco.mechanisms.plant import Plant
 
 SOFT_SOLREF = (0.02, 1.0)  # MuJoCo's default of solreffriction
+SOFT_SOLIMP = (0.9, 0.95, 0.001, 0.5, 2.0)  # of solimpfriction
 MAX_GIVE = 2e-3  # rad (m) for a blow of 1 rad/s (m/s): a warning tells of more; chosen
 MAX_CREEP = 1e-6  # rad/s (m/s) of dry friction: a warning tells of more; chosen
 TEST_STEP = 2.5e-4  # s, at which softness is measured: that of runs with constraints
@@ -84,6 +85,11 @@ def default_friction(model: mujoco.MjModel) -> bool:
     """Return whether joints have dry friction, and the file does not say how soft it is."""
     dry = model.dof_frictionloss > 0.0
     return bool(np.any(dry) and np.all(model.dof_solref[dry] == SOFT_SOLREF))
+
+
+def says_how_soft(model: mujoco.MjModel, dof: int) -> bool:
+    """Return whether a model's file says how soft the dry friction of a joint is."""
+    return tuple(model.dof_solref[dof]) not in (SOFT_SOLREF, HARD_SOLREF)
 
 
 def softness_warnings(label: str, made: Plant) -> list[str]:

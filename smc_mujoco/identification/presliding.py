@@ -1,0 +1,128 @@
+"""Presliding: whether dry friction gives way in the logs before it slides, and how far that moves
+the numbers found.
+
+Dry friction of replays holds a joint until it breaks away. That of a real joint bends first, and
+MuJoCo's default creeps, so inertia, friction and delay take the blame. At the solution the logs are
+replayed with friction that gives way in each of these ways. The share of that change which the
+residuals have, found by least squares beside the numbers, is how much friction gives way; and what
+the numbers lose to it is an error of theirs, at first order.
+"""
+
+import copy
+import dataclasses
+import math
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.aliases import Array
+from smc_mujoco.common.data import frozen_data
+from smc_mujoco.identification.own_rig import RUN_STEP, OwnRig
+from smc_mujoco.identification.replays import Replays, Slopes
+from smc_mujoco.identification.rig import Values
+from smc_mujoco.mechanisms.custom.model_constraints import SOFT_SOLIMP, SOFT_SOLREF
+from smc_mujoco.mechanisms.hardware.friction import LuGre
+from smc_mujoco.mechanisms.layout import channel_names, dof_ids
+from smc_mujoco.mechanisms.plant import Field, Plant
+from smc_mujoco.mechanisms.plant import Values as Parameters
+
+BENDS = 2e-4, 1e-3, 4e-3  # rad (m), by which a joint gives way before it slides; chosen
+SLIDES_AT = 1.0  # rad/s (m/s): of bristles without a Stribeck drop, where it changes nothing
+DAMPING = 0.6  # of bristles, relative to the root of stiffness and inertia; chosen
+TOLD = 0.9  # of the residuals' norm, to which giving way lowers it: below that it is told; chosen
+
+
+class Presliding(NamedTuple):
+    """How dry friction gives way in the logs."""
+
+    way: str  # as what it gives way, and what to do; "" for not at all
+    moved: Array  # how far the numbers would move, in their scales, (p,)
+
+
+@frozen_data
+class Giving:
+    """Plant.fields of a plant whose dry friction creeps as MuJoCo's default does, or, if `bends`,
+    is left to bristles.
+    """
+
+    inner: Callable[[mujoco.MjModel, Parameters], Iterator[Field]]
+    bends: bool
+
+    def __call__(self, model: mujoco.MjModel, p: Parameters) -> Iterator[Field]:
+        yield from self.inner(model, p)
+        every = np.arange(model.nv)
+        if self.bends:
+            yield Field("dof_frictionloss", every, 0.0)
+            return
+        yield Field("dof_solref", every, SOFT_SOLREF)
+        yield Field("dof_solimp", every, SOFT_SOLIMP)
+        model.opt.noslip_iterations = 0  # a number, which no Field can write
+
+
+def presliding(replays: Replays, slopes: Slopes) -> Presliding:
+    """Return how dry friction gives way in the logs, as the way that explains most of the residuals
+    says.
+    """
+    none = Presliding("", np.zeros(len(replays.names)))
+    rig = replays.rig(slopes.point)
+    if not isinstance(rig, OwnRig) or not rig.plant.rubs or rig.base.actuator:
+        return none
+    J = np.concatenate(slopes.freed(slopes.by_values))
+    r = np.concatenate(slopes.freed(slopes.residuals))
+    best, least = none, float(np.linalg.norm(r))
+    told = TOLD * least
+    trial = copy.copy(replays)
+    control = rig.repeated(replays.pieces[0].part).control_period  # pyright: ignore[reportArgumentType]
+    trial.steps = {"physics_step": control / math.ceil(control / RUN_STEP - 1e-9)}
+    (holding,) = trial.residuals([slopes.point])
+    for way, giving in _ways(rig).items():
+        trial.twin = giving
+        (residuals,) = trial.residuals([slopes.point])
+        changed = [after - before for after, before in zip(residuals, holding, strict=True)]
+        c = np.concatenate(slopes.freed(changed))
+        share = float(np.linalg.lstsq(np.column_stack([J, c]), -r, rcond=None)[0][-1])
+        share = min(max(share, 0.0), 1.0)
+        moved = np.linalg.lstsq(J, share * c, rcond=None)[0]
+        left = float(np.linalg.norm(r + share * c - J @ moved))
+        if left < least:
+            best, least = Presliding(way if left < told else "", np.abs(moved)), left
+    return best
+
+
+def _ways(rig: OwnRig) -> dict[str, OwnRig]:
+    """Return as what friction gives way, and what to do -> the rig with such friction."""
+    fields = rig.numbers_of(Values(**rig.values))
+    model = fields["plant"].load()
+    dofs = dof_ids(model)
+    levels = model.dof_frictionloss[dofs].tolist()
+    inertias = model.dof_M0[dofs].tolist()
+    joints = channel_names(rig.plant)
+    found = {
+        "MuJoCo's default does: if a simulation made them, its softness belongs into the file, as "
+        'solreffriction="0.0201 1" of the joint': dataclasses.replace(
+            rig, plant=_giving(rig.plant, False)
+        )
+    }
+    for bend in BENDS:
+        bristles = []
+        for joint, level, inertia in zip(joints, levels, inertias, strict=True):
+            if level:
+                k = level / bend
+                damping = DAMPING * math.sqrt(k * inertia)
+                bristles.append(LuGre(level, level, SLIDES_AT, k, damping, on=(joint,)))
+        base = dataclasses.replace(rig.base, friction=(*rig.base.friction, *bristles))
+        way = (
+            f"bristles that bend by {1e3 * bend:g} mrad (mm): find a LuGre's coulomb and stiffness "
+            "in place of frictionloss"
+        )
+        found[way] = dataclasses.replace(rig, base=base, plant=_giving(rig.plant, True))
+    return found
+
+
+def _giving(plant: Plant, bends: bool) -> Plant:
+    """Return the plant with dry friction that gives way, or none at all."""
+    return dataclasses.replace(
+        plant, fields=Giving(plant.fields, bends), rubs=False, smooth=plant.smooth and bends
+    )
