@@ -63,6 +63,14 @@ def input_gain(y):
 
 
 @njit
+def per_command(y, b):
+    """Return how fast a law's command changes s' before `command` divides it by g: 1 with the
+    model, the assumed input gain b without.
+    """
+    return b if y.model == 0.0 else 1.0
+
+
+@njit
 def assumed(y, b):
     """Return the input gain and the known acceleration of an observer: g and f - r'' with the
     model, b and 0 without.

@@ -29,6 +29,11 @@ class Unit(NamedTuple):
         """Return the size of the unit for these sizes of F, X and T."""
         return scales["F"] ** self.force * scales["X"] ** self.position * scales["T"] ** self.time
 
+    @property
+    def rates(self) -> float:
+        """The power of 1 / T that it has with an inertia in place of a force, F = M X / T^2."""
+        return 2.0 * self.force - self.time
+
     def text(self, force: str, position: str) -> str:
         """Return the unit in words, such as "N m s/rad" for a force "N m" and a position "rad".
 
@@ -119,6 +124,8 @@ def shared(gains: Mapping[str, Gain]) -> dict[str, Gain]:
 
 SLOPE = Gain(2.5, RATE, nonnegative=True)  # c of the surface s = de + c e
 ASSUMED_B = Gain(3.0, INPUT_GAIN, positive=True)  # of e'' = b u + d, for an observer
+# of s' = b u + d, for a law that solves for s one period ahead
+AHEAD_B = Gain(1.0, INPUT_GAIN, positive=True, held=True)
 # of e'' = a1 e + a2 de + b u; a scenario puts in the values of its plant
 LINEAR_PLANT = {
     "a1": Gain(math.inf, RATE2, held=True, plant="a1"),

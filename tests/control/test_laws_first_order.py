@@ -155,9 +155,10 @@ def test_implicit_varies_a_thousand_times_less_than_explicit():
         (8.0, True),
     ],
 )
-def test_implicit_model_free_chatters_from_g_of_two_on_and_never_with_the_model(g, chatters):
-    law = smc.law("implicit_first_order", k=4.0)
-    assert (plant_a(law, wave, g=g).variation() > 100) == chatters
+@pytest.mark.parametrize("b", [1.0, 8.0])
+def test_implicit_model_free_chatters_from_g_of_two_b_on_and_never_with_the_model(b, g, chatters):
+    law = smc.law("implicit_first_order", k=4.0, b=b)
+    assert (plant_a(law, wave, g=b * g).variation() > 100) == chatters
     assert plant_a(law, wave, g=g, f=0.7, model=1.0).variation() < 10
 
 

@@ -51,27 +51,27 @@ def law(name, **gains):
 @pytest.mark.parametrize("name", ["implicit_super_twisting", "proper_super_twisting"])
 def test_implicit_laws_solve_their_inclusion(name):
     """5,000 random gains, periods and states: u + k1 [z]^(1/2) - w+ is 0, and w+ is in w - dt k2
-    sgn(z).
+    sgn(z), of s' = b u.
     """
     rng = np.random.default_rng(12)
-    k1, k2, dt = 10.0 ** rng.uniform((-1, -1, -4), (1, 1, 0), (5_000, 3)).T
+    k1, k2, b, dt = 10.0 ** rng.uniform((-1, -1, -1, -4), (1, 1, 1, 0), (5_000, 4)).T
     s, w = rng.normal(size=(2, 5_000)) * 10.0 ** rng.uniform(-6, 0, (2, 5_000))
-    s *= np.where(rng.random(5_000) < 0.3, dt * dt * k2, 1.0)  # inside the sliding layer too
+    s *= np.where(rng.random(5_000) < 0.3, b * dt * dt * k2, 1.0)  # inside the sliding layer too
     function = law(name).function
     on = 0
     assert function is not None
-    for values in zip(k1.tolist(), k2.tolist(), dt.tolist(), s.tolist(), w.tolist(), strict=True):
-        k1_, k2_, h, s_, w_ = values
+    for values in np.array([k1, k2, b, dt, s, w]).T.tolist():
+        k1_, k2_, b_, h, s_, w_ = values
         memory = np.array([w_])
-        u, _ = function(on_surface(s_, dt=h), SimpleNamespace(k1=k1_, k2=k2_, c=0.0), memory)
+        u, _ = function(on_surface(s_, dt=h), SimpleNamespace(k1=k1_, k2=k2_, b=b_, c=0.0), memory)
         after = memory[0]
-        ahead = s_ + h * u
+        ahead = s_ + h * b_ * u
         root = (after - u) / k1_
         if name == "proper_super_twisting":
-            ahead = s_ + h * (u - after)
+            ahead = s_ + h * b_ * (u - after)
             root = (2.0 * after - w_ - u) / k1_
         z = root * abs(root)
-        scale = abs(s_) + h * (abs(u) + abs(w_) + abs(after))
+        scale = abs(s_) + h * b_ * (abs(u) + abs(w_) + abs(after))
         assert abs(ahead - z) <= 1e-12 * (scale + abs(z)), values
         if abs(z) <= 1e-12 * scale:
             on += 1

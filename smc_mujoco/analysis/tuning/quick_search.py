@@ -33,7 +33,8 @@ RULE = (
     "quick CMA-ES and COBYQA, in the logarithm of the gains: each search has its own start, seed, "
     f"noise and initial states, and {BUDGET} evaluations a gain, at one physics step a control "
     "period. A Latin hypercube of half as many sets, within 1.5 decades about the gains' scale by "
-    "dimension, is screened in the first run alone, and the best of these in all. CMA-ES and "
+    "dimension, further above for products of more than two rates, "
+    "is screened in the first run alone, and the best of these in all. CMA-ES and "
     "COBYQA go on from there; both may leave the box by a decade. The best three sets are decided "
     "as a scenario runs"
 )

@@ -102,6 +102,7 @@ class Tuned(Tables):
             self.verdict,
             f"objective {self.objective:.4g} s², with the law's own gains {self.before:.4g} s²; "
             f"{counted(self.evaluations, 'set')} of gains, seed {self.seed}",
+            *search_space.edges_in_words(self.gains, self.at_bound),
         )
         return [
             Tabular(

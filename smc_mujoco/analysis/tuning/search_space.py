@@ -8,10 +8,14 @@ The plant has four scales, from which each gain's scale follows:
     T = sqrt(M X / u_max)   s, time in which the actuator moves the plant from rest by X / 2
 
 A gain with the unit F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5,
-and a search may leave this box by a decade. That holds for forces too, such as lambda of -lambda
-tanh(s), as the actuator clips the command of every law alike. A law with 1 / tau in place of k has
-the same search. A law may divide a gain by another one, such as k by b in the force k / b, where b
-is an estimate of g. Then k / b is searched as far as a force, for the b of each candidate. The law
+and a search may leave this box by a decade. As F = M X / T^2, its unit has 2 a - c powers of a rate
+1 / T, and each beyond two raises its upper end by a decade. So ki of a PID, N/(m s), reaches the l
+wc^2 / b that is the integral of a PD with an observer, and weights of squares reach the gains of
+other laws. Two powers are a force or a stiffness. Forces have this box too, such as lambda of
+-lambda tanh(s), as the actuator clips the command of every law alike. A law with 1 / tau in place
+of k has the same search. A law may divide a gain by another one, such as k by b in the force k / b,
+where b is an estimate of g. Then k / b is searched as far as a force, for the b of each candidate.
+The law
 declares this with `Gain(2.0, ACCELERATION, over="b")`.
 
 Where u is a voltage or an acceleration, F is its bound and g is x'' per unit of u. X is the largest
@@ -47,12 +51,12 @@ from smc_mujoco.common.aliases import Numbers, Pair
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component, unit_cure
-from smc_mujoco.control.units import Gain, Unit
+from smc_mujoco.control.units import FORCE, Gain, Unit
 from smc_mujoco.mechanisms.custom import scales as at_start
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.grid import SPREAD, START_CURE
 
-HALF_WIDTH = 1.5  # decades on either side of a scale: chosen, a factor of 1000 in all
+HALF_WIDTH = 1.5  # decades on either side of the scale of a force or a rate: chosen
 BOUND_MARGIN = 0.02  # of the range in log space: a gain so close to a bound counts as at the bound
 WIDENING = 1.0  # decades by which the search may leave the box
 OF_TURNS = " of turns"  # at the end of the names of an attitude's scales
@@ -185,7 +189,8 @@ def box(law: Component, plant_scales: Numbers) -> dict[str, Pair]:
             _gain(law, name).held or left_out(law, name)
         ):
             scale = gain_unit.of(_scales_of(_gain(law, name), plant_scales))
-            bounds[name] = (scale * 10**-HALF_WIDTH, scale * 10**HALF_WIDTH)
+            above = HALF_WIDTH + max(0.0, gain_unit.rates - FORCE.rates)
+            bounds[name] = (scale * 10**-HALF_WIDTH, scale * 10**above)
     if not bounds:
         raise ScenarioError(f"law {law.name!r} has no gain to tune: choose another")
     return bounds
@@ -202,6 +207,18 @@ def at_bound(gains: Numbers, bounds: Box) -> dict[str, str]:
         if min(place, 1.0 - place) <= BOUND_MARGIN:
             near[name] = place
     return {name: "lower" if place < 0.5 else "upper" for name, place in near.items()}
+
+
+def edges_in_words(gains: Numbers, edges: Mapping[str, str]) -> list[str]:
+    """Return a sentence for each gain that is at the edge of where it was searched, `edges` being
+    what `at_bound` returns.
+    """
+    beyond = {"lower": "smaller", "upper": "larger"}
+    return [
+        f"{name} = {gains[name]:.4g} is at the {side} end of its box: a {beyond[side]} one may be "
+        "better"
+        for name, side in edges.items()
+    ]
 
 
 def force_limits(law: Component, gains: Numbers, u_max: float) -> dict[str, float]:

@@ -39,14 +39,10 @@ FIXED = {
 WITHOUT_MODEL = dict.fromkeys(
     (
         "discrete_time",
-        "implicit_first_order",
-        "implicit_super_twisting",
         "integral",
         "nonsingular_fast_terminal",
         "nonsingular_terminal",
         "prescribed_time",
-        "proper_conditioned_super_twisting",
-        "proper_super_twisting",
         "terminal",
     ),
     G_IS_1,
