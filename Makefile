@@ -65,7 +65,7 @@ without: ## the quick tests in a copy without ANNEX=evidence and its tests, in .
 lowest: ## the quick tests under the oldest versions that pyproject.toml allows, in .cache/lowest
 	@python3 -m venv --clear .cache/lowest
 	@.cache/lowest/bin/python -m pip install --quiet uv
-	@VIRTUAL_ENV=.cache/lowest .cache/lowest/bin/uv pip install --quiet --resolution lowest-direct -e ".[all]" --group test
+	@VIRTUAL_ENV=.cache/lowest .cache/lowest/bin/uv pip install --quiet --resolution lowest-direct -e ".[all,dm]" --group test
 	NUMBA_CACHE_DIR=.cache/lowest/numba .cache/lowest/bin/python -m pytest --quick
 
 entered: setup ## the one entry that the last commit or merge brings, in a suite
@@ -111,7 +111,7 @@ lock: ## the locks again from pyproject.toml, needs uv; delete a lock first to u
 	$(LOCK) pyproject.toml --extra dm --extra film --extra site --extra rl --group use -o requirements.lock
 	@# the other locks leave out what requirements.lock has, except what it has only for Windows
 	beside="-c requirements.lock $$(sed -n "/== 'win32'/!s/^\([a-z0-9.-]*\)==.*/--no-emit-package \1/p" requirements.lock)"; \
-	$(LOCK) pyproject.toml --extra all --extra cluster --group test --group check $$beside -o requirements-test.lock && \
+	$(LOCK) pyproject.toml --extra all --extra dm --extra cluster --group test --group check $$beside -o requirements-test.lock && \
 	for group in bench docs; do \
 		$(LOCK) --group $$group $$beside -c requirements-test.lock -o requirements-$$group.lock || exit; done
 
