@@ -117,8 +117,9 @@ class Chattering:
             if math.isnan(self.amplitude_range[1]):
                 return math.nan
             return math.inf
-        pairs = ((self.amplitude_range, self.amplitude), (self.frequency_range, self.frequency))
-        return max(abs(end / value - 1.0) for ends, value in pairs for end in ends)
+        ranges = np.array([self.amplitude_range, self.frequency_range])
+        values = np.array([[self.amplitude], [self.frequency]])
+        return float(np.abs(ranges / values - 1.0).max())
 
 
 def chattering(

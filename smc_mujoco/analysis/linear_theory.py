@@ -82,13 +82,11 @@ def linear(plant: Plant) -> Linear:
 
     def slopes(at: Callable[[Array, int], float]) -> Array:
         """Return -d f_i / d z_j / g, (n, n), by central differences."""
-        steps = DIFFERENCE_STEP * np.eye(n)
-        return np.array(
-            [
-                [(at(-z, i) - at(z, i)) / (2.0 * DIFFERENCE_STEP * g[i]) for z in steps]
-                for i in range(n)
-            ]
-        )
+        found = np.empty((n, n))
+        for j, z in enumerate(DIFFERENCE_STEP * np.eye(n)):
+            for i in range(n):
+                found[i, j] = (at(-z, i) - at(z, i)) / (2.0 * DIFFERENCE_STEP * g[i])
+        return found
 
     stiffness = slopes(lambda x, i: plant.nominal(x, rest, i, p)[0])
     damping = slopes(lambda v, i: plant.nominal(rest, v, i, p)[0])

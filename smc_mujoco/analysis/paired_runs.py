@@ -354,20 +354,17 @@ def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
     if scenario is None or metric == SETTLES:
         return 0.0
     entry = CATALOGUE[metric]
-    driven = []
-    for group in channel_groups(scenario):
-        if group.driven:
-            driven.append(group)
     T = scenario.duration
     off = np.abs(np.subtract(scenario.resolved.x0, scenario.plant.origin))
-    start = max((float(off[i]) for group in driven for i in group.channels), default=0.0)  # X0
+    start = 0.0  # X0
+    counts = 0.0
+    for group in channel_groups(scenario):
+        if group.driven:
+            start = max(start, float(off[list(group.channels)].max()))
+            counts = max(counts, resolution(scenario, group))
     least = eps * start
-    seen = max(least, *(resolution(scenario, group) for group in driven))
-    bounds = []
-    for bound in scenario.limits:
-        if math.isfinite(bound):
-            bounds.append(bound)
-    u = MIN_COMMAND_SHARE * max(bounds, default=0.0)
+    seen = max(least, counts)
+    u = MIN_COMMAND_SHARE * max(filter(math.isfinite, scenario.limits), default=0.0)
     by_unit = {
         "s": scenario.control_period,
         "{x}": seen if entry.late else least,

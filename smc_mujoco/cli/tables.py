@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import chain
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich import box
@@ -158,7 +159,7 @@ def tips(title: str, traces: Mapping[str, Trace], again: Again | None = None) ->
     if not next(iter(traces.values())).scenario.plant.tip:
         return []
     values = _several(tip_scores, traces, again)
-    known = set().union(*(run or () for runs in values.values() for run in runs))
+    known = set().union(*filter(None, chain.from_iterable(values.values())))
     shown = {head: column for head, column in TIP_COLUMNS.items() if column[0] in known}
     heads = [Text(f"{head}\n").append(unit, "dim") for head, (_, unit, _) in shown.items()]
     rows: dict[str, list[Text]] = {}

@@ -194,15 +194,15 @@ def csv_rows(path: AnyPath) -> list[tuple[int, list[str]]]:
             semicolons = ";" in re.sub('"[^"]*"', "", text.readline())
             text.seek(0)
             reader = csv.reader(text, strict=True, delimiter=";" if semicolons else ",")
-            rows = [
-                (reader.line_num, [cell.strip() for cell in row])
-                for row in reader
-                if len(row) > 1 or any(row)
-            ]
+            rows = []
+            for row in reader:
+                if len(row) > 1 or any(row):
+                    rows.append((reader.line_num, list(map(str.strip, row))))
         if any("\0" in "".join(row) for _, row in rows):
             raise ScenarioError("it is not text")
     if semicolons:
-        rows = [(line, [cell.replace(",", ".") for cell in row]) for line, row in rows]
+        for _, row in rows:
+            row[:] = [cell.replace(",", ".") for cell in row]
     return rows
 
 

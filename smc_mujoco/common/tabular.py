@@ -10,6 +10,7 @@ left.
 """
 
 import io
+import itertools
 import re
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
@@ -85,7 +86,8 @@ class Tabular:
         if self.title:
             yield Text(self.title, "bold")
         for part in _parts(list(map(_widest, columns)), options.max_width, self.left):
-            tall = any("\n" in cell.plain for i in part for cell in columns[i][1:])
+            cells = itertools.chain.from_iterable(columns[i][1:] for i in part)
+            tall = any("\n" in cell.plain for cell in cells)
             table = Table(
                 box=box.HORIZONTALS if tall else box.SIMPLE_HEAD,  # rules between tall rows
                 show_lines=tall,

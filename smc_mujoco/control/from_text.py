@@ -197,7 +197,9 @@ def _of_python(path: str) -> list[Law]:
             laws.append(template())
     # a law that is a template with gains is not one more
     made = {template.function for template in (*templates.values(), *known_laws().values())}
-    laws += [law for law in bound.values() if not made & {part.function for part in law.parts}]
+    for law in bound.values():
+        if made.isdisjoint(part.function for part in law.parts):
+            laws.append(law)
     if not laws:
         raise ScenarioError(
             f"{path} has no law: write @smc.law_function above a function (y, gains, memory), "

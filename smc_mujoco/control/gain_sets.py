@@ -156,10 +156,11 @@ def general_laws(plants: Sequence[str | Plant], gains: NameOfSet) -> list[str]:
     """List the general laws that have gains in a set on each of these plants, those of COMPARED
     first.
     """
-    named = []
-    for plant in plants:
-        named.append(as_plant(plant))
-    if names := [name for name in general() if all(in_set(plant, name, gains) for plant in named)]:
+    named = list(map(as_plant, plants))
+    names = general()
+    for plant in named:
+        names = [name for name in names if in_set(plant, name, gains)]
+    if names:
         return names
     together = ", ".join(plant.name for plant in named)
     raise ScenarioError(
@@ -259,11 +260,11 @@ def _stored(plant: str, name: str, gains: str) -> TunedGains | None:
 def _package_gains(gains: str) -> dict[tuple[str, str], TunedGains]:
     """Return the gains of a set in this package, by plant and law."""
     data = read_json(file_of(gains))
-    return {
-        (plant, name): _from_record(record, record.get("rule", data["rule"]))
-        for plant, laws in data["plants"].items()
-        for name, record in laws.items()
-    }
+    found = {}
+    for plant, laws in data["plants"].items():
+        for name, record in laws.items():
+            found[plant, name] = _from_record(record, record.get("rule", data["rule"]))
+    return found
 
 
 def _from_record(record: Data, rule: str) -> TunedGains:

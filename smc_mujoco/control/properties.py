@@ -73,7 +73,9 @@ def suitable(needs: Iterable[str] = (), plant: Plant | str | None = None) -> lis
     templates = []
     for name in laws(plant):
         templates.append(known_laws()[name])
-    return [law for law in templates if all(needed.holds(law) for needed in properties)]
+    for needed in properties:
+        templates = list(filter(needed.holds, templates))
+    return templates
 
 
 def _reads(function: object, position: int, seen: set[object]) -> set[str]:

@@ -110,10 +110,11 @@ def scores(trace: Trace) -> dict[str, dict[str, float]]:
       Group -> metric -> value.
     """
     refuse(trace)
-    return {
-        group.name: {m.name: float(m.formula(part)) for m in metrics() if m.applies_to(group)}
-        for group, part in conventions.by_group(trace).items()
-    }
+    found = {}
+    for group, part in conventions.by_group(trace).items():
+        applying = [m for m in metrics() if m.applies_to(group)]
+        found[group.name] = {m.name: float(m.formula(part)) for m in applying}
+    return found
 
 
 def arrived(trace: Trace) -> bool:

@@ -56,10 +56,10 @@ TOLERATED_ERROR = 0.05  # of the scale: the audit's threshold for an ultimate bo
 VELOCITY_NOISE_RATIO = 5.0
 MAX_FORCE = 6.0  # N or N m: the study's u_max; no actuator there holds a larger force
 MAX_MASS_RATIO, MAX_NOISE = 64.0, 2.048  # mass ratio; rad or m: chosen, far above tolerated levels
-FORCES, NOISES = (
-    tuple(largest * 2.0 ** (i - 8) for i in range(9)) for largest in (MAX_FORCE, MAX_NOISE)
-)
-BLOWS = tuple(2.0 ** (i - 5) for i in range(9))  # of F T of the plant's scales; chosen
+POWERS = 2.0 ** np.arange(-8, 1)
+FORCES = tuple((MAX_FORCE * POWERS).tolist())
+NOISES = tuple((MAX_NOISE * POWERS).tolist())
+BLOWS = tuple((8.0 * POWERS).tolist())  # of F T of the plant's scales; chosen
 MASS_RATIOS = tuple(np.geomspace(1.0, MAX_MASS_RATIO, 10)[1:].tolist())
 JITTERS = tuple(i / JITTER_SHARES for i in range(1, JITTER_SHARES))  # of the control period
 DELAYS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # s

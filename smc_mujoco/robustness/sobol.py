@@ -147,6 +147,11 @@ class SobolResult:
     checked: str  # how far the fast engine's scores are from MuJoCo's; "" if MuJoCo made all runs
 
 
+def _intervals(ends: Array, points: int) -> list[Interval]:
+    """Return the interval of each axis from its value, low and high end, (3, axes)."""
+    return [Interval(*of_axis, points) for of_axis in ends.T.tolist()]
+
+
 def _random(scenario: Scenario) -> bool:
     """Return whether a run depends on the scenario's seed."""
     noise = scenario.noise
@@ -236,10 +241,7 @@ def indices(
         resampled = np.array([of(at) for at in draws if np.ptp(parts[:2, at])])
         ends = np.quantile(resampled, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
         whole = np.array([of(np.arange(points)), *ends])  # (3, 2, k)
-        first, total = (
-            [Interval(at, low, high, points) for at, low, high in whole[:, kind].T.tolist()]
-            for kind in (0, 1)
-        )
+        first, total = (_intervals(whole[:, kind], points) for kind in (0, 1))
     axes = []
     for i, name in enumerate(space.names):
         ordered = name != CHANCE and np.ptp(values) > 0.0

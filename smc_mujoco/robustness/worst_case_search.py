@@ -343,11 +343,12 @@ class WorstCaseSearch:
             best.setdefault(one.origin, one)
         parents = list(best.values())[: len(CHANGES_PER_PARENT)]
         counts = CHANGES_PER_PARENT[1 : len(parents)]
-        return [
-            Case(self.members.changed(parent.member, rng), origin=parent.origin)
-            for parent, count in zip(parents, (BATCH_MEMBERS - sum(counts), *counts), strict=True)
-            for _ in range(count)
-        ]
+        cases = []
+        for parent, count in zip(parents, (BATCH_MEMBERS - sum(counts), *counts), strict=True):
+            for _ in range(count):
+                changed = self.members.changed(parent.member, rng)
+                cases.append(Case(changed, origin=parent.origin))
+        return cases
 
     def _evolution(self, rng: np.random.Generator) -> Iterator[list[Case]]:
         """Yield the generations of an evolution that begins with the worst member so far."""

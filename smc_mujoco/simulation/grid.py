@@ -384,12 +384,10 @@ def listed_laws(laws: object) -> list[str | Law | Template]:
 
     Names of the library's laws stay names; other texts become laws.
     """
-    values = listed("laws", laws)
-    return [
-        law
-        for value in values
-        for law in (from_text.laws(value) if isinstance(value, str) else [value])
-    ]
+    found = []
+    for value in listed("laws", laws):
+        found += from_text.laws(value) if isinstance(value, str) else [value]
+    return found
 
 
 def listed(what: str, values: object) -> list:

@@ -841,9 +841,14 @@ class Sum(Signal):
 
 KINDS = Constant, Sine, Step, Ramp, MinimumJerk  # what a Sum may have
 _constant, _sine, _step, _ramp, _jerk = (njit(error_model="numpy")(kind.value) for kind in KINDS)
-_Constant, _Sine, _Step, _Ramp, _Jerk = (
-    namedtuple(kind.__name__, [f.name for f in dataclasses.fields(kind)]) for kind in KINDS
-)
+
+
+def _record(kind: type) -> type:
+    """Return the type of a signal's numbers in compiled code."""
+    return namedtuple(kind.__name__, [field.name for field in dataclasses.fields(kind)])
+
+
+_Constant, _Sine, _Step, _Ramp, _Jerk = map(_record, KINDS)
 
 
 @njit(error_model="numpy")

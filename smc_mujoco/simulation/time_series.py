@@ -139,7 +139,9 @@ class TimeSeries(Signal):
                     raise ScenarioError(
                         f"{path}, line {line}: {names[i]} is {shown(row[i])}: {cure}"
                     )
-        times, values = ([float(row[i]) for _, row in rows] for i in places)
+        of_time, of_value = places
+        times = [float(row[of_time]) for _, row in rows]
+        values = [float(row[of_value]) for _, row in rows]
         _check(str(path), times, lambda i: f"line {rows[i][0]}")
         steps = np.diff(times)
         median = np.quantile(

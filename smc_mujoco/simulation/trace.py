@@ -219,11 +219,11 @@ class Trace:
         Those of your own model have the names of its joints: x_shoulder, x_elbow, ...
         """
         ends = column_ends(self.scenario.plant)
-        return {"t": self.t} | {
-            f"{name}{end}": getattr(self, name)[:, i]
-            for name in ARRAYS[1:]
-            for i, end in enumerate(ends)
-        }
+        found = {"t": self.t}
+        for name in ARRAYS[1:]:
+            for end, column in zip(ends, getattr(self, name).T, strict=True):
+                found[f"{name}{end}"] = column
+        return found
 
     def units(self) -> dict[str, str]:
         """Return the unit of each of the `columns`: "s", "rad", "N m", ...; "" for s, whose unit

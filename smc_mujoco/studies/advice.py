@@ -1,6 +1,7 @@
 """Advice: which law to use on a plant, with its gains, and how certain that is, in words."""
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 
@@ -66,8 +67,11 @@ class Advice(Tables):
             return f"no law is reliable here; this one settles in {share}"
         if len(self.laws) < 2:
             return "there is no second law"
-        if barred := [law for board in boards for law in board.barred if law != self.law.name]:
-            return f"first so far; --defaults lets a law win over {barred[0]}'s default gains"
+        barred = dict.fromkeys(itertools.chain.from_iterable(board.barred for board in boards))
+        barred.pop(self.law.name, None)
+        if barred:
+            first = next(iter(barred))
+            return f"first so far; --defaults lets a law win over {first}'s default gains"
         if all(board.too_few for board in boards):
             return f"first so far; {boards[0].too_few}"
         name = self.law.name
@@ -210,7 +214,7 @@ class RaceAdvice(Advice):
         """J of the laws' sets of gains; the needs by condition, of the gains in the answer."""
         shown = [self._objectives]
         for table in self.leaderboard.tables:
-            rows = [[_unmarked(cell) for cell in row] for row in table.rows]
+            rows = [list(map(_unmarked, row)) for row in table.rows]
             shown.append(dataclasses.replace(table, rows=rows, notes=()))
         notes = [*self.leaderboard.failures, *self.leaderboard.untouched]
         notes.append(

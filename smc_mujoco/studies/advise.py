@@ -62,7 +62,9 @@ def advise(
     candidates = {plant.name: [Candidate(law, (law,)) for law in chosen.values()]}
     table = trial.run(candidates, seeds, half_steps=False)
     settled = _settled(table)
-    shares = {law: min(n / of for n, of in found.values()) for law, found in settled.items()}
+    shares = {}
+    for law, found in settled.items():
+        shares[law] = min(n / of for n, of in found.values())
     order = sorted(chosen, key=lambda law: shares[law] < RELIABLE)
     boards = leaderboard(table, metrics, defaults=True, relevant=relevant)
     if not boards:
@@ -126,7 +128,9 @@ def _chosen(
         if one.count > 1:
             order = np.argsort(one.values[: one.count], kind="stable")[:CONSIDERED].tolist()
             sets = [one.gains(k) for k in order]
-            laws = [law for law in sets for _ in CHOOSING]
+            laws = []
+            for tried in sets:
+                laws += [tried] * len(CHOOSING)
             J, _ = unseen(trial, plant, laws, goal, [*CHOOSING] * len(sets))
             law = sets[int(np.log(J).reshape(len(sets), -1).sum(axis=1).argmin())]
         if one.task:

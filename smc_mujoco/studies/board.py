@@ -327,7 +327,9 @@ class Board(Tables):
         """The laws with default gains over which no winner is named in any block, see
         `Block.barred`.
         """
-        return list(dict.fromkeys(law for block in self.blocks for law in block.barred))
+        return list(
+            dict.fromkeys(itertools.chain.from_iterable(block.barred for block in self.blocks))
+        )
 
     @property
     def few(self) -> dict[str, int]:
@@ -539,9 +541,8 @@ def _cell(board: Board, entry: BoardEntry) -> Cell:
 
 def _few(boards: Sequence[Board]) -> bool:
     """Return whether an interval is of fewer than MIN_INTERVAL_SAMPLES samples."""
-    return any(
-        entry.interval.n < MIN_INTERVAL_SAMPLES for board in boards for entry in board.entries
-    )
+    entries = itertools.chain.from_iterable(board.entries for board in boards)
+    return any(entry.interval.n < MIN_INTERVAL_SAMPLES for entry in entries)
 
 
 def key(boards: Sequence[Board], tables: str) -> str:

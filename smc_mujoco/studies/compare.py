@@ -1,6 +1,7 @@
 """Comparison of laws on plants in conditions, in one call: gains, runs, tables and verdicts."""
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -184,7 +185,7 @@ class Compared(Tables):
         figure = html.picture(
             lambda file, size: self.plot(file, self._metrics, size=size, format="svg"), about
         )
-        laws = dict.fromkeys(law for gains in self.gains.values() for law in gains)
+        laws = dict.fromkeys(itertools.chain.from_iterable(self.gains.values()))
         title = f"{joined([*laws])} on {joined([*self.gains])}"
         page = html.page(title, [figure, *(table._repr_html_() for table in self.tables)])
         with replacing(Path(path)) as file:

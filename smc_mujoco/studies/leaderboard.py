@@ -182,9 +182,11 @@ def _untuned(sources: Sources, defaults: bool) -> Names:
     """Return the laws with default gains, over which no winner is named; none if `defaults`."""
     if defaults:
         return ()
-    return tuple(
-        law for law, known in sources.items() if any(source.kind == DEFAULT for source in known)
-    )
+    return tuple(law for law, known in sources.items() if any(map(_is_default, known)))
+
+
+def _is_default(source: Source) -> bool:
+    return source.kind == DEFAULT
 
 
 def _board(

@@ -13,6 +13,7 @@ whether another start or noise would change the order.
 import ast
 import dataclasses
 import functools
+import itertools
 import math
 import os
 import sys
@@ -68,7 +69,7 @@ class Outcome:
     @property
     def labels(self) -> list[str]:
         """The labels of all runs."""
-        return list(dict.fromkeys(label for runs in self.traces.values() for label in runs))
+        return list(dict.fromkeys(itertools.chain.from_iterable(self.traces.values())))
 
     @property
     def named(self) -> str:
@@ -116,7 +117,9 @@ class Outcome:
         Args:
           unit: unit of the value, if the measure is a function.
         """
-        values = [value for runs in self.values(measure).values() for value in runs.values()]
+        values = []
+        for by_label in self.values(measure).values():
+            values += by_label.values()
         return _range(values, unit or self._unit(measure))
 
     def leaders(self, *measures: Measure) -> list[str]:

@@ -131,7 +131,8 @@ class Store:
                 parts.append(part.take([self.where[names[i]][1] for i in indices]))
             order = np.argsort(np.concatenate(list(places.values())))
             data = pa.concat_tables(parts).take(order).combine_chunks()
-            for name in sorted({column for key in names for column in changes.get(key, ())}):
+            changed = set().union(*(changes.get(key, ()) for key in names))
+            for name in sorted(changed):
                 pairs = zip(names, data[name].to_pylist(), strict=True)
                 values = []
                 for key, value in pairs:

@@ -228,9 +228,8 @@ def load_tuned(path: AnyPath, plant: Plant | None = None) -> Tuned:
         data = read_json(file)
         scenario = scenario_json.restore(data["scenario"], plant)
         fields: Fields = {name: data[name] for name in SAVED_FIELDS}
-        fields |= {
-            name: {k: tuple(v) for k, v in data[name].items()} for name in ("bounds", "searched")
-        }
+        for name in ("bounds", "searched"):
+            fields[name] = {gain: tuple(ends) for gain, ends in data[name].items()}
         return Tuned(
             **fields,
             searches=tuple(map(_found, data["searches"])),

@@ -266,9 +266,10 @@ def laws(
     from smc_mujoco.control import from_text
 
     known = {law.name: [law] for law in of_rig}
-    return [
-        made for text in names(texts, default) for made in known.get(text) or from_text.laws(text)
-    ]
+    made = []
+    for text in names(texts, default):
+        made += known.get(text) or from_text.laws(text)
+    return made
 
 
 def law(text: str) -> "str | Law":

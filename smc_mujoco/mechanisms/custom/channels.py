@@ -173,17 +173,17 @@ def suggested(channels: Pairs) -> dict[str, tuple]:
     """Return field -> what each channel suggests to scenarios, None for nothing; without fields
     that none suggests.
     """
-    fields = {name: tuple(getattr(channel, name) for _, channel in channels) for name in SUGGESTED}
     bare = [joint for joint, channel in channels if channel.law is None]
     if 0 < len(bare) < len(channels):
         raise ScenarioError(
             f"channel {bare[0]!r} has no law and others have: give each one, or none"
         )
-    return {
-        name: values
-        for name, values in fields.items()
-        if any(value is not None for value in values)
-    }
+    fields = {}
+    for name in SUGGESTED:
+        values = tuple(getattr(channel, name) for _, channel in channels)
+        if values.count(None) < len(values):
+            fields[name] = values
+    return fields
 
 
 def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:

@@ -5,6 +5,7 @@ import dataclasses
 import functools
 import glob
 import hashlib
+import itertools
 import os
 import sys
 import threading
@@ -203,15 +204,17 @@ def _of_text(text: str, assets: Mapping[str, Any]) -> ModelSource:
     assets = {name: v.encode() if isinstance(v, str) else bytes(v) for name, v in assets.items()}
     given = {PurePosixPath(name).name for name in assets}
     texts = [text, *(content for name, content in assets.items() if name.lower().endswith(XML))]
-    for name in _files(element for content in texts for element in _elements(content)):
+    for name in _files(itertools.chain.from_iterable(map(_elements, texts))):
         if PurePosixPath(name).name not in given:
             cure = f"give assets={{{name!r}: its bytes}}, or the path of the model's file"
             raise ScenarioError(
                 f"the model names the file {shown(name)}, and a text has no folder: {cure}"
             )
     pairs = tuple(sorted(assets.items()))
-    parts = [part for name, content in pairs for part in (name.encode(), content)]
-    return ModelSource("", _sha256([text.encode(errors="surrogatepass"), *parts]), text, pairs)
+    parts = [text.encode(errors="surrogatepass")]
+    for name, content in pairs:
+        parts += [name.encode(), content]
+    return ModelSource("", _sha256(parts), text, pairs)
 
 
 def _of_spec(spec: mujoco.MjSpec) -> ModelSource:
@@ -334,7 +337,8 @@ def _named_files(path: Path) -> list[Path]:
         elements = _elements(text)
         names += _files(elements)
         inner |= dict.fromkeys(_folders(elements))
-        for place in [folder / sub / name for name in names for sub in inner for folder in folders]:
+        for name, sub, folder in list(itertools.product(names, inner, folders)):
+            place = folder / sub / name
             if place.is_file() and place.resolve() not in files:
                 files[place.resolve()] = None
                 if place.suffix.lower() in XML:

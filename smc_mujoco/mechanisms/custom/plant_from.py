@@ -363,7 +363,8 @@ def missing(model: mujoco.MjModel, joints: list[str], motors: Sequence[Motor]) -
     idle = np.ones(model.nactuator, bool)
     if is_free(model, joints[0]):
         idle[own.thrusters(model, joints[0])] = False
-    idle[[actuator for motor in motors for actuator in motor.replaced]] = False
+    for motor in motors:
+        idle[list(motor.replaced)] = False
     if np.any(model.actuator_dyntype[idle] == DCMOTOR):
         return f"a dcmotor has a current that is not measured: {WITHOUT_MODEL}"
     # what may couple trees

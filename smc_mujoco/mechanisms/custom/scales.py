@@ -220,7 +220,8 @@ def _clear_start(plant: Plant, x0: Floats, i: int, down: float, up: float) -> Fl
     sides = [min(BESIDE, ROOM * up), -min(BESIDE, ROOM * down)]
     if down > up:
         sides.reverse()
-    ways = sorted((side / 2**k for side in sides for k in range(HALVINGS)), key=abs, reverse=True)
+    ways = np.outer(sides, 0.5 ** np.arange(HALVINGS)).ravel().tolist()
+    ways.sort(key=abs, reverse=True)
     at_goal = overlap(plant, plant.origin).depth
     places: list[Floats] = []
     for allowed in (max(TOUCH, at_goal), max(DEPTH, at_goal)):

@@ -68,6 +68,12 @@ SETS = {
     },
 }
 
+ENSEMBLE = []
+for model in ("model_1_0", "model_2_0", "model_3_0"):  # not model 1.1, which has no friction
+    numbers = dict(SETS[model])
+    del numbers["source"]
+    ENSEMBLE.append(numbers)
+
 
 def quantities():
     """Return name -> Quantity: identified numbers, else those of model 1.0, and the boards' limit
@@ -107,10 +113,7 @@ COMMON = {
     "identified_from": ("sys-id 03", "sys-id 13"),
     "free": ("r1", "r2", "I1", "I2", "Ir", "b1", "b2", "cf1", "cf2"),
     "published": SETS,
-    "ensemble": tuple(  # not model 1.1, which has no friction
-        {key: value for key, value in SETS[f"model_{number}_0"].items() if key != "source"}
-        for number in (1, 2, 3)
-    ),
+    "ensemble": tuple(ENSEMBLE),
     "about": (
         "Records: sys-id motions and board runs of design C.1. Masses are kept, because torques "
         "determine only moments."
