@@ -13,7 +13,9 @@ nothing in it is run:
 
 The levels of the suite are those of a machine of the study's size. Dry friction is of any size: a
 sixtieth of the machine's bound on the force of each driven joint, 0.1 N m or N in the study. The
-viscous friction of "friction" is half as much at 1 rad/s or m/s. The backlash is that of a worn
+viscous friction of "friction" is half as much at 1 rad/s or m/s. That of "stiction" is six times
+as large, and nine times at rest: a law with an integral may hunt there, which a search under it
+sees. The backlash is that of a worn
 gear, the lag that of a hydraulic valve, and the counts, per revolution or metre, are those of an
 inexpensive encoder. On a free body and on a user's model, whose size may be any, a disturbance is
 the same share of the largest force as it is of u_max in the study. The play, the counts and the
@@ -61,6 +63,7 @@ from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
 from smc_mujoco.mechanisms.hardware.stepper import of_rig
+from smc_mujoco.mechanisms.hardware.stribeck import Stribeck
 from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants
@@ -108,6 +111,7 @@ STUDY_ACCELERATION, ROTOR_SHARE = 48.0, 0.008
 STEPPER_ACCELERATIONS, SHORTEST_WAY_OF_STEPS = (5.0, 500.0), 0.15
 SINE = Sine(amplitude=0.2, omega=5.0)
 SENSOR_NOISE = Noise(position=0.01, velocity=0.05)
+STICTION_SPEED = 0.05  # rad/s (m/s), at which friction has fallen, chosen: that of the bristles
 # of an elastic joint, chosen: its rotor's share of the inertia, as of a geared arm; its resonance
 # over the joint's own rate, sqrt(bound/(inertia way)), which is 68 Hz on the study's pendulum, ten
 # times its loop; and the share of critical damping
@@ -504,6 +508,11 @@ def _rubbing(make: Callable[[float, Plant], Friction | tuple[Friction, ...]]) ->
     return _each_joint("friction", lambda limit, plant: make(limit / BOUNDS_PER_FRICTION, plant))
 
 
+def _sticking(limit: float, plant: Plant) -> Friction:
+    """Return dry friction that falls from 15 % of the bound at rest to 10 % in motion."""
+    return Stribeck(0.1 * limit, 0.15 * limit, STICTION_SPEED)
+
+
 def _bristles(level: float, plant: Plant) -> Friction:
     """Return bristles that bend by 0.1 mrad (mm) before a joint slides, as those of the study do.
     On the library's plants they have the study's stiffness. The default step does not resolve them
@@ -621,6 +630,7 @@ REAL: dict[str, Recipe] = {
     "friction": _rubbing(lambda level, plant: (Coulomb(level), Viscous(0.5 * level))),
     "coulomb": _rubbing(lambda level, plant: Coulomb(level)),
     "lugre": _rubbing(_bristles),
+    "stiction": _each_joint("friction", _sticking),
     "lag_20ms": {"actuator": Lag(0.02)},
     "dc_motor": _fitted(DCMotor(), _motor),
     "stepper": _stepper,

@@ -12,6 +12,9 @@ from smc_mujoco.mechanisms.plant import field_array
 from smc_mujoco.simulation import model as models
 
 GAP = 0.01
+AXIS = """<mujoco><worldbody><body><joint name="slide" type="slide" axis="1 0 0"/>
+<geom size="0.05" mass="0.6" contype="0" conaffinity="0"/></body></worldbody>
+<actuator><motor joint="slide" ctrlrange="-6 6"/></actuator></mujoco>"""
 
 
 @pytest.mark.parametrize("divisor", [1, 16])
@@ -94,3 +97,24 @@ def test_a_cycle_of_the_adaptive_law_does_not_depend_on_the_step():
         steps.append(scenario.resolved.physics_step / k)
     for trace in smc.run([dataclasses.replace(scenario, physics_step=step) for step in steps]):
         assert smc.score(trace)["ultimate_bound"] == pytest.approx(2.1e-3, rel=0.05)
+
+
+@smc.law_function(gains={})
+def seen(y, gains, memory):
+    return 0.0, y.x
+
+
+def test_friction_is_on_the_side_of_the_gap_that_it_names():
+    """A push of a tenth of the friction: on the motor's side it holds the rotor, and the joint stops at
+    the flank; on the link's side it holds the joint, and the rotor crosses the play.
+    """
+    axis = smc.plant_from(AXIS, ["slide"], name="axis")
+    fields = {"plant": axis, "law": seen(), "feedforward": smc.Constant(0.5), "duration": 1.0}
+    fields |= {"actuator": smc.Backlash(GAP, rotor_inertia=0.4), "v0": 0.02}
+    fields |= {"sensor": smc.Encoder(math.inf, side="motor"), "velocity": "measured"}
+    motor, link = smc.run(
+        [smc.Scenario(friction=smc.Coulomb(5.0, side=side), **fields) for side in ("motor", "link")]
+    )
+    ends = [(trace.x[-1, 0], trace.s[-1, 0]) for trace in (motor, link)]  # joint, rotor
+    assert ends[0] == pytest.approx((GAP / 2, 0.0), abs=0.1 * GAP)
+    assert ends[1] == pytest.approx((0.0, GAP / 2), abs=0.1 * GAP)
