@@ -5,6 +5,7 @@ A `turn` is a camera's frame as MuJoCo keeps it, (3, 3): its columns point right
 """
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -134,9 +135,9 @@ def layout(
         fits = down <= tall if beside else across <= wide
         if beside:
             fits &= across <= MAX_BESIDE * wide
-            left, foot = round(min(across, MAX_BESIDE * wide)), 0
+            left, foot = math.ceil(min(across, MAX_BESIDE * wide)), 0
         else:
-            left, foot = 0, round(min(down, (1.0 - MIN_HEIGHT) * tall))
+            left, foot = 0, math.ceil(min(down, (1.0 - MIN_HEIGHT) * tall))
         size = (wide - left, tall - foot)
         edge = TILE_EDGE * size[1]
         head = min(HEAD_ROOM * (room.right - room.left), 0.5 * size[1])

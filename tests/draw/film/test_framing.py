@@ -189,3 +189,15 @@ def test_labels_are_beside_machines_that_are_far_wider_than_high():
         tiles, labels, _ = camera.layout(4, room, sizes, shape, turn)
         rows[name] = len(set(tiles[:, 1].tolist())), bool((labels[:, 2] <= tiles[:, 0]).all())
     assert rows == {"rail": (4, True), "cube": (1, False)}
+
+
+def test_a_label_has_all_the_width_that_it_asked_for():
+    """Else its law's name is cut, though there is room beside it."""
+    tall = world.CORNERS * (0.3, 0.3, 1.0)
+    room = camera.Room(0.0, 54.0, 800.0, 342.0)
+    for wide in np.linspace(80.0, 82.0, 21).tolist():
+        sizes = lambda room, wide=wide: np.array([[wide, 90.3]])  # noqa: E731
+        _, labels, _ = camera.layout(1, room, sizes, tall, camera.turn(90.0, 0.0))
+        left, top, right, bottom = labels[0].tolist()
+        assert right - left >= wide
+        assert bottom - top >= 90.3
