@@ -83,7 +83,8 @@ def median_of(values: Array, samples: Sequence[int] | None = None) -> Interval:
     tail = ndtr(-math.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 + LEVEL) / 2))
     # index of the resample at which the interval ends, from either end
     at = max(1, math.floor(tail * (RESAMPLES + 1)))
-    lower, upper = np.sort(middle(lower)), np.sort(middle(upper))
+    lower = np.sort(middle(lower))
+    upper = np.sort(middle(upper))
     return Interval(centre, float(lower[at - 1]), float(upper[RESAMPLES - at]), n)
 
 

@@ -476,7 +476,8 @@ def _behind(drive: Actuator, block: Array, model: mujoco.MjModel) -> Array:
     if isinstance(drive, DCMotor):
         made[:, speeds] += drive.constant * made[:, outputs]
         made[outputs, speeds] = -drive.constant / drive.delay
-    made[outputs, outputs], made[outputs, len(block) + ids] = -1.0 / drive.delay, 1.0 / drive.delay
+    made[outputs, outputs] = -1.0 / drive.delay
+    made[outputs, len(block) + ids] = 1.0 / drive.delay
     return made
 
 
@@ -547,12 +548,18 @@ def _run(addresses, g0, g1, g2, m0, m1, m2, start, x, v, q, dq, model, y, out):
     for k in range(len(x)):
         for i in range(len(start)):
             y[i] = start[i]
-        y[T], y[X], y[E] = start[DT] * k, x[k], x[k]
-        y[F], y[G] = model[0, 0] + model[0, 2] * x[k] + model[0, 3] * v[k], model[0, 1]
+        y[T] = start[DT] * k
+        y[X] = x[k]
+        y[E] = x[k]
+        y[F] = model[0, 0] + model[0, 2] * x[k] + model[0, 3] * v[k]
+        y[G] = model[0, 1]
         if len(q):
             y[Q], y[DQ] = q[k], dq[k]
-            y[FQ], y[GQ] = model[1, 0] + model[1, 2] * q[k] + model[1, 3] * dq[k], model[1, 1]
-        reading[0], reading[1], reading[2] = start[DT], x[k], v[k]
+            y[FQ] = model[1, 0] + model[1, 2] * q[k] + model[1, 3] * dq[k]
+            y[GQ] = model[1, 1]
+        reading[0] = start[DT]
+        reading[1] = x[k]
+        reading[2] = v[k]
         if call(addresses[0], at_reading, gains[0], memories[0], at_estimate) != 0:
             return -1
         y[V], y[DE] = estimate[0], v[k] + (estimate[0] - v[k])
@@ -560,7 +567,9 @@ def _run(addresses, g0, g1, g2, m0, m1, m2, start, x, v, q, dq, model, y, out):
         if addresses[1] != 0:
             if call(addresses[1], at_y, gains[1], memories[1], at_sliding) != 0:
                 return -1
-            y[HAS_SURFACE], y[S], y[V_EQ] = 1.0, sliding[0], sliding[1]
+            y[HAS_SURFACE] = 1.0
+            y[S] = sliding[0]
+            y[V_EQ] = sliding[1]
         if call(addresses[2], at_y, gains[2], memories[2], at_out + 16 * k) != 0:
             return -1
         if not math.isfinite(out[k, 0]):

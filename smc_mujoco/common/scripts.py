@@ -39,5 +39,6 @@ def users_traceback(error: BaseException) -> str:
         code = step.tb_frame.f_code
         if inside and "runpy" not in code.co_filename:
             return "".join(traceback.format_exception(type(error), error, step))
-        inside, step = inside or code is execute.__code__, step.tb_next
+        inside = inside or code is execute.__code__
+        step = step.tb_next
     return ""

@@ -956,7 +956,8 @@ def limits(traces: Sequence[Trace], name: str) -> Pair:
     low, high = span(traces, name)
     if name == "x":
         r = np.concatenate([trace.r[np.isfinite(trace.r)] for trace in traces])
-        low, high = min(low, r.min(initial=low)), max(high, r.max(initial=high))
+        low = min(low, r.min(initial=low))
+        high = max(high, r.max(initial=high))
     if name == "e":
         low, high = min(low, 0.0), max(high, 0.0)
     if name in PEAKS:

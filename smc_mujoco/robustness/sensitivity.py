@@ -67,7 +67,9 @@ AT_ONCE = 4096  # scenarios in memory at once; chosen
 ROUGH_POINTS = 32
 MASS, PERIOD, BOUND = (0.7, 1.3), (1.0, 4.0), (0.5, 1.0)  # factors of the default class: chosen
 # of the default class: control periods, rad or m; chosen
-DELAY_PERIODS, NOISE, COUNTS = 20.0, 1e-3, (2.0**11, 2.0**15)
+DELAY_PERIODS = 20.0
+NOISE = 1e-3
+COUNTS = (2.0**11, 2.0**15)
 FRICTION_SHARE = 1 / 20  # of the force of the weakest drive: of the default class, chosen
 KEY = (
     "Alone: first-order index. With others: total index, 0 if the axis changes nothing. Below: 95 "

@@ -258,7 +258,8 @@ class Members:
             )
         middle = np.full(len(self.constants), 0.5)
         if count > 1:
-            self.ends[0], middle[0] = [(i + 0.5) / count for i in range(count)], 0.0
+            self.ends[0] = [(i + 0.5) / count for i in range(count)]
+            middle[0] = 0.0
         self.bare = Member(middle, np.zeros(0), np.zeros((2, self.times)))
         for constant in self.constants:
             constant.check(scenario)
@@ -320,7 +321,8 @@ class Members:
 
     def limited(self, force: Array) -> Array:
         """Return a force limited to -1 .. 1, and in its slope."""
-        force, change = np.clip(force, -1.0, 1.0), self.slope / self.within.disturbance
+        force = np.clip(force, -1.0, 1.0)
+        change = self.slope / self.within.disturbance
         if not change or np.abs(np.diff(force)).max(initial=0.0) <= change:
             return force
         limited = [before := float(force[0])]

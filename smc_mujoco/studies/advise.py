@@ -151,7 +151,10 @@ def _fixed(
     """Return the comparison of laws with these gains; None for one law."""
     if len(chosen) < 2:
         return None
-    J, halves, one, fine = {}, {}, {}, {}
+    J = {}
+    halves = {}
+    one = {}
+    fine = {}
     for name, law in chosen.items():
         J[name], halves[name] = unseen(trial, plant, [law] * len(DECIDING), goal, DECIDING)
         one[name] = np.zeros(len(DECIDING))

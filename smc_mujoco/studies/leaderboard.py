@@ -305,7 +305,8 @@ def _lead(comparison: Comparison, at: int, order: Sequence[str], floor: str) -> 
     first, *rivals = order
     effects = {rival: comparison.effect(at, first, rival) for rival in rivals}
     rival = max(rivals, key=lambda rival: effects[rival].high)
-    a, b = comparison.laws.index(first), comparison.laws.index(rival)
+    a = comparison.laws.index(first)
+    b = comparison.laws.index(rival)
     lacking = comparison.without_value[:, at]
     effect = effects[rival]
     if lacking[a] or not effect.samples or comparison.both_below[at, a, b]:

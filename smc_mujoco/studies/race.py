@@ -140,7 +140,9 @@ def race(
     running = {one.law.name: one for one in entrants}
     everyone = dict(running)
     dropped: dict[str, float] = {}
-    comparison, seconds, stopped = None, 0.0, False
+    comparison = None
+    seconds = 0.0
+    stopped = False
     with bar("set of gains", LOOKS[0] * len(running), trial.progress, counted=True) as shown:
         for k in range(LOOKS[-1]):
             start = time.monotonic()
@@ -202,7 +204,10 @@ def judged(running: Mapping[str, Entrant], goal: Objective, relevant: float) -> 
     """Return the comparison of laws by J of their sets; None for one law."""
     if len(running) < 2:
         return None
-    values, halves, numbers, fine = {}, {}, {}, {}
+    values = {}
+    halves = {}
+    numbers = {}
+    fine = {}
     for name, one in running.items():
         J = [unseen for unseen in one.J if unseen]
         values[name] = np.array([unseen.value for unseen in J])

@@ -186,7 +186,8 @@ class Outcome:
 
     def changes(self, measure: Measure, one: str, other: str, unit: str = "") -> str:
         """Return each label's value in one condition and in another: "a 1.20 to 1.43 s"."""
-        before, after = self[one].values(measure)[one], self[other].values(measure)[other]
+        before = self[one].values(measure)[one]
+        after = self[other].values(measure)[other]
         unit = unit or self._unit(measure)
         parts = []
         for label in before:

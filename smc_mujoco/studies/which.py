@@ -191,7 +191,8 @@ def _fit(table: Table) -> tuple[dict[str, float], list[str]]:
     """Return the least share of a law's runs that settle in a condition, and the laws that settle
     often enough to be compared; all if none does.
     """
-    laws, conditions = table.column("law"), table.column("condition")
+    laws = table.column("law")
+    conditions = table.column("condition")
     settled = 1.0 - values(table, SETTLES)
     names = sorted(set(laws.tolist()))
     tested = sorted(set(conditions.tolist()))

@@ -360,9 +360,11 @@ class TuningTask(NamedTuple):
         control period.
         """
         if by_equation.engine == EQUATION:
-            every, accurate = by_equation, self._evaluator(by_equation.cases)
+            every = by_equation
+            accurate = self._evaluator(by_equation.cases)
         else:
-            every, accurate = _cheap(by_equation, at_period=True), by_equation
+            every = _cheap(by_equation, at_period=True)
+            accurate = by_equation
         first = every.of_first()
         trials = self._trials(every, every, report)
         alone = self._trials(first, first, lambda count: None)

@@ -50,7 +50,9 @@ def observe(y, l1, l2, l3, memory):
     h = y.dt
     if memory[0] == 0.0:
         # the first prediction is the reading
-        memory[0], memory[1], memory[2] = (1.0, y.e - h * y.de, y.de)
+        memory[0] = 1.0
+        memory[1] = y.e - h * y.de
+        memory[2] = y.de
     push = memory[3] + memory[4]
     z1 = memory[1] + h * memory[2] + h * h / 2.0 * push
     z2 = memory[2] + h * push

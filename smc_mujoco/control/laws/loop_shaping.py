@@ -169,21 +169,32 @@ def start(y, a1, a2, b, k, wi, memory):
     # 0, started; 1, w; 2 to 4, x^; 5 to 7, F; 8 to 10, Hs; then exp(M h) and its integral, M = A +
     # Hs C
     memory[5], memory[6], memory[7], memory[8], memory[9], memory[10], _ = design(a1, a2, b, k, wi)
-    p0, p1, p2 = -memory[8], -a1 - memory[9], -a2 - memory[10]
+    p0 = -memory[8]
+    p1 = -a1 - memory[9]
+    p2 = -a2 - memory[10]
     memory[3], memory[4] = y.de - a2 * y.e, y.e
     for j in range(3):
         q1, q2, q3 = (1.0, 0.0, 0.0) if j == 0 else ((0.0, 1.0, 0.0) if j == 1 else (0.0, 0.0, 1.0))
-        s1, s2, s3, i1, i2, i3 = q1, q2, q3, y.dt * q1, y.dt * q2, y.dt * q3
+        s1 = q1
+        s2 = q2
+        s3 = q3
+        i1 = y.dt * q1
+        i2 = y.dt * q2
+        i3 = y.dt * q3
         for n in range(1, TERMS):
             q1, q2, q3 = -p0 * q3 * y.dt / n, (q1 - p1 * q3) * y.dt / n, (q2 - p2 * q3) * y.dt / n
-            s1, s2, s3 = s1 + q1, s2 + q2, s3 + q3
-            i1, i2, i3 = (
-                i1 + y.dt * q1 / (n + 1),
-                i2 + y.dt * q2 / (n + 1),
-                i3 + y.dt * q3 / (n + 1),
-            )
-        memory[PHI + j], memory[PHI + 3 + j], memory[PHI + 6 + j] = s1, s2, s3
-        memory[GAMMA + j], memory[GAMMA + 3 + j], memory[GAMMA + 6 + j] = i1, i2, i3
+            s1 = s1 + q1
+            s2 = s2 + q2
+            s3 = s3 + q3
+            i1 = i1 + y.dt * q1 / (n + 1)
+            i2 = i2 + y.dt * q2 / (n + 1)
+            i3 = i3 + y.dt * q3 / (n + 1)
+        memory[PHI + j] = s1
+        memory[PHI + 3 + j] = s2
+        memory[PHI + 6 + j] = s3
+        memory[GAMMA + j] = i1
+        memory[GAMMA + 3 + j] = i2
+        memory[GAMMA + 6 + j] = i3
     return 1.0
 
 
@@ -192,8 +203,12 @@ def observe(v, e, n0, n1, memory):
     """Bring x^ to the next sample under v and the reading e. Return its last state, the error that
     it predicts.
     """
-    q1, q2, q3 = n0 * v - memory[8] * e, n1 * v - memory[9] * e, -memory[10] * e
-    x1, x2, x3 = memory[2], memory[3], memory[4]
+    q1 = n0 * v - memory[8] * e
+    q2 = n1 * v - memory[9] * e
+    q3 = -memory[10] * e
+    x1 = memory[2]
+    x2 = memory[3]
+    x3 = memory[4]
     for i in range(3):
         kept = (
             memory[PHI + 3 * i] * x1 + memory[PHI + 3 * i + 1] * x2 + memory[PHI + 3 * i + 2] * x3

@@ -45,7 +45,10 @@ from smc_mujoco.control.units import LINEAR_PLANT, RATE, TIME, WEIGHTS, Gain
 # free), its function of e, de and the bounds' middle and reach, the linear term by e and by de; the
 # gradient, the step, what a share of it changes; and the Hessian and the factor, 20 x 20, by rows.
 # chosen; from no plan 34 steps were enough in 60,000 states
-MOVES, MOST_STEPS, MOST_HALVINGS, TERMS = (20, 40, 40, 40)
+MOVES = 20
+MOST_STEPS = 40
+MOST_HALVINGS = 40
+TERMS = 40
 AT_E, AT_DE, AT_MIDDLE, AT_REACH, MOST_E, MOST_DE, MOST_MIDDLE, ROOM = range(10, 18)
 PLAN, SIDE, FROM_E, FROM_DE, FROM_MIDDLE, FROM_REACH, BY_E, BY_DE = range(18, 26)
 ROW = 8

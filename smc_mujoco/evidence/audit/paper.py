@@ -417,7 +417,8 @@ def _checked(folder: Path, data: Data, code: ModuleType) -> Paper:
     allowed = {
         law: _allowed(law, one, functions, paper) for law, one in values.get("allowed", {}).items()
     }
-    paper, entries = dataclasses.replace(paper, allowed=allowed), {}
+    paper = dataclasses.replace(paper, allowed=allowed)
+    entries = {}
     for number, one in enumerate(values["claim"], 1):
         with _about(
             f"claim {one.get('id', f'number {number}') if isinstance(one, dict) else number}"

@@ -68,7 +68,11 @@ def state_feedback(y, gains, memory):
     if started != 0.0:
         de = (gains.cutoff * (y.e - e_) + de) / (1.0 + gains.cutoff * y.dt)
         dq = (gains.cutoff * (y.q - q_) + dq) / (1.0 + gains.cutoff * y.dt)
-    memory[0], memory[1], memory[2], memory[3], memory[4] = 1.0, y.e, y.q, de, dq
+    memory[0] = 1.0
+    memory[1] = y.e
+    memory[2] = y.q
+    memory[3] = de
+    memory[4] = dq
     return gains.kp * y.e + gains.kd * de + gains.kp_free * y.q + gains.kd_free * dq, 0.0
 
 

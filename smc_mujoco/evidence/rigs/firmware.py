@@ -76,12 +76,17 @@ def measure(y, m):
     theta = DEGREES * y.x
     passed = TICK
     if m[STARTED] == 0.0:
-        m[STARTED], m[ALPHA], m[THETA], m[ENGAGED] = 1.0, alpha, theta, y.t
+        m[STARTED] = 1.0
+        m[ALPHA] = alpha
+        m[THETA] = theta
+        m[ENGAGED] = y.t
     else:
         passed = y.t - m[TIME]
     m[ALPHA_RATE] = clip(SLOPE * (alpha - m[ALPHA]) - OLD_RATE * m[ALPHA_RATE], MAX_RATE)
     m[THETA_RATE] = clip(SLOPE * (theta - m[THETA]) - OLD_RATE * m[THETA_RATE], MAX_RATE)
-    m[TIME], m[ALPHA], m[THETA] = y.t, alpha, theta
+    m[TIME] = y.t
+    m[ALPHA] = alpha
+    m[THETA] = theta
     return passed
 
 
