@@ -29,6 +29,7 @@ from smc_mujoco.common.errors import ScenarioError, whole
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import RateLimit
+from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
 from smc_mujoco.mechanisms.named import jointed
 from smc_mujoco.simulation.scenario import Scenario
 
@@ -89,7 +90,7 @@ class Chattering:
 
     amplitude: float = math.nan  # of the sliding variable s, half its range, in its unit
     amplitude_x: float = math.nan  # of the position, rad or m
-    amplitude_u: float = math.nan  # of the command, half its range: N m, N or V
+    amplitude_u: float = math.nan  # of the command, half its range, in the unit of u
     frequency: float = math.nan  # Hz
     # mean square of s', (amplitude omega)^2 / 2 with the first harmonic of s
     power: float = math.nan
@@ -490,6 +491,8 @@ def _assumptions(loop: Loop) -> Iterator[str]:
     yield "no reference, disturbance or noise"
     if any(isinstance(part, RateLimit) for part in scenario.actuator):
         yield "no rate limit"
+    if any(isinstance(part, PositionServo) and part.stall for part in scenario.actuator):
+        yield "no forcerange"
     if any(isinstance(part, Backlash) for part in scenario.actuator):
         yield "rotor and joint free in the play"
     if scenario.friction:

@@ -31,6 +31,7 @@ from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
 from smc_mujoco.mechanisms.hardware.part import Actuator
+from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
 from smc_mujoco.mechanisms.layout import dof_ids, drive_ids, moving_joints
 from smc_mujoco.simulation import cfunctions
 from smc_mujoco.simulation import model as models
@@ -100,6 +101,12 @@ class Loop:
                     f"chattering is not predicted behind {type(part).__name__}, whose force is a "
                     "function of your own: measure it in a run"
                 )
+            if isinstance(part, PositionServo) and (part.goal or part.step):
+                raise ScenarioError(
+                    "chattering is predicted about x = 0 and without steps of a set-point, and a "
+                    f"PositionServo has goal {part.goal:g} and step {part.step:g}: measure it in a "
+                    "run"
+                )
         for joint, low, high in plant.ranges:
             if not low <= 0.0 <= high:
                 raise ScenarioError(
@@ -137,7 +144,7 @@ class Loop:
             for part in s.actuator
             if isinstance(part, DCMotor)
         ]
-        motors += [part for part in s.actuator if isinstance(part, ElasticJoint)]
+        motors += [part for part in s.actuator if isinstance(part, ElasticJoint | PositionServo)]
         gears = [part for part in s.actuator if isinstance(part, Backlash)]
         friction = s.friction
         if gears:  # the rotor is rigid on the joint here

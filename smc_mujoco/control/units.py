@@ -37,11 +37,14 @@ class Unit(NamedTuple):
     def text(self, force: str, position: str) -> str:
         """Return the unit in words, such as "N m s/rad" for a force "N m" and a position "rad".
 
-        A number without a unit is "1".
+        A number without a unit is "1". `force` is the unit of u.
         """
+        powers: dict[str, float] = {}
+        for name, power in ((force, self.force), (position, self.position), ("s", self.time)):
+            powers[name] = powers.get(name, 0.0) + power  # a set-point is in the unit of a position
         above: list[str] = []
         below: list[str] = []
-        for name, power in ((force, self.force), (position, self.position), ("s", self.time)):
+        for name, power in powers.items():
             if power > 0.0:
                 above.append(_raised(name, power))
             elif power < 0.0:

@@ -227,11 +227,9 @@ def _size_of_force(base: Scenario) -> float:
 
 
 def _size_of_blow(base: Scenario) -> float:
-    """Return F T of the plant's scales: the momentum that u stops in the time T."""
-    bound = min(base.limits)
-    per_u = None if base.accelerates else base.drive_train.nominal[0].gain
+    """Return F T of the plant's scales: the momentum that the drives stop in the time T."""
     far = np.abs(np.subtract(base.resolved.x0, base.plant.origin)).max()
-    scales = search_space.scales(base.plant, bound, float(far), per_u)
+    scales = search_space.scales(base.plant, min(base.drive_train.forces), float(far))
     return scales["F"] * scales["T"]
 
 

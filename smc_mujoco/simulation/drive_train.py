@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from smc_mujoco.common.cached import cached_property
+from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.hardware.moments import Torque
 from smc_mujoco.mechanisms.hardware.part import Actuator, NominalDrive, chains
 from smc_mujoco.mechanisms.layout import driven_names
@@ -60,6 +61,18 @@ class DriveTrain:
         for i, motor in enumerate(self.motors):
             efforts[i] = motor.unit.format(x=self.plant.units[i]) or efforts[i]
         return tuple(efforts)
+
+    @property
+    def words(self) -> list[str]:
+        """What u is of joints where that is said: a sentence for those where it is the same."""
+        joints: dict[str, list[str]] = {}
+        for motor, unit, joint in zip(
+            self.motors, self.plant.units, driven_names(self.plant), strict=False
+        ):
+            if motor.meaning:
+                joints.setdefault(motor.meaning.format(x=unit), []).append(repr(joint))
+        name = self.plant.name
+        return [f"u of {joined(those)} of {name} is {what}." for what, those in joints.items()]
 
     @cached_property
     def limits(self) -> tuple[float, ...]:

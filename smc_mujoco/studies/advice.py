@@ -216,7 +216,7 @@ class RaceAdvice(Advice):
         for table in self.leaderboard.tables:
             rows = [list(map(_unmarked, row)) for row in table.rows]
             shown.append(dataclasses.replace(table, rows=rows, notes=()))
-        notes = [*self.leaderboard.failures, *self.leaderboard.untouched]
+        notes = self.leaderboard.remarks
         notes.append(
             f"{MEDIANS} Nothing here is tested: what is, stands below. {capital(UNTRIED)}."
         )

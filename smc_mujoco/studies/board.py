@@ -409,9 +409,16 @@ class Boards(Tables, list[Board]):
     board.
     """
 
-    # sentences below the last table: for each law with failed runs, and where no run touches
+    # sentences below the last table: what u is where it is a set-point, for each law with failed
+    # runs, and where no run touches
+    commands: Sequence[str] = ()
     failures: Sequence[str] = ()
     untouched: Sequence[str] = ()
+
+    @property
+    def remarks(self) -> list[str]:
+        """These sentences."""
+        return [*self.commands, *self.failures, *self.untouched]
 
     @property
     def winners(self) -> list[tuple[str, str, str, str]]:
@@ -450,7 +457,7 @@ class Boards(Tables, list[Board]):
         if not groups:
             return [Tabular(headings=["no boards: no metric applies"], rows=[])]
         made = [_table(name, boards) for name, boards in groups.items()]
-        notes = *made[-1].notes, *self.failures, *self.untouched, key(self, repr(made))
+        notes = *made[-1].notes, *self.remarks, key(self, repr(made))
         return [*made[:-1], dataclasses.replace(made[-1], notes=notes)]
 
 

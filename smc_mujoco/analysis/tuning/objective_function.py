@@ -34,9 +34,10 @@ class ObjectiveFunction:
 
     def __init__(self, task: TuningTask, search: int):
         self._task = task
-        self._evaluator = Evaluator(task.goal, task.cases(search), tuple(task.box), task.threads)
+        cases = task.cases(search)
+        self._evaluator = Evaluator(task.goal, cases, tuple(task.box), task.threads)
         self.bounds: dict[str, Pair] = dict(task.box)
-        self.units = search_space.unit_texts(task.law, tuple(task.box), task.plant)
+        self.units = search_space.unit_texts(task.law, tuple(task.box), cases[0])
         self.evaluations = 0
 
     def __repr__(self) -> str:

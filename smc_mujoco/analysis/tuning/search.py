@@ -413,6 +413,12 @@ def task_of(
         raise ScenarioError(
             f"the conditions of a tuning have commands in {both}: tune for each drive alone"
         )
+    if len({bool(motor.unit) for motor in first.drive_train.motors}) > 1:
+        units = " and ".join(dict.fromkeys(first.efforts[: first.plant.driven]))
+        raise ScenarioError(
+            f"joints of {first.plant.name} take commands in {units}, and a tuning has one bound on "
+            "u: give all of them servos or motors, as smc.Channel(motor=True)"
+        )
     bound = goal.u_max or (default_u_max(first.plant) if first.force_command else min(first.limits))
     goal = dataclasses.replace(goal, u_max=bound)
     reach = goal.starts.largest(dataclasses.replace(first, x0=None))

@@ -55,6 +55,7 @@ from smc_mujoco.control.units import FORCE, Gain, Unit
 from smc_mujoco.mechanisms.custom import scales as at_start
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.grid import SPREAD, START_CURE
+from smc_mujoco.simulation.scenario import Scenario
 
 HALF_WIDTH = 1.5  # decades on either side of the scale of a force or a rate: chosen
 BOUND_MARGIN = 0.02  # of the range in log space: a gain so close to a bound counts as at the bound
@@ -92,8 +93,9 @@ def without_unit(law: Component) -> dict[str, float]:
     }
 
 
-def unit_texts(law: Component, names: Sequence[str], plant: Plant) -> dict[str, str]:
-    """Return gain -> its unit in words on a plant, "1" for one without a unit or of unknown unit.
+def unit_texts(law: Component, names: Sequence[str], scenario: Scenario) -> dict[str, str]:
+    """Return gain -> its unit in words in a scenario, "1" for one without a unit or of unknown
+    unit.
 
     A gain that several channels share has the unit of the first that it belongs to.
     """
@@ -102,7 +104,7 @@ def unit_texts(law: Component, names: Sequence[str], plant: Plant) -> dict[str, 
         gain = _gain(law, name)
         channel = 3 if gain.turns else 0
         unit = gain.unit if isinstance(gain.unit, Unit) else Unit()
-        texts[name] = unit.text(plant.efforts[channel], plant.units[channel])
+        texts[name] = unit.text(scenario.efforts[channel], scenario.plant.units[channel])
     return texts
 
 

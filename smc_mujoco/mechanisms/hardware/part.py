@@ -263,6 +263,7 @@ class Actuator(OnJoints):
     limited: ClassVar[bool] = False  # whether the rate of the force is limited
     # of u, where {x} stands for that of the joint; "" for that of the joint's force
     unit: ClassVar[str] = ""
+    meaning: ClassVar[str] = ""  # what u is, in words, where tables say so; {x} as in `unit`
     accelerates: ClassVar[bool] = False  # whether u is the acceleration of the joint
     bound: ClassVar[float | None] = None  # on u, in its unit, if u is no force
     stall: ClassVar[float | None] = None  # N m (N), the largest force at rest; None: any

@@ -69,6 +69,11 @@ class PositionServo(Actuator):
             )
 
     @property
+    def meaning(self) -> str:
+        """What u is, in words."""
+        return f"the set-point of its servo, in {{x}} from its goal at {self.goal:g}"
+
+    @property
     def bound(self) -> float | None:
         """The largest |u| that the ctrlrange takes, rad (m); None without one."""
         low, high = self.ctrlrange

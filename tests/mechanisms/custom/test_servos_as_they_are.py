@@ -7,8 +7,12 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.engine.group import why_not
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.hardware import PositionServo
+from smc_mujoco.mechanisms.named import from_text
+from smc_mujoco.metrics.tip import knows_contacts
+from smc_mujoco.robustness.margins import MARGIN_KINDS
 
 ARM = """<mujoco model="arm"><compiler angle="radian"/><worldbody>
   <body><joint name="a" axis="0 1 0" damping=".1" armature=".02"/>
@@ -128,6 +132,11 @@ REFUSED = {
         {},
         ["gain 9", "-8"],
     ),
+    "a constant force": (
+        '<general joint="j" gainprm="9" biastype="affine" biasprm="1 -9 0"/>',
+        {},
+        ["bias 1"],
+    ),
     "one way": ('<position joint="j" kp="9" forcerange="0 3"/>', {}, ["0 to 3", "motor=True"]),
     "two things": (POSITION, {"motor": True}, ["motor=True", "servo=True"]),
     "a step without a servo": (POSITION, {"servo": False, "set_point_step": 0.1}, ["0.1", "servo"]),
@@ -174,6 +183,100 @@ def test_a_trace_of_a_servo_is_read_back(tmp_path):
     np.testing.assert_array_equal(run_again(back.scenario).x, trace.x)
 
 
+def test_a_text_keeps_a_servo_and_its_steps(tmp_path):
+    (tmp_path / "hobby.xml").write_text(HOBBY % POSITION)
+    plant = from_text("hobby.xml:j(servo,set_point_step=0.01)", tmp_path)
+    (part,) = smc.Scenario(plant=plant, law="pid").actuator
+    assert (part.kp, part.step) == (17.8, 0.01)
+    assert plant.argument.endswith("hobby.xml:j(servo,set_point_step=0.01)")
+
+
+def test_contacts_of_a_run_with_steps_of_a_set_point_are_unknown():
+    stops = {
+        "contact": smc.Wall("arm", direction=(0, 0, -1), gap=0.05),
+        "x0": 0.1,
+        "duration": 0.1,
+        "law": "pid",
+    }
+    xml = (HOBBY % POSITION).replace("<body>", '<body name="arm" pos="0 0 1">')
+    assert knows_contacts(smc.Scenario(plant=servo(xml), **stops))
+    assert not knows_contacts(smc.Scenario(plant=servo(xml, set_point_step=0.01), **stops))
+
+
 def run_again(scenario):
     (trace,) = smc.run([scenario])
     return trace
+
+
+# without weight and friction: a limit cycle is predicted about 0
+BARE = (HOBBY % POSITION).replace("<worldbody>", '<option gravity="0 0 0"/><worldbody>', 1)
+BARE = BARE.replace('frictionloss=".052" range="-1.9 1.9"', "")
+STRONG = BARE.replace('forcerange="-2.94 2.94"', "")
+
+
+@pytest.mark.parametrize(
+    ("law", "late"),
+    [(smc.law("classical", k=0.2, c=8.0), 0.01), (smc.law("super_twisting", k1=0.5, k2=0.5), 0.02)],
+)
+def test_predicted_chattering_has_the_servo_s_spring(law, late):
+    fields = {"law": law, "x0": 0.1, "duration": 6.0, "input_delay": late}
+    scenario = smc.Scenario(plant=servo(STRONG), **fields)
+    predicted = smc.design.chattering(scenario)
+    ideal = smc.plant_from(BARE, {"j": smc.Channel(motor=True)})
+    part = PositionServo(kp=KP, kv=0.1, forcerange=(-2.94, 2.94), ctrlrange=(-1.9, 1.9))
+    weak = smc.design.chattering(smc.Scenario(plant=ideal, actuator=part, **fields))
+    assert weak.frequency == pytest.approx(predicted.frequency)
+    assert {*weak.assumptions} - {*predicted.assumptions} == {"no forcerange"}
+    trace = run_again(scenario)
+    x = trace.x[trace.t > 4.0, 0]
+    assert predicted.amplitude_x == pytest.approx(0.5 * np.ptp(x), rel=0.02)
+    turns = np.flatnonzero(np.diff(np.sign(x)) > 0)
+    assert predicted.frequency == pytest.approx(1e3 * np.diff(turns).mean() ** -1, rel=0.02)
+
+
+def test_chattering_is_not_predicted_for_a_goal_or_steps_of_a_set_point():
+    stepped = smc.Scenario(plant=servo(BARE, set_point_step=0.01), law="classical")
+    with pytest.raises(ScenarioError, match=r"goal 0 and step 0.01: measure it in a run"):
+        smc.design.chattering(stepped)
+
+
+def test_gains_tables_figures_and_files_have_the_unit_of_the_set_point(tmp_path):
+    plant = servo(HOBBY % POSITION, name="hobby")
+    units = smc.design.objective(plant, "pid").units
+    assert units == {"kp": "1", "ki": "1/s", "kd": "s", "tt": "s"}
+    trace = run(plant=plant, law="pid", x0=0.3, duration=0.5)
+    header = trace.export(tmp_path / "run.csv").read_text().splitlines()[0]
+    assert "u [rad]" in header
+    assert "force [N m]" in header
+    labels = [ax.get_ylabel() for ax in smc.figure(trace).axes]
+    assert "j u (rad)" in labels
+    assert "j delivered (N·m)" in labels
+    table = smc.study(
+        smc.grid(plant, [smc.law("pid")], "nominal", seeds=2, duration=0.1), tmp_path / "runs"
+    )
+    said = "u of 'j' of hobby is the set-point of its servo, in rad from its goal at 0."
+    assert said in str(smc.leaderboard(table, ["tv_rate"])).replace("\n", " ")
+
+
+def test_sizes_of_conditions_and_blows_follow_from_the_servo_s_force():
+    plant = servo(HOBBY % POSITION, name="hobby")
+    (friction,) = smc.grid(plant, [smc.law("pid")], "coulomb", duration=0.1)
+    assert friction.friction[0].level == pytest.approx(2.94 / 60.0)
+    assert friction.drive_train.forces == [2.94]
+    ideal = smc.plant_from(HOBBY % POSITION, {"j": smc.Channel(motor=True)}, name="hobby")
+    blows = [
+        MARGIN_KINDS["blow"].size(smc.Scenario(plant=one, law="pid", x0=0.3))
+        for one in (plant, ideal)
+    ]
+    assert blows[0] == pytest.approx(blows[1])
+
+
+def test_joints_with_a_servo_and_with_a_motor_are_not_tuned_together():
+    channels = {"a": smc.Channel(servo=True), "b": smc.Channel(motor=True)}
+    with pytest.raises(ScenarioError, match="commands in rad and N m"):
+        smc.design.objective(smc.plant_from(ARM, channels, keyframe="home"), "pid")
+
+
+def test_the_fast_engine_says_what_of_a_servo_it_cannot():
+    scenario = smc.Scenario(plant="duffing", law="pid", actuator=PositionServo(kp=9.0))
+    assert "an actuator other than" in why_not(scenario)
