@@ -127,7 +127,7 @@ def _svg(traces: Sequence, colours: Sequence[str]) -> bytes:
     """
     from matplotlib.figure import Figure
 
-    from smc_mujoco.draw import panels, style
+    from smc_mujoco.draw import lanes, panels, style
     from smc_mujoco.draw.decimate import end, finite
 
     traces = [finite(trace) for trace in traces]
@@ -135,11 +135,11 @@ def _svg(traces: Sequence, colours: Sequence[str]) -> bytes:
     for panel in (
         panel for quantity in ("x", "u") for panel in panels.over_groups(traces, quantity)
     ):
-        lanes = []
+        rows = []
         for trace, colour in zip(panel.traces, colours, strict=True):
-            lanes.append((panel._replace(traces=[trace]), [colour]))
-        if panel.quantity == "u" and panels.crowded(panel):
-            shown += lanes
+            rows.append((panel._replace(traces=[trace]), [colour]))
+        if panel.quantity == "u" and lanes.crowded(panel):
+            shown += rows
         else:
             shown += [(panel, colours)]
     with style.page():

@@ -13,9 +13,9 @@ from matplotlib.ticker import MaxNLocator
 from smc_mujoco.common.aliases import AnyPath, Data, Pair
 from smc_mujoco.common.errors import ScenarioError, find, items_of
 from smc_mujoco.control.source import by_words
+from smc_mujoco.draw import horizon, lanes, quantities, style
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
-from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.draw.page import Handle, Size
 from smc_mujoco.draw.panels import Panel
@@ -78,7 +78,7 @@ class DrawnRuns(NamedTuple):
             by_words(dict(zip(names, sources, strict=True))),
             events,
             style.marks(events),
-            (drawing.horizon(shown), end(shown)),
+            (horizon.horizon(shown), end(shown)),
         )
 
 
@@ -212,7 +212,7 @@ class Blocks(NamedTuple):
 
 def _blocks(runs: DrawnRuns, chosen: Sequence[str]) -> Blocks:
     """Return the chosen panels of traces."""
-    early = [drawing.until(trace, runs.span[0]) for trace in runs.traces]
+    early = [horizon.until(trace, runs.span[0]) for trace in runs.traces]
     left: list[Panel] = []
     right: list[Panel] = []
     left_out = ""
@@ -288,7 +288,7 @@ def _cells(
 
 def _height(panel: Panel) -> float:
     """Return the relative height of a panel over time."""
-    if not drawing.crowded(panel):
+    if not lanes.crowded(panel):
         return 1.0
     row = LINE_ROW if len(panel.group.channels) == 1 else LINES_ROW
     return max(1.0, row * len(panel.traces))
@@ -361,20 +361,20 @@ def _rows(
     panel: Panel,
     runs: DrawnRuns,
     share: Axes | None = None,
-) -> tuple[Axes, list[drawing.Row]]:
+) -> tuple[Axes, list[lanes.Row]]:
     """Return the axes that have the label of a panel, and its rows.
 
     A crowded panel has a row for each trace, with the trace's name in it. Others have one row.
     """
-    if not drawing.crowded(panel):
+    if not lanes.crowded(panel):
         ax = page.add_subplot(cell, sharex=share)
-        return ax, [drawing.Row(ax, panel, runs.colours)]
+        return ax, [lanes.Row(ax, panel, runs.colours)]
     frame = page.add_subplot(cell, frameon=False, xticks=[])
     size = style.points(8.5)
     room = 72 * cell.get_position(page).width * page.bbox.width / page.dpi - 4.0 * size
     look = {"fontsize": size, "edgecolor": "none", "borderaxespad": 0.2, "borderpad": 0.0}
     look |= {"loc": "upper right", "frameon": True, "framealpha": 0.75}
-    rows = drawing.rows(frame, panel, runs.colours, share=share)
+    rows = lanes.rows(frame, panel, runs.colours, share=share)
     for row, name in zip(rows, runs.names, strict=True):
         key = row.axes.legend(handles=[pages.entry(".", row.colours[0])], handlelength=1.0, **look)
         key.get_texts()[0].set_text(style.cropped(name, room, size))
@@ -383,7 +383,7 @@ def _rows(
     return frame, rows
 
 
-def _equal_ranges(frame: Axes, rows: Sequence[drawing.Row]) -> None:
+def _equal_ranges(frame: Axes, rows: Sequence[lanes.Row]) -> None:
     """Give several rows of a panel the range of the runs that last, and ticks near its ends: of u,
     at its bounds.
     """
@@ -442,7 +442,7 @@ def _draw_beside(
         else:
             panel = places[0]._replace(quantity="settling")
             drawing.over_time(ax, panel, runs.colours, names=runs.names)
-            width = 1e3 * drawing.peak_window(panel.traces)
+            width = 1e3 * quantities.peak_window(panel.traces)
             words = f"time (s)\nthe largest in the last {width:.3g} ms"
             ax.set(xlabel=words, ylabel=panel.label, xlim=(0.0, runs.span[1]))
 

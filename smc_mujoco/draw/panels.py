@@ -9,7 +9,7 @@ pixels.
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -20,18 +20,24 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from smc_mujoco.common.aliases import Array, ArrayPair, Data, Fields, Pair
-from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
+from smc_mujoco.draw.coincidence import agreements, tell_agreements
 from smc_mujoco.draw.decimate import COLUMNS, band, end, line, smooth, window
+from smc_mujoco.draw.quantities import (
+    LASTING_QUANTILE,
+    PEAKS,
+    QUANTITIES,
+    limits,
+    span,
+)
 from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.metrics.conventions import (
     ChannelGroup,
     group_trace,
-    last_exit,
     scale,
     settling_band,
 )
-from smc_mujoco.metrics.tip import contacts, knows_contacts, tip_error
+from smc_mujoco.metrics.tip import knows_contacts
 from smc_mujoco.simulation.trace import Trace
 
 LAST_SAMPLES = 60  # control samples in the close-up of u
@@ -39,31 +45,10 @@ LAST_SAMPLES = 60  # control samples in the close-up of u
 MIN_CLOSE_UP = 0.02
 # of a network, drawn one by one: of more, evenly chosen ones and the extreme ones
 MAX_DRAWN_CHANNELS = 40
-# of |reaction|, or of what an arrow shows: values above it are short peaks; chosen
-LASTING_QUANTILE = 0.98
 LEAST_LASTING = 0.02  # of the peaks: an axis that holds these shows smaller lasting values, too
-MIN_WORDS = 4.0  # of a panel's height, in heights of letters, from which on it has room for words
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
 SLOWEST_LINE = 2.4  # points, width of the channel whose x comes to its reference last
-# of a panel's height, below the width of a line: curves no farther apart agree
-COINCIDENT_DISTANCE = 0.01
-# of agreeing curves' samples, so that controls that switch a sample apart agree; chosen
-COINCIDENT_SHARE = 0.99
-# of the largest value of two curves: they do not agree if their peaks are farther apart
-PEAK_DISTANCE = 0.02
-MIN_PEAK = 0.1  # of the distance of curves that coincide: peaks closer than it are equal
-PEAK_TIME = 0.01  # of a run: peaks are compared within so much time before and after; chosen
-# of a run: nothing is said of curves that all agree for less; chosen
-MIN_AGREEMENT = 0.15
-MIN_WIDE_BAND = 0.2  # mean height of a wide band, of a panel's; chosen
-MAX_BANDS = 1  # that share a row; chosen
 VISIBLE_CHATTERING = 0.01  # of a panel's height: chattering that is smaller needs no words; chosen
-REST_BAND = 0.02  # of a panel's height: an x that stays within it rests; chosen
-# panels show ZOOM times the time until all rest, if that is less than this part of a run
-ZOOM = 1.3
-MAX_ZOOMED = 0.5
-MIN_ERROR = 1e-9  # smaller errors are drawn at it; chosen
-MIN_RATIO = 4.0  # least ratio of a logarithmic axis, without its margin; chosen
 QUANTITY_OF_UNIT = {  # quantity -> another one of the same unit
     **dict.fromkeys(("spread", "e", "settling"), "x"),
     "de": "v",
@@ -85,57 +70,10 @@ WHOLE_LABELS = {  # quantity, one number a sample -> what an axis says
     "settling": "|x − r|",
     "largest": "largest |u|",
 }
-PEAKS = ("settling", "tip")  # drawn as `peaks`, on a logarithmic axis
 SINGLE = ("spread", *WHOLE_LABELS)  # one number a sample, whatever the number of channels
 UNBANDED = ("x", "e", *SINGLE)  # drawn sample by sample, without a mean over time
-# of a run whose plant diverged: its first part sets a panel's range if no run lasts; chosen
-UNDIVERGED_SHARE = 0.8
-MARGIN = 0.08  # of a panel's height, above and below its curves
-# of the largest value: a quantity that varies less is drawn as a constant, without its round-off
-MIN_VARIATION = 1e-3
-LANE_BAND = 0.45  # opacity of a band in a row of its own, below a film
-LANE_GAP = 0.25  # letters between a row, and how far u swings
-END_SHARE = 0.1  # of the run: its end, over which a row says how far u swings
-MAX_SWITCHES = 20  # of a u that shares its axes with others
-SMOOTH_SHARE = 0.02  # of a panel's range: a swing below it is none
-ROW_FILLED = 0.82  # part of a trace's row that its axes fill
 DASHES = (0, (4, 4))  # of a reference's line
 REFERENCE = "reference"  # id of a reference's lines
-
-
-def off_path(trace: Trace) -> Array:
-    """Return how far an arm's tip is off its path, (K+1, 1) mm."""
-    return peaks(1e3 * tip_error(trace), trace)
-
-
-def contact_force(trace: Trace) -> Array:
-    """Return the force of a contact of an arm's tip, (K+1, 1) N."""
-    return contacts(trace).force[:, None]
-
-
-def share_of_limit(trace: Trace) -> Array:
-    """Return the largest |u| of a joint, as a share of its limit, (K+1, 1) %."""
-    return 100.0 * (np.abs(trace.applied) / trace.scenario.limits).max(axis=1, keepdims=True)
-
-
-QUANTITIES: dict[str, Callable[[Trace], Array]] = {  # name -> (K+1, n)
-    "x": lambda trace: trace.x,
-    "e": lambda trace: trace.x - trace.r,
-    "v": lambda trace: trace.v,
-    "de": lambda trace: trace.v - np.gradient(trace.r, trace.t, axis=0),
-    "u": lambda trace: trace.u,
-    "applied": lambda trace: trace.applied,
-    "d": lambda trace: trace.d,
-    "s": lambda trace: trace.s,
-    "force": lambda trace: trace.force,
-    "reaction": lambda trace: trace.reaction,
-    "spread": lambda trace: np.ptp(trace.x, axis=1, keepdims=True),
-    "tip": off_path,
-    "contact": contact_force,
-    "load": share_of_limit,
-    "settling": lambda trace: peaks(np.abs(trace.x - trace.r).max(axis=1), trace),
-    "largest": lambda trace: np.abs(trace.u).max(axis=1, keepdims=True),
-}
 
 
 class Panel(NamedTuple):
@@ -194,14 +132,6 @@ class Panel(NamedTuple):
         if not group.driven:
             kind = f"free {kind}"
         return f"{KINDS.get(name, kind)} {letter}{unit}"
-
-
-class Row(NamedTuple):
-    """Axes, the panel that they show, and the colours of its traces."""
-
-    axes: Axes
-    panel: Panel
-    colours: Sequence[str]
 
 
 def slides(trace: Trace) -> bool:
@@ -390,64 +320,6 @@ def mean_window(traces: Sequence[Trace]) -> float:
     return longest
 
 
-def peaks(y: Array, trace: Trace) -> Array:
-    """Return the largest of y (K+1,) within a window before each sample, the first window as a
-    whole, (K+1, 1), or MIN_ERROR if that is more.
-    """
-    from scipy.ndimage import maximum_filter1d
-
-    width = window(trace)
-    largest = maximum_filter1d(y, width, mode="nearest", origin=(width - 1) // 2)
-    largest[:width] = y[:width].max()
-    return np.maximum(largest, MIN_ERROR)[:, None]
-
-
-def peak_window(traces: Sequence[Trace]) -> float:
-    """Return the longest time over which `peaks` are taken, s."""
-    return max(window(trace) * trace.scenario.control_period for trace in traces)
-
-
-def horizon(traces: Sequence[Trace]) -> float:
-    """Return the time that panels of x, u and s show, s: the whole run, or the first part if all
-    rest after it.
-
-    Nothing changes or disturbs the plant after that part, and no reference moves.
-    """
-    whole = end(traces)
-    last = 0.0
-    for group, parts in style.split(traces).items():
-        low, high = span(parts, "x")
-        for trace in parts:
-            moved = np.abs(trace.x - trace.x[-1]).max(axis=1) > REST_BAND * (high - low)
-            acted = (trace.d != 0.0).any(axis=1) | (trace.r != trace.r[-1]).any(axis=1)
-            times = trace.t[moved | (acted & group.driven)]
-            last = max(last, *times[-1:], trace.diverged_at or 0.0)
-            if trace.scenario.jump:
-                last = max(last, trace.scenario.jump.time)
-            if trace.scenario.fault:
-                last = max(last, trace.scenario.fault.at)
-    if 0.0 < ZOOM * last < MAX_ZOOMED * whole:
-        return ZOOM * last
-    return whole
-
-
-def until(trace: Trace, time: float) -> Trace:
-    """Return the trace up to a time, s, with two samples at least."""
-    count = max(2, int(np.searchsorted(trace.t, time + 1e-9)))
-    part = {name: array[:count] for name, array in trace.arrays().items()}
-    return dataclasses.replace(trace, **part)
-
-
-def since(trace: Trace, time: float) -> Trace:
-    """Return the trace from a time on, s, as a run of its own, which is not smoothed."""
-    first = min(int(np.searchsorted(trace.t, time - 1e-9)), len(trace.t) - 2)
-    part = {name: array[first:] for name, array in trace.arrays().items()}
-    part["t"] = part["t"] - part["t"][0]
-    calm = {"duration": float(part["t"][-1]), "jump": None, "fault": None}
-    scenario = dataclasses.replace(trace.scenario, **calm)
-    return dataclasses.replace(trace, scenario=scenario, **part)
-
-
 def over_time(
     ax: Axes,
     panel: Panel,
@@ -469,15 +341,7 @@ def over_time(
     means = [QUANTITIES[name](trace).mean(axis=1) for trace in traces]
     heights = limits(traces, name)
     if name in PEAKS:
-        ax.set_yscale("log")
-        first, last = np.log10(heights)
-        if math.floor(last) > math.ceil(first):
-            ax.yaxis.set_minor_formatter(NullFormatter())
-        else:  # with fewer than two decades, numbers between them
-            ax.yaxis.set_minor_locator(LogLocator(subs=(3.0,)))
-            numbers = FuncFormatter(lambda value, _: style.short(value))
-            ax.yaxis.set_major_formatter(numbers)
-            ax.yaxis.set_minor_formatter(numbers)
+        set_logarithmic(ax, heights)
     ax.set_ylim(limits(among or traces, name))
     set_numbers(ax.yaxis, panel._replace(traces=among or traces))
     if name == "reaction":
@@ -504,6 +368,20 @@ def over_time(
         lines = [(trace.t, y) for trace, y in zip(traces, means, strict=True)]
         tell_agreements(ax, agreements(lines, heights, name in PEAKS), names)
     return artists
+
+
+def set_logarithmic(ax: Axes, heights: Pair) -> None:
+    """Make the vertical axis logarithmic, for values in this range."""
+    ax.set_yscale("log")
+    first, last = np.log10(heights)
+    if math.floor(last) > math.ceil(first):
+        ax.yaxis.set_minor_formatter(NullFormatter())
+        return
+    # with fewer than two decades, numbers between them
+    ax.yaxis.set_minor_locator(LogLocator(subs=(3.0,)))
+    numbers = FuncFormatter(lambda value, _: style.short(value))
+    ax.yaxis.set_major_formatter(numbers)
+    ax.yaxis.set_minor_formatter(numbers)
 
 
 def steps(trace: Trace, name: str) -> str:
@@ -535,96 +413,6 @@ def set_numbers(axis: Axis, panel: Panel) -> None:
 def cross() -> Fields:
     """Return the look of the mark at the end of a failed run."""
     return {"ms": style.points(9), "mec": "white", "mew": style.points(1)}
-
-
-Line = tuple[np.ndarray, np.ndarray]  # times and values
-Agreement = tuple[list[int], float]  # of these lines, until a time, s; inf where they never part
-
-
-def agreements(lines: Sequence[Line], limits: Pair, logarithmic: bool = False) -> list[Agreement]:
-    """Return until when all lines agree in a panel of these limits, and which of them never
-    part.
-    """
-    if len(lines) < 2:
-        return []
-    last = max(float(t[-1]) for t, _ in lines)
-    until = [[_parting(one, other, limits, logarithmic) for other in lines] for one in lines]
-    found = []
-    left = list(range(len(lines)))
-    if MIN_AGREEMENT * last <= min(until[0]) < last:
-        found.append((left, min(until[0])))
-    while left:
-        group = [i for i in left if until[left[0]][i] >= last]
-        left = [i for i in left[1:] if i not in group]
-        if len(group) > 1:
-            found.append((group, np.inf))
-    return found
-
-
-def _parting(one: Line, other: Line, limits: Pair, logarithmic: bool) -> float:
-    """Return until when, s, two lines coincide in a panel, but for a small share of their points,
-    and have equal peaks, upwards and downwards.
-    """
-    from scipy.ndimage import maximum_filter1d
-
-    t = one[0][one[0] <= other[0][-1] + 1e-9]
-    y = np.stack([one[1][: len(t)], np.interp(t, *other)])
-    drawn = y
-    sides = limits
-    if logarithmic:
-        drawn = np.log10(y)
-        sides = np.log10(limits)
-    apart = COINCIDENT_DISTANCE * float(np.ptp(sides))
-    highest = PEAK_DISTANCE * float(np.abs(y).max())
-    if not logarithmic:
-        highest = min(max(highest, MIN_PEAK * apart), apart)
-    window = 2 * math.ceil(PEAK_TIME * len(one[0])) + 1
-    held = np.ones(len(t), bool)
-    high = maximum_filter1d(y, window, mode="nearest")
-    low = maximum_filter1d(-y, window, mode="nearest")
-    for pair, room in ((drawn, apart), (high, highest), (low, highest)):
-        near = np.abs(pair[0] - pair[1]) <= room
-        held &= near & (np.cumsum(near) / np.arange(1, len(t) + 1) >= COINCIDENT_SHARE)
-    return float(t[held].max(initial=-np.inf))
-
-
-def tell_agreements(ax: Axes, shared: Sequence[Agreement], names: Sequence[str]) -> None:
-    """Write which traces agree, and until when, above the curves, on up to two lines: the range of
-    the axes grows by the height of the words.
-    """
-    size = style.points(9.0)
-    height = 72 * ax.get_window_extent().height / ax.figure.dpi  # points
-    room = 72 * ax.get_window_extent().width / ax.figure.dpi - size
-    forever = [one for one in shared if one[1] == np.inf]
-    for said in [agreement_words(which, names) for which in (shared, forever)]:
-        words = style.wrapped(said, room, size, 2)
-        lines = 1 + words.count("\n")
-        if words and "…" not in words and height >= MIN_WORDS * size * lines:
-            break
-    else:
-        return
-    free = 1.0 - (0.6 + 1.2 * lines) * size / height
-    axis = ax.yaxis.get_transform()
-    low, high = axis.transform(np.array(ax.get_ylim()))
-    ax.set_ylim(top=float(axis.inverted().transform(np.array([low + (high - low) / free]))[0]))
-    place = {"xytext": (-0.5 * size, -0.4 * size), "textcoords": "offset points"}
-    look: Fields = {"ha": "right", "va": "top", "fontsize": size, "in_layout": False}
-    look["bbox"] = {"fc": style.PAPER, "ec": "none", "pad": 0.1 * size}  # hides lines of times
-    ax.annotate(words, (1.0, 1.0), xycoords="axes fraction", parse_math=False, **place, **look)
-
-
-def agreement_words(shared: Sequence[Agreement], names: Sequence[str]) -> str:
-    """Return which traces agree, by their names, and until when."""
-    parts = []
-    for who, stop in shared:
-        words = joined([names[i] for i in who])
-        if len(who) == len(names):
-            words = "all" if len(who) > 2 else "both"
-        words += " agree"
-        if stop < np.inf:
-            words += f" until {stop:.3g} s"
-        parts.append(words)
-    return "; ".join(parts)
 
 
 def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
@@ -774,134 +562,11 @@ def last_samples(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
     ax.set_xlim(1e3 * (begin - stop), 0.0)
 
 
-def rows(
-    frame: Axes,
-    panel: Panel,
-    colours: Sequence[str],
-    wide: float = 1.0,
-    share: Axes | None = None,
-) -> list[Row]:
-    """Return a row for each trace of a panel, from above, within a share of the width of its
-    axes.
-    """
-    pitch = 1.0 / len(panel.traces)
-    found = []
-    for i, (trace, colour) in enumerate(zip(panel.traces, colours, strict=True), 1):
-        place = (0.0, 1.0 - i * pitch, wide, ROW_FILLED * pitch)
-        ax = frame.inset_axes(place, sharex=share)
-        found.append(Row(ax, panel._replace(traces=[trace]), [colour]))
-        share = ax
-    return found
-
-
 def dot(ax: Axes, colour: str) -> Line2D:
     """Add to axes the dot of a run."""
     look: Fields = {"mec": style.PAPER, "mew": style.points(0.6), "ms": style.points(5.0)}
     (found,) = ax.plot([], [], "o", color=colour, zorder=6, clip_on=False, animated=True, **look)
     return found
-
-
-def below_film(
-    ax: Axes,
-    panel: Panel,
-    colours: Sequence[str],
-    names: Sequence[str],
-    changes: Mapping[float, str],
-) -> tuple[list[Row], list[Artist]]:
-    """Draw a panel below a film, whose time axis is set, and return its rows, one a run where they
-    would hide each other, and the artists of the runs.
-    """
-    found = [Row(ax, panel, colours)]
-    laned = in_lanes(panel)
-    if laned:
-        letters = style.points(float(style.RC["font.size"]))
-        room = 72 * ax.get_window_extent().width / ax.figure.dpi
-        found = rows(ax, panel, colours, 1.0 - (style.width("smooth", letters) + 2.0) / room)
-        for row in found:
-            row.axes.set(xlim=ax.get_xlim(), xticks=ax.get_xticks())
-            row.axes.set_xticklabels(ax.get_xticklabels())
-            row.axes.tick_params(length=0, labelbottom=row is found[-1], labelleft=False)
-        ax.set_axis_off()
-    drawn: list[Artist] = []
-    for row in found:
-        mark(row.axes, changes, named=False)
-        bands = laned or not crowded(panel)
-        drawn += over_time(row.axes, row.panel, row.colours, panel.traces, bands, names)
-        drawn += settled(row.axes, row.panel, row.colours)
-        if laned:
-            tell_swing(row.axes, row.panel.traces[0], row.colours[0])
-    return found, drawn
-
-
-def in_lanes(panel: Panel) -> bool:
-    """Return whether each law's u has its own row, because a wide band would hide the others, or
-    one that switches often.
-    """
-    if panel.quantity != "u" or len(panel.traces) < 2:
-        return False
-    least = MIN_WIDE_BAND * np.ptp(limits(panel.traces, "u"))
-    switches = [np.sum(np.abs(np.diff(trace.u, axis=0)) > least) for trace in panel.traces]
-    return max(switches) > MAX_SWITCHES or crowded(panel, 0)
-
-
-def settled(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Artist]:
-    """Mark when each run's x has settled for good, where it does after the start, and return the
-    marks.
-    """
-    marks: list[Artist] = []
-    if panel.quantity != "x":
-        return marks
-    look: Fields = {"ms": style.points(6), "mec": style.PAPER, "mew": style.points(0.5)}
-    for trace, colour in zip(panel.traces, colours, strict=True):
-        error = np.abs(trace.x - trace.r).max(axis=1)
-        time = last_exit(trace.t, error, settling_band(trace.scenario, scale(trace)))
-        if trace.diverged_at is None and 0.0 < time < min(trace.t[-1], ax.get_xlim()[1]):
-            y = float(np.interp(time, trace.t, trace.x.mean(axis=1)))
-            marks += ax.plot(time, y, "v", color=colour, zorder=6, clip_on=False, **look)
-    return marks
-
-
-def tell_swing(lane: Axes, trace: Trace, colour: str) -> None:
-    """Say beside a row how far u swings at the end of the run, with a bar; "smooth" if it does
-    not.
-    """
-    low, high = lane.get_ylim()
-    for swings in lane.collections:
-        swings.set_alpha(LANE_BAND)
-    u = trace.u[-max(2, round(END_SHARE * len(trace.t))) :]
-    u = u[np.isfinite(u)]
-    least = float(u.min(initial=np.inf))
-    most = float(u.max(initial=-np.inf))
-    swing = 0.5 * (most - least)
-    if trace.diverged_at is not None:
-        words = "fails"
-    elif swing > SMOOTH_SHARE * (high - low):
-        words = f"±{swing:.2g}"
-        ends = lane.transLimits.transform([(0.0, least), (0.0, most)])[:, 1]
-        look: Fields = {"color": colour, "lw": style.points(3), "clip_on": False}
-        lane.plot([1.012, 1.012], ends, transform=lane.transAxes, **look)
-    else:
-        words = "smooth"
-    size = style.points(style.RC["font.size"])
-    place: Fields = {"xytext": (LANE_GAP * size, 0.0), "textcoords": "offset points"}
-    look: Fields = {"va": "center", "fontsize": size, "color": style.INK}
-    lane.annotate(words, (1.0, 0.5), xycoords="axes fraction", **place, **look)
-
-
-def crowded(panel: Panel, allowed: int = MAX_BANDS) -> bool:
-    """Return whether each trace needs a row: it has several channels, or more than `allowed` bands
-    of u are wide.
-    """
-    if len(panel.group.channels) > 1 and panel.quantity not in SINGLE:
-        return len(panel.traces) > 1
-    if panel.quantity != "u":
-        return False
-    low, high = limits(panel.traces, "u")
-    wide = 0
-    for trace in panel.traces:
-        _, least, most = band(trace.t, trace.u)
-        wide += float(np.mean(most - least)) > MIN_WIDE_BAND * (high - low)
-    return wide > allowed
 
 
 def drawn_channels(y: Array) -> list[int]:
@@ -915,56 +580,3 @@ def drawn_channels(y: Array) -> list[int]:
         return list(range(n))
     chosen = np.linspace(0, n - 1, MAX_DRAWN_CHANNELS).round().astype(int)
     return sorted({*chosen.tolist(), int(np.nanargmin(y)) % n, int(np.nanargmax(y)) % n})
-
-
-def lasting(traces: Sequence[Trace], name: str) -> list[Array]:
-    """Return the values of successful runs; if there are none, of failed ones without their
-    ends.
-    """
-    values = [QUANTITIES[name](trace) for trace in traces if trace.diverged_at is None]
-    if not values:
-        for trace in traces:
-            y = QUANTITIES[name](trace)
-            share = UNDIVERGED_SHARE if trace.plant_diverged else 1.0
-            values.append(y[: max(1, int(share * len(y)))])
-    return [y for y in values if np.isfinite(y).all()]
-
-
-def span(traces: Sequence[Trace], name: str) -> Pair:
-    """Return the least and largest value of the runs that last."""
-    values = np.concatenate([np.ravel(y) for y in lasting(traces, name)] or [np.zeros(1)])
-    return float(values.min()), float(values.max())
-
-
-def usual(traces: Sequence[Trace], name: str) -> float:
-    """Return the largest magnitude of a quantity in runs that last, without brief values of over
-    twice it.
-
-    A brief value takes at most 1 - LASTING_QUANTILE of the time.
-    """
-    peak = max(map(abs, span(traces, name)))
-    largest = 0.0
-    for y in lasting(traces, name):
-        largest = max(largest, float(np.quantile(np.abs(y), LASTING_QUANTILE, axis=0).max()))
-    return largest if peak > 2.0 * largest else peak
-
-
-def limits(traces: Sequence[Trace], name: str) -> Pair:
-    """Return the vertical range for a quantity: its span with the reference (zero for an error),
-    and a margin.
-    """
-    low, high = span(traces, name)
-    if name == "x":
-        r = np.concatenate([trace.r[np.isfinite(trace.r)] for trace in traces])
-        low = min(low, r.min(initial=low))
-        high = max(high, r.max(initial=high))
-    if name == "e":
-        low, high = min(low, 0.0), max(high, 0.0)
-    if name in PEAKS:
-        high = max(high, MIN_RATIO * MIN_ERROR)
-        return min(max(low, MIN_ERROR), high / MIN_RATIO) / 1.5, high * 1.5
-    size = max(abs(low), abs(high))
-    air = MARGIN * (high - low)
-    if high - low <= MIN_VARIATION * size:
-        air = size / 2 or 1.0
-    return low - air, high + air

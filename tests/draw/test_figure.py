@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 import smc_mujoco as smc
-from smc_mujoco.draw import decimate, panels
+from smc_mujoco.draw import decimate, panels, quantities
 from smc_mujoco.draw import figure as draw_figure
 from smc_mujoco.draw.page import FORMATS, files, write
 from smc_mujoco.metrics.conventions import groups
@@ -90,7 +90,7 @@ def test_a_run_that_fails_at_once_is_an_x_where_it_started(tmp_path):
     cut = decimate.finite(gone)
     assert cut.x.tolist() == [list(gone.scenario.resolved.x0)]
     assert np.isnan(cut.u).all()
-    low, high = panels.limits([cut], "x")
+    low, high = quantities.limits([cut], "x")
     assert low < min(gone.scenario.resolved.x0) <= max(gone.scenario.resolved.x0) < high
 
 
@@ -240,7 +240,7 @@ def test_the_close_up_shows_no_round_off(pair, level):
         run = dataclasses.replace(pair[0], u=u)
         panels.last_samples(ax, shown._replace(traces=[run]), ["#000000"])
         low, high = ax.get_ylim()
-        assert high - low >= 0.0199 * np.abs(u).max() <= np.ptp(panels.limits([run], "u"))
+        assert high - low >= 0.0199 * np.abs(u).max() <= np.ptp(quantities.limits([run], "u"))
         assert (low + high) / 2 == pytest.approx(level, abs=1e-6)
     full = Figure().subplots()
     switching = dataclasses.replace(pair[0], u=np.sign(held - level))

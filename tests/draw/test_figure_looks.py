@@ -15,8 +15,8 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 import smc_mujoco as smc
+from smc_mujoco.draw import coincidence, horizon, panels, quantities, style
 from smc_mujoco.draw import page as pages
-from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.figure import figure
 
 PAGE = "ieee-page"
@@ -184,10 +184,10 @@ def test_a_run_that_fails_does_not_set_the_range_of_the_rows_of_others(one):
     lost = failed(dataclasses.replace(under(one, "pid", 1.0), u=1e4 * one.u), 400)
     over_time, end = figure([*three, lost], panels=["u", "end"]).axes
     assert len(rows(over_time)) == 4
-    assert {row.get_ylim() for row in rows(over_time)} == {panels.limits(three, "u")}
+    assert {row.get_ylim() for row in rows(over_time)} == {quantities.limits(three, "u")}
     (cross,) = [line for row in rows(over_time) for line in row.lines if line.get_marker() == "X"]
     # at the edge of the range: it lies far outside
-    assert cross.get_ydata()[0] in panels.limits(three, "u")
+    assert cross.get_ydata()[0] in quantities.limits(three, "u")
     assert end.get_ylim()[1] < 0.0
     (alone,) = figure([lost], panels=["end"]).axes
     assert [text.get_text() for text in alone.texts] == ["the run failed"]
@@ -255,7 +255,9 @@ def test_words_above_the_curves_tell_which_agree_and_until_when(one):
         (one.t, np.where(one.t < 0.9 * one.t[-1], 0.0, 1.0)),
         (one.t, np.where(one.t < 0.1, 0.0, -1.0)),
     ]
-    assert panels.agreements(brief, (0.0, 1.0)) == [], "for a short time alone, or not to the end"
+    assert coincidence.agreements(brief, (0.0, 1.0)) == [], (
+        "for a short time alone, or not to the end"
+    )
 
 
 def test_controls_of_which_one_chatters_do_not_agree(one):
@@ -284,7 +286,7 @@ def test_panels_over_time_end_where_all_rest_and_never_before_something_happens(
     still = dataclasses.replace(
         one, x=np.where(np.arange(len(one.t)) < at, 1.0, 0.01)[:, None], d=0.0 * one.d
     )
-    assert panels.horizon([still]) == pytest.approx(1.3 * one.t[at - 1])
+    assert horizon.horizon([still]) == pytest.approx(1.3 * one.t[at - 1])
     whole = one.t[-1]
     late = np.where(np.arange(len(one.t)) < 0.9 * len(one.t), 0.0, 1.0)[:, None]
     jump = dataclasses.replace(one.scenario, jump=smc.Jump(0.9 * whole, {"mass": 2.0}))
@@ -294,9 +296,11 @@ def test_panels_over_time_end_where_all_rest_and_never_before_something_happens(
         {"r": late},
         {"scenario": jump},
     ):
-        assert panels.horizon([still, dataclasses.replace(still, **change)]) == pytest.approx(whole)
+        assert horizon.horizon([still, dataclasses.replace(still, **change)]) == pytest.approx(
+            whole
+        )
     lost = failed(under(still, "pid", 0.5), int(0.9 * len(one.t)))
-    assert panels.horizon([still, lost]) == pytest.approx(whole)
+    assert horizon.horizon([still, lost]) == pytest.approx(whole)
     over_time, settling = figure([still], panels=["x", "settling"]).axes
     assert over_time.get_xlim()[1] == pytest.approx(1.3 * one.t[at - 1])
     assert settling.get_xlim()[1] == pytest.approx(whole)
@@ -306,14 +310,14 @@ def test_the_error_is_the_largest_within_its_window_on_a_logarithmic_axis(one):
     ax = figure([one], panels=["settling"]).axes[0]
     assert ax.get_yscale() == "log"
     t, y = curves(ax)[0].get_data()
-    width = panels.peak_window([one])
+    width = quantities.peak_window([one])
     e = np.abs(one.x - one.r)[:, 0]
     for time, value in zip(t[::17], y[::17], strict=True):
         ago = time - one.t
         past = ago >= -1e-9
         assert value <= e[past & (ago <= width) | (one.t <= width)].max() + 1e-12
         recent = past & (ago <= width - 2 * one.scenario.control_period)
-        assert value >= e[recent].max(initial=panels.MIN_ERROR)
+        assert value >= e[recent].max(initial=quantities.MIN_ERROR)
 
 
 def test_a_figure_is_returned_in_any_size_and_written_where_asked(one, tmp_path):

@@ -18,7 +18,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFilter
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.draw import panels, style
+from smc_mujoco.draw import quantities, style
 from smc_mujoco.draw.decimate import Envelope, windows
 from smc_mujoco.draw.film import world
 from smc_mujoco.mechanisms.plant import EFFORT, Plant, catalogue
@@ -180,7 +180,7 @@ def scales(traces: Sequence[Trace]) -> dict[ChannelGroup, Scale]:
             found[group] = Scale(0.0, push)
             lasting.append(push)
             continue
-        reaction = max(map(abs, panels.span(parts, "reaction")))
+        reaction = max(map(abs, quantities.span(parts, "reaction")))
         if not group.driven and traces[0].scenario.plant.base >= 0:
             reaction = 0.0  # the floor's, which bears the machine
         brief.append(reaction)
@@ -189,13 +189,13 @@ def scales(traces: Sequence[Trace]) -> dict[ChannelGroup, Scale]:
             continue
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
         drive = same and any(part.drives for trace in traces for part in trace.scenario.actuator)
-        control = panels.usual(parts, "applied")
+        control = quantities.usual(parts, "applied")
         if drive:
-            control = max(control, panels.usual(parts, "force"))
-        push = max(map(abs, panels.span(parts, "d")))
+            control = max(control, quantities.usual(parts, "force"))
+        push = max(map(abs, quantities.span(parts, "d")))
         brief.append(push)
         if same:
-            lasting += [control, panels.usual(parts, "d")]
+            lasting += [control, quantities.usual(parts, "d")]
         found[group] = Scale(control, push, reaction, drive, full=0.0 if same else control)
     longest = max(lasting) or max(brief)
     scaled = {}

@@ -24,7 +24,7 @@ from smc_mujoco.common.aliases import AnyPath, Array, Pair
 from smc_mujoco.common.errors import ScenarioError, items_of, number
 from smc_mujoco.common.files import replacing, with_ending
 from smc_mujoco.common.progress import Bar, bar
-from smc_mujoco.draw import panels, style
+from smc_mujoco.draw import horizon, style
 from smc_mujoco.draw.decimate import end
 from smc_mujoco.draw.figure import DrawnRuns
 from smc_mujoco.draw.film import arrows, camera, pace
@@ -305,7 +305,7 @@ def pictures(frames: Frames) -> Generator[Array]:
         yield from drawn(clock, stages, overlays, sheet)
         if close := clock.close:
             start = float(close.times[0])
-            last = runs._replace(traces=[panels.since(trace, start) for trace in runs.traces])
+            last = runs._replace(traces=[horizon.since(trace, start) for trace in runs.traces])
             last = last._replace(span=(end(last.traces), end(last.traces)))
             said = [f"last periods, deflections × {close.factor:g}"]
             sheet = Sheet(last, size, placed.tiles, placed.labels, frames.title, said, start)

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.draw import panels, style
+from smc_mujoco.draw import panels, quantities, style
 from smc_mujoco.simulation.trace import Trace
 
 PAST_LINE = 2.2  # points, width of a path that is flown
@@ -44,11 +44,11 @@ def draw_map(
     across, along = np.array(["x", "y", "z"])[axes]
     ax.set_title(f"{along} over {across} (m)", fontweight="normal")
     goals = [trace.r for trace in panel.traces]
-    seen = np.concatenate([*panels.lasting(panel.traces, "x"), *goals])
+    seen = np.concatenate([*quantities.lasting(panel.traces, "x"), *goals])
     low = seen[:, axes].min(axis=0)
     high = seen[:, axes].max(axis=0)
     sides = np.array(ax.get_window_extent().size)
-    half = (0.5 + panels.MARGIN) * ((high - low) / sides).max() * sides
+    half = (0.5 + quantities.MARGIN) * ((high - low) / sides).max() * sides
     ends = np.transpose((low + high) / 2 + np.array([-half, half]))
     ax.set(xlim=ends[0], ylim=ends[1])
     artists: list[Artist] = []

@@ -22,12 +22,12 @@ from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 
 from smc_mujoco.common.aliases import Array
+from smc_mujoco.draw import lanes, panels, style
 from smc_mujoco.draw import page as pages
-from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.figure import DrawnRuns
 from smc_mujoco.draw.film import flight
 from smc_mujoco.draw.film.camera import Room
-from smc_mujoco.draw.panels import Row
+from smc_mujoco.draw.lanes import Row
 from smc_mujoco.draw.states import State
 
 # Numbers of presentation here are chosen. The letters of a page of this width, those of a journal's
@@ -218,7 +218,7 @@ class Sheet:
                 words = style.cropped(panel.label, room, high)
                 ax.set_title(words, fontweight="normal", parse_math=False)
                 self.set_time(ax)
-                rows, drawn = panels.below_film(
+                rows, drawn = lanes.below_film(
                     ax, panel, self.runs.colours, self.runs.names, self.runs.marks
                 )
                 moving += list(map(set_moving, rows))

@@ -118,7 +118,8 @@ def test_a_torque_s_arrow_points_to_where_it_moves_the_pendulum():
 
     def column(picture):
         """Return the mean column of what differs from the pendulum upright, from the middle."""
-        return np.nonzero(np.abs(picture.astype(int) - upright).max(axis=2) > 60)[1].mean() - 320
+        columns = np.nonzero(np.abs(picture.astype(int) - upright).max(axis=2) > 60)[1]
+        return columns.mean() - 0.5 * picture.shape[1]
 
     with staged(trace, (640, 360)) as scene:
         scene.arrange(np.array([0.0]))

@@ -12,7 +12,7 @@ from helpers.sketch import made
 
 import smc_mujoco as smc
 from smc_mujoco.draw import style
-from smc_mujoco.draw.panels import horizon
+from smc_mujoco.draw.horizon import horizon
 
 LAWS = ("classical", "pid")
 SIZE = (1280, 720)

@@ -12,7 +12,7 @@ from helpers.runs import at_defaults
 from helpers.sketch import made
 
 import smc_mujoco as smc
-from smc_mujoco.draw import panels, style
+from smc_mujoco.draw import lanes, panels, style
 
 SIZE = (1280, 720)
 LAWS = ("observer_free", "classical", "adaptive")
@@ -28,8 +28,8 @@ def swinging(law, amplitude):
 @pytest.fixture
 def drawn(monkeypatch):
     said = []
-    plain = panels.tell_swing
-    monkeypatch.setattr(panels, "tell_swing", lambda *row: (plain(*row), said.append(row)))
+    plain = lanes.tell_swing
+    monkeypatch.setattr(lanes, "tell_swing", lambda *row: (plain(*row), said.append(row)))
     traces = []
     for law, amplitude in zip(LAWS, (0.0, 2.0, 6.0), strict=True):
         traces.append(swinging(law, amplitude))
@@ -57,8 +57,8 @@ def test_a_law_that_switches_in_few_samples_has_a_lane():
     runs = []
     for rate in (90.0, 3.0):
         runs.append(dataclasses.replace(run, u=np.sign(np.sin(rate * run.t))[:, None]))
-    assert panels.in_lanes(panels.Panel("u", group, runs))
-    assert not panels.in_lanes(panels.Panel("u", group, runs[1:] * 2))
+    assert lanes.in_lanes(panels.Panel("u", group, runs))
+    assert not lanes.in_lanes(panels.Panel("u", group, runs[1:] * 2))
 
 
 def test_two_laws_that_chatter_are_told_apart(drawn):
@@ -73,7 +73,7 @@ def test_two_laws_that_chatter_are_told_apart(drawn):
         column = shown[int(SIZE[1] - box.y1) : int(SIZE[1] - box.y0), int(0.5 * (box.x0 + box.x1))]
         paper = np.array([255.0] * 3)
         ink = np.array(style.rgb(colour), float)
-        wanted = paper + panels.LANE_BAND * (ink - paper)
+        wanted = paper + lanes.LANE_BAND * (ink - paper)
         heights.append(int((np.abs(column - wanted).max(axis=1) < 12).sum()))
     assert heights[0] <= 2
     assert heights[2] == pytest.approx(3.0 * heights[1], rel=0.25)

@@ -1,0 +1,57 @@
+"""Which part of the runs a figure shows: until all rest, or from a time on."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from smc_mujoco.draw import style
+from smc_mujoco.draw.decimate import end
+from smc_mujoco.draw.quantities import span
+from smc_mujoco.simulation.trace import Trace
+
+REST_BAND = 0.02  # of a panel's height: an x that stays within it rests; chosen
+# panels show ZOOM times the time until all rest, if that is less than this part of a run
+ZOOM = 1.3
+MAX_ZOOMED = 0.5
+
+
+def horizon(traces: Sequence[Trace]) -> float:
+    """Return the time that panels of x, u and s show, s: the whole run, or the first part if all
+    rest after it.
+
+    Nothing changes or disturbs the plant after that part, and no reference moves.
+    """
+    whole = end(traces)
+    last = 0.0
+    for group, parts in style.split(traces).items():
+        low, high = span(parts, "x")
+        for trace in parts:
+            moved = np.abs(trace.x - trace.x[-1]).max(axis=1) > REST_BAND * (high - low)
+            acted = (trace.d != 0.0).any(axis=1) | (trace.r != trace.r[-1]).any(axis=1)
+            times = trace.t[moved | (acted & group.driven)]
+            last = max(last, *times[-1:], trace.diverged_at or 0.0)
+            if trace.scenario.jump:
+                last = max(last, trace.scenario.jump.time)
+            if trace.scenario.fault:
+                last = max(last, trace.scenario.fault.at)
+    if 0.0 < ZOOM * last < MAX_ZOOMED * whole:
+        return ZOOM * last
+    return whole
+
+
+def until(trace: Trace, time: float) -> Trace:
+    """Return the trace up to a time, s, with two samples at least."""
+    count = max(2, int(np.searchsorted(trace.t, time + 1e-9)))
+    part = {name: array[:count] for name, array in trace.arrays().items()}
+    return dataclasses.replace(trace, **part)
+
+
+def since(trace: Trace, time: float) -> Trace:
+    """Return the trace from a time on, s, as a run of its own, which is not smoothed."""
+    first = min(int(np.searchsorted(trace.t, time - 1e-9)), len(trace.t) - 2)
+    part = {name: array[first:] for name, array in trace.arrays().items()}
+    part["t"] = part["t"] - part["t"][0]
+    calm = {"duration": float(part["t"][-1]), "jump": None, "fault": None}
+    scenario = dataclasses.replace(trace.scenario, **calm)
+    return dataclasses.replace(trace, scenario=scenario, **part)

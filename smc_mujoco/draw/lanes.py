@@ -1,0 +1,160 @@
+"""Panels whose traces would hide each other: each trace has a row of its own."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+
+from smc_mujoco.common.aliases import Fields
+from smc_mujoco.draw import style
+from smc_mujoco.draw.decimate import band
+from smc_mujoco.draw.panels import SINGLE, Panel, mark, over_time
+from smc_mujoco.draw.quantities import limits
+from smc_mujoco.metrics.conventions import (
+    last_exit,
+    scale,
+    settling_band,
+)
+from smc_mujoco.simulation.trace import Trace
+
+MIN_WIDE_BAND = 0.2  # mean height of a wide band, of a panel's; chosen
+MAX_BANDS = 1  # that share a row; chosen
+LANE_BAND = 0.45  # opacity of a band in a row of its own, below a film
+LANE_GAP = 0.25  # letters between a row, and how far u swings
+END_SHARE = 0.1  # of the run: its end, over which a row says how far u swings
+MAX_SWITCHES = 20  # of a u that shares its axes with others
+SMOOTH_SHARE = 0.02  # of a panel's range: a swing below it is none
+ROW_FILLED = 0.82  # part of a trace's row that its axes fill
+
+
+class Row(NamedTuple):
+    """Axes, the panel that they show, and the colours of its traces."""
+
+    axes: Axes
+    panel: Panel
+    colours: Sequence[str]
+
+
+def rows(
+    frame: Axes,
+    panel: Panel,
+    colours: Sequence[str],
+    wide: float = 1.0,
+    share: Axes | None = None,
+) -> list[Row]:
+    """Return a row for each trace of a panel, from above, within a share of the width of its
+    axes.
+    """
+    pitch = 1.0 / len(panel.traces)
+    found = []
+    for i, (trace, colour) in enumerate(zip(panel.traces, colours, strict=True), 1):
+        place = (0.0, 1.0 - i * pitch, wide, ROW_FILLED * pitch)
+        ax = frame.inset_axes(place, sharex=share)
+        found.append(Row(ax, panel._replace(traces=[trace]), [colour]))
+        share = ax
+    return found
+
+
+def below_film(
+    ax: Axes,
+    panel: Panel,
+    colours: Sequence[str],
+    names: Sequence[str],
+    changes: Mapping[float, str],
+) -> tuple[list[Row], list[Artist]]:
+    """Draw a panel below a film, whose time axis is set, and return its rows, one a run where they
+    would hide each other, and the artists of the runs.
+    """
+    found = [Row(ax, panel, colours)]
+    laned = in_lanes(panel)
+    if laned:
+        letters = style.points(float(style.RC["font.size"]))
+        room = 72 * ax.get_window_extent().width / ax.figure.dpi
+        found = rows(ax, panel, colours, 1.0 - (style.width("smooth", letters) + 2.0) / room)
+        for row in found:
+            row.axes.set(xlim=ax.get_xlim(), xticks=ax.get_xticks())
+            row.axes.set_xticklabels(ax.get_xticklabels())
+            row.axes.tick_params(length=0, labelbottom=row is found[-1], labelleft=False)
+        ax.set_axis_off()
+    drawn: list[Artist] = []
+    for row in found:
+        mark(row.axes, changes, named=False)
+        bands = laned or not crowded(panel)
+        drawn += over_time(row.axes, row.panel, row.colours, panel.traces, bands, names)
+        drawn += settled(row.axes, row.panel, row.colours)
+        if laned:
+            tell_swing(row.axes, row.panel.traces[0], row.colours[0])
+    return found, drawn
+
+
+def in_lanes(panel: Panel) -> bool:
+    """Return whether each law's u has its own row, because a wide band would hide the others, or
+    one that switches often.
+    """
+    if panel.quantity != "u" or len(panel.traces) < 2:
+        return False
+    least = MIN_WIDE_BAND * np.ptp(limits(panel.traces, "u"))
+    switches = [np.sum(np.abs(np.diff(trace.u, axis=0)) > least) for trace in panel.traces]
+    return max(switches) > MAX_SWITCHES or crowded(panel, 0)
+
+
+def settled(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Artist]:
+    """Mark when each run's x has settled for good, where it does after the start, and return the
+    marks.
+    """
+    marks: list[Artist] = []
+    if panel.quantity != "x":
+        return marks
+    look: Fields = {"ms": style.points(6), "mec": style.PAPER, "mew": style.points(0.5)}
+    for trace, colour in zip(panel.traces, colours, strict=True):
+        error = np.abs(trace.x - trace.r).max(axis=1)
+        time = last_exit(trace.t, error, settling_band(trace.scenario, scale(trace)))
+        if trace.diverged_at is None and 0.0 < time < min(trace.t[-1], ax.get_xlim()[1]):
+            y = float(np.interp(time, trace.t, trace.x.mean(axis=1)))
+            marks += ax.plot(time, y, "v", color=colour, zorder=6, clip_on=False, **look)
+    return marks
+
+
+def tell_swing(lane: Axes, trace: Trace, colour: str) -> None:
+    """Say beside a row how far u swings at the end of the run, with a bar; "smooth" if it does
+    not.
+    """
+    low, high = lane.get_ylim()
+    for swings in lane.collections:
+        swings.set_alpha(LANE_BAND)
+    u = trace.u[-max(2, round(END_SHARE * len(trace.t))) :]
+    u = u[np.isfinite(u)]
+    least = float(u.min(initial=np.inf))
+    most = float(u.max(initial=-np.inf))
+    swing = 0.5 * (most - least)
+    if trace.diverged_at is not None:
+        words = "fails"
+    elif swing > SMOOTH_SHARE * (high - low):
+        words = f"±{swing:.2g}"
+        ends = lane.transLimits.transform([(0.0, least), (0.0, most)])[:, 1]
+        look: Fields = {"color": colour, "lw": style.points(3), "clip_on": False}
+        lane.plot([1.012, 1.012], ends, transform=lane.transAxes, **look)
+    else:
+        words = "smooth"
+    size = style.points(style.RC["font.size"])
+    place: Fields = {"xytext": (LANE_GAP * size, 0.0), "textcoords": "offset points"}
+    look: Fields = {"va": "center", "fontsize": size, "color": style.INK}
+    lane.annotate(words, (1.0, 0.5), xycoords="axes fraction", **place, **look)
+
+
+def crowded(panel: Panel, allowed: int = MAX_BANDS) -> bool:
+    """Return whether each trace needs a row: it has several channels, or more than `allowed` bands
+    of u are wide.
+    """
+    if len(panel.group.channels) > 1 and panel.quantity not in SINGLE:
+        return len(panel.traces) > 1
+    if panel.quantity != "u":
+        return False
+    low, high = limits(panel.traces, "u")
+    wide = 0
+    for trace in panel.traces:
+        _, least, most = band(trace.t, trace.u)
+        wide += float(np.mean(most - least)) > MIN_WIDE_BAND * (high - low)
+    return wide > allowed
