@@ -87,6 +87,19 @@ def halved(scenario: Scenario) -> Scenario:
     return dataclasses.replace(scenario, physics_step=0.5 * scenario.resolved.physics_step)
 
 
+def doubled(scenario: Scenario) -> Scenario:
+    """Return the same scenario at twice its physics step, if it runs under RK4 and that fits its
+    control period, delay and clock; else itself. Stable poles stay so, by the rule of the step.
+    """
+    step = 2.0 * scenario.resolved.physics_step
+    if scenario.resolved.integrator != "RK4" or step > scenario.control_period:
+        return scenario
+    try:
+        return dataclasses.replace(scenario, physics_step=step)
+    except ScenarioError:
+        return scenario
+
+
 def nudged(scenario: Scenario) -> Scenario:
     """Return the same scenario with each start position moved by 1e-9 of its distance from the
     plant's origin. A joint that starts there stays there.

@@ -105,6 +105,7 @@ class RaceAdvice(Advice):
     fixed: Comparison | None
     # law -> condition -> the numbers of its runs that settle, and of all
     settled: Mapping[str, Mapping[str, tuple[int, int]]]
+    weighs: Mapping[str, float]  # condition -> its share of J of the first law
     margins: Sequence[Margin]  # of the first law with its gains, without other conditions
     worst_run: Scenario  # of the first law in the condition where it fares worst
     tuned: Tuned | None  # the searches for the gains of the first law; None if they were known
@@ -120,6 +121,8 @@ class RaceAdvice(Advice):
             lines.append(f"However tuned: {self._however}")
         if self.fixed:
             lines.append(f"With these gains: {self._with_these}")
+        if len(self.weighs) > 1:
+            lines.append(f"Its J: {self._weighs}")
         lines += [f"Settles: {self._where}", f"Tolerates: {self._margins}"]
         for name, share in self.race.dropped.items():
             least = f"its lowest J was {number(share)} times the highest of the law that led"
@@ -195,6 +198,12 @@ class RaceAdvice(Advice):
         least = min(done for done, _ in found.values())
         share = f"all {runs}" if least == runs else f"at least {least} of {runs}"
         return f"in {share} unseen runs in {_each(len(found))}"
+
+    @property
+    def _weighs(self) -> str:
+        """Which share of J of the first law each condition has, the largest first."""
+        order = sorted(self.weighs, key=lambda name: -self.weighs[name])
+        return joined([f"{100.0 * self.weighs[name]:.0f} % {name}" for name in order])
 
     @property
     def _margins(self) -> str:

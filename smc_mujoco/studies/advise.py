@@ -14,7 +14,7 @@ import numpy as np
 from smc_mujoco.analysis.paired_runs import SETTLES, values
 from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.tuning import search
-from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective
+from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective, shares
 from smc_mujoco.analysis.tuning.result import Tuned
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError
 from smc_mujoco.common.text import joined
@@ -62,10 +62,10 @@ def advise(
     candidates = {plant.name: [Candidate(law, (law,)) for law in chosen.values()]}
     table = trial.run(candidates, seeds, half_steps=False)
     settled = _settled(table)
-    shares = {}
+    least = {}
     for law, found in settled.items():
-        shares[law] = min(n / of for n, of in found.values())
-    order = sorted(chosen, key=lambda law: shares[law] < RELIABLE)
+        least[law] = min(n / of for n, of in found.values())
+    order = sorted(chosen, key=lambda law: least[law] < RELIABLE)
     boards = leaderboard(table, metrics, defaults=True, relevant=relevant)
     if not boards:
         raise ScenarioError(f"no need has a number in any run on {plant.name}: ask for others")
@@ -74,10 +74,11 @@ def advise(
         table=table,
         leaderboard=boards,
         laws=tuple(chosen[law] for law in order),
-        settles=shares,
+        settles=least,
         race=raced,
         fixed=fixed,
         settled=settled,
+        weighs=shares(plant, first, goal, CHOOSING, trial.threads),
         margins=_margins(trial, plant, first),
         worst_run=_worst_run(table, first.name),
         tuned=tuned.get(first.name),

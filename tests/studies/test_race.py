@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis import step_halving
 from smc_mujoco.analysis.ranking import RELEVANT
-from smc_mujoco.analysis.tuning.objective import Evaluation, Objective
+from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, objectives
 from smc_mujoco.analysis.tuning.result import SearchResult
 from smc_mujoco.studies import race as module
 from smc_mujoco.studies.fair_gains import Candidate
@@ -155,3 +156,38 @@ def test_the_same_searches_under_two_names_have_no_winner(run, monkeypatch):
         assert raced.winner is None
         assert raced.sets == module.LOOKS[-1]
         assert raced.first == ["a", "b"]
+
+
+ROBOT = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/><body pos="0 0 .6">
+<joint name="j" axis="0 1 0" frictionloss=".05"/>
+<geom type="capsule" fromto="0 0 0 .3 0 0" size=".02" mass=".4"/></body></worldbody>
+<actuator><motor joint="j" ctrlrange="-4 4"/></actuator></mujoco>"""
+
+
+def test_unseen_runs_under_rk4_have_twice_the_step_and_one_in_four_their_own():
+    robot = smc.plant_from(ROBOT, ["j"], name="robot")
+    law = smc.law("pid", kp=20.0, ki=20.0, kd=2.0)
+    goal = Objective(conditions=("friction", "contact", "delay_10ms"), duration=1.0)
+    trial = types.SimpleNamespace(seeds=range, threads=1)
+    steps = {case.resolved.physics_step for case in goal.holdout(robot, law, 0)}
+    assert {case.resolved.integrator for case in goal.holdout(robot, law, 0)} == {"RK4"}
+    assert max(steps) < goal.control_period  # so they may be doubled
+    fast, own = module.unseen(trial, robot, [law] * 2, goal, [0, 1])
+    J, _ = objectives(robot, [law] * 2, goal, [0, 1], 1)
+    assert own[0] == J[0]
+    assert math.isnan(own[1])
+    assert (fast != J).all()
+    np.testing.assert_allclose(fast, J, rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"friction": smc.Coulomb(0.1), "integrator": "implicitfast"},  # of first order
+        {"control_period": 1e-3},  # the step of RK4 is the period
+        {"input_delay": 5e-4, "physics_step": 2.5e-4, "control_period": 7.5e-4},
+    ],
+)
+def test_runs_that_cannot_have_twice_the_step_keep_theirs(fields):
+    scenario = smc.Scenario(plant="duffing", law=smc.law("pid"), **fields)
+    assert step_halving.doubled(scenario) is scenario

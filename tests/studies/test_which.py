@@ -160,7 +160,12 @@ def raced(tmp_path_factory):
 def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(raced):
     _, advice, _ = raced
     lines = dict(line.split(": ", 1) for line in advice.answer)
-    assert [*lines][:5] == ["Use", "However tuned", "With these gains", "Settles", "Tolerates"]
+    verdicts = ["Use", "However tuned", "With these gains", "Its J", "Settles", "Tolerates"]
+    assert [*lines][:6] == verdicts
+    shares = [float(share) for share in re.findall(r"(\d+) % \w+", lines["Its J"])]
+    assert sum(shares) == pytest.approx(100.0, abs=1.0)
+    assert shares == sorted(shares, reverse=True)
+    assert advice.weighs.keys() == {"coulomb", "noise"}
     assert lines["Use"] == advice.law.name
     compared = [law.name for law in advice.laws]
     assert len(compared) < len(advice.race.entrants)  # so the sentence says which

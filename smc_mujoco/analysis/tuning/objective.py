@@ -24,13 +24,13 @@ gains beyond it cost more than that.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from smc_mujoco.analysis import step_halving
 from smc_mujoco.analysis.chattering import predict
-from smc_mujoco.analysis.step_halving import halved as halved_step
 from smc_mujoco.common.aliases import Array, ArrayPair, Data, Fields, Floats, Pair
 from smc_mujoco.common.constraints import Natural, Positive, Whole, constrain
 from smc_mujoco.common.data import named_data
@@ -259,6 +259,7 @@ def objectives(
     instances: Sequence[int] | None = None,
     threads: int | None = None,
     halved: bool = False,
+    doubled: bool = False,
 ) -> ArrayPair:
     """Return J of laws on instances that no search has seen, (laws,), s^2, computed by MuJoCo, and
     whether all runs of an instance have arrived, (laws,).
@@ -268,7 +269,45 @@ def objectives(
         condition.
       instances: numbers of the instances, in place of 0, 1, ...
       threads: as in `run`.
-      halved: whether the runs have half their physics step.
+      doubled: whether the runs have twice their physics step where they may, see
+        `step_halving.doubled`.
+      halved: whether the runs have half their physics step, or half of the doubled one.
+    """
+    found = []
+    there = []
+    for cases, runs in _unseen(plant, laws, goal, instances, threads, halved, doubled):
+        found.append(goal.evaluation(cases[0], runs).objective)
+        there.append(all(map(metrics.arrived, runs)))
+    return np.array(found), np.array(there)
+
+
+def shares(
+    plant: Plant, law: Component, goal: Objective, instances: Sequence[int], threads: int | None
+) -> dict[str, float]:
+    """Return condition -> its share of the tracking and variation in J of a law, over instances
+    that no search has seen, at twice the physics step where they may have it.
+    """
+    costs = []
+    laws = [law] * len(instances)
+    for _, runs in _unseen(plant, laws, goal, instances, threads, doubled=True):
+        terms = np.array([goal.terms_of_run(trace) for trace in runs])
+        costs.append(terms @ (1.0, goal.weight))
+    total = np.sum(costs, axis=0)
+    names = [condition.name for condition in goal.conditions]
+    return dict(zip(names, (total / total.sum()).tolist(), strict=True))
+
+
+def _unseen(
+    plant: Plant | str,
+    laws: Sequence[Component],
+    goal: Objective,
+    instances: Sequence[int] | None,
+    threads: int | None,
+    halved: bool = False,
+    doubled: bool = False,
+) -> Iterator[tuple[list[Scenario], list[Trace]]]:
+    """Yield the runs of each law on its instance, one for each condition. Arguments as in
+    `objectives`.
     """
     if instances is None:
         numbers = range(len(laws))
@@ -281,14 +320,11 @@ def objectives(
     cases = []
     for law, number in zip(laws, numbers, strict=True):
         cases += goal.holdout(plant, law, number)
+    if doubled:
+        cases = list(map(step_halving.doubled, cases))
     if halved:
-        cases = list(map(halved_step, cases))
+        cases = list(map(step_halving.halved, cases))
     traces = run(cases, threads)
-    found = []
-    there = []
     count = len(goal.conditions)
     for first in range(0, len(cases), count):
-        runs = traces[first : first + count]
-        found.append(goal.evaluation(cases[first], runs).objective)
-        there.append(all(map(metrics.arrived, runs)))
-    return np.array(found), np.array(there)
+        yield cases[first : first + count], traces[first : first + count]
