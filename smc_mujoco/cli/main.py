@@ -12,7 +12,14 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.commands import analysis, listing, rigs, run_and_look, studies
+from smc_mujoco.cli.commands import (
+    analysis,
+    listing,
+    machine_numbers,
+    rigs,
+    run_and_look,
+    studies,
+)
 from smc_mujoco.cli.console import errors_as_sentences
 from smc_mujoco.common import annexes
 from smc_mujoco.common.errors import ScenarioError, printable
@@ -39,7 +46,7 @@ GROUPS: dict[str, list[Callable[..., None]]] = {
         analysis.sensitivity,
         analysis.chatter,
     ],
-    "Machines": [rigs.identify, rigs.rig],
+    "Machines": [machine_numbers.excitation, machine_numbers.identify, rigs.rig],
 }
 for annex in sorted(filter(annexes.installed, annexes.ANNEXES)):
     more = annexes.module(f"smc_mujoco.{annex}.commands", "the command line").GROUPS

@@ -21,7 +21,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.aliases import AnyPath, Array, Floats, Numbers
+from smc_mujoco.common.aliases import AnyPath, Array, Fields, Floats, Numbers
 from smc_mujoco.common.constraints import Natural, Positive, constrained
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, items_of, number, shown
@@ -131,6 +131,14 @@ class Excitation:
         if second:
             why += f"; {first} and {second} are told apart worst (correlation {correlation:.2f})"
         return "\n".join([*lines, why])
+
+    def about(self) -> Fields:
+        """Return what a log of each motion would tell as JSON data, best first."""
+        told = ("condition", "errors", "values", "largest_u", "largest_v", "worst_pair", "rest")
+        found = {}
+        for motion in self.motions:
+            found[motion.name] = {name: getattr(motion, name) for name in told}
+        return found
 
     def save(self, path: AnyPath, name: str | None = None) -> Path:
         """Write the reference of a motion as CSV, the best by default: t, and r or r_JOINT, rad or

@@ -38,7 +38,7 @@ def friction_figure(
     measured columns of the log, and their times.
     """
     predicted, measured, t = prediction
-    paths = pages.files(Path(path).with_suffix(""))
+    paths = pages.files(path)
     colour = style.spread(1)[0]
     handles = [
         Line2D([], [], color=style.INK, label="log"),

@@ -26,7 +26,7 @@ import numpy as np
 from smc_mujoco.common.aliases import AnyPath, Array, Data, Fields, Numbers
 from smc_mujoco.common.constraints import Natural, Seed, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
-from smc_mujoco.common.files import replacing, write_json
+from smc_mujoco.common.files import write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.identification import first_guess, gauss_newton, number_text, records
@@ -231,10 +231,7 @@ class Identified:
         file = Path(path)
         if file.suffix != ".txt":
             return write_json(file, self.about())
-        with replacing(file) as part:
-            comments = "".join(f"# {line}\n" for line in str(self).splitlines())
-            part.write_text(f"{comments}{self.condition()}\n", encoding="utf-8")
-        return file
+        return number_text.save_condition(file, str(self), self.condition())
 
     def figure(self, path: str | Path, record: int = 0) -> list[Path]:
         """Draw measured and predicted columns of a log, their residuals over time and speed, and

@@ -1,9 +1,14 @@
-"""Identified numbers as text: each with the digits that its error leaves, a table, and fits."""
+"""Identified numbers as text: each with the digits that its error leaves, a table, fits, and a
+condition below them.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from smc_mujoco.common.aliases import Numbers
+from smc_mujoco.common.files import replacing
+from smc_mujoco.simulation.conditions import Condition
 
 
 def to_error(value: float, error: float) -> str:
@@ -38,6 +43,14 @@ def fits(heads: Sequence[str], whole: Sequence[Numbers], pieces: Sequence[Number
             line += f"; in pieces of 1 s {_percent(of_pieces)}"
         lines.append(line)
     return lines
+
+
+def save_condition(file: Path, text: str, condition: Condition) -> Path:
+    """Write a condition with what was found as comments above it. Return the path."""
+    with replacing(file) as part:
+        comments = "".join(f"# {line}\n" for line in text.splitlines())
+        part.write_text(f"{comments}{condition}\n", encoding="utf-8")
+    return file
 
 
 def _percent(fit: Numbers) -> str:

@@ -29,7 +29,7 @@ def residual_figure(
     `t`: times, s, (K,). `predicted`, `fits`: name of a twin -> what it predicts, and its fit of
     each column, percent. `units`: of the columns.
     """
-    paths = pages.files(Path(path).with_suffix(""))
+    paths = pages.files(path)
     colours = dict(zip(predicted, style.spread(len(predicted)), strict=True))
     handles = [Line2D([], [], color=style.INK, label="measured")]
     handles += [Line2D([], [], color=colour, label=twin) for twin, colour in colours.items()]

@@ -12,14 +12,18 @@ Trees, 1984, section 3.4.3).
 """
 
 import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.aliases import Array, Numbers
+from smc_mujoco.common.aliases import AnyPath, Array, Fields, Numbers
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.identification import number_text
+from smc_mujoco.common.files import as_path, write_json
+from smc_mujoco.identification import number_text, records
 from smc_mujoco.mechanisms.hardware.stribeck import Stribeck
+from smc_mujoco.simulation.conditions import Condition, condition
 
 # Model -> its terms, from the smallest on
 MODELS = {
@@ -52,7 +56,26 @@ class FrictionFit:
     rms: float  # N m (N), of the residuals
     held_out: float  # N m (N), the same on pairs that were not used
     r2: float  # share of the variation of torque that it explains
+    covariance: Array = dataclasses.field(repr=False)  # of the errors, (p, p), as `numbers`
     at_zero: tuple[str, ...] = ()  # numbers that would be negative
+
+    @property
+    def _values(self) -> tuple[tuple[str, ...], Array, float]:
+        """The terms, their numbers, and the speed of one of them; 1 without one."""
+        terms = MODELS[self.model]
+        every = list(self.numbers.values())
+        speed = every[len(terms)] if len(every) > len(terms) else 1.0
+        return terms, np.array(every[: len(terms)]), speed
+
+    def force(self, v: Array) -> Array:
+        """Return the friction at speeds v, (K,), N m (N)."""
+        terms, values, speed = self._values
+        return _columns(terms, v, speed) @ values
+
+    def force_error(self, v: Array) -> Array:
+        """Return the standard error of the friction at speeds v, (K,), at first order."""
+        slopes = _slopes(v, *self._values)
+        return np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", slopes, self.covariance, slopes), 0.0))
 
     @property
     def part(self) -> Stribeck:
@@ -76,6 +99,7 @@ class FrictionFound:
 
     fits: dict[str, FrictionFit]  # by model, from the smallest on
     best: FrictionFit
+    pairs: Pairs = dataclasses.field(repr=False)  # speeds and torques of the joint while it moves
 
     @property
     def part(self) -> Stribeck:
@@ -97,6 +121,38 @@ class FrictionFound:
         if self.best.r2 >= MIN_R2:
             return ""
         return f"no friction in it: {self.best.model} explains {self.best.r2:.2f} of the variation"
+
+    def condition(self, name: str = "identified") -> Condition:
+        """Return a condition with this friction, for `compare`, `which`, `tune`, `grid`."""
+        return condition(name, friction=self.part)
+
+    def about(self) -> Fields:
+        """Return the fits as JSON data."""
+        told = ("numbers", "errors", "rms", "held_out", "r2")
+        fits = {}
+        for model, fit in self.fits.items():
+            fits[model] = {name: getattr(fit, name) for name in told}
+        return {"best": self.best.model, "fits": fits}
+
+    def save(self, path: AnyPath) -> Path:
+        """Write a file, and return its path. FILE.txt is the condition, with the table as comments,
+        for --condition of compare, which and tune. Any other is `about` as JSON.
+        """
+        file = as_path(path)
+        if file.suffix != ".txt":
+            return write_json(file, self.about())
+        return number_text.save_condition(file, str(self), self.condition())
+
+    def figure(self, path: AnyPath) -> list[Path]:
+        """Draw the pairs, the friction that is taken with its error, and the other models, as
+        PATH.svg and PATH.png.
+        """
+        from smc_mujoco.identification.pairs_figure import pairs_figure
+
+        forces = {model: fit.force for model, fit in self.fits.items()}
+        best = self.best
+        title = f"rms {best.rms:.3g}, held out {best.held_out:.3g}, R² {best.r2:.3f}"
+        return pairs_figure(self.pairs, forces, best.model, best.force_error, title, path)
 
     def __str__(self) -> str:
         heads = f"{'model':<30} {'rms':>8} {'held out':>8} {'R2':>6}"
@@ -141,8 +197,25 @@ def identify_friction(speed: Any, torque: Any, held_out: Any = None) -> Friction
     for fit, loss in zip(fits.values(), losses, strict=True):
         worse = loss - least
         if worse.mean() <= worse.std(ddof=1) / np.sqrt(len(worse)):
-            return FrictionFound(fits, fit)
+            return FrictionFound(fits, fit, pairs)
     raise AssertionError("the best model is not worse than itself")
+
+
+def read_pairs(path: AnyPath, columns: Mapping[str, str] | None = None) -> Pairs:
+    """Return the columns speed and torque of a CSV or npz file. `columns`: our name -> the file's.
+
+    Raises:
+      ScenarioError: the file has no such column.
+    """
+    record: Any = records.given(path, columns)
+    for name in ("speed", "torque"):
+        if not isinstance(record, Mapping) or name not in record:
+            has = ", ".join(map(str, record)) if isinstance(record, Mapping) else "a trace"
+            raise ScenarioError(
+                f"{path} has no column {name} (it has {has}): add it, or say which it is, as "
+                f"--columns {name}=NAME"
+            )
+    return record["speed"], record["torque"]
 
 
 def _moving(speed: Any, torque: Any, what: str) -> Pairs:
@@ -236,7 +309,8 @@ def _fitted(
     found = dict(zip(names, numbers.tolist(), strict=True))
     speeds = [SPEED_OF[term] for term in terms if term in SPEED_OF]
     found |= dict.fromkeys(speeds, speed)
-    errors, losses = _errors(terms, pairs, numbers, speed, bool(speeds))
+    covariance, losses = _covariance(terms, pairs, numbers, speed)
+    errors = np.sqrt(np.diag(covariance))
     fit = FrictionFit(
         model,
         found,
@@ -244,38 +318,52 @@ def _fitted(
         float(np.sqrt(np.mean(residual**2))),
         float(np.sqrt(np.mean(rest**2))),
         float(1.0 - np.sum(residual**2) / np.sum((force - force.mean()) ** 2)),
+        covariance,
         tuple(name for name in names if name != "offset" and found[name] == 0.0),
     )
     return fit, losses
 
 
-def _errors(
-    terms: tuple[str, ...], pairs: Pairs, numbers: Array, speed: float, has_speed: bool
+def _slopes(v: Array, terms: tuple[str, ...], numbers: Array, speed: float) -> Array:
+    """Return how friction at speeds v depends on the numbers of the terms and on the speed of one,
+    (K, p).
+    """
+    slopes = _columns(terms, v, speed)
+    if not set(terms) & SPEED_OF.keys():
+        return slopes
+    step = 1e-4 * speed
+    faster, slower = (_columns(terms, v, speed + sign * step) for sign in (1.0, -1.0))
+    return np.column_stack([slopes, (faster - slower) @ numbers / (2.0 * step)])
+
+
+def _covariance(
+    terms: tuple[str, ...], pairs: Pairs, numbers: Array, speed: float
 ) -> tuple[Array, Array]:
-    """Return standard errors of the numbers and of the speed, if there is one, and the mean squares
-    of the errors on each block that was left out.
+    """Return the covariance of the errors of the numbers and of the speed, if there is one, and the
+    mean squares of the errors on each block that was left out.
 
     The numbers without a block follow from the slopes at the fit. Numbers at 0 stay there.
+    Variances are those of blocks, or of white noise if larger.
     """
     v, force = pairs
-    slopes = _columns(terms, v, speed)
-    residual = force - slopes @ numbers
-    if has_speed:
-        step = 1e-4 * speed
-        faster, slower = (_columns(terms, v, speed + sign * step) for sign in (1.0, -1.0))
-        slopes = np.column_stack([slopes, (faster - slower) @ numbers / (2.0 * step)])
+    slopes = _slopes(v, terms, numbers, speed)
+    residual = force - _columns(terms, v, speed) @ numbers
     free = np.any(slopes != 0.0, axis=0)
     free[: len(terms)] &= (numbers != 0.0) | np.array([term == "offset" for term in terms])
-    slopes = slopes[:, free]
+    kept = np.flatnonzero(free)
+    slopes = slopes[:, kept]
     whole = slopes.T @ slopes
-    moved = np.zeros((BLOCKS, slopes.shape[1]))
+    moved = np.zeros((BLOCKS, len(kept)))
     losses = np.zeros(BLOCKS)
     for b, block in enumerate(np.array_split(np.arange(len(v)), BLOCKS)):
         own, left = slopes[block], residual[block]
         moved[b] = -np.linalg.lstsq(whole - own.T @ own, own.T @ left, rcond=None)[0]
         losses[b] = np.mean((left - own @ moved[b]) ** 2)
-    by_blocks = (BLOCKS - 1) / BLOCKS * np.sum((moved - moved.mean(axis=0)) ** 2, axis=0)
-    white = np.sum(residual**2) / max(len(v) - slopes.shape[1], 1) * np.diag(np.linalg.pinv(whole))
-    errors = np.zeros(len(free))
-    errors[free] = np.sqrt(np.maximum(by_blocks, white))
-    return errors, losses
+    moved -= moved.mean(axis=0)
+    by_blocks = (BLOCKS - 1) / BLOCKS * moved.T @ moved
+    white = np.sum(residual**2) / max(len(v) - len(kept), 1) * np.diag(np.linalg.pinv(whole))
+    variance = np.diag(by_blocks)
+    factors = np.sqrt(np.maximum(white / np.maximum(variance, 1e-300), 1.0))
+    covariance = np.zeros((len(free), len(free)))
+    covariance[np.ix_(kept, kept)] = by_blocks * np.outer(factors, factors)
+    return covariance, losses

@@ -86,6 +86,8 @@ CALLS = {
     "chatter duffing --law pid --channel 1 --out c --json c.json --threads 2": [
         "analysis.chattering.chattering"
     ],
+    "excitation arm.xml --for m,input_delay --u-max 5 --v-max 2 --amplitude 0.3 --duration 4 "
+    "--rate 250 --out m.csv --json e.json": ["identification.excitation.excitation"],
     "export pid.c": ["exchange.c.export_c.law_to_c"],
     "export pid there.c --gains kp=50 --type float --joints 2": ["exchange.c.export_c.law_to_c"],
     "export pid.fmu": ["exchange.fmu.export_fmu.law_to_fmu"],
@@ -158,6 +160,7 @@ ALIASES = {  # option -> arguments that it may change, besides the one of its na
     "--out": "folder",
     "--actuator": "changes",
     "--type": "numbers",
+    "--for": "names",
     "--period": "control_period",
 }
 # not told in whole

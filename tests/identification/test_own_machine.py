@@ -316,6 +316,31 @@ def test_a_chirp_is_recommended_and_a_staircase_is_last_because_it_rests(arm, tm
         assert len(file.readlines()) == 1501
 
 
+@pytest.mark.slow
+def test_the_motion_that_the_command_writes_is_read_back_with_its_log(tmp_path):
+    """The log here is columns x_j1 and u_j1 beside t and r, which `identify` takes as they are."""
+    (tmp_path / "arm.xml").write_text(ONE)
+    machine = f"{tmp_path / 'arm.xml'}:j1"
+    motion = tmp_path / "motion.csv"
+    bounds = ["--u-max", "8", "--duration", "2", "--rate", "250"]
+    options = ["--for", "j1.damping", *bounds, "--out", str(motion)]
+    done = CliRunner().invoke(app, ["excitation", machine, *options])
+    assert done.exit_code == 0, done.output
+    assert "chirp from 0.2 to 3 Hz: condition number" in " ".join(done.output.split())
+    assert "record t, x, u, and run" in done.output
+    played = np.genfromtxt(motion, delimiter=",", names=True)
+    rate = np.gradient(played["r"], played["t"])
+
+    def reference(time):
+        return [np.interp(time, played["t"], row) for row in (played["r"], rate)]
+
+    run = log(ONE, TRUTH, reference, 20.0, 1.5, rate=250.0, duration=2.0)
+    rows = np.column_stack([played["t"][:-1], played["r"][:-1], run["x"], run["u"]])
+    np.savetxt(motion, rows, delimiter=",", header="t,r,x,u", comments="")
+    found = smc.identify(machine, motion, list(TRUTH), most=1)
+    assert found.values["j1.damping"] == pytest.approx(0.3, rel=0.1)
+
+
 def test_a_motion_stays_within_range_and_speed_and_an_unknown_one_is_refused(tmp_path):
     limited = smc.plant_from(ONE.replace('name="j1"', 'name="j1" range="-.2 .3"'), ["j1"])
     advice = smc.design.excitation(limited, ["j1.damping"], u_max=5.0, duration=2.0, rate=250.0)

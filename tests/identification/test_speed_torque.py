@@ -8,8 +8,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import smc_mujoco as smc
+from smc_mujoco.cli.main import app
+from smc_mujoco.simulation.conditions import from_file
 
 T = np.linspace(0.0, 20.0, 10_000)
 SPEED = 1.5 * np.sin(1.7 * T) + 0.4 * np.sin(5.0 * T)
@@ -108,6 +111,42 @@ def test_pairs_without_friction_are_told(refused):
 )
 def test_pairs_that_tell_nothing_are_refused(speed, torque, words, refused):
     refused(lambda: smc.identify_friction(speed, torque), words)
+
+
+def test_the_error_of_the_curve_is_that_of_its_numbers():
+    """By hand for a level and viscous friction: v' C v with v = (sign, speed)."""
+    fit = smc.identify_friction(SPEED, pairs("level, viscous, offset")).fits["level, viscous"]
+    level, viscous = fit.numbers["level"], fit.numbers["viscous"]
+    v = np.array([-2.0, 0.5])
+    np.testing.assert_allclose(fit.force(v), level * np.sign(v) + viscous * v)
+    of_level, both, of_viscous = fit.covariance[0, 0], fit.covariance[0, 1], fit.covariance[1, 1]
+    variance = of_level + 2.0 * both * np.abs(v) + of_viscous * v**2
+    np.testing.assert_allclose(fit.force_error(v), np.sqrt(variance))
+    np.testing.assert_allclose(np.sqrt(np.diag(fit.covariance)), list(fit.errors.values()))
+
+
+def test_the_command_says_what_the_function_says_and_writes_a_figure_and_a_condition(tmp_path):
+    torque = pairs("level, drop, viscous, offset", noise=0.01)
+    table = np.column_stack([SPEED, torque])[::5]
+    file = tmp_path / "pairs.csv"
+    np.savetxt(file, table, delimiter=",", header="dq,tau", comments="")
+    found = smc.identify_friction(*table.T)
+    columns = ["identify", "--pairs", str(file), "--columns", "speed=dq,torque=tau"]
+    written = ["--figure", str(tmp_path / "friction"), "--out", str(tmp_path / "found.txt")]
+    done = CliRunner().invoke(app, [*columns, *written])
+    assert done.exit_code == 0, done.output
+    assert done.output.startswith(f"{found}\n")
+    assert (tmp_path / "friction.png").stat().st_size > 10_000
+    (read,) = from_file(tmp_path / "found.txt")
+    assert read.fields["friction"].static == pytest.approx(found.part.static, rel=1e-6)
+    for given, words in (
+        (columns[:3], "no column speed (it has dq, tau)"),
+        ([*columns, "--for", "m"], "leave out the machine"),
+        (["identify"], "needs a machine and its logs"),
+    ):
+        wrong = CliRunner().invoke(app, given)
+        assert wrong.exit_code == 2
+        assert words in " ".join(wrong.output.split())
 
 
 @pytest.mark.skipif(not (LOGS / "case4_slow.csv").is_file(), reason="NNFM=FOLDER has public logs")

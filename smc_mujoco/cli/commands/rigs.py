@@ -1,6 +1,4 @@
-"""smc-mujoco rig and identify: records of a real machine beside its twin, and a machine's numbers
-from its logs.
-"""
+"""smc-mujoco rig: records of a real machine beside its twin."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -86,101 +84,6 @@ def rig(
         wanted = options.names(sets)
         _repeat(name, files[0], named, wanted, start, duration, figure, film, terminal)
     terminal.finish()
-
-
-Machine = Annotated[
-    str,
-    typer.Argument(
-        metavar="MACHINE",
-        help=(
-            "FILE.xml:joint+joint; FILE.xml alone has the joints of the logs' columns. "
-            "Or a plant or a rig by its name."
-        ),
-    ),
-]
-Logs = Annotated[
-    list[Path],
-    typer.Argument(metavar="LOG...", help="CSV or npz files of columns, or traces."),
-]
-Paths = Annotated[
-    str | None,
-    typer.Option(
-        "--for",
-        metavar="PATH,...",
-        help="Numbers to find, as shoulder.damping,elbow.frictionloss,input_delay,m; "
-        "default: those that a rig's records determine.",
-    ),
-]
-HeldOut = Annotated[
-    Path | None, typer.Option(help="A log that is not used, to check the numbers on.")
-]
-FoundFile = Annotated[
-    Path | None, typer.Option(help="File for --condition of compare, which and tune: FILE.txt.")
-]
-Corrected = Annotated[
-    bool, typer.Option("--corrected", help="Correct for the errors of the simulation's steps.")
-]
-Starts = Annotated[int, typer.Option(min=1, help="How many sets the search may start from.")]
-StartsSeed = Annotated[int, typer.Option(min=0, help="Seed of these starts.")]
-
-
-def identify(
-    machine: Machine,
-    files: Logs,
-    names: Paths = None,
-    held_out: HeldOut = None,
-    columns: options.Columns = None,
-    figure: Annotated[
-        Path | None, options.picture("prediction over log, residuals and frictions")
-    ] = None,
-    out: FoundFile = None,
-    corrected: Corrected = False,
-    starts: Starts = 1,
-    seed: StartsSeed = 0,
-    json: options.Json = None,
-) -> None:
-    """Find numbers of a machine from its logs: friction, armature, delay, masses, with errors.
-
-    A log is of any controller, at 40 Hz or more. It has columns t in s, and x (rad or m) and u (N m
-    or N) of the joint, or x_JOINT and u_JOINT of each. Nobody gives a start.
-
-    The paths of numbers are JOINT.damping, .frictionloss, .armature, .stiffness, .gain, .offset and
-    .zero, input_delay, m and grav. The table has each number with its standard error. What the logs
-    cannot tell is said below it.
-
-    Example: smc-mujoco identify arm.xml run1.csv run2.csv --for shoulder.damping,input_delay
-
-    Example: smc-mujoco identify arm.xml:shoulder run.csv --for m --columns x=angle,u=torque
-
-    Example: smc-mujoco identify emps run.csv
-    """
-    terminal = Terminal(json)
-    with delay_signals():
-        from smc_mujoco.cli import rig_tables
-        from smc_mujoco.identification import identify as identification
-
-    options.check_files(None, figure, out)
-    found = identification.identify(
-        machine,
-        list(files),
-        options.names(names) or None,
-        held_out=held_out,
-        columns=options.pairs(columns, "columns", "x_elbow=angle,t=time") or None,
-        corrected=corrected,
-        starts=starts,
-        seed=seed,
-        progress=True,
-    )
-    for table in rig_tables.identified(found, [str(file) for file in files]):
-        terminal.print(table)
-    for note in found.notes:
-        terminal.note(note, wrap=True)
-    terminal.note(f"{found.evaluations} parameter sets, {terminal.seconds:.0f} s")
-    if figure:
-        terminal.wrote(*found.figure(figure))
-    if out:
-        terminal.wrote(found.save(out))
-    terminal.finish(found.about())
 
 
 def _list(terminal: Terminal) -> None:

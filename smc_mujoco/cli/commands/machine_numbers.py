@@ -1,0 +1,217 @@
+"""smc-mujoco identify and excitation: a machine's numbers from its logs, and what to record."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.console import Terminal
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import with_ending
+from smc_mujoco.common.interrupts import delay_signals
+
+Machine = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="MACHINE",
+        help=(
+            "FILE.xml:joint+joint; FILE.xml alone has the joints of the logs' columns. "
+            "Or a plant or a rig by its name."
+        ),
+    ),
+]
+Logs = Annotated[
+    list[Path] | None,
+    typer.Argument(metavar="LOG...", help="CSV or npz files of columns, or traces."),
+]
+Paths = Annotated[
+    str | None,
+    typer.Option(
+        "--for",
+        metavar="PATH,...",
+        help="Numbers to find, as shoulder.damping,elbow.frictionloss,input_delay,m; "
+        "default: those that a rig's records determine.",
+    ),
+]
+PairsFile = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Find friction alone, from columns speed and torque, without a machine.",
+    ),
+]
+HeldOut = Annotated[
+    Path | None,
+    typer.Option(help="A log, or pairs, that are not used, to check the numbers on."),
+]
+FoundFile = Annotated[
+    Path | None, typer.Option(help="File for --condition of compare, which and tune: FILE.txt.")
+]
+Corrected = Annotated[
+    bool, typer.Option("--corrected", help="Correct for the errors of the simulation's steps.")
+]
+Starts = Annotated[int, typer.Option(min=1, help="How many sets the search may start from.")]
+StartsSeed = Annotated[int, typer.Option(min=0, help="Seed of these starts.")]
+ModelJoints = Annotated[
+    str, typer.Argument(metavar="MACHINE", help="FILE.xml:joint+joint, or a plant by its name.")
+]
+UMax = Annotated[
+    float | None, typer.Option(help="Bound on |u| of each motor, N m or N; default: the model's.")
+]
+VMax = Annotated[
+    float | None,
+    typer.Option(help="Bound on the speed that is asked of each joint, rad/s or m/s."),
+]
+Amplitude = Annotated[
+    float | None,
+    typer.Option(help="Largest way from the goal to each side, rad or m; default: 0.5 or 0.1."),
+]
+MotionDuration = Annotated[float, typer.Option(help="Duration of each motion, s.")]
+Rate = Annotated[float, typer.Option(help="Samples a second of the log.")]
+MotionFile = Annotated[
+    Path | None, typer.Option(help="CSV file of the best motion: t, and r or r_JOINT.")
+]
+
+
+def identify(
+    machine: Machine = None,
+    files: Logs = None,
+    names: Paths = None,
+    pairs: PairsFile = None,
+    held_out: HeldOut = None,
+    columns: options.Columns = None,
+    figure: Annotated[
+        Path | None, options.picture("prediction over log, residuals and friction; or the pairs")
+    ] = None,
+    out: FoundFile = None,
+    corrected: Corrected = False,
+    starts: Starts = 1,
+    seed: StartsSeed = 0,
+    json: options.Json = None,
+) -> None:
+    """Find numbers of a machine from its logs: friction, armature, delay, masses, with errors.
+
+    A log is of any controller, at 40 Hz or more. It has columns t in s, and x (rad or m) and u (N m
+    or N) of the joint, or x_JOINT and u_JOINT of each. Nobody gives a start.
+
+    The paths of numbers are JOINT.damping, .frictionloss, .armature, .stiffness, .gain, .offset and
+    .zero, input_delay, m and grav. The table has each number with its standard error. What the logs
+    cannot tell is said below it.
+
+    Pairs of speed (rad/s or m/s) and torque (N m or N) are of one joint in the order of time. The
+    torque is what friction alone needs: measured, less gravity and inertia.
+
+    Example: smc-mujoco identify arm.xml run1.csv run2.csv --for shoulder.damping,input_delay
+
+    Example: smc-mujoco identify arm.xml:shoulder run.csv --for m --columns x=angle,u=torque
+
+    Example: smc-mujoco identify emps run.csv
+
+    Example: smc-mujoco identify --pairs slow.csv --columns speed=dq4,torque=tau4 --figure friction
+    """
+    terminal = Terminal(json)
+    options.check_files(None, figure, out)
+    renamed = options.pairs(columns, "columns", "x_elbow=angle,t=time") or None
+    if pairs is not None:
+        if machine is not None or names is not None:
+            raise ScenarioError(
+                "--pairs has friction alone: leave out the machine, its logs and --for"
+            )
+        _from_pairs(pairs, held_out, renamed, figure, out, terminal)
+        return
+    if machine is None or not files:
+        raise ScenarioError(
+            "identify needs a machine and its logs, as arm.xml run.csv, or --pairs FILE"
+        )
+    with delay_signals():
+        from smc_mujoco.cli import rig_tables
+        from smc_mujoco.identification import identify as identification
+
+    found = identification.identify(
+        machine,
+        list(files),
+        options.names(names) or None,
+        held_out=held_out,
+        columns=renamed,
+        corrected=corrected,
+        starts=starts,
+        seed=seed,
+        progress=True,
+    )
+    for table in rig_tables.identified(found, [str(file) for file in files]):
+        terminal.print(table)
+    for note in found.notes:
+        terminal.note(note, wrap=True)
+    terminal.note(f"{found.evaluations} parameter sets, {terminal.seconds:.0f} s")
+    if figure:
+        terminal.wrote(*found.figure(figure))
+    if out:
+        terminal.wrote(found.save(out))
+    terminal.finish(found.about())
+
+
+def _from_pairs(
+    file: Path,
+    held_out: Path | None,
+    columns: Mapping[str, str] | None,
+    figure: Path | None,
+    out: Path | None,
+    terminal: Terminal,
+) -> None:
+    """Find friction in pairs of speed and torque."""
+    with delay_signals():
+        from smc_mujoco.identification import speed_torque
+
+    read = speed_torque.read_pairs
+    other = None if held_out is None else read(held_out, columns)
+    found = speed_torque.identify_friction(*read(file, columns), held_out=other)
+    terminal.note(str(found))
+    if figure:
+        terminal.wrote(*found.figure(figure))
+    if out:
+        terminal.wrote(found.save(out))
+    terminal.finish(found.about())
+
+
+def excitation(
+    machine: ModelJoints,
+    names: Paths = None,
+    u_max: UMax = None,
+    v_max: VMax = None,
+    amplitude: Amplitude = None,
+    duration: MotionDuration = 8.0,
+    rate: Rate = 500.0,
+    out: MotionFile = None,
+    json: options.Json = None,
+) -> None:
+    """Recommend a motion to record, from which numbers of a machine can be told apart.
+
+    It compares chirps, sines and staircases within the bounds on the model: how large the error of
+    each number will be, and which two are told apart worst. Play the best under any controller that
+    holds, and record t, and x and u of each joint, for `smc-mujoco identify`.
+
+    Example: smc-mujoco excitation arm.xml:shoulder --for shoulder.damping,input_delay --out m.csv
+    """
+    terminal = Terminal(json)
+    options.check_files(None, out and with_ending(out, ".csv"))
+    with delay_signals():
+        from smc_mujoco.identification import excitation as recommendation
+
+    advice = recommendation.excitation(
+        machine,
+        options.names(names),
+        u_max=u_max,
+        v_max=v_max,
+        amplitude=amplitude,
+        duration=duration,
+        rate=rate,
+    )
+    terminal.note(str(advice), wrap=True)
+    if out:
+        terminal.wrote(advice.save(out))
+        ends = [column.removeprefix("r") for column in advice.columns]
+        logged = ", ".join(["t", *(f"x{end}" for end in ends), *(f"u{end}" for end in ends)])
+        terminal.note(f"play it, record {logged}, and run smc-mujoco identify", wrap=True)
+    terminal.finish(advice.about())
