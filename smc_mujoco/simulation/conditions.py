@@ -251,7 +251,8 @@ def applicable(names: Iterable[str], plants: Sequence[Plant], duration: float) -
     for name in names:
         with contextlib.suppress(ScenarioError):
             for plant in plants:
-                NAMED[name].on(plant, duration)
+                fields = NAMED[name].on(plant, duration)
+                Scenario.recorded(plant=plant, law="none", duration=duration, **fields)
             fitting.append(name)
     return fitting
 

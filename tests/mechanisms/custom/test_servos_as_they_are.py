@@ -13,6 +13,7 @@ from smc_mujoco.hardware import PositionServo
 from smc_mujoco.mechanisms.named import from_text
 from smc_mujoco.metrics.tip import knows_contacts
 from smc_mujoco.robustness.margins import MARGIN_KINDS
+from smc_mujoco.simulation.conditions import applicable
 
 ARM = """<mujoco model="arm"><compiler angle="radian"/><worldbody>
   <body><joint name="a" axis="0 1 0" damping=".1" armature=".02"/>
@@ -280,3 +281,8 @@ def test_joints_with_a_servo_and_with_a_motor_are_not_tuned_together():
 def test_the_fast_engine_says_what_of_a_servo_it_cannot():
     scenario = smc.Scenario(plant="duffing", law="pid", actuator=PositionServo(kp=9.0))
     assert "an actuator other than" in why_not(scenario)
+
+
+def test_a_comparison_leaves_out_the_conditions_with_another_drive():
+    left = applicable(["nominal", "dc_motor", "lag_20ms", "fault", "backlash"], [servo(BARE)], 1.0)
+    assert left == ["nominal", "backlash"]
