@@ -23,7 +23,7 @@ def advancing(form: Form, between: Any, compile_user: Compiler) -> Any:
     rubs = bool(form.frictions)
     # a signal without memory is the same at the third stage as at the second
     remembers = any(kind.memory for kind in form.disturbances)
-    drive = _driving(form)
+    drive = driving(form)
     bend = _bending(form)
     friction = _rubbing(form, compile_user)
     nominal = compile_user(form.nominal.function)
@@ -90,7 +90,7 @@ def _valuing(form: Form) -> Any:
     return valued
 
 
-def _driving(form: Form) -> Any:
+def driving(form: Form) -> Any:
     """Return a function (view, i, stage) -> the force of the drive of channel i, whose mean over
     the step is the state's `middle`.
     """

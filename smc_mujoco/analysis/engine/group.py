@@ -3,7 +3,7 @@
 import functools
 import math
 from collections import Counter
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -55,7 +55,6 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
     """Return what this engine cannot do of a scenario, in one sentence; "" if it does all."""
     s = scenario.resolved
     plant = s.plant
-    parts = [part for part in (*s.law.parts, s.surface, s.velocity) if part is not None]
     beyond = {
         f"{plant.name} is more than one equation a joint": bool(
             plant.by_mujoco or plant.unmodelled or plant.direct or plant.measured
@@ -69,8 +68,19 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
         ),
         f"its integrator is {s.integrator}": s.integrator
         != ("implicitfast" if rubs_by_force(s) else "RK4"),
+    }
+    for name in filter(holds, metrics):
+        told = f"{name} is of bristles or of an own friction's force, which a trace tells"
+        beyond[told] = rubs_by_force(s)
+    return first_of(beyond) or why_not_sampled(s, metrics, device)
+
+
+def why_not_sampled(s: Resolved, metrics: Sequence[str], device: str) -> str:
+    """Return what a sample of this engine cannot do of a scenario, whatever integrates it."""
+    parts = [part for part in (*s.law.parts, s.surface, s.velocity) if part is not None]
+    beyond = {
         "a law of many joints, or in C, is for the processor": device == "cuda"
-        and any(_part(law).function is None for law in s.law.of_channels(plant.driven)),
+        and any(_part(law).function is None for law in s.law.of_channels(s.plant.driven)),
         "a function of its user's may index beyond its memory, which only the processor checks": (
             device == "cuda" and not all(map(_indexes_within, _users(s)))
         ),
@@ -84,9 +94,11 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
         beyond[f"it does not sum up {name}"] = not summed_up(name)
         only = f"the engine sums up {name} only for a reference at rest"
         beyond[only] = name in RESTING and moving
-        beyond[f"{name} is of bristles or of an own friction's force, which a trace tells"] = holds(
-            name
-        ) and rubs_by_force(s)
+    return first_of(beyond)
+
+
+def first_of(beyond: Mapping[str, bool]) -> str:
+    """Return the first of some sentences that holds; "" if none does."""
     return next((words for words, holds in beyond.items() if holds), "")
 
 
@@ -242,11 +254,13 @@ class FormGroup:
       known: forms that are compiled already; the group's form contains them, to use their code.
     """
 
+    least = 1  # runs that are worth a group
+
     def __init__(
         self, scenarios: Sequence[Scenario], metrics: Sequence[str] = (), known: Sequence[Form] = ()
     ):
         self.scenarios = [scenario.resolved for scenario in scenarios]
-        forms = dict.fromkeys(form_of(s, metrics) for s in self.scenarios)
+        forms = dict.fromkeys(self.form_of(s, metrics) for s in self.scenarios)
         self.form = functools.reduce(wider, [*forms, *known])
         self.layout = layout(self.form)
         self.rows = np.zeros((len(scenarios), self.layout.row_size))
@@ -255,6 +269,15 @@ class FormGroup:
         for row, s in zip(self.rows, self.scenarios, strict=True):
             self._fill(row, s)
         self.tables = np.concatenate([*self._points, np.zeros(1)])
+
+    @staticmethod
+    def key_of(scenario: Scenario) -> Hashable:
+        """Return what is equal for scenarios that one group can run."""
+        return key(scenario)
+
+    def form_of(self, s: Resolved, metrics: Sequence[str]) -> Form:
+        """Return the form of one run."""
+        return form_of(s, metrics)
 
     def run(self, rows: np.ndarray, threads: int | None = None, device: str = "cpu") -> np.ndarray:
         """Return the scores of rows, (runs, SCORES + metrics); NaN after a failure."""
@@ -330,7 +353,7 @@ class FormGroup:
         for k, spring in enumerate(_springs(s).values()):
             _put(row, self.layout.row.springs + len(spring) * k, spring)
         places = self.layout.row.damping, self.layout.row.levels
-        for part in s.friction:
+        for part in s.friction if self.form.frictions else ():
             for first, value in zip(places, part.added_to_model, strict=True):
                 row[np.add(first, part.channels(s.plant))] += value
 

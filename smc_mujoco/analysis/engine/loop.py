@@ -69,15 +69,15 @@ def simulation(form: Form, compile_user: Compiler, noise: Any) -> Any:
     numbers `form.LOGGED` of every channel at every sample, if the row says `logging`. `noise` is a
     moment, see `noise`.
     """
-    begin, between = order(_moments(form, compile_user, noise))
+    begin, between = order(moments(form, compile_user, noise))
     if form.implicit:
         advance = advancing_implicitly(form, compile_user)
     else:
         advance = advancing(form, between, compile_user)
-    remember = _remembering(form)
+    remember = remembering(form)
     elastic = form.elastic
     rotors = len(elastic)
-    record = _recording(form)
+    record = recording(form)
     n = form.n
     row_at, work_at = layout(form)[:2]
     size = layout(form).work_size
@@ -120,9 +120,9 @@ def simulation(form: Form, compile_user: Compiler, noise: Any) -> Any:
     return start, take
 
 
-def _moments(form: Form, compile_user: Compiler, noise: Any) -> Moments:
+def moments(form: Form, compile_user: Compiler, noise: Any) -> Moments:
     """Return what a run of the form does at each moment."""
-    moments = Moments(
+    found = Moments(
         **_records(form),
         **_sensing(form, compile_user),
         **_forces(form, compile_user),
@@ -137,8 +137,8 @@ def _moments(form: Form, compile_user: Compiler, noise: Any) -> Moments:
         sums=bool(form.frictions),
     )
     if form.joint:
-        return moments._replace(ask=_asking_all(form, compile_user))
-    return moments._replace(ask=asking(moments, _asked(form, compile_user)))
+        return found._replace(ask=_asking_all(form, compile_user))
+    return found._replace(ask=asking(found, _asked(form, compile_user)))
 
 
 def _records(form: Form) -> Fields:
@@ -176,7 +176,7 @@ def _records(form: Form) -> Fields:
     }
 
 
-def _remembering(form: Form) -> Any:
+def remembering(form: Form) -> Any:
     """Return a function (view, step): keep the state for a sensor that is late."""
     if not form.past:
         return always(None)
@@ -506,7 +506,7 @@ def _measuring_all(form: Form, compile_user: Compiler) -> Any:
     return measure
 
 
-def _recording(form: Form) -> Any:
+def recording(form: Form) -> Any:
     """Return a function (view, scores, log, k): what is kept of sample k."""
     n = form.n
     columns = len(LOGGED)

@@ -1,0 +1,38 @@
+"""Worlds that MuJoCo steps on the processor, in double precision: what `engine.worlds` writes around
+a physics step, without MuJoCo Warp.
+"""
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.analysis.engine import worlds
+from smc_mujoco.analysis.engine.form import SETTING
+from smc_mujoco.common import mjcb
+from smc_mujoco.simulation.model import put_initial_state, with_values
+from smc_mujoco.simulation.state import address
+
+
+def run_rows(group, scenarios, rows):
+    """The scores of rows, one of each scenario, (runs, SCORES + metrics)."""
+    work, scores = group.start(rows)
+    control = worlds.compiled(group.form)
+    for i, scenario in enumerate(scenarios):
+        model = with_values(group.mechanism.model, scenario)
+        data = mujoco.MjData(model)
+        put_initial_state(model, data, scenario)
+        of_run = [rows[i], group.tables, work[i], scores[i]]
+        places = list(map(address, (*of_run, data.qpos, data.qvel, data.ctrl, data.qfrc_applied)))
+        stages = scenario.resolved.stages
+        calls = [0]
+
+        def callback(model, data, places=places, stages=stages, calls=calls):
+            if calls[0] % stages < group.calls:
+                control(1, *places, 0, 0, 0)
+            calls[0] += 1
+
+        steps = int(rows[i, SETTING.samples] * rows[i, SETTING.steps])
+        with mjcb.installed(callback):
+            for _ in range(steps):
+                mujoco.mj_step(model, data)
+            mujoco.mj_forward(model, data)
+    return np.array(scores)
