@@ -38,6 +38,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from smc_mujoco.analysis.engine import CHECKED, CONVERGES, DOES_NOT, UNDECIDED, Device
+from smc_mujoco.analysis.engine.choice import chosen
 from smc_mujoco.analysis.engine.form import SCORES, SETTING
 from smc_mujoco.analysis.engine.group import FormGroup, why_not
 from smc_mujoco.analysis.engine.outcome import NAME, over_trace
@@ -207,10 +208,13 @@ def basin_of(
     grid = _Grid(base, x, v, threads)
     states = np.stack([np.tile(x, v.size), np.repeat(v, x.size)], axis=1)
     checked = ""
-    if why_not(base, (), device) or prepare(base).why_not:
+    kind, _ = chosen(base, (NAME,), device)
+    if kind is None or len(states) < kind.least or prepare(base).why_not:
         outcome, decided_at = grid.decide(grid.by_mujoco, grid.traced, states, report)
     else:
-        outcome, decided_at = grid.decide(grid.by_engine(device), BATCH_STATES, states, report)
+        outcome, decided_at = grid.decide(
+            grid.by_engine(kind, device), BATCH_STATES, states, report
+        )
         drawn = np.random.default_rng(0).permutation(len(states))[:CHECKED]
         again, _ = grid.decide(grid.by_mujoco, CHECKED, states[drawn], lambda done, needed: None)
         differ = np.count_nonzero(again != outcome[drawn])
@@ -280,11 +284,11 @@ class _Grid:
             found[i] = verdict_of(trace, self.x, self.v, final) or UNDECIDED
         return found
 
-    def by_engine(self, device: str) -> Callable:
-        """Return the same by the fast engine, on a device."""
+    def by_engine(self, kind: type[FormGroup], device: str) -> Callable:
+        """Return the same by a kind of group, on a device."""
 
         def run(shortened: Scenario, states: Array, final: bool) -> Array:
-            made = FormGroup([shortened], (NAME,))
+            made = kind([shortened], (NAME,))
             rows = np.repeat(made.rows, len(states), axis=0)
             at = made.layout.row
             n = self.base.plant.n

@@ -241,7 +241,7 @@ def sensitivity(
     design = designs(points, len(space.names), seed)
     work = len(design) * scenario.work
     formulas = {metric: lambda trace: _score(trace, metric), "rest_share": rest_share}
-    fast = ScoredRuns(formulas, device, threads, worth_compiling(work), by_group=True)
+    fast = ScoredRuns(formulas, device, threads, worth_compiling(work), by_group=True, worlds=True)
     words = f"sensitivity of {scenario.law.name} on {scenario.plant.name}"
     with bar(words, work, shown=progress) as drawn:
         scores, held = _run(space, design, fast, drawn.advance)

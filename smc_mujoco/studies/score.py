@@ -68,7 +68,9 @@ def score(
     columns = {"plant": pa.string(), "law": pa.string(), "condition": pa.string()}
     columns |= {"seed": pa.int64()} | dict.fromkeys((*names, "diverged_at"), pa.float64())
     schema = pa.schema(list(columns.items()))
-    scored = ScoredRuns({name: getattr(catalogue, name) for name in names}, device, threads)
+    scored = ScoredRuns(
+        {name: getattr(catalogue, name) for name in names}, device, threads, worlds=True
+    )
     tables = []
     left = iter(runs)
     while chunk := list(itertools.islice(left, CHUNK)):

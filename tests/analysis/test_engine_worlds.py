@@ -96,7 +96,7 @@ def check(plant, law, conditions, duration=0.3, seeds=2):
     assert worlds.why_not(cases[0], metrics, "cpu") == ""
     assert len(set(map(worlds.WorldGroup.key_of, cases))) == 1
     made = worlds.WorldGroup(cases, metrics)
-    found = mujoco_worlds.run_rows(made, cases, made.rows)
+    found = mujoco_worlds.run_rows(made, made.rows)
     for scores, trace in zip(found, smc.run(cases), strict=True):
         if trace.diverged_at is not None:
             assert scores[FAILURE] != state.FINE
@@ -174,7 +174,7 @@ def test_a_world_that_fails_leaves_the_others_as_they_are():
         cases.append(smc.Scenario(plant=plant, law=law, duration=duration, u_max=1e9))
     cases.append(smc.Scenario(plant=plant, law=raising(), duration=0.03))
     made = worlds.WorldGroup(cases, ("itae",))
-    found = mujoco_worlds.run_rows(made, cases, made.rows)
+    found = mujoco_worlds.run_rows(made, made.rows)
     assert found[:, FAILURE].tolist()[:2] == [state.FINE, state.RAISED]
     assert found[3, FAILURE] == state.FINE
     traces = smc.run([cases[0], cases[3]])

@@ -12,17 +12,19 @@ from smc_mujoco.simulation.model import put_initial_state, with_values
 from smc_mujoco.simulation.state import address
 
 
-def run_rows(group, scenarios, rows):
-    """The scores of rows, one of each scenario, (runs, SCORES + metrics)."""
+def run_rows(group, rows):
+    """The scores of rows, (runs, SCORES + metrics), of the group's scenarios in turn."""
     work, scores = group.start(rows)
     control = worlds.compiled(group.form)
-    for i, scenario in enumerate(scenarios):
+    for i in range(len(rows)):
+        scenario = group.scenarios[i % len(group.scenarios)]
         model = with_values(group.mechanism.model, scenario)
         data = mujoco.MjData(model)
         put_initial_state(model, data, scenario)
+        (data.qpos[:],), (data.qvel[:],) = group.states(rows[i : i + 1], data.qpos, data.qvel)
         of_run = [rows[i], group.tables, work[i], scores[i]]
         places = list(map(address, (*of_run, data.qpos, data.qvel, data.ctrl, data.qfrc_applied)))
-        stages = scenario.resolved.stages
+        stages = scenario.stages
         calls = [0]
 
         def callback(model, data, places=places, stages=stages, calls=calls):

@@ -21,19 +21,23 @@ with extra("gpu", "device 'cuda'"):
         setattr(np, "row_stack", np.vstack)  # noqa: B010
         importlib.import_module("numba.cuda.np.arrayobj")
         delattr(np, "row_stack")
-    from numba import cuda, float64, njit, types
+    from numba import cuda, float32, float64, njit, types
     from numba.extending import intrinsic
 
 from smc_mujoco.analysis.engine import noise
 from smc_mujoco.analysis.engine.calls import View
 from smc_mujoco.analysis.engine.form import FAILURE, SCORES, UNDER_WAY, Form, layout
 from smc_mujoco.analysis.engine.loop import simulation
+from smc_mujoco.analysis.engine.worlds import World, controlling
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.numba_internals import cgutils
 
 THREADS = 128  # in a block
 PIECE = 2**18  # runs in a call of the device: they fill an H100, and Ctrl-C waits for them
 ARGUMENTS = types.void(float64[:, ::1], float64[::1], float64[:, ::1])
+OF_WORLDS = types.void(
+    float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], *[float32[:, ::1]] * 4
+)
 
 
 @intrinsic
@@ -43,7 +47,7 @@ def _pointer(typingctx, array):
     def codegen(context, builder, signature, args):
         return cgutils.create_struct_proxy(array)(context, builder, args[0]).data
 
-    return types.CPointer(types.float64)(array), codegen
+    return types.CPointer(array.dtype)(array), codegen
 
 
 def kernel(form: Form) -> Any:
@@ -76,6 +80,24 @@ def kernel(form: Form) -> Any:
     return runs
 
 
+def control_kernel(form: Form) -> Any:
+    """Return the control callback of worlds in Python, (rows, tables, work, scores, qpos, qvel,
+    ctrl, qfrc_applied).
+    """
+    control = controlling(form, njit(error_model="numpy"))
+
+    def callback(rows, tables, work, scores, qpos, qvel, ctrl, qfrc_applied):
+        i = cuda.grid(1)
+        if i < len(rows):
+            view = View(_pointer(rows[i]), _pointer(tables), _pointer(work[i]))
+            world = World(
+                _pointer(qpos[i]), _pointer(qvel[i]), _pointer(ctrl[i]), _pointer(qfrc_applied[i])
+            )
+            control(view, _pointer(scores[i]), world)
+
+    return callback
+
+
 def check_device() -> None:
     """Raise ScenarioError unless this machine has a CUDA device, and all that its code needs."""
     if not cuda.is_available():
@@ -95,6 +117,12 @@ def check_device() -> None:
 def compiled(form: Form) -> Any:
     """Return the compiled kernel of a form, for the device of this machine."""
     return cuda.jit(ARGUMENTS)(kernel(form))
+
+
+@functools.lru_cache(maxsize=64)
+def compiled_control(form: Form) -> Any:
+    """Return the compiled control callback of worlds, for the device of this machine."""
+    return cuda.jit(OF_WORLDS)(control_kernel(form))
 
 
 def run_rows(form: Form, rows: Array, tables: Array) -> Array:

@@ -332,7 +332,8 @@ class FormGroup:
         parts: list[tuple[PartAt | None, Any]] = []
         parts += [(self.layout.drive, part) for part in _drives(s)]
         parts += [(self.layout.sensor, part) for part in s.sensors]
-        parts += zip(self.layout.frictions, (*s.exact_parts, *_held(s)), strict=True)
+        if self.form.frictions:  # else MuJoCo has them
+            parts += zip(self.layout.frictions, (*s.exact_parts, *_held(s)), strict=True)
         parts += zip(self.layout.compensated, s.compensated, strict=True)
         for at, part in parts:
             assert at is not None  # one loop's scenarios have the same parts

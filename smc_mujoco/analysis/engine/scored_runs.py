@@ -1,4 +1,5 @@
-"""Scores of many scenarios without their traces: by the fast engine where it can, else by MuJoCo.
+"""Scores of many scenarios without their traces: by the fast engine or, on a CUDA device, by MuJoCo
+Warp where they can, else by MuJoCo.
 
 Where the engine's numbers are shown, MuJoCo repeats some of them, and `ScoredRuns.checked` says how
 far apart they were.
@@ -6,8 +7,9 @@ far apart they were.
 
 import math
 import random
+from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from smc_mujoco.analysis.engine import CHECKED
 from smc_mujoco.metrics.conventions import groups
@@ -18,6 +20,7 @@ from smc_mujoco.simulation.trace import Trace, warn_of_broken
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.engine.form import Form
+    from smc_mujoco.analysis.engine.group import FormGroup
 
 MIN_WORK = 20_000_000  # physics steps times channels, about a minute of MuJoCo's: chosen
 Scored = tuple[list[float], float | None]  # metrics, and the time of a failure, s
@@ -41,6 +44,7 @@ class ScoredRuns:
       worth_compiling: whether the runs are worth it. If not, on the processor, all are MuJoCo's.
       by_group: whether a formula is the worst of the groups of channels. With several groups all
         runs are MuJoCo's.
+      worlds: whether there are so many runs at once that MuJoCo Warp may be worth it.
     """
 
     def __init__(
@@ -50,16 +54,19 @@ class ScoredRuns:
         threads: int | None = None,
         worth_compiling: bool = True,
         by_group: bool = False,
+        worlds: bool = False,
     ):
         self.formulas = formulas
         self.device = device
         self.worth_compiling = worth_compiling or device != "cpu"
         self.by_group = by_group
+        self.worlds = worlds
         self.threads = threads
         self.broken: dict[str, str] = {}  # law -> how it failed first, in a sentence
         self.forms: dict[Hashable, list[Form]] = {}
-        self.compiles: dict[Hashable, bool] = {}
+        self.compiles: dict[Hashable, str] = {}  # why a form does not compile
         self.random = random.Random(0)
+        self.refused: Counter[str] = Counter()  # why a card cannot run them -> runs of MuJoCo's
         self.count = 0
         self.drawn: list[tuple[Scenario, Scored]] = []
 
@@ -67,20 +74,20 @@ class ScoredRuns:
         self, cases: Sequence[Scenario], report: Report = lambda steps: None
     ) -> list[Scored]:
         """Return the scores of scenarios, in their order."""
-        from smc_mujoco.analysis.engine.group import FormGroup, key
-
         found: list[Scored] = [([], None)] * len(cases)
-        members: dict[Hashable, list[int]] = {}
+        members: dict[Any, list[int]] = {}
         for i, case in enumerate(cases):
-            group = key(case) if self.covers(case) else None
-            members.setdefault(group, []).append(i)
-        for group, indices in members.items():
+            kind, why = self._kind(case)
+            if why and self.device != "cpu":
+                self.refused[why] += 1
+            members.setdefault(kind and (kind, kind.key_of(case)), []).append(i)
+        for key, indices in self._large_enough(members).items():
             some = [cases[i] for i in indices]
-            if group is None:
+            if key is None:
                 scored = self.by_mujoco(some, report)
             else:
-                made = FormGroup(some, tuple(self.formulas), self.forms.get(group, []))
-                self.forms[group] = [made.form]
+                made = key[0](some, tuple(self.formulas), self.forms.get(key, []))
+                self.forms[key] = [made.form]
                 scored = made.scored(self.device, self.threads)
                 report(sum(case.work for case in some))
                 self._take(some, scored)
@@ -88,18 +95,38 @@ class ScoredRuns:
                 found[i] = scores
         return found
 
+    def _large_enough(self, members: dict[Any, list[int]]) -> dict[Any, list[int]]:
+        """Return groups of runs, in which those that are too few for their kind are MuJoCo's."""
+        kept: dict[Any, list[int]] = {}
+        for key, indices in members.items():
+            if key is not None and len(indices) < key[0].least:
+                self.refused[f"they are fewer than {key[0].least} of one model"] += len(indices)
+                kept.setdefault(None, []).extend(indices)
+            else:
+                kept.setdefault(key, []).extend(indices)
+        return kept
+
     def covers(self, case: Scenario) -> bool:
         """Return whether the fast engine can run a scenario."""
-        from smc_mujoco.analysis.engine.group import key, why_not
+        return self._kind(case)[0] is not None
 
-        if not self.worth_compiling or (self.by_group and len(groups(case)) > 1):
-            return False
-        if why_not(case, tuple(self.formulas), self.device):
-            return False
-        functions = key(case), *map(type, case.resolved.disturbance)
+    def _kind(self, case: Scenario) -> "tuple[type[FormGroup] | None, str]":
+        """Return the kind of group that runs a scenario; None and why if MuJoCo has to."""
+        from smc_mujoco.analysis.engine.choice import chosen
+
+        if not self.worth_compiling:
+            return None, "they are few"
+        if self.by_group and len(groups(case)) > 1:
+            return None, "its channels are of several groups"
+        kind, why = chosen(case, tuple(self.formulas), self.device, self.worlds)
+        if kind is None:
+            return None, why
+        functions = kind.key_of(case), *map(type, case.resolved.disturbance)
         if functions not in self.compiles:
-            self.compiles[functions] = not prepare.why_not(case)
-        return self.compiles[functions]
+            self.compiles[functions] = prepare.why_not(case)
+        if why := self.compiles[functions]:
+            return None, why
+        return kind, ""
 
     def by_mujoco(
         self, cases: Sequence[Scenario], report: Report = lambda steps: None
@@ -127,15 +154,16 @@ class ScoredRuns:
                 self.drawn[place] = pair
 
     def checked(self) -> str:
-        """Return in words how far the scores are from MuJoCo's, which repeats some runs; "" if it
-        made all.
+        """Return in words how far the scores are from MuJoCo's, which repeats some runs, and why a
+        card could not run others; "" if MuJoCo made all.
 
         Warn of laws that fail in these, or in MuJoCo's own.
         """
         others = self.by_mujoco([case for case, _ in self.drawn])
         warn_of_broken(self.broken)
+        refused = [f"MuJoCo made {n} runs: {why}" for why, n in self.refused.items()]
         if not self.drawn:
-            return ""
+            return "; ".join(refused)
         apart = dict.fromkeys(self.formulas, 0.0)
         failed = 0  # in one of the two
         for (_, (ours, time)), (theirs, other_time) in zip(self.drawn, others, strict=True):
@@ -146,7 +174,8 @@ class ScoredRuns:
                     if value != other and not (math.isnan(value) and math.isnan(other)):
                         apart[name] = max(apart[name], abs(value - other))
         parts = [f"{name} {value:.1g}" for name, value in apart.items()]
-        return (
+        apart_by = (
             f"MuJoCo repeated {len(self.drawn)} runs: {failed} failed in one engine alone, the "
             f"others are apart by at most {', '.join(parts)}"
         )
+        return "; ".join([apart_by, *refused])

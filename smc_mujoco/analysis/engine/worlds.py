@@ -33,6 +33,7 @@ from smc_mujoco.analysis.engine.form import (
 )
 from smc_mujoco.analysis.engine.group import FormGroup, first_of, form_of, key, why_not_sampled
 from smc_mujoco.analysis.engine.loop import moments, recording, remembering
+from smc_mujoco.analysis.engine.scores import holds
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import Key, compile_for, inlined, jit, pointer
@@ -97,6 +98,7 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cuda
         "a disturbance acts on a body": bool(s.disturbance) and not plant.direct,
     }
     for name in metrics:
+        beyond[f"{name} is of friction that holds, which a trace tells"] = holds(name)
         if refusal := name in CATALOGUE and CATALOGUE[name].refusal(plant):
             beyond[refusal] = True
     return first_of(beyond) or why_not_sampled(s, metrics, device)
@@ -278,6 +280,22 @@ class WorldGroup(FormGroup):
         scores = np.full((len(rows), SCORES + len(self.form.metrics)), np.nan)
         scores[:, FAILURE] = UNDER_WAY
         return np.zeros((len(rows), work_size(self.form))), scores
+
+    def states(self, rows: np.ndarray, qpos: np.ndarray, qvel: np.ndarray) -> tuple:
+        """Return the states at which the worlds of rows start, (worlds, nq) and (worlds, nv), given
+        the model's.
+        """
+        at = world_places(self.form)[0]
+        n = self.form.n
+        found = []
+        for state, of_row, place in (
+            (qpos, self.layout.row.x0, at.qpos),
+            (qvel, self.layout.row.v0, at.qvel),
+        ):
+            states = np.tile(state, (len(rows), 1))
+            states[:, rows[0, place : place + n].astype(int)] = rows[:, of_row : of_row + n]
+            found.append(states)
+        return tuple(found)
 
     def steps(self, rows: np.ndarray) -> int:
         """Return how many physics steps the longest run has."""

@@ -1,0 +1,171 @@
+"""MuJoCo Warp's worlds against MuJoCo: on its processor device, and what it is asked to run."""
+
+import importlib.util
+import sys
+
+import numpy as np
+import pytest
+from analysis.test_engine_worlds import CONDITIONS, PLANTS
+from helpers import mujoco_worlds
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.engine import choice, worlds
+from smc_mujoco.analysis.engine.form import FAILURE, SCORES
+from smc_mujoco.analysis.engine.group import FormGroup
+from smc_mujoco.analysis.engine.scored_runs import ScoredRuns
+from smc_mujoco.metrics import catalogue
+from smc_mujoco.simulation import state
+
+with_warp = pytest.mark.skipif(
+    importlib.util.find_spec("mujoco_warp") is None,
+    reason="mujoco-warp is missing: pip install 'smc-mujoco[gpu]'",
+)
+AGREES = 1e-5  # relative: MuJoCo Warp computes in single precision
+METRICS = ("itae", "tv", "max_u", "rms_error", "ultimate_bound")
+HINGE = """
+<mujoco model="hinge">
+  <default><geom contype="0" conaffinity="0"/></default>
+  <worldbody>
+    <body pos="0 0 1"><joint name="hinge" axis="0 1 0"/><geom type="capsule" size=".02" fromto="0 0 0 0 0 -.5" mass="1"/></body>
+  </worldbody>
+  <actuator><motor joint="hinge" ctrlrange="-20 20"/></actuator>
+</mujoco>
+"""
+FLOOR = """
+<mujoco model="floor">
+  <worldbody>
+    <geom type="plane" size="1 1 .1"/>
+    <body pos="0 0 .1">
+      <joint name="slide" type="slide" axis="0 0 1" range="-1 1"/>
+      <geom type="box" size=".1 .1 .1" mass="1"/>
+    </body>
+  </worldbody>
+  <actuator><motor joint="slide" ctrlrange="-20 20"/></actuator>
+</mujoco>
+"""
+
+
+def hinge():
+    return smc.plant_from(HINGE, {"hinge": smc.Channel(x0=0.4)})
+
+
+def cases_of(plant, law, conditions, duration, seeds=2):
+    cases = []
+    for seed in range(seeds):
+        x0 = tuple(x + 0.05 - 0.01 * seed for x in plant.x0)
+        fields = {"mismatch": {"m": 1.0 + 0.1 * seed}, "seed": seed, "x0": x0}
+        for name in conditions:
+            fields |= CONDITIONS[name]
+        cases.append(smc.Scenario(plant=plant, law=smc.law(law), duration=duration, **fields))
+    return cases
+
+
+def check(cases):
+    """Compare scores of worlds on MuJoCo Warp's processor device with those of runs."""
+    from smc_mujoco.analysis.engine import warp
+
+    assert warp.why_not(cases[0]) == ""
+    made = worlds.WorldGroup(cases, METRICS)
+    found = warp.run_rows(made, made.rows, "cpu")
+    assert (found[:, FAILURE] == state.FINE).all()
+    for scores, trace in zip(found, smc.run(cases), strict=True):
+        expected = [getattr(catalogue, name)(trace) for name in METRICS]
+        np.testing.assert_allclose(scores[SCORES:], expected, rtol=AGREES)
+
+
+MACHINES = {
+    "hinge": (hinge, "super_twisting", ("noise", "sine", "lag"), 0.1),
+    "wall": (PLANTS["wall"], "pid", ("noise", "delay", "encoder", "friction"), 0.1),
+    "panda": (PLANTS["panda"], "pid", ("noise", "missed"), 0.05),
+}
+
+
+@with_warp
+@pytest.mark.slow
+@pytest.mark.parametrize("machine", MACHINES)
+def test_worlds_of_mujoco_warp_have_other_masses_and_the_scores_of_runs(machine):
+    made, law, conditions, duration = MACHINES[machine]
+    check(cases_of(made(), law, conditions, duration))
+
+
+@with_warp
+@pytest.mark.slow
+def test_contacts_that_do_not_fit_are_run_again_with_more_room(monkeypatch, refused):
+    """A box stands on its four corners, and there is room for one contact."""
+    from smc_mujoco.analysis.engine import warp
+
+    plant = smc.plant_from(FLOOR, ["slide"])
+    cases = [smc.Scenario(plant=plant, law=smc.law("pid"), duration=0.02, x0=-1e-4)]
+    monkeypatch.setattr(warp, "CONTACTS", 1)
+    check(cases)
+    monkeypatch.setattr(warp, "MOST_CONTACTS", 2)
+    made = worlds.WorldGroup(cases, METRICS)
+    refused(lambda: warp.run_rows(made, made.rows, "cpu"), "floor", "2 a world", "'cpu'")
+
+
+@with_warp
+def test_a_model_that_mujoco_warp_cannot_run_is_told():
+    from smc_mujoco.analysis.engine import warp
+
+    text = HINGE.replace("<default>", '<option solver="PGS"/><default>')
+    plant = smc.plant_from(text, ["hinge"])
+    assert "PGS" in warp.why_not(smc.Scenario(plant=plant, law="pid", duration=0.1))
+
+
+@pytest.fixture
+def on_card(monkeypatch):
+    """Worlds are MuJoCo's, and a few are worth a card."""
+    monkeypatch.setattr(choice, "_of_model", lambda scenario: "")
+    monkeypatch.setattr(worlds.WorldGroup, "least", 3)
+
+    def run(group, rows, threads=None, device="cuda"):
+        assert device == "cuda"
+        return mujoco_worlds.run_rows(group, rows)
+
+    monkeypatch.setattr(worlds.WorldGroup, "run", run)
+
+
+def test_own_machines_are_scored_in_worlds_and_the_rest_by_mujoco(on_card):
+    alike = cases_of(hinge(), "pid", ("noise",), 0.1, seeds=3)
+    jump = smc.Scenario(
+        plant=hinge(), law=smc.law("pid"), duration=0.1, jump=smc.Jump(0.05, {"m": 2.0})
+    )
+    few = cases_of(PLANTS["cart"](), "pid", (), 0.1)
+    runs = ScoredRuns({"itae": catalogue.itae}, "cuda", worlds=True)
+    every = [alike[0], jump, *alike[1:], *few]
+    found = runs.scored(every)
+    for (values, failed), trace in zip(found, smc.run(every), strict=True):
+        assert failed is None
+        assert values == [pytest.approx(catalogue.itae(trace), rel=1e-12)]
+    told = runs.checked()
+    assert "MuJoCo repeated 3 runs: 0 failed" in told
+    assert "MuJoCo made 1 runs: its parameters jump" in told
+    assert "MuJoCo made 2 runs: they are fewer than 3 of one model" in told
+
+
+def test_a_map_of_an_own_machine_is_made_in_worlds(on_card, monkeypatch):
+    from smc_mujoco.robustness.region_of_attraction import basin_of
+
+    base = smc.Scenario(plant=hinge(), law=smc.law("pid"), duration=0.3)
+    axes = (0.0, 0.3), (0.0, 1.0)
+    found = basin_of(base, *axes, device="cuda")
+    expected = basin_of(base, *axes)
+    assert found.outcome.tolist() == expected.outcome.tolist()
+    assert "MuJoCo repeated 4 states, 0" in found.checked
+    assert expected.checked == ""
+
+
+def test_the_plant_decides_which_engine_runs_it(on_card):
+    equation = smc.Scenario(plant="duffing", law="pid", duration=0.1)
+    own = smc.Scenario(plant=hinge(), law="pid", duration=0.1)
+    assert choice.chosen(equation, (), "cuda")[0] is FormGroup
+    assert choice.chosen(own, (), "cuda")[0] is worlds.WorldGroup
+    assert choice.chosen(own, (), "cuda", many=False)[0] is None
+    assert choice.chosen(own, (), "cpu")[0] is None
+
+
+def test_a_card_without_mujoco_warp_says_what_to_install(monkeypatch, refused):
+    monkeypatch.setitem(sys.modules, "mujoco_warp", None)
+    monkeypatch.delitem(sys.modules, "smc_mujoco.analysis.engine.warp", raising=False)
+    own = smc.Scenario(plant=hinge(), law="pid", duration=0.1)
+    refused(lambda: choice.chosen(own, (), "cuda"), "pip install 'smc-mujoco[gpu]'")
