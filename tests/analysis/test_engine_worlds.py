@@ -11,7 +11,7 @@ from helpers.arms import arm
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine import worlds
 from smc_mujoco.analysis.engine.form import FAILED_STEP, FAILURE, SCORES
-from smc_mujoco.analysis.engine.scores import RESTING, names
+from smc_mujoco.analysis.engine.scores import RESTING, holds, names
 from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.hardware import RateLimit
 from smc_mujoco.metrics import catalogue
@@ -92,7 +92,9 @@ def check(plant, law, conditions, duration=0.3, seeds=2):
     moving = not all(isinstance(one, smc.Constant) for one in cases[0].references)
     metrics = catalogue.CATALOGUE.keys() & set(names())
     metrics = sorted(metrics.difference(RESTING if moving else ()))
-    metrics = [name for name in metrics if not catalogue.CATALOGUE[name].refusal(plant)]
+    metrics = [
+        name for name in metrics if not (holds(name) or catalogue.CATALOGUE[name].refusal(plant))
+    ]
     assert worlds.why_not(cases[0], metrics, "cpu") == ""
     assert len(set(map(worlds.WorldGroup.key_of, cases))) == 1
     made = worlds.WorldGroup(cases, metrics)
@@ -153,6 +155,11 @@ def test_what_a_world_cannot_run_is_told(what):
 def test_a_metric_that_is_not_summed_up_is_told():
     scenario = smc.Scenario(plant=PLANTS["wall"](), law="pid", duration=0.3)
     assert "overshoot" in worlds.why_not(scenario, ("overshoot",), "cpu")
+
+
+def test_a_metric_of_friction_that_holds_is_told():
+    scenario = smc.Scenario(plant=PLANTS["wall"](), law="pid", duration=0.3)
+    assert "holds" in worlds.why_not(scenario, ("stick_time",), "cpu")
 
 
 def test_a_metric_that_has_no_one_value_is_mujocos():
