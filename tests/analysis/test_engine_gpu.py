@@ -4,10 +4,12 @@ import importlib.util
 import types
 
 import pytest
+from analysis.test_engine_worlds import PLANTS as PLANTS_OF_WORLDS
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine import group
 from smc_mujoco.analysis.engine.scores import names
+from smc_mujoco.analysis.engine.worlds import WorldGroup
 from smc_mujoco.control.law import catalogue
 
 with_cuda = pytest.mark.skipif(
@@ -44,8 +46,8 @@ FRICTION = {  # of plants whose joints move alone
 }
 
 
-def code(monkeypatch, plant, law, metrics=("settling_time",), **fields):
-    """The code of a run for compute capability 9.0."""
+def code(monkeypatch, plant, law, metrics=("settling_time",), worlds=False, **fields):
+    """The code of a run, or of the callback of worlds, for compute capability 9.0."""
     from numba.cuda import dispatcher
 
     from smc_mujoco.analysis.engine import gpu
@@ -53,8 +55,11 @@ def code(monkeypatch, plant, law, metrics=("settling_time",), **fields):
     device = types.SimpleNamespace(compute_capability=(9, 0))
     monkeypatch.setattr(dispatcher, "get_current_device", lambda: device)
     case = smc.Scenario(plant=plant, law=law, duration=1.0, **fields)
-    kernel = gpu.kernel(group.FormGroup([case], metrics).form)
-    return gpu.cuda.compile_ptx(kernel, gpu.ARGUMENTS, cc=(9, 0))[0]
+    if worlds:
+        kernel, arguments = gpu.control_kernel(WorldGroup([case], metrics).form), gpu.OF_WORLDS
+    else:
+        kernel, arguments = gpu.kernel(group.FormGroup([case], metrics).form), gpu.ARGUMENTS
+    return gpu.cuda.compile_ptx(kernel, arguments, cc=(9, 0))[0]
 
 
 @with_cuda
@@ -79,6 +84,23 @@ def test_rotors_behind_springs_compile_for_a_device(monkeypatch):
 def test_every_law_compiles_for_a_device(monkeypatch, law):
     """On one plant: a law reads numbers and returns numbers, whatever the plant."""
     assert ".entry" in code(monkeypatch, "duffing", law)
+
+
+ALL_IN_A_WORLD = FULL | {"jump": None, "friction": DRY, "fault": smc.Fault(0.5)}
+
+
+@with_cuda
+@pytest.mark.parametrize(
+    ("law", "fields"),
+    [
+        ("pid", ALL_IN_A_WORLD),
+        pytest.param("super_twisting", {}, marks=pytest.mark.slow),
+        pytest.param("adrc", {"noise": smc.Noise(1e-3, 5e-3)}, marks=pytest.mark.slow),
+    ],
+)
+def test_the_callback_of_worlds_compiles_for_a_device(monkeypatch, law, fields):
+    plant = PLANTS_OF_WORLDS["wall"]()
+    assert ".entry" in code(monkeypatch, plant, law, worlds=True, **fields)
 
 
 @with_cuda

@@ -9,6 +9,7 @@ from analysis.test_engine_worlds import CONDITIONS, PLANTS
 from helpers import mujoco_worlds
 
 import smc_mujoco as smc
+from smc_mujoco.analysis import engine
 from smc_mujoco.analysis.engine import choice, worlds
 from smc_mujoco.analysis.engine.form import FAILURE, SCORES
 from smc_mujoco.analysis.engine.group import FormGroup
@@ -66,7 +67,7 @@ def check(cases):
 
     assert warp.why_not(cases[0]) == ""
     made = worlds.WorldGroup(cases, METRICS)
-    found = warp.run_rows(made, made.rows, "cpu")
+    found = warp.run_rows(made.runs, made.rows, "cpu")
     assert (found[:, FAILURE] == state.FINE).all()
     for scores, trace in zip(found, smc.run(cases), strict=True):
         expected = [getattr(catalogue, name)(trace) for name in METRICS]
@@ -95,12 +96,12 @@ def test_contacts_that_do_not_fit_are_run_again_with_more_room(monkeypatch, refu
     from smc_mujoco.analysis.engine import warp
 
     plant = smc.plant_from(FLOOR, ["slide"])
-    cases = [smc.Scenario(plant=plant, law=smc.law("pid"), duration=0.02, x0=-1e-4)]
+    made = worlds.WorldGroup([smc.Scenario(plant=plant, law="pid", duration=0.02)], METRICS)
+    expected = warp.run_rows(made.runs, made.rows, "cpu")
     monkeypatch.setattr(warp, "CONTACTS", 1)
-    check(cases)
+    np.testing.assert_array_equal(warp.run_rows(made.runs, made.rows, "cpu"), expected)
     monkeypatch.setattr(warp, "MOST_CONTACTS", 2)
-    made = worlds.WorldGroup(cases, METRICS)
-    refused(lambda: warp.run_rows(made, made.rows, "cpu"), "floor", "2 a world", "'cpu'")
+    refused(lambda: warp.run_rows(made.runs, made.rows, "cpu"), "floor", "2 a world", "'cpu'")
 
 
 @with_warp
@@ -167,5 +168,6 @@ def test_the_plant_decides_which_engine_runs_it(on_card):
 def test_a_card_without_mujoco_warp_says_what_to_install(monkeypatch, refused):
     monkeypatch.setitem(sys.modules, "mujoco_warp", None)
     monkeypatch.delitem(sys.modules, "smc_mujoco.analysis.engine.warp", raising=False)
+    monkeypatch.delattr(engine, "warp", raising=False)
     own = smc.Scenario(plant=hinge(), law="pid", duration=0.1)
     refused(lambda: choice.chosen(own, (), "cuda"), "pip install 'smc-mujoco[gpu]'")

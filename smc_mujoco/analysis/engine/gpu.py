@@ -28,7 +28,7 @@ from smc_mujoco.analysis.engine import noise
 from smc_mujoco.analysis.engine.calls import View
 from smc_mujoco.analysis.engine.form import FAILURE, SCORES, UNDER_WAY, Form, layout
 from smc_mujoco.analysis.engine.loop import simulation
-from smc_mujoco.analysis.engine.worlds import World, controlling
+from smc_mujoco.analysis.engine.world_callback import World, controlling
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.numba_internals import cgutils
 

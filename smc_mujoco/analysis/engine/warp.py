@@ -1,8 +1,8 @@
 """Worlds that MuJoCo Warp steps, in single precision, on a CUDA device.
 
-Its control callback is that of `worlds`, in double precision. It reads positions and velocities
-where MuJoCo Warp has them, and writes commands there. It needs the packages mujoco-warp and
-numba-cuda: `pip install 'smc-mujoco[gpu]'`. Tests run the same on MuJoCo Warp's processor device.
+Its control callback is that of `world_callback`, in double precision: it reads positions and
+velocities where MuJoCo Warp has them, and writes commands there. It needs the packages mujoco-warp
+and numba-cuda: `pip install 'smc-mujoco[gpu]'`. Tests run it on MuJoCo Warp's processor device.
 """
 
 # pyright: reportMissingImports=false, reportAttributeAccessIssue=false
@@ -15,9 +15,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from smc_mujoco.analysis.engine import worlds
+from smc_mujoco.analysis.engine import world_callback
 from smc_mujoco.analysis.engine.form import FAILURE, UNDER_WAY
-from smc_mujoco.analysis.engine.worlds import WorldGroup
+from smc_mujoco.analysis.engine.world_callback import WorldRuns
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, users_stacklevel
 from smc_mujoco.common.extras import extra
@@ -100,7 +100,7 @@ def _for_warp(base: mujoco.MjModel) -> mujoco.MjModel:
     return model
 
 
-def run_rows(group: WorldGroup, rows: Array, device: str = "cuda") -> Array:
+def run_rows(runs: WorldRuns, rows: Array, device: str = "cuda") -> Array:
     """Return the scores of rows, (runs, SCORES + metrics); NaN after a failure. Row i has the
     model of scenario i, or of those in turn.
 
@@ -108,40 +108,40 @@ def run_rows(group: WorldGroup, rows: Array, device: str = "cuda") -> Array:
       ScenarioError: its contacts do not fit into MOST_CONTACTS a world.
     """
     rows = np.ascontiguousarray(rows)
-    members = np.arange(len(rows)) % len(group.scenarios)
+    members = np.arange(len(rows)) % len(runs.scenarios)
     found = []
     with warp.ScopedDevice(device):
         for first in range(0, len(rows), PIECE):
             piece = slice(first, first + PIECE)
-            found.append(_run(group, rows[piece], members[piece]))
+            found.append(_run(runs, rows[piece], members[piece]))
     return np.concatenate(found)
 
 
-def _run(group: WorldGroup, rows: Array, members: Array) -> Array:
+def _run(runs: WorldRuns, rows: Array, members: Array) -> Array:
     """Return the scores of as many rows as are run at once, with room for all contacts."""
-    values = _values(group)
+    values = _values(runs)
     contacts = CONTACTS
     while True:
-        model, data = _worlds(group, rows, members, values, contacts)
-        scores = _stepped(group, rows, model, data)
+        model, data = _worlds(runs, rows, members, values, contacts)
+        scores = _stepped(runs, rows, model, data)
         if not np.any(data.overflow.numpy() & FULL):
             return scores
         contacts *= 2
         if contacts > MOST_CONTACTS:
             raise ScenarioError(
-                f"{group.scenarios[0].plant.name} has more contacts than MuJoCo Warp has room "
+                f"{runs.scenarios[0].plant.name} has more contacts than MuJoCo Warp has room "
                 f"for, {MOST_CONTACTS} a world: give device 'cpu'"
             )
 
 
-def _values(group: WorldGroup) -> dict[str, Array]:
+def _values(runs: WorldRuns) -> dict[str, Array]:
     """Return the fields of the model that a scenario sets, with what MuJoCo derives of them,
     (scenarios, ...) each.
     """
-    base = group.mechanism.model
+    base = runs.model
     model = copy.copy(base)
     data = mujoco.MjData(model)
-    each = [field_values(base, s, 0) for s in group.scenarios]
+    each = [field_values(base, s, 0) for s in runs.scenarios]
     names = {name for values in each for name in values if not _of_sensors(name)}
     if not names:
         return {}
@@ -156,10 +156,10 @@ def _values(group: WorldGroup) -> dict[str, Array]:
 
 
 def _worlds(
-    group: WorldGroup, rows: Array, members: Array, values: dict[str, Array], contacts: int
+    runs: WorldRuns, rows: Array, members: Array, values: dict[str, Array], contacts: int
 ) -> tuple[Any, Any]:
     """Return MuJoCo Warp's model and data of the worlds of rows, at their start."""
-    host = _for_warp(group.mechanism.model)
+    host = _for_warp(runs.model)
     for name, of_each in values.items():
         # MuJoCo Warp looks whether there is any dry friction
         field_array(host, name)[:] = of_each.max(axis=0) if name in DRY_FRICTION else of_each[0]
@@ -172,11 +172,11 @@ def _worlds(
     for name, of_each in varying.items():
         _put(model, name, of_each[members])
     start = mujoco.MjData(host)
-    put_initial_state(host, start, group.scenarios[0])
+    put_initial_state(host, start, runs.scenarios[0])
     room = _room(host, contacts)
     data = mujoco_warp.put_data(host, start, nworld=len(rows), **room)
     for array, states in zip(
-        (data.qpos, data.qvel), group.states(rows, start.qpos, start.qvel), strict=True
+        (data.qpos, data.qvel), runs.states(rows, start.qpos, start.qvel), strict=True
     ):
         array.assign(states.astype(np.float32))
     return model, data
@@ -212,22 +212,22 @@ def _room(model: mujoco.MjModel, contacts: int) -> dict[str, int]:
     return {"nconmax": contacts, "njmax": int(rows + of_contact * contacts)}
 
 
-def _stepped(group: WorldGroup, rows: Array, model: Any, data: Any) -> Array:
+def _stepped(runs: WorldRuns, rows: Array, model: Any, data: Any) -> Array:
     """Return the scores of worlds, stepped to the end of the longest run."""
     callback = _OnCard if warp.get_device().is_cuda else _OnProcessor
-    called = callback(group, rows, data)
-    stages = group.scenarios[0].stages
+    called = callback(runs, rows, data)
+    stages = runs.scenarios[0].stages
     calls = 0
 
     def control(model, data):
         nonlocal calls
-        if calls % stages < group.calls:
+        if calls % stages < runs.calls:
             called()
         calls += 1
 
     model.callback.control = control
     step = functools.partial(mujoco_warp.step, model, data)
-    steps = group.steps(rows)
+    steps = world_callback.steps(rows)
     if steps:
         step()  # MuJoCo Warp compiles its kernels
         step = called.captured(step)
@@ -245,14 +245,14 @@ def _stepped(group: WorldGroup, rows: Array, model: Any, data: Any) -> Array:
 class _OnProcessor:
     """The callback on MuJoCo Warp's processor device, for tests."""
 
-    def __init__(self, group: WorldGroup, rows: Array, data: Any):
-        self.control = worlds.compiled(group.form)
+    def __init__(self, runs: WorldRuns, rows: Array, data: Any):
+        self.control = world_callback.compiled(runs.form)
         self.theirs = [data.qpos, data.qvel, data.ctrl, data.qfrc_applied]
         self.mine = [array.numpy().astype(float) for array in self.theirs]
         self.sizes = [array.shape[1] for array in self.mine[:3]]
         self.rows = rows
-        self.tables = group.tables
-        self.work, self.kept = group.start(rows)
+        self.tables = runs.tables
+        self.work, self.kept = runs.start(len(rows))
 
     def __call__(self) -> None:
         for mine, theirs in zip(self.mine, self.theirs, strict=True):
@@ -272,14 +272,14 @@ class _OnProcessor:
 class _OnCard:
     """The callback on a CUDA device, a thread a world, on MuJoCo Warp's stream."""
 
-    def __init__(self, group: WorldGroup, rows: Array, data: Any):
+    def __init__(self, runs: WorldRuns, rows: Array, data: Any):
         from smc_mujoco.analysis.engine import gpu
 
-        work, scores = group.start(rows)
+        work, scores = runs.start(len(rows))
         stream = gpu.cuda.external_stream(warp.get_stream().cuda_stream)
-        kernel = gpu.compiled_control(group.form)
+        kernel = gpu.compiled_control(runs.form)
         self.launch = kernel[-(-len(rows) // gpu.THREADS), gpu.THREADS, stream]
-        self.numbers = [gpu.cuda.to_device(array) for array in (rows, group.tables, work)]
+        self.numbers = [gpu.cuda.to_device(array) for array in (rows, runs.tables, work)]
         self.kept = gpu.cuda.to_device(scores)
         self.theirs = []
         for array in (data.qpos, data.qvel, data.ctrl, data.qfrc_applied):

@@ -1,77 +1,17 @@
-"""The fast engine's samples in worlds that another engine steps.
+"""Runs in worlds of one model, which MuJoCo Warp steps on a CUDA device."""
 
-A run has two halves: what happens at a sample, and a physics step. Where a plant has no equation,
-MuJoCo takes the steps, in thousands of worlds at once (see `warp`), and calls at each of their
-stages what MuJoCo calls its control callback. That is composed here, of the same moments and in the
-same order as the fast engine's loop. It reads a world's positions and velocities, and writes its
-commands, and the disturbances on its joints.
-"""
-
-# pyright: reportCallIssue=false
-# (an intrinsic is called without its typing context)
-import functools
-from collections import namedtuple
 from collections.abc import Hashable, Sequence
-from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
-from smc_mujoco.analysis.engine import noise
-from smc_mujoco.analysis.engine.advance import driving
-from smc_mujoco.analysis.engine.calls import Compiler, View
-from smc_mujoco.analysis.engine.form import (
-    FAILED_STEP,
-    FAILURE,
-    SCORES,
-    SETTING,
-    UNDER_WAY,
-    ChannelFunction,
-    Form,
-    Places,
-    layout,
-)
+from smc_mujoco.analysis.engine.form import ChannelFunction, Form
 from smc_mujoco.analysis.engine.group import FormGroup, first_of, form_of, key, why_not_sampled
-from smc_mujoco.analysis.engine.loop import moments, recording, remembering
 from smc_mujoco.analysis.engine.scores import holds
-from smc_mujoco.common import fingerprint
-from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.jit import Key, compile_for, inlined, jit, pointer
+from smc_mujoco.analysis.engine.world_callback import WorldRuns, calls_in_step, world_places
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.model import check_start, mechanism, structure
 from smc_mujoco.simulation.scenario import Resolved, Scenario
-from smc_mujoco.simulation.state import FINE, RAISED
-from smc_mujoco.simulation.step import order
-
-# What the callback reaches of a world, as pointers to numbers of any precision.
-World = namedtuple("World", ("qpos", "qvel", "ctrl", "qfrc_applied"))
-
-
-class WorldPlaces(NamedTuple):
-    """Where a run's numbers of its world are in its row, behind all that `layout` names; n of
-    each, where it says no other.
-    """
-
-    calls: int  # of the callback in a physics step; 1 number
-    qpos: int  # index in the array of this name, as are the next two
-    qvel: int
-    ctrl: int  # only of channels that have an actuator
-    scale: int  # control of the actuator per unit of u
-
-
-@functools.cache
-def world_places(form: Form) -> tuple[WorldPlaces, int]:
-    """Return the places of a world's numbers, and the size of a row."""
-    row = Places(layout(form).row_size)
-    places = WorldPlaces(row.take(), *(row.take(form.n) for _ in range(4)))
-    return places, row.size
-
-
-def work_size(form: Form) -> int:
-    """Return how many numbers the state of a run has: those of its layout, and how often the
-    callback was called.
-    """
-    return layout(form).work_size + 1
 
 
 def no_model(x, v, i, p):
@@ -104,126 +44,6 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cuda
     return first_of(beyond) or why_not_sampled(s, metrics, device)
 
 
-def controlling(form: Form, compile_user: Compiler) -> Any:
-    """Return a compiled function (view, scores, world): the control callback of a world.
-
-    The run has ended once its failure among the scores is not UNDER_WAY; then nothing acts.
-    """
-    begin, between = order(moments(form, compile_user, noise.drawn))
-    remember = remembering(form)
-    record = recording(form)
-    act = _acting(form)
-    release = _releasing(form)
-    n = form.n
-    at = world_places(form)[0]
-    work_at = layout(form).work
-    called = layout(form).work_size
-
-    @inlined
-    def control(view, scores, world):
-        row, _, work = view
-        if scores[FAILURE] != UNDER_WAY:
-            release(view, world)
-            return
-        count = int(work[called])
-        work[called] = count + 1.0
-        calls = int(row[at.calls])
-        step = count // calls
-        stage = count - step * calls
-        steps = int(row[SETTING.steps])
-        k = step // steps
-        within = step - k * steps
-        for i in range(n):
-            work[work_at.x + i] = world.qpos[int(row[at.qpos + i])]
-            work[work_at.v + i] = world.qvel[int(row[at.qvel + i])]
-        if stage == 0:
-            if within == 0 and k > 0:  # at the end of its period: a sample may come late
-                record(view, scores, scores, k - 1)
-            scores[FAILED_STEP] = step
-            remember(view, step)
-            failure = begin(view, k, within, step)
-        else:
-            failure = between(view, k, within, stage)
-        if failure != FINE:
-            scores[FAILURE] = failure
-        elif k == int(row[SETTING.samples]):
-            record(view, scores, scores, k)
-            scores[FAILURE] = FINE
-        act(view, world, stage)
-
-    return control
-
-
-def _acting(form: Form) -> Any:
-    """Return a function (view, world, stage): write the commands, and the disturbances."""
-    driven = form.driven
-    disturbed = bool(form.disturbances)
-    drive = driving(form)
-    at = world_places(form)[0]
-    work_at = layout(form).work
-
-    @inlined
-    def act(view, world, stage):
-        row, _, work = view
-        for i in range(driven):
-            u = drive(view, i, stage)
-            world.ctrl[int(row[at.ctrl + i])] = row[at.scale + i] * u
-            if disturbed:
-                world.qfrc_applied[int(row[at.qvel + i])] = work[work_at.d + i]
-
-    return act
-
-
-def _releasing(form: Form) -> Any:
-    """Return a function (view, world): let nothing act any more."""
-    driven = form.driven
-    at = world_places(form)[0]
-
-    @inlined
-    def release(view, world):
-        for i in range(driven):
-            world.ctrl[int(view.row[at.ctrl + i])] = 0.0
-            world.qfrc_applied[int(view.row[at.qvel + i])] = 0.0
-
-    return release
-
-
-@functools.lru_cache(maxsize=64)
-def compiled(form: Form) -> Any:
-    """Return the compiled callback of worlds on the processor, (count, addresses of rows, tables,
-    work, scores, qpos, qvel, ctrl and qfrc_applied, numbers of qpos, qvel and ctrl in a world).
-    """
-    control = controlling(form, jit)
-    row_bytes = 8 * world_places(form)[1]
-    work_bytes = 8 * work_size(form)
-    score_bytes = 8 * (SCORES + len(form.metrics))
-
-    def worlds(count, rows, tables, work, scores, qpos, qvel, ctrl, qfrc_applied, nq, nv, nu):
-        for i in range(count):
-            view = View(
-                pointer(rows + row_bytes * i), pointer(tables), pointer(work + work_bytes * i)
-            )
-            world = World(
-                pointer(qpos + 8 * nq * i),
-                pointer(qvel + 8 * nv * i),
-                pointer(ctrl + 8 * nu * i),
-                pointer(qfrc_applied + 8 * nv * i),
-            )
-            kept = pointer(scores + score_bytes * i)
-            try:
-                control(view, kept, world)
-            except Exception:
-                kept[FAILURE] = RAISED
-
-    made = njit(error_model="numpy", nogil=True)(worlds)
-    try:
-        found = Key(__name__, fingerprint.now(worlds))
-    except ScenarioError:  # a function that has no hash is compiled in every process
-        found = None
-    compile_for(made, (0,) * 12, found)
-    return made
-
-
 class WorldGroup(FormGroup):
     """Runs in worlds of one model, see `FormGroup`."""
 
@@ -246,25 +66,23 @@ class WorldGroup(FormGroup):
         rows = np.zeros((len(scenarios), size))
         rows[:, : self.layout.row_size] = self.rows
         for row, s in zip(rows, self.scenarios, strict=True):
-            row[at.calls] = self.calls
+            row[at.calls] = calls_in_step(self.form, s)
             for name in ("qpos", "qvel", "ctrl"):
                 first = getattr(at, name)
                 row[first : first + s.plant.n] = self.mechanism.channels[name]
             row[at.scale : at.scale + s.plant.driven] = s.drive_train.scales
         self.rows = rows
 
-    def run(self, rows: np.ndarray, threads: int | None = None, device: str = "cuda") -> np.ndarray:
+    @property
+    def runs(self) -> WorldRuns:
+        """What is run, without its rows."""
+        return WorldRuns(self.form, self.scenarios, self.mechanism.model, self.tables)
+
+    def run(self, rows: Array, threads: int | None = None, device: str = "cuda") -> Array:
         """Return the scores of rows, (runs, SCORES + metrics); NaN after a failure."""
         from smc_mujoco.analysis.engine import warp
 
-        return warp.run_rows(self, rows, device)
-
-    @property
-    def calls(self) -> int:
-        """How often in a physics step the callback has to be called."""
-        if self.form.disturbances or self.form.drive:
-            return self.scenarios[0].stages
-        return 1
+        return warp.run_rows(self.runs, rows, device)
 
     def form_of(self, s: Resolved, metrics: Sequence[str]) -> Form:
         """Return the form of one run, whose plant and frictions are the world's."""
@@ -272,31 +90,3 @@ class WorldGroup(FormGroup):
         if s.plant.by_mujoco or s.plant.unmodelled:
             form = form._replace(nominal=ChannelFunction(no_model, form.nominal.names))
         return form._replace(frictions=(), implicit=False)
-
-    def start(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the state of runs and their scores so far, (runs, work_size) and (runs, SCORES +
-        metrics).
-        """
-        scores = np.full((len(rows), SCORES + len(self.form.metrics)), np.nan)
-        scores[:, FAILURE] = UNDER_WAY
-        return np.zeros((len(rows), work_size(self.form))), scores
-
-    def states(self, rows: np.ndarray, qpos: np.ndarray, qvel: np.ndarray) -> tuple:
-        """Return the states at which the worlds of rows start, (worlds, nq) and (worlds, nv), given
-        the model's.
-        """
-        at = world_places(self.form)[0]
-        n = self.form.n
-        found = []
-        for state, of_row, place in (
-            (qpos, self.layout.row.x0, at.qpos),
-            (qvel, self.layout.row.v0, at.qvel),
-        ):
-            states = np.tile(state, (len(rows), 1))
-            states[:, rows[0, place : place + n].astype(int)] = rows[:, of_row : of_row + n]
-            found.append(states)
-        return tuple(found)
-
-    def steps(self, rows: np.ndarray) -> int:
-        """Return how many physics steps the longest run has."""
-        return int((rows[:, SETTING.samples] * rows[:, SETTING.steps]).max())
