@@ -34,6 +34,7 @@ from smc_mujoco.draw.states import State
 # column, are 11 px high where the film is as wide as a phone, 390 px.
 WIDTH = 3.9  # inches
 ONE_SIZE = dict.fromkeys(("xtick.labelsize", "ytick.labelsize", "axes.titlesize"), 8.0)
+LOOK = ONE_SIZE | {"axes.titlepad": 3.0}  # points; below the pictures, which hide what is higher
 LINE_PITCH = 1.2  # of letters
 EDGE = 0.6  # letters, from the picture's edge to text
 CHARTS_SHARE = 0.355  # of the film's height
@@ -114,7 +115,7 @@ class Sheet:
         self.tiles = tiles
         self.start = start
         self.letters = letters(size)
-        with style.page(WIDTH), rc_context(ONE_SIZE):  # pyright: ignore[reportArgumentType]
+        with style.page(WIDTH), rc_context(LOOK):  # pyright: ignore[reportArgumentType]
             inches = (WIDTH, WIDTH * size[1] / size[0])
             self.page = Figure(figsize=inches, dpi=size[0] / WIDTH)
             self.canvas = FigureCanvasAgg(self.page)
