@@ -8,6 +8,7 @@ import itertools
 import json
 import re
 import sys
+import typing
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -101,6 +102,56 @@ CALLS = {line: paths for line, paths in CALLS.items() if annexes.here(paths) == 
 COMMANDS = {
     info.name: (info.rich_help_panel, info.callback) for info in main.app.registered_commands
 }
+
+
+def parameters(command: Callable) -> dict[str, tuple[inspect.Parameter, Any]]:
+    """Return how each option and argument is written -> its parameter, and what typer is told of
+    it.
+    """
+    found = {}
+    every = inspect.signature(command).parameters
+    for one in [one for name, one in every.items() if name != "ctx"]:
+        (info,) = one.annotation.__metadata__
+        given = []
+        for word in (info.default, *(info.param_decls or ())):
+            if isinstance(word, str):
+                given.append(word)
+        name = one.name.replace("_", "-")
+        names = [f"--{name}", *[f"--no-{name}"] * isinstance(one.default, bool)]
+        found["/".join(given or (names if isinstance(info, OptionInfo) else [one.name]))] = (
+            one,
+            info,
+        )
+    return found
+
+
+def number_of(one: inspect.Parameter, info: Any) -> str:
+    """Return a number that an option takes and that is not its default; "" if it takes none."""
+    kind = one.annotation.__origin__
+    if not {int, float} & {kind, *typing.get_args(kind)}:
+        return ""
+    return str(max(info.min or 0, one.default or 0) + 1)
+
+
+def with_numbers(calls: dict[str, list[str]]) -> dict[str, list[str]]:
+    """Return the calls; the longest of each command also has the numbers that none of them has, so
+    that such an option needs no word here.
+    """
+    found = dict(calls)
+    for name, (_, command) in COMMANDS.items():
+        lines = sorted((line for line in calls if line.split()[0] == name), key=len)
+        tried = set(" ".join(lines).split())
+        more = []
+        for names, (one, info) in parameters(command).items():
+            number = number_of(one, info)
+            if number and names.startswith("-") and not tried & {*names.split("/")}:
+                more += [names, number]
+        if lines and more:
+            found[" ".join([lines[-1], *more])] = found.pop(lines[-1])
+    return found
+
+
+CALLS = with_numbers(CALLS)
 
 PRINTED = [  # command lines that are run to their ends
     "list --needs continuous,one-gain --json l.json",
@@ -309,27 +360,6 @@ def test_a_device_without_its_package_is_refused_before_the_work(line, monkeypat
     assert end.value.code == 2
     assert "numba_cuda" in (told := capsys.readouterr().err)
     assert told.endswith("pip install 'smc-mujoco[gpu]'\n")
-
-
-def parameters(command: Callable) -> dict[str, tuple[inspect.Parameter, Any]]:
-    """Return how each option and argument is written -> its parameter, and what typer is told of
-    it.
-    """
-    found = {}
-    every = inspect.signature(command).parameters
-    for one in [one for name, one in every.items() if name != "ctx"]:
-        (info,) = one.annotation.__metadata__
-        given = []
-        for word in (info.default, *(info.param_decls or ())):
-            if isinstance(word, str):
-                given.append(word)
-        name = one.name.replace("_", "-")
-        names = [f"--{name}", *[f"--no-{name}"] * isinstance(one.default, bool)]
-        found["/".join(given or (names if isinstance(info, OptionInfo) else [one.name]))] = (
-            one,
-            info,
-        )
-    return found
 
 
 def test_the_calls_above_have_every_option_of_their_commands():
