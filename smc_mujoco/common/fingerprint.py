@@ -75,7 +75,9 @@ def arithmetic() -> str:
         math.log,
         lambda x: x**0.7,
     )
-    values = [f(x) for f in functions for x in inputs]
+    values = []
+    for function in functions:
+        values += map(function, inputs)
     return hashlib.sha256(struct.pack(f"<{len(values)}d", *values)).hexdigest()[:8]
 
 

@@ -150,7 +150,9 @@ def _within(rig: OwnRig, values: Numbers, data: Sequence[Data]) -> OwnRig:
     """Return the rig with values cut to their ranges; one that would be 0 or less starts small, as
     the search takes steps by factors.
     """
-    u = max(float(np.std(record[name])) for record in data for name in rig.columns.inputs)
+    u = 0.0
+    for record in data:
+        u = max(u, *(float(np.std(record[name])) for name in rig.columns.inputs))
     inertia = float(np.min(rig.plant.load().dof_M0))
     changed = dict(rig.quantities)
     for name, value in values.items():
@@ -187,10 +189,7 @@ def forces(rig: OwnRig, record: Record, delays: Sequence[float]) -> Forces:
     """Return what a log says about forces."""
     columns = dataclasses.replace(rig.columns, torque=rig.columns.x)
     filtered = Filter(record, columns)
-    x, v, a = (
-        np.column_stack([filtered.cubic(name, order) for name in rig.columns.x])
-        for order in range(3)
-    )
+    x, v, a = filtered.motion(rig.columns.x)
     zeroed = {name: 0.0 for name in rig.plant.parameters if "." in name}
     base = rig.values_of_plant() | zeroed
 

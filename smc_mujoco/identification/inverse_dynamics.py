@@ -8,6 +8,8 @@ low-pass filter, forward and backward. Source: M. Gautier, "Dynamic identificati
 power model", IEEE ICRA 1997 (the parallel filter).
 """
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 
@@ -59,6 +61,13 @@ class Filter:
         )
         return np.asarray(smooth)[:: self.stride]
 
+    def motion(self, names: Sequence[str]) -> list[Array]:
+        """Return columns, their rates and their second derivatives, (N, n) each."""
+        found = []
+        for order in range(3):
+            found.append(np.column_stack([self.cubic(name, order) for name in names]))
+        return found
+
     def low(self, values: Array) -> Array:
         """Return the part of values (N,) below CUTOFF, without the ends."""
         from scipy.signal import sosfiltfilt
@@ -103,10 +112,7 @@ def torques(plant: Plant, data: Record, columns: Columns) -> Record:
     state = mujoco.MjData(model)
     joints = joint_ids(model)
     dofs = dof_ids(model)
-    motion = [
-        np.column_stack([filtered.cubic(name, order) for name in columns.x]) for order in range(3)
-    ]
-    x, v, a = motion
+    x, v, a = filtered.motion(columns.x)
     forces = np.empty_like(x)
     at = model.jnt_qposadr[joints]
     for k in range(len(x)):

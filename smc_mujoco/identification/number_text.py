@@ -26,7 +26,7 @@ def table(values: Numbers, errors: Numbers, units: Mapping[str, str]) -> list[st
     rows = [("number", "value", "±", "unit")]
     for name, value in values.items():
         rows.append((name, to_error(value, errors[name]), f"{errors[name]:.2g}", units[name]))
-    widths = [max(len(row[i]) for row in rows) for i in range(3)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []
     for name, value, error, unit in rows:
         line = f"{name:<{widths[0]}}  {value:>{widths[1]}}  {error:>{widths[2]}}  {unit}"

@@ -220,7 +220,7 @@ class OwnRig(Rig):
         """The quantities that replays have and runs of the machine leave out."""
         joints = driven_names(self.plant)
         motors = [name for name in self.quantities if name.endswith((".gain", ".offset"))]
-        faulty = {joint for joint in joints for name in motors if name.startswith(f"{joint}.")}
+        faulty = {name.rpartition(".")[0] for name in motors}.intersection(joints)
         zeros = [name for name in self.quantities if name.endswith(".zero")]
         return tuple(zeros + (motors if len(faulty) > 1 else []))
 

@@ -108,7 +108,8 @@ def known_paths(base: Scenario) -> list[str]:
     """Return every path to a number of a scenario."""
     plant = base.plant
     paths = [*plant.parameters, DELAY, *joint_numbers(plant)]
-    paths += [f"{joint}.{kind}" for joint in driven_names(plant) for kind in ("gain", "offset")]
+    for joint in driven_names(plant):
+        paths += [f"{joint}.gain", f"{joint}.offset"]
     paths += [f"{joint}.zero" for joint in channel_names(plant)]
     for field in FIELDS:
         paths += _paths_of_parts(base, field)
@@ -156,7 +157,8 @@ def _paths_of_parts(base: Scenario, field: str) -> list[str]:
     paths = []
     for part in parts_of(base, field):
         joints = [f".{joint}" for joint in getattr(part, "on", ())] or [""]
-        paths += [f"{field}{joint}.{name}" for joint in joints for name in _names_of(part)]
+        for joint in joints:
+            paths += [f"{field}{joint}.{name}" for name in _names_of(part)]
     return paths
 
 

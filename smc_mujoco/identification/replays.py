@@ -225,7 +225,9 @@ class Replays:
 
     def costs(self, points: Sequence[Point]) -> Array:
         """Return the sum of squares of each piece at each point, (points, pieces)."""
-        found = [[cost([rows]) for rows in by_piece] for by_piece in self.residuals(points)]
+        found = []
+        for by_piece in self.residuals(points):
+            found.append([cost([rows]) for rows in by_piece])
         return np.array(found)
 
     def predicted(self, points: Sequence[Point]) -> list[list[Record]]:
@@ -233,9 +235,9 @@ class Replays:
         self.evaluations += len(points)
         rigs = [self.rig(point) for point in points]
         if self.twin.dynamics is not None:
-            predictions = [
-                [columns for columns, _, _ in rig.predictions(self.data)] for rig in rigs
-            ]
+            predictions = []
+            for rig in rigs:
+                predictions.append([columns for columns, _, _ in rig.predictions(self.data)])
         else:
             predictions = self._replayed(rigs, points, self.steps)
         self.report(len(points))

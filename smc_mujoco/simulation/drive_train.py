@@ -114,7 +114,10 @@ class DriveTrain:
     @property
     def scales(self) -> list[float]:
         """The control of the actuator of each driven channel, per unit of u."""
-        return [math.prod(part.scale for part in chain) for chain in self.chains]
+        found = []
+        for chain in self.chains:
+            found.append(math.prod(part.scale for part in chain))
+        return found
 
     @cached_property
     def nominal(self) -> list[NominalDrive]:

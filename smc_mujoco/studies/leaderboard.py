@@ -91,8 +91,11 @@ def leaderboard(
     for group in paired_runs.groups(table, by):
         sources = paired_runs.sources(table, group.rows[group.rows >= 0])
         ranked.append(RankedGroup(group, paired_runs.scenarios(table, group), sources))
-    known = [scenario for each in ranked for scenario in each.ran if scenario]
-    boards.commands = [*dict.fromkeys(word for one in known for word in one.drive_train.words)]
+    words: list[str] = []
+    for each in ranked:
+        for scenario in filter(None, each.ran):
+            words += scenario.drive_train.words
+    boards.commands = [*dict.fromkeys(words)]
     by_metric = {}
     for metric in dict.fromkeys(metrics):
         by_metric[metric] = _boards_of(table, metric, ranked, defaults, relevant)

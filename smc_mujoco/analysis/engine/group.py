@@ -154,29 +154,18 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
     laws = []
     for law in s.law.of_channels(s.plant.driven):
         laws.append(_part(law)._replace(channels=every if law.joint else ()))
-    frictions = []
-    for part in s.exact_parts:
-        channels = tuple(part.channels(s.plant))
-        frictions.append(ChannelFunction(part.stage_force, part.names, part.memory, channels))
-    for part in _held(s):
-        frictions.append(
-            ChannelFunction(part.force, part.names, part.memory, tuple(part.channels(s.plant)))
-        )
-    compensated = []
-    for part in s.compensated:
-        channels = tuple(part.channels(s.plant))
-        compensated.append(ChannelFunction(part.steady, part.names, part.memory, channels))
+    frictions = [_on_channels(part, part.stage_force, s) for part in s.exact_parts]
+    frictions += [_on_channels(part, part.force, s) for part in _held(s)]
+    compensated = [_on_channels(part, part.steady, s) for part in s.compensated]
     elastic = tuple(_springs(s))
-    motor_side = [i for part in s.sensors if part.side == "motor" for i in part.channels(s.plant)]
+    motor_side = set()
+    for part in s.sensors:
+        if part.side == "motor":
+            motor_side.update(part.channels(s.plant))
     clock = not s.clock.regular
-    slots = 1
-    while slots < s.delay_steps // s.steps + 1 + clock:  # few sizes, each of which is compiled
-        slots *= 256
-    past = 0
-    if s.readings:
-        past = 16
-        while past < _oldest(s):
-            past *= 16
+    # few sizes, each of which is compiled
+    slots = _power(256, s.delay_steps // s.steps + 1 + clock)
+    past = max(_power(16, _oldest(s)), 16) if s.readings else 0
     return Form(
         n=s.plant.n,
         driven=s.plant.driven,
@@ -208,6 +197,19 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
         past=past,
         metrics=tuple(metrics),
     )
+
+
+def _on_channels(part: Any, function: Any, s: Resolved) -> ChannelFunction:
+    """Return a function of a part, on the part's channels."""
+    return ChannelFunction(function, part.names, part.memory, tuple(part.channels(s.plant)))
+
+
+def _power(base: int, least: int) -> int:
+    """Return the smallest power of a base, 1 or more, that is at least so much."""
+    power = 1
+    while power < least:
+        power *= base
+    return power
 
 
 def _part(c: Component) -> ChannelFunction:

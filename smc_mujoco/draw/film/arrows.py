@@ -188,7 +188,7 @@ def scales(traces: Sequence[Trace]) -> dict[ChannelGroup, Scale]:
             found[group] = Scale(0.0, 0.0, reaction)
             continue
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
-        drive = same and any(part.drives for trace in traces for part in trace.scenario.actuator)
+        drive = same and any(_drives(trace) for trace in traces)
         control = quantities.usual(parts, "applied")
         if drive:
             control = max(control, quantities.usual(parts, "force"))
@@ -206,6 +206,11 @@ def scales(traces: Sequence[Trace]) -> dict[ChannelGroup, Scale]:
             longest=longest, full=full, units=(units["u"], units["force"])
         )
     return scaled
+
+
+def _drives(trace: Trace) -> bool:
+    """Return whether an actuator of a trace gives the force of a drive."""
+    return any(part.drives for part in trace.scenario.actuator)
 
 
 def flying(loads: Mapping[str, Envelope], frame: int, scale: Scale) -> list[tuple[int, Arrow]]:

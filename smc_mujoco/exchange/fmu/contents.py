@@ -13,6 +13,7 @@ because FMPy's `simulate_fmu` takes no inputs of several shapes. The elements fo
 the array of variables, so C reads them as an array.
 """
 
+import itertools
 import math
 import re
 import sys
@@ -206,7 +207,10 @@ def _starts(name: str, exported: ExportedLaw) -> dict[str, float]:
         return dict.fromkeys(exported.places, float(name in ("g", "gq") and not exported.joints))
     columns = range(1, exported.joints + 1)
     rows = {"J": range(1, 4)}.get(name, columns)
-    return {f"[{i},{j}]": float(name == "M" and i == j) for i in rows for j in columns}
+    starts = {}
+    for i, j in itertools.product(rows, columns):
+        starts[f"[{i},{j}]"] = float(name == "M" and i == j)
+    return starts
 
 
 def inputs(exported: ExportedLaw) -> set[str]:

@@ -554,7 +554,7 @@ def add_motors(spec: mujoco.MjSpec, motors: Sequence[Motor]) -> None:
     """Add the channels' motors, in this order, and keep the model's other actuators as passive
     parts.
     """
-    replaced = {i for motor in motors for i in motor.replaced}
+    replaced = set().union(*(motor.replaced for motor in motors))
     for i, actuator in enumerate(list(spec.actuators)):
         if i in replaced:
             spec.delete(actuator)

@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from dm_control.mjcf import RootElement
 
 WITHOUT_MODEL = "give model='none' and a law that reads no model"
+SET_POINT = f"u is the set-point of a servo, and a nominal u is a force: {WITHOUT_MODEL}"
 # dynamics of an actuator whose state changes even at ctrl = 0
 DCMOTOR = mujoco.mjtDyn.mjDYN_DCMOTOR.value
 
@@ -216,8 +217,7 @@ def _plant(
     if tip and special.get("base", -1) >= 0:
         raise ScenarioError(f"the base of {label} is measured: leave the tip out")
     build = UserModel(source, keyframe, pairs, (), tip or "", others=others, measured=seen)
-    driven = [joint for joint, _ in pairs if not is_free(model, joint)]
-    goals = dict(zip(driven, own.goals(model, driven, keyframe)[0], strict=True))
+    goals = _goals(model, [joint for joint, _ in pairs if not is_free(model, joint)], keyframe)
     if others in ("held", "locked"):
         model = source.compiled(build.edited())
     build, limits = _with_drives(build, label, model, scenarios, goals)
@@ -227,9 +227,7 @@ def _plant(
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields = UserFields(mass, gravity)
-    why_not = missing(model, joints, build.motors)
-    if "actuator" in scenarios:
-        why_not = f"u is the set-point of a servo, and a nominal u is a force: {WITHOUT_MODEL}"
+    why_not = SET_POINT if "actuator" in scenarios else missing(model, joints, build.motors)
     rubs = default_friction(model)
     return Plant(
         name=plant_name,
@@ -317,7 +315,7 @@ def _places(
     start, checked = own.starts(model, alone, pairs, keyframe)
     check_ranges(plant, checked, [start[joint] for joint, _, _ in checked])
     names, units, x0 = own.places(model, joints, start, keyframe)
-    goals = dict(zip(alone, own.goals(model, alone, keyframe)[0], strict=True))
+    goals = _goals(model, alone, keyframe)
     rest = own.places(model, joints, goals, keyframe)[2]
     fields: Fields = {"x0": x0, "ranges": own.ranges(model, names)}
     if any(rest):
@@ -327,6 +325,11 @@ def _places(
         if joint not in alone:
             fields["base"] = names.index(joint)
     return units, fields
+
+
+def _goals(model: mujoco.MjModel, joints: list[str], keyframe: str | None) -> dict[str, float]:
+    """Return hinges and slides with where they end by default, rad or m."""
+    return dict(zip(joints, own.goals(model, joints, keyframe)[0], strict=True))
 
 
 def without_model(x, v, i, p):

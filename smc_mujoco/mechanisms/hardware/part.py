@@ -308,4 +308,7 @@ class Actuator(OnJoints):
 
 def chains(parts: Sequence[P], joints: Sequence[str]) -> list[tuple[P, ...]]:
     """Return those of the parts that each joint has."""
-    return [tuple(part for part in parts if not part.on or joint in part.on) for joint in joints]
+    found = []
+    for joint in joints:
+        found.append(tuple(part for part in parts if not part.on or joint in part.on))
+    return found
