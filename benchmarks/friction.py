@@ -1,0 +1,542 @@
+"""Which law wins under friction, and what friction compensation is worth: runs for
+docs/what_wins_under_friction.md.
+
+    python -m benchmarks.friction rail geared ak80 --keep FOLDER --out friction.json
+    python -m benchmarks.friction drawn_rail drawn_geared --lot 1234567 --seeds 1 --out lot.json
+
+`benchmarks.friction_sentences` reads the file.
+
+The joints are those of friction_plants.py. All laws read the same encoder of 4096 counts with 0.3
+counts of noise, at 1 kHz, and act after 2 ms; the rate is a filtered difference, whose time
+constant is a gain of each law. No law has a model. Errors are in counts; **below one count nothing
+is ranked**.
+
+Tasks: `rest`, from the start to 0, the rms of 5 to 10 s; `sine`, through reversals, the rms of one
+period. Two prices: J, the ITAE over the start plus weighted variation of u, of five runs of 5 s
+without friction; and R, the rate of variation of u at rest without friction, of the bound a second.
+A set of gains is admitted if its J is at most ADMITTED times the least of all laws.
+
+Each law gets the same number of sets: two thirds drawn over the box of a search and a decade
+beyond it, the others bred from their fronts. One instance chooses, twelve others judge, with other
+starts, phases, zeros of the encoder and noise. Both seeds are whole searches. A feedforward knows
+the friction, or has 30 % less or more of it, and a set is chosen for each of these.
+
+The fast engine searches. MuJoCo runs each point that the page prints, and what no search has seen:
+friction that grows with the load, LuGre, a play with friction on either side, a contact.
+"""
+
+import argparse
+import json
+import math
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import smc_mujoco as smc
+from benchmarks.friction_plants import Joint, joints
+from smc_mujoco.analysis.engine.form import FAILURE, SCORES, SETTING
+from smc_mujoco.analysis.engine.group import FormGroup
+from smc_mujoco.analysis.tuning import search_space
+from smc_mujoco.analysis.tuning.evaluator import with_gains
+from smc_mujoco.control.component import Component
+from smc_mujoco.simulation import state
+from smc_mujoco.simulation.conditions import NAMED
+from smc_mujoco.simulation.run import stream
+
+OBSERVERS = ("adrc", "pd_observer")
+LAWS = (
+    "pd",
+    "pid",
+    *OBSERVERS,
+    "hodob",
+    "super_twisting",
+    "implicit_super_twisting",
+    "observer_free_integral",
+    "boundary_layer",
+    "classical",
+)
+SETS = 240
+SEEDS = (1, 2)
+GENERATIONS = (0.5, 0.35, 0.25, 0.15)  # spread of the bred sets, of log gains
+WIDER = 1.0  # decades beyond the box of a search
+TAUS = (1e-3, 3e-2)  # s, of the filtered difference
+CAP = 1.5  # s^2: a set that costs more does not run under friction
+DRAWN = 2 / 3  # of the sets; the others are bred
+ADMITTED, MARGIN = 4.0, 0.97  # of the least J; of a level of R
+RATES = (10.0, 30.0)  # levels of R, 1/s
+UNSEEN, BY_MUJOCO = 12, 2  # instances
+PERIOD, DELAY, NOISE = 1e-3, 2e-3, 0.3  # s; s; counts
+REST, WINDOW, CALM, LONG, LATE = 10.0, 5.0, 4.0, 40.0, 10.0  # s
+AFTER_BLOW = 2.0  # s, the last of a run with a blow at 5 s
+SPEED, SETTLING = 0.1, 3.0  # of a sine: its peak over the start and the time scale; s
+STILL = 4.0  # counts: a joint that moves by more in the last 10 of 40 s still moves
+HUNTERS, HUNTING_RATE = 16, 30.0  # sets of a law that run for 40 s; their largest R
+SUMS = ("itae", "tv", "rms_error", "tv_rate", "ripple", "stick_time", "reversal_error")
+ITAE, TV, RMS, RATE, RIPPLE, STICK, TURNED = range(len(SUMS))
+SHARES = (0.0, 1.0, 0.7, 1.3)  # of the true friction that is fed forward
+# sets that MuJoCo runs under what no search has seen: friction, side of the gap
+OTHERS = ("load", "lugre", "play, motor", "play, link", "contact")
+
+
+class Case(NamedTuple):
+    """A friction, a task, and the share of the friction that is fed forward."""
+
+    friction: str
+    task: str = "rest"
+    share: float = 0.0
+
+
+PRICED = (  # runs without friction: J's, then that of the rate in calm
+    {},
+    {"load": 0.0},
+    {"load": 5.0},
+    {"mass": 0.7},
+    {"mass": 1.3},
+    {"calm": True},
+)
+
+
+def cases_of(one: Joint) -> list[Case]:
+    """Return what sets of gains are chosen under; compensation matters where the reference moves,
+    and its errors are told of dry friction of one level.
+    """
+    found = []
+    for name, (moving, resting) in one.levels.items():
+        shares = SHARES if moving == resting else SHARES[:1]
+        found += [Case(name), *(Case(name, "sine", share) for share in shares)]
+    return found
+
+
+def law_of(name: str, one: Joint) -> Component:
+    """Return a law of the page: `pd` is `pid` without an integral, whose rate has one filter."""
+    if name in ("pd", "pid"):
+        return smc.law("pid", tau=0.0, **({"ki": 0.0} if name == "pd" else {}))
+    if name == "super_twisting":
+        return smc.law(name, w_max=one.bound)
+    return smc.law(name)
+
+
+def scenario(one: Joint, law: Component, case: Case, instance: int, **changes: Any) -> smc.Scenario:
+    """Return a run; `changes` are fields of it, or the `length` of a rest, s."""
+    rng = np.random.default_rng([31, instance])
+    start = one.start * rng.uniform(0.8, 1.2) * rng.choice([-1, 1])
+    phase = rng.uniform(0.0, math.tau)
+    zero = rng.uniform(-0.5, 0.5) * one.count
+    omega = SPEED / one.scale
+    size = one.start if case.task == "sine" else 0.0
+    length = changes.pop("length", REST)
+    if case.task == "sine":
+        start = one.start * math.sin(phase)
+        length = SETTLING + period_of(one)
+    friction = one.friction(case.friction)
+    fields = {
+        "plant": one.plant,
+        "law": law,
+        "model": "none",
+        "u_max": one.bound,
+        "x0": start,
+        "friction": friction,
+        "feedforward": smc.Feedforward(friction, eps=one.slow / 4, error=case.share - 1.0),
+        "reference": smc.Sine(size, omega, phase),
+        "duration": length,
+        "control_period": PERIOD,
+        "physics_step": PERIOD,
+        "sensor": smc.Encoder(counts=one.counts, bias=zero),
+        "noise": smc.Noise(position=NOISE * one.count),
+        "velocity": smc.estimator("filtered_difference"),
+        "input_delay": DELAY,
+        "seed": instance,
+    }
+    return smc.Scenario(**fields | changes)
+
+
+def period_of(one: Joint) -> float:
+    """Return the period of the sine, s, in whole control periods."""
+    return round(math.tau * one.scale / SPEED / PERIOD) * PERIOD
+
+
+def window_of(one: Joint, case: Case) -> int:
+    """Return the samples that a case's error is taken over."""
+    return round((period_of(one) if case.task == "sine" else WINDOW) / PERIOD)
+
+
+def priced(one: Joint, law: Component, number: int, instance: int) -> smc.Scenario:
+    """Return a run of the prices."""
+    what = PRICED[number]
+    changes: dict[str, Any] = {"length": CALM if "calm" in what else 5.0}
+    if "calm" in what:
+        changes["x0"] = 0.0
+    if "mass" in what:
+        changes["mismatch"] = {"mass": what["mass"]}
+    if "load" in what:
+        force = one.bound / 30
+        changes["disturbance"] = (
+            smc.Sine(force, what["load"]) if what["load"] else smc.Constant(force)
+        )
+    return scenario(one, law, Case("none"), instance, **changes)
+
+
+class Sets(NamedTuple):
+    """Gains of a law, the last of which is tau, and what they reach where they are chosen."""
+
+    gains: np.ndarray  # (sets, gains)
+    J: np.ndarray  # (sets,), NaN beyond CAP
+    rates: np.ndarray  # (sets,), R
+    errors: np.ndarray  # (sets, cases), counts
+
+
+class Bench:
+    """The runs of a law on a joint, as rows of the fast engine, for some instances."""
+
+    def __init__(self, one: Joint, name: str, instances: Sequence[int]):
+        self.one = one
+        self.law = law_of(name, one)
+        scales = search_space.scales(one.plant, one.bound, one.start, 1.0)
+        self.box = search_space.box(self.law, scales)
+        self.cases = cases_of(one)
+        runs = []
+        ends = []  # first sample of the window, before the end
+        for instance in instances:
+            for number in range(len(PRICED)):
+                runs.append(priced(one, self.law, number, instance))
+                ends.append(round((CALM - 1.0) / PERIOD))
+            for case in self.cases:
+                runs.append(scenario(one, self.law, case, instance))
+                ends.append(window_of(one, case))
+        self.group = FormGroup(runs, SUMS)
+        self.starts = [abs(run.resolved.x0[0]) for run in runs]
+        self.size = len(PRICED) + len(self.cases)
+        rows = self.group.rows
+        rows[:, SETTING.early] = rows[:, SETTING.samples] + 1 - ends
+        rows[:, SETTING.late] = rows[:, SETTING.samples] - ends
+
+    def sums(self, gains: np.ndarray, runs: Sequence[int]) -> np.ndarray:
+        """Return the sums of gains in some runs, (sets, runs, sums); NaN after a failure."""
+        rows = np.tile(self.group.rows[runs], (len(gains), 1))
+        for name, values in zip(self.box, gains.T, strict=False):
+            rows[:, self.group.gain_columns(name)] = np.repeat(values, len(runs))[:, None]
+        rows[:, self.group.layout.estimator.numbers] = np.repeat(gains[:, -1], len(runs))
+        scores = self.group.run(rows, threads=1)
+        found = np.where(scores[:, [FAILURE]] == state.FINE, scores[:, SCORES:], np.nan)
+        return found.reshape(len(gains), len(runs), len(SUMS))
+
+    def prices(self, gains: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return J and R of gains on the first instance."""
+        sums = self.sums(gains, range(len(PRICED)))
+        J = np.zeros(len(gains))
+        for i, start in enumerate(self.starts[: len(PRICED) - 1]):
+            J += sums[:, i, ITAE] / start + PERIOD * sums[:, i, TV] / (self.one.bound * 5.0)
+        return J, sums[:, -1, RATE] / self.one.bound
+
+    def judged(self, gains: np.ndarray) -> Sets:
+        """Return what gains reach on the first instance; only what is within CAP and the largest
+        level of R runs under friction.
+        """
+        J, rates = self.prices(gains)
+        J[~(J < CAP)] = np.nan
+        errors = np.full((len(gains), len(self.cases)), np.nan)
+        fine = np.flatnonzero(np.isfinite(J) & (rates <= RATES[-1]))
+        if fine.size:
+            sums = self.sums(gains[fine], range(len(PRICED), self.size))
+            errors[fine] = sums[:, :, RMS] / self.one.count
+        return Sets(gains, J, rates, errors)
+
+
+def joined(parts: Sequence[Sets]) -> Sets:
+    """Return sets as one."""
+    return Sets(*(np.concatenate(its) for its in zip(*parts, strict=True)))
+
+
+def on_front(sets: Sets) -> np.ndarray:
+    """Return the sets that have less error in some case than every set of a lower R, and the one of
+    the least J.
+    """
+    found = {int(np.nanargmin(sets.J))} if np.isfinite(sets.J).any() else set()
+    for error in sets.errors.T:
+        least = math.inf
+        for i in np.argsort(sets.rates):
+            if error[i] < 0.95 * least:
+                found.add(int(i))
+                least = error[i]
+    return np.array(sorted(found), int)
+
+
+def searched(one: Joint, name: str, count: int, seed: int, folder: Path | None) -> Sets:
+    """Return the sets of a search, which a folder may keep."""
+    file = folder and folder / f"{one.plant.name}-{name}-{seed}-{count}.npz"
+    if file and file.exists():
+        with np.load(file) as kept:
+            return Sets(**kept)
+    found = search(one, name, count, seed)
+    if file:
+        np.savez_compressed(file, **found._asdict())
+    return found
+
+
+def search(one: Joint, name: str, count: int, seed: int) -> Sets:
+    """Draw and breed sets of gains of a law, and judge them on the instance that chooses."""
+    bench = Bench(one, name, [0])
+    rng = np.random.default_rng([seed, zlib.crc32(name.encode())])
+    low, high = np.log([*bench.box.values(), TAUS]).T
+    low[:-1] -= WIDER * math.log(10.0)
+    high[:-1] += WIDER * math.log(10.0)
+    drawn = round(DRAWN * count)
+    known = [bench.judged(np.exp(rng.uniform(low, high, (drawn, len(low)))))]
+    size = (count - drawn) // len(GENERATIONS)
+    for spread in GENERATIONS:
+        so_far = joined(known)
+        parents = np.log(so_far.gains[on_front(so_far)])
+        if not len(parents):
+            break
+        steps = rng.normal(0.0, spread, (size, len(low)))
+        steps *= rng.random(steps.shape) < 0.6
+        bred = parents[rng.integers(len(parents), size=len(steps))] + steps
+        known.append(bench.judged(np.exp(np.clip(bred, low, high))))
+    return joined(known)
+
+
+class Choice(NamedTuple):
+    """A point of the page, before its runs: what buys it, and where."""
+
+    price: str  # "J": the set of the least J; "R": that of the least error which a level affords
+    level: float
+    case: int
+
+
+def choices(cases: Sequence[Case]) -> Iterator[Choice]:
+    """Yield what the page prints: rest by the set of the least J, reversals by level of R."""
+    for k, case in enumerate(cases):
+        if case.task == "rest":
+            yield Choice("J", 0.0, k)
+            continue
+        for level in RATES:
+            if case.share == 0.0 or level == RATES[0]:
+                yield Choice("R", level, k)
+
+
+def chosen(sets: Sets, choice: Choice, least: float) -> int:
+    """Return the set of a choice; -1 where there is none."""
+    if choice.price == "J":
+        costs = sets.J
+    else:
+        admitted = (sets.J / least <= ADMITTED) & (sets.rates <= MARGIN * choice.level)
+        costs = np.where(admitted, sets.errors[:, choice.case], np.nan)
+    return -1 if np.isnan(costs).all() else int(np.nanargmin(costs))
+
+
+class Told(NamedTuple):
+    """What the engine and MuJoCo say of sets of gains of a law on a joint."""
+
+    one: Joint
+    name: str
+    law: Component
+    names: tuple[str, ...]  # of the gains, without tau
+
+    def scenario(self, gains: Sequence[float], case: Case, instance: int, **changes: Any):
+        """Return a run with these gains."""
+        law = with_gains(self.law, self.names, [float(value) for value in gains[:-1]])
+        rate = smc.estimator("filtered_difference", tau=float(gains[-1]))
+        return scenario(self.one, law, case, instance, **{"velocity": rate} | changes)
+
+    def named(self, gains: np.ndarray) -> dict[str, float]:
+        """Return the gains by name."""
+        return dict(zip((*self.names, "tau"), gains.tolist(), strict=True))
+
+    def runs(self, gains: np.ndarray, case: Case) -> dict[str, Any]:
+        """Return what unseen instances of a case give, by the engine and by MuJoCo."""
+        window = window_of(self.one, case)
+        runs = [self.scenario(gains, case, 1 + instance) for instance in range(UNSEEN)]
+        sums = self.by_engine(runs, window)
+        found: dict[str, Any] = {"errors": (sums[:, RMS] / self.one.count).tolist()}
+        for key, column in (("ripple", RIPPLE), ("turned", TURNED)):
+            found[key] = float(np.median(sums[:, column]) / self.one.count)
+        found["stuck"] = float(np.median(sums[:, STICK]) / runs[0].duration)
+        return found | {"mujoco": self.by_mujoco(runs[:BY_MUJOCO], window)}
+
+    def by_engine(self, runs: Sequence[smc.Scenario], window: int) -> np.ndarray:
+        """Return the sums of runs of one form over their last samples, (runs, sums)."""
+        group = FormGroup(runs, SUMS)
+        group.rows[:, SETTING.early] = group.rows[:, SETTING.samples] + 1 - window
+        group.rows[:, SETTING.late] = group.rows[:, SETTING.samples] - window
+        scores = group.run(group.rows, threads=1)
+        return np.where(scores[:, [FAILURE]] == state.FINE, scores[:, SCORES:], np.nan)
+
+    def by_mujoco(self, runs: Sequence[smc.Scenario], window: int) -> list[float]:
+        """Return the rms of the error over the last samples of MuJoCo's runs, counts."""
+        found = [math.nan] * len(runs)
+        for i, trace in stream(runs, threads=1):
+            if trace.failure is None and trace.diverged_at is None:
+                found[i] = float(np.sqrt(np.mean(trace.e[-window:, 0] ** 2)) / self.one.count)
+        return found
+
+
+def told(one: Joint, name: str, found: Sequence[Sets], least: float) -> list[dict]:
+    """Return the points of a law, by the sets of all searches together, on instances that chose
+    nothing; `chose` has what each search by itself chose, on the instance that chooses.
+    """
+    law = law_of(name, one)
+    box = search_space.box(law, search_space.scales(one.plant, one.bound, one.start, 1.0))
+    it = Told(one, name, law, tuple(box))
+    cases = cases_of(one)
+    sets = joined(found)
+    points = []
+    for choice in choices(cases):
+        case = cases[choice.case]
+        point: dict[str, Any] = {"joint": one.plant.name, "law": name, "price": choice.price}
+        point |= {"level": choice.level} | case._asdict() | {"errors": None}
+        i = chosen(sets, choice, least)
+        if i >= 0:
+            alone = [(its, chosen(its, choice, least)) for its in found]
+            point["chose"] = [
+                its.errors[j, choice.case] if j >= 0 else math.inf for its, j in alone
+            ]
+            point |= {"J": sets.J[i] / least, "R": sets.rates[i], "gains": it.named(sets.gains[i])}
+            point |= it.runs(sets.gains[i], case) | {"edge": edges(sets.gains[i], box)}
+        points.append(point)
+    points += hunting(it, sets, least)
+    if "identified" not in one.levels and np.isfinite(sets.J).any():
+        points += beyond(it, sets, least)
+    return points
+
+
+def beyond(it: Told, sets: Sets, least: float) -> Iterator[dict]:
+    """Yield what MuJoCo says of the set of the least J at rest under what no search has seen."""
+    one = it.one
+    i = int(np.nanargmin(sets.J))
+    for name in OTHERS:
+        changes: dict[str, Any] = {}
+        case = Case(name if name in ("load", "lugre") else "coulomb10")
+        if name == "lugre":
+            changes = {"physics_step": PERIOD / 4}
+        if name.startswith("play"):
+            changes = play(one, name.removeprefix("play, "))
+        if name == "contact":
+            changes = dict(NAMED["contact"].on(one.plant, REST)) | {"x0": one.start}
+            changes["physics_step"] = PERIOD / 4
+        runs = []
+        for instance in range(BY_MUJOCO):
+            runs.append(it.scenario(sets.gains[i], case, 1 + instance, **changes))
+        window = round((AFTER_BLOW if name == "contact" else WINDOW) / PERIOD)
+        found = it.by_mujoco(runs, window)
+        point = {"joint": one.plant.name, "law": it.name, "price": "J", "level": 0.0}
+        point |= {"friction": name, "task": "rest", "share": 0.0, "J": sets.J[i] / least}
+        yield point | {"R": sets.rates[i], "errors": found}  # by MuJoCo alone
+
+
+def play(one: Joint, side: str) -> dict[str, Any]:
+    """Return a play of a hundredth of the start, with 40 % of the inertia on the motor's side, and
+    friction of 10 % of the bound on a side of it.
+    """
+    M = one.plant.parameters["M"]
+    gap = smc.Backlash(one.start / 100, rotor_inertia=0.4 * M)
+    friction = smc.Coulomb(0.1 * one.bound, side=side)
+    fields = {"actuator": gap, "friction": friction, "feedforward": None, "mismatch": {"mass": 0.6}}
+    return fields | {"physics_step": PERIOD / 8}
+
+
+def edges(gains: np.ndarray, box: Mapping[str, tuple[float, float]]) -> list[str]:
+    """Return the gains that are outside of the box of a search, or at its edge."""
+    found = []
+    for (name, (low, high)), value in zip(box.items(), gains, strict=False):
+        place = math.log(value / low) / math.log(high / low)
+        if not search_space.BOUND_MARGIN < place < 1.0 - search_space.BOUND_MARGIN:
+            found.append(name)
+    return found
+
+
+def hunting(it: Told, sets: Sets, least: float) -> Iterator[dict]:
+    """Yield for each friction which share of a law's admitted sets still moves after 40 s."""
+    admitted = np.flatnonzero((sets.J / least <= ADMITTED) & (sets.rates <= HUNTING_RATE))
+    picked = np.random.default_rng(5).permutation(admitted)[:HUNTERS]
+    for friction in it.one.levels:
+        point: dict[str, Any] = {"joint": it.one.plant.name, "law": it.name, "price": "hunting"}
+        point |= {"friction": friction, "sets": len(picked)}
+        if len(picked):
+            runs = []
+            for i in picked:
+                for instance in (1, 2):
+                    runs.append(it.scenario(sets.gains[i], Case(friction), instance, length=LONG))
+            ripples = it.by_engine(runs, round(LATE / PERIOD))[:, RIPPLE] / it.one.count
+            ranges = np.nan_to_num(ripples, nan=math.inf).reshape(-1, 2)
+            moving = (ranges > STILL).all(axis=1)
+            point["share"] = float(moving.mean())
+            point["range"] = float(np.median(ranges[moving])) if moving.any() else 0.0
+        yield point
+
+
+def points_of(one: Joint, count: int, seeds: Sequence[int], folder: Path | None) -> list[dict]:
+    """Return the points of all laws on a joint."""
+    found = {}
+    for seed in seeds:
+        for name in LAWS:
+            found.setdefault(name, []).append(searched(one, name, count, seed, folder))
+    J = [sets.J for its in found.values() for sets in its]
+    least = float(np.nanmin(np.concatenate(J)))
+    points = []
+    for name, its in found.items():
+        file = folder and folder / f"{one.plant.name}-{name}-{count}.json"
+        if file and file.exists():
+            points += json.loads(file.read_text())
+            continue
+        made = told(one, name, its, least)
+        if file:
+            file.write_text(json.dumps(made))
+        points += made
+    return [point | {"least": least, "searched": count * len(seeds)} for point in points]
+
+
+def rounded(value: Any) -> Any:
+    """Return a point with numbers of four digits."""
+    if isinstance(value, dict):
+        return {key: rounded(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [rounded(one) for one in value]
+    if isinstance(value, float):
+        return float(f"{value:.4g}") if math.isfinite(value) else None
+    return value
+
+
+def row(point: dict) -> str:
+    """Return a point as a line."""
+    about = [point[name] for name in ("joint", "law", "price", "friction")]
+    if point["price"] == "hunting":
+        return f"{about} {point['sets']} sets, {point.get('share')} move"
+    about += [point["level"], point["task"], point["share"], point.get("edge")]
+    errors = [np.median(point[by]) if point.get(by) else math.nan for by in ("errors", "mujoco")]
+    return f"{about} J {point.get('J')} R {point.get('R')}: {errors[0]:.3g} ({errors[1]:.3g})"
+
+
+def main() -> None:
+    """Print a line a point, and write all points."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("joints", nargs="+", help="rail, geared, ak80; of a lot drawn_rail, ...")
+    parser.add_argument("--sets", type=int, default=SETS)
+    parser.add_argument("--seeds", type=int, nargs="+", default=SEEDS)
+    parser.add_argument("--lot", type=int, metavar="SEED", help="draw the joints")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--keep", type=Path, help="folder of searches that are done")
+    parser.add_argument("--out", type=Path, required=True)
+    asked = parser.parse_args()
+    points = []
+    known = joints(asked.lot)
+    with ProcessPoolExecutor(asked.processes, mp_context=get_context("spawn")) as executor:
+        work = []
+        for name in asked.joints:
+            its = known[name], asked.sets, asked.seeds, asked.keep
+            work.append(executor.submit(points_of, *its))
+        for one in work:
+            points += map(rounded, one.result())
+            lines = ",\n".join(map(json.dumps, points))
+            asked.out.write_text(f"[\n{lines}\n]\n")
+    print(*map(row, points), sep="\n")
+
+
+if __name__ == "__main__":
+    main()
