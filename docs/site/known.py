@@ -196,12 +196,11 @@ def _plain(text: str) -> str:
     return re.sub(r"([|_*<\[\]`\\])", lambda found: f"&#{ord(found[1])};", " ".join(text.split()))
 
 
-METRICS = ", ".join(f"`{metric.name}`" for metric in metrics())
 SHOWN = {  # what the repository's page shows -> lines of the site's
     "<!-- every public name -->": contents,
     "[Every plant](../smc_mujoco/mechanisms/plants)": machines,
     "[Every law](../smc_mujoco/control/laws)": kinds,
-    f"[Their definitions](../smc_mujoco/metrics/catalogue.py): {METRICS}.": definitions,
+    "[Every metric](../smc_mujoco/metrics/catalogue.py)": definitions,
     "<!-- what holds instead of each claim -->": instead,
     "[Every scene](../scenes)": questions,
     "[Every audit](../benchmarks/papers)": audits,
