@@ -10,6 +10,7 @@ from helpers.machine_logs import chain, log, sines
 from typer.testing import CliRunner
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.engine import group
 from smc_mujoco.cli.main import app
 from smc_mujoco.identification.first_guess import first_guess
 from smc_mujoco.identification.friction_figure import curve_error, friction
@@ -168,6 +169,40 @@ def test_a_joint_s_number_is_a_parameter_that_a_mismatch_changes():
     np.testing.assert_allclose(ours.x, theirs.x, atol=1e-12)
     with pytest.raises(smc.ScenarioError, match=r"unknown parameter of chain 'j1\.dampng'"):
         smc.Scenario(**common, mismatch={"j1.dampng": 1.5})
+
+
+def test_a_gearbox_that_warms_up_is_a_jump_of_its_joint_s_friction(refused):
+    """From then on the run is that of the other numbers, from the state that it has."""
+    arm = smc.plant_from(ONE.replace('name="j1"', 'name="j1" damping=".2"'), ["j1"])
+    cold, warm = {"j1.frictionloss": 0.8}, {"j1.frictionloss": 0.3, "j1.damping": 0.5}
+    common = {"plant": arm, "law": "none", "u_max": 5.0}
+    jump = smc.Jump(1.0, {"j1.frictionloss": warm["j1.frictionloss"] - 0.8, "j1.damping": 0.5})
+    whole = smc.Scenario(
+        **common, feedforward=smc.Sine(2.5, 3.0), mismatch=cold, jump=jump, duration=2.0
+    )
+    first = smc.run(whole)
+    np.testing.assert_array_equal(
+        first.x[:1001], smc.run(dataclasses.replace(whole, jump=None, duration=1.0)).x
+    )
+    rest = smc.run(
+        smc.Scenario(
+            **common,
+            feedforward=smc.Sine(2.5, 3.0, phase=3.0),
+            mismatch=warm,
+            x0=first.x[1000, 0],
+            v0=first.v[1000, 0],
+            duration=1.0,
+        )
+    )
+    np.testing.assert_allclose(first.x[1000:], rest.x, atol=1e-9)
+    assert "more than one equation a joint" in group.why_not(whole, ("itae",))
+    refused(
+        lambda: smc.Scenario(
+            **common, friction=smc.Coulomb(0.3), jump=smc.Jump(1.0, {"friction.level": 2.0})
+        ),
+        "'friction.level'",
+        "reads y.t",
+    )
 
 
 @pytest.mark.filterwarnings("ignore:the dry friction of chain creeps")
