@@ -19,6 +19,7 @@ CANDIDATES = 8  # further starts that are drawn for each one that is refined; ch
 DAMPINGS = 0.0, 1e-2, 1.0, 1e3  # of steps that are tried at once, relative to the curvature; chosen
 # of its linear move by which a piece's starting state is moved in trials; chosen
 SHARES = 0.3, 1.0
+TRIALS = len(DAMPINGS) * (len(SHARES) + 1)  # points that a step tries
 # scales of a state at the start, by which it may differ from the measured one; chosen
 MAX_STATE = 100.0
 MAX_FACTOR = 10.0  # by which a step may change a quantity that cannot be negative; chosen

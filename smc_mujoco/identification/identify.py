@@ -53,6 +53,8 @@ from smc_mujoco.simulation.scenario import Scenario
 POOR_FIT = 80.0  # percent: a fit below may mean that the search ended in a wrong place; chosen
 PERFECT_FIT = 99.99  # percent: residuals beyond it are the simulation's; chosen
 FLOOR = 0.05  # of a value, by which drawn sets differ at least; chosen: friction warms up by more
+USUAL_STEPS = 6  # of a search; chosen: only the progress that is shown depends on it
+AHEAD = 1.1  # times what is done: the work that is shown, if a search takes longer
 PIECE_STEPS = 12  # of the search for the starts of pieces of a log that was not used; chosen
 Log = Source | AnyPath  # also a data frame
 Count = Annotated[int, Whole(low=1, high=1000)]
@@ -312,9 +314,15 @@ def identify(
     names = _checked_names(twin, names)
     fits_before = twin.fits(data)  # also refuses records that are too short
     doubts = first_guess.doubts(twin, data) if isinstance(twin, OwnRig) else []
-    with bar(f"identify {twin.name}", 2 * most * (2 * len(names) + 1), shown=progress) as drawn:
+    expected = _expected_sets(twin, names, most)
+    with bar(f"identify {twin.name}", expected, shown=progress) as drawn:
+
+        def report(count: int) -> None:
+            done = drawn.done + count
+            drawn.reached(done, max(expected, AHEAD * done))
+
         replays, slopes, by_steps = _solved(
-            twin, names, data, doubts, starts, seed, most, corrected, drawn.advance
+            twin, names, data, doubts, starts, seed, most, corrected, report
         )
         giving = presliding(replays, slopes)
         errors, correlations, independent = statistics(
@@ -348,6 +356,13 @@ def identify(
         gives_way=giving.way,
         data=tuple(data),
     )
+
+
+def _expected_sets(twin: Rig, names: Sequence[str], most: int) -> int:
+    """Return about how many parameter sets a search will simulate."""
+    slopes = 2 * (len(names) + 2 * len(twin.columns.x)) + 1
+    searches = 1 if twin.controller is None else 2
+    return searches * min(most, USUAL_STEPS) * (slopes + gauss_newton.TRIALS)
 
 
 def check(rig: Rig, log: Log, columns: Mapping[str, str] | None = None) -> HeldOutFit:

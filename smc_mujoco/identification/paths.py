@@ -56,15 +56,27 @@ class PartNumber(NamedTuple):
         return value if self.joint < 0 else value[self.joint]
 
     def put(self, parts: Sequence[Any], value: float) -> tuple[Any, ...]:
-        """Return the parts with another number, unchecked: a search keeps within its range."""
+        """Return the parts with another number, unchecked: a search keeps within its range. A level
+        at rest follows one while sliding that would pass it, and the other way round.
+        """
         made = copy.copy(parts[self.part])
-        if self.joint >= 0:
-            every = list(getattr(made, self.name))
-            every[self.joint] = value
-            object.__setattr__(made, self.name, tuple(every))
-        else:
-            object.__setattr__(made, self.name, value)
+        self._set(made, self.name, value)
+        ordered = getattr(made, "ordered", ())  # of frictions
+        if self.name in ordered and getattr(made, ordered[1]) is not None:
+            low, high = (np.ravel(getattr(made, name))[max(self.joint, 0)] for name in ordered)
+            if low > high:
+                (other,) = set(ordered) - {self.name}
+                self._set(made, other, value)
         return *parts[: self.part], made, *parts[self.part + 1 :]
+
+    def _set(self, made: Any, name: str, value: float) -> None:
+        """Set a number of a part, of this joint where each has one."""
+        every = getattr(made, name)
+        if isinstance(every, tuple):
+            changed = list(every)
+            changed[max(self.joint, 0)] = value
+            value = tuple(changed)  # pyright: ignore[reportAssignmentType]
+        object.__setattr__(made, name, value)
 
 
 class Paths(NamedTuple):

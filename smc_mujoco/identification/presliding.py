@@ -114,8 +114,8 @@ def _ways(rig: OwnRig) -> dict[str, OwnRig]:
                 bristles.append(LuGre(level, level, SLIDES_AT, k, damping, on=(joint,)))
         base = dataclasses.replace(rig.base, friction=(*rig.base.friction, *bristles))
         way = (
-            f"bristles that bend by {1e3 * bend:g} mrad (mm): find a LuGre's coulomb and stiffness "
-            "in place of frictionloss"
+            f"bristles that bend by {1e3 * bend:g} mrad (mm): find the coulomb of a LuGre with "
+            "such bristles in place of frictionloss"
         )
         found[way] = dataclasses.replace(rig, base=base, plant=_giving(rig.plant, True))
     return found

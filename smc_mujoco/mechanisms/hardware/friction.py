@@ -295,7 +295,7 @@ class LuGre(Friction):
     """
 
     keeps_state = True
-    forces = "coulomb", "static"
+    forces = ordered = "coulomb", "static"
     names = "coulomb", "static", "stribeck"
 
     coulomb: Positive

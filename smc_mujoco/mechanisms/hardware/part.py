@@ -164,6 +164,8 @@ class Friction(OnJoints):
     keeps_state: ClassVar[bool] = False
     smooth: ClassVar[bool] = False  # whether it is a damper, which RK4 integrates
     forces: ClassVar[tuple[str, ...]] = ()  # fields that its force is proportional to
+    # two of its numbers, of which the second is the first or more; identification keeps them so
+    ordered: ClassVar[tuple[str, ...]] = ()
     # (y, p, memory) -> the force that a joint needs to move against it at the steady speed y.v
     steady: ClassVar[Callable[..., float] | None] = None
     added_to_model: ClassVar[Added] = Added()

@@ -48,6 +48,7 @@ class Stribeck(Sliding):
     """
 
     forces = "coulomb", "static", "viscous", "offset"
+    ordered = "coulomb", "static"
 
     coulomb: NaturalPerJoint
     static: NaturalPerJoint | None = None
