@@ -6,7 +6,13 @@ UV ?= uv
 LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --custom-compile-command "make lock"
 
-.PHONY: help demo promised test slow quick attack mutants check docs lowest without entered tagged build gains gallery bench size gpu lock setup
+# the extra gpu, if it is missing; an environment that uv made has no pip
+WITH_GPU = $(BIN)/python -c "import numba_cuda, mujoco_warp" 2>/dev/null || \
+	$(UV) pip install --quiet --python $(BIN)/python -e ".[gpu]" 2>/dev/null || \
+	$(BIN)/python -m pip install --quiet -e ".[gpu]" || \
+	echo "smc-mujoco: could not install the extra gpu" >&2
+
+.PHONY: help demo promised test slow quick attack mutants check docs lowest without entered tagged build gains gallery bench size gpu cardless lock setup
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -97,14 +103,17 @@ bench: ## speed, beside bare MuJoCo and other packages
 size: ## tokens by room, density, the largest files and functions, beside the last release's
 	@python3 benchmarks/size.py
 
-gpu: ## the fast engine on a CUDA device, beside the processor; "no device" elsewhere
+gpu: ## the engines on a CUDA device, beside the processor: within ten minutes; "no device" elsewhere
 	@$(BIN)/python -c "import numba, mujoco" 2>/dev/null || ./setup.sh
-	@# numba-cuda, where there may be a device; an environment that uv made has no pip
-	@! command -v nvidia-smi >/dev/null || $(BIN)/python -c "import smc_mujoco.analysis.engine.gpu" 2>/dev/null || \
-		$(UV) pip install --quiet --python $(BIN)/python -e ".[gpu]" 2>/dev/null || \
-		$(BIN)/python -m pip install --quiet -e ".[gpu]" || \
-		echo "smc-mujoco: could not install numba-cuda" >&2
+	@# packages for a card, where there may be one
+	@! command -v nvidia-smi >/dev/null || $(WITH_GPU)
 	$(BIN)/python benchmarks/engine.py --cuda
+	$(BIN)/python benchmarks/card.py
+
+cardless: ## the code of every law for a card, compiled without one, and MuJoCo Warp's processor device
+	@./setup.sh requirements-test.lock
+	@$(WITH_GPU)
+	$(BIN)/python -m pytest tests/analysis/test_engine_gpu.py tests/analysis/test_engine_warp.py
 
 lock: ## the locks again from pyproject.toml, needs uv; delete a lock first to upgrade its packages
 	@command -v $(UV) >/dev/null || { echo "make lock needs uv: see docs.astral.sh/uv" >&2; exit 1; }

@@ -123,7 +123,7 @@ def picture(path: str, device: str, side: int = 1000) -> None:
 
 def main() -> None:
     cuda = "--cuda" in sys.argv
-    if cuda and not _has_device():
+    if cuda and not has_device():
         return
     if "--picture" in sys.argv:
         path = sys.argv[sys.argv.index("--picture") + 1]
@@ -139,7 +139,7 @@ def main() -> None:
         print(f"{name:34}{cells}", flush=True)
 
 
-def _has_device() -> bool:
+def has_device() -> bool:
     """Print the name of the CUDA device, or why there is none, and return whether there is one."""
     try:
         from smc_mujoco.analysis.engine import gpu

@@ -260,3 +260,13 @@ def _unanswered(site):
         if not any(hit.startswith(place) for hit in hits for place in places):
             unanswered[question] = hits
     return unanswered
+
+
+def test_what_the_page_says_of_a_card_is_what_was_measured():
+    import card
+
+    page = (DOCS / "gpu.md").read_text(encoding="utf-8")
+    measured = card.load()
+    assert card.table(measured) in page
+    assert ("Nobody has run this engine on a card yet" in page) == (not measured)
+    assert "not measured" not in card.table(measured | dict.fromkeys(card.ROWS.values(), 1.0))

@@ -1,5 +1,5 @@
 """The order of a control step, once for all that drive a run: MuJoCo's control callback (see
-`controller`) and the fast engine (see `analysis/engine`).
+`controller`), the fast engine, and the callback of MuJoCo Warp's worlds (see `analysis/engine`).
 
 At the first stage of a physics step:
 

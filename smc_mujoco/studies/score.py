@@ -45,14 +45,14 @@ def score(
       runs: a Trace, of which every metric is returned; or any number of scenarios, also from a
         generator.
       metrics: of scenarios, names of metrics.
-      device: of those scenarios that the fast engine can run, "cpu" or "cuda". MuJoCo runs the
-        others.
+      device: of those scenarios that the fast engine can run, "cpu" or "cuda". On "cuda" MuJoCo
+        Warp runs those of your own machines, 256 of one model or more. MuJoCo runs the others.
       threads: as in `run`.
 
     Returns:
       Of a trace name -> value. Of scenarios a Table, a row a scenario: the metrics are null where a
-      run failed, and `diverged_at` is its time, s. MuJoCo repeats 20 of the fast engine's runs; the
-      Table says how far apart their scores are.
+      run failed, and `diverged_at` is its time, s. MuJoCo repeats 20 of the others' runs; the
+      Table says how far apart their scores are, and why a card could not run some.
 
     Raises:
       ScenarioError: the trace diverged, failed or holds NaN; not a scenario, an unknown metric, or

@@ -4,6 +4,7 @@ A search, a map and a share of failures need thousands of runs of one law on one
 writes the run of such a group out as one function: sensors, noise, estimator, law, delay,
 disturbances and the plant's equation under RK4 in a single loop, compiled together with the law.
 Scores are summed on the way. `group` tells what this engine cannot run; `cpu` and `gpu` compile it.
+Plants without an equation run on a device in `worlds` that MuJoCo Warp steps; `choice` decides.
 
 It finds gains, fills maps, and gives sensitivities and medians of worst-case searches; where its
 numbers are shown, MuJoCo repeats CHECKED runs. All others are MuJoCo's.

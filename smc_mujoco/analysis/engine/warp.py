@@ -31,8 +31,8 @@ with extra("gpu", "device 'cuda' for a plant that MuJoCo runs"):
     import mujoco_warp
     import warp
 
-warp.config.quiet = True
-PIECE = 2**17  # worlds at once; chosen
+warp.config.log_level = warp.LOG_WARNING
+PIECE = 2**18  # worlds at once; chosen
 # Contacts for which a world has room at first, and at most. What does not fit is told, and run
 # again with twice the room; chosen.
 CONTACTS, MOST_CONTACTS = 16, 1024
@@ -119,10 +119,10 @@ def run_rows(runs: WorldRuns, rows: Array, device: str = "cuda") -> Array:
 
 def _run(runs: WorldRuns, rows: Array, members: Array) -> Array:
     """Return the scores of as many rows as are run at once, with room for all contacts."""
-    values = _values(runs)
+    values = values_of(runs)
     contacts = CONTACTS
     while True:
-        model, data = _worlds(runs, rows, members, values, contacts)
+        model, data = worlds_of(runs, rows, members, values, contacts)
         scores = _stepped(runs, rows, model, data)
         if not np.any(data.overflow.numpy() & FULL):
             return scores
@@ -134,7 +134,7 @@ def _run(runs: WorldRuns, rows: Array, members: Array) -> Array:
             )
 
 
-def _values(runs: WorldRuns) -> dict[str, Array]:
+def values_of(runs: WorldRuns) -> dict[str, Array]:
     """Return the fields of the model that a scenario sets, with what MuJoCo derives of them,
     (scenarios, ...) each.
     """
@@ -155,7 +155,7 @@ def _values(runs: WorldRuns) -> dict[str, Array]:
     return {name: np.array(of_each) for name, of_each in found.items()}
 
 
-def _worlds(
+def worlds_of(
     runs: WorldRuns, rows: Array, members: Array, values: dict[str, Array], contacts: int
 ) -> tuple[Any, Any]:
     """Return MuJoCo Warp's model and data of the worlds of rows, at their start."""
