@@ -43,6 +43,7 @@ from smc_mujoco.control import from_text
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import Law, checked_name, known_laws
+from smc_mujoco.mechanisms.custom.clearance import raised
 from smc_mujoco.mechanisms.custom.scales import beside_goal
 from smc_mujoco.mechanisms.hardware.contact import kinds
 from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
@@ -121,6 +122,8 @@ class Starts:
                 x0.append(r + (x - r) * (1.0 + self.spread * factor) + away * factor)
         if "bobs" in kinds(scenario.contact):
             x0.sort()
+        if scenario.plant.pose and scenario.plant.is_user_model:
+            x0 = raised(scenario.plant, tuple(x0))
         return dataclasses.replace(scenario, seed=seed, x0=x0)
 
 

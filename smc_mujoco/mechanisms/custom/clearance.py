@@ -11,6 +11,7 @@ from smc_mujoco.mechanisms.layout import joint_ids, loaded, posed
 from smc_mujoco.mechanisms.plant import Plant
 
 DEPTH = 5e-3  # m, chosen: soft feet stand less deep
+RAISES = 4  # at most, as another part may be lower when the deepest is out; chosen
 TOUCH = 1e-3  # m, chosen: what touches overlaps by less, so a deeper start begins with a blow
 
 
@@ -35,6 +36,17 @@ def overlap(plant: Plant, x: Floats) -> Overlap:
     data = posed(model, x)
     mujoco.mj_fwdPosition(model, data)
     return deepest(plant, model, data)
+
+
+def raised(plant: Plant, x: Floats) -> Floats:
+    """Return a start of a free body, raised by as much as it would stand in the ground below."""
+    allowed = max(DEPTH, overlap(plant, plant.x0).depth)
+    for _ in range(RAISES):
+        depth = overlap(plant, x).depth
+        if depth <= allowed:
+            break
+        x = (*x[:2], x[2] + depth, *x[3:])
+    return x
 
 
 def deepest(

@@ -493,3 +493,21 @@ def test_laws_of_a_body_with_a_load_are_those_that_run_on_it(joint):
     with pytest.raises(smc.ScenarioError, match=r"give model='none' and a law that reads no model"):
         smc.Scenario(plant=plant, law="geometric")
     assert smc.run(smc.Scenario(plant=plant, law="none", duration=0.01)).failure is None
+
+
+def test_starts_in_the_floor_are_raised_and_others_stay():
+    touches = 'contype="1" conaffinity="1" type='
+    ground = f'<worldbody><geom name="ground" {touches}"plane" size="1 1 .1" pos="0 0 {{}}"/>'
+    solid = TEXT.replace('type="box"', f'{touches}"box"')
+    starts = []
+    for height in (0.95, -9.0):  # it hovers at 1 m
+        text = solid.replace("<worldbody>", ground.format(height), 1)
+        machine = smc.plant_from(text, channels=["body"], name="drone", keyframe="hover")
+        runs = smc.grid(machine, nothing, "nominal", seeds=8)
+        starts.append(np.array([scenario.resolved.x0 for scenario in runs]))
+    near, far = starts
+    up = near[:, 2] - far[:, 2]
+    assert (up >= 0.0).all()
+    assert 0 < np.count_nonzero(up) < len(up)
+    assert near[:, 2].min() > 0.95
+    np.testing.assert_array_equal(np.delete(near, 2, axis=1), np.delete(far, 2, axis=1))
