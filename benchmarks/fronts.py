@@ -354,7 +354,7 @@ class Bench:
 def assumed(task: TuningTask) -> dict[str, tuple[float, float]]:
     """Return the box of the input gain that an implicit law assumes, which tuning leaves at 1."""
     declared = catalogue()[task.law.name].gains
-    if declared.get("b") is not AHEAD_B:
+    if declared.get("b") != AHEAD_B:
         return {}
     scale = INPUT_GAIN.of(task.scales)
     return {"b": (scale * 10**-search_space.HALF_WIDTH, scale * 10**search_space.HALF_WIDTH)}

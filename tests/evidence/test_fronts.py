@@ -19,6 +19,7 @@ SPREAD = np.exp(np.linspace(-0.05, 0.05, UNSEEN))
 def point(law, error, level=2.0, **fields):
     """A point of a front, with runs about an error."""
     made = {"plant": "duffing", "model": "none", "law": law, "price": "J", "level": level}
+    made |= {"lot": None, "period": 1e-3}
     made |= {"condition": "middle", "chose": error, "errors": (error * SPREAD).tolist()}
     return made | {"within": True} | fields
 
@@ -33,7 +34,9 @@ def point(law, error, level=2.0, **fields):
         (None, 0.01, "contradicted"),  # nothing at this price
         (0.01, None, "alone"),
         (FLOOR / 100, FLOOR / 2, "not ranked"),
-        (FLOOR / 100, FLOOR * 2, "stands"),
+        (FLOOR / 100, FLOOR * 2, "below the floor"),
+        (FLOOR / 100, FLOOR * 1.3, "not ranked"),  # another search may find it below, too
+        (FLOOR * 2, FLOOR / 100, "contradicted"),
         (math.nan, 0.01, "contradicted"),  # a run that fails is behind all others
     ],
 )
@@ -47,6 +50,9 @@ def test_a_sentence_is_judged_by_the_lead_at_the_prices_that_it_is_about(ours, t
             points.append(point(law, error))
     (found,) = fronts.judged(points, [sentence])
     assert found.verdict == said
+    if said in ("stands", "open"):
+        assert found.lead == pytest.approx(theirs / ours)
+        assert found.low <= found.lead <= found.high
     assert not list(fronts.judged(points, [sentence._replace(within=False)]))
 
 
@@ -61,8 +67,10 @@ def test_a_level_buys_the_least_error_among_sets_that_have_settled():
     for price, level, condition, i in fronts.chosen(sets, LEVELS, 1.0):
         if condition == 0:
             found[price, level] = i
-    bought = [found[at] for at in (("J", 1.5), ("J", 3.0), ("J", 4.0), ("J", 6.0), ("rate", 10.0))]
-    assert bought == [0, 1, 1, 2, 1]  # 4 is within the margin of its level
+    bought = [found[at] for at in (("J", 1.5), ("J", 3.0), ("J", 5.0), ("rate", 30.0))]
+    assert bought == [0, 1, 2, 1]
+    just = fronts.chosen(sets, {"J": (4.0,)}, 1.0)  # 4 is within the margin of its level
+    assert [i for *_, condition, i in just if condition == 0] == [1]
     assert [*fronts.on_front(sets)] == [True, True, True, False]
 
 

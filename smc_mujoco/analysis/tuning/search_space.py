@@ -9,14 +9,13 @@ The plant has four scales, from which each gain's scale follows:
 
 A gain with the unit F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5,
 and a search may leave this box by a decade. As F = M X / T^2, its unit has 2 a - c powers of a rate
-1 / T, and each beyond two raises its upper end by a decade. So ki of a PID, N/(m s), reaches the l
-wc^2 / b that is the integral of a PD with an observer, and weights of squares reach the gains of
-other laws. Two powers are a force or a stiffness. Forces have this box too, such as lambda of
--lambda tanh(s), as the actuator clips the command of every law alike. A law with 1 / tau in place
-of k has the same search. A law may divide a gain by another one, such as k by b in the force k / b,
-where b is an estimate of g. Then k / b is searched as far as a force, for the b of each candidate.
-The law
-declares this with `Gain(2.0, ACCELERATION, over="b")`.
+1 / T. A force or a stiffness has two, and each beyond two, or beyond those of F^a if a > 1, raises
+the upper end by a decade. So ki of a PID, N/(m s), reaches the l wc^2 / b that is the integral of a
+PD with an observer. Forces have this box too, such as lambda of -lambda tanh(s), as the actuator
+clips the command of every law alike. A law with 1 / tau in place of k has the same search. A law
+may divide a gain by another one, such as k by b in the force k / b, where b is an estimate of g.
+Then k / b is searched as far as a force, for the b of each candidate. The law declares this with
+`Gain(2.0, ACCELERATION, over="b")`.
 
 Where u is a voltage or an acceleration, F is its bound and g is x'' per unit of u. X is the largest
 |x0| of all joints, also of free ones, in m and in rad alike.
@@ -191,7 +190,8 @@ def box(law: Component, plant_scales: Numbers) -> dict[str, Pair]:
             _gain(law, name).held or left_out(law, name)
         ):
             scale = gain_unit.of(_scales_of(_gain(law, name), plant_scales))
-            above = HALF_WIDTH + max(0.0, gain_unit.rates - FORCE.rates)
+            usual = FORCE.rates * max(1.0, gain_unit.force)
+            above = HALF_WIDTH + max(0.0, gain_unit.rates - usual)
             bounds[name] = (scale * 10**-HALF_WIDTH, scale * 10**above)
     if not bounds:
         raise ScenarioError(f"law {law.name!r} has no gain to tune: choose another")
