@@ -15,7 +15,7 @@ import numpy as np
 
 from smc_mujoco.mechanisms.plant import Field, Plant
 
-SEED, GRAVITY, HELD = 93597661, 9.81, 3.0  # of the lot; m/s^2; N m
+SEED, GRAVITY, HELD = 225907474, 9.81, 3.0  # of the lot; m/s^2; N m
 MODEL = """
 <mujoco>
   <option timestep="0.001" integrator="RK4"/>

@@ -4,6 +4,7 @@ takes to turn a sentence of the page.
 
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from benchmarks import fronts
 from benchmarks.fronts import CONDITIONS, FLOOR, LEVELS, SENTENCES, UNSEEN, Job, Sentence, Sets
 
+PAGE = Path(fronts.__file__).parents[1] / "docs" / "where_sliding_mode_loses.md"
 POINTS = json.loads(Path(fronts.__file__).with_suffix(".json").read_text())  # of the page
 SPREAD = np.exp(np.linspace(-0.05, 0.05, UNSEEN))
 
@@ -89,25 +91,65 @@ def test_a_lot_draws_loads_and_prices_of_its_seed_and_plant():
 
 
 @pytest.mark.quick
-def test_the_points_of_the_page_bear_its_sentences():
-    found = list(fronts.judged(POINTS))
-    assert {one.sentence for one in found} == {sentence.name for sentence in SENTENCES}
-    assert not [one for one in found if one.verdict == "contradicted"]
-    assert 5 * sum(one.verdict == "open" for one in found) <= len(found)
+def test_a_gain_at_the_edge_of_its_box_is_named_once_for_a_plant_with_how_often():
+    edges = [{"l": "upper"}, {"l": "upper"}, {}]
+    points = [point("hodob", 0.1, gains={"l": 632.5}, edges=edge) for edge in edges]
+    (said,) = fronts.at_edges(points)
+    assert said.startswith("hodob on duffing: l = 632.5 is at the upper end of its box: a larger")
+    assert said.endswith("(2 of 3 points)")
+
+
+@pytest.mark.quick
+def test_the_implicit_laws_assumed_gain_is_searched():
+    implicit = fronts.Bench(Job("inverted_pendulum", "implicit_super_twisting", 30.0))
+    low, high = fronts.drawn_from(implicit.task)["b"]
+    assert low < 8.0 < high  # the pendulum's g
+    assert "b" in implicit.names
+    assert fronts.assumed(fronts.Bench(Job("duffing", "pid", 8.2)).task) == {}
+
+
+@pytest.mark.quick
+def test_the_page_has_the_tables_of_its_points_and_strikes_out_what_they_contradict():
+    text = PAGE.read_text()
+    for line in (*fronts.tables(POINTS), *fronts.counted(POINTS)):
+        assert line in text.splitlines(), line
+    contradicted = {one.sentence for one in fronts.judged(POINTS) if one.verdict == "contradicted"}
+    assert {one.sentence for one in fronts.judged(POINTS)} == {one.name for one in SENTENCES}
+    for sentence in SENTENCES:
+        (struck,) = re.findall(rf"^- (~~)?\*{re.escape(sentence.name)}\*", text, re.MULTILINE)
+        assert bool(struck) == (sentence.name in contradicted), sentence.name
+    words = f"**{len(contradicted)} of {len(SENTENCES)} sentences are contradicted**"
+    assert words in " ".join(text.split())
+
+
+@pytest.mark.quick
+def test_readme_and_the_page_say_first_how_often_super_twisting_leads_and_trails():
+    readme = PAGE.parents[1] / "README.md"
+    for path, words in zip((readme, PAGE), fronts.in_words(POINTS), strict=True):
+        assert words in " ".join(path.read_text().split()), path
+
+
+@pytest.mark.quick
+def test_mujoco_has_run_each_point_that_a_sentence_rests_on():
+    sides = [side for _, *both in fronts.compared(POINTS) for side in both if side]
+    apart = [side["apart"] for side in sides if side["lot"] is None]
+    assert apart
+    ranked = [side for side in sides if side["lot"] is None and np.median(side["errors"]) > FLOOR]
+    near = [np.abs(side["apart"]).max() < 0.05 for side in ranked]
+    assert np.mean(near) > 0.95
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("sentence", SENTENCES, ids=[sentence.name for sentence in SENTENCES])
-def test_no_change_of_one_gain_of_a_losing_law_turns_a_sentence(sentence):
+def test_no_change_of_one_gain_of_a_losing_law_turns_a_sentence_that_stands(sentence):
     """By 3, 10 or 30 either way: it costs more than the price, or its error is larger still."""
     kinds = [condition.kind for condition in CONDITIONS]
     benches = {}
     for _, first, second in fronts.compared(POINTS, [sentence]):
-        if not (first and second) or first["level"] not in (0.0, 1.5, 2.0, 3.0, 6.0, 100.0):
+        stands = fronts.verdict(sentence, first, second)[-1] == "stands"
+        if not (first and second and stands and first["lot"] is None):
             continue
-        job = Job(
-            second["plant"], second["law"], sentence.model, second["wc"], CONDITIONS, 0, "cpu"
-        )
+        job = Job(second["plant"], second["law"], second["wc"], period=second["period"])
         bench = benches.setdefault(job, None) or fronts.Bench(job)
         benches[job] = bench
         changed = np.repeat([list(second["gains"].values())], 6 * len(bench.names), axis=0)
@@ -118,6 +160,6 @@ def test_no_change_of_one_gain_of_a_losing_law_turns_a_sentence(sentence):
             assert (np.nan_to_num(sets.J, nan=np.inf) > first["J"][0]).all()
             continue
         cost = sets.rates if sentence.price == "rate" else sets.J / second["least"]
-        error = np.maximum(sets.errors[:, kinds.index(second["condition"])], FLOOR)
-        turned = (cost <= first["level"]) & (error < fronts.values(first)[0])
+        error = sets.errors[:, kinds.index(second["condition"])]
+        turned = (cost <= first["level"]) & (error < np.median(first["errors"]))
         assert not turned.any(), (first["law"], second["law"], first["level"], changed[turned])
