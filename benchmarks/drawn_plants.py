@@ -4,8 +4,9 @@ docs/where_sliding_mode_loses.md on them.
     python benchmarks/fronts.py benchmarks/drawn_plants.py:drawn_pendulum --lot SEED
 
 SEED is that of the lot, the first seven digits of the hash that git gave benchmarks/fronts.py when
-its code was fixed (git hash-object). A mass on a spring: M x'' = -k x - b x' + u + d. A pendulum, m l^2 x'' = m g l sin x - b x' + u + d,
-that stands or hangs; one that half of u_max cannot hold is drawn again.
+its code was fixed (git hash-object). A mass on a spring: M x'' = -k x - b x' + u + d. A pendulum, m
+l^2 x'' = m g l sin x - b x' + u + d, that stands or hangs; one that half of u_max cannot hold is
+drawn again.
 """
 
 import math
