@@ -33,8 +33,8 @@ MIN_DURATION, MAX_STEP = 1.0, 0.05  # s: of a record, and between its samples; c
 class Filter:
     """The filter of a record's columns at its own rate."""
 
-    def __init__(self, data: Record, columns: Columns):
-        """Make the filter of a record."""
+    def __init__(self, data: Record, columns: Columns, cutoff: float = CUTOFF):
+        """Make the filter of a record, of `cutoff` Hz."""
         from scipy.signal import butter
 
         t = data[columns.time]
@@ -47,7 +47,7 @@ class Filter:
                 f"{MAX_STEP:g} s or more often"
             )
         self.stride = max(1, round(COMPARED_PERIOD / self.step))
-        self.poles = butter(POLES, CUTOFF, fs=1.0 / (self.stride * self.step), output="sos")
+        self.poles = butter(POLES, cutoff, fs=1.0 / (self.stride * self.step), output="sos")
 
     def cubic(self, name: str, derivative: int = 0) -> Array:
         """Return a column or its derivative, (N,), at the samples that are compared, from cubics
@@ -103,11 +103,11 @@ def long_enough(data: Record, columns: Columns) -> bool:
     return bool(t[-1] - t[0] >= MIN_DURATION and step_of(t) <= MAX_STEP)
 
 
-def torques(plant: Plant, data: Record, columns: Columns) -> Record:
-    """Return the torque of each joint in the measured motion, below CUTOFF, N m, by MuJoCo's
+def torques(plant: Plant, data: Record, columns: Columns, cutoff: float = CUTOFF) -> Record:
+    """Return the torque of each joint in the measured motion, below `cutoff` Hz, N m, by MuJoCo's
     inverse dynamics.
     """
-    filtered = Filter(data, columns)
+    filtered = Filter(data, columns, cutoff)
     model = plant.load()
     state = mujoco.MjData(model)
     joints = joint_ids(model)

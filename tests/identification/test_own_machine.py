@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from helpers.machine_logs import chain, log, sines
+from helpers.machine_logs import chain, chirp, log, sines
 from typer.testing import CliRunner
 
 import smc_mujoco as smc
@@ -97,11 +97,28 @@ def test_a_log_that_an_open_loop_leaves_is_told_apart_from_a_poor_fit(found):
     assert note.startswith("the fit is poor")
 
 
-def test_a_first_guess_is_within_a_fifth_without_a_simulation(arm, run):
-    """15 % from 3 s of a log, as a pilot had; delays are tried in steps of 1 ms."""
+def test_a_first_guess_is_within_a_tenth_without_a_simulation(arm, run):
+    """10 % from 3 s of a log; delays are tried in steps of 1 ms."""
     guess = first_guess(own_rig(arm, list(TRUTH)), [run])
     for name, true in TRUTH.items():
-        assert guess.values[name] == pytest.approx(true, rel=0.2 if name != "input_delay" else 0.3)
+        assert guess.values[name] == pytest.approx(true, rel=0.1 if name != "input_delay" else 0.3)
+
+
+@pytest.mark.slow
+def test_a_first_guess_of_three_joints_is_within_a_tenth():
+    """Forces below 5 Hz leave out the steps of dry friction, and a start from them is 18 % off."""
+    numbers = {"j1": (0.4, 0.6, 0.05), "j2": (0.2, 0.3, 0.02), "j3": (0.05, 0.1, 0.005)}
+    truth = {"input_delay": 0.002}
+    for joint, values in numbers.items():
+        for kind, value in zip(("damping", "frictionloss", "armature"), values, strict=True):
+            truth[f"{joint}.{kind}"] = value
+    three = chain([0.3, 0.3, 0.2], [1.5, 1.0, 0.5])
+    motion = chirp([0.0, 0.4, -0.3], 0.4, 0.2, 2.5, 3.0)
+    fields = {"joints": [*numbers], "rate": 1000.0, "counts": 16384, "duration": 3.0}
+    run = log(three, truth, motion, [40.0, 40.0, 15.0], [3.0, 3.0, 0.6], **fields)
+    guess = first_guess(own_rig(smc.plant_from(three, [*numbers]), list(truth)), [run])
+    for name, true in truth.items():
+        assert guess.values[name] == pytest.approx(true, rel=0.1), name
 
 
 @pytest.mark.slow
