@@ -157,7 +157,7 @@ def general_laws(plants: Sequence[str | Plant], gains: NameOfSet) -> list[str]:
     first.
     """
     named = list(map(as_plant, plants))
-    names = general()
+    names = list(general())
     for plant in named:
         names = [name for name in names if in_set(plant, name, gains)]
     if names:

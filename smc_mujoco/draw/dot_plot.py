@@ -172,9 +172,9 @@ def _looks(laws: Sequence[str]) -> dict[str, Fields]:
     return looks
 
 
-def _draw_plant(row: Sequence[Axes], dots: Dots, plant: str, named: bool) -> None:
-    """Draw a panel of each metric of a plant; laws are named at the first, or at all if
-    `named`.
+def _draw_plant(row: Array, dots: Dots, plant: str, named: bool) -> None:
+    """Draw a panel of each metric of a plant in a row of axes; laws are named at the first, or at
+    all if `named`.
     """
     for ax, name in zip(row, dots.metrics, strict=True):
         here = name, plant

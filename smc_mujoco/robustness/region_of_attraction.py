@@ -160,7 +160,7 @@ def basin(
     return basin_of(base, xs if x is None else x, vs if v is None else v, threads, report, device)
 
 
-def _default_axes(plant: Plant, points: object, needed: bool) -> ArrayPair:
+def _default_axes(plant: Plant, points: Sequence[int], needed: bool) -> ArrayPair:
     """Return the positions and the velocities of the default grid; if they are `needed`, raise
     ScenarioError for a plant that gives them no size.
     """

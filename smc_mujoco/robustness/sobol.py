@@ -149,7 +149,7 @@ class SobolResult:
 
 def _intervals(ends: Array, points: int) -> list[Interval]:
     """Return the interval of each axis from its value, low and high end, (3, axes)."""
-    return [Interval(*of_axis, points) for of_axis in ends.T.tolist()]
+    return [Interval(at, low, high, points) for at, low, high in ends.T.tolist()]
 
 
 def _random(scenario: Scenario) -> bool:
