@@ -450,6 +450,10 @@ def actuator(name: str, value: Actuators | None, s: Any) -> tuple[Actuator, ...]
         return ()
     driven = driven_names(s.plant)
     items = _by_joint(name, value, s, Actuator, "smc.Lag(0.01)", driven_names)
+    kept = _kept(items, s.plant)
+    if kept:
+        before = [part for part in items if part.leads]
+        items = before + kept + [part for part in items if not part.leads]
     for chain in dict.fromkeys(chains(items, driven)):
         drives = tuple(part for part in chain if part.drives)
         others = [type(part).__name__ for part in chain if not part.drives]
@@ -458,12 +462,21 @@ def actuator(name: str, value: Actuators | None, s: Any) -> tuple[Actuator, ...]
                 f"{name} has {joined(others)}, and a joint has one rotor beside it: give one"
             )
         if len(drives) > 2 or (len(drives) == 2 and not drives[0].leads):
-            raise ScenarioError(
-                f"{name} has the drives {shown(drives)}: give one drive, or (smc.Lag(0.01), "
-                "another)"
-            )
-    items = _kept(items, s.plant) + items
+            raise ScenarioError(_too_many(name, drives, kept))
     return tuple(sorted(items, key=lambda part: not part.drives))
+
+
+def _too_many(name: str, drives: Sequence[Actuator], kept: Sequence[Actuator]) -> str:
+    """Return a sentence on drives of one joint that are not all taken."""
+    if file := next((part for part in drives if part in kept), None):
+        others = joined(type(part).__name__ for part in drives if part is not file)
+        return (
+            f"{name} has {others}, and the joint keeps the {type(file).__name__} of its file: "
+            "leave that out, or give smc.Channel(motor=True) for an ideal motor instead"
+        )
+    return (
+        f"{name} has the drives {shown(tuple(drives))}: give one drive, or (smc.Lag(0.01), another)"
+    )
 
 
 def _kept(items: Sequence[Actuator], plant: Plant) -> list[Actuator]:

@@ -1,15 +1,6 @@
-"""What an actuator of a user's model is, in the words of MJCF, and why it is no plain motor or no
-servo whose set-point a law may command.
-"""
-
-import math
+"""What an actuator of a user's model is, in the words of MJCF, and why it is no plain motor."""
 
 import mujoco
-
-from smc_mujoco.common.aliases import Pair
-from smc_mujoco.mechanisms.hardware.position_servo import UNBOUNDED, PositionServo
-
-EQUAL = 1e-9  # relative: gain and stiffness of a servo, which a file may write twice
 
 # what a kind of dynamics or of gain is, and what its command would be
 DYNAMICS = {
@@ -43,64 +34,10 @@ def no_motor(model: mujoco.MjModel, i: int) -> str:
         kind = f"has dynamics (dyntype {dynamics.removeprefix('mjDYN_').lower()})"
     if delay := float(model.actuator_delay[i]):
         kind = f"{kind or 'is a motor'}, with a delay of {delay:g} s"
-    return kind or _spoilt(model, i)
+    return kind or spoilt(model, i)
 
 
-def no_servo(model: mujoco.MjModel, i: int) -> str:
-    """Return why an actuator is not a `<position>` servo of a joint's own position; "" if it is
-    one.
-    """
-    bias, stiffness, _ = model.actuator_biasprm[i, :3].tolist()
-    gain = float(model.actuator_gainprm[i, 0])
-    affine = model.actuator_biastype[i] == mujoco.mjtBias.mjBIAS_AFFINE
-    if not no_motor(model, i) or not (affine and stiffness):
-        return f"{no_motor(model, i) or 'is a motor'}, and has no set-point"
-    if model.actuator_gaintype[i] != mujoco.mjtGain.mjGAIN_FIXED:
-        return no_motor(model, i)
-    if model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
-        lag = mujoco.mjtDyn(model.actuator_dyntype[i]).name.removeprefix("mjDYN_").lower()
-        return f"is a servo with dynamics (dyntype {lag})"
-    if delay := float(model.actuator_delay[i]):
-        return f"is a servo with a delay of {delay:g} s"
-    if bias or not math.isclose(gain, -stiffness, rel_tol=EQUAL):
-        return f"has the gain {gain:g} and the bias {bias:g} {stiffness:g}, and is no <position>"
-    return _spoilt(model, i)
-
-
-def servo_of(model: mujoco.MjModel, i: int, goal: float, step: float) -> PositionServo:
-    """Return a `<position>` servo as it acts at its joint, with gear 1."""
-    gear = float(model.actuator_gear[i, 0])
-    _, stiffness, damping = model.actuator_biasprm[i, :3].tolist()
-    ctrlrange = UNBOUNDED
-    clamped = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL.value
-    if model.actuator_ctrllimited[i] and clamped:
-        ctrlrange = _times(model.actuator_ctrlrange[i].tolist(), 1.0 / gear)
-    return PositionServo(
-        kp=-gear * gear * stiffness,
-        kv=-gear * gear * damping,
-        forcerange=forcerange_of(model, i),
-        ctrlrange=ctrlrange,
-        goal=goal,
-        step=step,
-    )
-
-
-def forcerange_of(model: mujoco.MjModel, i: int) -> Pair:
-    """Return the least and the largest force of an actuator at its joint, N m or N, by its
-    forcerange alone.
-    """
-    if not model.actuator_forcelimited[i]:
-        return UNBOUNDED
-    return _times(model.actuator_forcerange[i].tolist(), float(model.actuator_gear[i, 0]))
-
-
-def _times(ends: list[float], factor: float) -> Pair:
-    """Return the lowest and the highest of two ends times a factor."""
-    low, high = sorted(factor * end for end in ends)
-    return low, high
-
-
-def _spoilt(model: mujoco.MjModel, i: int) -> str:
+def spoilt(model: mujoco.MjModel, i: int) -> str:
     """Return what else a force of gear and gain alone has not, or ""."""
     if (
         model.actuator_armature[i]

@@ -25,13 +25,10 @@ from smc_mujoco.common.errors import (
     shown,
     users_stacklevel,
 )
-from smc_mujoco.mechanisms.custom.actuator_kinds import (
-    forcerange_of,
-    no_motor,
-    no_servo,
-    servo_of,
-)
+from smc_mujoco.mechanisms.custom.actuator_kinds import no_motor
+from smc_mujoco.mechanisms.custom.kept_actuators import forcerange_of, kept, not_kept
 from smc_mujoco.mechanisms.custom.mjcf import pick
+from smc_mujoco.mechanisms.hardware.part import Actuator
 from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
 from smc_mujoco.mechanisms.layout import BASE, PASSIVE, PLACES, POSE, unit_wrenches
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Range
@@ -53,7 +50,7 @@ FLIES = (
 )
 MOTOR_GROUP = 31  # actuator group of motors, which actuatorgroupdisable cannot turn off
 CURE = "give smc.Channel(motor=True), or JOINT(motor) in a text, for one ideal motor instead"
-KEEP = "give smc.Channel(servo=True), or JOINT(servo) in a text, to command its set-point"
+KEEP = "give smc.Channel(servo=True), or JOINT(servo) in a text, to command it as it is"
 
 
 @named_data
@@ -64,9 +61,9 @@ class Channel:
       motor: whether to replace the joint's actuators, if it has any, by an ideal motor. It keeps
         their forcerange, a motor's ctrlrange, and the joint's actuatorfrcrange. Without it, the
         joint needs exactly one actuator: a motor.
-      servo: whether u is the set-point of the file's `<position>` servo, which stays as it is: kp,
-        kv, gear, forcerange and ctrlrange. u is in rad (m), and counts from the joint's default
-        goal. There is then no nominal model.
+      servo: whether u is the command of the file's actuator, which stays as it is. u is the
+        set-point of a `<position>`, rad (m) from the joint's default goal, with its kp, kv, gear,
+        forcerange and ctrlrange, and without a nominal model; or the voltage of a `<dcmotor>`, V.
       set_point_step: the servo rounds its set-point to multiples of this, rad (m); 0: it does not.
       partner: a joint without an actuator that moves with this one, such as a pole on its cart. It
         is measured and scored as a separate channel, after the driven ones. The law of this channel
@@ -446,14 +443,14 @@ class Motor(NamedTuple):
     joint: str
     limit: float  # bound on its force, N m or N
     replaced: tuple[int, ...]  # indices of the actuators that it replaces
-    servo: PositionServo | None = None  # of the file, if a law commands its set-point
+    kept: Actuator | None = None  # of the file, if a law commands it as it is
 
 
 def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel, goal: float) -> Motor:
     """Return the motor that drives a joint, whose default goal is given."""
     joint_id = model.joint(joint).id
     bounds = []
-    servo = None
+    part = None
     if model.jnt_actfrclimited[joint_id]:
         bounds.append(tuple(map(float, model.jnt_actfrcrange[joint_id])))
     actuators = [i for i in range(model.nactuator) if model.actuator_trntype[i] in ONE_JOINT]
@@ -467,14 +464,19 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel, go
     elif len(actuators) > 1:
         raise ScenarioError(f"joint {joint!r} of {label} has the actuators {names}: {CURE}")
     elif channel.servo:
-        if why := no_servo(model, actuators[0]):
+        if why := not_kept(model, actuators[0]):
             raise ScenarioError(
-                f"actuator {names!r} of joint {joint!r} {why}, and servo=True is for a <position>: "
-                f"leave servo out, or {CURE}"
+                f"actuator {names!r} of joint {joint!r} {why}, and servo=True is for a <position> "
+                f"and a plain <dcmotor>: leave servo out, or {CURE}"
+            )
+        if channel.set_point_step and model.actuator_gaintype[actuators[0]] != FIXED:
+            raise ScenarioError(
+                f"actuator {names!r} of joint {joint!r} is a <dcmotor>, which has no set-point: "
+                "leave set_point_step out"
             )
         bounds.append(forcerange_of(model, actuators[0]))
     elif why := no_motor(model, actuators[0]):
-        cure = CURE if no_servo(model, actuators[0]) else f"{KEEP}, or {CURE}"
+        cure = CURE if not_kept(model, actuators[0]) else f"{KEEP}, or {CURE}"
         raise ScenarioError(
             f"actuator {names!r} of joint {joint!r} {why}, and a law commands a force: {cure}"
         )
@@ -483,21 +485,24 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel, go
     gives = f"actuator {names!r} gives joint {joint!r} of {label}"
     limit = _limit(gives, CURE, *bounds)
     if channel.servo:
-        servo = servo_of(model, actuators[0], goal, channel.set_point_step)
-    return Motor(joint, limit, tuple(actuators), servo)
+        part = kept(model, actuators[0], goal, channel.set_point_step)
+    return Motor(joint, limit, tuple(actuators), part)
 
 
-def servo_bound(label: str, model: mujoco.MjModel, joint: str, servo: PositionServo) -> float:
-    """Return the default bound on |u| of a servo, rad or m: its ctrlrange about the goal, or the
-    joint's range.
+def bound_of_kept(label: str, model: mujoco.MjModel, joint: str, part: Actuator) -> float:
+    """Return the default bound on |u| of an actuator that stays as it is: its ctrlrange, of a
+    set-point about the goal; without one, the joint's range.
     """
-    if servo.bound is not None:
-        return servo.bound
+    if part.bound is not None and part.bound < math.inf:
+        return part.bound
+    cure = "give smc.Channel(servo=True, u_max=...)"
+    if not isinstance(part, PositionServo):
+        raise ScenarioError(f"the <dcmotor> of joint {joint!r} of {label} has no ctrlrange: {cure}")
     for _, low, high in ranges(model, [joint]):
-        return max(high - servo.goal, servo.goal - low)
+        return max(high - part.goal, part.goal - low)
     raise ScenarioError(
-        f"the servo of joint {joint!r} of {label} has no ctrlrange, and the joint no range: give "
-        "smc.Channel(servo=True, u_max=...), how far the set-point may be from the goal"
+        f"the servo of joint {joint!r} of {label} has no ctrlrange, and the joint no range: "
+        f"{cure}, how far the set-point may be from the goal"
     )
 
 

@@ -48,6 +48,7 @@ from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.custom.others import OTHERS, limp, ties
 from smc_mujoco.mechanisms.custom.scales import rises
 from smc_mujoco.mechanisms.custom.user_model import UserFields, UserModel
+from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
 from smc_mujoco.mechanisms.plant import Plant, catalogue, check_ranges
 
 if TYPE_CHECKING:
@@ -223,11 +224,12 @@ def _plant(
     build, limits = _with_drives(build, label, model, scenarios, goals)
     if is_free(model, joints[0]):
         special["pose"] = own.held_pose(label, model, joints[0])
-    scenarios |= _servos(label, model, build.motors, scenarios)
+    scenarios |= _kept(label, model, build.motors, scenarios)
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields = UserFields(mass, gravity)
-    why_not = SET_POINT if "actuator" in scenarios else missing(model, joints, build.motors)
+    servo = any(isinstance(motor.kept, PositionServo) for motor in build.motors)
+    why_not = SET_POINT if servo else missing(model, joints, build.motors)
     rubs = default_friction(model)
     return Plant(
         name=plant_name,
@@ -337,20 +339,20 @@ def without_model(x, v, i, p):
     return math.nan, math.nan
 
 
-def _servos(
+def _kept(
     label: str, model: mujoco.MjModel, motors: Sequence[Motor], given: Mapping[str, tuple]
 ) -> dict[str, tuple]:
-    """Return what the servos that laws command suggest to scenarios: themselves, and bounds on u
-    where their channels give none.
+    """Return what the actuators that stay as they are suggest to scenarios: themselves, and bounds
+    on u where their channels give none.
     """
-    servos = tuple(motor.servo for motor in motors)
-    if not any(servos):
+    parts = tuple(motor.kept for motor in motors)
+    if not any(parts):
         return {}
     bounds = list(given.get("u_max", (None,) * len(motors)))
     for i, motor in enumerate(motors):
-        if motor.servo and bounds[i] is None:
-            bounds[i] = own.servo_bound(label, model, motor.joint, motor.servo)
-    return {"actuator": servos, "u_max": tuple(bounds)}
+        if motor.kept and bounds[i] is None:
+            bounds[i] = own.bound_of_kept(label, model, motor.joint, motor.kept)
+    return {"actuator": parts, "u_max": tuple(bounds)}
 
 
 def missing(model: mujoco.MjModel, joints: list[str], motors: Sequence[Motor]) -> str:

@@ -9,7 +9,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine.group import why_not
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.hardware import PositionServo
+from smc_mujoco.hardware import PositionServo, RateLimit
 from smc_mujoco.mechanisms.named import from_text
 from smc_mujoco.metrics.tip import knows_contacts
 from smc_mujoco.robustness.margins import MARGIN_KINDS
@@ -32,6 +32,8 @@ HOBBY = """<mujoco model="hobby"><compiler angle="radian"/><worldbody><body>
   <geom type="capsule" fromto="0 0 0 .2 0 0" size=".02" mass=".3" contype="0" conaffinity="0"/>
   </body></worldbody><actuator>%s</actuator></mujoco>"""
 POSITION = '<position joint="j" kp="17.8" kv=".1" forcerange="-2.94 2.94" ctrlrange="-1.9 1.9"/>'
+MOTOR = """<dcmotor joint="j" motorconst=".05" resistance="2" gear="9" ctrlrange="-12 12"
+  saturation=".22" cogging=".002 12 0"%s/>"""
 LOAD, RUBS, KP = 0.3 * 9.81 * 0.1, 0.052, 17.8
 
 
@@ -139,6 +141,28 @@ REFUSED = {
         ["bias 1"],
     ),
     "one way": ('<position joint="j" kp="9" forcerange="0 3"/>', {}, ["0 to 3", "motor=True"]),
+    "a pid": ('<pid joint="j" kp="9"/>', {}, ["is a <pid>"]),
+    "a controller": (
+        '<dcmotor joint="j" motorconst=".05" resistance="2" lugre="1 1 .1 .2 .1"/>',
+        {},
+        ["controller, heat, friction"],
+    ),
+    "a slew rate": (
+        '<dcmotor joint="j" motorconst=".05" resistance="2" saturation="0 0 3"/>',
+        {},
+        ["slew rate"],
+    ),
+    "a motor without a bound": (
+        '<dcmotor joint="j" motorconst=".05" resistance="2"/>',
+        {},
+        ["<dcmotor>", "no ctrlrange", "u_max="],
+    ),
+    "steps of a voltage": (MOTOR % "", {"set_point_step": 0.1}, ["has no set-point"]),
+    "uneven": (
+        '<dcmotor joint="j" motorconst=".05" resistance="2" ctrlrange="-6 12"/>',
+        {},
+        ["-6 to 12"],
+    ),
     "two things": (POSITION, {"motor": True}, ["motor=True", "servo=True"]),
     "a step without a servo": (POSITION, {"servo": False, "set_point_step": 0.1}, ["0.1", "servo"]),
     "no bound": (FREE, {"range": ""}, ["no ctrlrange", "u_max="]),
@@ -163,7 +187,7 @@ BESIDE = {
     "nominal": ({"model": "nominal"}, "give model='none'"),
     "of_model": ({"law": "mpc"}, "give model=.none."),
     "lag": ({"actuator": smc.Lag(0.01)}, "Lag is a drive"),
-    "motor": ({"actuator": smc.DCMotor()}, "DCMotor is a drive"),
+    "motor": ({"actuator": smc.DCMotor()}, "DCMotor, and the joint keeps the PositionServo"),
     "fault": ({"fault": smc.Fault(at=1.0, gain=0.5)}, "stuck=True"),
 }
 
@@ -202,6 +226,49 @@ def test_contacts_of_a_run_with_steps_of_a_set_point_are_unknown():
     xml = (HOBBY % POSITION).replace("<body>", '<body name="arm" pos="0 0 1">')
     assert knows_contacts(smc.Scenario(plant=servo(xml), **stops))
     assert not knows_contacts(smc.Scenario(plant=servo(xml, set_point_step=0.01), **stops))
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
+def test_a_dcmotor_moves_as_that_of_the_file_whose_ctrl_is_the_voltage(integrator):
+    xml = BARE.replace(POSITION, MOTOR % "")
+    fields = {"control_period": 5e-3, "physics_step": 1e-3, "integrator": integrator}
+    law = smc.law("pid", kp=40.0, ki=20.0, kd=2.0)
+    plant = servo(xml)
+    trace = run(plant=plant, law=law, x0=0.5, duration=2.0, reference=smc.Sine(0.6, 5.0), **fields)
+    model = mujoco.MjModel.from_xml_string(xml)
+    model.opt.timestep = 1e-3
+    model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.5
+    for k in range(len(trace.t) - 1):
+        np.testing.assert_allclose(data.qpos, trace.x[k], rtol=0, atol=1e-12)
+        data.ctrl[:] = trace.u[k]
+        for _ in range(5):
+            mujoco.mj_step(model, data)
+    assert trace.units()["u"] == "V"
+    assert np.abs(trace.u).max() == 12.0
+    assert 9 * 0.22 <= np.abs(trace.force).max() <= 9 * (0.22 + 0.002)  # cogging is not cut
+    assert not plant.unmodelled
+
+
+def test_the_winding_of_a_dcmotor_is_kept():
+    xml = BARE.replace(POSITION, MOTOR.replace("cogging", 'inductance=".04 0" cogging') % "")
+    (part,) = smc.Scenario(plant=servo(xml), law="pid").actuator
+    assert part.delay == pytest.approx(0.02)
+    lagged = smc.Scenario(plant=servo(xml), law="pid", actuator=smc.Lag(0.01))
+    assert lagged.actuator == (smc.Lag(0.01), part)
+    with pytest.raises(ScenarioError, match="RateLimit, and the joint keeps the DCMotor"):
+        smc.Scenario(plant=servo(xml), law="pid", actuator=RateLimit(9.0))
+    trace = run(plant=servo(xml), law=smc.law("pid"), x0=0.5, duration=0.5, physics_step=1e-4)
+    model = mujoco.MjModel.from_xml_string(xml)
+    model.opt.timestep = 1e-4
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.5
+    for k in range(len(trace.t) - 1):
+        data.ctrl[:] = trace.u[k]
+        for _ in range(10):
+            mujoco.mj_step(model, data)
+    assert abs(data.qpos[0] - trace.x[-1, 0]) < 1e-4
 
 
 def run_again(scenario):
