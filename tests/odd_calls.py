@@ -182,6 +182,7 @@ def commands(random: Random, sentence: Callable[[str], None]) -> str:
 
 
 SHORT = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.01)
+TRACE = object()  # stands for the trace of a run
 # public name -> its right arguments, which cost little; ... for what is always odd
 ARGUMENTS: dict[str, dict[str, Any]] = {
     "tune": {"plant": ..., "law": "pid", "budget": 1, "searches": 1, "objective": "balanced"},
@@ -199,6 +200,19 @@ ARGUMENTS: dict[str, dict[str, Any]] = {
     "design.basin": {"plant": "duffing", "law": ..., "points": (2, 2), "duration": 0.1},
     "design.objective": {"plant": "duffing", "law": ..., "objective": "balanced", "search": 0},
     "design.chattering": {"law": SHORT, "channel": 0},
+    "design.lqr": {"plant": "duffing", "q": (100.0, 16.0), "r": 1.0},
+    "design.state_space": {"plant": "duffing", "x": 0.1},
+    "design.excitation": {"machine": "duffing", "names": ["M"], "u_max": ...},
+    "accuracy.step_halving": {"traces": ..., "channel": 0},
+    "identify_friction": {"speed": [-1.0, -0.5, 0.5, 1.0], "torque": ...},
+    "Feedforward": {"friction": smc.Coulomb(0.2), "error": 0.1},
+    "hardware.Stribeck": {"coulomb": 1.0, "static": 2.0},
+    "hardware.servo": {"name": "xl330", "model": "m4"},
+    "signals.cartesian_path": {"plant": "double_pendulum", "times": [0.0, 1.0], "points": ...},
+    "exchange.law_to_c": {"law": "pid", "numbers": "double"},
+    "exchange.law_from_c": {"source": "a.c", "flags": ...},
+    "exchange.law_from_control": {"K": np.array([[1.0, 2.0]]), "inputs": ["e", "de"]},
+    "claims": {"table": ...},
     "grid": {"plants": "duffing", "laws": "pid", "conditions": "nominal", "seeds": 1},
     "study": {"scenarios": [SHORT], "out": ...},
     "leaderboard": {"table": ..., "metrics": ["itae"]},
@@ -219,13 +233,13 @@ ARGUMENTS: dict[str, dict[str, Any]] = {
     "identify": {"machine": "emps", "logs": ...},
     "policy": {"act": lambda y: 0.0},
     "plot": {"table": ..., "path": "p.pdf"},
-    "figure": {"traces": ..., "path": "f.pdf"},
+    "figure": {"traces": TRACE, "path": ...},
     "film": {"traces": ..., "path": "f.mp4"},
     "plant_from": {"path": "a.xml", "channels": ["shoulder"]},
     "Uncertainty": {"mass": (0.9, 1.1), "disturbance": 1.0},
     "Channel": {"x0": 0.1},
     "scores": {"trace": ...},
-    "score": {"trace": ...},
+    "score": {"runs": TRACE, "metrics": ["itae"]},
 }
 CALLS: dict[Callable, dict[str, Any]] = {}
 for name in annexes.here(ARGUMENTS):
@@ -242,9 +256,11 @@ for function in CALLS:
 
 def calls(random: Random, sentence: Callable[[str], None]) -> str:
     """Call a public function with odd arguments."""
-    world()
+    trace = world()
     function = random.choice(list(CALLS))
-    arguments = dict(CALLS[function])
+    arguments = {}
+    for name, right in CALLS[function].items():
+        arguments[name] = trace if right is TRACE else right
     odd = [name for name, value in arguments.items() if value is ...]
     known = sorted({*arguments, *PARAMETERS[function]} - {"progress", "report"})
     odd += random.sample(known, random.randint(0 if odd else 1, min(2, len(known))))

@@ -22,7 +22,15 @@ def case(**fields):
     return smc.Scenario(plant="duffing", law=smc.law("pid"), **fields)
 
 
+class Awkward:
+    """A value whose every attribute fails."""
+
+    def __getattr__(self, name):
+        raise ZeroDivisionError(name)
+
+
 MASKED = np.ma.masked
+EMPTY = np.zeros(0)
 REFUSED = {
     "x0 masked": (lambda: case(x0=MASKED), "x0 is None"),
     "number masked": (lambda: smc.Noise(position=MASKED), "position is masked"),
@@ -43,6 +51,14 @@ REFUSED = {
     "a word of several names": (lambda: smc.plant("pendulum"), "'double_pendulum' or 'inverted"),
     "a short word": (lambda: smc.law("smc"), "choose from"),
     "gains of a law": (lambda: smc.law("pid")(kp=-3), "kp is -3"),
+    "a value on which all fails": (lambda: smc.Coulomb(Awkward()), "level is <"),  # pyright: ignore
+    "no text": (lambda: smc.Sine(1.0, 1.0, about=EMPTY), "about is array"),  # pyright: ignore
+    "no name of a model": (lambda: case(model=EMPTY), "unknown model array"),
+    "no scenarios": (lambda: smc.score(MASKED), "cannot score masked"),
+    "beyond floats": (lambda: smc.identify_friction([10**400, -1], [1, 2]), "give one number"),
+    "a number for names": (lambda: smc.design.excitation("duffing", np.nan), "names is nan"),  # pyright: ignore
+    "no names": (lambda: smc.design.excitation("duffing", []), "name some, of M, delta"),
+    "endless names": (lambda: smc.identify("emps", "a.csv", range(10**9)), "give fewer"),  # pyright: ignore
 }
 
 
@@ -57,6 +73,39 @@ def test_it_is_refused_in_a_sentence(name):
 def test_a_figure_s_path_is_a_text(trace):
     with pytest.raises(smc.ScenarioError, match="the path is "):
         smc.figure(trace, path=("a.png",))  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize("given", [np.nan, b"1", "\ud800"])
+def test_a_title_is_a_text(trace, given):
+    with pytest.raises(smc.ScenarioError, match=r"title is .*: give a text"):
+        smc.figure(trace, title=given)
+
+
+def test_a_title_of_two_lines_is_drawn_on_one(trace):
+    smc.figure(trace, title="two\nlines")
+
+
+def test_a_trace_has_the_metrics_that_are_asked_for(trace):
+    every = smc.score(trace)
+    assert smc.score(trace, ["itae", "peak"]) == {"itae": every["itae"], "peak": every["peak"]}
+    with pytest.raises(smc.ScenarioError, match="unknown metric 'peeks'"):
+        smc.score(trace, ["peeks"])
+
+
+@pytest.mark.parametrize("channel", [np.nan, -1, 1, "0"])
+def test_a_channel_to_compare_is_one_of_the_run(trace, channel):
+    with pytest.raises(smc.ScenarioError, match=r"channel is .*: give a whole number from 0 to 0"):
+        step_halving([trace], channel=channel)
+
+
+TWO_MOTORS = """<mujoco><worldbody><body><joint name="a" axis="0 1 0"/><geom size=".1"/>
+<body pos=".5 0 0"><joint name="b" axis="0 1 0"/><geom size=".1"/></body></body></worldbody>
+<actuator><motor joint="a" ctrlrange="-3 3"/><motor joint="b" ctrlrange="-3 3"/></actuator></mujoco>"""
+
+
+def test_measured_joints_may_come_from_a_generator():
+    """They were read twice: the second reader found none, and warned of a limp joint."""
+    assert smc.plant_from(TWO_MOTORS, ["a"], measured=iter(["b"])).n == 2
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from smc_mujoco.analysis.differ import MAX_CHANGE, relative_range
-from smc_mujoco.common.errors import ScenarioError, items_of, shown
+from smc_mujoco.common.errors import ScenarioError, items_of, shown, whole
 from smc_mujoco.common.text import number
 from smc_mujoco.metrics.conventions import last_part
 from smc_mujoco.metrics.limit_cycle import channel_cycle, largest_cycle
@@ -158,6 +158,8 @@ def step_halving(
     for trace in traces:
         if not isinstance(trace, Trace):
             raise ScenarioError(f"traces has {shown(trace)}: give what smc.run returns")
+        if channel is not None:
+            channel = whole("channel", channel, 0, trace.scenario.plant.n - 1)
     scenarios = [repetitions(trace) for trace in traces]
     again = iter(run(list(itertools.chain(*scenarios)), threads=threads))
     changes = []

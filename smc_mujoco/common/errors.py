@@ -185,7 +185,7 @@ def _real(value: Any) -> Any:
     """Return a real number, also from an array without axes; None for anything else, such as flags
     and durations.
     """
-    if np.ma.is_masked(value):
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
         return None
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
@@ -208,6 +208,13 @@ def items_of(what: str, values: Iterable[T]) -> list[T]:
     if len(first) > MAX_ITEMS:
         raise ScenarioError(f"{what} has more than {MAX_ITEMS:,} items: give fewer")
     return first
+
+
+def has_items(value: object) -> bool:
+    """Return whether a value has items, as a list or a generator has; an array without axes has
+    none.
+    """
+    return isinstance(value, Iterable) and not (isinstance(value, np.ndarray) and value.ndim == 0)
 
 
 def has(value: object, name: str) -> bool:

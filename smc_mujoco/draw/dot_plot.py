@@ -84,6 +84,7 @@ def plot(
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
     dots = _dots(table, items_of("metrics", metrics), winners)
+    head = style.titled(title, f"Medians: {dots.heading}")
     with style.page(width):
         key, shared = _key(table, dots.looks, list(dots.intervals.values()), bool(dots.won))
         across = 1 if width < pages.NARROW else len(dots.metrics)
@@ -95,11 +96,11 @@ def plot(
         by_plant = axes.reshape(len(dots.conditions), -1)
         for plant, high, row in zip(dots.conditions, tall, by_plant, strict=True):
             _draw_plant(row, dots, plant, across == 1)
-            named = title or len(dots.conditions) > 1
+            named = title is not None or len(dots.conditions) > 1
             words = style.plant_name(dots.labels[plant]) if named else ""
             above = 1.0 + 1.7 * pages.TEXT_SIZE / 72 / (high - WORDS_HEIGHT)  # the note
             row[0].set_title(words, y=above, parse_math=False)
-        pages.set_head(page, width, title or f"Medians: {dots.heading}", key, shared)
+        pages.set_head(page, width, head, key, shared)
         return pages.write(page, paths)
 
 

@@ -188,7 +188,7 @@ def _composed_page(
         words = drawing.titles(panels, (pitch * np.array(heights[k])).tolist())
         _draw_over_time(page, cells[k], list(zip(panels, words, strict=True)), runs, k == 0)
     _draw_beside(page, cells[2], blocks.beside, blocks.places, runs)
-    pages.set_head(page, width, title or runs.head, handles, gains)
+    pages.set_head(page, width, style.titled(title, runs.head), handles, gains)
     page.set_label("; ".join(str(one.get_label()) for one in key))
     pages.space_ticks(page)
     return page

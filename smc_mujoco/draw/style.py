@@ -311,6 +311,16 @@ def _template(law: Component | str) -> tuple[Template | None, str]:
     return law.template or known_laws().get(law.name), law.name
 
 
+def titled(title: object, default: str) -> str:
+    """Return the title that a user gives, on one line, or the default."""
+    if title is None:
+        return default
+    line = " ".join(title.split()) if isinstance(title, str) else "\n"
+    if not line.isprintable():
+        raise ScenarioError(f"title is {shown(title)}: give a text")
+    return line or default
+
+
 def in_words(name: str) -> str:
     """Return an identifier as words: boundary_layer as "Boundary layer"."""
     return capital(name.replace("_", " "))
@@ -324,7 +334,8 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
     are numbered.
     """
     if given is not None:
-        if isinstance(given, str) or len(given) != len(traces):
+        given = items_of("labels", given)
+        if len(given) != len(traces):
             raise ScenarioError(
                 f"labels are {shown(given)} for {len(traces)} traces: give one string a trace"
             )

@@ -212,7 +212,7 @@ def _names(inputs: str | Iterable[str] | None, count: int) -> tuple[str, ...]:
     elif isinstance(inputs, str):
         names = (inputs,)
     else:
-        names = tuple(inputs)
+        names = tuple(errors.items_of("inputs", inputs))
     for name in names:
         errors.find("input of a controller", name, INPUTS)
     if len(names) != count:

@@ -28,7 +28,7 @@ from smc_mujoco.common.errors import ScenarioError, find, items_of, number, show
 from smc_mujoco.common.files import as_path, replacing
 from smc_mujoco.control.from_text import law as find_law
 from smc_mujoco.identification.own_rig import RUN_STEP, OwnRig, own_rig
-from smc_mujoco.identification.paths import DELAY
+from smc_mujoco.identification.paths import DELAY, named_once
 from smc_mujoco.identification.replays import Point, Replays
 from smc_mujoco.identification.rig import Values
 from smc_mujoco.identification.standard_errors import check_told_apart, statistics
@@ -191,6 +191,7 @@ def excitation(
       ScenarioError: as `smc.identify` of paths; no motion that the machine can follow.
     """
     base = machine if isinstance(machine, Scenario) else jointed(machine, "excitation")
+    names = named_once(names)
     rig = own_rig(base, names)
     plant = rig.plant
     bounds = _bounds(plant, u_max)
@@ -202,7 +203,7 @@ def excitation(
     for name, shape in shapes.items():
         size = largest_size(rig, goal, ways[:, None] * shape, 1.0 / rate, bounds, v_max)
         moved[name] = goal[:, None] + size * ways[:, None] * shape
-    found = _motions(rig, list(names), moved, 1.0 / rate, bounds, noise)
+    found = _motions(rig, names, moved, 1.0 / rate, bounds, noise)
     if not found:
         raise ScenarioError(
             f"{plant.name} follows none of {', '.join(shapes)}: give a smaller amplitude"

@@ -31,7 +31,7 @@ from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.identification import first_guess, gauss_newton, number_text, records
 from smc_mujoco.identification.own_rig import OwnRig, condition_fields, own_rig
-from smc_mujoco.identification.paths import known_paths
+from smc_mujoco.identification.paths import named_once
 from smc_mujoco.identification.presliding import presliding
 from smc_mujoco.identification.records import Record
 from smc_mujoco.identification.replays import Point, Replays, Slopes
@@ -310,8 +310,9 @@ def identify(
         without motion, in degrees, or too short; nothing in the logs depends on a number, or two
         cannot be told apart.
     """
-    twin, data = _read(machine, logs, names, columns)
-    names = _checked_names(twin, names)
+    listed = None if names is None else named_once(names)
+    twin, data = _read(machine, logs, listed, columns)
+    names = _checked_names(twin, listed)
     fits_before = twin.fits(data)  # also refuses records that are too short
     doubts = first_guess.doubts(twin, data) if isinstance(twin, OwnRig) else []
     expected = _expected_sets(twin, names, most)
@@ -405,11 +406,7 @@ def _read(
     if isinstance(machine, str):
         machine = find_rig(machine) if machine in rigs() else _named_plant(machine, read)
     if isinstance(machine, Plant | Scenario):
-        if not names:
-            base = own_rig(machine, []).base
-            known = ", ".join(known_paths(base))
-            raise ScenarioError(f"{base.plant.name} has no numbers to find: name some, of {known}")
-        machine = own_rig(machine, _once(names))
+        machine = own_rig(machine, names or [])
     if not isinstance(machine, Rig):
         raise ScenarioError(
             f"cannot identify {shown(machine)}: give a plant, a scenario, or a rig or its name"
@@ -456,18 +453,9 @@ def _check_log(twin: OwnRig, given: Any, record: Data) -> None:
         raise
 
 
-def _once(names: Sequence[str]) -> list[str]:
-    """Return the names, each of which may be there once."""
-    listed = list(names)
-    for name in listed:
-        if listed.count(name) > 1:
-            raise ScenarioError(f"quantities have {name} {listed.count(name)} times: name it once")
-    return listed
-
-
-def _checked_names(twin: Rig, names: Sequence[str] | None) -> list[str]:
+def _checked_names(twin: Rig, names: list[str] | None) -> list[str]:
     """Return the names of the quantities to find."""
-    listed = _once(twin.free if names is None else names)
+    listed = list(twin.free) if names is None else names
     for name in listed:
         find(f"quantity of {twin.name}", name, twin.quantities)
     if not listed:

@@ -18,7 +18,15 @@ from smc_mujoco.common.data import frozen_data, named_data
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.law import law_function
 from smc_mujoco.identification import records
-from smc_mujoco.identification.paths import DELAY, FIELDS, MAX_DELAY, PartNumber, parts_of, resolved
+from smc_mujoco.identification.paths import (
+    DELAY,
+    FIELDS,
+    MAX_DELAY,
+    PartNumber,
+    known_paths,
+    parts_of,
+    resolved,
+)
 from smc_mujoco.identification.records import Columns, Record
 from smc_mujoco.identification.rig import RecordPart, Rig, Source, Values
 from smc_mujoco.mechanisms.layout import channel_names, column_ends, driven_names
@@ -226,8 +234,11 @@ class OwnRig(Rig):
 
 
 def own_rig(given: Plant | Scenario, names: Sequence[str]) -> OwnRig:
-    """Return the rig of a plant or a scenario whose quantities are the named paths."""
+    """Return the rig of a plant or a scenario whose quantities are the named paths, one or more."""
     base = given if isinstance(given, Scenario) else Scenario.recorded(plant=given, law="none")
+    if not names:
+        known = ", ".join(known_paths(base))
+        raise ScenarioError(f"{base.plant.name} has no numbers to find: name some, of {known}")
     paths = resolved(base, names)
     ends = column_ends(base.plant)
     inputs = tuple(f"u{end}" for end in ends[: base.plant.driven])

@@ -15,13 +15,14 @@ frictionloss - offset and frictionloss + offset.
 import copy
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from smc_mujoco.common.constraints import Number, of_fields
-from smc_mujoco.common.errors import ScenarioError, shown, unknown
+from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
 from smc_mujoco.identification.rig import Quantity
 from smc_mujoco.mechanisms.custom.joint_numbers import joint_numbers, with_joint_numbers
 from smc_mujoco.mechanisms.hardware.joint_force import of_joint
@@ -85,6 +86,18 @@ class Paths(NamedTuple):
     plant: Plant  # with the numbers of its joints among its parameters
     quantities: dict[str, Quantity]
     parts: dict[str, PartNumber]  # those of parts
+
+
+def named_once(names: Iterable[str]) -> list[str]:
+    """Return the names of quantities that a user gives, each of which may be there once."""
+    listed = items_of("names", names)
+    for name in listed:
+        if not isinstance(name, str):
+            raise ScenarioError(f"names has {shown(name)}: give texts, such as 'elbow.damping'")
+    for name, times in Counter(listed).items():
+        if times > 1:
+            raise ScenarioError(f"quantities have {name} {times} times: name it once")
+    return listed
 
 
 def resolved(base: Scenario, names: Sequence[str]) -> Paths:

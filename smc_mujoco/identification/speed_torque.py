@@ -222,7 +222,7 @@ def _moving(speed: Any, torque: Any, what: str) -> Pairs:
     """Return the pairs of a joint that moves."""
     try:
         v, force = np.asarray(speed, float), np.asarray(torque, float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         v = force = np.empty((0, 0))
     if v.ndim != 1 or v.shape != force.shape:
         raise ScenarioError(

@@ -30,7 +30,13 @@ from smc_mujoco.mechanisms.layout import all_joints, channel_names, driven_names
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.controller import MAX_STATE
-from smc_mujoco.simulation.signals import Constant, Jump, PerChannel, Signal, parameter_factors
+from smc_mujoco.simulation.signals import (
+    Constant,
+    Jump,
+    PerChannel,
+    Signal,
+    parameter_factors,
+)
 
 T = TypeVar("T")
 P = TypeVar("P", bound=OnJoints)
@@ -308,7 +314,7 @@ def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
     if isinstance(value, Mapping):
         joints = driven_names(plant)
         value = dict(zip(joints, at_goal, strict=False)) | dict(value)
-    elif getattr(value, "about", ""):
+    elif isinstance(value, Signal) and getattr(value, "about", ""):
         value = [value] * plant.driven  # pyright: ignore[reportAssignmentType] a Sine
     if isinstance(value, PerChannel):
         value = value.signals

@@ -24,7 +24,7 @@ import numpy as np
 from smc_mujoco.common import arithmetic
 from smc_mujoco.common.attended import attended
 from smc_mujoco.common.constraints import Flag, Whole, constrained
-from smc_mujoco.common.errors import ScenarioError, shown, users_stacklevel, warn_once
+from smc_mujoco.common.errors import ScenarioError, has_items, shown, users_stacklevel, warn_once
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import counted
 from smc_mujoco.mechanisms.plant import field_array
@@ -138,8 +138,7 @@ def one_or_several(scenarios: Any) -> Iterable[Scenario | Prepared]:
     """Return one scenario, or what yields several, as the latter."""
     if isinstance(scenarios, Scenario):
         return [scenarios]
-    iterable = isinstance(scenarios, Iterable) and getattr(scenarios, "shape", None) != ()
-    if iterable and not isinstance(scenarios, str):
+    if has_items(scenarios) and not isinstance(scenarios, str):
         return scenarios
     raise ScenarioError(
         f"cannot run {shown(scenarios)}: give smc.Scenario(plant='duffing', law='pid'), or several"

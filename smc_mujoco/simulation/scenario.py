@@ -240,12 +240,15 @@ class Scenario:
     def _convert(self) -> None:
         """Convert every field from what the user gave."""
         declared = of_fields(Scenario)
+        converted = []
         for f in dataclasses.fields(self):
-            value = getattr(self, f.name)
-            if convert := f.metadata.get("convert"):
-                vars(self)[f.name] = convert(f.name, value, self)  # the class is frozen
+            if "convert" in f.metadata:
+                converted.append(f)
             elif f.name in declared:
-                vars(self)[f.name] = declared[f.name](f.name, value)
+                vars(self)[f.name] = declared[f.name](f.name, getattr(self, f.name))
+        for f in converted:  # these may depend on the others
+            value = f.metadata["convert"](f.name, getattr(self, f.name), self)
+            vars(self)[f.name] = value  # the class is frozen
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Scenario) and self.resolved._values() == other.resolved._values()

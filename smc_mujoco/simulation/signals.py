@@ -123,7 +123,7 @@ class Sine(Signal):
 
     def __post_init__(self, about: str):
         super().__post_init__()
-        if about not in ("", "goal"):
+        if not isinstance(about, str) or about not in ("", "goal"):
             raise ScenarioError(f"Sine's about is {shown(about)}: give 'goal', or leave it out")
         object.__setattr__(self, "about", about)
 

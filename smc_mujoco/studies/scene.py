@@ -26,7 +26,7 @@ from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.analysis.ranking import exceeds
 from smc_mujoco.common import errors
 from smc_mujoco.common.data import named_data
-from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.errors import ScenarioError, items_of, shown
 from smc_mujoco.common.errors import find as lookup
 from smc_mujoco.common.files import shipped, slug
 from smc_mujoco.common.registry import Catalogue, added, source
@@ -335,10 +335,12 @@ class Scene:
                 )
         if len({slug(condition) for condition in self.conditions}) < len(self.conditions):
             raise ScenarioError(f"conditions of {self.title!r} have one file name: rename one")
-        film = self.film or next(iter(self.conditions))
+        film = self.film
+        if isinstance(film, str) and not film:
+            film = next(iter(self.conditions))
         lookup("condition to film", film, self.conditions)
         lookup("kind of figure", self.figure, dict.fromkeys(FIGURES))
-        for name in self.answers:
+        for name in items_of("answers", self.answers):
             lookup("metric that answers", name, CATALOGUE)
         object.__setattr__(self, "film", film)
         object.__setattr__(self, "camera", checked(self.camera))

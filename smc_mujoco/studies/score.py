@@ -7,7 +7,7 @@ from typing import Any, overload
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns
 from smc_mujoco.common.constraints import constrained
-from smc_mujoco.common.errors import ScenarioError, find, has, items_of, shown
+from smc_mujoco.common.errors import ScenarioError, find, has, has_items, items_of, shown
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -18,18 +18,18 @@ METRICS = ("settling_time", "itae")
 
 
 @overload
-def score(runs: Trace) -> dict[str, float]: ...
+def score(runs: Trace, metrics: Sequence[str] | None = None) -> dict[str, float]: ...
 @overload
 def score(
     runs: Iterable[Scenario],
-    metrics: Sequence[str] = METRICS,
+    metrics: Sequence[str] | None = None,
     device: str = "cpu",
     threads: int | None = None,
 ) -> Table: ...
 @constrained
 def score(
     runs: Any,
-    metrics: Sequence[str] = METRICS,
+    metrics: Sequence[str] | None = None,
     device: Device = "cpu",
     threads: int | None = None,
 ) -> dict[str, float] | Table:
@@ -42,9 +42,8 @@ def score(
     cart's.
 
     Args:
-      runs: a Trace, of which every metric is returned; or any number of scenarios, also from a
-        generator.
-      metrics: of scenarios, names of metrics.
+      runs: a Trace; or any number of scenarios, also from a generator.
+      metrics: their names; default: every one of a Trace, and settling_time and itae of scenarios.
       device: of those scenarios that the fast engine can run, "cpu" or "cuda". On "cuda" MuJoCo
         Warp runs those of your own machines, 256 of one model or more. MuJoCo runs the others.
       threads: as in `run`.
@@ -58,11 +57,12 @@ def score(
       ScenarioError: the trace diverged, failed or holds NaN; not a scenario, an unknown metric, or
         no such device.
     """
-    if has(runs, "scenario") or not isinstance(runs, Iterable):
-        return catalogue.score(runs)
-    names = tuple(items_of("metrics", metrics))
+    names = METRICS if metrics is None else tuple(items_of("metrics", metrics))
     for name in names:
         find("metric", name, catalogue.CATALOGUE)
+    if has(runs, "scenario") or not has_items(runs):
+        values = catalogue.score(runs)
+        return values if metrics is None else {name: values[name] for name in names}
     import pyarrow as pa
 
     columns = {"plant": pa.string(), "law": pa.string(), "condition": pa.string()}

@@ -259,3 +259,7 @@ def test_gains_are_taken_as_a_list_as_well_as_an_array(refused):
     runs = [smc.Scenario(plant="duffing", law=law, duration=0.1) for law in (as_list, as_array)]
     np.testing.assert_array_equal(*(trace.u for trace in smc.run(runs)))
     refused(lambda: smc.law_from([["a", 2.0]]), "K", "TransferFunction")
+
+
+def test_names_of_inputs_are_a_list(refused):
+    refused(lambda: smc.law_from(np.ones((1, 2)), inputs=np.nan), "inputs is nan", "give a list")

@@ -119,7 +119,7 @@ class Sheet:
             inches = (WIDTH, WIDTH * size[1] / size[0])
             self.page = Figure(figsize=inches, dpi=size[0] / WIDTH)
             self.canvas = FigureCanvasAgg(self.page)
-            self.write_head(title or runs.head, key)
+            self.write_head(style.titled(title, runs.head), key)
             self.write_labels(labels)
             rim = withStroke(linewidth=style.points(3), foreground=style.PAPER)
             corners = tiles[:, :2] + 0.3 * self.letters

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from smc_mujoco.analysis.paired_runs import check_table
 from smc_mujoco.common.constraints import Called
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown, unknown
 from smc_mujoco.common.files import with_ending, write_json
@@ -101,7 +102,10 @@ def audit(
         audited = paper
     else:
         audited = find_paper(paper)
-    rows = {} if table is None else of_table(table)
+    rows = {}
+    if table is not None:
+        check_table(table)
+        rows = of_table(table)
     shared: dict[str, RunResult] = {}
     entries = wanted(audited, only)
     names = sets(audited, gains, quick)

@@ -26,7 +26,7 @@ import numpy as np
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.constraints import Timeout, constrained
-from smc_mujoco.common.errors import ScenarioError, shown, whole
+from smc_mujoco.common.errors import ScenarioError, items_of, shown, whole
 from smc_mujoco.common.files import as_path
 from smc_mujoco.common.jit import AtAddress, CompiledFunction, call_int, pointer
 from smc_mujoco.control.component import Template, as_gains, gain_text, template_decorator
@@ -240,8 +240,9 @@ def _library(
     path = as_path(source, "the law")
     if not isinstance(symbol, str) or not re.fullmatch(r"[A-Za-z_]\w*", symbol, re.ASCII):
         raise ScenarioError(f"symbol is {shown(symbol)}: give the name of a C function")
-    if isinstance(flags, str):
-        raise ScenarioError(f"flags is {shown(flags)}: give several, such as ['-DUNIT_TEST']")
+    flags = items_of("flags", flags)
+    if not all(isinstance(flag, str) for flag in flags):
+        raise ScenarioError(f"flags is {shown(flags)}: give texts, such as ['-DUNIT_TEST']")
     if path.suffix not in (".c", *LIBRARY_SUFFIXES):
         raise ScenarioError(
             f"cannot take a law from {shown(str(path))}: give a .c file, or a shared library, .so"

@@ -27,6 +27,7 @@ from smc_mujoco.common.constraints import Positive, constrained
 from smc_mujoco.common.errors import ScenarioError, number, one_line, unknown
 from smc_mujoco.common.extras import extra
 from smc_mujoco.common.files import no_room, reading
+from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.jit import Uncompiled
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Measurement, law_function
@@ -211,17 +212,17 @@ def law_from_fmu(
     digest = hashlib.sha256(file.read_bytes()).hexdigest()
     about = _description(file, digest)
     known = {variable.name: variable for variable in about.modelVariables}
-    inputs, outputs = _meanings(file.name, known, variables or {}, constants or {})
+    held = frozen({} if constants is None else constants)
+    chosen = frozen({} if variables is None else variables)
+    inputs, outputs = _meanings(file.name, known, chosen, held)
     gains = _gains(known.values())
     law = FmuLaw(
         path=str(file.resolve()),
         digest=digest,
-        name=errors.name("name", name or re.sub(r"\W", "_", file.stem)),
+        name=errors.name("name", re.sub(r"\W", "_", file.stem) if name is None else name),
         inputs=tuple(inputs.items()),
         outputs=tuple(outputs.values()),
-        constants=tuple(
-            (key, number(f"constants[{key!r}]", value)) for key, value in (constants or {}).items()
-        ),
+        constants=tuple((key, number(f"constants[{key!r}]", value)) for key, value in held.items()),
         parameters=tuple(theirs for theirs, _ in gains.values()),
         period=_period(about) if period is None else period,
     )

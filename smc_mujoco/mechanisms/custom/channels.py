@@ -224,17 +224,15 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
 
 
 def measured_joints(
-    label: str, model: mujoco.MjModel, channels: Pairs, measured: Iterable[str] | None
+    label: str, model: mujoco.MjModel, channels: Pairs, measured: Iterable[str]
 ) -> Names:
     """Return the names of the joints that are measured beside the channels; "base" is the model's
     only free joint.
     """
-    if measured is None:
-        return ()
     given = items_of("measured", measured)
-    if isinstance(measured, str) or not all(isinstance(name, str) for name in given):
+    if not all(isinstance(name, str) for name in given):
         raise ScenarioError(
-            f"measured is {shown(measured)}: give joints' names, such as ['pole', 'base']"
+            f"measured is {shown(given)}: give joints' names, such as ['pole', 'base']"
         )
     names = [model.joint(i).name for i in range(model.njnt)]
     free = [names[i] for i in np.flatnonzero(model.jnt_type == FREE)]

@@ -31,7 +31,13 @@ import numpy as np
 from smc_mujoco.common import errors
 from smc_mujoco.common.aliases import Fields, Names
 from smc_mujoco.common.constraints import OneOf, constrained
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, shown, users_stacklevel
+from smc_mujoco.common.errors import (
+    ScenarioError,
+    ScenarioWarning,
+    items_of,
+    shown,
+    users_stacklevel,
+)
 from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom import mjcf, urdf
@@ -125,6 +131,7 @@ def plant_from(
         pairs: Pairs = own.UNNAMED  # refused with the joints that there are
     else:
         pairs = own.coerce(channels)
+    measured = items_of("measured", () if measured is None else measured)
     made = _plant(source, pairs, name, keyframe, tip, others or "", measured)
     spec = source.spec()
     model = mjcf.as_it_is(source)
@@ -141,7 +148,7 @@ def plant_from(
             f"{source.label} draws joint {joint!r} outside its range, so that the default goal is "
             "the middle of it: give a keyframe or a reference for another one"
         )
-    seen = [*joints_of(pairs), *(measured or ())]
+    seen = [*joints_of(pairs), *measured]
     doubts += _doubts_of_others(source.label, spec, model, seen, others)
     for doubt in doubts:
         warnings.warn(doubt, ScenarioWarning, users_stacklevel())
@@ -200,7 +207,7 @@ def _plant(
     keyframe: str | None,
     tip: str | None,
     others: str,
-    measured: Iterable[str] | None,
+    measured: Iterable[str],
 ) -> Plant:
     """Return the plant of a model, see `plant_from`."""
     label = source.label
@@ -396,5 +403,5 @@ def restored(data: Mapping, name: str) -> Plant:
         source = mjcf.found(data["path"], data["sha256"])
     others = data.get("others", "")
     pairs = own.coerce(data["channels"])
-    measured = data.get("measured")
+    measured = data.get("measured", ())
     return _plant(source, pairs, name, data["keyframe"], data.get("tip"), others, measured)

@@ -499,3 +499,7 @@ def test_the_wrong_sign_converges_just_where_the_plant_has_it_too():
 def test_a_quick_audit_tells_what_it_measures_instead(quick, reported):
     (claim,) = claims(only=["18"], gains="study", quick=quick)
     assert claim.measured.endswith(reported)
+
+
+def test_what_is_no_table_is_refused(refused):
+    refused(lambda: claims(table=math.nan), "table is nan", "smc.Table.read")  # pyright: ignore[reportArgumentType]
