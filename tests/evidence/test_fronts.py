@@ -152,7 +152,9 @@ def test_no_change_of_one_gain_of_a_losing_law_turns_a_sentence_that_stands(sent
         job = Job(second["plant"], second["law"], second["wc"], period=second["period"])
         bench = benches.setdefault(job, None) or fronts.Bench(job)
         benches[job] = bench
-        changed = np.repeat([list(second["gains"].values())], 6 * len(bench.names), axis=0)
+        # on duffing the implicit law's b was left at 1
+        its = [second["gains"].get(name, 1.0) for name in bench.names]
+        changed = np.repeat([its], 6 * len(bench.names), axis=0)
         for i, (gain, factor) in enumerate(np.ndindex(len(bench.names), 6)):
             changed[i, gain] *= (1 / 30, 1 / 10, 1 / 3, 3.0, 10.0, 30.0)[factor]
         sets = bench.judged(changed, 1)
