@@ -79,8 +79,6 @@ HUNTERS, HUNTING_RATE = 16, 30.0  # sets of a law that run for 40 s; their large
 SUMS = ("itae", "tv", "rms_error", "tv_rate", "ripple", "stick_time", "reversal_error")
 ITAE, TV, RMS, RATE, RIPPLE, STICK, TURNED = range(len(SUMS))
 SHARES = (0.0, 1.0, 0.7, 1.3)  # of the true friction that is fed forward
-# sets that MuJoCo runs under what no search has seen: friction, side of the gap
-OTHERS = ("load", "lugre", "play, motor", "play, link", "contact")
 
 
 class Case(NamedTuple):
@@ -356,7 +354,9 @@ class Told(NamedTuple):
         for key, column in (("ripple", RIPPLE), ("turned", TURNED)):
             found[key] = float(np.median(sums[:, column]) / self.one.count)
         found["stuck"] = float(np.median(sums[:, STICK]) / runs[0].duration)
-        return found | {"mujoco": self.by_mujoco(runs[:BY_MUJOCO], window)}
+        if self.one.printed:
+            found["mujoco"] = self.by_mujoco(runs[:BY_MUJOCO], window)
+        return found
 
     def by_engine(self, runs: Sequence[smc.Scenario], window: int) -> np.ndarray:
         """Return the sums of runs of one form over their last samples, (runs, sums)."""
@@ -399,7 +399,7 @@ def told(one: Joint, name: str, found: Sequence[Sets], least: float) -> list[dic
             point |= it.runs(sets.gains[i], case) | {"edge": edges(sets.gains[i], box)}
         points.append(point)
     points += hunting(it, sets, least)
-    if "identified" not in one.levels and np.isfinite(sets.J).any():
+    if np.isfinite(sets.J).any():
         points += beyond(it, sets, least)
     return points
 
@@ -408,7 +408,7 @@ def beyond(it: Told, sets: Sets, least: float) -> Iterator[dict]:
     """Yield what MuJoCo says of the set of the least J at rest under what no search has seen."""
     one = it.one
     i = int(np.nanargmin(sets.J))
-    for name in OTHERS:
+    for name in one.others:
         changes: dict[str, Any] = {}
         case = Case(name if name in ("load", "lugre") else "coulomb10")
         if name == "lugre":
@@ -464,16 +464,18 @@ def hunting(it: Told, sets: Sets, least: float) -> Iterator[dict]:
             ripples = it.by_engine(runs, round(LATE / PERIOD))[:, RIPPLE] / it.one.count
             ranges = np.nan_to_num(ripples, nan=math.inf).reshape(-1, 2)
             moving = (ranges > STILL).all(axis=1)
-            point["share"] = float(moving.mean())
+            point["moving"] = float(moving.mean())
             point["range"] = float(np.median(ranges[moving])) if moving.any() else 0.0
         yield point
 
 
-def points_of(one: Joint, count: int, seeds: Sequence[int], folder: Path | None) -> list[dict]:
-    """Return the points of all laws on a joint."""
+def points_of(
+    one: Joint, laws: Sequence[str], count: int, seeds: Sequence[int], folder: Path | None
+) -> list[dict]:
+    """Return the points of some laws on a joint."""
     found = {}
     for seed in seeds:
-        for name in LAWS:
+        for name in laws:
             found.setdefault(name, []).append(searched(one, name, count, seed, folder))
     J = [sets.J for its in found.values() for sets in its]
     least = float(np.nanmin(np.concatenate(J)))
@@ -505,7 +507,7 @@ def row(point: dict) -> str:
     """Return a point as a line."""
     about = [point[name] for name in ("joint", "law", "price", "friction")]
     if point["price"] == "hunting":
-        return f"{about} {point['sets']} sets, {point.get('share')} move"
+        return f"{about} {point['sets']} sets, {point.get('moving')} move"
     about += [point["level"], point["task"], point["share"], point.get("edge")]
     errors = [np.median(point[by]) if point.get(by) else math.nan for by in ("errors", "mujoco")]
     return f"{about} J {point.get('J')} R {point.get('R')}: {errors[0]:.3g} ({errors[1]:.3g})"
@@ -517,6 +519,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("joints", nargs="+", help="rail, geared, ak80; of a lot drawn_rail, ...")
+    parser.add_argument("--law", nargs="+", default=LAWS, help="names of laws")
     parser.add_argument("--sets", type=int, default=SETS)
     parser.add_argument("--seeds", type=int, nargs="+", default=SEEDS)
     parser.add_argument("--lot", type=int, metavar="SEED", help="draw the joints")
@@ -529,7 +532,7 @@ def main() -> None:
     with ProcessPoolExecutor(asked.processes, mp_context=get_context("spawn")) as executor:
         work = []
         for name in asked.joints:
-            its = known[name], asked.sets, asked.seeds, asked.keep
+            its = known[name], asked.law, asked.sets, asked.seeds, asked.keep
             work.append(executor.submit(points_of, *its))
         for one in work:
             points += map(rounded, one.result())

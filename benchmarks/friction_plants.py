@@ -45,6 +45,8 @@ class Joint:
     bound: float  # N m (N)
     start: float  # rad (m)
     levels: dict[str, tuple[float, float]]  # name -> dry friction in motion and at rest
+    others: tuple[str, ...] = ()  # frictions that MuJoCo alone runs, under gains chosen without
+    printed: bool = True  # whether the page prints its points, so that MuJoCo runs them
 
     @property
     def scale(self) -> float:
@@ -103,7 +105,7 @@ def nominal(x, v, i, p):
     return (-p.G * math.sin(x[i] + p.off) - p.D * v[i]) / p.M, 1.0 / p.M
 
 
-def joint(name, kind, parameters, bound, start, levels):
+def joint(name, kind, parameters, bound, start, levels, **more):
     """Return a joint of a slide or a hinge."""
     fields = slide_fields if kind == "slide" else hinge_fields
     plant = Plant(
@@ -116,10 +118,11 @@ def joint(name, kind, parameters, bound, start, levels):
         fields=fields,
         nominal=nominal,
     )
-    return Joint(plant, bound, start, levels)
+    return Joint(plant, bound, start, levels, **more)
 
 
 LEVELS = {"coulomb10": (0.1, 0.1), "coulomb30": (0.3, 0.3), "stribeck": (0.15, 0.225)}
+OTHERS = ("load", "lugre", "play, motor", "play, link", "contact")  # play: with the friction's side
 RAIL = {"M": 1.0, "D": 0.0, "G": 0.0, "off": 0.0}
 LINK = {"M": 0.225, "D": 0.02, "G": 2.4525, "off": 0.8}
 
@@ -142,7 +145,7 @@ def drawn(seed: int) -> dict[str, Joint]:
         return float(f"{math.exp(rng.uniform(math.log(low), math.log(high))):.3g}")
 
     found = {}
-    for name, kind, usual in (("rail", "slide", RAIL), ("geared", "hinge", LINK)):
+    for name, kind, usual in (("drawn_rail", "slide", RAIL), ("drawn_geared", "hinge", LINK)):
         numbers = dict(usual)
         numbers["M"] *= between(0.4, 2.5)
         bound = 6.0 * between(0.6, 1.5)
@@ -152,7 +155,7 @@ def drawn(seed: int) -> dict[str, Joint]:
         factor = between(0.5, 1.5)
         levels = {what: (factor * a, factor * b) for what, (a, b) in LEVELS.items()}
         start = (0.1 if kind == "slide" else 0.5) * between(0.5, 1.5)
-        found[f"drawn_{name}"] = joint(f"drawn_{name}", kind, numbers, bound, start, levels)
+        found[name] = joint(name, kind, numbers, bound, start, levels, printed=False)
     return found
 
 
@@ -161,7 +164,7 @@ def joints(lot: int | None = None) -> dict[str, Joint]:
     if lot is not None:
         return drawn(lot)
     return {
-        "rail": joint("rail", "slide", RAIL, 6.0, 0.1, LEVELS),
-        "geared": joint("geared", "hinge", LINK, 6.0, 0.5, LEVELS),
+        "rail": joint("rail", "slide", RAIL, 6.0, 0.1, LEVELS, others=OTHERS),
+        "geared": joint("geared", "hinge", LINK, 6.0, 0.5, LEVELS, others=OTHERS[:2]),
         "ak80": machine(),
     }

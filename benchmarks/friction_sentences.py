@@ -83,7 +83,7 @@ class Points:
     def share(self, joint: str, law: str, friction: str) -> float:
         """Return the share of sets that still move; NaN without sets."""
         point = self.find(joint, law, friction, price="hunting") or {}
-        return point.get("share", math.nan)
+        return point.get("moving", math.nan)
 
     def frictions(self, joint: str, names: Sequence[str]) -> list[str]:
         """Return those frictions that the points of a joint have."""
