@@ -103,7 +103,7 @@ class Loop:
                 )
             if isinstance(part, PositionServo) and (part.goal or part.step):
                 raise ScenarioError(
-                    "chattering is predicted about x = 0 and without steps of a set-point, and a "
+                    "chattering is predicted about x = 0 and without steps of a set-point, but a "
                     f"PositionServo has goal {part.goal:g} and step {part.step:g}: measure it in a "
                     "run"
                 )

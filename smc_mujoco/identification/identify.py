@@ -106,7 +106,7 @@ class Identified:
     scatter: Numbers = dataclasses.field(default_factory=dict)  # of values between logs, if several
     held_out: HeldOutFit | None = None  # of the log that was kept aside
     units_doubted: tuple[str, ...] = ()  # sentences on columns that may be in another unit
-    gives_way: str = ""  # as what dry friction gives way before it slides, and what to do
+    gives_way: str = ""  # how dry friction gives way before it slides, and what to do
     data: tuple[Data, ...] = dataclasses.field(default=(), repr=False)  # the logs' columns
 
     @property
@@ -127,8 +127,8 @@ class Identified:
                 notes.append(f"{name} may as well be 0")
         if self.gives_way:
             notes.append(
-                f"dry friction gives way in the logs before it slides, as {self.gives_way}; the "
-                "errors have what that may change"
+                "presliding: in the logs dry friction gives way before it slides, "
+                f"{self.gives_way}; the errors include what that may change"
             )
         worst = min(min(fit.values()) for fit in self.by_pieces or self.fits)
         if self.independent < BLOCKS[0] and worst < PERFECT_FIT and self.rig.controller is None:
@@ -289,7 +289,7 @@ def identify(
         unit of the machine's command) of the joint, or x_JOINT and u_JOINT of each.
       names: paths of the numbers: "shoulder.damping", .frictionloss,
         .armature, .stiffness, .gain, .offset, .zero, "input_delay", "m", "friction.elbow.kc". None:
-        the rig's `free`. Nobody gives a start: it comes from least squares of forces.
+        the rig's `free`. No start is needed: it comes from least squares of forces.
       held_out: a log that is not used, to check the numbers on.
       columns: our name of a column -> that of the logs.
       corrected: whether to correct open loops for the errors of the simulation's steps, in several

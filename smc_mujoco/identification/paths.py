@@ -63,7 +63,7 @@ class PartNumber(NamedTuple):
         made = copy.copy(parts[self.part])
         self._set(made, self.name, value)
         ordered = getattr(made, "ordered", ())  # of frictions
-        if self.name in ordered and getattr(made, ordered[1]) is not None:
+        if ordered and self.name in ordered and getattr(made, ordered[1]) is not None:
             low, high = (np.ravel(getattr(made, name))[max(self.joint, 0)] for name in ordered)
             if low > high:
                 (other,) = set(ordered) - {self.name}

@@ -2,10 +2,10 @@
 the numbers found.
 
 Dry friction of replays holds a joint until it breaks away. That of a real joint bends first, and
-MuJoCo's default creeps, so inertia, friction and delay take the blame. At the solution the logs are
-replayed with friction that gives way in each of these ways. The share of that change which the
-residuals have, found by least squares beside the numbers, is how much friction gives way; and what
-the numbers lose to it is an error of theirs, at first order.
+MuJoCo's default creeps, so inertia, friction and delay would absorb that. At the solution the logs
+are replayed with friction that gives way in each of these ways. Least squares, with the numbers
+free, finds the share of that change which the residuals show. How far that share moves the numbers,
+at first order, is part of their errors.
 """
 
 import copy
@@ -31,18 +31,18 @@ from smc_mujoco.mechanisms.plant import Values as Parameters
 BENDS = 2e-4, 1e-3, 4e-3  # rad (m), by which a joint gives way before it slides; chosen
 SLIDES_AT = 1.0  # rad/s (m/s): of bristles without a Stribeck drop, where it changes nothing
 DAMPING = 0.6  # of bristles, relative to the root of stiffness and inertia; chosen
-TOLD = 0.9  # of the residuals' norm, to which giving way lowers it: below that it is told; chosen
+REPORTED = 0.9  # of the residuals' norm: presliding is reported if it lowers it below this; chosen
 
 
 class Presliding(NamedTuple):
     """How dry friction gives way in the logs."""
 
-    way: str  # as what it gives way, and what to do; "" for not at all
+    way: str  # how it gives way, and what to do; "" if it does not
     moved: Array  # how far the numbers would move, in their scales, (p,)
 
 
 @frozen_data
-class Giving:
+class PreslidingFields:
     """Plant.fields of a plant whose dry friction creeps as MuJoCo's default does, or, if `bends`,
     is left to bristles.
     """
@@ -62,8 +62,8 @@ class Giving:
 
 
 def presliding(replays: Replays, slopes: Slopes) -> Presliding:
-    """Return how dry friction gives way in the logs, as the way that explains most of the residuals
-    says.
+    """Return how dry friction gives way in the logs: in the way that explains most of the
+    residuals.
     """
     none = Presliding("", np.zeros(len(replays.names)))
     rig = replays.rig(slopes.point)
@@ -72,13 +72,13 @@ def presliding(replays: Replays, slopes: Slopes) -> Presliding:
     J = np.concatenate(slopes.freed(slopes.by_values))
     r = np.concatenate(slopes.freed(slopes.residuals))
     best, least = none, float(np.linalg.norm(r))
-    told = TOLD * least
+    reported = REPORTED * least
     trial = copy.copy(replays)
     control = rig.repeated(replays.pieces[0].part).control_period  # pyright: ignore[reportArgumentType]
     trial.steps = {"physics_step": control / math.ceil(control / RUN_STEP - 1e-9)}
     (holding,) = trial.residuals([slopes.point])
-    for way, giving in _ways(rig).items():
-        trial.twin = giving
+    for way, yielding in _ways(rig).items():
+        trial.twin = yielding
         (residuals,) = trial.residuals([slopes.point])
         changed = [after - before for after, before in zip(residuals, holding, strict=True)]
         c = np.concatenate(slopes.freed(changed))
@@ -87,12 +87,12 @@ def presliding(replays: Replays, slopes: Slopes) -> Presliding:
         moved = np.linalg.lstsq(J, share * c, rcond=None)[0]
         left = float(np.linalg.norm(r + share * c - J @ moved))
         if left < least:
-            best, least = Presliding(way if left < told else "", np.abs(moved)), left
+            best, least = Presliding(way if left < reported else "", np.abs(moved)), left
     return best
 
 
 def _ways(rig: OwnRig) -> dict[str, OwnRig]:
-    """Return as what friction gives way, and what to do -> the rig with such friction."""
+    """Return how friction gives way, and what to do -> the rig with such friction."""
     fields = rig.numbers_of(Values(**rig.values))
     model = fields["plant"].load()
     dofs = dof_ids(model)
@@ -100,9 +100,9 @@ def _ways(rig: OwnRig) -> dict[str, OwnRig]:
     inertias = model.dof_M0[dofs].tolist()
     joints = channel_names(rig.plant)
     found = {
-        "MuJoCo's default does: if a simulation made them, its softness belongs into the file, as "
+        "as MuJoCo's default does: if a simulation made the logs, give the file its softness, as "
         'solreffriction="0.0201 1" of the joint': dataclasses.replace(
-            rig, plant=_giving(rig.plant, False)
+            rig, plant=_yielding(rig.plant, False)
         )
     }
     for bend in BENDS:
@@ -114,15 +114,18 @@ def _ways(rig: OwnRig) -> dict[str, OwnRig]:
                 bristles.append(LuGre(level, level, SLIDES_AT, k, damping, on=(joint,)))
         base = dataclasses.replace(rig.base, friction=(*rig.base.friction, *bristles))
         way = (
-            f"bristles that bend by {1e3 * bend:g} mrad (mm): find the coulomb of a LuGre with "
+            f"as bristles that bend by {1e3 * bend:g} mrad (mm): find the coulomb of a LuGre with "
             "such bristles in place of frictionloss"
         )
-        found[way] = dataclasses.replace(rig, base=base, plant=_giving(rig.plant, True))
+        found[way] = dataclasses.replace(rig, base=base, plant=_yielding(rig.plant, True))
     return found
 
 
-def _giving(plant: Plant, bends: bool) -> Plant:
+def _yielding(plant: Plant, bends: bool) -> Plant:
     """Return the plant with dry friction that gives way, or none at all."""
     return dataclasses.replace(
-        plant, fields=Giving(plant.fields, bends), rubs=False, smooth=plant.smooth and bends
+        plant,
+        fields=PreslidingFields(plant.fields, bends),
+        rubs=False,
+        smooth=plant.smooth and bends,
     )

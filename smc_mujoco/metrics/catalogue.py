@@ -379,7 +379,7 @@ def stick_time(trace: Trace) -> float:
 
 @folded("1/s", Fold("slips", "sum", part="late", rate=True), realistic=True)
 def slip_rate(trace: Trace) -> float:
-    """How often a second friction lets a joint go in the last part, worst channel.
+    """How many times a second a joint breaks away from friction in the last part, worst channel.
 
     A joint that hunts sticks and slips again and again. A joint that never sticks has no slips.
     """
@@ -390,7 +390,7 @@ def slip_rate(trace: Trace) -> float:
 def reversal_error(trace: Trace) -> float:
     """Largest |e| in the 0.15 s after the reference turns back, worst channel.
 
-    There dry friction changes its sign. It counts from a quarter of the run on; 0 where the
+    Dry friction changes its sign there. It counts from a quarter of the run on; 0 where the
     reference does not turn.
     """
     ...

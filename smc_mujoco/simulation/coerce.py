@@ -72,7 +72,7 @@ def plant(name: str, value: object, s: Any) -> Plant:
         for path in jump.factors:
             if path.partition(".")[0] in PARTS:
                 raise ScenarioError(
-                    f"Jump has {path!r}, a number of a part, and changes the plant's: give a "
+                    f"Jump has {path!r}, a number of a part, but changes the plant's: give a "
                     "joint's number, as 'elbow.frictionloss', or a friction of your own that reads "
                     "y.t"
                 )
@@ -473,7 +473,7 @@ def actuator(name: str, value: Actuators | None, s: Any) -> tuple[Actuator, ...]
 
 
 def _too_many(name: str, drives: Sequence[Actuator], kept: Sequence[Actuator]) -> str:
-    """Return a sentence on drives of one joint that are not all taken."""
+    """Return a sentence that refuses the drives of one joint, which are too many."""
     if file := next((part for part in drives if part in kept), None):
         others = joined(type(part).__name__ for part in drives if part is not file)
         return (

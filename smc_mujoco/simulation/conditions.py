@@ -13,9 +13,9 @@ nothing in it is run:
 
 The levels of the suite are those of a machine of the study's size. Dry friction is of any size: a
 sixtieth of the machine's bound on the force of each driven joint, 0.1 N m or N in the study. The
-viscous friction of "friction" is half as much at 1 rad/s or m/s. That of "stiction" is six times
-as large, and nine times at rest: a law with an integral may hunt there, which a search under it
-sees. The backlash is that of a worn
+viscous friction of "friction" is half as much at 1 rad/s or m/s. The dry friction of "stiction" is
+six times as large in motion, and nine times at rest: a law with an integral may hunt under it, and
+a search under this condition counts that. The backlash is that of a worn
 gear, the lag that of a hydraulic valve, and the counts, per revolution or metre, are those of an
 inexpensive encoder. On a free body and on a user's model, whose size may be any, a disturbance is
 the same share of the largest force as it is of u_max in the study. The play, the counts and the

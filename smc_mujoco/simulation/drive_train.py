@@ -64,7 +64,7 @@ class DriveTrain:
 
     @property
     def words(self) -> list[str]:
-        """What u is of joints where that is said: a sentence for those where it is the same."""
+        """Sentences that say what u is where it is no force, one for the joints that share it."""
         joints: dict[str, list[str]] = {}
         for motor, unit, joint in zip(
             self.motors, self.plant.units, driven_names(self.plant), strict=False

@@ -138,6 +138,7 @@ def test_the_command_says_what_the_function_says_and_writes_a_figure_and_a_condi
     assert done.output.startswith(f"{found}\n")
     assert (tmp_path / "friction.png").stat().st_size > 10_000
     (read,) = from_file(tmp_path / "found.txt")
+    assert isinstance(read.fields, dict)
     assert read.fields["friction"].static == pytest.approx(found.part.static, rel=1e-6)
     for given, words in (
         (columns[:3], "no column speed (it has dq, tau)"),

@@ -14,10 +14,11 @@ from smc_mujoco.simulation.scenario import Scenario
 def chosen(
     scenario: Scenario, metrics: Sequence[str], device: str, many: bool = True
 ) -> tuple[type[FormGroup] | None, str]:
-    """Return the kind of group that runs a scenario, or None and why MuJoCo has to, in one
-    sentence.
+    """Return the kind of group that runs a scenario on a device, "cpu" or "cuda", and ""; or None
+    and why MuJoCo has to run it, in one sentence.
 
-    MuJoCo Warp takes as long for one world as for a thousand, so it runs `many` at once alone.
+    MuJoCo Warp needs about as long for one world as for a thousand, so it is chosen only for `many`
+    runs at once.
     """
     why = group.why_not(scenario, metrics, device)
     if not why:

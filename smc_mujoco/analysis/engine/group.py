@@ -70,13 +70,13 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
         != ("implicitfast" if rubs_by_force(s) else "RK4"),
     }
     for name in filter(holds, metrics):
-        told = f"{name} is of bristles or of an own friction's force, which a trace tells"
+        told = f"{name} needs the force of bristles or of your own friction, as a trace has it"
         beyond[told] = rubs_by_force(s)
     return first_of(beyond) or why_not_sampled(s, metrics, device)
 
 
 def why_not_sampled(s: Resolved, metrics: Sequence[str], device: str) -> str:
-    """Return what a sample of this engine cannot do of a scenario, whatever integrates it."""
+    """Return what a scenario needs of a sample that this engine cannot do, by any integrator."""
     parts = [part for part in (*s.law.parts, s.surface, s.velocity) if part is not None]
     beyond = {
         "a law of many joints, or in C, is for the processor": device == "cuda"

@@ -65,7 +65,7 @@ def _fold(name: str) -> Fold | None:
 
 
 def holds(name: str) -> bool:
-    """Return whether a metric is of the time for which friction held a joint."""
+    """Return whether a metric needs to know when friction held a joint."""
     fold = _fold(name)
     return fold is not None and fold.signal in HOLDING
 

@@ -33,8 +33,8 @@ with extra("gpu", "device 'cuda' for a plant that MuJoCo runs"):
 
 warp.config.log_level = warp.LOG_WARNING
 PIECE = 2**18  # worlds at once; chosen
-# Contacts for which a world has room at first, and at most. What does not fit is told, and run
-# again with twice the room; chosen.
+# Contacts for which a world has room at first, and at most. If some do not fit, all runs are
+# repeated with twice the room; chosen.
 CONTACTS, MOST_CONTACTS = 16, 1024
 ROWS_OF_EQUALITY = 6  # of a weld, which has the most
 # what mj_setConst computes of the fields that a scenario sets, of those that MuJoCo Warp has
@@ -91,8 +91,8 @@ def _batched(name: str) -> bool:
 
 
 def _for_warp(base: mujoco.MjModel) -> mujoco.MjModel:
-    """Return a copy of a model without what MuJoCo Warp has not, and what its callback does
-    without.
+    """Return a copy of a model without what MuJoCo Warp lacks and what the callback does not
+    need.
     """
     model = copy.copy(base)
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
@@ -135,7 +135,7 @@ def _run(runs: WorldRuns, rows: Array, members: Array) -> Array:
 
 
 def values_of(runs: WorldRuns) -> dict[str, Array]:
-    """Return the fields of the model that a scenario sets, with what MuJoCo derives of them,
+    """Return the fields of the model that a scenario sets, with what MuJoCo derives from them,
     (scenarios, ...) each.
     """
     base = runs.model
@@ -161,7 +161,7 @@ def worlds_of(
     """Return MuJoCo Warp's model and data of the worlds of rows, at their start."""
     host = _for_warp(runs.model)
     for name, of_each in values.items():
-        # MuJoCo Warp looks whether there is any dry friction
+        # MuJoCo Warp checks whether there is any dry friction
         field_array(host, name)[:] = of_each.max(axis=0) if name in DRY_FRICTION else of_each[0]
     varying = {}
     for name, of_each in values.items():
@@ -194,7 +194,7 @@ def _put(model: Any, name: str, values: Array) -> None:
 
 
 def _room(model: mujoco.MjModel, contacts: int) -> dict[str, int]:
-    """Return for how many contacts and rows of constraints a world gets room.
+    """Return how many contacts and rows of constraints a world gets room for.
 
     With none, MuJoCo Warp leaves its solver out.
     """
@@ -270,7 +270,7 @@ class _OnProcessor:
 
 
 class _OnCard:
-    """The callback on a CUDA device, a thread a world, on MuJoCo Warp's stream."""
+    """The callback on a CUDA device, one thread per world, on MuJoCo Warp's stream."""
 
     def __init__(self, runs: WorldRuns, rows: Array, data: Any):
         from smc_mujoco.analysis.engine import gpu
@@ -289,13 +289,13 @@ class _OnCard:
         self.launch(*self.numbers, self.kept, *self.theirs)
 
     def captured(self, step: Callable[[], None]) -> Callable[[], None]:
-        """Return a step as one launch, of a CUDA graph."""
+        """Return a step as one launch of a CUDA graph; as it is if CUDA cannot capture one."""
         try:
             with warp.ScopedCapture(capture_mode=warp.CaptureMode.RELAXED) as capture:
                 step()
         except Exception as error:  # the device's driver decides
             warnings.warn(
-                f"CUDA captures no graph of a step, and runs are slower: {error}",
+                f"CUDA could not capture a graph of a step, so runs are slower: {error}",
                 ScenarioWarning,
                 users_stacklevel(),
             )

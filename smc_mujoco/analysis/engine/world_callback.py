@@ -44,8 +44,8 @@ World = namedtuple("World", ("qpos", "qvel", "ctrl", "qfrc_applied"))
 
 
 class WorldPlaces(NamedTuple):
-    """Where a run's numbers of its world are in its row, behind all that `layout` names; n of
-    each, where it says no other.
+    """Where a run's row has the numbers of its world, behind all that `layout` names. There are n
+    of each, unless another count is given.
     """
 
     calls: int  # of the callback in a physics step; 1 number
@@ -65,7 +65,7 @@ class WorldRuns(NamedTuple):
 
     @property
     def calls(self) -> int:
-        """How often in a physics step the callback has to be called."""
+        """How many times in a physics step the callback has to be called."""
         return calls_in_step(self.form, self.scenarios[0])
 
     def start(self, count: int) -> ArrayPair:
@@ -100,14 +100,14 @@ def world_places(form: Form) -> tuple[WorldPlaces, int]:
 
 
 def work_size(form: Form) -> int:
-    """Return how many numbers the state of a run has: those of its layout, and how often the
-    callback was called.
+    """Return how many numbers the state of a run has: those of its layout, and the count of calls
+    so far.
     """
     return layout(form).work_size + 1
 
 
 def calls_in_step(form: Form, s: Resolved) -> int:
-    """Return how often in a physics step the callback has to be called."""
+    """Return how many times in a physics step the callback has to be called."""
     return s.stages if form.disturbances or form.drive else 1
 
 

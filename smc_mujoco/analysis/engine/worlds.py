@@ -20,9 +20,7 @@ def no_model(x, v, i, p):
 
 
 def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cuda") -> str:
-    """Return what the callback of a world cannot do of a scenario, in one sentence; "" if it does
-    all.
-    """
+    """Return why the callback of a world cannot run a scenario, in one sentence; "" if it can."""
     s = scenario.resolved
     plant = s.plant
     beyond = {
@@ -38,7 +36,7 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cuda
         "a disturbance acts on a body": bool(s.disturbance) and not plant.direct,
     }
     for name in metrics:
-        beyond[f"{name} is of friction that holds, which a trace tells"] = holds(name)
+        beyond[f"{name} needs to know when friction holds a joint, as a trace does"] = holds(name)
         if refusal := name in CATALOGUE and CATALOGUE[name].refusal(plant):
             beyond[refusal] = True
     return first_of(beyond) or why_not_sampled(s, metrics, device)
@@ -47,7 +45,7 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cuda
 class WorldGroup(FormGroup):
     """Runs in worlds of one model, see `FormGroup`."""
 
-    # chosen: by estimate, an H100 is as fast as two cores for 55 Pandas, as 16 threads for 440
+    # chosen: by an estimate an H100 draws level with two cores at 55 Pandas, with 16 threads at 440
     least = 256
 
     @staticmethod
@@ -75,7 +73,7 @@ class WorldGroup(FormGroup):
 
     @property
     def runs(self) -> WorldRuns:
-        """What is run, without its rows."""
+        """What is run: the form, the scenarios and the model, without rows."""
         return WorldRuns(self.form, self.scenarios, self.mechanism.model, self.tables)
 
     def run(self, rows: Array, threads: int | None = None, device: str = "cuda") -> Array:

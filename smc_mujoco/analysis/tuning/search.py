@@ -416,7 +416,7 @@ def task_of(
     if len({bool(motor.unit) for motor in first.drive_train.motors}) > 1:
         units = " and ".join(dict.fromkeys(first.efforts[: first.plant.driven]))
         raise ScenarioError(
-            f"joints of {first.plant.name} take commands in {units}, and a tuning has one bound on "
+            f"joints of {first.plant.name} take commands in {units}, but a tuning has one bound on "
             "u: give all of them servos or motors, as smc.Channel(motor=True)"
         )
     bound = goal.u_max or (default_u_max(first.plant) if first.force_command else min(first.limits))

@@ -17,7 +17,7 @@ Machine = Annotated[
     typer.Argument(
         metavar="MACHINE",
         help=(
-            "FILE.xml:joint+joint; FILE.xml alone has the joints of the logs' columns. "
+            "FILE.xml:joint+joint; FILE.xml alone takes the joints from the logs' columns. "
             "Or a plant or a rig by its name."
         ),
     ),
@@ -31,7 +31,7 @@ Paths = Annotated[
     typer.Option(
         "--for",
         metavar="PATH,...",
-        help="Numbers to find, as shoulder.damping,elbow.frictionloss,input_delay,m; "
+        help="Numbers to find, such as shoulder.damping,elbow.frictionloss,input_delay,m; "
         "default: those that a rig's records determine.",
     ),
 ]
@@ -62,11 +62,11 @@ UMax = Annotated[
 ]
 VMax = Annotated[
     float | None,
-    typer.Option(help="Bound on the speed that is asked of each joint, rad/s or m/s."),
+    typer.Option(help="Bound on the speed of each joint's reference, rad/s or m/s."),
 ]
 Amplitude = Annotated[
     float | None,
-    typer.Option(help="Largest way from the goal to each side, rad or m; default: 0.5 or 0.1."),
+    typer.Option(help="Largest travel to each side of the goal, rad or m; default: 0.5 or 0.1."),
 ]
 MotionDuration = Annotated[float, typer.Option(help="Duration of each motion, s.")]
 Rate = Annotated[float, typer.Option(help="Samples a second of the log.")]
@@ -93,12 +93,12 @@ def identify(
 ) -> None:
     """Find numbers of a machine from its logs: friction, armature, delay, masses, with errors.
 
-    A log is of any controller, at 40 Hz or more. It has columns t in s, and x (rad or m) and u (N m
-    or N) of the joint, or x_JOINT and u_JOINT of each. Nobody gives a start.
+    A log may come from any controller, at 40 Hz or more. It has columns t in s, and x (rad or m)
+    and u (N m or N) of the joint, or x_JOINT and u_JOINT of each. No start is needed.
 
     The paths of numbers are JOINT.damping, .frictionloss, .armature, .stiffness, .gain, .offset and
-    .zero, input_delay, m and grav. The table has each number with its standard error. What the logs
-    cannot tell is said below it.
+    .zero, input_delay, m and grav. The table has each number with its standard error. Notes below
+    it say what the logs cannot determine.
 
     Pairs of speed (rad/s or m/s) and torque (N m or N) are of one joint in the order of time. The
     torque is what friction alone needs: measured, less gravity and inertia.
@@ -189,8 +189,9 @@ def excitation(
     """Recommend a motion to record, from which numbers of a machine can be told apart.
 
     It compares chirps, sines and staircases within the bounds on the model: how large the error of
-    each number will be, and which two are told apart worst. Play the best under any controller that
-    holds, and record t, and x and u of each joint, for `smc-mujoco identify`.
+    each number will be, and which two are hardest to tell apart. Play the best one under any
+    controller that tracks it stably, and record t, and x and u of each joint, for `smc-mujoco
+    identify`.
 
     Example: smc-mujoco excitation arm.xml:shoulder --for shoulder.damping,input_delay --out m.csv
     """

@@ -1,4 +1,4 @@
-"""PD with a disturbance observer of second order: u = -(wc^2 e + 2 wc de + z) / b, z estimates d.
+"""PD with a second-order disturbance observer: u = -(wc^2 e + 2 wc de + z) / b, z estimates d.
 
     z' = r + 2 l (de' - b u - z);  r' = l^2 (de' - b u - z)
 
@@ -8,15 +8,16 @@ d = e'' - b u is the total disturbance, and r estimates its rate. So z = Q d wit
     e = p^2 / ((p + wc)^2 (p + l)^2) d
 
 so all poles are at -wc and -l, a d of constant rate leaves no error, and |d''| <= J leaves |d - z|
-<= J / l^2 in the end. On e'' = g u it is stable for g / b > wc l / (wc^2 + 3 wc l + l^2), 0.18 if l
+<= J / l^2 ultimately. On e'' = g u it is stable for g / b > wc l / (wc^2 + 3 wc l + l^2), 0.18 if l
 = 2 wc, where `pd_observer` has 0.10; a delay times wc must then stay below 0.20 (0.31). Two
-integrals in the loop make it accurate under loads that change, and make it hunt under dry friction.
+integrals in the loop make it accurate under loads that change, and can make it hunt under dry
+friction.
 
 The observer takes d's mean over the last period from the difference of two rates, and u after
 saturation, so z does not wind up. It is sampled with both poles at P = exp(-l dt), and z is that of
-the next period. So under a d of constant rate it leaves what holding u leaves, d' dt^2 / (6 wc).
-Its loop alone is then stable for g / b < 1 + (1 + P)^2 / ((1 - P) (3 + P)). With the model b = g,
-and f and r'' are known and fed forward. The trace's s is wc^2 e + 2 wc de.
+the next period. So under a d of constant rate only the error of holding u is left, d' dt^2 / (6
+wc). The observer's own loop is then stable for g / b < 1 + (1 + P)^2 / ((1 - P) (3 + P)). With the
+model b = g, and f and r'' are known and fed forward. The trace's s is wc^2 e + 2 wc de.
 Gains: wc, bandwidth of the loop [1/s]; l, bandwidth of the observer [1/s]; b, assumed input gain
 [1/kg].
 Sources: T. Umeno & Y. Hori, "Robust speed control of DC servomotors using modern two

@@ -1,7 +1,7 @@
 """What a Feedforward adds to a law's u, in C: Python that is translated, as the law's is.
 
 It has the operations of the control callback in their order, so that it gives the same bits. The
-share `error` of a Feedforward is left out: it says how wrong the compensation is of the true
+share `error` of a Feedforward is left out: it says how far the compensation is off on the true
 machine, which no controller knows. What is written is the Feedforward with error=0.
 """
 
@@ -27,7 +27,7 @@ def compensate_of(scenario: Scenario) -> Compensate | None:
     """Return what the Feedforward of a scenario adds to u; None without one.
 
     Raises:
-      ScenarioError: a law of one channel, and a compensation that differs between the channels.
+      ScenarioError: the law has one channel, but the compensation differs between the channels.
     """
     s = scenario.resolved
     given = s.feedforward
@@ -42,7 +42,7 @@ def compensate_of(scenario: Scenario) -> Compensate | None:
     if not s.law.joint:
         if any(repr(one) != repr((terms[0], gains[0])) for one in zip(terms, gains, strict=True)):
             raise ScenarioError(
-                "the scenario's Feedforward differs between its channels, and a law of one "
+                "the scenario's Feedforward differs between its channels, but a law of one "
                 "channel is written once for all: give one that is the same for every channel"
             )
         return _of_channel(_added(terms[0], speed, given.eps, gains[0]))

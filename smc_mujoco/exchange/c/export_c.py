@@ -166,7 +166,8 @@ def translated(
     if compensate:
         what += " with the scenario's Feedforward"
         others = others | compensation.function(compensate, joints)
-        together = compensation.compensated(component.function, compensate, joints)
+        law = component.function
+        together = compensation.compensated(law, compensate, joints)  # pyright: ignore[reportArgumentType]
         component = dataclasses.replace(component, function=together)
     try:
         slots, code = translate(component, single, joints, others)

@@ -95,8 +95,8 @@ class Channel:
             )
         if self.set_point_step and not self.servo:
             raise ScenarioError(
-                f"a Channel has set_point_step={self.set_point_step:g} and no servo: give "
-                "servo=True too"
+                f"a Channel has set_point_step={self.set_point_step:g} but no servo: give "
+                "servo=True as well"
             )
 
 
@@ -464,8 +464,8 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel, go
     elif channel.servo:
         if why := not_kept(model, actuators[0]):
             raise ScenarioError(
-                f"actuator {names!r} of joint {joint!r} {why}, and servo=True is for a <position> "
-                f"and a plain <dcmotor>: leave servo out, or {CURE}"
+                f"actuator {names!r} of joint {joint!r} {why}, but servo=True is for a <position> "
+                f"or a plain <dcmotor>: leave servo out, or {CURE}"
             )
         if channel.set_point_step and model.actuator_gaintype[actuators[0]] != FIXED:
             raise ScenarioError(
@@ -476,7 +476,7 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel, go
     elif why := no_motor(model, actuators[0]):
         cure = CURE if not_kept(model, actuators[0]) else f"{KEEP}, or {CURE}"
         raise ScenarioError(
-            f"actuator {names!r} of joint {joint!r} {why}, and a law commands a force: {cure}"
+            f"actuator {names!r} of joint {joint!r} {why}, but a law commands a force: {cure}"
         )
     else:
         bounds.append(_of_actuator(model, actuators[0]))
@@ -499,8 +499,8 @@ def bound_of_kept(label: str, model: mujoco.MjModel, joint: str, part: Actuator)
     for _, low, high in ranges(model, [joint]):
         return max(high - part.goal, part.goal - low)
     raise ScenarioError(
-        f"the servo of joint {joint!r} of {label} has no ctrlrange, and the joint no range: "
-        f"{cure}, how far the set-point may be from the goal"
+        f"the servo of joint {joint!r} of {label} has no ctrlrange, and the joint has no range: "
+        f"{cure}, the largest distance of the set-point from the goal"
     )
 
 

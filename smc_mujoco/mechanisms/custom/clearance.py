@@ -11,7 +11,7 @@ from smc_mujoco.mechanisms.layout import joint_ids, loaded, posed
 from smc_mujoco.mechanisms.plant import Plant
 
 DEPTH = 5e-3  # m, chosen: soft feet stand less deep
-RAISES = 4  # at most, as another part may be lower when the deepest is out; chosen
+RAISES = 4  # at most: another part may be the deepest once the first is out; chosen
 TOUCH = 1e-3  # m, chosen: what touches overlaps by less, so a deeper start begins with a blow
 
 
@@ -39,7 +39,7 @@ def overlap(plant: Plant, x: Floats) -> Overlap:
 
 
 def raised(plant: Plant, x: Floats) -> Floats:
-    """Return a start of a free body, raised by as much as it would stand in the ground below."""
+    """Return a start of a free body, raised by as much as it overlaps the ground below."""
     allowed = max(DEPTH, overlap(plant, plant.x0).depth)
     for _ in range(RAISES):
         depth = overlap(plant, x).depth

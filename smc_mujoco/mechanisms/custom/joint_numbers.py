@@ -87,7 +87,7 @@ def with_joint_numbers(plant: Plant, names: Iterable[str]) -> Plant:
         nominal = dataclasses.replace(nominal, fields=fields)
     absent = {name: one.unit for name, one in added.items() if not one.value}
     rubbing = [one.joint for one in added.values() if one.kind == "frictionloss"]
-    # as soft as the file says, which only MuJoCo's constraints are
+    # only MuJoCo's constraints are as soft as the file says
     model = loaded(plant)
     soft = any(says_how_soft(model, _place(model, joint, "frictionloss")) for joint in rubbing)
     return dataclasses.replace(

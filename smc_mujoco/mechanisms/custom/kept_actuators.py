@@ -1,4 +1,4 @@
-"""Actuators of a user's file that stay as they are: what a law commands is their own command.
+"""Actuators of a user's file that stay as they are: u is their own command.
 
 A `<position>` is a PositionServo, and a `<dcmotor>` on a voltage a DCMotor, each as it acts at its
 joint with gear 1.
@@ -14,7 +14,7 @@ from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.part import Actuator
 from smc_mujoco.mechanisms.hardware.position_servo import UNBOUNDED, PositionServo
 
-EQUAL = 1e-9  # relative: numbers of a file that are to agree
+EQUAL = 1e-9  # relative: numbers of a file that should agree
 AFFINE = mujoco.mjtBias.mjBIAS_AFFINE.value
 FIXED = mujoco.mjtGain.mjGAIN_FIXED.value
 OF_DCMOTOR = mujoco.mjtGain.mjGAIN_DCMOTOR.value
@@ -33,23 +33,25 @@ def not_kept(model: mujoco.MjModel, i: int) -> str:
         return f"is a servo with dynamics (dyntype {lag})"
     gain = float(model.actuator_gainprm[i, 0])
     if bias or not math.isclose(gain, -stiffness, rel_tol=EQUAL):
-        return f"has the gain {gain:g} and the bias {bias:g} {stiffness:g}, and is no <position>"
+        return (
+            f"has the gain {gain:g} and the bias {bias:g} {stiffness:g}, so it is not a <position>"
+        )
     return _late(model, i) or spoilt(model, i)
 
 
 def _no_plain_dcmotor(model: mujoco.MjModel, i: int) -> str:
-    """Return what else than resistance, torque constant, inductance and cogging a `<dcmotor>` has,
-    or "".
+    """Return what a `<dcmotor>` has besides resistance, torque constant, inductance and cogging;
+    "" if nothing.
     """
     winding, state, torque = (
         numbers[i]
         for numbers in (model.actuator_gainprm, model.actuator_dynprm, model.actuator_biasprm)
     )
-    # MuJoCo keeps the time constant of a winding first in its state
+    # the first number of MuJoCo's state is the time constant of the winding
     if winding[2:].any() or state[1:].any() or torque[2:].any():
         return "is a <dcmotor> with a controller, heat, friction, a slew rate or a cogging phase"
     if model.actuator_ctrlspec[i] != VOLTAGE:
-        return "is a <dcmotor> whose command is no voltage"
+        return "is a <dcmotor> whose command is not a voltage"
     if model.actuator_gear[i, 0] < 0.0:
         return f"is a <dcmotor> of gear {model.actuator_gear[i, 0]:g}, which is negative"
     for what, (low, high) in (
@@ -57,17 +59,17 @@ def _no_plain_dcmotor(model: mujoco.MjModel, i: int) -> str:
         ("forcerange", forcerange_of(model, i)),
     ):
         if not math.isclose(-low, high, rel_tol=EQUAL):
-            return f"is a <dcmotor> whose {what} {low:g} to {high:g} is not even"
+            return f"is a <dcmotor> whose {what} {low:g} to {high:g} is not symmetric"
     return _late(model, i) or spoilt(model, i)
 
 
 def _late(model: mujoco.MjModel, i: int) -> str:
     delay = float(model.actuator_delay[i])
-    return f"has a delay of {delay:g} s, which a scenario's input_delay is instead" if delay else ""
+    return f"has a delay of {delay:g} s, which belongs in input_delay instead" if delay else ""
 
 
 def kept(model: mujoco.MjModel, i: int, goal: float, step: float) -> Actuator:
-    """Return an actuator that stays as it is. `goal` and `step`: of a set-point."""
+    """Return an actuator that stays as it is. `goal` and `step` are those of a set-point."""
     gear = float(model.actuator_gear[i, 0])
     if model.actuator_gaintype[i] == OF_DCMOTOR:
         return _dcmotor(model, i, gear)

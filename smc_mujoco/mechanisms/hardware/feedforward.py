@@ -24,8 +24,8 @@ class Feedforward:
     At each sample it is (1 + error) F(v) tanh(|v| / eps), with F the force that a joint needs to
     move against the friction at a steady speed v. Of a drive it takes the u that gives this force
     at rest. What it added is `compensation` of the trace. Observers of a law do not see it.
-    `smc.exchange.law_to_c` and `law_to_fmu` write it with the law of a scenario, without its error:
-    that is of the machine, and no controller knows it.
+    `smc.exchange.law_to_c` and `law_to_fmu` write it with the law of a scenario, as if its error
+    were 0: no controller knows how far its compensation is off.
 
     Attributes:
       friction: what is compensated, as a scenario's `friction`: one part, several, or by joint. It

@@ -36,9 +36,9 @@ class PositionServo(Actuator):
         smc.hardware.PositionServo(kp=17.8, kv=0.1, forcerange=(-2.94, 2.94), ctrlrange=(-1.9, 1.9))
 
     MuJoCo computes the force kp (goal + u - x) - kv v at each stage of a step, as for the file's
-    own `<position>`. The set-point is cut to `ctrlrange`, the force to `forcerange`. u is 0 at the
-    goal, so that a law with one bound on |u| commands to both sides of it. An `input_delay` delays
-    the set-point alone. There is no nominal model for a law.
+    own `<position>`. The set-point is clipped to `ctrlrange`, the force to `forcerange`. u is 0 at
+    the goal, so that one bound on |u| reaches equally far to both sides of it. An `input_delay`
+    delays only the set-point. A law has no nominal model of it.
 
     Attributes:
       kp: N m/rad (N/m) at the joint, greater than 0.
@@ -47,6 +47,10 @@ class PositionServo(Actuator):
       ctrlrange: lowest and highest set-point, rad (m) of the joint.
       goal: position at which u is 0, rad (m) of the joint.
       step: the set-point is rounded to multiples of this, rad (m) of the joint; 0: it is not.
+
+    Raises:
+      ScenarioError: `forcerange` does not contain 0 between its ends. In a scenario: another drive
+        of the joint, a Fault other than stuck=True, or a nominal model.
     """
 
     unit = "{x}"
@@ -64,8 +68,8 @@ class PositionServo(Actuator):
         low, high = self.forcerange
         if not low < 0.0 < high:
             raise ScenarioError(
-                f"PositionServo's forcerange is {low:g} to {high:g}, but it pushes both ways: "
-                "give one about 0"
+                f"PositionServo's forcerange is {low:g} to {high:g}, but a servo pushes both "
+                "ways: give a lowest force below 0 and a highest above it"
             )
 
     @property
@@ -75,14 +79,14 @@ class PositionServo(Actuator):
 
     @property
     def bound(self) -> float | None:
-        """The largest |u| that the ctrlrange takes, rad (m); None without one."""
+        """The largest |u| that the ctrlrange allows, rad (m); None without one."""
         low, high = self.ctrlrange
         farthest = max(self.goal - low, high - self.goal)
         return farthest if 0.0 < farthest < math.inf else None
 
     @property
     def stall(self) -> float | None:
-        """The largest force that it gives both ways, N m (N); None: any."""
+        """The largest force that it gives in both directions, N m (N); None if unbounded."""
         low, high = self.forcerange
         least = min(-low, high)
         return least if least < math.inf else None
@@ -100,17 +104,17 @@ class PositionServo(Actuator):
         if len(drives := [part for part in chain if part.drives]) > 1:
             other = next(part for part in drives if part is not self)
             raise ScenarioError(
-                f"a PositionServo takes a set-point itself, and {type(other).__name__} is a drive, "
-                "too: leave that out, or give smc.Channel(motor=True) for an ideal motor instead"
+                f"a PositionServo is a drive of its own, and so is {type(other).__name__}: leave "
+                "that out, or give smc.Channel(motor=True) for an ideal motor instead"
             )
         if s.fault is not None and not s.fault.stuck:
             raise ScenarioError(
-                "a Fault is less force or a bias of it, and u is the set-point of a PositionServo: "
-                "leave fault out, or give stuck=True"
+                "a Fault reduces a force or adds a bias to it, but u is the set-point of a "
+                "PositionServo: leave fault out, or give stuck=True"
             )
         if s.model != "none":
             raise ScenarioError(
-                f"model is {s.model!r}, in which u is a force, and u is the set-point of a "
+                f"model is {s.model!r}, in which u is a force, but u is the set-point of a "
                 "PositionServo: give model='none', or smc.Channel(motor=True)"
             )
 
@@ -144,7 +148,7 @@ numbers_at = record_at(floats(PositionServo.names))
 
 @register_jitable
 def rounded(sim, data, part):
-    """Give MuJoCo's servo the set-point as a multiple of the step, at the start of a step."""
+    """Round the set-point of MuJoCo's servo to a multiple of `step`, at the start of a step."""
     if sim.stage == 0:
         channel = channel_at(sim.channels, part.channel)
         p = numbers_at(part.function.parameters, 0)
