@@ -536,7 +536,7 @@ SEARCH = {"J": 1.5, "rate": 1.5, "least": 1.1}
 VERDICTS = {
     "stands": "by a ratio",
     "below the floor": "the first is below the floor, the second is not",
-    "alone": "the second laws have nothing at this price",
+    "unopposed": "the second laws have no gains at this price",
     "open": "",
     "not ranked": "the floor decides",
     "contradicted": "",
@@ -581,7 +581,7 @@ def verdict(sentence: Sentence, first: dict | None, second: dict | None) -> tupl
     """Return the lead of the first point over the second with its interval, and what it says."""
     none = math.nan, math.nan, math.nan
     if first is None or second is None:
-        return *none, "alone" if first else "contradicted"
+        return *none, "unopposed" if first else "contradicted"
     ours, theirs = values(first), values(second)
     beyond = SEARCH[sentence.price]
     if second["price"] != "least":
@@ -721,9 +721,9 @@ def summary(points: Sequence[dict]) -> Iterator[str]:
 
 SHOWN = (
     Sentence("of super-twisting, without noise", TWISTING, RIVALS, QUIET),
-    Sentence("of super-twisting, with a sensor's noise", TWISTING, RIVALS, NOISY),
+    Sentence("of super-twisting, with sensor noise", TWISTING, RIVALS, NOISY),
     Sentence("of smooth sliding, without noise", SMOOTH, RIVALS, QUIET),
-    Sentence("of smooth sliding, with a sensor's noise", SMOOTH, RIVALS, NOISY),
+    Sentence("of smooth sliding, with sensor noise", SMOOTH, RIVALS, NOISY),
 )
 
 
@@ -731,7 +731,7 @@ def cell(one: Verdict) -> str:
     """Return what a table of the page says of a verdict."""
     first, second = one.laws
     if first == "none" or second == "none":
-        return "not had" if first == "none" else "alone"
+        return "no gains" if first == "none" else "no rival"
     if one.verdict == "not ranked":
         return "not ranked"
     if math.isnan(one.lead):
@@ -766,13 +766,13 @@ def in_words(points: Sequence[dict]) -> tuple[str, str]:
     quiet, noisy, *smooth = counts
     leads = [its["stands"] + its["below the floor"] for its in counts]
     readme = (
-        f"In {noisy['all']} cases with a sensor's noise super-twisting leads the best of its "
-        f"rivals `adrc`, `pd_observer`, `hodob` and `pid` in {leads[1]} and trails it in "
-        f"{noisy['contradicted']}; in {quiet['all']} without noise it leads in {leads[0]} and "
-        f"trails in {quiet['contradicted']}, and in {quiet['not ranked']} errors are below a "
-        "ten-thousandth of the start and not ranked. Smooth first-order sliding leads them in "
-        f"{sum(leads[2:])} of {sum(its['all'] for its in smooth)} cases, with noise and without, "
-        f"and trails in {sum(its['contradicted'] for its in smooth)}."
+        f"In {noisy['all']} cases with sensor noise, super-twisting leads the best of its rivals "
+        f"`adrc`, `pd_observer`, `hodob` and `pid` in {leads[1]} and trails it in "
+        f"{noisy['contradicted']}. In {quiet['all']} cases without noise it leads in {leads[0]} "
+        f"and trails in {quiet['contradicted']}; in {quiet['not ranked']} the errors are below a "
+        "ten-thousandth of the start, or near it, and are not ranked. Smooth first-order sliding "
+        f"leads the best rival in {sum(leads[2:])} of {sum(its['all'] for its in smooth)} cases, "
+        f"with and without noise, and trails in {sum(its['contradicted'] for its in smooth)}."
     )
     admitted = [one.verdict for one in judged(own, SENTENCES[1:2])]
     page = (

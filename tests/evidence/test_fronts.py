@@ -34,7 +34,7 @@ def point(law, error, level=2.0, **fields):
         (0.01, 0.013, "open"),  # another search may find as much
         (0.02, 0.01, "contradicted"),
         (None, 0.01, "contradicted"),  # nothing at this price
-        (0.01, None, "alone"),
+        (0.01, None, "unopposed"),
         (FLOOR / 100, FLOOR / 2, "not ranked"),
         (FLOOR / 100, FLOOR * 2, "below the floor"),
         (FLOOR / 100, FLOOR * 1.3, "not ranked"),  # another search may find it below, too

@@ -167,7 +167,8 @@ def translated(
         what += " with the scenario's Feedforward"
         others = others | compensation.function(compensate, joints)
         law = component.function
-        together = compensation.compensated(law, compensate, joints)  # pyright: ignore[reportArgumentType]
+        assert law is not None  # `writable` refuses it
+        together = compensation.compensated(law, compensate, joints)
         component = dataclasses.replace(component, function=together)
     try:
         slots, code = translate(component, single, joints, others)
