@@ -102,7 +102,7 @@ def bad_by_channel(one):
 def bad_ranges(one):
     wrong = []
     for value in bad(Number(above=one.above, low=one.low)):
-        if isinstance(value, float):
+        if isinstance(value, float) and not (one.infinite and math.isinf(value)):
             wrong.append(value)
     return ["ab", None, 1.0, [1.0], (1.0, 2.0, 3.0), (2.0, 1.0), *((value, 2.0) for value in wrong)]
 

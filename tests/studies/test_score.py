@@ -16,10 +16,10 @@ def failing(y, gains, memory):
 
 
 def cases():
-    rough = smc.hardware.LuGre(0.1, 0.1, 0.1)
+    stops = smc.Stops({"slide": (-3.0, 3.0)})  # which MuJoCo runs
     laws = ("pid", failing(when=0.2), "pid", failing(when=9.0))
-    for law, friction in zip(laws, ((), (), rough, ()), strict=True):
-        yield smc.Scenario(plant="duffing", law=at_defaults(law), duration=0.5, friction=friction)
+    for law, contact in zip(laws, ((), (), stops, ()), strict=True):
+        yield smc.Scenario(plant="duffing", law=at_defaults(law), duration=0.5, contact=contact)
 
 
 def test_a_table_has_the_scores_of_every_run_in_order(monkeypatch):
