@@ -113,7 +113,7 @@ def cases_of(one: Joint) -> list[Case]:
 def law_of(name: str, one: Joint) -> Component:
     """Return a law of the page: `pd` is `pid` without an integral, whose rate has one filter."""
     if name in ("pd", "pid"):
-        return smc.law("pid", tau=0.0, **({"ki": 0.0} if name == "pd" else {}))
+        return smc.law("pid", tau=0.0, ki=0.0) if name == "pd" else smc.law("pid", tau=0.0)
     if name == "super_twisting":
         return smc.law(name, w_max=one.bound)
     return smc.law(name)
@@ -335,7 +335,9 @@ class Told(NamedTuple):
     law: Component
     names: tuple[str, ...]  # of the gains, without tau
 
-    def scenario(self, gains: Sequence[float], case: Case, instance: int, **changes: Any):
+    def scenario(
+        self, gains: Sequence[float] | np.ndarray, case: Case, instance: int, **changes: Any
+    ):
         """Return a run with these gains."""
         law = with_gains(self.law, self.names, [float(value) for value in gains[:-1]])
         rate = smc.estimator("filtered_difference", tau=float(gains[-1]))

@@ -74,9 +74,17 @@ class Joint:
             level = 0.1 * self.bound
             return LuGre(level, 1.5 * level, self.slow, stiffness=1e3 * level / self.start)
         if name == "load":
-            shares = {"km": 0.12, "ke": 0.12, "kms": 0.048, "kes": 0.048}
-            dry = {"kc": 0.03 * self.bound, "kcs": 0.012 * self.bound}
-            return ServoFriction(kv=0.0, vs=self.slow, alpha=2.0, **dry, **shares)
+            return ServoFriction(
+                kv=0.0,
+                kc=0.03 * self.bound,
+                kcs=0.012 * self.bound,
+                km=0.12,
+                ke=0.12,
+                kms=0.048,
+                kes=0.048,
+                vs=self.slow,
+                alpha=2.0,
+            )
         moving, resting = self.levels.get(name, (0.0, 0.0))
         return Stribeck(moving * self.bound, resting * self.bound, self.slow)
 

@@ -139,7 +139,8 @@ def compare(first: Any, second: Any, factor: float = 1.0, levels: Sequence[float
                         about = {"price": "R", "level": level, "task": "sine", "share": share}
                         errors.append(points.best(joint, laws, friction, **about))
                     sides.append(max(errors))
-                yield f"{friction}, R {level:g}", *sides, leads(*sides, factor)
+                ours, theirs = sides
+                yield f"{friction}, R {level:g}", ours, theirs, leads(ours, theirs, factor)
 
     return said
 
