@@ -1,4 +1,4 @@
-"""What a CUDA device makes of own machines, beside the processor, within ten minutes.
+"""What a CUDA device makes of machines of your own, against the processor, in ten minutes.
 
     python benchmarks/card.py            # or "no device": make gpu
     python benchmarks/card.py --write    # also benchmarks/card.json, and the table of docs/gpu.md
@@ -6,7 +6,7 @@
 Measured are: whether a step is captured as one graph; the time of a step of MuJoCo Warp by the
 number of worlds, with and without the control callback; runs of a Panda of 3 s a second, beside all
 threads of this machine; whether contacts fit, and how far scores are from MuJoCo's; and a wide
-search of gains beside `smc.tune`. A part that fails is told, and the others go on.
+search of gains against `smc.tune`. A part that fails is reported, and the others go on.
 """
 
 import datetime
@@ -70,11 +70,11 @@ ROWS = {
     "a step of 1 / 1,000 / 32,768 / 262,144 worlds of a two-joint arm, ms": "arm",
     "the same of a Panda with its limits, ms": "panda",
     "share of the control callback in the last": "callback",
-    "own machine: runs of a Panda of 3 s a second, card": "card_runs",
-    "the same in all threads of that machine": "thread_runs",
-    "scores of an arm at a wall apart, 10 s, largest": "wall_apart",
-    "of these 64 runs, failed on the card": "wall_failed",
-    "J of gains of a wide search over those of smc.tune, and its time over tune's": "wide",
+    "runs of a Panda, 3 s each, per second on the card": "card_runs",
+    "the same in all threads of that machine's processor": "thread_runs",
+    "largest relative error of scores, 64 runs of an arm at a wall, 10 s": "wall_apart",
+    "of these runs, failed on the card": "wall_failed",
+    "J of a wide search's gains over J of smc.tune's, and its time over tune's": "wide",
 }
 
 
@@ -147,7 +147,7 @@ def times_of_steps() -> dict[str, Any]:
 
 
 def pandas() -> dict[str, Any]:
-    """Runs a second, on the card and in all threads, and how far apart their scores are."""
+    """Runs a second, on the card and in all threads of the processor."""
     group = group_of(smc.plant("panda"), 3.0)
     rows = rows_of(group, PANDAS)
     taken = seconds(lambda: group.run(rows))

@@ -89,7 +89,7 @@ def halved(scenario: Scenario) -> Scenario:
 
 def doubled(scenario: Scenario) -> Scenario:
     """Return the same scenario at twice its physics step, if it runs under RK4 and that fits its
-    control period, delay and clock; else itself. Stable poles stay so, by the rule of the step.
+    control period, delay and clock; else itself. Stable poles stay stable, by the rule of the step.
     """
     step = 2.0 * scenario.resolved.physics_step
     if scenario.resolved.integrator != "RK4" or step > scenario.control_period:

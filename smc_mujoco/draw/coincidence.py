@@ -10,7 +10,7 @@ from smc_mujoco.common.aliases import Fields, Pair
 from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
 
-MIN_WORDS = 4.0  # of a panel's height, in heights of letters, from which on it has room for words
+MIN_WORDS = 4.0  # least height of a panel that has room for words, in heights of letters
 # of a panel's height, below the width of a line: curves no farther apart agree
 COINCIDENT_DISTANCE = 0.01
 # of agreeing curves' samples, so that controls that switch a sample apart agree; chosen

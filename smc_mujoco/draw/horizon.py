@@ -1,4 +1,4 @@
-"""Which part of the runs a figure shows: until all rest, or from a time on."""
+"""Which part of the runs a figure shows: until all are at rest, or from a time on."""
 
 import dataclasses
 from collections.abc import Sequence

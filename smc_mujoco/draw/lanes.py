@@ -20,7 +20,7 @@ from smc_mujoco.metrics.conventions import (
 from smc_mujoco.simulation.trace import Trace
 
 MIN_WIDE_BAND = 0.2  # mean height of a wide band, of a panel's; chosen
-MAX_BANDS = 1  # that share a row; chosen
+MAX_BANDS = 1  # wide bands that share a row; chosen
 LANE_BAND = 0.45  # opacity of a band in a row of its own, below a film
 LANE_GAP = 0.25  # letters between a row, and how far u swings
 END_SHARE = 0.1  # of the run: its end, over which a row says how far u swings
@@ -118,8 +118,8 @@ def settled(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Artist]:
 
 
 def tell_swing(lane: Axes, trace: Trace, colour: str) -> None:
-    """Say beside a row how far u swings at the end of the run, with a bar; "smooth" if it does
-    not.
+    """Write beside a row how far u swings at the end of the run, with a bar; "smooth" if it does
+    not swing.
     """
     low, high = lane.get_ylim()
     for swings in lane.collections:

@@ -26,10 +26,14 @@ def pairs_figure(
     title: str,
     path: AnyPath,
 ) -> list[Path]:
-    """Write PATH.svg and PATH.png, or PATH.pdf.
+    """Write PATH.svg and PATH.png, or PATH.pdf, and return the paths.
 
-    `pairs`: speeds and torques, (K,) each. `forces`: model -> its friction. `taken`: one of the
-    models, whose friction has this standard `error`. `title`: of the panel.
+    Args:
+      pairs: speeds and torques, (K,) each.
+      forces: model -> its friction.
+      taken: the model that is taken.
+      error: the standard error of its friction.
+      title: of the panel.
     """
     paths = pages.files(path)
     v, torque = pairs

@@ -73,7 +73,7 @@ class FrictionFit:
         return _columns(terms, v, speed) @ values
 
     def force_error(self, v: Array) -> Array:
-        """Return the standard error of the friction at speeds v, (K,), at first order."""
+        """Return the standard error of the friction at speeds v, (K,), N m (N), at first order."""
         slopes = _slopes(v, *self._values)
         return np.sqrt(np.maximum(np.einsum("kp,pq,kq->k", slopes, self.covariance, slopes), 0.0))
 
@@ -144,8 +144,8 @@ class FrictionFound:
         return number_text.save_condition(file, str(self), self.condition())
 
     def figure(self, path: AnyPath) -> list[Path]:
-        """Draw the pairs, the friction that is taken with its error, and the other models, as
-        PATH.svg and PATH.png.
+        """Draw the pairs, the friction that is taken with two standard errors, and the other
+        models, as PATH.svg and PATH.png, or PATH.pdf. Return the paths.
         """
         from smc_mujoco.identification.pairs_figure import pairs_figure
 
@@ -202,7 +202,11 @@ def identify_friction(speed: Any, torque: Any, held_out: Any = None) -> Friction
 
 
 def read_pairs(path: AnyPath, columns: Mapping[str, str] | None = None) -> Pairs:
-    """Return the columns speed and torque of a CSV or npz file. `columns`: our name -> the file's.
+    """Return the columns speed and torque of a CSV or npz file, (K,) each.
+
+    Args:
+      path: of the file.
+      columns: our name of a column -> the file's.
 
     Raises:
       ScenarioError: the file has no such column.

@@ -43,10 +43,10 @@ project:
 - at rest: |v| <= 0.1 % of the group's largest |v|, or 1e-5 rad/s or m/s if that is larger. Joints
   held by Coulomb friction or contacts creep at 1e-6 or less. With LuGre friction they move as the
   bristles bend; there a joint sticks while these carry less than 99 % of what slides at its speed.
-- slip: a sample in whose control period friction held a joint at no time, after one in which it
-  did. It holds for the time that `held` of a trace says. Without it, that is a control period at
-  both ends of which the joint is at rest, with a reaction.
-- after a turn: the 0.15 s after the sample from which r moves back, also after a rest.
+- slip: a control period in which friction never held a joint, after one in which it did. `held` of
+  a trace says for how long it held. Where a trace has none, friction held for a control period if
+  the joint is at rest at both its ends, with a reaction.
+- after a turn: the 0.15 s after the sample from which r moves back, even if it rested between.
 - channels: errors and efforts that are integrals over time are summed over the group's channels;
   every other metric takes its worst channel, so that it does not grow with n.
 - commands are held between samples; states are not, their integrals use the trapezoid rule.

@@ -315,8 +315,8 @@ def unseen(
     """Return J of laws on unseen instances, and of one instance in four at half the physics step,
     NaN elsewhere, (laws,) s^2.
 
-    Runs under RK4 have twice the step of a scenario here, where they may, and so the step of a
-    scenario in that one of four: J moves by some thousandths, for half of the time.
+    Runs under RK4 have twice the usual physics step here, where that fits, and the usual one in
+    that one of four. J moves by some thousandths, for half of the time.
     """
     (first,) = trial.seeds(1)
     instances = [first + k for k in numbers]

@@ -225,7 +225,7 @@ class DryFriction(Part):
 @frozen_data
 class Bristles(Part):
     """The force of LuGre's bristles, as MuJoCo's `dcmotor` exerts it under implicitfast: the bend z
-    is that of v held over the step, and the force is that of z and v at its start.
+    follows from v, held over the step, and the force from z and v at the step's start.
     """
 
     names = "coulomb", "static", "stribeck", "stiffness", "damping"
