@@ -164,6 +164,7 @@ def translated(
         others = body.functions(plant)
     what = f"{component.kind} {component.name!r}"
     if compensate:
+        assert component.function is not None  # see `writable`
         what += " with the scenario's Feedforward"
         others = others | compensation.function(compensate, joints)
         law = component.function
