@@ -65,7 +65,9 @@ def advise(
     least = {}
     for law, found in settled.items():
         least[law] = min(n / of for n, of in found.values())
-    order = sorted(chosen, key=lambda law: least[law] < RELIABLE)
+    # where sets name no winner, the one that runs name comes first
+    better = fixed.winners[0] if fixed and not raced.winner else None
+    order = sorted(chosen, key=lambda law: (least[law] < RELIABLE, law != better))
     boards = leaderboard(table, metrics, defaults=True, relevant=relevant)
     if not boards:
         raise ScenarioError(f"no need has a number in any run on {plant.name}: ask for others")
