@@ -3,8 +3,9 @@ benchmarks/friction.py, and its figure.
 
     python -m benchmarks.friction_sentences benchmarks/friction.json --figure friction.svg
 
-A lead counts if it is beyond what another search may find, SEARCH, and is contradicted if the other
-side leads by as much; else it is open. Below one count of the encoder nothing is ranked.
+A lead counts if it is larger than another search may change it, SEARCH. A sentence is contradicted
+if the other side leads by as much, and else it is open. Below one count of the encoder nothing is
+ranked.
 """
 
 import argparse
@@ -178,8 +179,8 @@ def counts(verdicts: Sequence[Verdict]) -> dict[str, dict[str, int]]:
 
 
 def agreement(points: Sequence[dict]) -> np.ndarray:
-    """Return MuJoCo's median error over the engine's on the same instances, of each point of more
-    than a count that both ran.
+    """Return MuJoCo's median error over the engine's on the same instances, for each point above a
+    count that both ran.
     """
     found = []
     for point in points:
@@ -265,8 +266,8 @@ def verdict_rows(points: Sequence[dict], draw: str) -> Iterator[str]:
 
 
 def search_noise(points: Sequence[dict]) -> np.ndarray:
-    """Return how many times the error that one search chose is that of the other, where either is
-    more than a count; inf where one has none.
+    """Return the larger over the smaller of the errors that two searches chose, where either is
+    more than a count; inf where one search found no set.
     """
     found = []
     for point in points:

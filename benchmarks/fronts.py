@@ -6,31 +6,32 @@
     python benchmarks/fronts.py van_der_pol --lot 12345678 --keep lot.json
     python benchmarks/fronts.py --read two.json lot.json     # the sentences of the page, judged
 
-A law has as many accuracies as it has gains, so two laws are compared at one price. There are two.
-J is what gains are tuned for: ITAE and variation of the command in seven conditions of 5 s. Its
-share of noise ends where the command jumps from bound to bound at every sample. So the rate of
-variation in calm, with a sensor's noise of 1e-3 of the start, stands beside it, and still rises
-for another decade of slope. Each plant is run at control periods of 1 and 5 ms.
+The accuracy of a law depends on its gains, so two laws are compared at one price. There are two. J
+is what gains are tuned for: ITAE and variation of the command in seven conditions of 5 s. Its share
+of noise saturates where the command jumps from bound to bound at every sample. So the rate of
+variation in calm, with sensor noise of 1e-3 of the start, stands beside it, and still rises for
+another decade of slope. Each plant is run at control periods of 1 and 5 ms.
 
 Half of a law's sets of gains are drawn over the box of a search and half a decade beyond it, a
 decade for the widths of slopes and the bandwidths of observers. The other half are bred from the
-fronts of the first. The input gain that an implicit law assumes is searched, too. Sets are chosen
-on one instance. All that is told of them comes from twelve others, with other starts, phases and
-noise. A set that misses a condition of its theorem is drawn again, and a chosen gain at the edge
-of where it was drawn is named. The error is the rms of the true position over whole periods, of 2 s
-or one period at least, as a share of the start. A set whose error in the window before differs by
-more than 25 % has not settled, and is not chosen. The load is a sixth of the bound on u, and its
-frequency counts by the bandwidth wc of the tuned ADRC.
+fronts of the first. The input gain that an implicit law assumes is searched as well. Sets are
+chosen on one instance. All results come from twelve others, with other starts, phases and noise.
 
-A lead is the ratio of two errors, with the interval of that ratio, and a sentence of the page
-stands at a price if the interval agrees and the lead is beyond what another search would find. It
+A set that misses a condition of its theorem is drawn again, and a chosen gain at the edge of where
+it was drawn is named. The error is the rms of the true position over whole periods, of 2 s or one
+period at least, as a share of the start. A set whose error in the window before differs by more
+than 25 % has not settled, and is not chosen. The load is a sixth of the bound on u, and its
+frequency is given in units of wc, the bandwidth of the tuned ADRC.
+
+A lead is the ratio of two errors, with the interval of that ratio. A sentence of the page stands at
+a price if the whole interval is above 1 and the lead is beyond what another search would find. It
 is contradicted if both say the reverse, and else open. Errors below a ten-thousandth of the start
-are not ranked: if both are, nothing is said; if one is, it is said which, and no ratio. With --lot,
-loads, prices, phases, starts and noise are drawn.
+are not ranked. If both are below it, nothing is said; if one is, that is said, without a ratio.
+With --lot, loads, prices, phases, starts and noise are drawn.
 
-Runs are by the suite's fast engine, and MuJoCo runs each point that a sentence rests on, too,
-unless a lot drew it. A plant that is
-more than one equation is run by MuJoCo alone, with 40 sets a law and fewer conditions.
+The fast engine runs everything. MuJoCo also runs each point that a sentence rests on, unless a lot
+drew it. A plant of more than one equation is run by MuJoCo alone, with 40 sets a law and fewer
+conditions.
 """
 
 import argparse

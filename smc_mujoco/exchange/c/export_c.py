@@ -46,8 +46,8 @@ def law_to_c(
     Args:
       law: a Law, its Template, or its text, see `law`; or a Scenario, which then gives the number
         of joints, what the law knows of its plant, of a free body the function that gives its
-        actuators their commands, and its Feedforward: u then has the compensation, with error=0,
-        and smc_compensation is what was added.
+        actuators their commands, and its Feedforward: u then includes the compensation, with
+        error=0, and smc_compensation gives it alone.
       numbers: "double", "float", or, only for the paper's law observer_free, "q15": words of 16
         bits.
       joints: the number of joints for which a law of many joints is written. Default: the number of
