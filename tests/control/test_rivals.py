@@ -192,7 +192,7 @@ def test_pd_observer_is_incremental_dynamic_inversion():
         last = de
 
 
-# PD with an observer of second order
+# PD with a second-order observer
 
 
 def loop_of_hodob(wc, l, g, h):

@@ -186,7 +186,7 @@ def test_what_servo_true_does_not_take_is_said(case):
 BESIDE = {
     "nominal": ({"model": "nominal"}, "give model='none'"),
     "of_model": ({"law": "mpc"}, "give model=.none."),
-    "lag": ({"actuator": smc.Lag(0.01)}, "Lag is a drive"),
+    "lag": ({"actuator": smc.Lag(0.01)}, "so is Lag: leave that out"),
     "motor": ({"actuator": smc.DCMotor()}, "DCMotor, and the joint keeps the PositionServo"),
     "fault": ({"fault": smc.Fault(at=1.0, gain=0.5)}, "stuck=True"),
 }
