@@ -45,13 +45,15 @@ def score(
       runs: a Trace; or any number of scenarios, also from a generator.
       metrics: their names; default: every one of a Trace, and settling_time and itae of scenarios.
       device: of those scenarios that the fast engine can run, "cpu" or "cuda". On "cuda" MuJoCo
-        Warp runs those of your own machines, 256 of one model or more. MuJoCo runs the others.
+        Warp runs those of your own machines, if 256 or more are of one model. MuJoCo runs the
+        others.
       threads: as in `run`.
 
     Returns:
       Of a trace name -> value. Of scenarios a Table, a row a scenario: the metrics are null where a
-      run failed, and `diverged_at` is its time, s. MuJoCo repeats 20 of the others' runs; the
-      Table says how far apart their scores are, and why a card could not run some.
+      run failed, and `diverged_at` is its time, s. MuJoCo repeats 20 runs that it did
+      not make itself; the Table says how far apart the scores are, and why a card could not run
+      some.
 
     Raises:
       ScenarioError: the trace diverged, failed or holds NaN; not a scenario, an unknown metric, or
