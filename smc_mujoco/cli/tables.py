@@ -196,14 +196,16 @@ def answers(
     """Return a table for each metric that applies, or one table of them all if there is only one
     condition.
     """
-    plants = {}
+    scenarios = {}
     for runs in traces.values():
         for trace in runs.values():
-            plants[trace.scenario.plant, trace.scenario.efforts[0]] = None
+            scenarios[trace.scenario.plant, trace.scenario.efforts] = trace.scenario
     columns = {}
     for metric in map(CATALOGUE.__getitem__, names):
-        if not all(metric.refusal(plant) for plant, _ in plants):
-            units = dict.fromkeys(metric.unit_for(plant.unit, effort) for plant, effort in plants)
+        if not all(map(metric.refusal, scenarios.values())):
+            units = {}
+            for plant, efforts in scenarios:
+                units[metric.unit_for(plant.unit, efforts[0])] = None
             columns[f"{metric.name} ({' or '.join(units)})"] = [
                 (condition, metric, runs, (again or {}).get(condition, {}))
                 for condition, runs in traces.items()
@@ -235,7 +237,7 @@ def _cell(metric: Metric, trace: Trace | None, again: Sequence[Trace] = ()) -> T
     """Return a metric of a run as text; "" if there is no run, or if the metric does not apply to
     its plant.
     """
-    if trace is None or metric.refusal(trace.scenario.plant):
+    if trace is None or metric.refusal(trace.scenario):
         return ""
     runs = (trace, *again)
     values = [None if run.diverged_at is not None else metric.of(run) for run in runs]

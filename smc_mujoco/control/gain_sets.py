@@ -218,7 +218,8 @@ def tuned(plant: str | Plant, name: str, gains: str = "tuned") -> TunedGains:
     find_law(name)  # raises if there is none
     raise ScenarioError(
         f"no gains in set {gains!r} for {name} on {plant.name}: give the law's gains yourself, "
-        "tune them (smc-mujoco tune), or take the defaults (--gains default)"
+        "tune them (smc-mujoco tune), or take the defaults (--gains default; in Python "
+        f"smc.law({name!r}))"
     )
 
 

@@ -218,6 +218,8 @@ def _blocks(runs: DrawnRuns, chosen: Sequence[str]) -> Blocks:
     left_out = ""
     if "channels" in chosen:
         worst = drawing.worst_first(early)
+        if len(worst) <= MAX_WORST:  # all have a place, as in the model
+            worst.sort(key=lambda panel: panel.group.channels)
         left += worst[:MAX_WORST]
         right += _controls(left, early)
         if right and len(worst) > MAX_WORST:

@@ -172,7 +172,11 @@ def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
             wanted = panel.group.driven and len(panel.group.channels) > 1
         else:
             wanted = panel.group.driven
-        if wanted:
+        if not wanted:
+            continue
+        if quantity in ("u", "applied") and not panel.group.effort:
+            kept += by_channel(panel)
+        else:
             kept.append(panel)
     return kept
 
@@ -205,7 +209,8 @@ def by_channel(panel: Panel) -> list[Panel]:
     for place, channel in enumerate(i for i in panel.group.channels if i in scored):
         within = dataclasses.replace(panel.group, channels=(place,))
         traces = [group_trace(trace, within) for trace in panel.traces]
-        group = dataclasses.replace(panel.group, channels=(channel,))
+        effort = panel.traces[0].scenario.efforts[channel]
+        group = dataclasses.replace(panel.group, channels=(channel,), effort=effort)
         panels.append(Panel(panel.quantity, group, traces, channel))
     return panels
 
@@ -244,7 +249,10 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
         place = Panel("x", *each)
         many = len(place.group.channels) > 1
         if place.group.driven:
-            controls.append(place._replace(quantity="largest" if many and plant.direct else "u"))
+            control = place._replace(quantity="largest" if many and plant.direct else "u")
+            controls += (
+                [control] if place.group.effort else by_channel(place._replace(quantity="u"))
+            )
         if many and plant.direct and plant.n == plant.driven == 2:
             motions += by_channel(place)
         elif place.group.driven or not many:

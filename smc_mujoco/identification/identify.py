@@ -59,8 +59,8 @@ PIECE_STEPS = 12  # of the search for the starts of pieces of a log that was not
 Log = Source | AnyPath  # also a data frame
 Count = Annotated[int, Whole(low=1, high=1000)]
 SLOW = (
-    "the residuals are slow, as where a force was not recorded: true errors may be several "
-    "standard errors"
+    "the residuals are slow, for example by a force that was not recorded, a softness, or a log "
+    "whose u is late: true errors may be several standard errors"
 )
 LEFT = (
     "a whole log is left in an open loop, as an arm under gravity leaves it however good its "

@@ -237,8 +237,12 @@ def own_rig(given: Plant | Scenario, names: Sequence[str]) -> OwnRig:
     """Return the rig of a plant or a scenario whose quantities are the named paths, one or more."""
     base = given if isinstance(given, Scenario) else Scenario.recorded(plant=given, law="none")
     if not names:
-        known = ", ".join(known_paths(base))
-        raise ScenarioError(f"{base.plant.name} has no numbers to find: name some, of {known}")
+        known = list(known_paths(base))
+        example = next((path for path in known if "." in path), known[0])
+        raise ScenarioError(
+            f"{base.plant.name} has no numbers to find: name some with --for, in Python names, "
+            f"such as {example!r}; there are {', '.join(known)}"
+        )
     paths = resolved(base, names)
     ends = column_ends(base.plant)
     inputs = tuple(f"u{end}" for end in ends[: base.plant.driven])

@@ -120,7 +120,10 @@ class FrictionFound:
         """A sentence if no model explains half of the variation of torque; else ""."""
         if self.best.r2 >= MIN_R2:
             return ""
-        return f"no friction in it: {self.best.model} explains {self.best.r2:.2f} of the variation"
+        share = f"{self.best.r2:.2f} of the variation"
+        if self.best.r2 < 0.005:
+            share = "nothing of the variation"
+        return f"no friction in it: {self.best.model} explains {share}"
 
     def condition(self, name: str = "identified") -> Condition:
         """Return a condition with this friction, for `compare`, `which`, `tune`, `grid`."""

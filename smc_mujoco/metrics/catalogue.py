@@ -38,6 +38,7 @@ from smc_mujoco.metrics.fold import Fold
 
 if TYPE_CHECKING:
     from smc_mujoco.mechanisms.plant import Plant
+    from smc_mujoco.simulation.scenario import Scenario
     from smc_mujoco.simulation.trace import Trace
 
 # rows that tuning and problems read, too
@@ -54,12 +55,12 @@ def metrics() -> tuple[Metric, ...]:
     return tuple(CATALOGUE.values())
 
 
-def metric_of(plant: Plant, name: object) -> Metric:
+def metric_of(machine: Plant | Scenario, name: object) -> Metric:
     """Return the metric of a name. Raise ScenarioError if there is none, or if it has no single
-    value for the plant.
+    value for the plant, or for the scenario.
     """
     found = find("metric", name, CATALOGUE)
-    if why := found.refusal(plant):
+    if why := found.refusal(machine):
         raise ScenarioError(why)
     return found
 
@@ -91,7 +92,7 @@ def score(trace: Trace) -> dict[str, float]:
     traces = conventions.by_group(trace)
     found = MetricValues()
     for m in metrics():
-        if not m.refusal(trace.scenario.plant):
+        if not m.refusal(trace.scenario):
             found[m.name] = m.worst(traces)
     return found
 
@@ -154,7 +155,7 @@ def trends(trace: Trace) -> dict[str, float]:
     whole = conventions.by_group(trace)
     found = {}
     for m in metrics():
-        if m.late and not m.refusal(trace.scenario.plant):
+        if m.late and not m.refusal(trace.scenario):
             now = m.worst(whole)
             before = m.worst(earlier)
             if now > 0.0 and before > 0.0:

@@ -67,7 +67,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, has, shown
-from smc_mujoco.common.text import first_paragraph, number
+from smc_mujoco.common.text import first_paragraph, joined, number
 from smc_mujoco.mechanisms.custom.scales import falls
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics.fold import Fold, first_sample
@@ -100,7 +100,7 @@ class ChannelGroup:
 
     name: str  # "driven" or "free"; "driven rad" if several groups are driven
     unit: str  # of their x, "rad" or "m"
-    effort: str  # unit of their u: "N m", "N" or "V"
+    effort: str  # unit of their u: "N m", "N" or "V"; "" if they differ in it
     driven: bool  # whether they have actuators
     channels: tuple[int, ...]  # their indices, ascending
 
@@ -121,7 +121,8 @@ def groups(machine: Plant | Scenario) -> tuple[ChannelGroup, ...]:
         name = "driven" if driven else "free"
         if kinds.count(driven) > 1:
             name += f" {unit}"
-        effort = machine.efforts[channels[0]]
+        efforts = {machine.efforts[i] for i in channels}
+        effort = efforts.pop() if len(efforts) == 1 else ""
         found.append(
             ChannelGroup(
                 name=name, unit=unit + rate, effort=effort, driven=driven, channels=tuple(channels)
@@ -189,9 +190,18 @@ class Metric:
     absent: float = math.nan
     fold: Fold | None = None  # its row, if it takes one sample after the other
 
-    def refusal(self, plant: Plant) -> str:
-        """Return why the metric has no single value for the plant, or ""."""
-        driven = [group for group in groups(plant) if group.driven]
+    def refusal(self, machine: Plant | Scenario) -> str:
+        """Return why the metric has no single value for a plant, or for a scenario with its
+        actuators; or "".
+        """
+        plant = machine if isinstance(machine, Plant) else machine.plant
+        driven = [group for group in groups(machine) if group.driven]
+        if "{u}" in self.unit and not all(group.effort for group in driven):
+            efforts = joined(dict.fromkeys(machine.efforts[: plant.driven]))
+            return (
+                f"{self.name} has no one value where u is in {efforts}, as in {plant.name}: take a "
+                "metric of the error, or smc.metrics.joint_scores for each joint by itself"
+            )
         if not any(map(self.applies_to, driven)):
             return (
                 f"{self.name} compares channels and {plant.name} has one of a kind: give a "
@@ -230,6 +240,8 @@ class Metric:
 
     def applies_to(self, group: ChannelGroup) -> bool:
         """Return whether the metric applies to a group by itself."""
+        if "{u}" in self.unit and not group.effort:
+            return False
         return (group.driven or not self.command) and (len(group.channels) > 1 or not self.network)
 
     def text(self, value: float) -> str:
@@ -290,7 +302,7 @@ def metric(
         @functools.wraps(formula)
         def checked(trace: Trace) -> float:
             refuse(trace)
-            if why := entry.refusal(trace.scenario.plant):
+            if why := entry.refusal(trace.scenario):
                 raise ScenarioError(why)
             return entry.of(trace)
 

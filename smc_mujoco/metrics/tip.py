@@ -263,7 +263,8 @@ def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
     names = channel_names(trace.scenario.plant)
     for group in groups(trace.scenario):
         for i in group.channels:
-            joint = dataclasses.replace(group, channels=(i,))
+            effort = trace.scenario.efforts[i]
+            joint = dataclasses.replace(group, channels=(i,), effort=effort)
             part = group_trace(trace, joint)
             power = np.abs(trace.force[:, i] * trace.v[:, i])
             found = {}

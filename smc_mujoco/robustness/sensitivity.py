@@ -235,7 +235,7 @@ def sensitivity(
             f"sensitivity is of a Scenario, not {shown(scenario)}: give smc.Scenario(...)"
         )
     within = _checked_class(within, scenario)
-    entry = metric_of(scenario.plant, metric)
+    entry = metric_of(scenario, metric)
     space = Space(scenario, within)
     points = _checked_points(points, space)
     design = designs(points, len(space.names), seed)

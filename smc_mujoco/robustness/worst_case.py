@@ -233,7 +233,7 @@ def worst_case(
     scenarios = _listed(scenario)
     scenario = scenarios[0]
     within = _checked_class(scenario, within)
-    entry = metric_of(scenario.plant, metric)
+    entry = metric_of(scenario, metric)
     if budget is None:
         budget = default_budget(scenario, within)
     members = Members(scenarios, within)

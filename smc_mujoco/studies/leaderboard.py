@@ -95,6 +95,11 @@ def leaderboard(
     for each in ranked:
         for scenario in filter(None, each.ran):
             words += scenario.drive_train.words
+        defaults_ran = any(
+            source.kind == DEFAULT for its in each.sources.values() for source in its
+        )
+        if words and defaults_ran:
+            words.append("Default gains are for a force: tune them for this u first.")
     boards.commands = [*dict.fromkeys(words)]
     by_metric = {}
     for metric in dict.fromkeys(metrics):

@@ -78,7 +78,10 @@ def score(
     while chunk := list(itertools.islice(left, CHUNK)):
         for case in chunk:
             if not isinstance(case, Scenario):
-                raise ScenarioError(f"cannot score {shown(case)}: give one Trace, or scenarios")
+                raise ScenarioError(
+                    f"cannot score {shown(case)}: give one Trace, or scenarios; score a list of "
+                    "traces one at a time"
+                )
         rows = []
         for case, (values, failed) in zip(chunk, scored.scored(chunk), strict=True):
             numbers = [value if failed is None else None for value in values]

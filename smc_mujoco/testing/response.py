@@ -111,7 +111,7 @@ class StepResponse:
     def _no_metric(self, name: str) -> ScenarioError:
         """Return the error for a metric that does not exist, or that the plant does not have."""
         if name in CATALOGUE:
-            return ScenarioError(CATALOGUE[name].refusal(self.scenario.plant))
+            return ScenarioError(CATALOGUE[name].refusal(self.scenario))
         return unknown("metric", name, CATALOGUE)
 
     def _label(self, group: str, metric: str) -> str:

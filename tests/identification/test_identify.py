@@ -194,7 +194,11 @@ def test_parameters_that_cannot_be_told_apart_are_named(swung):
         ("axis", ["mass", "mass"], "quantities have mass 2 times"),
         ("axis", [], "axis has no quantities to find"),
         (FIXED, None, "fixed has no quantities to find"),
-        ("servo_axis", None, "servo_axis has no numbers to find: name some, of M, b, cf, offset"),
+        (
+            "servo_axis",
+            None,
+            "servo_axis has no numbers to find: name some with --for.* M, b, cf, offset",
+        ),
         (3, None, "cannot identify 3: give a plant"),
     ],
 )

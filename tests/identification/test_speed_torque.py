@@ -95,6 +95,7 @@ def test_pairs_without_friction_are_told(refused):
     found = smc.identify_friction(SPEED, random.standard_normal(len(T)))
     assert found.best.r2 < 0.5
     assert "no friction in it" in str(found)
+    assert "explains nothing of the variation" in str(found)
     refused(lambda: found.part, "no friction in it", "gravity")
 
 

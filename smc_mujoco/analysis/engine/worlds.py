@@ -37,7 +37,7 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cuda
     }
     for name in metrics:
         beyond[f"{name} needs to know when friction holds a joint, as a trace does"] = holds(name)
-        if refusal := name in CATALOGUE and CATALOGUE[name].refusal(plant):
+        if refusal := name in CATALOGUE and CATALOGUE[name].refusal(s):
             beyond[refusal] = True
     return first_of(beyond) or why_not_sampled(s, metrics, device)
 

@@ -64,6 +64,13 @@ class ModelSource:
 
     @property
     def label(self) -> str:
+        """The file's name; for a text, words with the name that the model gives itself."""
+        if self.path:
+            return Path(self.path).name
+        return f"the text of model {self.name.removesuffix('.xml')!r}"
+
+    @property
+    def name(self) -> str:
         """The file's name; for a text, the name that the model gives itself, as a file's name."""
         if self.path:
             return Path(self.path).name
@@ -98,7 +105,7 @@ class ModelSource:
             else:
                 spec = mujoco.MjSpec.from_file(self.path)
         except ValueError as error:
-            raise broken(self.path or self.label, str(error)) from None
+            raise broken(self.path or self.label, str(error), self.path) from None
         taken = {joint.name for joint in spec.joints}
         for joint in spec.joints:
             if (
@@ -114,7 +121,7 @@ class ModelSource:
         try:
             return mjcb.compiled(spec, _built)
         except ValueError as error:
-            raise broken(self.path or self.label, str(error)) from None
+            raise broken(self.path or self.label, str(error), self.path) from None
 
 
 @functools.lru_cache(maxsize=MAX_KEPT)
@@ -226,7 +233,7 @@ def _of_spec(spec: mujoco.MjSpec) -> ModelSource:
         model = mjcb.compiled(copied)
         text = _full_precision_xml(copied)
     except (ValueError, mujoco.FatalError) as error:
-        raise broken("the MjSpec", str(error)) from None
+        raise broken("the MjSpec", str(error), "") from None
     made = _of_text(text, _assets(spec, text))
     if lost := _difference(model, made.compiled(made.spec())):
         raise ScenarioError(
@@ -289,15 +296,15 @@ def fields(model: mujoco.MjModel) -> list[str]:
     return [name for name in names if isinstance(getattr(model, name), np.ndarray)]
 
 
-def broken(where: str, error: str) -> ScenarioError:
-    """Return the error for MuJoCo's message about a model."""
+def broken(where: str, error: str, path: str) -> ScenarioError:
+    """Return the error for MuJoCo's message about a model; path is that of its file, if any."""
     cure = next((CURES[words] for words in CURES if words in error), "")
-    for file in sorted(Path(where).parent.glob("*.xml")):
-        if not cure and any(part.get("file") == Path(where).name for part in _elements(file)):
+    for file in sorted(Path(path).parent.glob("*.xml")) if path else ():
+        if not cure and any(part.get("file") == Path(path).name for part in _elements(file)):
             cure = f"give {file.name}, which includes it, or fix the file"
     if not cure:
-        cure = "fix the file"
-        if any(words in error for words in OF_A_PART):
+        cure = "fix the file" if path else "fix it"
+        if path and any(words in error for words in OF_A_PART):
             cure += ", or give the one that includes it"
     return ScenarioError(f"MuJoCo cannot read {where} ({' '.join(error.split())}): {cure}")
 

@@ -220,7 +220,7 @@ def _plant(
     seen = own.measured_joints(label, model, pairs, measured)
     joints = [*joints_of(pairs), *seen]
     _check_names(label, model, keyframe, tip)
-    plant_name = _name(label) if name is None else name
+    plant_name = _name(source.name) if name is None else name
     units, special = _places(plant_name, model, joints, pairs, keyframe)
     if tip and special.get("base", -1) >= 0:
         raise ScenarioError(f"the base of {label} is measured: leave the tip out")

@@ -209,6 +209,11 @@ class DCMotor(Actuator):
         return "V" if self.by_voltage else ""
 
     @property
+    def meaning(self) -> str:
+        """What u is, in words, if it is the voltage."""
+        return "the voltage of its motor, in V" if self.by_voltage else ""
+
+    @property
     def nominal(self) -> NominalDrive:
         """Torque per unit of u and of velocity, N m/V and N m s/rad, if u is the voltage; else u is
         the torque.

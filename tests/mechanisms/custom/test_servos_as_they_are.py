@@ -9,6 +9,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine.group import why_not
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.draw import panels
 from smc_mujoco.hardware import PositionServo, RateLimit
 from smc_mujoco.mechanisms.named import from_text
 from smc_mujoco.metrics.tip import knows_contacts
@@ -323,7 +324,9 @@ def test_gains_tables_figures_and_files_have_the_unit_of_the_set_point(tmp_path)
         smc.grid(plant, [smc.law("pid")], "nominal", seeds=2, duration=0.1), tmp_path / "runs"
     )
     said = "u of 'j' of hobby is the set-point of its servo, in rad from its goal at 0."
-    assert said in str(smc.leaderboard(table, ["tv_rate"])).replace("\n", " ")
+    printed = str(smc.leaderboard(table, ["tv_rate"])).replace("\n", " ")
+    assert said in printed
+    assert "Default gains are for a force: tune them for this u first." in printed
 
 
 def test_sizes_of_conditions_and_blows_follow_from_the_servo_s_force():
@@ -353,3 +356,46 @@ def test_the_fast_engine_says_what_of_a_servo_it_cannot():
 def test_a_comparison_leaves_out_the_conditions_with_another_drive():
     left = applicable(["nominal", "dc_motor", "lag_20ms", "fault", "backlash"], [servo(BARE)], 1.0)
     assert left == ["nominal", "backlash"]
+
+
+def test_a_voltage_beside_a_set_point_is_never_pooled_with_it():
+    """A figure has the unit of each channel, and a metric of u has no one value."""
+    text = ARM.replace(
+        '<position joint="a" kp="30" kv="1.5" gear="-2" ctrlrange="-2 1" forcerange="-4 3"/>',
+        '<dcmotor joint="a" motorconst=".05" resistance="2" gear="9" ctrlrange="-12 12"/>',
+    )
+    channels = {joint: smc.Channel(servo=True) for joint in "ab"}
+    arm = smc.plant_from(text, channels, keyframe="home")
+    trace = run(plant=arm, law=on_set_point(kp=0.1), duration=0.2, x0=0.1)
+    labels = [ax.get_ylabel() for ax in smc.figure([trace]).axes]
+    assert [label for label in labels if " u " in label] == ["a u (V)", "b u (rad)"]
+    for quantity in ("u", "applied"):
+        units = [panel.scale[1] for panel in panels.over_groups([trace], quantity)]
+        assert units == [" (V)", " (rad)"]
+    assert {"itae", "hf_share"} <= set(smc.score(trace))
+    assert not {"tv_rate", "max_u", "energy"} & set(smc.score(trace))
+    assert not {"tv_rate", "max_u", "energy"} & set(smc.scores(trace)["driven"])
+    with pytest.raises(ScenarioError, match="u is in V and rad, as in arm: take a metric of the"):
+        smc.metrics.catalogue.tv_rate(trace)
+    assert smc.metrics.joint_scores(trace)["b"]["max_u"] == np.abs(trace.u[:, 1]).max()
+    assert trace.scenario.drive_train.words == [
+        "u of 'a' of arm is the voltage of its motor, in V.",
+        "u of 'b' of arm is the set-point of its servo, in rad from its goal at 0.4.",
+    ]
+
+
+def test_a_text_is_no_file_in_what_is_said_of_it():
+    broken = (HOBBY % POSITION).replace("<geom", "<goem")
+    with pytest.raises(ScenarioError, match=r"the text of model 'hobby' \(.*: fix it$"):
+        smc.plant_from(broken, ["j"])
+    with pytest.raises(ScenarioError, match="unknown joint of the text of model 'hobby' 'k'"):
+        smc.plant_from(HOBBY % POSITION, ["k"])
+    assert smc.plant_from(HOBBY % POSITION, {"j": smc.Channel(servo=True)}).name == "hobby"
+
+
+def test_traces_in_a_list_are_to_be_scored_one_at_a_time():
+    trace = run(plant="duffing", law="pid", duration=0.1)
+    with pytest.raises(ScenarioError, match="score a list of traces one at a time"):
+        smc.score([trace])
+    with pytest.raises(ScenarioError, match=r"in Python smc.law\('pid'\)"):
+        smc.grid(servo(HOBBY % POSITION), ["pid"])
