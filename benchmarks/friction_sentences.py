@@ -29,6 +29,7 @@ WITHOUT_INTEGRAL = ("pd", "boundary_layer")
 
 
 VERDICTS = "stands", "open", "contradicted", "not ranked"
+JOINTS_OF = {"friction": "the three above", "friction_lot": "drawn"}  # file -> its name on the page
 
 
 class Verdict(NamedTuple):
@@ -258,11 +259,12 @@ def page_rows(points: Sequence[dict]) -> Iterator[str]:
             yield from rest_rows(points, joint, sides)
 
 
-def verdict_rows(points: Sequence[dict], draw: str) -> Iterator[str]:
+def verdict_rows(points: Sequence[dict], file: str) -> Iterator[str]:
     """Yield a row for each sentence: how often it stands, is open, contradicted, not ranked."""
+    joints = JOINTS_OF.get(file, file)
     for name, found in counts(judged(points)).items():
         numbers = [str(found.get(word, 0)) for word in VERDICTS]
-        yield f"| `{name}` | {draw} | {' | '.join(numbers)} |"
+        yield f"| `{name}` | {joints} | {' | '.join(numbers)} |"
 
 
 def search_noise(points: Sequence[dict]) -> np.ndarray:

@@ -775,11 +775,16 @@ def in_words(points: Sequence[dict]) -> tuple[str, str]:
         f"leads the best rival in {sum(leads[2:])} of {sum(its['all'] for its in smooth)} cases, "
         f"with and without noise, and trails in {sum(its['contradicted'] for its in smooth)}."
     )
-    admitted = [one.verdict for one in judged(own, SENTENCES[1:2])]
+    within = list(judged(own, SENTENCES[1:2]))
+    admitted = [one.verdict for one in within]
+    loads = [one.condition.removesuffix(", noise") for one in within]
+    under = [f"{loads.count(load)} under *{load}*" for load in QUIET]
+    plants = len({one.plant for one in within})
     page = (
         f"Where its theorem admits the load and the sensor has noise, super-twisting leads the "
         f"best of its rivals in {admitted.count('stands') + admitted.count('below the floor')} of "
-        f"{len(admitted)} cases and trails it in {admitted.count('contradicted')}."
+        f"{len(admitted)} cases and trails it in {admitted.count('contradicted')}. These are "
+        f"on {plants} plants, {', '.join(under)}."
     )
     return readme, page
 

@@ -268,5 +268,5 @@ def test_what_the_page_says_of_a_card_is_what_was_measured():
     page = (DOCS / "gpu.md").read_text(encoding="utf-8")
     measured = card.load()
     assert card.table(measured) in page
-    assert ("Nobody has run this engine on a card yet" in page) == (not measured)
+    assert ("Nobody has run MuJoCo Warp with these samples on a card yet" in page) == (not measured)
     assert "not measured" not in card.table(measured | dict.fromkeys(card.ROWS.values(), 1.0))

@@ -120,9 +120,10 @@ def claims():
     lot = json.loads(LOTS[0].read_text())
     points, drawn = sentences.Points(POINTS), sentences.Points(lot)
     sine = {"price": "R", "level": 10.0, "task": "sine"}
+    dearer = sine | {"level": 30.0}
 
-    def error(law, share=0.0):
-        return two(sentences.error(points.find("rail", law, "coulomb30", share=share, **sine)))
+    def error(law, share=0.0, price=sine):
+        return two(sentences.error(points.find("rail", law, "coulomb30", share=share, **price)))
 
     def turned(law):
         return two(points.find("rail", law, "coulomb10", **sine)["turned"])
@@ -131,7 +132,17 @@ def claims():
     at_rest = [sentences.error(drawn.find("drawn_rail", "pd_observer", one)) for one in dry]
     off = []
     for law in ("hodob", "observer_free_integral"):
-        off += [sentences.error(points.find("rail", law, one)) for one in dry]
+        off += [sentences.error(points.find("rail", law, one)) for one in (*dry, "load", "lugre")]
+    still = points.find("rail", "classical", "coulomb30")
+    resists = JOINTS["rail"].levels["coulomb30"][0] * JOINTS["rail"].bound
+    assert still["stuck"] == 1.0
+    stand = [
+        one
+        for one in (*sentences.judged(POINTS), *sentences.judged(lot))
+        if one.verdict == "stands"
+    ]
+    alone = [one for one in stand if one.values[1] == math.inf]
+    assert [one.joint for one in alone if one.sentence == "right"] == ["ak80"]
     moving = [
         drawn.share("drawn_rail", law, one) for law in ("hodob", "pd_observer") for one in dry
     ]
@@ -144,6 +155,14 @@ def claims():
         f"the PD has {wrong.pop()} counts, level with super-twisting",
         f"a PD with an observer has {error('pd_observer')}, ADRC {error('adrc')}. With "
         f"compensation as well, ADRC has {error('adrc', 1.0)}.",
+        f"a plain PID without compensation has {error('pid')} in the same case",
+        f"super-twisting has {error('super_twisting', price=dearer)}, the PD with an observer "
+        f"{error('pd_observer', price=dearer)}, ADRC {error('adrc', price=dearer)}.",
+        f"the boundary layer has {error('boundary_layer', 1.0)} and the integral sliding law "
+        f"{error('observer_free_integral', 1.0)}",
+        f"its k is {still['gains']['k']:.2f} N, the friction {resists:.1f} N",
+        f"in {len(alone)} of the {len(stand)} points that stand",
+        f"under LuGre on the rail, with {two(sentences.error(points.find('rail', 'super_twisting', 'lugre')))}",
         f"with {two(min(at_rest))} to {two(max(at_rest))} counts",
         f"are off by {two(min(off))} to {two(max(off))} counts on the rail",
         f"{100 * max(moving[:3]):.0f} % of them move, at most {100 * max(moving[3:]):.0f} % of the",
@@ -168,5 +187,5 @@ def test_super_twisting_rests_within_the_counts_that_the_page_says():
     for path in (FILE, *LOTS):
         points = sentences.Points(json.loads(path.read_text()))
         for joint in points.joints:
-            for one in points.frictions(joint, sentences.DRY):
+            for one in points.frictions(joint, (*sentences.DRY, "load")):
                 assert sentences.error(points.find(joint, "super_twisting", one)) < 1.3
