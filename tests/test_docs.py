@@ -108,6 +108,17 @@ def test_numbers_that_the_mathematics_tell_are_what_their_code_prints(tmp_path, 
 
 
 @pytest.mark.slow
+def test_friction_compensation_lessens_the_error_as_the_page_says(tmp_path):
+    page = (DOCS / "mechanisms.md").read_text()
+    (block,) = [block for block in blocks(page, "python") if "smc.Feedforward(" in block]
+    (tmp_path / "block.py").write_text(block)
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        runpy.run_path(str(tmp_path / "block.py"))
+    plain, compensated = re.findall(r"(\d+) mrad", said.getvalue())
+    assert f"It prints {plain} mrad without compensation and {compensated} with it." in page
+
+
+@pytest.mark.slow
 def test_the_tutorial_s_comparison_prints_what_the_page_shows(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with beside(TUTORIAL, tmp_path), contextlib.redirect_stdout(io.StringIO()) as said:
