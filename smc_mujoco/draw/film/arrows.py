@@ -21,8 +21,9 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import quantities, style
 from smc_mujoco.draw.decimate import Envelope, windows
 from smc_mujoco.draw.film import world
+from smc_mujoco.draw.panels import Panel, by_channel
 from smc_mujoco.mechanisms.plant import EFFORT, Plant, catalogue
-from smc_mujoco.metrics.conventions import ChannelGroup, groups
+from smc_mujoco.metrics.conventions import ChannelGroup
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -168,12 +169,24 @@ class Scale(NamedTuple):
     units: tuple[str, str] = ("", "")  # of u, and of a force
 
 
+def _of_one_unit(traces: Sequence[Trace]) -> dict[ChannelGroup, Sequence[Trace]]:
+    """Return the traces of each group of channels, or of each channel where units of u differ."""
+    found = {}
+    for group, parts in style.split(traces).items():
+        if group.effort or traces[0].scenario.plant.pose:
+            found[group] = parts
+            continue
+        for panel in by_channel(Panel("u", group, parts)):
+            found[panel.group] = panel.traces
+    return found
+
+
 def scales(traces: Sequence[Trace]) -> dict[ChannelGroup, Scale]:
     """Return the scale of the arrows for each group of channels."""
     found = {}
     lasting = [0.0]  # forces that drive and disturb
     brief = [0.0]
-    for group, parts in style.split(traces).items():
+    for group, parts in _of_one_unit(traces).items():
         if traces[0].scenario.plant.pose:
             pushes = [np.linalg.norm(trace.d[:, :3], axis=1).max() for trace in traces]
             push = float(max(pushes)) if group.unit == "m" else 0.0
@@ -262,10 +275,10 @@ def key(traces: Sequence[Trace], scales: Mapping[ChannelGroup, Scale]) -> list[s
     return words
 
 
-def scales_by_channel(trace: Trace, scales: Mapping[ChannelGroup, Scale]) -> list[Scale]:
-    """Return the scale of the arrows of each of a trace's channels."""
+def scales_by_channel(scales: Mapping[ChannelGroup, Scale]) -> list[Scale]:
+    """Return the scale of the arrows of each channel."""
     of_channel = {}
-    for group, scale in zip(groups(trace.scenario), scales.values(), strict=True):
+    for group, scale in scales.items():
         of_channel |= dict.fromkeys(group.channels, scale)
     return [of_channel[i] for i in sorted(of_channel)]
 

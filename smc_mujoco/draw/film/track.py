@@ -53,7 +53,7 @@ class MachineTrack:
         self.motion = motion(trace, np.union1d(grid, times))
         sizes = []
         if scales and not trace.scenario.plant.tip:
-            sizes = arrows.scales_by_channel(trace, scales)[:n]
+            sizes = arrows.scales_by_channel(scales)[:n]
         self.drawn = arrows.frames(trace, edges, self.holds, sizes, colour)
         self.framing = arrows.frames(trace, grid, np.zeros(len(grid)), sizes, colour)
         self.states = states.timeline(trace, times, clock.played)

@@ -347,7 +347,7 @@ def test_the_arrow_of_friction_is_at_the_joint_that_rubs(joint, channel):
             plant="cart_pole", law="none", friction={joint: smc.Coulomb(0.02)}, duration=0.3
         )
     )
-    sizes = scales_by_channel(trace, scales([trace]))
+    sizes = scales_by_channel(scales([trace]))
     acting = loads(trace, np.array([0.2, 0.21]))
     with_arrow = [i for i in range(2) if arrows(acting, 0, i, sizes[i], "#0072B2")]
     assert with_arrow == [channel]

@@ -10,6 +10,7 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.engine.group import why_not
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw import panels
+from smc_mujoco.draw.film import arrows
 from smc_mujoco.hardware import PositionServo, RateLimit
 from smc_mujoco.mechanisms.named import from_text
 from smc_mujoco.metrics.tip import knows_contacts
@@ -372,6 +373,9 @@ def test_a_voltage_beside_a_set_point_is_never_pooled_with_it():
     for quantity in ("u", "applied"):
         units = [panel.scale[1] for panel in panels.over_groups([trace], quantity)]
         assert units == [" (V)", " (rad)"]
+    scales = arrows.scales_by_channel(arrows.scales([trace]))
+    assert [scale.units[0] for scale in scales] == ["V", "rad"]
+    assert [scale.full for scale in scales] == [scale.control for scale in scales]
     assert {"itae", "hf_share"} <= set(smc.score(trace))
     assert not {"tv_rate", "max_u", "energy"} & set(smc.score(trace))
     assert not {"tv_rate", "max_u", "energy"} & set(smc.scores(trace)["driven"])
