@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -46,6 +46,9 @@ HeldOut = Annotated[
     Path | None,
     typer.Option(help="A log, or pairs, that are not used, to check the numbers on."),
 ]
+FoundFigure = Annotated[
+    Path | None, options.picture("prediction over log, residuals and friction; or the pairs")
+]
 FoundFile = Annotated[
     Path | None, typer.Option(help="File for --condition of compare, which and tune: FILE.txt.")
 ]
@@ -82,9 +85,7 @@ def identify(
     pairs: PairsFile = None,
     held_out: HeldOut = None,
     columns: options.Columns = None,
-    figure: Annotated[
-        Path | None, options.picture("prediction over log, residuals and friction; or the pairs")
-    ] = None,
+    figure: FoundFigure = None,
     out: FoundFile = None,
     corrected: Corrected = False,
     starts: Starts = 1,
@@ -126,7 +127,6 @@ def identify(
             "identify needs a machine and its logs, as arm.xml run.csv, or --pairs FILE"
         )
     with delay_signals():
-        from smc_mujoco.cli import rig_tables
         from smc_mujoco.identification import identify as identification
 
     found = identification.identify(
@@ -140,7 +140,16 @@ def identify(
         seed=seed,
         progress=True,
     )
-    for table in rig_tables.identified(found, [str(file) for file in files]):
+    _tell(found, [str(file) for file in files], figure, out, terminal)
+
+
+def _tell(
+    found: Any, files: list[str], figure: Path | None, out: Path | None, terminal: Terminal
+) -> None:
+    """Print what was found in logs, and write its figure and its file."""
+    from smc_mujoco.cli import rig_tables
+
+    for table in rig_tables.identified(found, files):
         terminal.print(table)
     for note in found.notes:
         terminal.note(note, wrap=True)
