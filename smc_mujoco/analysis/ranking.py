@@ -305,11 +305,12 @@ class Comparison:
     @property
     def best(self) -> np.ndarray:
         """Whether a law may be the best, (laws, blocks): the winner, or where there is none, no
-        other is better, its units are enough to say so, all its runs have a value and have arrived,
-        and it is below the floor if one of these is.
+        other is better, its units and those of another law are enough to say so, all its runs have
+        a value and have arrived, and it is below the floor if one of these is.
         """
-        enough = min_p(self.units) <= self.limit
-        best = self.ranked & enough & ~self.worse & ~self.away.any(axis=2)
+        enough = self.ranked & (min_p(self.units) <= self.limit)
+        enough &= enough.sum(axis=0) > 1
+        best = enough & ~self.worse & ~self.away.any(axis=2)
         lowest = best & self.below
         best = np.where(lowest.any(axis=0), lowest, best)
         for k, winner in enumerate(self.winners):

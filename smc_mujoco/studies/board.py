@@ -94,19 +94,19 @@ class Lead(NamedTuple):
         ahead in 24 of 24 runs"; "below the floor of 0.01 rad, and pid's is at least 1.3 times the
         floor".
         """
-        ratio, low, high = map(number, self.effect[:3])
-        if self.floor:
-            least = 1.0 / self.effect.high
-            if least < MIN_TIMES:
-                return f"below the floor of {self.floor}, unlike {self.rival}'s"
-            text = f"below the floor of {self.floor}, and {self.rival}'s is at least"
-            return f"{text} {number(least)} times the floor"
         share = f"{self.effect.ahead} of {self.effect.samples}"
         ahead = f"and it is ahead in {share} runs"
         if self.effect.sets:
             ahead = f"and it is ahead with {share} sets of gains"
         if self.lacking:
             return f"defined in every run, while {self.rival} has none in {self.lacking}, {ahead}"
+        if self.floor:
+            least = 1.0 / self.effect.high
+            if least < MIN_TIMES:
+                return f"below the floor of {self.floor}, unlike {self.rival}'s"
+            text = f"below the floor of {self.floor}, and {self.rival}'s is at least"
+            return f"{text} {number(least)} times the floor"
+        ratio, low, high = map(number, self.effect[:3])
         return f"{ratio} times {self.rival}'s ({low} to {high}), {ahead}"
 
 
@@ -158,14 +158,22 @@ class Block:
 
     @property
     def lowest(self) -> str:
-        """That several of the best laws are below the floor; "" if they are not."""
+        """That several of the best laws, or all laws, are below the floor; "" if they are not."""
         low = [law for law in self.best if law in self.below]
+        if len(self.below) == len(self.medians) and not self.away:
+            low = list(self.medians)
         if len(low) < 2:
             return ""
         names = joined(low)
         if len(low) == len(self.medians) == 2:
             names = "both"
         return f"{names} are below the floor of {self.floor}, so they are not ranked"
+
+    @property
+    def all_alike(self) -> bool:
+        """Whether every run of every law settles, or none, for the share of runs that do not."""
+        shares = set(self.medians.values())
+        return shares in ({0.0}, {1.0})
 
     @property
     def sample(self) -> str:
@@ -291,12 +299,18 @@ class Board(Tables):
             return f"no law may win over the default gains of {joined(self.barred)}"
         if all(len(block.away) == len(block.medians) for block in self.blocks):
             return "every law has runs that fail or do not arrive"
-        reasons = dict.fromkeys(block.lowest or self.too_few for block in self.blocks)
+        reasons = dict.fromkeys(self._tied(block) or self.too_few for block in self.blocks)
         if reason := "; ".join(filter(None, reasons)) or self._too_few_to_rank:
             return reason
         if not self.best:
             return "every law is beaten in some condition"
         return self.alike
+
+    def _tied(self, block: Block) -> str:
+        """Return why no number of samples would tell the laws of a block apart; "" if one may."""
+        if self.metric == SETTLES and block.all_alike:
+            return f"{'both laws' if len(self.entries) == 2 else 'all laws'} {SAME_RUNS}"
+        return block.lowest
 
     @property
     def alike(self) -> str:

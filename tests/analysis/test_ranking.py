@@ -823,3 +823,15 @@ def test_a_run_that_arrives_only_at_the_whole_step_is_charged():
     table = table_of({"a": A, "b": B}, "tv_rate", half_step=halves)
     (board,) = leaderboard(table, ["tv_rate"])
     assert board.winner is None
+
+
+def test_a_law_is_not_told_from_the_best_by_its_own_samples_alone():
+    """Of two laws one has seven sets of gains, too few to be found worse; of three two are enough."""
+    few = np.arange(12) % 7
+    many = np.arange(12)
+    spread = 1.0 + 0.1 * np.sin(np.arange(12))
+    scores = {"few": [spread[::-1]], "many": [spread]}
+    sets = {"few": [few], "many": [many]}
+    assert not Comparison(scores, sets=sets).best.any()
+    beside = Comparison(scores | {"other": [1.01 * spread[::-1]]}, sets=sets | {"other": [many]})
+    assert beside.best[:, 0].tolist() == [False, True, True]

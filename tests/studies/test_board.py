@@ -301,6 +301,10 @@ LOST = {
     "best": (),
 }
 RESULTS = {  # changes of both blocks -> the result
+    "few sets below the floor": (
+        LOST | {"samples": 3, "sets": 3, "below": LAWS, "floor": "0.1 m"},
+        f"{EVIL}, second and third are below the floor of 0.1 m, so they are not ranked",
+    ),
     "barred": ({"untuned": ("second", "third")}, "no law may win over the default gains of second"),
     "all fail": (LOST | {"away": LAWS}, "every law has runs that fail"),
     "few sets": (
@@ -316,6 +320,22 @@ RESULTS = {  # changes of both blocks -> the result
         "4 sets of gains cannot rank 3 laws here; 7 can (seeds=7)",
     ),
 }
+
+
+def test_few_sets_are_no_reason_where_every_run_settles(boards):
+    block = dataclasses.replace(boards[0].blocks[0], medians=dict.fromkeys(LAWS, 0.0))
+    few = dataclasses.replace(block, **LOST, samples=3, sets=3)
+    settles = dataclasses.replace(boards[0], metric="settles", blocks=(few,))
+    assert settles.result == "no winner; all laws settle in the same runs"
+
+
+def test_a_law_below_the_floor_may_beat_one_without_any_value():
+    never = Effect(0.0, 0.0, 0.0, ahead=12, samples=12, sets=True, below=True)
+    lead = Lead("pid", "none", never, floor="0.006 N/s", lacking="12 of 12")
+    assert lead.words == (
+        "defined in every run, while none has none in 12 of 12, and it is ahead with 12 of 12 sets "
+        "of gains"
+    )
 
 
 @pytest.mark.parametrize("case", RESULTS)
