@@ -146,7 +146,7 @@ def identify(
 def _tell(
     found: Any, files: list[str], figure: Path | None, out: Path | None, terminal: Terminal
 ) -> None:
-    """Print what was found in logs, and write its figure and its file."""
+    """Print what was found in logs, and write it."""
     from smc_mujoco.cli import rig_tables
 
     for table in rig_tables.identified(found, files):
@@ -154,6 +154,11 @@ def _tell(
     for note in found.notes:
         terminal.note(note, wrap=True)
     terminal.note(f"{found.evaluations} parameter sets, {terminal.seconds:.0f} s")
+    _write(found, figure, out, terminal)
+
+
+def _write(found: Any, figure: Path | None, out: Path | None, terminal: Terminal) -> None:
+    """Write the figure and the file of what was found, and end."""
     if figure:
         terminal.wrote(*found.figure(figure))
     if out:
@@ -177,11 +182,7 @@ def _from_pairs(
     other = None if held_out is None else read(held_out, columns)
     found = speed_torque.identify_friction(*read(file, columns), held_out=other)
     terminal.note(str(found))
-    if figure:
-        terminal.wrote(*found.figure(figure))
-    if out:
-        terminal.wrote(found.save(out))
-    terminal.finish(found.about())
+    _write(found, figure, out, terminal)
 
 
 def excitation(
