@@ -57,7 +57,11 @@ REFUSED = {
     "no scenarios": (lambda: smc.score(MASKED), "cannot score masked"),
     "beyond floats": (lambda: smc.identify_friction([10**400, -1], [1, 2]), "give one number"),
     "a number for names": (lambda: smc.design.excitation("duffing", np.nan), "names is nan"),  # pyright: ignore
-    "no names": (lambda: smc.design.excitation("duffing", []), "name some, of M, delta"),
+    "no names": (lambda: smc.design.excitation("duffing", []), "there are M, delta"),
+    "endless points": (
+        lambda: smc.signals.cartesian_path("panda", [0.0, 1.0], range(10**9), body="link7"),  # pyright: ignore
+        "give fewer",
+    ),
     "endless names": (lambda: smc.identify("emps", "a.csv", range(10**9)), "give fewer"),  # pyright: ignore
 }
 

@@ -291,6 +291,8 @@ def _number(cell: str) -> float | None:
 
 def _places(points: Sequence[Sequence[float]]) -> Array:
     """Return points in space, (N, 3), m."""
+    if not isinstance(points, str | np.ndarray) and np.iterable(points):
+        points = items_of("points", points)
     try:
         array = np.asarray(points, float)
     except (TypeError, ValueError, OverflowError):  # no numbers, or rows of unequal lengths
