@@ -122,18 +122,23 @@ def claims():
     sine = {"price": "R", "level": 10.0, "task": "sine"}
     dearer = sine | {"level": 30.0}
 
+    def at(*where, **price):
+        point = points.find(*where, **price)
+        assert point is not None
+        return point
+
     def error(law, share=0.0, price=sine):
         return two(sentences.error(points.find("rail", law, "coulomb30", share=share, **price)))
 
     def turned(law):
-        return two(points.find("rail", law, "coulomb10", **sine)["turned"])
+        return two(at("rail", law, "coulomb10", **sine)["turned"])
 
     dry = ("coulomb10", "coulomb30", "stribeck")
     at_rest = [sentences.error(drawn.find("drawn_rail", "pd_observer", one)) for one in dry]
     off = []
     for law in ("hodob", "observer_free_integral"):
         off += [sentences.error(points.find("rail", law, one)) for one in (*dry, "load", "lugre")]
-    still = points.find("rail", "classical", "coulomb30")
+    still = at("rail", "classical", "coulomb30")
     resists = JOINTS["rail"].levels["coulomb30"][0] * JOINTS["rail"].bound
     assert still["stuck"] == 1.0
     stand = [
@@ -147,7 +152,7 @@ def claims():
         drawn.share("drawn_rail", law, one) for law in ("hodob", "pd_observer") for one in dry
     ]
     ratios = sentences.search_noise(POINTS)
-    chose = points.find("rail", "pid", "coulomb10", **sine)["chose"]
+    chose = at("rail", "pid", "coulomb10", **sine)["chose"]
     wrong = {error("pd", share) for share in (0.7, 1.3)}
     return [
         f"a PD with it has an error of {error('pd', 1.0)} counts of the encoder, super-twisting "
