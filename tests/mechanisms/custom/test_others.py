@@ -489,7 +489,7 @@ def test_a_robot_that_rises_from_its_floor_is_taken_and_told(mode, x0, foot):
     text = DOG.format(legs=legs, motors="".join(servos))
     knee = {"k0": smc.Channel(motor=True, x0=x0)}
     with pytest.warns(
-        ScenarioWarning, match=r"start of dog\.xml has 'floor' \d+ mm inside"
+        ScenarioWarning, match=r"start of the text of model 'dog' has 'floor' \d+ mm inside"
     ) as said:
         made = smc.plant_from(text, knee, keyframe="home", others=mode)
     inside = next(str(one.message) for one in said if "inside" in str(one.message))
