@@ -22,6 +22,10 @@ HEADER = "smc_mujoco/exchange/c/smc_law.h"  # to which pages link
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from smc_mujoco.common.gl import choose_gl  # noqa: E402
+
+choose_gl()  # else dm_control tries GLFW first, which asks for a display
+
 import catalogue  # noqa: E402
 import known  # noqa: E402
 import llms  # noqa: E402

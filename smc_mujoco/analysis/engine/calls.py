@@ -12,7 +12,7 @@ from collections import namedtuple
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from numba import types
+from numba import njit, types
 from numba.extending import intrinsic, overload
 
 from smc_mujoco.analysis.engine.form import (
@@ -28,13 +28,38 @@ from smc_mujoco.analysis.engine.form import (
     measured_places,
     parameters,
 )
-from smc_mujoco.common.jit import always, call, floats, inlined, named, place, record_in
+from smc_mujoco.common import fingerprint
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.jit import (
+    Key,
+    always,
+    call,
+    compile_for,
+    floats,
+    inlined,
+    named,
+    place,
+    record_in,
+)
 from smc_mujoco.common.numba_internals import arrayobj, cgutils
 
 Compiler = Callable[[Any], Any]
 # A run's numbers, the points of its series, and its state, as pointers.
 View = namedtuple("View", ("row", "tables", "work"))
 settings_in = record_in(floats(Settings._fields))
+
+
+def compiled_once(function: Callable) -> Any:
+    """Return a function of counts and addresses, compiled, and kept on the disk if all that it uses
+    has a hash.
+    """
+    made = njit(error_model="numpy", nogil=True)(function)
+    try:
+        key = Key(function.__module__, fingerprint.now(function))
+    except ScenarioError:  # a function that has no hash is compiled in every process
+        key = None
+    compile_for(made, (0,) * function.__code__.co_argcount, key)
+    return made
 
 
 @functools.cache

@@ -6,17 +6,14 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from smc_mujoco.analysis.engine import noise
-from smc_mujoco.analysis.engine.calls import View
+from smc_mujoco.analysis.engine.calls import View, compiled_once
 from smc_mujoco.analysis.engine.form import FAILURE, SCORES, SETTING, UNDER_WAY, Form, layout
 from smc_mujoco.analysis.engine.loop import simulation
-from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.attended import attended
-from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.jit import Key, compile_for, inlined, jit, pointer
+from smc_mujoco.common.jit import inlined, jit, pointer
 from smc_mujoco.simulation.state import RAISED, address
 
 # in a call of compiled code: .05 s of a core, or .15 with dry friction
@@ -60,13 +57,7 @@ def compiled(form: Form) -> Any:
                     except Exception:
                         kept[FAILURE] = RAISED
 
-    made = njit(error_model="numpy", nogil=True)(runs)
-    try:
-        key = Key(__name__, fingerprint.now(runs))
-    except ScenarioError:  # a function that has no hash is compiled in every process
-        key = None
-    compile_for(made, (0,) * 7, key)
-    return made
+    return compiled_once(runs)
 
 
 def _work_size(form: Form) -> int:

@@ -231,6 +231,7 @@ def _stepped(runs: WorldRuns, rows: Array, model: Any, data: Any) -> Array:
     if steps:
         step()  # MuJoCo Warp compiles its kernels
         step = called.captured(step)
+        calls -= calls % stages  # of a step that CUDA captured in part
     for _ in range(steps - 1):
         step()
     called()  # the last sample, at the end of the run

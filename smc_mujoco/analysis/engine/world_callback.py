@@ -15,11 +15,10 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numba import njit
 
 from smc_mujoco.analysis.engine import noise
 from smc_mujoco.analysis.engine.advance import driving
-from smc_mujoco.analysis.engine.calls import Compiler, View
+from smc_mujoco.analysis.engine.calls import Compiler, View, compiled_once
 from smc_mujoco.analysis.engine.form import (
     FAILED_STEP,
     FAILURE,
@@ -31,10 +30,8 @@ from smc_mujoco.analysis.engine.form import (
     layout,
 )
 from smc_mujoco.analysis.engine.loop import moments, recording, remembering
-from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import Array, ArrayPair
-from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.jit import Key, compile_for, inlined, jit, pointer
+from smc_mujoco.common.jit import inlined, jit, pointer
 from smc_mujoco.simulation.scenario import Resolved
 from smc_mujoco.simulation.state import FINE, RAISED
 from smc_mujoco.simulation.step import order
@@ -227,10 +224,4 @@ def compiled(form: Form) -> Any:
             except Exception:
                 kept[FAILURE] = RAISED
 
-    made = njit(error_model="numpy", nogil=True)(worlds)
-    try:
-        found = Key(__name__, fingerprint.now(worlds))
-    except ScenarioError:  # a function that has no hash is compiled in every process
-        found = None
-    compile_for(made, (0,) * 12, found)
-    return made
+    return compiled_once(worlds)
