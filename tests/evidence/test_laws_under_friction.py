@@ -141,12 +141,16 @@ def claims():
     still = at("rail", "classical", "coulomb30")
     resists = JOINTS["rail"].levels["coulomb30"][0] * JOINTS["rail"].bound
     assert still["stuck"] == 1.0
-    stand = [
-        one
-        for one in (*sentences.judged(POINTS), *sentences.judged(lot))
-        if one.verdict == "stands"
-    ]
+    before = [*sentences.judged(POINTS), *sentences.judged(lot)]
+    stand = [one for one in before if one.verdict == "stands"]
     alone = [one for one in stand if one.values[1] == math.inf]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sentences, "SEARCH", 2.5)
+        stricter = [*sentences.judged(POINTS), *sentences.judged(lot)]
+    verdicts = [one.verdict for one in stricter]
+    assert verdicts.count("contradicted") == len(
+        [one for one in before if one.verdict == "contradicted"]
+    )
     assert [one.joint for one in alone if one.sentence == "right"] == ["ak80"]
     moving = [
         drawn.share("drawn_rail", law, one) for law in ("hodob", "pd_observer") for one in dry
@@ -167,6 +171,7 @@ def claims():
         f"{error('observer_free_integral', 1.0)}",
         f"its k is {still['gains']['k']:.2f} N, the friction {resists:.1f} N",
         f"in {len(alone)} of the {len(stand)} points that stand",
+        f"{verdicts.count('stands')} of the {len(stand)} points would stand",
         f"under LuGre on the rail, with {two(sentences.error(points.find('rail', 'super_twisting', 'lugre')))}",
         f"with {two(min(at_rest))} to {two(max(at_rest))} counts",
         f"are off by {two(min(off))} to {two(max(off))} counts on the rail",
