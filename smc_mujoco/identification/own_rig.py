@@ -240,7 +240,7 @@ def own_rig(given: Plant | Scenario, names: Sequence[str]) -> OwnRig:
         known = list(known_paths(base))
         example = next((path for path in known if "." in path), known[0])
         raise ScenarioError(
-            f"{base.plant.name} has no numbers to find: name some with --for, in Python names, "
+            f"no number of {base.plant.name} is named: name some with --for, in Python with names, "
             f"such as {example!r}; there are {', '.join(known)}"
         )
     paths = resolved(base, names)

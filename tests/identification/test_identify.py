@@ -197,7 +197,7 @@ def test_parameters_that_cannot_be_told_apart_are_named(swung):
         (
             "servo_axis",
             None,
-            "servo_axis has no numbers to find: name some with --for.* M, b, cf, offset",
+            "no number of servo_axis is named: name some with --for.* M, b, cf, offset",
         ),
         (3, None, "cannot identify 3: give a plant"),
     ],
