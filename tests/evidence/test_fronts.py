@@ -15,6 +15,7 @@ from benchmarks.fronts import CONDITIONS, FLOOR, LEVELS, SENTENCES, UNSEEN, Job,
 
 PAGE = Path(fronts.__file__).parents[1] / "docs" / "where_sliding_mode_loses.md"
 POINTS = json.loads(Path(fronts.__file__).with_suffix(".json").read_text())  # of the page
+SECOND = json.loads((Path(fronts.__file__).parent / "second_fronts.json").read_text())
 SPREAD = np.exp(np.linspace(-0.05, 0.05, UNSEEN))
 
 
@@ -114,6 +115,9 @@ def test_the_page_has_the_tables_of_its_points_and_strikes_out_what_they_contrad
     for line in (*fronts.tables(POINTS), *fronts.counted(POINTS)):
         assert line in text.splitlines(), line
     contradicted = {one.sentence for one in fronts.judged(POINTS) if one.verdict == "contradicted"}
+    for name, verdicts in SECOND["verdicts"].items():
+        if verdicts["contradicted"]:
+            contradicted.add(name)
     assert {one.sentence for one in fronts.judged(POINTS)} == {one.name for one in SENTENCES}
     for sentence in SENTENCES:
         (struck,) = re.findall(rf"^- (~~)?\*{re.escape(sentence.name)}\*", text, re.MULTILINE)
@@ -127,6 +131,43 @@ def test_readme_and_the_page_say_first_how_often_super_twisting_leads_and_trails
     readme = PAGE.parents[1] / "README.md"
     for path, words in zip((readme, PAGE), fronts.in_words(POINTS), strict=True):
         assert words in " ".join(path.read_text().split()), path
+
+
+@pytest.mark.quick
+def test_readme_and_the_page_say_what_a_second_search_found():
+    _, noisy, *smooth = SECOND["tallies"]
+    leads = [its["stands"] + its["below the floor"] for its in (noisy, *smooth)]
+    cases = sum(its["all"] for its in smooth)
+    behind = sum(its["contradicted"] for its in smooth)
+    quiet = SECOND["verdicts"]["smooth, quiet"]
+    said = {
+        PAGE.parents[1] / "README.md": [
+            f"A second search gives {leads[0]} and {noisy['contradicted']} of {noisy['all']} with "
+            f"noise, and {sum(leads[1:])} and {behind} of {cases}.",
+        ],
+        PAGE: [
+            f"in no case of this search, and in {sum(leads[1:])} of another",
+            f"found errors {SECOND['median']:.2g} times apart in the median of the "
+            f"{SECOND['compared']} that both have and that lie above the floor, and "
+            f"{SECOND['tenth']:.2g} times or more in a tenth",
+            f"leads the best rival in {leads[0]} of {noisy['all']} cases with noise and trails it "
+            f"in {noisy['contradicted']}; smooth sliding leads in {sum(leads[1:])} of {cases} and "
+            f"trails in {behind}",
+            f"Contradicted at {quiet['contradicted']} of {sum(quiet.values())} of the second",
+        ],
+    }
+    for path, sentences in said.items():
+        text = " ".join(path.read_text().split())
+        assert [words for words in sentences if words not in text] == []
+
+
+@pytest.mark.quick
+def test_another_search_is_compared_where_both_have_a_point_above_the_floor():
+    first = [point("pid", 0.01), point("adrc", FLOOR / 9), point("pid", 0.5, level=3.0)]
+    second = [point("pid", 0.02), point("adrc", FLOOR / 3), point("adrc", 0.1, level=3.0)]
+    found = fronts.second(second, first)
+    assert found["compared"] == 1
+    assert found["median"] == pytest.approx(2.0)
 
 
 @pytest.mark.quick
