@@ -63,11 +63,9 @@ def advise(
     table = trial.run(candidates, seeds, half_steps=False)
     settled = _settled(table)
     least = {}
-    for law, found in settled.items():
-        least[law] = min(n / of for n, of in found.values())
-    # where sets name no winner, the one that runs name comes first
-    better = fixed.winners[0] if fixed and not raced.winner else None
-    order = sorted(chosen, key=lambda law: (least[law] < RELIABLE, law != better))
+    for law in chosen:
+        least[law] = min(n / of for n, of in settled[law].values())
+    order = in_order(least, fixed, raced.winner)
     boards = leaderboard(table, metrics, defaults=True, relevant=relevant)
     if not boards:
         raise ScenarioError(f"no need has a number in any run on {plant.name}: ask for others")
@@ -116,6 +114,16 @@ def _entrants(trial: Trial, plant: Plant, laws: Laws) -> tuple[list[Entrant], di
         elif trial.defaults or len(laws) == 1:
             entrants.append(Entrant(default_of(law), None))
     return entrants, left_out
+
+
+def in_order(
+    settled: Mapping[str, float], fixed: Comparison | None, winner: str | None
+) -> list[str]:
+    """Return the laws, the one to use first: those that settle reliably, given the least share of
+    each, and among them the one that runs name where sets of gains name no winner.
+    """
+    better = fixed.winners[0] if fixed and not winner else None
+    return sorted(settled, key=lambda law: (settled[law] < RELIABLE, law != better))
 
 
 def _chosen(

@@ -8,10 +8,11 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis import step_halving
-from smc_mujoco.analysis.ranking import RELEVANT
+from smc_mujoco.analysis.ranking import RELEVANT, Comparison
 from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, objectives
 from smc_mujoco.analysis.tuning.result import SearchResult
 from smc_mujoco.studies import race as module
+from smc_mujoco.studies.advise import in_order
 from smc_mujoco.studies.fair_gains import Candidate
 
 GOAL = Objective(conditions=("nominal",), duration=1.0)
@@ -191,3 +192,17 @@ def test_unseen_runs_under_rk4_have_twice_the_step_and_one_in_four_their_own():
 def test_runs_that_cannot_have_twice_the_step_keep_theirs(fields):
     scenario = smc.Scenario(plant="duffing", law=smc.law("pid"), **fields)
     assert step_halving.doubled(scenario) is scenario
+
+
+def test_the_law_to_use_is_the_one_that_runs_name_where_sets_name_none():
+    """It must settle, too."""
+    runs = 1.0 + 0.01 * np.sin(np.arange(12))
+    fixed = Comparison({"a": [2.0 * runs], "b": [runs]})
+    assert fixed.winners == ["b"]
+    for settled, winner, order in (
+        ({"a": 1.0, "b": 1.0}, None, ["b", "a"]),
+        ({"a": 1.0, "b": 1.0}, "a", ["a", "b"]),
+        ({"a": 1.0, "b": 0.1}, None, ["a", "b"]),
+    ):
+        assert in_order(settled, fixed, winner) == order
+    assert in_order({"a": 1.0}, None, None) == ["a"]
