@@ -1,13 +1,12 @@
 """Dot plots of a study: the median of each law with its interval, by condition."""
 
 import itertools
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
-from matplotlib.ticker import NullFormatter
 
 from smc_mujoco.analysis.bootstrap import MIN_INTERVAL_SAMPLES, Interval, median_of, share_interval
 from smc_mujoco.analysis.paired_runs import (
@@ -36,7 +35,7 @@ from smc_mujoco.simulation.trace import Trace
 METRICS = ("settling_time", "ultimate_bound", "tv_rate")
 Cell = tuple[str, str, str, str]  # metric, plant, condition, law
 MIN_SIZE = 1e-9  # smaller sizes are drawn at it
-RING: Fields = {"marker": "o", "mfc": "none", "mec": style.INK}  # around a winner
+RING: Fields = {"marker": "o", "mfc": "none", "mec": style.INK, "clip_on": False}  # around a winner
 # inches on a full page, heights of a law's line, and of the title, numbers and label of a panel
 LINE_HEIGHT, WORDS_HEIGHT = 0.18, 0.9
 
@@ -112,6 +111,7 @@ class Dots(NamedTuple):
     looks: dict[str, Fields]  # law -> colour and mark
     intervals: dict[Cell, Interval]
     won: set[Cell]  # those with a ring
+    logarithmic: set[str]  # metrics whose axis is, on all plants
     units: dict[str, str]  # plant -> unit of positions
     labels: dict[str, Plant | str]  # plant -> what pictures call it
     heading: str  # plants and conditions in words
@@ -153,10 +153,33 @@ def _dots(table: RunColumns, metrics: Sequence[str], winners: Collection[Cell]) 
         looks=_looks(laws),
         intervals=intervals,
         won=intervals.keys() & set(winners),
+        logarithmic={name for name in metrics if _differs_much(intervals, name)},
         units=units,
         labels=labels,
         heading=style.heading([*labels.values()], conditions, short=len(plants) > 1),
     )
+
+
+def _finite(intervals: Iterable[Interval]) -> Array:
+    """Return the finite medians and ends of intervals."""
+    sizes = np.array([interval[:3] for interval in intervals])
+    return sizes[np.isfinite(sizes)]
+
+
+def _differs_much(intervals: Mapping[Cell, Interval], metric: str) -> bool:
+    """Return whether the values of a metric differ so much on one plant that its axis is
+    logarithmic; that of the share of runs that settle never is.
+    """
+    if metric == SETTLES:
+        return False
+    found = False
+    for plant in dict.fromkeys(cell[1] for cell in intervals):
+        here = [its for cell, its in intervals.items() if cell[:2] == (metric, plant)]
+        sizes = _finite(here)
+        if sizes.size and not sizes.min() > 0.0:
+            return False
+        found |= bool(sizes.size and style.LOG_RANGE * sizes.min() < sizes.max())
+    return found
 
 
 def _distinct(table: RunColumns, column: str) -> list[str]:
@@ -181,7 +204,8 @@ def _draw_plant(row: Array, dots: Dots, plant: str, named: bool) -> None:
         here = name, plant
         of_panel = {cell[2:]: its for cell, its in dots.intervals.items() if cell[:2] == here}
         rings = [cell[2:] for cell in dots.won if cell[:2] == here]
-        _panel(ax, of_panel, dots.conditions[plant], dots.looks, name, rings)
+        decades = name in dots.logarithmic
+        _panel(ax, of_panel, dots.conditions[plant], dots.looks, name, rings, decades)
         ax.set_xlabel(_label(name, dots.units[plant]))
         ax.tick_params(labelleft=named or ax is row[0])
 
@@ -242,18 +266,15 @@ def _panel(
     looks: Mapping[str, Mapping[str, str]],
     metric: str,
     rings: Collection[tuple[str, str]],
+    logarithmic: bool,
 ) -> None:
     """Draw a metric of one plant, (condition, law) -> its interval: a block of lines per condition,
     a dot per law, with a ring around those that win.
-
-    Its axis is logarithmic where values differ much, but for the share of runs that settle.
     """
     height = len(looks) + 1
-    sizes = np.array([interval[:3] for interval in intervals.values()])
-    sizes = sizes[np.isfinite(sizes)]
-    if metric != SETTLES and sizes.size and 0.0 < style.LOG_RANGE * sizes.min() < sizes.max():
+    sizes = _finite(intervals.values())
+    if logarithmic:
         ax.set_xscale("log")
-        ax.xaxis.set_minor_formatter(NullFormatter())  # numbers between decades would overlap
     for (j, condition), (k, law) in itertools.product(enumerate(conditions), enumerate(looks)):
         if (condition, law) in intervals:
             interval = intervals[condition, law]
@@ -275,6 +296,8 @@ def _panel(
     ax.set_ylim(len(conditions) * height - 1, -1)
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)
+    if logarithmic:
+        drawing.number_decades(ax.xaxis, ax.get_xlim())
 
 
 def _dot(ax: Axes, interval: Interval, line: int, look: Mapping[str, str]) -> None:

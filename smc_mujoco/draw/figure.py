@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from smc_mujoco.common.aliases import AnyPath, Data, Pair
 from smc_mujoco.common.errors import ScenarioError, find, items_of
 from smc_mujoco.control.source import by_words
-from smc_mujoco.draw import horizon, lanes, quantities, style
+from smc_mujoco.draw import dark, horizon, lanes, quantities, style
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw.decimate import end, finite
@@ -91,6 +91,7 @@ def figure(
     size: Size = None,
     format: str | None = None,
     fig: Figure | SubFigure | None = None,
+    ax: Axes | None = None,
 ) -> Figure:
     """Draw traces of one plant: x, u, s and a disturbance over time, the phase portrait (of the
     error where the reference moves), |x - r|, and a close-up of the end of u.
@@ -123,15 +124,21 @@ def figure(
         (width, height) in inches. Default: 8.8 in wide.
       format: "svg", "png" or "pdf", of the file.
       fig: Figure or SubFigure to draw into; default: a new one.
+      ax: axes to draw one panel into, by default "x", in your own style; `ax.legend()` then names
+        the runs.
 
     Returns:
-      The whole figure; of a SubFigure, the one that it is part of.
+      The whole figure; of a SubFigure or of axes, the one that they are part of.
 
     Raises:
       ScenarioError: no traces, traces of several plants, an unknown panel, size or format, or a
         path that cannot be written.
     """
     paths = pages.files(path, format)
+    if ax is not None:
+        name = find("panel", pages.given_axes(ax, size, fig, panels), PANEL_NAMES)
+        _draw_alone(ax, DrawnRuns.of(traces, labels), name, title)
+        return pages.save(ax.figure, paths)
     width, height = pages.measure(size, fig)
     runs = DrawnRuns.of(traces, labels)
     if panels is None:
@@ -290,7 +297,7 @@ def _cells(
 
 def _height(panel: Panel) -> float:
     """Return the relative height of a panel over time."""
-    if not lanes.crowded(panel):
+    if drawing.is_shared(panel) or not lanes.crowded(panel):
         return 1.0
     row = LINE_ROW if len(panel.group.channels) == 1 else LINES_ROW
     return max(1.0, row * len(panel.traces))
@@ -348,13 +355,44 @@ def _draw_over_time(
             ax.tick_params(labelbottom=False)
         _equal_ranges(frame, rows)
     if axes:
-        shown, whole = runs.span
         axes[-1].tick_params(labelbottom=True)
-        words = "time (s)"
-        if shown < whole:
-            words += f", the first {shown:.2g} s of {whole:g} s"
-        axes[-1].set_xlabel(words)
+        axes[-1].set_xlabel(_time_words(runs))
     page.align_ylabels(frames)
+
+
+def _draw_alone(ax: Axes, runs: DrawnRuns, name: str, title: str | None) -> None:
+    """Draw one panel into a caller's axes, which keep their look."""
+    before = set(ax.findobj())
+    blocks = _blocks(runs, [name])
+    if blocks.beside:
+        places = blocks.places[1:] if name == "phase" else blocks.places[:1]
+    else:
+        places = blocks.left
+    if len(places) != 1 or len(blocks.beside) > 1:
+        plant = runs.traces[0].scenario.plant.name
+        count = len(blocks.beside or places) or "none"
+        raise ScenarioError(
+            f"{plant} has {count} of the panel {name!r}, and one ax: choose another, or give fig"
+        )
+    if blocks.beside:
+        _draw_side(ax, name, places[0], runs)
+    else:
+        ax.set(xlim=(0.0, runs.span[0]), xlabel=_time_words(runs), ylabel=places[0].label)
+        drawing.over_time(ax, places[0], runs.colours, names=runs.names)
+        drawing.mark(ax, runs.marks, named=title is None)
+    if title is not None:
+        ax.set_title(style.titled(title, ""))
+    for handle in pages.run_handles(runs.traces, runs.names, runs.colours)[0]:
+        ax.add_artist(handle)
+    dark.suit_page(set(ax.findobj()) - before)
+
+
+def _time_words(runs: DrawnRuns) -> str:
+    """Return the label of the time axis of panels that may end before the runs do."""
+    shown, whole = runs.span
+    if shown < whole:
+        return f"time (s), the first {shown:.2g} s of {whole:g} s"
+    return "time (s)"
 
 
 def _rows(
@@ -368,6 +406,10 @@ def _rows(
 
     A crowded panel has a row for each trace, with the trace's name in it. Others have one row.
     """
+    if drawing.is_shared(panel):
+        ax = page.add_subplot(cell, sharex=share)
+        drawing.note(ax, "the same in all runs")
+        return ax, [lanes.Row(ax, panel._replace(traces=panel.traces[:1]), [style.DISTURBANCE])]
     if not lanes.crowded(panel):
         ax = page.add_subplot(cell, sharex=share)
         return ax, [lanes.Row(ax, panel, runs.colours)]
@@ -429,24 +471,28 @@ def _draw_beside(
     """
     portraits = iter(places[1:])
     for cell, name in zip(cells, column, strict=True):
-        ax = page.add_subplot(cell)
-        if name == "end":
-            panel = places[0]._replace(quantity="u")
-            drawing.last_samples(ax, panel, runs.colours)
-            plant = panel.traces[0].scenario.plant
-            letter = "control u"
-            if plant.driven > 1 or plant.direct:
-                letter = f"{channel_names(plant)[0]} u"
-            label = style.folded(letter + panel.scale[1])
-            ax.set(xlabel="time before the end (ms)", ylabel=label)
-        elif name == "phase":
-            drawing.phase(ax, next(portraits), runs.colours)
-        else:
-            panel = places[0]._replace(quantity="settling")
-            drawing.over_time(ax, panel, runs.colours, names=runs.names)
-            width = 1e3 * quantities.peak_window(panel.traces)
-            words = f"time (s)\nthe largest in the last {width:.3g} ms"
-            ax.set(xlabel=words, ylabel=panel.label, xlim=(0.0, runs.span[1]))
+        place = next(portraits) if name == "phase" else places[0]
+        _draw_side(page.add_subplot(cell), name, place, runs)
+
+
+def _draw_side(ax: Axes, name: str, place: Panel, runs: DrawnRuns) -> None:
+    """Draw a panel that is not over the time of others, for the group of channels of `place`."""
+    if name == "end":
+        panel = place._replace(quantity="u")
+        drawing.last_samples(ax, panel, runs.colours)
+        plant = panel.traces[0].scenario.plant
+        letter = "control u"
+        if plant.driven > 1 or plant.direct:
+            letter = f"{channel_names(plant)[0]} u"
+        ax.set(xlabel="time before the end (ms)", ylabel=style.folded(letter + panel.scale[1]))
+    elif name == "phase":
+        drawing.phase(ax, place, runs.colours)
+    else:
+        panel = place._replace(quantity="settling")
+        drawing.over_time(ax, panel, runs.colours, names=runs.names)
+        width = 1e3 * quantities.peak_window(panel.traces)
+        words = f"time (s)\nthe largest in the last {width:.3g} ms"
+        ax.set(xlabel=words, ylabel=panel.label, xlim=(0.0, runs.span[1]))
 
 
 def _key(shown: Sequence[Panel]) -> list[Handle]:

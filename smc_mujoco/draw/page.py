@@ -23,10 +23,10 @@ from matplotlib.text import Annotation
 from matplotlib.ticker import MaxNLocator
 
 from smc_mujoco.common.constraints import OneOf
-from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.common.files import as_path, replacing
 from smc_mujoco.control.source import NONE, Source, kinds
-from smc_mujoco.draw import style
+from smc_mujoco.draw import dark, style
 from smc_mujoco.simulation.trace import Trace
 
 DPI = 200  # of a PNG of a full page or a slide
@@ -115,6 +115,20 @@ def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, f
 def entry(label: str, colour: str = style.MUTED, **look: Any) -> Line2D:
     """Return a legend's entry with a line, of 3 points by default."""
     return Line2D([], [], label=label, color=colour, **{"lw": style.points(3.0), **look})
+
+
+def given_axes(
+    ax: Axes, size: Size, fig: Figure | SubFigure | None, panels: Sequence[str] | None
+) -> str:
+    """Return the panel that is drawn into a caller's axes; refuse what does not go with them."""
+    if not isinstance(ax, Axes):
+        raise ScenarioError(f"ax is {shown(ax)}: give axes of matplotlib")
+    if size is not None or fig is not None:
+        raise ScenarioError("ax has a figure and a size: give ax alone, or size or fig")
+    chosen = items_of("panels", ["x"] if panels is None else panels)
+    if len(chosen) != 1:
+        raise ScenarioError(f"panels is {shown(panels)} for one ax: give one, such as ['u']")
+    return chosen[0]
 
 
 def blank(width: float, height: float, fig: Figure | SubFigure | None = None) -> Figure | SubFigure:
@@ -273,6 +287,12 @@ def files(path: str | os.PathLike[str] | None, format: str | None = None) -> lis
 
 
 def write(page: Figure | SubFigure, paths: Sequence[Path]) -> Figure:
+    """Suit a figure that is drawn to a dark page, write it as `save` does, and return it."""
+    dark.suit_page(page.findobj())
+    return save(page, paths)
+
+
+def save(page: Figure | SubFigure, paths: Sequence[Path]) -> Figure:
     """Write a whole figure to files of these names, its label as their description, and return it.
 
     The same figure gives the same files.

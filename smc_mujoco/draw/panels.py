@@ -72,6 +72,7 @@ WHOLE_LABELS = {  # quantity, one number a sample -> what an axis says
 }
 SINGLE = ("spread", *WHOLE_LABELS)  # one number a sample, whatever the number of channels
 UNBANDED = ("x", "e", *SINGLE)  # drawn sample by sample, without a mean over time
+NO_SURFACE = ("baseline", "predictive", "feedback", "linear")  # families of laws without an s
 DASHES = (0, (4, 4))  # of a reference's line
 REFERENCE = "reference"  # id of a reference's lines
 
@@ -98,7 +99,7 @@ class Panel(NamedTuple):
         if self.quantity in PEAKS:
             return 1.0, f" ({unit})"
         factor, prefixed = style.prefixed(max(map(abs, limits(self.traces, self.quantity))), unit)
-        if self.quantity != "s" or all(map(slides_on_speed, self.traces)):
+        if self.quantity != "s" or all(map(slides_on_speed, filter(slides, self.traces))):
             return factor, f" ({prefixed})"
         return factor, "" if factor == 1.0 else f" / {1.0 / factor:g}"
 
@@ -135,25 +136,44 @@ class Panel(NamedTuple):
 
 
 def slides(trace: Trace) -> bool:
-    """Return whether a law has a sliding variable; the s of a baseline such as PID is a force."""
+    """Return whether a law has a sliding variable: the s of a baseline such as PID is a force, and
+    a law that cancels what an observer finds slides only if it switches.
+    """
     template = trace.scenario.law.template
-    return template is None or template.family != "baseline"
+    if template is None:
+        return True
+    if template.family == "disturbance-observer":
+        return not template.continuous
+    return template.family not in NO_SURFACE
 
 
 def slides_on_speed(trace: Trace) -> bool:
-    """Return whether s has the unit of a speed: that of twisting is e, and that of PID a force."""
-    law = trace.scenario.law
-    baseline = law.template is not None and law.template.family == "baseline"
-    return law.relative_degree == 1 and not trace.scenario.plant.free and not baseline
+    """Return whether s has the unit of a speed: that of twisting is e."""
+    scenario = trace.scenario
+    return scenario.law.relative_degree == 1 and not scenario.plant.free and slides(trace)
+
+
+def without_s(trace: Trace) -> Trace:
+    """Return a trace whose s is unknown, so that no panel draws it."""
+    return dataclasses.replace(trace, s=np.full_like(trace.s, np.nan))
+
+
+def is_shared(panel: Panel) -> bool:
+    """Return whether a panel shows one disturbance, which all its runs have."""
+    first, *others = panel.traces
+    if panel.quantity != "d" or not others:
+        return False
+    return all(np.array_equal(first.d, other.d, equal_nan=True) for other in others)
 
 
 def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
     """Return the panels of a quantity over time, one for each group of channels that has it; a tip
     has one panel.
     """
-    groups = style.split(traces)
     scenarios = [trace.scenario for trace in traces]
-    panels = [Panel(quantity, group, parts) for group, parts in groups.items()]
+    if quantity == "s":
+        traces = [trace if slides(trace) else without_s(trace) for trace in traces]
+    panels = [Panel(quantity, *each) for each in style.split(traces).items()]
     if quantity == "tip":
         return [panels[0]._replace(traces=traces)] if all(s.plant.tip for s in scenarios) else []
     if quantity == "contact":
@@ -163,22 +183,26 @@ def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
     if quantity == "force" and not any(scenario.actuator for scenario in scenarios):
         return []
     kept = []
-    for panel in panels:
-        if quantity == "reaction":
-            wanted = any(np.nan_to_num(part.reaction).any() for part in panel.traces)
-        elif quantity == "s":
-            wanted = panel.group.driven and any(map(slides, panel.traces))
-        elif quantity == "spread":
-            wanted = panel.group.driven and len(panel.group.channels) > 1
-        else:
-            wanted = panel.group.driven
-        if not wanted:
-            continue
+    for panel in filter(has_something, panels):
         if quantity in ("u", "applied") and not panel.group.effort:
             kept += by_channel(panel)
         else:
             kept.append(panel)
     return kept
+
+
+def has_something(panel: Panel) -> bool:
+    """Return whether a panel has something to show: reactions and disturbances may be zero, and
+    channels without an actuator have no control.
+    """
+    quantity = panel.quantity
+    if quantity in ("reaction", "d"):
+        return any(np.nan_to_num(QUANTITIES[quantity](part)).any() for part in panel.traces)
+    if quantity == "s":
+        return panel.group.driven and any(map(slides, panel.traces))
+    if quantity == "spread":
+        return panel.group.driven and len(panel.group.channels) > 1
+    return panel.group.driven
 
 
 def worst_first(traces: Sequence[Trace]) -> list[Panel]:
@@ -381,15 +405,21 @@ def over_time(
 def set_logarithmic(ax: Axes, heights: Pair) -> None:
     """Make the vertical axis logarithmic, for values in this range."""
     ax.set_yscale("log")
-    first, last = np.log10(heights)
+    number_decades(ax.yaxis, heights)
+
+
+def number_decades(axis: Axis, ends: Pair) -> None:
+    """Number the decades of a logarithmic axis between its ends; with fewer than two of them, a
+    number between them too.
+    """
+    first, last = np.log10(ends)
     if math.floor(last) > math.ceil(first):
-        ax.yaxis.set_minor_formatter(NullFormatter())
+        axis.set_minor_formatter(NullFormatter())
         return
-    # with fewer than two decades, numbers between them
-    ax.yaxis.set_minor_locator(LogLocator(subs=(3.0,)))
+    axis.set_minor_locator(LogLocator(subs=(3.0,)))
     numbers = FuncFormatter(lambda value, _: style.short(value))
-    ax.yaxis.set_major_formatter(numbers)
-    ax.yaxis.set_minor_formatter(numbers)
+    axis.set_major_formatter(numbers)
+    axis.set_minor_formatter(numbers)
 
 
 def steps(trace: Trace, name: str) -> str:

@@ -49,6 +49,7 @@ HUES = 36  # of the grid from which colours are chosen
 # 2009).
 REACTION = "#9018F0"
 NEUTRAL = (PAPER, INK, DISTURBANCE, REACTION, FAILED)  # colours that no law has
+DARK_PAGE = 0.2  # luminance of the darkest light page; chosen
 LOG_RANGE = 20.0  # largest over smallest value above which an axis may be logarithmic; chosen
 MANY_DIGITS = 1e5  # from it on, matplotlib writes numbers with an exponent
 # of units, by the power of 1000 that a number is given
@@ -153,10 +154,32 @@ def page(width: float = FULL_WIDTH):
         letters = RC["font.size"]
     scale = letters / RC["font.size"]
     keys = ("size", "linewidth", "markersize")
+    on_dark = neutral_on_dark()
     scaled: Any = {}
     for key, value in RC.items():
-        scaled[key] = value * scale if key.endswith(keys) else value
+        if key.endswith(keys):
+            scaled[key] = value * scale
+        else:
+            scaled[key] = on_dark.get(value, value)
     return rc_context(scaled)
+
+
+def neutral_on_dark() -> dict[Any, str]:
+    """Return the neutral colours of this style -> those on the caller's page, if that is dark, as
+    in `plt.style.context("dark_background")`; {} on a light page.
+    """
+    from matplotlib import rcParams
+    from matplotlib.colors import to_hex
+
+    if rcParams["axes.facecolor"] == "none":
+        return {}
+    paper = to_hex(rcParams["axes.facecolor"]).upper()
+    if luminance(paper) > DARK_PAGE:
+        return {}
+    ink = to_hex(rcParams["text.color"]).upper()
+    shares = {GRID: 0.16, BAND: 0.25, RULE: 0.4, FAILED: 0.55, MUTED: 0.7, DISTURBANCE: 0.85}
+    mixtures = {colour: mixed(paper, ink, share) for colour, share in shares.items()}
+    return {PAPER: paper, INK: ink, **mixtures}
 
 
 def points(size: float) -> float:
@@ -694,12 +717,12 @@ def letters_on(colour: str) -> str:
     """Return the colour of letters that have more contrast with a colour, white or ink (WCAG
     2.2).
     """
-    on = _luminance(colour) + 0.05
-    darker = on / (_luminance(INK) + 0.05)
-    return INK if darker > (_luminance(PAPER) + 0.05) / on else PAPER
+    on = luminance(colour) + 0.05
+    darker = on / (luminance(INK) + 0.05)
+    return INK if darker > (luminance(PAPER) + 0.05) / on else PAPER
 
 
-def _luminance(colour: str) -> float:
+def luminance(colour: str) -> float:
     """Return the relative luminance of WCAG 2.2, 0 for black and 1 for white."""
     return float(np.array([0.2126, 0.7152, 0.0722]) @ _linear(colour))
 

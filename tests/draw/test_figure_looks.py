@@ -7,12 +7,14 @@ import itertools
 import json
 import re
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from helpers.boxes import words_of
 from helpers.sketch import failed
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 import smc_mujoco as smc
 from smc_mujoco.draw import coincidence, horizon, panels, quantities, style
@@ -508,13 +510,85 @@ def test_a_board_s_intervals_are_those_of_the_table_where_runs_share_gains(monke
 
 
 @pytest.mark.parametrize(
-    ("law", "unit"),
+    ("law", "unit", "drawn"),
     [
-        ("classical", " (m/s)"),
-        ("twisting", ""),
-        ("pid", ""),
+        ("boundary_layer", " (m/s)", 2),
+        ("extended_state", "", 2),
+        ("twisting", "", 2),
+        ("pid", " (m/s)", 1),
+        ("adrc", " (m/s)", 1),
+        ("mpc", " (m/s)", 1),
     ],
 )
-def test_only_an_s_that_is_a_velocity_has_its_unit(law, unit, one):
-    (shown,) = panels.over_groups([one, under(one, law, 0.9)], "s")
-    assert shown.label == f"sliding variable s{unit}"
+def test_s_is_drawn_for_laws_with_a_surface_and_has_its_unit_if_all_are_speeds(
+    law, unit, drawn, one
+):
+    page = figure([one, under(one, law, 0.9)], panels=["s"])
+    (ax,) = page.axes
+    assert ax.get_ylabel().replace("\n", " ") == f"sliding variable s{unit}"
+    assert sum(np.isfinite(line.get_ydata()).any() for line in curves(ax)) == drawn
+    if drawn == 1:
+        alone = figure(under(one, law, 0.9)).axes
+        assert not any("sliding" in ax.get_ylabel() for ax in alone)
+
+
+def test_a_disturbance_that_all_runs_have_is_one_line_that_says_so(one):
+    pushed = dataclasses.replace(one, d=np.sin(one.t)[:, None])
+    (ax,) = figure([pushed, under(pushed, "pid", 0.9)], panels=["d"]).axes
+    assert [line.get_color() for line in curves(ax)] == [style.DISTURBANCE]
+    assert ax.get_title(loc="right") == "the same in all runs"
+    other = dataclasses.replace(under(pushed, "pid", 0.9), d=0.5 * pushed.d)
+    (ax,) = figure([pushed, other], panels=["d"]).axes
+    assert len(curves(ax)) == 2
+
+
+def contrast(one: str, other: str) -> float:
+    """The contrast of WCAG 2.2."""
+    low, high = sorted(style.luminance(colour) + 0.05 for colour in (one, other))
+    return high / low
+
+
+def test_a_page_is_dark_where_the_caller_s_style_is_and_all_on_it_can_be_seen(one):
+    runs = [one, *(under(one, law, 0.9) for law in ("pid", "adrc", "super_twisting"))]
+    with plt.style.context("dark_background"):
+        page = figure(runs)
+        board = smc.plot(Rows(), metrics=["settling_time"])
+    for dark in (page, board):
+        assert to_hex(dark.get_facecolor()) == "#000000"
+        for words in dark.findobj(Text):
+            if words.get_text():
+                assert contrast(to_hex(words.get_color()), "#000000") > 4.5, words
+                if behind := words.get_bbox_patch():
+                    assert to_hex(behind.get_facecolor()) == "#000000"
+        for ax in dark.axes:
+            for line in curves(ax):
+                assert contrast(to_hex(line.get_color()), "#000000") >= 3.0, line
+    usual = figure(runs)
+    assert to_hex(usual.get_facecolor()).upper() == style.PAPER
+
+
+def test_a_panel_is_drawn_into_axes_of_the_caller_whose_legend_names_the_runs(one, tmp_path):
+    runs = [one, under(one, "pid", 0.9)]
+    fig, (left, right) = plt.subplots(1, 2)
+    assert figure(runs, ax=left) is fig
+    assert figure(runs, tmp_path / "two.png", format="png", ax=right, panels=["phase"]) is fig
+    assert (tmp_path / "two.png").exists()
+    for ax in (left, right):
+        assert [text.get_text() for text in ax.legend().get_texts()] == ["Classical", "PID"]
+    assert left.get_ylabel() == "position x (m)"
+    assert any(np.array_equal(line.get_xdata(), (one.x - one.r)[:, 0]) for line in curves(right))
+    plt.close(fig)
+
+
+def test_a_metric_s_axis_is_of_one_kind_on_all_plants():
+    class Two(Rows):
+        def column(self, name):
+            found = super().column(name)
+            if name == "tv_rate":
+                wide = self.column("plant") == "duffing"
+                found = np.where(wide, np.geomspace(1.0, 1e4, len(found)), found)
+            return found
+
+    page = smc.plot(Two(), metrics=["tv_rate", "settling_time"])
+    scales = [ax.get_xscale() for ax in page.axes]
+    assert scales == ["log", "linear", "log", "linear"]

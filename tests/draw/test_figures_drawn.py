@@ -44,9 +44,9 @@ ALL = (
     "settling",
     "end",
 )
-NEUTRAL = {
-    to_hex(colour) for colour in (style.INK, style.MUTED, style.RULE, style.PAPER, style.GRID)
-}
+# a disturbance that all runs have is named above its panel
+NEUTRAL = {style.INK, style.MUTED, style.RULE, style.PAPER, style.GRID, style.DISTURBANCE}
+NEUTRAL = set(map(to_hex, NEUTRAL))
 UNIT = re.compile(r"\((?:s|ms|1/s|s²|unit of s|[µm]?(?:m|rad|N|N·m|V)(?:/s)?)\)")
 UNITLESS = re.compile(r"share of .*|(real|imaginary) part|.*\bs")  # also s, whose unit is the law's
 
@@ -498,6 +498,10 @@ REFUSED = {  # call -> arguments, and what replaces them
             {"size": (1.9, 5.0)},
             {"size": (5.0,)},
             {"size": (5.0, 4.0), "fig": Figure()},
+            {"ax": Figure()},
+            {"ax": Figure().add_subplot(), "size": "slide"},
+            {"ax": Figure().add_subplot(), "panels": ["x", "u"]},
+            {"ax": Figure().add_subplot(), "panels": ["tip"]},
             {"panels": ["y"]},
             {"panels": []},
         ],

@@ -138,7 +138,7 @@ def test_contrasts_are_those_of_wcag():
     Grey #757575 is the lightest on which white letters have 4.5 : 1.
     """
     light, grey, black = (
-        style._luminance(colour) + 0.05 for colour in ("#FFFFFF", "#757575", "#000000")
+        style.luminance(colour) + 0.05 for colour in ("#FFFFFF", "#757575", "#000000")
     )
     assert light / black == pytest.approx(21.0)
     assert 4.5 < light / grey < 4.7

@@ -115,7 +115,8 @@ class Sheet:
         self.tiles = tiles
         self.start = start
         self.letters = letters(size)
-        with style.page(WIDTH), rc_context(LOOK):  # pyright: ignore[reportArgumentType]
+        light = rc_context({"axes.facecolor": style.PAPER})  # whatever the caller's page
+        with light, style.page(WIDTH), rc_context(LOOK):  # pyright: ignore[reportArgumentType]
             inches = (WIDTH, WIDTH * size[1] / size[0])
             self.page = Figure(figsize=inches, dpi=size[0] / WIDTH)
             self.canvas = FigureCanvasAgg(self.page)
