@@ -55,11 +55,9 @@ def print_pages(name: str, console: Console) -> None:
         if name in templates:
             pages.append((templates[name], templates.package(name)))
     if not pages and "." in name:
-        pages.extend(
-            (law.template, "")
-            for law in from_text.laws(name)
-            if isinstance(law, Law) and law.template
-        )
+        for law in from_text.laws(name):
+            if isinstance(law, Law) and law.template:
+                pages.append((law.template, ""))
     if not pages:
         raise unknown("law, surface or velocity estimator", name, known)
     for template, package in pages:
@@ -73,7 +71,10 @@ def print_plant(plant: Plant, console: Console) -> None:
     _print_docstring(inspect.getdoc(inspect.getmodule(plant.build)) or "", console)
     rows = {"parameters": _values(plant.parameters)}
     for name, values in plant.sets.items():
-        changed = {key: value for key, value in values.items() if value != plant.parameters[key]}
+        changed = {}
+        for key, value in values.items():
+            if value != plant.parameters[key]:
+                changed[key] = value
         rows[f"set {name}"] = _values(changed) or "the default"
     rows["use"] = f'smc.plant("{plant.name}")'
     _print_rows(rows, console)
@@ -101,10 +102,10 @@ def lists() -> dict[str, list[tuple[str, str]]]:
     """Return heading -> name and formula of each law, surface and estimator, as the first line of
     its docstring.
     """
-    return {
-        heading: listed(templates(), lambda template: template.doc)
-        for heading, templates in CATALOGUES.items()
-    }
+    rows = {}
+    for heading, templates in CATALOGUES.items():
+        rows[heading] = listed(templates(), lambda template: template.doc)
+    return rows
 
 
 def print_suitable(needs: Sequence[str], plant: str | None, console: Console) -> None:
@@ -115,7 +116,11 @@ def print_suitable(needs: Sequence[str], plant: str | None, console: Console) ->
         title += f" that {' and '.join(PROPERTIES[need].words for need in needs)}"
     if plant is not None:
         title += f" for {plant}"
-    console.print(catalogue(title, [row for row in lists()["Laws"] if row[0] in names]))
+    shown = []
+    for row in lists()["Laws"]:
+        if row[0] in names:
+            shown.append(row)
+    console.print(catalogue(title, shown))
 
 
 def print_page(template: Template, console: Console, package: str, text: str) -> None:
@@ -126,12 +131,12 @@ def print_page(template: Template, console: Console, package: str, text: str) ->
     _print_docstring(template.doc, console)
     some = _values(dict(list(template.defaults.items())[:2]))
     call = f'"{text}", {some}' if some else f'"{text}"'
+    conditions = [*template.conditions]
+    for words in template.advice:
+        conditions.append(f"{words} (advice)")
     rows = {
         "gains": "\n".join(_gains(template)),
-        "conditions": "\n".join(
-            [*template.conditions, *(f"{words} (advice)" for words in template.advice)]
-        )
-        or "none on the gains alone",
+        "conditions": "\n".join(conditions) or "none on the gains alone",
         "family": template.family,
         "package": package,
         "use": CALL_TEMPLATES[template.kind].format(call),
@@ -139,10 +144,16 @@ def print_page(template: Template, console: Console, package: str, text: str) ->
     if template.kind == "law":
         degree = template.relative_degree
         rows["degree"] = f"{degree}: acts on {DEGREES.get(degree, 'joints')}"
-        rows["properties"] = ", ".join(
-            name for name, needed in PROPERTIES.items() if needed.holds(template)
-        )
-        rows["reads"] = ", ".join(name for name in Measurement._fields if name in reads(template))
+        held = []
+        for name, needed in PROPERTIES.items():
+            if needed.holds(template):
+                held.append(name)
+        rows["properties"] = ", ".join(held)
+        fields = []
+        for name in Measurement._fields:
+            if name in reads(template):
+                fields.append(name)
+        rows["reads"] = ", ".join(fields)
         rows["plants"] = ", ".join(template.plants) or "all with an actuator at each joint"
     _print_rows(rows, console)
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from rich.table import Column, Table
+from rich.table import Table
 from rich.text import Text
 
-from smc_mujoco.cli.tables import titled
+from smc_mujoco.cli.tables import number_columns, titled
 from smc_mujoco.common.text import number
 from smc_mujoco.identification.identify import Identified
 from smc_mujoco.identification.number_text import to_error
@@ -18,7 +18,7 @@ def fits(title: str, by_name: Mapping[str, Mapping[str, float]]) -> Table:
     table = titled(
         f"{title}: fit, %",
         "",
-        *(Column(head, justify="right") for head in next(iter(by_name.values()))),
+        *number_columns(next(iter(by_name.values()))),
     )
     for name, fit in by_name.items():
         table.add_row(name, *(f"{value:z.1f}" for value in fit.values()))
@@ -32,7 +32,7 @@ def identified(result: Identified, names: Sequence[str]) -> list[Table]:
     values = titled(
         result.rig.label,
         "quantity",
-        *(Column(head, justify="right") for head in ("value", "±", "start")),
+        *number_columns(("value", "±", "start")),
         "",
     )
     for name, value in result.values.items():
@@ -42,7 +42,7 @@ def identified(result: Identified, names: Sequence[str]) -> list[Table]:
         values.add_row(
             name, to_error(value, error), f"{error:.2g}", before, Text(quantity.unit, "dim")
         )
-    heads = [Column(head, justify="right") for head in result.fits[0]]
+    heads = number_columns(result.fits[0])
     title = "fit, % (before)"
     if result.by_pieces:
         title = "fit of the whole log, % (in pieces of 1 s)"

@@ -92,11 +92,11 @@ def repeat(traces: Traces, threads: int | None) -> dict[str, dict[str, list[Trac
     for condition, runs in traces.items():
         for label, trace in runs.items():
             with contextlib.suppress(ScenarioError):  # its step cannot be halved
-                changed += [(condition, label, again) for again in repetitions(trace)]
+                for again in repetitions(trace):
+                    changed.append((condition, label, again))
+    repeated = run([scenario for *_, scenario in changed], threads, progress=True)
     made: dict[str, dict[str, list[Trace]]] = {}
-    for (condition, label, _), trace in zip(
-        changed, run([s for *_, s in changed], threads, progress=True), strict=True
-    ):
+    for (condition, label, _), trace in zip(changed, repeated, strict=True):
         made.setdefault(condition, {}).setdefault(label, []).append(trace)
     return made
 
@@ -108,7 +108,8 @@ def save(traces: Traces, out: Path, export: Sequence[str] = ()) -> list[Path]:
         for label, trace in runs.items():
             name = f"{slug(condition)}-{slug(label)}"
             written.append(trace.save(out / f"{name}.npz"))
-            written += [trace.export(out / f"{name}.{ending}") for ending in export]
+            for ending in export:
+                written.append(trace.export(out / f"{name}.{ending}"))
     return written
 
 

@@ -93,31 +93,51 @@ def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) 
         for metric in metrics():
             if metric.applies_to(group):
                 units[metric.name] = metric.unit_for(group.unit, group.effort)
-        shown = {head: name for head, name in SCORE_COLUMNS.items() if name in units}
-        heads = [Text(f"{head}\n").append(units[name], "dim") for head, name in shown.items()]
+        shown = []
+        heads = []
+        for head, name in SCORE_COLUMNS.items():
+            if name in units:
+                shown.append(name)
+                heads.append(_head(head, units[name]))
         rows: dict[str, list[Text]] = {}
         for label, runs in values.items():
-            least = {name: floor(traces[label].scenario, name) for name in units}
+            least = {}
+            for name in units:
+                least[name] = floor(traces[label].scenario, name)
             rows[label] = []
-            for name in shown.values():
+            for name in shown:
                 of_runs: list[Any] = [run and run[group.name][name] for run in runs]
                 rows[label].append(_marked(of_runs, traces[label].scenario, least[name]))
         tables.append(_by_label(", ".join(filter(None, (title, heading))), heads, traces, rows))
-    gains = {label: [trace.scenario.law.source] for label, trace in traces.items()}
+    gains = {}
+    for label, trace in traces.items():
+        gains[label] = [trace.scenario.law.source]
     return _noted(tables, in_words(gains))
+
+
+def _head(head: str, unit: str) -> Text:
+    """Return a column's heading with the unit below."""
+    return Text(f"{head}\n").append(unit, "dim")
 
 
 def _noted(tables: list[Table], *words: str) -> list[Table]:
     """Return tables with words below the last one, and what a mark means if a cell has one."""
-    notes = [word for word in words if word]
-    for table in tables:
-        for column in table.columns:
-            if SCORE_NOTE not in notes and any(MARK in str(cell) for cell in column.cells):
-                notes.append(SCORE_NOTE)
+    notes = list(filter(None, words))
+    if any(map(_has_mark, tables)):
+        notes.append(SCORE_NOTE)
     if tables and notes:
         tables[-1].caption = "; ".join(notes)
         tables[-1].caption_justify = "left"
     return tables
+
+
+def _has_mark(table: Table) -> bool:
+    """Return whether a cell of a table has a mark."""
+    for column in table.columns:
+        for cell in column.cells:
+            if MARK in str(cell):
+                return True
+    return False
 
 
 def _several(
@@ -128,9 +148,21 @@ def _several(
     """
     values = {}
     for label, trace in traces.items():
-        runs = (trace, *(again or {}).get(label, ()))
-        values[label] = [None if run.diverged_at is not None else scored(run) for run in runs]
-    return {label: scores for label, scores in values.items() if any(scores)}
+        of_runs = _of_runs(scored, (trace, *(again or {}).get(label, ())))
+        if any(of_runs):
+            values[label] = of_runs
+    return values
+
+
+def _of_runs(scored: Callable[[Trace], T], runs: Iterable[Trace]) -> list[T | None]:
+    """Return what is scored of each run, None for one that failed."""
+    scores = []
+    for run in runs:
+        if run.diverged_at is None:
+            scores.append(scored(run))
+        else:
+            scores.append(None)
+    return scores
 
 
 def _marked(values: Sequence[float | None], scenario: Scenario, least: float = 0.0) -> Text:
@@ -145,7 +177,12 @@ def _marked(values: Sequence[float | None], scenario: Scenario, least: float = 0
             return math.inf
         return -math.inf if math.isnan(value) else value
 
-    texts = {value: FAILED.plain if value is None else number(value) for value in values}
+    texts = {}
+    for value in values:
+        if value is None:
+            texts[value] = FAILED.plain
+        else:
+            texts[value] = number(value)
     low = texts[min(values, key=size)]
     high = texts[max(values, key=size)]
     numbers = [math.inf if value is None else value for value in values]
@@ -160,12 +197,16 @@ def tips(title: str, traces: Mapping[str, Trace], again: Again | None = None) ->
         return []
     values = _several(tip_scores, traces, again)
     known = set().union(*filter(None, chain.from_iterable(values.values())))
-    shown = {head: column for head, column in TIP_COLUMNS.items() if column[0] in known}
-    heads = [Text(f"{head}\n").append(unit, "dim") for head, (_, unit, _) in shown.items()]
+    shown = []
+    heads = []
+    for head, (name, unit, factor) in TIP_COLUMNS.items():
+        if name in known:
+            shown.append((name, factor))
+            heads.append(_head(head, unit))
     rows: dict[str, list[Text]] = {}
     for label, runs in values.items():
         rows[label] = []
-        for name, _, factor in shown.values():
+        for name, factor in shown:
             of_runs: list[Any] = [run and factor * run.get(name, math.nan) for run in runs]
             rows[label].append(_marked(of_runs, traces[label].scenario))
     return _noted([_by_label(f"{title}, tip", heads, traces, rows)])
@@ -206,13 +247,16 @@ def answers(
             units = {}
             for plant, efforts in scenarios:
                 units[metric.unit_for(plant.unit, efforts[0])] = None
-            columns[f"{metric.name} ({' or '.join(units)})"] = [
-                (condition, metric, runs, (again or {}).get(condition, {}))
-                for condition, runs in traces.items()
-            ]
+            of_metric = []
+            for condition, runs in traces.items():
+                of_metric.append((condition, metric, runs, (again or {}).get(condition, {})))
+            columns[f"{metric.name} ({' or '.join(units)})"] = of_metric
     if len(traces) == 1:
         columns = {"": [(head, *column[1:]) for head, (column,) in columns.items()]}
-    return _noted([_answer(head, of_metric) for head, of_metric in columns.items()])
+    answered = []
+    for head, of_metric in columns.items():
+        answered.append(_answer(head, of_metric))
+    return _noted(answered)
 
 
 def _answer(title: str, columns: Sequence[tuple[str, Metric, Mapping[str, Trace], Again]]) -> Table:
@@ -224,10 +268,10 @@ def _answer(title: str, columns: Sequence[tuple[str, Metric, Mapping[str, Trace]
         traces |= runs
     rows = {}
     for label in traces:
-        rows[label] = [
-            _cell(metric, runs.get(label), again.get(label, ()))
-            for _, metric, runs, again in columns
-        ]
+        cells = []
+        for _, metric, runs, again in columns:
+            cells.append(_cell(metric, runs.get(label), again.get(label, ())))
+        rows[label] = cells
     table = _by_label(title, [Text(head) for head, *_ in columns], traces, rows, 30)
     table.min_width = len(title)  # a narrower table would break the title
     return table
@@ -239,9 +283,13 @@ def _cell(metric: Metric, trace: Trace | None, again: Sequence[Trace] = ()) -> T
     """
     if trace is None or metric.refusal(trace.scenario):
         return ""
-    runs = (trace, *again)
-    values = [None if run.diverged_at is not None else metric.of(run) for run in runs]
+    values = _of_runs(metric.of, (trace, *again))
     return _marked(values, trace.scenario, floor(trace.scenario, metric.name))
+
+
+def number_columns(heads: Iterable[Text | str], **options: Any) -> list[Column]:
+    """Return the columns of numbers of a table, with other options of `Column`."""
+    return [Column(head, justify="right", **options) for head in heads]
 
 
 def _by_label(
@@ -258,7 +306,7 @@ def _by_label(
     # labels of runs of one law say what differs
     head = "run" if len(laws) == 1 < len(traces) else "law"
     label = Column(head, no_wrap=True, vertical="bottom", max_width=width, overflow="ellipsis")
-    numbers = (Column(head, justify="right", vertical="bottom") for head in heads)
+    numbers = number_columns(heads, vertical="bottom")
     table = titled(title, label, *numbers, padding=0, show_edge=False, pad_edge=False)
     for label, trace in traces.items():
         table.add_row(
@@ -311,7 +359,9 @@ def document(printed: Iterable[Any]) -> dict[str, Any]:
 
 def _tabular(table: Table) -> Tabular:
     """Return the texts of a table of rich."""
-    heads = [" ".join(str(column.header).split()) for column in table.columns]
+    heads = []
+    for column in table.columns:
+        heads.append(" ".join(str(column.header).split()))
     rows = zip(*(map(str, column.cells) for column in table.columns), strict=True)
     notes = [str(table.caption)] if table.caption else []
     return Tabular(headings=heads, rows=list(rows), title=str(table.title or ""), notes=notes)
@@ -348,13 +398,13 @@ def with_package(line: str, package: str) -> str:
 
 
 def margins(kind: str, results: Sequence[Margin]) -> Table:
-    """Return the margins of one kind: a line for each plant and law."""
-    numbers = [
-        Column(head, justify="right", no_wrap=True) for head in ("margin", "to within", "theory")
-    ]
+    """Return the results of one kind: a line for each plant and law."""
+    numbers = number_columns(("margin", "to within", "theory"), no_wrap=True)
     table = titled(f"largest {kind} tolerated", "plant", "law", *numbers, "unit")
     last = None
     for margin in results:
+        if margin.kind != kind:
+            continue
         theory = ""
         if margin.theory is not None:
             theory = "any" if margin.theory == math.inf else number(margin.theory)
@@ -379,7 +429,7 @@ def chattering(
     plant = scenarios[0].plant
     last = "coupling" if plant.driven > 1 else "third"
     heads = [f"s ({plant.units[channel]}/s)", "measured", "Hz", "measured", "±", last]
-    numbers = [Column(head, justify="right", no_wrap=True) for head in heads]
+    numbers = number_columns(heads, no_wrap=True)
     table = titled(f"chattering of {plant.name}: predicted, and measured in runs", "law", *numbers)
     for scenario, cycle, (amplitude, frequency), change in zip(
         scenarios, cycles, measured, changes, strict=True

@@ -48,7 +48,9 @@ def attended(jobs: Iterable[Callable[[], Any]], stop: Callable[[], Any]) -> None
         finally:
             del _running[threading.current_thread()]
 
-    threads = [threading.Thread(target=work, args=(job,), daemon=True) for job in jobs]
+    threads = []
+    for job in jobs:
+        threads.append(threading.Thread(target=work, args=(job,), daemon=True))
     with delay_signals() as deliver:
         try:
             for thread in threads:

@@ -107,7 +107,10 @@ class Each(Constraint):
             raise ScenarioError(
                 f"{what} is {shown(value)}: give a number, or one for each driven channel"
             )
-        return tuple(self.one(f"{what}[{i}]", item) for i, item in enumerate(listed))
+        checked = []
+        for i, item in enumerate(listed):
+            checked.append(self.one(f"{what}[{i}]", item))
+        return tuple(checked)
 
 
 @named_data
@@ -184,7 +187,10 @@ def of_type(kind: Any) -> Constraint | None:
     """
     if typing.get_origin(kind) is Annotated:
         notes = typing.get_args(kind)[1:]
-        return next((note for note in notes if isinstance(note, Constraint)), None)
+        for note in notes:
+            if isinstance(note, Constraint):
+                return note
+        return None
     options = typing.get_args(kind)
     found = next(filter(None, map(of_type, options)), None)
     if found and type(None) in options:
@@ -258,7 +264,10 @@ def constrained(function: Callable[P, T]) -> Callable[P, T]:
     the function runs.
     """
     kinds = function.__annotations__.items()
-    flags = {name: Flag() for name, kind in kinds if kind is bool}
+    flags = {}
+    for name, kind in kinds:
+        if kind is bool:
+            flags[name] = Flag()
     constraints = flags | of_parameters(function)
     signature = inspect.signature(function)
 

@@ -1,7 +1,8 @@
-"""Decorators for classes of immutable data."""
+"""Classes of immutable data, and their attributes by name."""
 
 import dataclasses
-from typing import TypeVar, dataclass_transform
+from collections.abc import Iterable
+from typing import Any, TypeVar, dataclass_transform
 
 T = TypeVar("T")
 
@@ -18,3 +19,8 @@ def frozen_data(kind: type[T]) -> type[T]:
 def named_data(kind: type[T]) -> type[T]:
     """Make a class a frozen dataclass whose fields are given by name."""
     return dataclasses.dataclass(frozen=True, kw_only=True)(kind)
+
+
+def attributes(thing: object, names: Iterable[str]) -> dict[str, Any]:
+    """Return name -> value of these attributes."""
+    return {name: getattr(thing, name) for name in names}

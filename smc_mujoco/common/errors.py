@@ -52,7 +52,13 @@ def printable(text: str) -> str:
     """Return the text with escapes for characters that a terminal would act on, such as a newline
     in a file's name.
     """
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+    shown = []
+    for c in text:
+        if c.isprintable():
+            shown.append(c)
+        else:
+            shown.append(c.encode("unicode_escape").decode())
+    return "".join(shown)
 
 
 def shown(value: object) -> str:
@@ -103,7 +109,10 @@ def _nearest(name: str, names: list[str]) -> list[str]:
     plain = {known.casefold(): known for known in names}
     wanted = name.casefold()
     if name.isupper():
-        abbreviated = [known for known in names if _abbreviates(wanted, known.split("_"))]
+        abbreviated = []
+        for known in names:
+            if _abbreviates(wanted, known.split("_")):
+                abbreviated.append(known)
         if abbreviated:
             return abbreviated
     words = [known for known in plain if wanted in known.split("_")]
@@ -130,7 +139,13 @@ def one_line(text: str, length: int = 200) -> str:
     """Return text on one line of at most `length` characters, with a ? for each that cannot be
     printed.
     """
-    text = "".join(c if c.isprintable() else "?" for c in " ".join(text[: 2 * length].split()))
+    letters = []
+    for c in " ".join(text[: 2 * length].split()):
+        if c.isprintable():
+            letters.append(c)
+        else:
+            letters.append("?")
+    text = "".join(letters)
     if len(text) <= length:
         return text
     return f"{text[: length - 3]}..."

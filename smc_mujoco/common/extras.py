@@ -48,7 +48,10 @@ def missing(name: str, what: str, *packages: str) -> str | None:
     """Return None if packages of an extra are installed, else a sentence that says which are
     not.
     """
-    absent = [package for package in packages if importlib.util.find_spec(package) is None]
+    absent = []
+    for package in packages:
+        if importlib.util.find_spec(package) is None:
+            absent.append(package)
     if absent:
         return f"{what} needs {' and '.join(absent)}: {cure(name)}"
     return None

@@ -88,7 +88,10 @@ def writable(*paths: AnyPath | None) -> None:
 
     Call it before a computation that takes minutes.
     """
-    for path in (Path(given) for given in paths if given is not None):
+    for given in paths:
+        if given is None:
+            continue
+        path = Path(given)
         if os.path.isdir(path):  # unlike Path.is_dir, False also for a name that is too long
             raise ScenarioError(f"cannot write {path}: it is a folder, give the file in it a name")
         with (
@@ -214,7 +217,7 @@ def plain(data: Any) -> Any:
     if isinstance(data, Mapping):
         return {name: plain(value) for name, value in data.items()}
     if isinstance(data, list | tuple):
-        return [plain(value) for value in data]
+        return list(map(plain, data))
     if isinstance(data, float) and not math.isfinite(data):
         if math.isnan(data):
             return "NaN"
@@ -229,7 +232,7 @@ def _restored(data: Any) -> Any:
     if isinstance(data, dict):
         return {name: _restored(value) for name, value in data.items()}
     if isinstance(data, list):
-        return [_restored(value) for value in data]
+        return list(map(_restored, data))
     if isinstance(data, str) and data.lstrip("'") in NON_FINITE:
         if data.startswith("'"):
             return data[1:]

@@ -94,7 +94,8 @@ def package(*without: str) -> str:
             files[name] = path
     for folder in {"models", PAPERS} - {*without}:
         home = shipped(folder)
-        files |= {Path(folder, path.relative_to(home)): path for path in home.rglob("*")}
+        for path in home.rglob("*"):
+            files[Path(folder, path.relative_to(home))] = path
     digest = hashlib.sha256()
     for name, path in sorted(files.items()):
         if path.suffix in (".py", ".xml", ".json", ".toml"):
@@ -149,9 +150,10 @@ def variables(function: Any) -> dict[str, str]:
     cells = zip(
         function.__code__.co_freevars, map(_cell_contents, function.__closure__ or ()), strict=True
     )
-    return {
-        name: now(value) for name, value in (*zip(reached[::2], reached[1::2], strict=True), *cells)
-    }
+    hashes = {}
+    for name, value in (*zip(reached[::2], reached[1::2], strict=True), *cells):
+        hashes[name] = now(value)
+    return hashes
 
 
 _compiled_hashes: dict[Any, str] = {}  # function or class -> its hash when it was compiled
@@ -218,9 +220,10 @@ class _CodePickler(pickle._Pickler):
             contents = sorted(obj.items(), key=lambda item: repr(item[0]))
         elif dataclasses.is_dataclass(obj) and hasattr(obj, "digest"):
             # a file counts by its content: its folder does not compare
-            values = [
-                getattr(obj, field.name) for field in dataclasses.fields(obj) if field.compare
-            ]
+            values = []
+            for field in dataclasses.fields(obj):
+                if field.compare:
+                    values.append(getattr(obj, field.name))
             contents = [type(obj), *values]
         if contents is NotImplemented:
             return contents
@@ -248,7 +251,7 @@ def _versioned(thing: Any) -> bool:
 def _function_contents(function: FunctionType) -> list[Any]:
     """Return everything that a function's result may depend on."""
     names = names_in(function.__code__)
-    closure = [_cell_contents(cell) for cell in function.__closure__ or ()]
+    closure = list(map(_cell_contents, function.__closure__ or ()))
     return [
         function.__code__,
         function.__defaults__,
@@ -305,7 +308,10 @@ def _cell_contents(cell: Any) -> Any:
 
 def _class_contents(kind: type) -> list[Any]:
     """Return the bases of a class, and the functions and values in its definition."""
-    parts: list[Any] = [base for base in kind.__bases__ if not _versioned(base)]
+    parts: list[Any] = []
+    for base in kind.__bases__:
+        if not _versioned(base):
+            parts.append(base)
     for name, value in sorted(vars(kind).items()):
         content = _as_written(value.fget if isinstance(value, property) else value)
         written = name == "__call__" or not name.startswith("__")

@@ -61,7 +61,10 @@ def choice() -> tuple[str, str]:
     wish = os.environ.get("MUJOCO_GL", "").strip().lower()
     if sys.platform != "linux":
         return wish, wish
-    return wish, next((name for name in (wish, "egl", "osmesa") if usable(name)), "disabled")
+    for name in (wish, "egl", "osmesa"):
+        if usable(name):
+            return wish, name
+    return wish, "disabled"
 
 
 def choose_gl() -> str:

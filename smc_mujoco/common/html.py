@@ -56,7 +56,12 @@ def table(
     width = 1
     if headings or rows:
         width = len(headings or rows[0])
-    sides = ["right" if i in numbers else "left" for i in range(width)]
+    sides = []
+    for i in range(width):
+        if i in numbers:
+            sides.append("right")
+        else:
+            sides.append("left")
     parts = [
         '<table style="border-collapse:collapse;font-variant-numeric:tabular-nums;color:inherit">'
     ]
@@ -68,7 +73,9 @@ def table(
             "th", headings, sides, "font-weight:normal;border-bottom:1px solid currentColor;"
         )
         parts.append(f"<thead><tr>{cells}</tr></thead>")
-    lines = [f"<tr>{_cells('td', row, sides, '')}</tr>" for row in rows[:max_rows]]
+    lines = []
+    for row in rows[:max_rows]:
+        lines.append(f"<tr>{_cells('td', row, sides, '')}</tr>")
     wide = f'<tr><td colspan="{width}" style="{_CELL}left;opacity:0.75">'
     if len(rows) > max_rows:
         lines.append(f"{wide}and {len(rows) - max_rows} more</td></tr>")
@@ -79,15 +86,17 @@ def table(
 
 def _cells(tag: str, values: Sequence[object], sides: Sequence[str], style: str) -> str:
     """Return the cells of a row; `sides` are their alignments."""
-    return "".join(
-        f'<{tag} style="{style}{_CELL}{side}">{text(value)}</{tag}>'
-        for value, side in zip(values, sides, strict=True)
-    )
+    cells = []
+    for value, side in zip(values, sides, strict=True):
+        cells.append(f'<{tag} style="{style}{_CELL}{side}">{text(value)}</{tag}>')
+    return "".join(cells)
 
 
 def fields(values: Mapping[str, object], caption: str) -> Html:
     """Return a table of names with their values."""
-    rows = [(Html(f"<i>{text(name)}</i>"), value) for name, value in values.items()]
+    rows = []
+    for name, value in values.items():
+        rows.append((Html(f"<i>{text(name)}</i>"), value))
     return table((), rows, caption, max_rows=99)
 
 

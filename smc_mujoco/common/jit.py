@@ -282,10 +282,9 @@ def attempting(count: int, estimates: bool = False) -> Callable:
                     numbers = [result]
                 else:
                     numbers = [builder.extract_value(result, i) for i in range(count)]
-                stored = [
-                    context.cast(builder, x, item, types.float64)
-                    for x, item in zip(numbers, items, strict=True)
-                ]
+                stored = []
+                for x, item in zip(numbers, items, strict=True):
+                    stored.append(context.cast(builder, x, item, types.float64))
                 place = builder.inttoptr(args[2], ir.DoubleType().as_pointer())
                 for i, x in enumerate([*stored, ir.Constant(ir.DoubleType(), math.nan)][:count]):
                     builder.store(x, builder.gep(place, [ir.Constant(ir.IntType(64), i)]))
@@ -520,7 +519,10 @@ def _complete(library: Any) -> bool:
     for variable in module.global_variables:
         if variable.name.startswith(internals.UNRESOLVED):
             return False
-    defined = [function.name for function in module.functions if not function.is_declaration]
+    defined = []
+    for function in module.functions:
+        if not function.is_declaration:
+            defined.append(function.name)
     return not any(map(NUMBERS.foreign, defined))
 
 
@@ -620,7 +622,8 @@ def _refuse_unchecked(function: FunctionType, callers: tuple[FunctionType, ...])
         )
     names = names_in(function.__code__)
     used = names.variables | names.attributes
-    used |= {getattr(value, "__name__", "") for value in values_in(function)}
+    for value in values_in(function):
+        used.add(getattr(value, "__name__", ""))
     for name in UNCHECKED:
         if name in used:
             raise NotCompilable(f"it uses {name}, whose indices compiled code does not check")

@@ -62,6 +62,10 @@ def lazy_module(package: str) -> LazyModule:
         return sorted({*here(origins), *here(modules), "__doc__"})
 
     def here(found: dict[str, str]) -> dict[str, str]:
-        return {name: module for name, module in found.items() if not annexes.missing(module)}
+        present = {}
+        for name, module in found.items():
+            if not annexes.missing(module):
+                present[name] = module
+        return present
 
     return LazyModule(imported, names, here(origins), here(modules))

@@ -116,7 +116,10 @@ def compiled(
 
 def _callbacks() -> dict[str, Any]:
     """Return name -> the installed callback, or None."""
-    return {name: getattr(mujoco, f"get_mjcb_{name}")() for name in CALLBACKS}
+    known = {}
+    for name in CALLBACKS:
+        known[name] = getattr(mujoco, f"get_mjcb_{name}")()
+    return known
 
 
 def _install(callbacks: dict[str, Any]) -> None:

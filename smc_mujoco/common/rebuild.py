@@ -89,20 +89,20 @@ def helpers(function: FunctionType) -> list[FunctionType]:
     for value in values_in(function):
         found.append(value)
         if isinstance(value, ModuleType):
-            found += [vars(value).get(name) for name in names.attributes]
+            found += list(map(vars(value).get, names.attributes))
     return [value.py_func for value in found if is_jitted(value)]
 
 
 def values_in(function: FunctionType) -> list[Any]:
     """Return the values of the global variables and of the closure of a function."""
     names = names_in(function.__code__)
-    values: list[Any] = [function.__globals__.get(name) for name in names.variables]
+    values: list[Any] = list(map(function.__globals__.get, names.variables))
     return values + [cell.cell_contents for cell in function.__closure__ or ()]
 
 
 def _holds(module: ModuleType, names: set[str]) -> bool:
     """Return whether a module has a compiled function with one of these names."""
-    members: list[Any] = [vars(module).get(name) for name in names]
+    members: list[Any] = list(map(vars(module).get, names))
     return any(map(is_jitted, members))
 
 

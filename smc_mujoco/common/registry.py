@@ -181,7 +181,9 @@ class Catalogue(Mapping[str, T_co]):
         if not isinstance(other, Catalogue):
             other = Catalogue(other)
         names = {*self.added, *other.added}
-        both = {name: (*self.added.get(name, ()), *other.added.get(name, ())) for name in names}
+        both = {}
+        for name in names:
+            both[name] = (*self.added.get(name, ()), *other.added.get(name, ()))
         # it is only read
         own: Any = ChainMap[str, Any](other.own, self.own)  # pyright: ignore[reportArgumentType]
         return Catalogue(own, both)
@@ -191,9 +193,10 @@ class Catalogue(Mapping[str, T_co]):
 
         An entry whose module is being imported does not count.
         """
-        return name in self.own or any(
-            not _being_imported(entry.point.module) for entry in self.added.get(name, ())
-        )
+        if name in self.own:
+            return True
+        modules = [entry.point.module for entry in self.added.get(name, ())]
+        return not all(map(_being_imported, modules))
 
     def package(self, name: str) -> str:
         """Return the name of the package that an entry is from, or "" if it is the library's."""
@@ -287,7 +290,9 @@ def discover(package: str, kind: type[T]) -> dict[str, T]:
     """
     values = []
     for module in modules(package):
-        values += [value for value in vars(module).values() if isinstance(value, kind)]
+        for value in vars(module).values():
+            if isinstance(value, kind):
+                values.append(value)
     return {NAME(value): value for value in sorted(values, key=NAME)}
 
 
@@ -299,9 +304,10 @@ class Files(Mapping[str, T_co]):
     def __init__(self, package: str, kind: type[T_co]):
         self.package = package
         self.kind = kind
-        self.names = sorted(
-            info.name for info in pkgutil.iter_modules(importlib.import_module(package).__path__)
-        )
+        names = []
+        for info in pkgutil.iter_modules(importlib.import_module(package).__path__):
+            names.append(info.name)
+        self.names = sorted(names)
 
     def __getitem__(self, name: str) -> T_co:
         if name not in self.names:

@@ -17,11 +17,10 @@ def execute(path: Path) -> dict:
     try:
         return runpy.run_path(str(path))
     except ScenarioError as error:
-        lines = [
-            frame.lineno
-            for frame in traceback.extract_tb(error.__traceback__)
-            if frame.filename == str(path)
-        ]
+        lines = []
+        for frame in traceback.extract_tb(error.__traceback__):
+            if frame.filename == str(path):
+                lines.append(frame.lineno)
         if lines:
             where = f"{path}, line {lines[-1]}"
         else:

@@ -86,8 +86,10 @@ class Tabular:
         if self.title:
             yield Text(self.title, "bold")
         for part in _parts(list(map(_widest, columns)), options.max_width, self.left):
-            cells = itertools.chain.from_iterable(columns[i][1:] for i in part)
-            tall = any("\n" in cell.plain for cell in cells)
+            bodies = []
+            for i in part:
+                bodies.append(columns[i][1:])
+            tall = any("\n" in cell.plain for cell in itertools.chain.from_iterable(bodies))
             table = Table(
                 box=box.HORIZONTALS if tall else box.SIMPLE_HEAD,  # rules between tall rows
                 show_lines=tall,
@@ -101,7 +103,7 @@ class Tabular:
                 above = Text("\n" * (lines - head.plain.count("\n")))
                 side = "left" if i < self.left else "right"
                 table.add_column(above.append_text(head), justify=side, overflow="fold")
-            for row in zip(*(columns[i][1:] for i in part), strict=True):
+            for row in zip(*bodies, strict=True):
                 table.add_row(*row)
             yield table
         for note in self.notes:
@@ -111,11 +113,11 @@ class Tabular:
         """Return the columns of names, then those of numbers, the widest ones narrow where space
         is short.
         """
-        names = [self._names(i) for i in range(self.left)]
+        names = list(map(self._names, range(self.left)))
         numbers = range(self.left, len(self.headings))
-        columns = [self._column(i) for i in numbers]
+        columns = list(map(self._column, numbers))
         narrow = [self._column(i, narrow=True) for i in numbers]
-        while sum(_widest(column) + 1 for column in [*names, *columns]) - 1 > width:
+        while sum(map(_widest, [*names, *columns])) + len(self.headings) - 1 > width:
             savings = []
             for wide, other in zip(columns, narrow, strict=True):
                 savings.append(_widest(wide) - _widest(other))
@@ -204,9 +206,14 @@ class Tabular:
         lines += [_tex_line(map(tex, self.headings)), "\\midrule"]
         for row in self.rows:
             names = map(_tex_cell, row[: self.left])
-            lines.append(_tex_line([*names, *(_tex_cell(c, marks) for c in row[self.left :])]))
+            cells = [*names]
+            for value in row[self.left :]:
+                cells.append(_tex_cell(value, marks))
+            lines.append(_tex_line(cells))
         lines.append("\\bottomrule")
-        meanings = (f"{mark}: {words}".replace(" ", NO_BREAK) for words, mark in marks.items())
+        meanings = []
+        for words, mark in marks.items():
+            meanings.append(f"{mark}: {words}".replace(" ", NO_BREAK))
         for text in (*_wrapped("; ".join(meanings), PLAIN_WIDTH).splitlines(), *self.under):
             wide = f"\\multicolumn{{{len(self.headings)}}}{{l}}"
             lines.append(_tex_line([f"{wide}{{\\footnotesize {tex(text)}}}"]))
@@ -243,7 +250,11 @@ class Tables:
         """Return a LaTeX tabular for each table, below comments that say what it shows; needs
         booktabs.
         """
-        return "\n".join(table.to_latex() for table in self.tables if table.rows)
+        texts = []
+        for table in self.tables:
+            if table.rows:
+                texts.append(table.to_latex())
+        return "\n".join(texts)
 
 
 def plain(shown: "RenderableType", width: int = PLAIN_WIDTH) -> str:
@@ -261,7 +272,8 @@ def plain(shown: "RenderableType", width: int = PLAIN_WIDTH) -> str:
         force_jupyter=False,
     )
     console.print(shown)
-    return "\n".join(line.rstrip() for line in console.file.getvalue().splitlines())  # pyright: ignore[reportAttributeAccessIssue]
+    printed = console.file.getvalue()  # pyright: ignore[reportAttributeAccessIssue]
+    return "\n".join(map(str.rstrip, printed.splitlines()))
 
 
 def folded(name: str, width: int) -> str:
@@ -270,9 +282,10 @@ def folded(name: str, width: int) -> str:
     """
     if len(name) <= width:
         return name
-    return "\n".join(
-        line.replace("_ ", "_") for line in textwrap.wrap(name.replace("_", "_ "), width)
-    )
+    lines = []
+    for line in textwrap.wrap(name.replace("_", "_ "), width):
+        lines.append(line.replace("_ ", "_"))
+    return "\n".join(lines)
 
 
 def _cell(cell: Cell | str) -> Cell:

@@ -194,7 +194,7 @@ class Component:
         """Return one component for all n channels, or one for each if laws or gains differ."""
         if self.joint or self.uniform:
             return [self]
-        return [self.of_channel(i) for i in range(n)]
+        return list(map(self.of_channel, range(n)))
 
     def numbers(self, count: int) -> list[float]:
         """Return each gain's values in so many channels, gain by gain."""

@@ -17,7 +17,7 @@ ANNEXES = ("evidence", "problems")  # with laws that are not in the catalogue, a
 def describe(c: Component) -> Fields:
     """Return a component as plain data that JSON represents without loss."""
     if c.each:
-        return {"name": c.name, "each": [describe(law) for law in c.each]}
+        return {"name": c.name, "each": list(map(describe, c.each))}
     return {
         "name": c.name,
         "gains": dict(c.gains),

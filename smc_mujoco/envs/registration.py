@@ -40,8 +40,10 @@ class Importer:
         """
         if name != LIBRARY:
             return None
-        others = [finder for finder in sys.meta_path if finder is not self]
-        spec = next(filter(None, (finder.find_spec(name, path, target) for finder in others)), None)
+        spec = None
+        for finder in list(sys.meta_path):
+            if spec is None and finder is not self:
+                spec = finder.find_spec(name, path, target)
         if spec is not None and spec.loader is not None:
             execute = spec.loader.exec_module
 
@@ -81,8 +83,10 @@ def plants() -> list[str]:
     from smc_mujoco.common.registry import points
 
     folder = Path(__file__).parents[1] / "mechanisms" / "plants"
-    shipped = [module.name for module in pkgutil.iter_modules([str(folder)])]
-    return list(dict.fromkeys([*shipped, *(point.name for point in points("smc_mujoco.plants"))]))
+    names = []
+    for named in (*pkgutil.iter_modules([str(folder)]), *points("smc_mujoco.plants")):
+        names.append(named.name)
+    return list(dict.fromkeys(names))
 
 
 def camel(name: str) -> str:

@@ -142,8 +142,11 @@ class SwingUp(Task):
         down = toppling(plant)
         p = Values(**plant.parameters)
         level = math.pi / 2 * down
-        pulls = (plant.nominal(level, 0.0 * level, int(i), p) for i in np.flatnonzero(down))
-        return {"u_max": SWING_UP_TORQUE * max(abs(f / g) for f, g in pulls)}
+        pulls = []
+        for i in np.flatnonzero(down):
+            f, g = plant.nominal(level, 0.0 * level, int(i), p)
+            pulls.append(abs(f / g))
+        return {"u_max": SWING_UP_TORQUE * max(pulls)}
 
     def selected(self, plant: Plant) -> Array:
         """Return the channels that topple."""
@@ -193,7 +196,11 @@ def reward(e: Array, w: Array) -> Any:
 def tasks(plant: Plant | str) -> list[str]:
     """Return the names of the tasks that a plant has; none of a free body."""
     plant = as_plant(plant)
-    return [name for name, task in TASKS.items() if task.applies_to(plant) and not plant.pose]
+    names = []
+    for name, task in TASKS.items():
+        if task.applies_to(plant) and not plant.pose:
+            names.append(name)
+    return names
 
 
 def starts(task: Task, plant: Plant) -> ArrayPair:

@@ -83,9 +83,10 @@ class BatchEnv(VectorEnv):
             min(cores(threads), self.num_envs),
             persistent=self.setting.uses_callback,
         )
-        self.qpos, self.qvel, self.ctrl, self.userdata = (
-            self.batch.bind(name) for name in ("qpos", "qvel", "ctrl", "userdata")
-        )
+        self.qpos = self.batch.bind("qpos")
+        self.qvel = self.batch.bind("qvel")
+        self.ctrl = self.batch.bind("ctrl")
+        self.userdata = self.batch.bind("userdata")
         self.callback_records = Records(self.setting, self.num_envs)
         self.randoms: list[np.random.Generator] = []
         # control samples since each episode began, and the copies whose episode has ended

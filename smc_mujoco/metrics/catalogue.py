@@ -113,8 +113,16 @@ def scores(trace: Trace) -> dict[str, dict[str, float]]:
     refuse(trace)
     found = {}
     for group, part in conventions.by_group(trace).items():
-        applying = [m for m in metrics() if m.applies_to(group)]
-        found[group.name] = {m.name: float(m.formula(part)) for m in applying}
+        found[group.name] = group_scores(group, part)
+    return found
+
+
+def group_scores(group: conventions.ChannelGroup, part: Trace) -> dict[str, float]:
+    """Return name -> value of the metrics that apply to a group, from the trace of its channels."""
+    found = {}
+    for m in metrics():
+        if m.applies_to(group):
+            found[m.name] = float(m.formula(part))
     return found
 
 
@@ -148,10 +156,10 @@ def trends(trace: Trace) -> dict[str, float]:
     """
     refuse(trace)
     count = last_part(trace).start + 1
-    first = dataclasses.replace(
-        trace, **{name: array[:count] for name, array in trace.arrays().items()}
-    )
-    earlier = conventions.by_group(first)
+    begun = {}
+    for name, array in trace.arrays().items():
+        begun[name] = array[:count]
+    earlier = conventions.by_group(dataclasses.replace(trace, **begun))
     whole = conventions.by_group(trace)
     found = {}
     for m in metrics():
@@ -412,9 +420,10 @@ def reversal_rate(trace: Trace) -> float:
     """
     part = last_part(trace)
     threshold = 1e-6 * scale(trace)
-    return max(conventions.turns(e, threshold) for e in error(trace)[part].T) / (
-        np.ptp(trace.t[part]) or np.inf
-    )
+    counts = []
+    for e in error(trace)[part].T:
+        counts.append(conventions.turns(e, threshold))
+    return max(counts) / (np.ptp(trace.t[part]) or np.inf)
 
 
 @metric("s", network=True)

@@ -154,7 +154,10 @@ def group_trace(trace: Trace, group: ChannelGroup) -> Trace:
         return dataclasses.replace(trace, **whole) if changed else trace
     if plant.pose:  # metrics take x - r for the error
         whole["x"] = trace.r + trace.e
-    columns = [i for i in group.channels if i in trace.scenario.scored_channels]
+    columns = []
+    for i in group.channels:
+        if i in trace.scenario.scored_channels:
+            columns.append(i)
     arrays = {}
     for name, array in whole.items():
         if name != "t":
@@ -234,9 +237,13 @@ class Metric:
                 counted.append(trace)
         if "{" in self.unit or self.unit == UNIT_OF_S:  # of a pose the position
             counted = counted[:1]
-        values = [float(self.formula(trace)) for trace in counted]
-        # a group without the value, such as a limit cycle, hides no other
-        return max((value for value in values if not math.isnan(value)), default=math.nan)
+        worst = math.nan
+        for trace in counted:
+            value = float(self.formula(trace))
+            # a group without the value, such as a limit cycle, hides no other
+            if math.isnan(worst) or value > worst:
+                worst = value
+        return worst
 
     def applies_to(self, group: ChannelGroup) -> bool:
         """Return whether the metric applies to a group by itself."""
@@ -396,13 +403,16 @@ def _after_turns(trace: Trace) -> Array:
 
 def by_group(trace: Trace) -> dict[ChannelGroup, Trace]:
     """Return group -> the trace of its channels, which is the argument of the functions below."""
-    return {group: group_trace(trace, group) for group in groups(trace.scenario)}
+    traces = {}
+    for group in groups(trace.scenario):
+        traces[group] = group_trace(trace, group)
+    return traces
 
 
 def scale(trace: Trace) -> float:
     """Return the scale of a group's trace in x's unit, never zero; see the module's conventions."""
     start = np.abs(trace.x[0] - trace.r[0]).max()
-    travel = max(np.ptp(r) for r in trace.r.T)
+    travel = max(map(np.ptp, trace.r.T))
     return float(max(start, travel)) or 1.0
 
 
@@ -506,7 +516,10 @@ def approaches(trace: Trace) -> list[list[slice]]:
     channels = []
     for r in trace.r.T:
         jumps = np.flatnonzero(np.abs(np.diff(r)) > band) + 1
-        channels.append([slice(*ends) for ends in itertools.pairwise([0, *jumps.tolist(), r.size])])
+        spans = []
+        for ends in itertools.pairwise([0, *jumps.tolist(), r.size]):
+            spans.append(slice(*ends))
+        channels.append(spans)
     return channels
 
 

@@ -101,8 +101,12 @@ def largest_cycle(trace: Trace) -> Pair:
     """Return amplitude and frequency of the channel with the largest limit cycle; NaN, NaN where
     none has one.
     """
-    cycles = [channel_cycle(trace, i) for i in range(trace.s.shape[1])]
-    return max((cycle for cycle in cycles if not math.isnan(cycle[0])), default=NO_CYCLE)
+    cycles = []
+    for i in range(trace.s.shape[1]):
+        cycle = channel_cycle(trace, i)
+        if not math.isnan(cycle[0]):
+            cycles.append(cycle)
+    return max(cycles, default=NO_CYCLE)
 
 
 def _order(rates: Array, spectrum: Array, first: int, peak: int, periods: float) -> int:

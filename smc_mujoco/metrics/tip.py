@@ -30,7 +30,7 @@ from smc_mujoco.mechanisms.layout import (
     joint_ids,
 )
 from smc_mujoco.metrics import conventions, fold
-from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.metrics.catalogue import group_scores
 from smc_mujoco.metrics.conventions import group_trace, groups
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation import model as models
@@ -88,9 +88,11 @@ def tip_paths(trace: Trace) -> ArrayPair:
     scenario = trace.scenario
     jump = _jump_sample(trace)
     parts = (trace.x[:jump], 0), (trace.x[jump:], scenario.jump_step)
-    actual = np.concatenate(
-        [tip_path(scenario.plant, x, scenario.factors(step)) for x, step in parts if len(x)]
-    )
+    pieces = []
+    for x, step in parts:
+        if len(x):
+            pieces.append(tip_path(scenario.plant, x, scenario.factors(step)))
+    actual = np.concatenate(pieces)
     paths = actual, tip_path(scenario.plant, trace.r)
     for path in paths:
         path.flags.writeable = False
@@ -111,11 +113,11 @@ def knows_contacts(scenario: Scenario) -> bool:
 
 def _with_hidden_state(scenario: Scenario) -> list:
     """Return the actuators with a state, or a force, that a trace lacks."""
-    return [
-        part
-        for part in scenario.actuator
-        if part.in_callback or part.delay or part.act is not None or not part.drives
-    ]
+    parts = []
+    for part in scenario.actuator:
+        if part.in_callback or part.delay or part.act is not None or not part.drives:
+            parts.append(part)
+    return parts
 
 
 @once_per_trace
@@ -139,11 +141,10 @@ def contacts(trace: Trace) -> Contacts:
     drives = model.actuator_ctrladr[drive_ids(model)]
     n = scenario.plant.driven
     scale = np.array(scenario.drive_train.scales)
-    pushes = [
-        (model.body(d.body).id, d)
-        for d in scenario.disturbance
-        if isinstance(d, Push) and scenario.plant.direct
-    ]
+    pushes = []
+    for d in scenario.disturbance:
+        if isinstance(d, Push) and scenario.plant.direct:
+            pushes.append((model.body(d.body).id, d))
     contacts = Contacts(np.zeros(len(trace.t)), np.zeros(len(trace.t)), np.zeros((len(trace.t), 3)))
     data.qpos[:] = initial_pose(model)
     jump = _jump_sample(trace)
@@ -267,10 +268,7 @@ def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
             joint = dataclasses.replace(group, channels=(i,), effort=effort)
             part = group_trace(trace, joint)
             power = np.abs(trace.force[:, i] * trace.v[:, i])
-            found = {}
-            for m in metrics():
-                if m.applies_to(joint):
-                    found[m.name] = float(m.formula(part))
+            found = group_scores(joint, part)
             found["peak_power"] = float(power.max())
             found["work"] = float(np.trapezoid(power, trace.t))
             values[names[i]] = found

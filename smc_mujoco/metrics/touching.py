@@ -47,7 +47,7 @@ def in_contact(trace: Trace) -> Array:
     data = [mujoco.MjData(shape.model) for shape in parts]
     places = parts[0].model.jnt_qposadr[joint_ids(parts[0].model)]
     tables = [_channels(shape.model) for shape in parts]
-    if any(hits for hits, _ in tables):
+    if any(pairs for pairs, _ in tables):
         reacting = (trace.holding != 0.0).any(axis=1)
     else:
         reacting = np.zeros(len(trace.t), bool)
@@ -91,7 +91,10 @@ def _channels(model: mujoco.MjModel) -> tuple[set[frozenset[int]], Array]:
     none does.
     """
     geoms = zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True)
-    hits = {frozenset(pair) for i, pair in enumerate(geoms) if model.pair(i).name.startswith(HIT)}
+    hits = set()
+    for i, pair in enumerate(geoms):
+        if model.pair(i).name.startswith(HIT):
+            hits.add(frozenset(pair))
     owner = np.full(model.nbody, -1)
     bodies = model.jnt_bodyid[joint_ids(model)].tolist()
     for body in range(1, model.nbody):

@@ -114,7 +114,10 @@ def _check_same_runs(target: Path, folder: AnyPath, content: bytes) -> None:
 def made_under(problems: Sequence[str]) -> dict[str, str]:
     """Return the hashes of the rules and of the list of a suite's problems."""
     texts = {"rules": problem(problems[0]).rules, "suite": "\n".join(problems)}
-    return {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
+    digests = {}
+    for name, text in texts.items():
+        digests[name] = hashlib.sha256(text.encode()).hexdigest()
+    return digests
 
 
 def run(
@@ -131,7 +134,9 @@ def run(
     """
     entry = entries.read(folder)
     files = sorted(filter(Path.is_file, Path(folder).glob("*")))
-    beside = [hashlib.sha256(path.read_bytes()).hexdigest() for path in files]  # it may import them
+    beside = []
+    for path in files:
+        beside.append(hashlib.sha256(path.read_bytes()).hexdigest())  # it may import them
     instances = range(count)
     failures = list[str]()
 

@@ -97,7 +97,10 @@ def read(folder: AnyPath) -> Entry:
     if folder in known_laws() and not os.path.isdir(folder):
         return _of_library(str(folder))
     folder = Path(folder)
-    laws = [folder / name for name in FILES if (folder / name).is_file()]
+    laws = []
+    for name in FILES:
+        if (folder / name).is_file():
+            laws.append(folder / name)
     if len(laws) != 1:
         names = " and ".join(path.name for path in laws) or "none of them"
         raise ScenarioError(f"entry {str(folder)!r} has {names}: give one of {', '.join(FILES)}")
@@ -120,7 +123,8 @@ def _of_library(name: str) -> Entry:
 
     It has shipped gains, which the search found, or else its defaults.
     """
-    shipped = any(gain_sets.in_set(find_plant(plant), name, "tuned") for plant in plants())
+    machines = map(find_plant, plants())
+    shipped = any(gain_sets.in_set(machine, name, "tuned") for machine in machines)
     return Entry(
         name=name,
         authors=("the authors of smc_mujoco",),
@@ -137,7 +141,9 @@ def _fields(about: Data) -> Fields:
     """Return the fields of an Entry that a file about it gives."""
     for name in about:
         find("line of entry.toml", name, dict.fromkeys((*TEXTS, "authors", "gains")))
-    fields: Fields = {name: _text(name, about.get(name)) for name in TEXTS}
+    fields: Fields = {}
+    for name in TEXTS:
+        fields[name] = _text(name, about.get(name))
     find("division", fields["division"], DIVISIONS)
     authors = about.get("authors")
     if not isinstance(authors, list) or not authors:
@@ -167,5 +173,8 @@ def _gains(sets: object, division: str) -> Mapping[str, Numbers]:
     for plant, values in sets.items():
         if plant not in known or not isinstance(values, dict):
             raise ScenarioError(f"gains for {shown(plant)}: {cure}")
-        gains[plant] = {name: number(f"gain {name}", value) for name, value in values.items()}
+        numbers = {}
+        for name, value in values.items():
+            numbers[name] = number(f"gain {name}", value)
+        gains[plant] = numbers
     return gains

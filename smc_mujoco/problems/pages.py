@@ -48,7 +48,9 @@ def build(results: Path, out: Path) -> tuple[Path, list[str]]:
             why = "enter a law first, with smc-mujoco enter FOLDER"
         raise ScenarioError(f"no results in {str(results)!r}: {why}")
     made = _environment()
-    left_out = [str(error).replace(f"{results}{os.sep}", "") for error in refused]
+    left_out = []
+    for error in refused:
+        left_out.append(str(error).replace(f"{results}{os.sep}", ""))
     for found in suites:
         folder = suite.folder(found.suite, found.seed)
         page = {"found": found, "folder": folder}
@@ -114,7 +116,10 @@ def curves(found: Results, question: str, names: Sequence[str]) -> dict[str, str
         t, share = found.curve(name, question)
         x = CURVE.width * t / t[-1]
         y = CURVE.height * (1.0 - share)
-        made[name] = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
+        points = []
+        for a, b in zip(x, y, strict=True):
+            points.append(f"{a:.1f},{b:.1f}")
+        made[name] = " ".join(points)
     return made
 
 

@@ -117,7 +117,11 @@ class Problem:
     @property
     def targets(self) -> dict[str, Floats]:
         """Measure -> the levels that laws are to reach, the hardest first."""
-        return {name: tuple(self._frozen[name]) for name in MEASURES if self._frozen}
+        kept = {}
+        if self._frozen:
+            for name in MEASURES:
+                kept[name] = tuple(self._frozen[name])
+        return kept
 
     def __repr__(self) -> str:
         return f"Problem({self.id!r})"
@@ -219,8 +223,10 @@ class Problem:
             values = dict.fromkeys(("accuracy", "itae", "settling", "calm"), math.inf)
             return {"failed": 1.0} | values | dict.fromkeys(self._names(), math.nan)
         groups = conventions.by_group(trace).values()
-        relative = [np.abs(conventions.error(part)) / conventions.scale(part) for part in groups]
-        worst = np.max([conventions.row_max(error) for error in relative], axis=0)
+        relative = []
+        for part in groups:
+            relative.append(np.abs(conventions.error(part)) / conventions.scale(part))
+        worst = np.max(list(map(conventions.row_max, relative)), axis=0)
         total = np.sum([error.sum(axis=1) for error in relative], axis=0)
         plant = trace.scenario.plant
         bounds = mixer(plant)[:, -1]
@@ -242,7 +248,9 @@ class Problem:
 
     def _times(self, trace: Trace, worst: Array, values: Numbers) -> dict[str, float]:
         """Return the time of each target, by name."""
-        reached = [_kept(trace, worst, level) for level in self.targets.get("accuracy", ())]
+        reached = []
+        for level in self.targets.get("accuracy", ()):
+            reached.append(_kept(trace, worst, level))
         times = dict(zip(self._names(), map(_or_never, reached), strict=False))
         counted = {
             "settling": _or_never(values["settling"]),
@@ -260,7 +268,8 @@ class Problem:
         """List the names of the targets' times."""
         names = []
         for measure in MEASURES:
-            names.extend(f"{measure}_{i}" for i in range(1, len(self.targets.get(measure, ())) + 1))
+            for i in range(1, len(self.targets.get(measure, ())) + 1):
+                names.append(f"{measure}_{i}")
         return names
 
 

@@ -159,7 +159,8 @@ class EntryResult:
         for name in problems:
             columns = self.runs.columns(name)
             levels = problem(name).targets.get(measure, ())
-            times.extend(columns[f"{measure}_{i}"] for i in range(1, len(levels) + 1))
+            for i in range(1, len(levels) + 1):
+                times.append(columns[f"{measure}_{i}"])
         return np.nan_to_num(np.concatenate(times), nan=np.inf)
 
 
@@ -197,7 +198,10 @@ class Results:
         """
         medians = []
         for entry in self.entries.values():
-            medians.append([entry.medians[cell][MEASURE[question]] for cell in self.on(question)])
+            of_entry = []
+            for cell in self.on(question):
+                of_entry.append(entry.medians[cell][MEASURE[question]])
+            medians.append(of_entry)
         return np.nan_to_num(np.array(medians), nan=np.inf, posinf=np.inf)
 
     def ranks(self, question: str) -> Array:
@@ -209,7 +213,11 @@ class Results:
 
     def boards(self) -> dict[str, QuestionBoard]:
         """Return question -> board, of the questions that the suite's problems inform."""
-        return {question: self.board(question) for question in MEASURE if self.on(question)}
+        boards = {}
+        for question in MEASURE:
+            if self.on(question):
+                boards[question] = self.board(question)
+        return boards
 
     def board(self, question: str) -> QuestionBoard:
         """Return the board of a question, the best entry first."""
@@ -234,13 +242,14 @@ class Results:
         tails = 50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL)
         ends = np.percentile(ranks @ draws(count) / count, tails, axis=1)
         placed = ranking.placed(names, ranks, np.isinf(medians), best)
+        places = np.array([one.place for one in placed])
         standings = []
         for one in placed:
             low, high = ends[:, names.index(one.law)].tolist()
             standings.append(
                 Standing(
                     entry=one.law,
-                    place=1 + sum(other.place < one.place for other in placed),
+                    place=1 + int((places < one.place).sum()),
                     rank=one.mean,
                     low=low,
                     high=high,
@@ -270,7 +279,8 @@ class Results:
         changes = []
         for name in self.entries:
             if name in other.entries:
-                changes.extend(self._change(other, name, question) for question in self.boards())
+                for question in self.boards():
+                    changes.append(self._change(other, name, question))
         return Changes(changes=tuple(changes))
 
     def _change(self, old: "Results", name: str, question: str) -> "Change":

@@ -24,7 +24,11 @@ def suite(name: str) -> Names:
     """Return the IDs of a suite's problems. Raise ScenarioError for an unknown name."""
     find("suite", name, dict.fromkeys(suites()))
     lines = (SUITES / f"{name}.txt").read_text(encoding="utf-8").splitlines()
-    return tuple(line for line in lines if line and not line.startswith("#"))
+    names = []
+    for line in lines:
+        if line and not line.startswith("#"):
+            names.append(line)
+    return tuple(names)
 
 
 def folder(name: str, seed: int) -> str:

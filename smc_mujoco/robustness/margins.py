@@ -91,7 +91,10 @@ class LevelSearch:
     def next(self) -> float | None:
         """The level to try next; None when the search is done."""
         if self.high == math.inf:
-            return next((level for level in self.levels if level > self.low), None)
+            for level in self.levels:
+                if level > self.low:
+                    return level
+            return None
         if self.high - self.low <= self.resolution(self.low) * (1.0 + 1e-9):
             return None
         return self.rounded((self.low + self.high) / 2.0)
@@ -111,9 +114,14 @@ def find_boundaries(
     """Advance searches together until all are done; `tolerated` judges a level of each search that
     continues.
     """
-    while tried := [
-        (key, level) for key, search in searches.items() if (level := search.next) is not None
-    ]:
+    while True:
+        tried = []
+        for key, search in searches.items():
+            level = search.next
+            if level is not None:
+                tried.append((key, level))
+        if not tried:
+            return
         for (key, level), good in zip(tried, tolerated(tried), strict=True):
             setattr(searches[key], "low" if good else "high", level)
 
@@ -156,7 +164,7 @@ class MarginKind:
                 return max(1, round(level / quantum)) * quantum
 
             step = QUANTA[resolution] * quantum
-            levels = [rounded(level) for level in self.levels]
+            levels = list(map(rounded, self.levels))
             return LevelSearch(
                 levels=levels, resolution=lambda low: step, rounded=rounded, low=self.none
             )
@@ -200,7 +208,10 @@ def tolerates(trace: Trace) -> bool:
 def rest_share(trace: Trace) -> float:
     """Return the ultimate bound over the scale, of the worst group of channels."""
     bound = catalogue.CATALOGUE["ultimate_bound"].formula
-    return max(bound(part) / scale(part) for part in by_group(trace).values())
+    shares = []
+    for part in by_group(trace).values():
+        shares.append(bound(part) / scale(part))
+    return max(shares)
 
 
 def _critical_delay(base: Scenario) -> float | None:
@@ -436,7 +447,10 @@ def margins_of(
     runs = ScoredRuns({"rest_share": rest_share}, device, threads, resolution != COARSE)
     unchanged = [(i, None) for i in range(0, len(cells.pairs), len(kinds))]
     held = cells.tolerated(unchanged, runs.by_mujoco)
-    going = {i: one for i, one in enumerate(cells.searches) if held[i // len(kinds)]}
+    going = {}
+    for i, one in enumerate(cells.searches):
+        if held[i // len(kinds)]:
+            going[i] = one
     find_boundaries(going, lambda tried: cells.tolerated(tried, runs.scored))
     again = {}  # MuJoCo has the last word on the ends
     ends = cells.ends_by(going, runs.covers)

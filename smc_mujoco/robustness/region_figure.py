@@ -36,9 +36,10 @@ def draw(maps: Sequence[Basin], path: str | os.PathLike[str] | None = None) -> F
         axes = page.subplots(1, len(maps), squeeze=False)[0]
         after = convergence_times(maps)
         plants = list(dict.fromkeys(region.plant for region in maps))
-        words, gains = pages.gain_sources(
-            [[restore({"kind": region.source, "search": None})] for region in maps]
-        )
+        sources = []
+        for region in maps:
+            sources.append([restore({"kind": region.source, "search": None})])
+        words, gains = pages.gain_sources(sources)
         for ax, region, source in zip(axes, maps, words, strict=True):
             name = style.law_name(region.law)
             if len(plants) > 1:
@@ -86,7 +87,9 @@ def colours_of(law: str) -> list[str]:
 
 def convergence_times(maps: Sequence[Basin]) -> list[float]:
     """Return the run lengths, s, after which states were seen to converge, over all maps."""
-    times = [region.decided_at[region.outcome == CONVERGES] for region in maps]
+    times = []
+    for region in maps:
+        times.append(region.decided_at[region.outcome == CONVERGES])
     return np.unique(np.concatenate(times)).tolist()
 
 

@@ -332,7 +332,8 @@ def load_basin(path: AnyPath) -> Basin:
     kinds = {"x": float, "v": float, "decided_at": float, "outcome": np.int8}
     with reading(path, "map", "give a .json file that Basin.save wrote") as file:
         fields: Fields = read_json(file)
-        fields |= {name: np.array(fields[name], kind) for name, kind in kinds.items()}
+        for name, kind in kinds.items():
+            fields[name] = np.array(fields[name], kind)
         return Basin(**fields)
 
 

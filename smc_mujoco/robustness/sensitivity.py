@@ -30,6 +30,7 @@ from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns, worth_compiling
 from smc_mujoco.common.aliases import Array, ArrayPair
 from smc_mujoco.common.constraints import Seed, Whole, constrained
+from smc_mujoco.common.data import attributes
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
@@ -162,17 +163,17 @@ class Sensitivity(Tables, SobolResult):
 
     def about(self) -> dict[str, Any]:
         """Return the result as JSON data."""
-        fields = "metric", "unit", "runs"
-        data: dict[str, Any] = {name: getattr(self, name) for name in fields}
-        data |= {"within": dataclasses.asdict(self.within), "says": self.sentences}
-        indices = []
+        axes = []
         for axis in self.axes:
-            indices.append({"first": axis.first._asdict(), "total": axis.total._asdict()})
-        data["axes"] = [axis._asdict() | its for axis, its in zip(self.axes, indices, strict=True)]
+            indices = {"first": axis.first._asdict(), "total": axis.total._asdict()}
+            axes.append(axis._asdict() | indices)
         samples = {}
         for i, name in enumerate(self.space.names):
             samples[name] = self.space.column(i, self.shares).tolist()
-        return data | {
+        return attributes(self, ("metric", "unit", "runs")) | {
+            "within": dataclasses.asdict(self.within),
+            "says": self.sentences,
+            "axes": axes,
             "samples": samples,
             "values": self.values.tolist(),
             "failed": self.failed.tolist(),
@@ -292,7 +293,7 @@ def _run(
     scores = np.empty(len(design))
     held = np.empty(len(design), bool)
     for first in range(0, len(design), AT_ONCE):
-        cases = [space.scenario_at(row) for row in design[first : first + AT_ONCE]]
+        cases = list(map(space.scenario_at, design[first : first + AT_ONCE]))
         for i, ((score, share), failed) in enumerate(fast.scored(cases, advance), first):
             scores[i] = math.inf if failed is not None else score
             held[i] = failed is None and share <= TOLERATED_ERROR
@@ -396,10 +397,9 @@ def _words(space: Space, cuts: Sequence[Cut]) -> str:
     """
     words = []
     for cut in cuts:
-        low, high = (
-            _with_unit(space.value(cut.axis, share), space.ends[cut.axis][2])
-            for share in (cut.low, cut.high)
-        )
+        unit = space.ends[cut.axis][2]
+        low = _with_unit(space.value(cut.axis, cut.low), unit)
+        high = _with_unit(space.value(cut.axis, cut.high), unit)
         if cut.outside:
             bounds = f"< {low} or > {high}"
         elif cut.low == 0.0:
@@ -427,5 +427,4 @@ def _with_unit(value: float, unit: str) -> str:
 
 
 def _percent(share: Interval) -> Cell:
-    low, middle, high = (f"{100 * value:.0f}" for value in (share.low, share.median, share.high))
-    return Cell(middle, f"{low}–{high}")
+    return Cell(f"{100 * share.median:.0f}", f"{100 * share.low:.0f}–{100 * share.high:.0f}")

@@ -127,7 +127,10 @@ class Space:
         """Return the values of an axis at points, (N,); for chance the shares."""
         if self.names[axis] == CHANCE:
             return shares[:, axis]
-        return np.array([self.value(axis, share) for share in shares[:, axis].tolist()])
+        values = []
+        for share in shares[:, axis].tolist():
+            values.append(self.value(axis, share))
+        return np.array(values)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -149,20 +152,18 @@ class SobolResult:
 
 def _intervals(ends: Array, points: int) -> list[Interval]:
     """Return the interval of each axis from its value, low and high end, (3, axes)."""
-    return [Interval(at, low, high, points) for at, low, high in ends.T.tolist()]
+    intervals = []
+    for at, low, high in ends.T.tolist():
+        intervals.append(Interval(at, low, high, points))
+    return intervals
 
 
 def _random(scenario: Scenario) -> bool:
     """Return whether a run depends on the scenario's seed."""
     noise = scenario.noise
     disturbed = any(signal.random for signal in scenario.disturbance)
-    return bool(
-        noise.position
-        or noise.velocity
-        or any(sensor.dropout for sensor in scenario.sensors)
-        or disturbed
-        or not scenario.clock.regular
-    )
+    measured = noise.position or noise.velocity or any(s.dropout for s in scenario.sensors)
+    return bool(measured or disturbed or not scenario.clock.regular)
 
 
 def designs(points: int, k: int, seed: int) -> Array:
@@ -190,7 +191,7 @@ def estimates(f_A: Array, f_B: Array, f_AB: Array) -> ArrayPair:  # scipy's
     all of unit variance: a correlation without what the two samples have in common by chance (G.
     Glen & K. Isaacs, Environmental Modelling & Software 37:157, 2012).
     """
-    a, b, mixed = (_standardised(f) for f in (f_A, f_B, f_AB))
+    a, b, mixed = map(_standardised, (f_A, f_B, f_AB))
     common = (a * b).mean(-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         alone = ((mixed * b).mean(-1) - common * (mixed * a).mean(-1)) / (1.0 - common**2)
@@ -238,10 +239,15 @@ def indices(
             return possible(*np.reshape([found.first_order, found.total_order], (2, 2, k))[:, 0])
 
         draws = np.random.default_rng(seed).integers(points, size=(RESAMPLES, points))
-        resampled = np.array([of(at) for at in draws if np.ptp(parts[:2, at])])
+        found = []
+        for at in draws:
+            if np.ptp(parts[:2, at]):
+                found.append(of(at))
+        resampled = np.array(found)
         ends = np.quantile(resampled, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
         whole = np.array([of(np.arange(points)), *ends])  # (3, 2, k)
-        first, total = (_intervals(whole[:, kind], points) for kind in (0, 1))
+        first = _intervals(whole[:, 0], points)
+        total = _intervals(whole[:, 1], points)
     axes = []
     for i, name in enumerate(space.names):
         ordered = name != CHANCE and np.ptp(values) > 0.0
@@ -312,10 +318,9 @@ def _more_fail(failed: Array, within: Array, left: Array) -> bool:
     """
     from scipy.stats import fisher_exact
 
-    counts = [
-        [int((failed & side).sum()), int((~failed & side).sum())]
-        for side in (within, left & ~within)
-    ]
+    counts = []
+    for side in (within, left & ~within):
+        counts.append([int((failed & side).sum()), int((~failed & side).sum())])
     return float(np.asarray(fisher_exact(counts, "greater"))[1]) < REGION_ERROR
 
 
@@ -356,13 +361,14 @@ def improvement(space: Space, shares: Array, values: Array, failed: Array) -> Im
     halves = []
     for i, name in enumerate(space.names):
         if name != CHANCE:
-            halves += [Cut(i, high=0.5), Cut(i, low=0.5), Cut(i, 0.25, 0.75)]
+            for cut in (Cut(i, high=0.5), Cut(i, low=0.5), Cut(i, 0.25, 0.75)):
+                if _within([cut], shares[:half]).any():
+                    halves.append(cut)
 
     def rank(cut: Cut) -> Pair:
         inside = _within([cut], shares[:half])
         return float(failed[:half][inside].mean()), float(np.median(values[:half][inside]))
 
-    halves = [cut for cut in halves if _within([cut], shares[:half]).any()]
     if not halves:
         return None
     best = min(halves, key=rank)

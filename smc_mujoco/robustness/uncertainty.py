@@ -110,9 +110,9 @@ class Uncertainty:
                 f"Uncertainty's parameters are {shown(self.parameters)}: give a range for each name"
             )
         of = constraints.Range()
-        ranges = {
-            str(name): of(f"Uncertainty's {name}", value) for name, value in self.parameters.items()
-        }
+        ranges = {}
+        for name, value in self.parameters.items():
+            ranges[str(name)] = of(f"Uncertainty's {name}", value)
         vars(self)["parameters"] = frozen(ranges)  # the class is frozen
         bounds = (
             self.disturbance,
@@ -123,9 +123,7 @@ class Uncertainty:
             self.encoder,
         )
         ends = self.delay, self.mass, self.friction, self.friction_scale, self.bound, self.period
-        if not any(bounds) and not any(
-            low < high for low, high in (*ends, *self.parameters.values())
-        ):
+        if not any(bounds) and all(low == high for low, high in (*ends, *ranges.values())):
             raise ScenarioError(
                 "Uncertainty allows nothing but the scenario itself: give a bound, such as "
                 "disturbance=2.0"
@@ -146,8 +144,9 @@ class Uncertainty:
         parts = []
         for name, bound in given.items():
             ends = bound if isinstance(bound, tuple) else (bound,)
-            words = f"{name.replace('_', ' ')} {' to '.join(f'{end:g}' for end in ends)}"
-            parts.append(f"{words} {units.get(name, '')}".strip())
+            width = " to ".join(f"{end:g}" for end in ends)
+            words = f"{name.replace('_', ' ')} {width} {units.get(name, '')}"
+            parts.append(words.strip())
         return ", ".join(parts)
 
 
@@ -161,7 +160,7 @@ def default_class(scenario: Scenario) -> Uncertainty:
     bounds = {}
     if not declared:
         bounds["disturbance"] = DEFAULT_FORCE_SHARE * strength(scenario)
-    if scenario.friction or _dry(scenario.plant):
+    if scenario.friction or dry_frictions(scenario.plant):
         bounds["friction_scale"] = DEFAULT_FRICTION_SCALE
     return Uncertainty(parameters=declared, **bounds)
 
@@ -325,11 +324,11 @@ class Members:
         change = self.slope / self.within.disturbance
         if not change or np.abs(np.diff(force)).max(initial=0.0) <= change:
             return force
-        limited = [before := float(force[0])]
-        limited += [
-            before := min(max(value, before - change), before + change)
-            for value in force[1:].tolist()
-        ]
+        before, *later = force.tolist()
+        limited = [before]
+        for value in later:
+            before = min(max(value, before - change), before + change)
+            limited.append(before)
         return np.array(limited)
 
     def random(self, rng: np.random.Generator) -> Member:
@@ -357,9 +356,10 @@ class Members:
                 member, force=self.limited(mutated_signal(member.force, rng))
             )
         if what == 1:
-            return dataclasses.replace(
-                member, noise=np.array([mutated_signal(row, rng) for row in member.noise])
-            )
+            noise = []
+            for row in member.noise:
+                noise.append(mutated_signal(row, rng))
+            return dataclasses.replace(member, noise=np.array(noise))
         moves = rng.normal(0.0, CONSTANT_DEVIATION, len(self.constants))
         moves = moves * (rng.random(len(self.constants)) < MOVE_PROBABILITY)
         return dataclasses.replace(member, shares=np.clip(member.shares + moves, 0.0, 1.0))
@@ -448,7 +448,11 @@ def _check_class(scenario: Scenario, within: Uncertainty) -> None:
     end of a run.
     """
     plant = scenario.plant
-    if foreign := [name for name in within.parameters if name not in (*plant.parameters, "mass")]:
+    foreign = []
+    for name in within.parameters:
+        if name not in plant.parameters and name != "mass":
+            foreign.append(name)
+    if foreign:
         fields = []
         for field in dataclasses.fields(within):
             if field.name != "parameters":
@@ -481,7 +485,7 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[RunConstant]
             unit = "added" if name in plant.added else ""
             yield RunConstant(name, bounds, functools.partial(_with_factor, name=name), unit)
     if within.friction_scale != (1.0, 1.0):
-        if not (scenario.friction or _dry(plant)):
+        if not (scenario.friction or dry_frictions(plant)):
             raise ScenarioError(
                 f"Uncertainty's friction_scale is of {plant.name}, which has no friction here: "
                 "give it some, such as friction=smc.Coulomb(0.1)"
@@ -575,22 +579,28 @@ def _with_start(scenario: Scenario, share: float, i: int) -> Scenario:
 
 def with_friction(scenario: Scenario, level: float) -> Scenario:
     """Return the scenario with `level` added to the dry friction of driven joints, N or N m."""
-    plain = [part for part in scenario.friction if isinstance(part, Coulomb) and not part.on]
-    others = [part for part in scenario.friction if part not in plain]
-    before = sum(part.level for part in plain)
+    before = 0
+    others = []
+    for part in scenario.friction:
+        if isinstance(part, Coulomb) and not part.on:
+            before += part.level
+        else:
+            others.append(part)
     return dataclasses.replace(scenario, friction=(*others, Coulomb(before + level)))
 
 
-def _dry(plant: Plant) -> list[str]:
+def dry_frictions(plant: Plant) -> list[str]:
+    """Return the names of the plant's dry frictions that are not 0."""
     return [name for name in plant.dry if plant.parameters[name]]
 
 
 def _with_friction_scale(scenario: Scenario, factor: float) -> Scenario:
     """Return the scenario with a factor on its friction, and on the dry friction of its plant."""
-    scenario = dataclasses.replace(
-        scenario, friction=tuple(part.scaled(factor) for part in scenario.friction)
-    )
-    for name in _dry(scenario.plant):
+    friction = []
+    for part in scenario.friction:
+        friction.append(part.scaled(factor))
+    scenario = dataclasses.replace(scenario, friction=tuple(friction))
+    for name in dry_frictions(scenario.plant):
         scenario = _with_factor(scenario, factor, name)
     return scenario
 

@@ -20,6 +20,7 @@ from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns, worth_compiling
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.constraints import Seed, Whole, constrained
+from smc_mujoco.common.data import attributes
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.common.progress import bar
@@ -27,7 +28,13 @@ from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.draw.style import law_colour, law_name, plant_name
 from smc_mujoco.metrics.catalogue import CATALOGUE, metric_of
 from smc_mujoco.metrics.conventions import Metric
-from smc_mujoco.robustness.uncertainty import Members, Uncertainty, default_class, outside
+from smc_mujoco.robustness.uncertainty import (
+    Members,
+    Uncertainty,
+    default_class,
+    dry_frictions,
+    outside,
+)
 from smc_mujoco.robustness.worst_case_search import WorstCaseSearch
 from smc_mujoco.simulation import run_key, scenario_json
 from smc_mujoco.simulation.run import run
@@ -109,9 +116,7 @@ class WorstCase(Tables):
     def about(self) -> dict[str, Any]:
         """Return it as JSON data, with the scenario as in a trace's file."""
         names = "value", "median", "unit", "found_by", "tried", "metric", "outside", "seed", "sets"
-        names += ("checked",)
-        values = {name: getattr(self, name) for name in names}
-        return values | {
+        return attributes(self, (*names, "checked")) | {
             "within": dataclasses.asdict(self.within),
             "scenario": scenario_json.describe(self.scenario),
         }
@@ -270,11 +275,15 @@ def _worst_of(
     scenario = scenarios[0]
     if broken := drawing.broken or search.broken:
         warn_of_broken({scenario.law.name: broken})
-    known = [one for one in (*search.tried, *drawing.tried) if one.by_mujoco]
+    known = []
+    for one in (*search.tried, *drawing.tried):
+        if one.by_mujoco:
+            known.append(one)
     worst = max(known, key=lambda tried: tried.key)
+    drawn = [tried.key[0] for tried in drawing.tried]
     return WorstCase(
         value=float(worst.key[0]),
-        median=float(np.median([tried.key[0] for tried in drawing.tried])),
+        median=float(np.median(drawn)),
         unit=entry.unit_for(scenario.plant.units[0], scenario.efforts[0]),
         scenario=members.scenario_of(worst.member),
         found_by=worst.member.kind,
@@ -349,10 +358,11 @@ def _listed(given: object) -> list[Scenario]:
         scenarios = list(given)
     else:
         scenarios = [given]
-    if not scenarios or not all(isinstance(attacked, Scenario) for attacked in scenarios):
-        raise ScenarioError(
-            f"worst_case attacks a Scenario, not {shown(given)}: give smc.Scenario(...)"
-        )
+    for attacked in scenarios or [given]:
+        if not isinstance(attacked, Scenario):
+            raise ScenarioError(
+                f"worst_case attacks a Scenario, not {shown(given)}: give smc.Scenario(...)"
+            )
     if len({(s.samples, s.control_period, s.plant.n) for s in scenarios}) > 1:
         raise ScenarioError(
             "worst_case attacks one run on several parameter sets: give all the same duration"
@@ -367,14 +377,7 @@ def default_budget(scenario: Scenario, within: Uncertainty) -> int:
     friction doubles that.
     """
     plant = scenario.plant
-    dry = bool(scenario.friction or within.friction[1]) or any(
-        plant.parameters[name] for name in plant.dry
-    )
-    channels = 1 + plant.n
-    return min(
-        max(
-            MIN_RUNS,
-            2 * DEFAULT_STEPS // (scenario.samples * scenario.steps * channels * (1 + dry)),
-        ),
-        MAX_RUNS,
-    )
+    dry = bool(scenario.friction or within.friction[1] or dry_frictions(plant))
+    steps = scenario.samples * scenario.steps * (1 + plant.n)  # of all channels in a run
+    runs = 2 * DEFAULT_STEPS // (steps * (1 + dry))
+    return min(max(MIN_RUNS, runs), MAX_RUNS)

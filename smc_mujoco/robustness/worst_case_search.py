@@ -109,11 +109,15 @@ class WorstCaseSearch:
     def draw(self, rng: np.random.Generator) -> None:
         """Run random members only, a whole budget of them."""
         for left in range(self.budget, 0, -BATCH_MEMBERS):
-            self.run([Case(self.members.random(rng)) for _ in range(min(left, BATCH_MEMBERS))])
+            cases = []
+            for _ in range(min(left, BATCH_MEMBERS)):
+                cases.append(Case(self.members.random(rng)))
+            self.run(cases)
 
     def search(self, rng: np.random.Generator, known: Sequence[TriedMember]) -> None:
         """Try the strategies, beginning with members that were run before."""
-        self.tried += [one._replace(origin=-1 - i) for i, one in enumerate(known)]
+        for i, one in enumerate(known):
+            self.tried.append(one._replace(origin=-1 - i))
         batches = (
             self._simple(),
             self._corners(),
@@ -137,7 +141,10 @@ class WorstCaseSearch:
         for case in cases:
             scenarios.append(self.members.scenario_of(case.member, case.relay))
         scored = self._scored(cases, scenarios)
-        traced = [i for i in range(len(cases)) if i not in scored]
+        traced = []
+        for i in range(len(cases)):
+            if i not in scored:
+                traced.append(i)
         for i, key in scored.items():
             member, _, origin = cases[i]
             tried[i] = TriedMember(member, key, origin if origin >= 0 else first + i, False)
@@ -200,7 +207,10 @@ class WorstCaseSearch:
         """Have MuJoCo run those of the worst members that it has not run yet."""
         tried = self.tried
         worst = sorted(range(len(tried)), key=lambda i: tried[i].key, reverse=True)[:CONFIRMED]
-        again = [i for i in worst if not tried[i].by_mujoco]
+        again = []
+        for i in worst:
+            if not tried[i].by_mujoco:
+                again.append(i)
         scenarios = [self.members.scenario_of(tried[i].member) for i in again]
         for k, trace in stream(scenarios, self.threads):
             i = again[k]
@@ -239,9 +249,10 @@ class WorstCaseSearch:
                 errors = measurement_errors(self.swing, members.times, members.hold)
             else:
                 errors = ()
-            yield [
-                Case(dataclasses.replace(base, noise=noise, kind=kind)) for kind, noise in errors
-            ]
+            cases = []
+            for kind, noise in errors:
+                cases.append(Case(dataclasses.replace(base, noise=noise, kind=kind)))
+            yield cases
 
     def _driven(self) -> Iterator[list[Case]]:
         """Yield the worst member so far, with a force along the motion from some time on."""
@@ -256,7 +267,10 @@ class WorstCaseSearch:
             relays = []
             for share in SWITCH_TIMES:
                 relays.append(Relay(self.members.within.disturbance, rate=1.0, start=share * end))
-            yield [Case(member, relay, worst.origin) for relay in relays]
+            cases = []
+            for relay in relays:
+                cases.append(Case(member, relay, worst.origin))
+            yield cases
 
     def _relayed(self, kind: str, sign: float = 1.0, **weights: float) -> Case:
         relay = Relay(sign * self.members.within.disturbance, **weights, slope=self.members.slope)
@@ -319,8 +333,10 @@ class WorstCaseSearch:
             places = np.unravel_index(
                 round(i * (corners - 1) / (count - 1)), [*map(len, ends)], order="F"
             )
-            shares = np.array([choices[place] for choices, place in zip(ends, places, strict=True)])
-            corner = dataclasses.replace(self.members.bare, shares=shares, kind="corner")
+            shares = []
+            for choices, place in zip(ends, places, strict=True):
+                shares.append(choices[place])
+            corner = dataclasses.replace(self.members.bare, shares=np.array(shares), kind="corner")
             if not self.members.forced:
                 yield [Case(corner)]
                 continue
@@ -364,10 +380,12 @@ class WorstCaseSearch:
         for _ in range(GENERATIONS):
             points = [evolution.ask() for _ in range(BATCH_MEMBERS)]
             before = len(self.tried)
-            yield [
-                Case(self.members.moved(start.member, z, FORCE_KNOTS), origin=start.origin)
-                for z in points
-            ]
+            cases = []
+            for z in points:
+                cases.append(
+                    Case(self.members.moved(start.member, z, FORCE_KNOTS), origin=start.origin)
+                )
+            yield cases
             keys = []
             for one in self.tried[before:]:
                 keys.append(one.key)
@@ -376,7 +394,7 @@ class WorstCaseSearch:
             for rank, i in enumerate(order):
                 ranks[i] = float(rank)
             if len(keys) == BATCH_MEMBERS:
-                evolution.tell([(points[i], ranks[i]) for i in range(BATCH_MEMBERS)])
+                evolution.tell([(point, ranks[i]) for i, point in enumerate(points)])
 
 
 def relay_signals(trace: Trace) -> dict[str, Array]:

@@ -90,9 +90,10 @@ def _checked(response: object, tolerances: Numbers) -> dict[str, float]:
     if not isinstance(response, StepResponse):
         raise ScenarioError(f"golden is given {shown(response)}: give what step_response returned")
     response.check_names(tolerances)
-    return {
-        name: number(f"tolerance of {name}", value, low=0.0) for name, value in tolerances.items()
-    }
+    checked = {}
+    for name, value in tolerances.items():
+        checked[name] = number(f"tolerance of {name}", value, low=0.0)
+    return checked
 
 
 def read(file: Path) -> dict[str, dict[str, Fields]]:

@@ -206,7 +206,10 @@ def _used(item: pytest.Item, ledger: Ledger) -> list[StepResponse]:
     from smc_mujoco.testing.response import StepResponse
 
     given = [*getattr(item, "funcargs", {}).values(), *ledger.responses]
-    found = {id(value): value for value in given if isinstance(value, StepResponse)}
+    found = {}
+    for value in given:
+        if isinstance(value, StepResponse):
+            found[id(value)] = value
     return list(found.values())
 
 

@@ -99,9 +99,11 @@ class StepResponse:
     def __repr__(self) -> str:
         if self.failure is not None:
             return f"StepResponse({self}: failed, {self.failure})"
-        names = [name for name in IN_REPR if name in self.metrics]
-        how = ", ".join(f"{name} {quantity(*self.value(name))}" for name in names)
-        return f"StepResponse({self}: {how})"
+        values = []
+        for name in IN_REPR:
+            if name in self.metrics:
+                values.append(f"{name} {quantity(*self.value(name))}")
+        return f"StepResponse({self}: {', '.join(values)})"
 
     def value(self, name: str) -> tuple[float, str]:
         """Return the value and the unit of one of `values`."""
@@ -153,14 +155,19 @@ class StepResponse:
                 "check has no limits: give metrics with their largest values, as settling_time=0.6"
             )
         self.check_names(limits)
-        bounds = [bound(name, *self.value(name), limit) for name, limit in limits.items()]
+        bounds = []
+        for name, limit in limits.items():
+            bounds.append(bound(name, *self.value(name), limit))
         judge(bounds, "limit", "not", self)
 
     def table(self) -> str:
         """Return a table, as text, of the metrics that have a meaning for this run."""
         if self.failure is not None:
             return f"failed: {self.failure}"
-        rows = [(name, quantity(*self.value(name))) for name in self.values if self.applies(name)]
+        rows = []
+        for name in self.values:
+            if self.applies(name):
+                rows.append((name, quantity(*self.value(name))))
         return str(Tabular(headings=("metric", "value"), rows=rows))
 
 
@@ -210,7 +217,9 @@ def report_of(test: str, responses: Sequence[StepResponse], folder: Path, video:
     from smc_mujoco.draw.figure import figure
     from smc_mujoco.draw.film.film import film
 
-    tables = [f"{response}\n{response.table()}" for response in responses]
+    tables = []
+    for response in responses:
+        tables.append(f"{response}\n{response.table()}")
     plants: dict[str, list[Trace]] = {}
     for response in responses:
         plants.setdefault(response.scenario.plant.name, []).append(response.trace)

@@ -165,12 +165,10 @@ def margins(
         from smc_mujoco.simulation.conditions import PLANTS
 
     terminal = Terminal(json)
-    machines = [
-        as_plant(text)
-        for text in options.plants(plants, QUICK_MARGINS["plants"] if quick else PLANTS)
-    ]
-    chosen = options.laws(law, QUICK_MARGINS["laws"] if quick else gain_sets.LAWS)
-    kind = options.names(kinds, QUICK_MARGINS["kinds"] if quick else KINDS)
+    usual = QUICK_MARGINS if quick else {"plants": PLANTS, "laws": gain_sets.LAWS, "kinds": KINDS}
+    machines = list(map(as_plant, options.plants(plants, usual["plants"])))
+    chosen = options.laws(law, usual["laws"])
+    kind = options.names(kinds, usual["kinds"])
     with bar("margins") as progress:
         results = search(
             machines,
@@ -185,11 +183,11 @@ def margins(
             device,
         )
     for name in kind:
-        terminal.print(tables.margins(name, [margin for margin in results if margin.kind == name]))
+        terminal.print(tables.margins(name, results))
     sources = _sources(machines, chosen, gains)
     words = [counted(len(results), "margin"), sources, f"{terminal.seconds:.0f} s"]
     terminal.note(", ".join(filter(None, words)), "dim", wrap=True)
-    terminal.finish([dataclasses.asdict(margin) for margin in results])
+    terminal.finish(list(map(dataclasses.asdict, results)))
 
 
 def _sources(machines: "Sequence[Machine]", laws: "Sequence[Law | str]", gains: str) -> str:
@@ -258,7 +256,6 @@ def worst(
     payload=0:2
     """
     with delay_signals():
-        from smc_mujoco.control.source import in_words
         from smc_mujoco.draw.page import files
         from smc_mujoco.robustness.worst_case import WorstCases, worst_case
 
@@ -266,14 +263,18 @@ def worst(
     within = _within(disturbance, bound)
     options.check_files(None, *files(out))
     cases = _attacked_cases(plant, law, condition, duration, gains)
-    results = WorstCases(
-        worst_case(runs, metric, within, budget, seed, threads, progress=True, device=device)
-        for runs in cases
-    )
+    found = []
+    for attacked in cases:
+        found.append(
+            worst_case(
+                attacked, metric, within, budget, seed, threads, progress=True, device=device
+            )
+        )
+    results = WorstCases(found)
     terminal.print(results)
-    sources = {case.nominal.law.name: [case.nominal.law.source] for case in results}
     runs = sum(case.tried for case in results)
-    terminal.note(f"{runs} runs, {in_words(sources)}", "dim", wrap=True)
+    sources = _sources_of([case.nominal for case in results])
+    terminal.note(f"{runs} runs, {sources}", "dim", wrap=True)
     terminal.finish([case.about() for case in results])
     if out:
         results.figure(out)
@@ -347,7 +348,7 @@ def _within(disturbance: float | None, bounds: str | None) -> "Uncertainty | Non
     known = {field.name for field in dataclasses.fields(Uncertainty)}
     for name, text in options.pairs(bounds, "--bound", "mass=0.7:1.3").items():
         try:
-            values = [float(part) for part in text.split(":")]
+            values = list(map(float, text.split(":")))
         except ValueError:
             cure = "write a range as mass=0.7:1.3, a number as x0=0.2"
             raise ScenarioError(f"--bound {name}={text} cannot be read: {cure}") from None
@@ -376,10 +377,16 @@ def _attacked_cases(
         rig = find_rig(plant)
         gain_set = "default" if gains == "tuned" else gains  # the laws of a rig have gains for it
         chosen = options.laws(law, of_rig=rig.laws) or rig.laws
-        return [ensemble.runs(rig, [attacked], 1, gain_set, duration) for attacked in chosen]
+        cases = []
+        for attacked in chosen:
+            cases.append(ensemble.runs(rig, [attacked], 1, gain_set, duration))
+        return cases
     chosen = options.laws(law, gain_sets.LAWS)
     machine = as_plant(plant)
-    return [[case(machine, attacked, condition, duration, gains)] for attacked in chosen]
+    cases = []
+    for attacked in chosen:
+        cases.append([case(machine, attacked, condition, duration, gains)])
+    return cases
 
 
 Actuator = Annotated[
@@ -425,7 +432,6 @@ def chatter(
         from smc_mujoco.cli import tables
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
-        from smc_mujoco.control.source import in_words
         from smc_mujoco.draw.page import files
         from smc_mujoco.mechanisms.named import jointed
         from smc_mujoco.metrics.limit_cycle import channel_cycle
@@ -438,7 +444,9 @@ def chatter(
     options.check_files(None, *pictures)
     fields = {} if actuator is None else {"actuator": options.actuator(actuator)}
     machine = jointed(plant, "chattering")
-    cases = [case(machine, law, condition, duration, gains, changes=fields) for law in chosen]
+    cases = []
+    for tried in chosen:
+        cases.append(case(machine, tried, condition, duration, gains, changes=fields))
     with bar("chattering") as progress:
         cycles = _cycles(cases, channel, progress.reached)
         traces = run(cases, threads=threads)
@@ -446,14 +454,20 @@ def chatter(
         changes = step_halving(traces, channel, threads)
     terminal.print(tables.chattering(cases, channel, cycles, measured, changes))
     terminal.note(f"assumed: {_assumed(cycles)}", wrap=True)
-    sources = {scenario.law.name: [scenario.law.source] for scenario in cases}
-    terminal.note(f"{in_words(sources)}, {terminal.seconds:.0f} s", "dim", wrap=True)
+    terminal.note(f"{_sources_of(cases)}, {terminal.seconds:.0f} s", "dim", wrap=True)
     terminal.finish(rows(cases, cycles, measured, changes))
     if pictures:
         from smc_mujoco.draw.nyquist import nyquist
 
         nyquist(cases, channel, cycles, traces, changes, out)
         terminal.wrote(*pictures)
+
+
+def _sources_of(scenarios: "Sequence[Scenario]") -> str:
+    """Return where the gains of the scenarios' laws come from, in words."""
+    from smc_mujoco.control.source import in_words
+
+    return in_words({scenario.law.name: [scenario.law.source] for scenario in scenarios})
 
 
 def _assumed(cycles: "Sequence[Chattering]") -> str:

@@ -108,10 +108,10 @@ def _print_all(terminal: Terminal, kind: str) -> None:
         "Scenes, for smc-mujoco run": tables.listed(scene.scenes(), scene.question),
     }
     machine = plants()["inverted_pendulum"]  # it has stops, and numbers for jumps
-    lists["Conditions, on inverted_pendulum for 10 s"] = [
-        (name, condition.brief(machine, DURATION) or "the scenario's defaults")
-        for name, condition in NAMED.items()
-    ]
+    conditions = []
+    for name, condition in NAMED.items():
+        conditions.append((name, condition.brief(machine, DURATION) or "the scenario's defaults"))
+    lists["Conditions, on inverted_pendulum for 10 s"] = conditions
     lists["Metrics"] = [(metric.name, metric.summary) for metric in metrics()]
     for title, rows in lists.items():
         if found := rows if kind in title.lower() else [row for row in rows if row[0] == kind]:

@@ -140,7 +140,7 @@ def identify(
         seed=seed,
         progress=True,
     )
-    _tell(found, [str(file) for file in files], figure, out, terminal)
+    _tell(found, list(map(str, files)), figure, out, terminal)
 
 
 def _tell(
@@ -222,7 +222,10 @@ def excitation(
     terminal.note(str(advice), wrap=True)
     if out:
         terminal.wrote(advice.save(out))
-        ends = [column.removeprefix("r") for column in advice.columns]
-        logged = ", ".join(["t", *(f"x{end}" for end in ends), *(f"u{end}" for end in ends)])
-        terminal.note(f"play it, record {logged}, and run smc-mujoco identify", wrap=True)
+        logged = ["t"]
+        for quantity in "xu":
+            for column in advice.columns:
+                logged.append(quantity + column.removeprefix("r"))
+        words = f"play it, record {', '.join(logged)}, and run smc-mujoco identify"
+        terminal.note(words, wrap=True)
     terminal.finish(advice.about())

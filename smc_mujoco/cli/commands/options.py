@@ -55,7 +55,11 @@ def _completing(module: str, name: str) -> Callable[[str], list[str]]:
         names = getattr(importlib.import_module(f"smc_mujoco.{module}"), name)
         known: Any = names() if callable(names) else names
         last = re.split("[,+]", incomplete)[-1]
-        return [incomplete + word[len(last) :] for word in known if word.startswith(last)]
+        completed = []
+        for word in known:
+            if word.startswith(last):
+                completed.append(incomplete + word[len(last) :])
+        return completed
 
     return complete
 
@@ -203,7 +207,7 @@ def names(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> lis
         return list(default)
     parts = []
     for text in [texts] if isinstance(texts, str) else texts:
-        of_text = [name.strip() for name in COMMA.split(text) if name.strip()]
+        of_text = list(filter(None, map(str.strip, COMMA.split(text))))
         if not of_text:
             raise ScenarioError(f"{shown(text)} holds no name: give names, such as pid,adrc")
         parts += of_text
@@ -234,7 +238,7 @@ def pairs(text: str | None, option: str, example: str) -> dict[str, str]:
     """
     values = {}
     for pair in names(text):
-        name, _, value = (part.strip() for part in pair.partition("="))
+        name, _, value = map(str.strip, pair.partition("="))
         if not (name and value):
             raise ScenarioError(f"{option} {shown(pair)} cannot be read: write it as {example}")
         if name in values:
@@ -289,7 +293,12 @@ def conditions(texts: Sequence[str] | None) -> "list[named.Condition]":
     from smc_mujoco.simulation.conditions import find_condition, from_file
 
     chosen = []
-    parts = [[text] if ":" in text else names(text) for text in texts or ()]
+    parts = []
+    for text in texts or ():
+        if ":" in text:
+            parts.append([text])
+        else:
+            parts.append(names(text))
     for text in itertools.chain(*parts):
         if (
             ":" not in text
@@ -340,9 +349,9 @@ def actuator(text: str) -> "tuple[Actuator, ...]":
     from smc_mujoco.mechanisms.hardware import backlash, drives  # noqa: F401
     from smc_mujoco.mechanisms.hardware.part import Actuator
 
-    known: dict[str, type[Actuator]] = {
-        kind.__name__.lower(): kind for kind in subclasses(Actuator)
-    }
+    known: dict[str, type[Actuator]] = {}
+    for kind in subclasses(Actuator):
+        known[kind.__name__.lower()] = kind
     parts = []
     for part in text.split("+"):
         name, _, numbers = part.partition(":")

@@ -128,7 +128,9 @@ def _repeat(
         )
     twins = {"twin": twin} | {name: twin.set(name) for name in sets}
     fits = {"twin": twin.fit(record)}
-    fits |= {name: shown.fits([record])[0] for name, shown in twins.items() if name != "twin"}
+    for name, shown in twins.items():
+        if name != "twin":
+            fits[name] = shown.fits([record])[0]
     terminal.print(rig_tables.fits(twin.label, fits))
     title = f"{twin.name}: {file.stem}"
     if figure:
@@ -137,11 +139,16 @@ def _repeat(
         predictions = {}
         for name, shown in twins.items():
             predictions[name] = shown.predictions([record])[0]
-        predicted = {name: columns for name, (columns, _, _) in predictions.items()}
+        predicted = {}
+        for name, prediction in predictions.items():
+            predicted[name] = prediction[0]
         _, measured, t = predictions["twin"]
         terminal.wrote(*residual_figure(title, t, measured, predicted, fits, twin.units, figure))
     if film:
-        repeated = run([shown.replay(record, start, duration) for shown in twins.values()])
+        replays = []
+        for shown in twins.values():
+            replays.append(shown.replay(record, start, duration))
+        repeated = run(replays)
         traces = [twin.measured(record, start, duration), *repeated]
         since = float(record[twin.columns.time][0]) + (twin.start if start is None else start)
         if since:

@@ -92,7 +92,9 @@ def show(
     endings = () if export is None else formats(export)
     loaded = load(trace)
     terminal = Terminal(json)
-    written = [loaded.export(trace.with_suffix(f".{ending}")) for ending in endings]
+    written = []
+    for ending in endings:
+        written.append(loaded.export(trace.with_suffix(f".{ending}")))
     if figure:
         from smc_mujoco.draw.figure import figure as draw
         from smc_mujoco.draw.page import files as drawn

@@ -83,10 +83,10 @@ class AccuracyTable(Tables, list[Accuracy]):
         tables = []
         for title, rows in self.groups.items():
             tables.append(_table(f"{title}: |e| in {rows[0].unit}", rows))
-        return [
-            *tables[:-1],
-            *(dataclasses.replace(last, notes=[*last.notes, KEY]) for last in tables[-1:]),
-        ]
+        if tables:
+            last = tables.pop()
+            tables.append(dataclasses.replace(last, notes=[*last.notes, KEY]))
+        return tables
 
 
 def _table(title: str, rows: Sequence[Accuracy]) -> Tabular:
@@ -96,13 +96,15 @@ def _table(title: str, rows: Sequence[Accuracy]) -> Tabular:
     """
     first, *_, last = rows[0].periods
     gains = {row.law: row.gains for row in rows}
-    cells = [
-        [
-            Cell(f"{row.law}*" if row.why else row.law, colour=law_colour(row.law)),
-            *(row.error(0), row.error(-1), str(row.e), str(row.s), row.theory),
-        ]
-        for row in rows
-    ]
+    cells = []
+    notes = []
+    for row in rows:
+        name = row.law
+        if row.why:
+            name += "*"
+            notes.append(f"* {row.law}: {row.why}")
+        law = Cell(name, colour=law_colour(row.law))
+        cells.append([law, row.error(0), row.error(-1), str(row.e), str(row.s), row.theory])
     return Tabular(
         headings=[
             "law",
@@ -114,7 +116,7 @@ def _table(title: str, rows: Sequence[Accuracy]) -> Tabular:
         ],
         rows=cells,
         title=", ".join(filter(None, [title, by_words(gains)])),
-        notes=[f"* {row.law}: {row.why}" for row in rows if row.why],
+        notes=notes,
     )
 
 
@@ -186,7 +188,9 @@ def _longest_first(periods: Sequence[float]) -> Floats:
     """Return the control periods in descending order; refuse fewer than two, equal ones, and what
     is no period.
     """
-    numbers = [number("a period", h, above=0.0, low=MIN_TIME) for h in items_of("periods", periods)]
+    numbers = []
+    for h in items_of("periods", periods):
+        numbers.append(number("a period", h, above=0.0, low=MIN_TIME))
     if len(numbers) < 2 or len(set(numbers)) < len(numbers):
         raise ScenarioError(
             f"periods is {shown(periods)}: give two or more different ones in s, such as {PERIODS}"
@@ -292,14 +296,18 @@ def _setup(
 
     runs = []
     for seed in seeds:
-        runs.extend(scenario(seed, h) for h in periods)
+        for h in periods:
+            runs.append(scenario(seed, h))
     return Setup(runs, periods, len(seeds))
 
 
 def _row(setup: Setup, runs: Sequence[PeriodRun]) -> Accuracy:
     """Return the row of a law from its runs, in the order of `Setup.scenarios`."""
     base = setup.scenarios[0]
-    failures = [run.failure for run in runs if run.failure]
+    failures = []
+    for run in runs:
+        if run.failure:
+            failures.append(run.failure)
     shape = setup.starts, len(setup.periods), PARTS
     floor = RESOLUTION * (max(map(abs, base.resolved.x0)) or 1.0)
     no_promise = _why_no_promise(base)

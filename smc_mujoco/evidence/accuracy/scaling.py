@@ -77,7 +77,8 @@ class Accuracy:
         """What sorts laws: the number of failed runs, then the largest |e| at each period, from the
         shortest on.
         """
-        return self.failed, *(max(error, self.floor) for error in reversed(self.e.largest))
+        shortest_first = np.maximum(self.e.largest[::-1], self.floor)
+        return self.failed, *shortest_first.tolist()
 
     @property
     def why(self) -> str:
@@ -86,16 +87,24 @@ class Accuracy:
         """
         if self.e.why == self.s.why:
             return self.e.why
-        return "; ".join(
-            f"for {name}, {remark}" for name in QUANTITIES if (remark := getattr(self, name).why)
-        )
+        remarks = []
+        for name in QUANTITIES:
+            remark = getattr(self, name).why
+            if remark:
+                remarks.append(f"for {name}, {remark}")
+        return "; ".join(remarks)
 
     @property
     def theory(self) -> str:
         """The orders of e and s that theory promises, as text: one number if they are the same, ""
         for none.
         """
-        promised = ["" if one.theory is None else f"{one.theory:.2g}" for one in (self.e, self.s)]
+        promised = []
+        for one in (self.e, self.s):
+            if one.theory is None:
+                promised.append("")
+            else:
+                promised.append(f"{one.theory:.2g}")
         return ", ".join(dict.fromkeys(promised))
 
     def error(self, k: int) -> str:

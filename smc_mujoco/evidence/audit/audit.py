@@ -180,7 +180,7 @@ def sets(paper: Paper, gains: str | Sequence[str] | None, quick: bool) -> list[s
 
 def document(claims: Sequence[Claim]) -> dict[str, Any]:
     """Return claims as JSON data: {"smc_mujoco": version, "claims": [...]}."""
-    return {"smc_mujoco": __version__, "claims": [dataclasses.asdict(claim) for claim in claims]}
+    return {"smc_mujoco": __version__, "claims": list(map(dataclasses.asdict, claims))}
 
 
 def measure(entry: ClaimEntry, runs: ClaimRuns) -> Evidence:
@@ -222,7 +222,9 @@ def _evidence(entry: ClaimEntry, returned: Any) -> Iterator[Check | Beside]:
             "it returns numbers, and holds_if is a text: "
             'write a table, as { "exponent" = ">= 1.9" }'
         )
-    values = {measure: dict(_cases(measure, one)) for measure, one in returned.items()}
+    values = {}
+    for measure, one in returned.items():
+        values[measure] = dict(_cases(measure, one))
     for threshold in entry.thresholds:
         if not values.get(threshold.measure):
             raise ScenarioError(

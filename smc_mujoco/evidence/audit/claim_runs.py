@@ -202,7 +202,10 @@ class ClaimRuns:
         changed.
         """
         cells = itertools.product(self.plants, self.laws, self.conditions)
-        return {cell: self.scenario(*cell, **changes) for cell in cells}
+        scenarios = {}
+        for cell in cells:
+            scenarios[cell] = self.scenario(*cell, **changes)
+        return scenarios
 
     def scores(self, scenarios: Iterable[Scenario]) -> list[Scores]:
         """Return every metric of every scenario, in order; a run that fails has inf in every
@@ -210,7 +213,10 @@ class ClaimRuns:
         """
         wanted = self._keyed(scenarios)
         known = ChainMap(self.shared, self.table)
-        new = {name: scenario for name, scenario in wanted if name not in known}
+        new = {}
+        for name, scenario in wanted:
+            if name not in known:
+                new[name] = scenario
         names = list(new)
         for index, trace in stream(list(new.values()), self.threads):
             law = trace.scenario.law
@@ -236,15 +242,21 @@ class ClaimRuns:
         self, name: str, plant: str, laws: Iterable[str], condition: str = "nominal"
     ) -> dict[str, float]:
         """Return law -> a metric of its run on a plant."""
-        return {law: self.score(plant, law, condition)[name] for law in laws}
+        found = {}
+        for law in laws:
+            found[law] = self.score(plant, law, condition)[name]
+        return found
 
     def traces(self, scenarios: Iterable[Scenario]) -> list[Trace]:
         """Return the traces of scenarios, in order; they are not kept."""
         wanted = self._keyed(scenarios)
         done = dict(stream([scenario for _, scenario in wanted], self.threads))
-        traces = [trace for _, trace in sorted(done.items())]
+        traces = [done[i] for i in sorted(done)]
         for (name, scenario), trace in zip(wanted, traces, strict=True):
-            hashed = _hash(*(getattr(trace, array).tobytes() for array in ARRAYS))
+            parts = []
+            for array in ARRAYS:
+                parts.append(getattr(trace, array).tobytes())
+            hashed = _hash(*parts)
             self.used[name] = self.used.get(name, Used(scenario))._replace(trace=hashed)
         return traces
 
@@ -253,7 +265,10 @@ class ClaimRuns:
         nothing in a run.
         """
         plants: Hashes = {}
-        return [(key(scenario.named(None), plants=plants), scenario) for scenario in scenarios]
+        keyed = []
+        for scenario in scenarios:
+            keyed.append((key(scenario.named(None), plants=plants), scenario))
+        return keyed
 
     def traced(self, scenarios: Mapping[Name, Scenario]) -> dict[Name, Trace]:
         """Return name -> trace of named scenarios, such as those of `grid`."""
@@ -263,7 +278,10 @@ class ClaimRuns:
         self, scenarios: Mapping[Name, Scenario], measure: Callable[[Trace], Value]
     ) -> dict[Name, Value]:
         """Return name -> what is measured on the trace of a named scenario."""
-        return {name: measure(trace) for name, trace in self.traced(scenarios).items()}
+        found = {}
+        for name, trace in self.traced(scenarios).items():
+            found[name] = measure(trace)
+        return found
 
     def results(self) -> Iterator[RunResult]:
         """Yield every run of the audit whose scores were used, and every run of the table."""
@@ -272,9 +290,10 @@ class ClaimRuns:
 
 def of_table(table: "Table") -> dict[str, RunResult]:
     """Return the runs that a study's table holds, by key."""
-    return {
-        row["hash"]: RunResult.of(row["law"], from_json(row["gains"]), row) for row in table.rows()
-    }
+    runs = {}
+    for row in table.rows():
+        runs[row["hash"]] = RunResult.of(row["law"], from_json(row["gains"]), row)
+    return runs
 
 
 def _hash(*parts: bytes) -> str:

@@ -18,6 +18,7 @@ from typing import Any
 
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import Data, Fields
+from smc_mujoco.common.data import attributes
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, reading, to_json
 from smc_mujoco.common.version import __version__
@@ -48,22 +49,28 @@ def document(audit: Any) -> Fields:
                     about["scores"] = run.scores
                 if run.trace:
                     about["trace"] = run.trace
-    sealed = [claim for claim in audit.claims if not audit.paper.claims[claim.id].varies]
+    sealed = []
+    for claim in audit.claims:
+        if not audit.paper.claims[claim.id].varies:
+            sealed.append(claim)
+    left_out = []
+    for id in audit.paper.claims:
+        if id not in audit.used:
+            left_out.append(id)
+    texts = attributes(audit.paper, ("name", *TEXT_FIELDS))
     data = {
         "format": FORMAT,
-        "paper": {
-            "name": audit.paper.name,
-            **{name: getattr(audit.paper, name) for name in TEXT_FIELDS},
-            "files": files(audit.paper),
-        },
+        "paper": texts | {"files": files(audit.paper)},
         "software": {
             "smc_mujoco": __version__,
-            **{name: version(name) for name in ("mujoco", "numba", "numpy")},
+            "mujoco": version("mujoco"),
+            "numba": version("numba"),
+            "numpy": version("numpy"),
             "python": f"{sys.version_info.major}.{sys.version_info.minor}",
             "code": fingerprint.package("testing", "draw", fingerprint.PAPERS),
         },
         "quick": audit.quick,
-        "left_out": [id for id in audit.paper.claims if id not in audit.used],
+        "left_out": left_out,
         "counts": dict(sorted(totals(sealed).items())),  # of the paper's own sentences
         "claims": [_claim(audit, claim, names) for claim in audit.claims],
         "runs": dict(sorted(runs.items())),
@@ -109,7 +116,7 @@ def files(paper: Paper) -> dict[str, str]:
 def _claim(audit: Any, claim: Any, names: Mapping[str, str]) -> Fields:
     """Return the part of a claim that is sealed."""
     entry = audit.paper.claims[claim.id]
-    sealed = {name: getattr(claim, name) for name in CLAIM_FIELDS}
+    sealed = attributes(claim, CLAIM_FIELDS)
     if entry.immune:
         sealed["immune"] = entry.immune
     if entry.varies:
@@ -117,10 +124,8 @@ def _claim(audit: Any, claim: Any, names: Mapping[str, str]) -> Fields:
     runs = {}
     for name, used in audit.used[claim.id].items():
         runs[name] = sorted({names[key] for key in used})
-    judged = {}
-    for name in ("numbers", "beside", "verdicts", "verdict", "flips", "note"):
-        judged[name] = getattr(claim, name)
-    return sealed | {"runs": runs} | judged
+    judged = ("numbers", "beside", "verdicts", "verdict", "flips", "note")
+    return sealed | {"runs": runs} | attributes(claim, judged)
 
 
 def _run(scenario: Scenario) -> Fields:

@@ -37,10 +37,13 @@ class TriedGains(NamedTuple):
     @property
     def rank(self) -> tuple[bool, float]:
         """Key that orders gains: whether all checks hold, then the least slack."""
-        checks = [check for check in self.evidence if isinstance(check, Check)]
-        return all(check.holds for check in checks), min(
-            (check.slack for check in checks), default=math.inf
-        )
+        held = []
+        slacks = []
+        for check in self.evidence:
+            if isinstance(check, Check):
+                held.append(check.holds)
+                slacks.append(check.slack)
+        return all(held), min(slacks, default=math.inf)
 
 
 def decisive(
@@ -82,15 +85,21 @@ def _decisive(
         spread, near = theorem.allowed.spread, theorem.allowed.near
         if runs.quick:
             spread, near = QUICK_SPREAD_SETS, QUICK_NEAR_SETS
-        if any(decides(gains, True) for gains in theorem.points(theorem.allowed.bounds, spread)):
-            return
+        for gains in theorem.points(theorem.allowed.bounds, spread):
+            if decides(gains, True):
+                return
         centre = best(quickly, key=lambda tried: tried.rank).gains
-        any(decides(gains, True) for gains in theorem.points(theorem.around(centre), near))
+        for gains in theorem.points(theorem.around(centre), near):
+            if decides(gains, True):
+                return
 
     starts = [{gain: theorem.rest[gain] for gain in theorem.allowed.bounds}]
     if len(entry.plants) == 1 and entry.plants[0] in entry.examples:
         starts.append(dict(entry.examples[entry.plants[0]]))
-    met = [gains for gains in starts if theorem.smallest(gains) > 0.0]
+    met = []
+    for gains in starts:
+        if theorem.smallest(gains) > 0.0:
+            met.append(gains)
     if not any(decides(gains, False) for gains in met):
         search()
         decides(best(quickly, key=lambda tried: tried.rank).gains, False)
@@ -115,24 +124,26 @@ class Theorem:
         self._failed = lambda error: failed(runs.paper, entry, error)
 
     def points(self, bounds: Bounds, count: int) -> Iterator[Gains]:
-        """Yield gain sets within bounds that meet the conditions, spread over the logarithms
-        (Halton's points).
-        """
-        from scipy.stats import qmc
-
-        low, high = np.log(list(bounds.values())).T
-        drawn = qmc.Halton(len(bounds), scramble=False).random(DRAWN_POINTS)[1:]
-        sets = (
-            dict(zip(bounds, np.exp(low + (high - low) * point).tolist(), strict=True))
-            for point in drawn
-        )
-        met = (gains for gains in sets if self.smallest(gains) > 0.0)
+        """Return gain sets within bounds that meet the conditions, at most `count`."""
+        met = self._meeting(bounds)
         first = next(met, None)
         if first is None:
             raise self._failed(
                 ScenarioError("no gains in [allowed] meet the conditions: widen its bounds")
             )
         return itertools.islice(itertools.chain([first], met), count)
+
+    def _meeting(self, bounds: Bounds) -> Iterator[Gains]:
+        """Yield gain sets within bounds that meet the conditions, spread over the logarithms
+        (Halton's points).
+        """
+        from scipy.stats import qmc
+
+        low, high = np.log(list(bounds.values())).T
+        for point in qmc.Halton(len(bounds), scramble=False).random(DRAWN_POINTS)[1:]:
+            gains = dict(zip(bounds, np.exp(low + (high - low) * point).tolist(), strict=True))
+            if self.smallest(gains) > 0.0:
+                yield gains
 
     def around(self, gains: Gains) -> Bounds:
         """Return narrower bounds around gains, within those of the paper."""
@@ -147,10 +158,10 @@ class Theorem:
         if self.allowed.margins is None:
             return {}
         try:
-            return {
-                name: float(value)
-                for name, value in self.allowed.margins({**self.rest, **gains}).items()
-            }
+            margins = {}
+            for name, value in self.allowed.margins({**self.rest, **gains}).items():
+                margins[name] = float(value)
+            return margins
         except Exception as error:  # whatever a user's function raises
             raise self._failed(error) from error
 

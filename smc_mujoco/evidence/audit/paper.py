@@ -210,7 +210,10 @@ class Paper:
 def shipped() -> dict[str, Path]:
     """Return name -> folder of every paper that ships, in alphabetical order."""
     home = files.shipped("benchmarks/papers")
-    return {path.parent.name: path.parent for path in sorted(home.glob(f"*/{PAPER_FILE}"))}
+    folders = {}
+    for path in sorted(home.glob(f"*/{PAPER_FILE}")):
+        folders[path.parent.name] = path.parent
+    return folders
 
 
 Home = tuple[Path, str]  # a paper's folder, and the name under which it is imported
@@ -282,8 +285,9 @@ def _package(folder: Path) -> str:
     """Make a package of a user's folder, so that its modules are imported, and return its name."""
     package = ModuleType("paper_" + re.sub(r"\W", "_", folder.resolve().name))
     package.__path__ = [str(folder.resolve())]
-    for known in [module for module in sys.modules if module.partition(".")[0] == package.__name__]:
-        del sys.modules[known]
+    for module in list(sys.modules):
+        if module.partition(".")[0] == package.__name__:
+            del sys.modules[module]
     sys.modules[package.__name__] = package
     importlib.invalidate_caches()
     return package.__name__
@@ -341,11 +345,10 @@ def _module(folder: Path, package: str) -> ModuleType:
 
 def _place(error: BaseException, folder: Path) -> str:
     """Return the file and line of a paper's folder at which an exception was raised."""
-    frames = [
-        frame
-        for frame in traceback.extract_tb(error.__traceback__)
-        if Path(frame.filename).is_relative_to(folder.resolve())
-    ]
+    frames = []
+    for frame in traceback.extract_tb(error.__traceback__):
+        if Path(frame.filename).is_relative_to(folder.resolve()):
+            frames.append(frame)
     if frames:
         return f"{frames[-1].filename}, line {frames[-1].lineno}"
     return str(folder / CODE_FILE)
@@ -365,7 +368,9 @@ def _values(data: Data, fields: Data, required: Names) -> dict:
     """
     for field in data:
         find("field", field, fields)
-    values = {field: _typed(field, value, fields[field]) for field, value in data.items()}
+    values = {}
+    for field, value in data.items():
+        values[field] = _typed(field, value, fields[field])
     for field in required:
         if not values.get(field):
             raise ScenarioError(f"it has no {field}: write {field}, {CURES[fields[field]]}")
@@ -391,20 +396,24 @@ def _checked(folder: Path, data: Data, code: ModuleType) -> Paper:
     quick_sets = tuple(values.get("quick_sets", list(sets)[:1]))
     for one in quick_sets:
         find("set of gains in quick_sets", one, sets)
+    texts = {}
+    for field in TEXT_FIELDS:
+        if field in values:
+            texts[field] = values[field]
+    plants = {}
+    for key, one in values.get("plants", {}).items():
+        plants[key] = _plant(f"plants.{key}", one, folder)
+    conditions = {}
+    for key, text in values.get("conditions", {}).items():
+        conditions[key] = condition(key, **_fields(f"conditions.{key}", text))
     paper = Paper(
         name=folder.resolve().name,
         folder=folder,
-        **{field: values[field] for field in TEXT_FIELDS if field in values},
+        **texts,
         sets=sets,
         quick_sets=quick_sets,
-        plants={
-            key: _plant(f"plants.{key}", one, folder)
-            for key, one in values.get("plants", {}).items()
-        },
-        conditions={
-            key: condition(key, **_fields(f"conditions.{key}", text))
-            for key, text in values.get("conditions", {}).items()
-        },
+        plants=plants,
+        conditions=conditions,
         laws=dict(_laws(code)),
         fields=_fields("runs", values.get("runs", "")),
         allowed={},
@@ -414,9 +423,9 @@ def _checked(folder: Path, data: Data, code: ModuleType) -> Paper:
     for key, value in vars(code).items():
         if inspect.isfunction(value):
             functions[key] = value
-    allowed = {
-        law: _allowed(law, one, functions, paper) for law, one in values.get("allowed", {}).items()
-    }
+    allowed = {}
+    for law, one in values.get("allowed", {}).items():
+        allowed[law] = _allowed(law, one, functions, paper)
     paper = dataclasses.replace(paper, allowed=allowed)
     entries = {}
     for number, one in enumerate(values["claim"], 1):
@@ -443,7 +452,8 @@ def _entry(data: Data, functions: Mapping[str, Callable], paper: Paper) -> Claim
         "words", asked if isinstance(asked, str) else ", ".join(map(str, thresholds))
     )
     values["quantifier"] = find("quantifier", values.get("quantifier", "named"), QUANTIFIERS)
-    values |= {field: tuple(values.get(field, ())) for field in ("plants", "laws", "conditions")}
+    for field in ("plants", "laws", "conditions"):
+        values[field] = tuple(values.get(field, ()))
     values.setdefault(
         "measured",
         " ".join((inspect.getdoc(function) or "").partition("\n\n")[0].split()).rstrip("."),
@@ -501,8 +511,11 @@ def _allowed(law: str, data: object, functions: Mapping[str, Callable], paper: P
     bounds = {}
     for gain, ends in table.items():
         find(f"gain of {law} in allowed", gain, paper.bound(law, {}).gains)
-        pair = ends if isinstance(ends, list) else []
-        pair = [end for end in pair if isinstance(end, int | float)]
+        pair = []
+        if isinstance(ends, list):
+            for end in ends:
+                if isinstance(end, int | float):
+                    pair.append(end)
         if len(pair) != 2 or not 0.0 < pair[0] < pair[1]:
             raise ScenarioError(
                 f"allowed.{law}.{gain} is {shown(ends)}: "

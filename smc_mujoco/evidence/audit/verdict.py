@@ -302,17 +302,25 @@ class Claim(Statement):
             "note": self.note,
         }
         for plant, gains in self.examples.items():
-            parts[f"holds on {plant} with"] = ", ".join(f"{k} = {v:g}" for k, v in gains.items())
+            words = ", ".join(f"{gain} = {value:g}" for gain, value in gains.items())
+            parts[f"holds on {plant} with"] = words
         if self.instead and self.verdict != SUPPORTED:
             parts["instead"] = f"{self.instead} ({self.shown_by})"
-        return {name: text for name, text in parts.items() if text}
+        told = {}
+        for name, text in parts.items():
+            if text:
+                told[name] = text
+        return told
 
     def _repr_html_(self) -> str:
         return Claims([self])._repr_html_()
 
     def checks(self, gains: str) -> list[Check]:
         """Return the checks under a set of gains."""
-        return [Check(what, **numbers) for what, numbers in self.numbers[gains].items()]
+        checks = []
+        for what, numbers in self.numbers[gains].items():
+            checks.append(Check(what, **numbers))
+        return checks
 
     def decisive(self, gains: str) -> Check | None:
         """Return the check that fails by most, else the one nearest to its limit; None without
@@ -358,21 +366,30 @@ class Claims(list[Claim]):
 def totals(claims: Sequence[Claim]) -> dict[str, int]:
     """Return verdict -> how many of the paper's own sentences have it, without zeros."""
     of_paper = [claim.verdict for claim in claims if claim.whose == PAPER]
-    return {kind: of_paper.count(kind) for kind in VERDICTS if kind in of_paper}
+    counts = {}
+    for kind in VERDICTS:
+        if kind in of_paper:
+            counts[kind] = of_paper.count(kind)
+    return counts
 
 
 def summary(claims: Sequence[Claim]) -> str:
     """Return a line: the totals of the paper's own sentences and what was read, then the verdicts
     on the rest.
     """
-    read = ", ".join(
-        dict.fromkeys(claim.read for claim in claims if claim.whose == PAPER and claim.read)
-    )
+    read_parts = []
+    for claim in claims:
+        if claim.whose == PAPER and claim.read:
+            read_parts.append(claim.read)
+    read = ", ".join(dict.fromkeys(read_parts))
     parts = [
         f"the paper's own sentences{f' ({read} read)' if read else ''}: {_marked(totals(claims))}"
     ]
     for whose, words in ((DERIVED, "derived from it"), (OURS, "questions beside it")):
-        rest = Counter(claim.verdict for claim in claims if claim.whose == whose)
+        rest = Counter()
+        for claim in claims:
+            if claim.whose == whose:
+                rest[claim.verdict] += 1
         if rest:
             parts.append(f"{words}: {_marked(rest)}")
     return "; ".join(parts)
@@ -380,17 +397,24 @@ def summary(claims: Sequence[Claim]) -> str:
 
 def over_gains(claims: Sequence[Claim]) -> str:
     """Return a sentence on how many supported sentences hold under every set of gains."""
-    supported = [one for one in claims if one.whose == PAPER and one.verdict == SUPPORTED]
-    same = sum(claim.for_every_set for claim in supported)
+    supported = 0
+    same = 0
+    for one in claims:
+        if one.whose == PAPER and one.verdict == SUPPORTED:
+            supported += 1
+            same += one.for_every_set
     return (
-        f"Of the paper's {len(supported)} supported sentences {same} hold under every set of gains "
-        f"that was run, and {len(supported) - same} for some gains."
+        f"Of the paper's {supported} supported sentences {same} hold under every set of gains "
+        f"that was run, and {supported - same} for some gains."
     )
 
 
 def _marked(counts: Mapping[str, int]) -> str:
     """Return counts of verdicts with their marks; "none" without any."""
-    return ", ".join(f"{MARKS[kind]} {count} {kind}" for kind, count in counts.items()) or "none"
+    words = []
+    for kind, count in counts.items():
+        words.append(f"{MARKS[kind]} {count} {kind}")
+    return ", ".join(words) or "none"
 
 
 def verdict(evidence: Evidence, quantifier: str = NAMED, over: str = "", limit: str = "") -> str:
@@ -418,7 +442,10 @@ def sentences(evidence: Evidence, quantifier: str = NAMED) -> dict[str, bool]:
         if isinstance(one, Check):
             checks.setdefault(one.sentence, []).append(one.holds)
     rule = any if quantifier == EXISTENTIAL else all
-    return {sentence: rule(holds) for sentence, holds in checks.items()}
+    found = {}
+    for sentence, holds in checks.items():
+        found[sentence] = rule(holds)
+    return found
 
 
 def combined(
@@ -436,13 +463,29 @@ def combined(
     return PARTLY, "The verdict depends on the gains."
 
 
+def _by_name(evidence: Evidence) -> tuple[dict[str, Fields], dict[str, float]]:
+    """Return what is measured -> the fields of its check, and -> the number beside the checks."""
+    checks: dict[str, Fields] = {}
+    beside: dict[str, float] = {}
+    for one in evidence:
+        fields = one._asdict()
+        what = fields.pop("what")
+        if what in checks or what in beside:
+            raise ScenarioError(f"a claim measures {what!r} twice: name the two apart")
+        if isinstance(one, Beside):
+            beside[what] = float(one.value)
+        else:
+            checks[what] = fields
+    return checks, beside
+
+
 def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
     """Return a claim with its verdict, from set of gains -> checks and the numbers beside them."""
-    searched = {name: statement.over if statement.rivals in ("", name) else "" for name in evidence}
     limit = "" if statement.whose == OURS else statement.limit
     verdicts = {}
     for name, some in evidence.items():
-        verdicts[name] = verdict(some, statement.quantifier, searched[name], limit)
+        searched = statement.over if statement.rivals in ("", name) else ""
+        verdicts[name] = verdict(some, statement.quantifier, searched, limit)
     if statement.rivals in verdicts:
         overall = verdicts[statement.rivals]
         rivals = f"{statement.rivals} gains of the other laws"
@@ -452,19 +495,12 @@ def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
     flips = len(set(verdicts.values())) > 1
     if statement.whose == OURS:
         overall = ANSWERS[overall]
-        verdicts = {name: ANSWERS[kind] for name, kind in verdicts.items()}
-    numbers: dict[str, dict[str, Fields]] = {name: {} for name in evidence}
-    beside: dict[str, dict[str, float]] = {name: {} for name in evidence}
+        for name, kind in verdicts.items():
+            verdicts[name] = ANSWERS[kind]
+    numbers = {}
+    beside = {}
     for name, some in evidence.items():
-        for one in some:
-            fields = one._asdict()
-            what = fields.pop("what")
-            if what in numbers[name] or what in beside[name]:
-                raise ScenarioError(f"a claim measures {what!r} twice: name the two apart")
-            if isinstance(one, Beside):
-                beside[name][what] = float(one.value)
-            else:
-                numbers[name][what] = fields
+        numbers[name], beside[name] = _by_name(some)
     shared = {}
     for field in dataclasses.fields(Statement):
         shared[field.name] = getattr(statement, field.name)

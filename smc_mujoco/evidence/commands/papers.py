@@ -134,7 +134,10 @@ def _papers(listed: bool, new: Path | None, check: Path | None, terminal: Termin
         terminal.wrote(*paper.new(new))
     if check:
         data = evidence.check(check)
-        counts = ", ".join(f"{count} {verdict}" for verdict, count in data["counts"].items())
+        counted = []
+        for verdict, count in data["counts"].items():
+            counted.append(f"{count} {verdict}")
+        counts = ", ".join(counted)
         about = f"{data['paper']['authors']}, {data['paper']['title']}"
         terminal.note(f"the seal is whole: {about}: {counts}", wrap=True)
     if listed:

@@ -100,11 +100,11 @@ UNITS = {  # quantity -> unit, and range
 
 def quantities(source, **values):
     """Return name -> Quantity, from numbers of one source in UNITS."""
-    values = {name: values[name] for name in UNITS if name in values}
-    return {
-        name: Quantity(value, UNITS[name][0], source, *UNITS[name][1:])
-        for name, value in values.items()
-    }
+    found = {}
+    for name, (unit, *ends) in UNITS.items():
+        if name in values:
+            found[name] = Quantity(values[name], unit, source, *ends)
+    return found
 
 
 QUBE_SERVO_2 = Rig(

@@ -8,6 +8,7 @@ machine, models 1.0 to 3.0, disagree.
 
 import math
 
+from smc_mujoco.common.data import attributes
 from smc_mujoco.identification.records import Columns
 from smc_mujoco.identification.rig import Quantity, Rig
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
@@ -91,7 +92,7 @@ def quantities():
 
 def plant_of(name, q):
     """Return a plant with the rig's numbers."""
-    return plant(name, **{key: getattr(q, key) for key in MODEL_1_0})
+    return plant(name, **attributes(q, MODEL_1_0))
 
 
 def fields(name, q):
