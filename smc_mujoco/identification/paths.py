@@ -12,16 +12,14 @@ Dry friction with another level in each direction is frictionloss and offset: th
 frictionloss - offset and frictionloss + offset.
 """
 
-import copy
-import dataclasses
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from smc_mujoco.common.constraints import Number, of_fields
+from smc_mujoco.common.constraints import of_fields
 from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
 from smc_mujoco.identification.rig import Quantity
 from smc_mujoco.mechanisms.custom.joint_numbers import joint_numbers, with_joint_numbers
@@ -30,6 +28,15 @@ from smc_mujoco.mechanisms.hardware.moments import JointState
 from smc_mujoco.mechanisms.hardware.part import Friction
 from smc_mujoco.mechanisms.layout import channel_names, driven_names
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.part_numbers import (
+    FIELDS,
+    PartNumber,
+    is_path,
+    part_number,
+    parts_of,
+    paths_of_parts,
+    ranges,
+)
 from smc_mujoco.simulation.scenario import Scenario
 
 DELAY = "input_delay"
@@ -39,45 +46,6 @@ MIN_GAIN = 1e-6  # chosen: a motor that does nothing cannot be found
 LEAST_ABOVE_ZERO = 1e-9  # SI units, of a number that must be greater than 0
 # Frictions and inertias of the library's plants, which are 0 or more
 NATURAL = frozenset(("b", "bq", "b1", "b2", "cf", "cfq", "cf1", "cf2", "delta", "J", "Jc"))
-# Fields of a scenario whose parts have numbers to find
-FIELDS = "friction", "actuator", "sensor", "contact", "disturbance"
-
-
-class PartNumber(NamedTuple):
-    """A number of a part of a scenario."""
-
-    field: str
-    part: int  # its index in the field
-    name: str
-    joint: int  # which of the part's joints, where each has a number; else -1
-
-    def of(self, parts: Sequence[Any]) -> Any:
-        """Return the number."""
-        value = getattr(parts[self.part], self.name)
-        return value if self.joint < 0 else value[self.joint]
-
-    def put(self, parts: Sequence[Any], value: float) -> tuple[Any, ...]:
-        """Return the parts with another number, unchecked: a search keeps within its range. A level
-        at rest follows one while sliding that would pass it, and the other way round.
-        """
-        made = copy.copy(parts[self.part])
-        self._set(made, self.name, value)
-        ordered = getattr(made, "ordered", ())  # of frictions
-        if ordered and self.name in ordered and getattr(made, ordered[1]) is not None:
-            low, high = (np.ravel(getattr(made, name))[max(self.joint, 0)] for name in ordered)
-            if low > high:
-                (other,) = set(ordered) - {self.name}
-                self._set(made, other, value)
-        return *parts[: self.part], made, *parts[self.part + 1 :]
-
-    def _set(self, made: Any, name: str, value: float) -> None:
-        """Set a number of a part, of this joint where each has one."""
-        every = getattr(made, name)
-        if isinstance(every, tuple):
-            changed = list(every)
-            changed[max(self.joint, 0)] = value
-            value = tuple(changed)  # pyright: ignore[reportAssignmentType]
-        object.__setattr__(made, name, value)
 
 
 class Paths(NamedTuple):
@@ -111,7 +79,6 @@ def resolved(base: Scenario, names: Sequence[str]) -> Paths:
     quantities: dict[str, Quantity] = {}
     places: dict[str, PartNumber] = {}
     for name in names:
-        field = str(name).partition(".")[0]
         if name in of_joints:
             known = of_joints[name]
             quantities[name] = Quantity(known.value, known.unit, "the model", 0.0)
@@ -122,7 +89,7 @@ def resolved(base: Scenario, names: Sequence[str]) -> Paths:
             quantities[name] = Quantity(plant.parameters[name], "", "the plant", least)
         elif quantity := _of_signals(base, str(name)):
             quantities[name] = quantity
-        elif field in FIELDS and "." in name:
+        elif is_path(str(name)):
             places[name], quantities[name] = _of_part(base, name)
         else:
             raise unknown(f"number of {plant.name}", name, known_paths(base))
@@ -137,7 +104,7 @@ def known_paths(base: Scenario) -> list[str]:
         paths += [f"{joint}.gain", f"{joint}.offset"]
     paths += [f"{joint}.zero" for joint in channel_names(plant)]
     for field in FIELDS:
-        paths += _paths_of_parts(base, field)
+        paths += paths_of_parts(base, field)
     return paths
 
 
@@ -158,89 +125,20 @@ def _of_signals(base: Scenario, name: str) -> Quantity | None:
     return None
 
 
-def parts_of(base: Scenario, field: str) -> tuple[Any, ...]:
-    """Return the parts of a field of a scenario."""
-    parts = getattr(base, field)
-    if parts is None:
-        return ()
-    return parts if isinstance(parts, tuple) else (parts,)
-
-
-def _names_of(part: Any) -> list[str]:
-    """Return the names of a part's numbers: of those declared as such, and of floats."""
-    declared = of_fields(type(part))
-    found = []
-    for field in dataclasses.fields(part):
-        is_number = any(_numbers(declared.get(field.name)))
-        if is_number or isinstance(getattr(part, field.name), float):
-            found.append(field.name)
-    return found
-
-
-def _paths_of_parts(base: Scenario, field: str) -> list[str]:
-    """Return every path to a number of a field's parts."""
-    paths = []
-    for part in parts_of(base, field):
-        joints = [f".{joint}" for joint in getattr(part, "on", ())] or [""]
-        for joint in joints:
-            paths += [f"{field}{joint}.{name}" for name in _names_of(part)]
-    return paths
-
-
 def _of_part(base: Scenario, path: str) -> tuple[PartNumber, Quantity]:
     """Return where a number of a part is, with its value and the range of its type."""
-    field, *joint, name = path.split(".")
-    found = []
-    for i, part in enumerate(parts_of(base, field)):
-        if not dataclasses.is_dataclass(part) or name not in _names_of(part):
-            continue
-        joints = _joints_of(part, base.plant)
-        if joint and ".".join(joint) not in joints:
-            continue
-        each = isinstance(getattr(part, name), tuple)
-        if each and not joint:
-            continue
-        found.append(PartNumber(field, i, name, joints.index(".".join(joint)) if each else -1))
-    if len(found) != 1:
-        known = known_paths(base)
-        if not found:
-            raise unknown(f"number of {base.plant.name}", path, known)
-        raise ScenarioError(
-            f"{path} is a number of {len(found)} parts: name the joint, as {field}.JOINT.{name}"
-        )
-    place = found[0]
-    part = parts_of(base, field)[place.part]
-    value = place.of(parts_of(base, field))
-    if not isinstance(value, int | float) or not math.isfinite(value):
-        raise ScenarioError(
-            f"{path} is {shown(value)}: give it a number in the scenario, where the search starts"
-        )
+    place = part_number(base, path, known_paths(base))
+    parts = parts_of(base, place.field)
     least, most = -math.inf, math.inf
-    for number in _numbers(of_fields(type(part)).get(name)):
+    for number in ranges(of_fields(type(parts[place.part])).get(place.name)):
         least = _open(number.low) if number.above != 0.0 else LEAST_ABOVE_ZERO
         most = math.inf if number.high >= 1e12 else number.high
-    return place, Quantity(float(value), "", "the scenario", least, most)
-
-
-def _joints_of(part: Any, plant: Plant) -> list[str]:
-    """Return the joints that a part of a scenario acts on."""
-    names = channel_names(plant)
-    if hasattr(part, "channels"):
-        return [names[i] for i in part.channels(plant) if i >= 0]
-    return list(names)
+    return place, Quantity(float(place.of(parts)), "", "the scenario", least, most)
 
 
 def _open(least: float) -> float:
     """Return the low end of a range; minus infinity for one that bounds nothing."""
     return -math.inf if least <= -1e12 else least
-
-
-def _numbers(constraint: Any) -> Iterator[Number]:
-    """Yield the Number in a constraint, which may be that of each joint."""
-    while constraint is not None:
-        if isinstance(constraint, Number):
-            yield constraint
-        constraint = getattr(constraint, "one", None)
 
 
 def steady_force(part: Friction, v: np.ndarray, i: int) -> np.ndarray:

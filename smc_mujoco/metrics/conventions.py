@@ -427,14 +427,19 @@ def _stuck(trace: Trace) -> dict[str, Array]:
     """Return `held` of a run with frictions that say by their force where a joint sticks, else
     nothing.
     """
-    plant = trace.scenario.plant
+    scenario = trace.scenario
+    plant = scenario.plant
     if trace.held is not None or trace.x.shape[1] != plant.n:
         return {}
     bends = {}
-    for part in trace.scenario.friction:
+    jump = scenario.jump_sample
+    later = scenario.machines[-1].friction  # the same, unless their numbers jump
+    for part, after in zip(scenario.friction, later, strict=True):
         for i in part.channels(plant) if part.side == "link" else ():
-            stuck = part.sticks(trace.v[:, i], trace.holding[:, i])
+            motion = trace.v[:, i], trace.holding[:, i]
+            stuck = part.sticks(*motion)
             if stuck is not None:
+                stuck[jump:] = after.sticks(*motion)[jump:]
                 bends[i] = stuck
     if not bends:
         return {}

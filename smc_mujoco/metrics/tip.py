@@ -86,7 +86,7 @@ def tip_paths(trace: Trace) -> ArrayPair:
     3), read-only.
     """
     scenario = trace.scenario
-    jump = _jump_sample(trace)
+    jump = trace.scenario.jump_sample
     parts = (trace.x[:jump], 0), (trace.x[jump:], scenario.jump_step)
     pieces = []
     for x, step in parts:
@@ -147,7 +147,7 @@ def contacts(trace: Trace) -> Contacts:
             pushes.append((model.body(d.body).id, d))
     contacts = Contacts(np.zeros(len(trace.t)), np.zeros(len(trace.t)), np.zeros((len(trace.t), 3)))
     data.qpos[:] = initial_pose(model)
-    jump = _jump_sample(trace)
+    jump = trace.scenario.jump_sample
     whole = None
     if any(part.loose for part in scenario.contact):
         whole = states(trace, trace.t)
@@ -189,16 +189,6 @@ def _add_contacts(model: mujoco.MjModel, data: mujoco.MjData, contacts: Contacts
         moves = (model.body_weldid[bodies] != 0) & ~moves
         first, second = moves.astype(float)
         contacts.push[k] += (second - first) * wrench[0] * data.contact.frame[i, :3]
-
-
-def _jump_sample(trace: Trace) -> int:
-    """Return the first sample at or after the jump of a trace's scenario, or the number of samples
-    without a jump.
-    """
-    scenario = trace.scenario
-    if scenario.jump is None:
-        return len(trace.t)
-    return -(-scenario.jump_step // scenario.steps)
 
 
 @constrained

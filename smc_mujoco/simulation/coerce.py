@@ -50,7 +50,6 @@ ByChannel = (
     Mapping[str, T] | Sequence[T]
 )  # joint -> value, or values in the order of the driven channels
 Laws = Law | Template | str | ByChannel[Law | Template | str]
-PARTS = "friction", "contact", "actuator", "sensor", "disturbance"  # fields of parts and signals
 EVERY = "*"  # in a mapping from joints to parts
 Some = T | Sequence[T]
 SomeByJoint = Some[T] | Mapping[str, Some[T]] | Sequence[Some[T] | Mapping[str, Some[T]]]
@@ -69,14 +68,7 @@ def plant(name: str, value: object, s: Any) -> Plant:
     if isinstance(mismatch, Mapping):
         changed += dotted(mismatch)
     if isinstance(jump, Jump):
-        for path in jump.factors:
-            if path.partition(".")[0] in PARTS:
-                raise ScenarioError(
-                    f"Jump has {path!r}, a number of a part, but changes the plant's: give a "
-                    "joint's number, as 'elbow.frictionloss', or a friction of your own that reads "
-                    "y.t"
-                )
-        changed += [name for name in dotted(jump.factors) if name in joint_numbers(made)]
+        changed += [name for name in dotted(jump.of_plant) if name in joint_numbers(made)]
     return with_joint_numbers(made, changed)
 
 

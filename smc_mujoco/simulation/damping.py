@@ -23,18 +23,28 @@ def forces(scenario: Scenario, x: Array) -> Array:
 
     It is that of the mean speed, which positions give exactly.
     """
+    found = np.zeros(x.shape)
+    jump = scenario.jump_sample
+    for machine in scenario.machines:
+        coefficients = _coefficients(machine)
+        if coefficients.any():
+            v = np.diff(x, axis=0) / scenario.control_period
+            constant, linear, square = coefficients
+            force = -(constant + linear * np.abs(v) + square * v * v) * v
+            first = 0 if machine is scenario else jump
+            found[1 + first :] = force[first:]
+    return found
+
+
+def _coefficients(scenario: Scenario) -> Array:
+    """Return the damping of each channel, (3, n), as `of_file`."""
     coefficients = of_file(scenario.plant).copy()
     for part in scenario.friction:
         b = part.added_to_model.damping
         if b and part.side == "link":
             named = part.joint_names(scenario.plant)  # some may be no channels
             coefficients[0, np.isin(channel_names(scenario.plant), named)] += b
-    found = np.zeros(x.shape)
-    if coefficients.any():
-        v = np.diff(x, axis=0) / scenario.control_period
-        constant, linear, square = coefficients
-        found[1:] = -(constant + linear * np.abs(v) + square * v * v) * v
-    return found
+    return coefficients
 
 
 @functools.lru_cache(maxsize=32)

@@ -129,7 +129,7 @@ def default_steps(s: Any) -> int:
     input delay is a whole number of steps.
     """
     # a scenario that needs less is refused later
-    longest = max(longest_step(s), s.control_period / MAX_DEFAULT_STEPS)
+    longest = max(min(map(longest_step, s.machines)), s.control_period / MAX_DEFAULT_STEPS)
     minimum = math.ceil(s.control_period / longest - 1e-9)
     delay = s.input_delay / s.control_period
     if s.actuator or s.exact_friction:

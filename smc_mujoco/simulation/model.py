@@ -390,7 +390,7 @@ def field_values(base: mujoco.MjModel, scenario: Scenario, step: int) -> dict[st
     if scenario.mechanism != "equation":
         fields = plant.mechanisms[scenario.mechanism].fields
     of_plant = fields(base, plant.values(scenario.factors(step)))
-    of_parts = (part.fields(base) for part in parts(scenario))
+    of_parts = (part.fields(base) for part in parts(scenario.machine(step)))
     for name, index, value, adds in itertools.chain(of_plant, *of_parts):
         values = written.setdefault(name, field_array(base, name).copy())
         if adds:

@@ -29,7 +29,7 @@ from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, DRIVE, PART, READER, Run
 from smc_mujoco.mechanisms.hardware.part import Friction, Part
 from smc_mujoco.mechanisms.plant import Native, Plant
-from smc_mujoco.simulation import agreement, cfunctions, philox, python_functions, state
+from smc_mujoco.simulation import agreement, cfunctions, part_jump, philox, python_functions, state
 from smc_mujoco.simulation.model import (
     Mechanism,
     check_start,
@@ -103,6 +103,7 @@ def prepare(scenario: object) -> Prepared:
     key = shared, scenario.control_period, scenario.samples
     reason = why_not(scenario)
     _refuse_mistakes(scenario.resolved, reason)
+    part_jump.check(scenario.resolved)
     return Prepared(scenario, reason, shared, key)
 
 
@@ -547,6 +548,14 @@ def _compensations(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]
         compiled = buffer.part(part, "steady")
         rows.append({"function": _function(compiled, numbers, buffer, part.memory), "channel": i})
     return rows
+
+
+def put_after_jump(prepared: Prepared, packed: Packed) -> None:
+    """Write the numbers that parts have from a jump on into the arrays of a simulation."""
+    _, *later = prepared.scenario.resolved.machines
+    for after in later:
+        parts = [*(part for part, _ in after.acting), *after.sensors]
+        part_jump.put(after, packed, (run_of(after, part) for part in parts))
 
 
 def _drives(s: Resolved) -> list[dict[str, Any]]:

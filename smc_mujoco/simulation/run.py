@@ -31,7 +31,7 @@ from smc_mujoco.mechanisms.plant import field_array
 from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.controller import MAX_STATE
-from smc_mujoco.simulation.prepare import Prepared, pack, prepare
+from smc_mujoco.simulation.prepare import Prepared, pack, prepare, put_after_jump
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import PLANT_DIVERGED as PLANT_DIVERGED_SHORT
 from smc_mujoco.simulation.trace import Trace, from_log, warn_of_broken
@@ -395,7 +395,10 @@ class ScenarioBatch:
             self.advance(stop - self.step, report)
             self.step = stop
             if stop > 0:
-                self.set_parameters(stop, [i for i, step in enumerate(jumps) if step == stop])
+                jumping = [i for i, step in enumerate(jumps) if step == stop]
+                self.set_parameters(stop, jumping)
+                for i in jumping:
+                    put_after_jump(self.prepared[i], self.packed[i])
 
     def set_parameters(self, step: int, indices: Sequence[int]) -> None:
         """Set the true parameters that hold from a physics step on, in the simulations of these

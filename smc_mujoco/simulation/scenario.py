@@ -32,6 +32,7 @@ from smc_mujoco.simulation import (
     doubts,
     force_bounds,
     integration,
+    part_numbers,
     scenario_checks,
 )
 from smc_mujoco.simulation.coerce import MIN_TIME
@@ -105,7 +106,7 @@ class Scenario:
       mismatch: parameter name -> factor on the true plant's parameter. For a parameter in
         `plant.added`, such as a payload in kg, the value is added instead. `mass` is the plant's
         mass.
-      jump: a change of the true plant's parameters in mid-run, or None.
+      jump: a change of the true plant's parameters, or of numbers of parts, in mid-run, or None.
       fault: a Fault of one or all actuators in mid-run: less gain, a bias, or stuck. Or None.
       tracks: "position", or "speed" for a speed loop: then x' is scored and drawn against r', so
         that settling time, overshoot and bounds are of the speed. The law reads the same.
@@ -462,6 +463,36 @@ class Scenario:
         return math.ceil(self.jump.time / self.resolved.physics_step - 1e-6)
 
     @property
+    def jump_sample(self) -> int:
+        """The first sample at or after the jump; the number of samples without a jump."""
+        if self.jump is None:
+            return self.samples + 1
+        return -(-self.jump_step // self.steps)
+
+    @cached_property
+    def _after_jump(self) -> "Scenario":
+        """The scenario with the numbers that its parts have from the jump on."""
+        after = object.__new__(type(self))
+        vars(after).update(self.__getstate__())
+        if self.jump is not None:
+            vars(after).update(part_numbers.changed(self, self.jump.of_parts))
+            vars(after)["jump"] = Jump(self.jump.time, self.jump.of_plant)
+        return after
+
+    @property
+    def machines(self) -> tuple["Scenario", ...]:
+        """The scenario with its parts as they are at the start, and as they are from the jump of
+        their numbers on, if there is one.
+        """
+        if self.jump is None or not self.jump.of_parts:
+            return (self,)
+        return self, self._after_jump
+
+    def machine(self, step: int) -> "Scenario":
+        """Return the scenario with its parts as they are at a physics step."""
+        return self.machines[-1 if step >= self.jump_step else 0]
+
+    @property
     def work(self) -> int:
         """Physics steps times channels: a measure of the run's cost."""
         return self.samples * self.steps * self.plant.n
@@ -479,7 +510,7 @@ class Scenario:
         """
         factors = dict(self.mismatch)
         if self.jump is not None and step >= self.jump_step:
-            for name, factor in self.jump.factors.items():
+            for name, factor in self.jump.of_plant.items():
                 if name in self.plant.added:
                     factors[name] = factors.get(name, 0.0) + factor
                 else:

@@ -194,19 +194,14 @@ def check_mechanism(s: Any) -> None:
     """Check that the integrator suits the parts, and that mechanism and contact suit the parameters
     at any time.
     """
+    for machine in s.machines:
+        _check_parts(machine)
     states = [part for part in s.friction if part.keeps_state or part.force is not None]
     if s.integrator == "RK4" and states and not s.exact_friction:
         raise ScenarioError(
             f"integrator RK4 has four stages in a step, and the state of {shown(states[0])} moves "
             "once a step: leave the integrator out"
         )
-    for chain in dict.fromkeys(s.drive_train.chains):
-        for part in chain:
-            part.suits(s, chain)
-    for part in s.friction:
-        part.check(s.plant)
-        if part.side == "motor":
-            check_rotors(s, part)
     if isinstance(s.feedforward, Feedforward):
         s.feedforward.check(s.plant)
         if s.accelerates:
@@ -224,6 +219,17 @@ def check_mechanism(s: Any) -> None:
                     f"the obstacles of contact {kind!r} of {s.plant.name} are placed for "
                     f"{name} = {value:g}, and {name} is {present:g}: leave {name} as it is"
                 )
+
+
+def _check_parts(s: Any) -> None:
+    """Check that drives and frictions suit the scenario."""
+    for chain in dict.fromkeys(s.drive_train.chains):
+        for part in chain:
+            part.suits(s, chain)
+    for part in s.friction:
+        part.check(s.plant)
+        if part.side == "motor":
+            check_rotors(s, part)
 
 
 def check_rotors(s: Any, part: Friction) -> None:

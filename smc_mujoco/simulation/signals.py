@@ -29,6 +29,7 @@ from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown
 from smc_mujoco.common.frozen import Frozen, frozen
 from smc_mujoco.simulation import philox
+from smc_mujoco.simulation.part_numbers import is_path
 
 FOOT = 0.3048  # m
 SAMPLES = 500  # of a reference, where its extremes are looked for; chosen
@@ -627,10 +628,18 @@ class Noise:
 @suggesting
 @frozen_data
 class Jump:
-    """A change of the plant's parameters at `time`, s, for the rest of the run.
+    """A change of the plant's parameters, or of numbers of parts, at `time`, s, for the rest of the
+    run.
 
-    `factors` has parameter names with the factors that multiply them. For parameters in
-    `plant.added`, such as a payload, it has terms, which are added.
+        smc.Jump(time=2.0, factors={"friction.elbow.level": 0.7})  # a gearbox that is warm
+
+    `factors` has names with the factors that multiply them: parameters of the plant, numbers of a
+    model's joints ("elbow.damping"), and paths to numbers of parts, FIELD.JOINT.NAME or FIELD.NAME.
+    For parameters in `plant.added`, such as a payload, and for numbers that are 0, it has terms,
+    which are added.
+
+    What a part keeps, such as the bend of bristles, stays as it is. The law and its bound on u do
+    not know of the change. The u of a DCMotor by torque is its stall torque after it, too.
     """
 
     time: Natural
@@ -639,6 +648,16 @@ class Jump:
     def __post_init__(self):
         constrain(self)
         object.__setattr__(self, "factors", parameter_factors("Jump", self.factors))
+
+    @property
+    def of_parts(self) -> dict[str, float]:
+        """The factors on numbers of parts, by path."""
+        return {path: factor for path, factor in self.factors.items() if is_path(path)}
+
+    @property
+    def of_plant(self) -> dict[str, float]:
+        """The factors on parameters of the plant."""
+        return {name: factor for name, factor in self.factors.items() if not is_path(name)}
 
     @property
     def text(self) -> str:

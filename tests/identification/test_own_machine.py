@@ -188,7 +188,7 @@ def test_a_joint_s_number_is_a_parameter_that_a_mismatch_changes():
         smc.Scenario(**common, mismatch={"j1.dampng": 1.5})
 
 
-def test_a_gearbox_that_warms_up_is_a_jump_of_its_joint_s_friction(refused):
+def test_a_gearbox_that_warms_up_is_a_jump_of_its_joint_s_friction():
     """From then on the run is that of the other numbers, from the state that it has."""
     arm = smc.plant_from(ONE.replace('name="j1"', 'name="j1" damping=".2"'), ["j1"])
     cold, warm = {"j1.frictionloss": 0.8}, {"j1.frictionloss": 0.3, "j1.damping": 0.5}
@@ -213,13 +213,6 @@ def test_a_gearbox_that_warms_up_is_a_jump_of_its_joint_s_friction(refused):
     )
     np.testing.assert_allclose(first.x[1000:], rest.x, atol=1e-9)
     assert "more than one equation a joint" in group.why_not(whole, ("itae",))
-    refused(
-        lambda: smc.Scenario(
-            **common, friction=smc.Coulomb(0.3), jump=smc.Jump(1.0, {"friction.level": 2.0})
-        ),
-        "'friction.level'",
-        "reads y.t",
-    )
 
 
 @pytest.mark.filterwarnings("ignore:the dry friction of chain creeps")

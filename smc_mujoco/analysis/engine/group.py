@@ -87,6 +87,7 @@ def why_not_sampled(s: Resolved, metrics: Sequence[str], device: str) -> str:
         "a disturbance acts on a body": any(
             d.cartesian or d.air or isinstance(d, Push) for d in s.disturbance
         ),
+        "numbers of its parts jump": len(s.machines) > 1,
         "its law does not compile": any(isinstance(part.function, Uncompiled) for part in parts),
     }
     moving = not all(isinstance(signal, Constant) for signal in s.references)
