@@ -97,8 +97,7 @@ class Component:
     source: Source = dataclasses.field(default=Source(), compare=False, repr=False)
 
     def __repr__(self) -> str:
-        gains = "".join(f", {name}={gain_text(value)}" for name, value in self.gains.items())
-        return f"{self.kind}({self.name!r}{gains})"
+        return f"{self.kind}({_with_gains(repr(self.name), self.gains)})"
 
     def __reduce__(self):
         """Pickle the name that its template has in its module: that of the function before it was
@@ -210,8 +209,7 @@ class Component:
         return self.template.bind({**self.gains, **gains}, warn=True)
 
     def __str__(self):
-        gains = ", ".join(f"{name}={gain_text(value)}" for name, value in self.gains.items())
-        return f"{self.name}({gains})"
+        return f"{self.name}({gains_text(self.gains)})"
 
 
 def gain_text(value: GainValue) -> str:
@@ -219,6 +217,16 @@ def gain_text(value: GainValue) -> str:
     if isinstance(value, tuple):
         return f"({', '.join(f'{number:g}' for number in value)})"
     return f"{value:g}"
+
+
+def gains_text(gains: Mapping[str, GainValue]) -> str:
+    """Return gains as text, such as "k=3, lam=(3, 4.5)"."""
+    return ", ".join(f"{name}={gain_text(value)}" for name, value in gains.items())
+
+
+def _with_gains(name: str, gains: Mapping[str, GainValue]) -> str:
+    """Return a name and gains as the arguments of a call."""
+    return ", ".join(filter(None, (name, gains_text(gains))))
 
 
 def unit_cure(name: str, default: GainValue) -> str:
@@ -276,8 +284,7 @@ class Template:
     joint: bool = False
 
     def __repr__(self) -> str:
-        gains = "".join(f", {name}={gain_text(gain.default)}" for name, gain in self.gains.items())
-        return f"<Template of {self.kind}({self.name!r}{gains})>"
+        return f"<Template of {self.kind}({_with_gains(repr(self.name), self.defaults)})>"
 
     @property
     def defaults(self) -> dict[str, float]:
@@ -364,6 +371,10 @@ class Template:
             for words in _unmet(self.advice, values):
                 message = f"{self.kind} {self.name!r} advises {words}, but {text}"
                 warnings.warn(message, errors.ScenarioWarning, users_stacklevel())
+        shared = []
+        for name, gain in self.gains.items():
+            if gain.shared:
+                shared.append(name)
         component = Component(
             kind=self.kind,
             name=self.name,
@@ -374,7 +385,7 @@ class Template:
             plants=self.plants,
             requires_model=self.requires_model,
             joint=self.joint,
-            shared=tuple(name for name, gain in self.gains.items() if gain.shared),
+            shared=tuple(shared),
             template=self,
         )
         if gains:
@@ -394,9 +405,15 @@ def _unmet(conditions: GainConditions, gains: Mapping[str, GainValue]) -> list[s
 
 def _per_channel(gains: Mapping[str, GainValue]) -> Iterable[SimpleNamespace]:
     """Yield the gains of each channel; once if all are the same in all channels."""
-    count = max((len(value) for value in gains.values() if isinstance(value, tuple)), default=1)
+    count = 1
+    for value in gains.values():
+        if isinstance(value, tuple):
+            count = max(count, len(value))
     for i in range(count):
-        yield SimpleNamespace(**{name: gain_at(value, i) for name, value in gains.items()})
+        of_channel = {}
+        for name, value in gains.items():
+            of_channel[name] = gain_at(value, i)
+        yield SimpleNamespace(**of_channel)
 
 
 def by_channel(laws: "Sequence[Component]") -> Component:

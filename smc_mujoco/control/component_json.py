@@ -49,11 +49,13 @@ def restore(data: Data, kind: str, known: Catalogue[Template]) -> Component:
       ScenarioError: it lacks a gain of the known one, or has another.
     """
     module = data["module"]
-    candidates = [  # a law may have another name, see `named`
-        template for template in known.own.values() if {*template.gains} == {*data["gains"]}
-    ]
     if data["name"] in known:
         candidates = [known[data["name"]]]
+    else:
+        candidates = []  # a law may have another name, see `named`
+        for template in known.own.values():
+            if template.gains.keys() == data["gains"].keys():
+                candidates.append(template)
     for template in candidates:
         if template.function.__module__ == module:
             check_gains(data["name"], data["gains"], template.gains)

@@ -85,8 +85,10 @@ def law(
         return _with_gains(text, gains)
     found = laws(text)
     if len(found) > 1:
-        names = ", ".join(law if isinstance(law, str) else law.name for law in found)
-        raise ScenarioError(f"{text} has several laws, {names}: give a file with one")
+        names = []
+        for one in found:
+            names.append(one if isinstance(one, str) else one.name)
+        raise ScenarioError(f"{text} has several laws, {', '.join(names)}: give a file with one")
     first = found[0]
     return _with_gains(known_laws()[first]() if isinstance(first, str) else first, gains)
 

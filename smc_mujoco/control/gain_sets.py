@@ -28,7 +28,7 @@ from smc_mujoco.common.data import named_data
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import read_json
 from smc_mujoco.control import source
-from smc_mujoco.control.component import Component, gain_text
+from smc_mujoco.control.component import Component, gains_text
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.law import law as find_law
 from smc_mujoco.mechanisms.named import as_plant
@@ -105,15 +105,16 @@ def law(
         else:
             values = shipped.sets[seed % len(shipped.sets)]
         search = shipped.search
-    law = dataclasses.replace(
-        base, gains={gain: values.get(gain, value) for gain, value in base.gains.items()}
-    )
+    replaced = {}
+    for gain, value in base.gains.items():
+        replaced[gain] = values.get(gain, value)
+    law = dataclasses.replace(base, gains=replaced)
     return law.sourced(source.SHIPPED if search else source.STUDY, search)
 
 
 def said(plant: Plant, law: Component) -> str:
     """Return a sentence on a law that was given by its name, and has shipped gains."""
-    gains = ", ".join(f"{name}={gain_text(value)}" for name, value in law.gains.items())
+    gains = gains_text(law.gains)
     text = (
         f"law {law.name!r} by its name alone has its shipped gains on {plant.name}, {gains}: give "
         f"smc.law({law.name!r}, plant={plant.name!r}) to say so, smc.law({law.name!r}) for its "
@@ -143,11 +144,11 @@ def general() -> Names:
     """List every law that can be compared on some plant: those of COMPARED, then all others by
     name.
     """
-    others = {name for name, template in catalogue().items() if not template.plants} - {
-        "none",
-        *ALIASES,
-        *COMPARED,
-    }
+    left_out = {"none", *ALIASES, *COMPARED}
+    others = []
+    for name, template in catalogue().items():
+        if not template.plants and name not in left_out:
+            others.append(name)
     return *COMPARED, *sorted(others)
 
 

@@ -301,11 +301,9 @@ def laws(plant: Plant | str | None = None, kind: str = "law") -> list[str]:
     plant = as_plant(plant)
     known = known_laws() if plant.pose else catalogue()
     whole = not plant.free and plant.pose != "heading"
-    return [
-        name
-        for name, law in known.items()
-        if suits(law, plant)
-        and (law.plants or name == "none" or whole)
-        # a law of many joints reads the model
-        and not (law.joint and plant.unmodelled)
-    ]
+    found = []
+    for name, law in known.items():
+        unread = law.joint and plant.unmodelled  # a law of many joints reads the model
+        if suits(law, plant) and (law.plants or name == "none" or whole) and not unread:
+            found.append(name)
+    return found

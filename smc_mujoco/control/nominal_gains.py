@@ -59,9 +59,9 @@ def at_plant(law: Law, plant: Plant) -> Law:
         return law
     values = linearised(plant, law.name)
     order = ("a1", "a2", "b")
-    gains = dict(law.gains) | {
-        name: values[order.index(of_plant)] for name, of_plant in missing.items()
-    }
+    gains = dict(law.gains)
+    for name, of_plant in missing.items():
+        gains[name] = values[order.index(of_plant)]
     return dataclasses.replace(law, gains=gains).sourced(law.source.kind, law.source.search)
 
 

@@ -125,10 +125,12 @@ def in_words(sources: Mapping[str, Iterable[Source]]) -> str:
 
     `sources` maps a law to the sources of its gains; laws without gains are left out.
     """
-    if len(sources) == 1:
-        words = {law: ", ".join(dict.fromkeys(map(str, its))) for law, its in sources.items()}
-    else:
-        words = {law: kinds(its) for law, its in sources.items()}
+    words = {}
+    for law, its in sources.items():
+        if len(sources) == 1:
+            words[law] = ", ".join(dict.fromkeys(map(str, its)))
+        else:
+            words[law] = kinds(its)
     return by_words(words)
 
 
@@ -143,4 +145,7 @@ def by_words(words: Mapping[str, str]) -> str:
             laws.setdefault(kind, []).append(law)
     if len(laws) < 2:
         return "".join(f"gains: {kind}" for kind in laws)
-    return f"gains: {', '.join(f'{kind} for {joined(names)}' for kind, names in laws.items())}"
+    parts = []
+    for kind, names in laws.items():
+        parts.append(f"{kind} for {joined(names)}")
+    return f"gains: {', '.join(parts)}"

@@ -10,7 +10,7 @@ from smc_mujoco.analysis.step_halving import UNTRIED
 from smc_mujoco.analysis.tuning.result import Tuned
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import capital, counted, joined, number
-from smc_mujoco.control.component import Component, gain_text
+from smc_mujoco.control.component import Component, gains_text
 from smc_mujoco.robustness.margins import Margin
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.board import MAX_LEAD, MEDIANS, Boards, Lead
@@ -43,10 +43,9 @@ class Advice(Tables):
     def answer(self) -> list[str]:
         """Four lines: the law, its gains, the second, and the evidence."""
         first = self.law
-        gains = ", ".join(f"{name}={gain_text(value)}" for name, value in first.gains.items())
         return [
             f"Use: {self._name}",
-            f"Gains: {gains or 'none'}, {first.source}",
+            f"Gains: {gains_text(first.gains) or 'none'}, {first.source}",
             f"Second: {self.second or 'none'}",
             f"Evidence: {self._sure}",
         ]

@@ -138,7 +138,7 @@ def _chosen(
         law = one.gains(0)
         if one.count > 1:
             order = np.argsort(one.values[: one.count], kind="stable")[:CONSIDERED].tolist()
-            sets = [one.gains(k) for k in order]
+            sets = list(map(one.gains, order))
             laws = []
             for tried in sets:
                 laws += [tried] * len(CHOOSING)

@@ -75,7 +75,10 @@ def compute_elsewhere(
     calls = []
     for batch in batches:
         scenarios = [prepared.scenario for prepared in batch]
-        calls.append((scenarios, [run_key.key(s, plants=plants) for s in scenarios]))
+        keys = []
+        for s in scenarios:
+            keys.append(run_key.key(s, plants=plants))
+        calls.append((scenarios, keys))
     for i, columns in workers.called(executor, scored, calls):
         finish(batches[i], columns)
         report(sum(prepared.scenario.work for prepared in batches[i]))
@@ -93,7 +96,10 @@ def scored(scenarios: Sequence[Scenario], keys: Sequence[str]) -> list[ResultCol
             raise ScenarioError(
                 f"a worker has other code for {scenario.law}: install the same there as here"
             )
-    return [result_columns(trace) for trace in run_batch(scenarios, 1)]
+    columns = []
+    for trace in run_batch(scenarios, 1):
+        columns.append(result_columns(trace))
+    return columns
 
 
 def compute(

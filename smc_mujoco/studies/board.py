@@ -228,11 +228,19 @@ class Board(Tables):
 
     def wins(self, law: str) -> list[str]:
         """Return the conditions in which a law wins."""
-        return [block.condition for block in self.blocks if block.winner == law]
+        won = []
+        for block in self.blocks:
+            if block.winner == law:
+                won.append(block.condition)
+        return won
 
     def losses(self, law: str) -> list[str]:
         """Return the conditions in which another law wins."""
-        return [block.condition for block in self.blocks if block.winner not in (law, None)]
+        lost = []
+        for block in self.blocks:
+            if block.winner not in (law, None):
+                lost.append(block.condition)
+        return lost
 
     @property
     def label(self) -> str:
@@ -279,7 +287,10 @@ class Board(Tables):
         if any(block.given for block in self.blocks):
             given = ", for these gains"
         if self.winner:
-            leads = [block.lead for block in self.blocks if block.lead]
+            leads = []
+            for block in self.blocks:
+                if block.lead:
+                    leads.append(block.lead)
             if leads:
                 least = max(leads, key=lambda lead: lead.effect.high)
                 given += f"; {at_worst}its value is {least.words}"
@@ -299,7 +310,9 @@ class Board(Tables):
             return f"no law may win over the default gains of {joined(self.barred)}"
         if all(len(block.away) == len(block.medians) for block in self.blocks):
             return "every law has runs that fail or do not arrive"
-        reasons = dict.fromkeys(self._tied(block) or self.too_few for block in self.blocks)
+        reasons = {}
+        for block in self.blocks:
+            reasons[self._tied(block) or self.too_few] = None
         if reason := "; ".join(filter(None, reasons)) or self._too_few_to_rank:
             return reason
         if not self.best:
@@ -328,7 +341,10 @@ class Board(Tables):
             names = "both laws" if len(self.entries) == 2 else "all laws"
         if all(block.level for block in self.blocks):
             return f"{names} {SAME_RUNS if self.metric == SETTLES else LEVEL_WORDS}"
-        seen = [block.resolves for block in self.blocks if not math.isnan(block.resolves)]
+        seen = []
+        for block in self.blocks:
+            if not math.isnan(block.resolves):
+                seen.append(block.resolves)
         if not seen:
             return f"{names} are statistically indistinguishable"
         least = "no lead"
@@ -341,9 +357,10 @@ class Board(Tables):
         """The laws with default gains over which no winner is named in any block, see
         `Block.barred`.
         """
-        return list(
-            dict.fromkeys(itertools.chain.from_iterable(block.barred for block in self.blocks))
-        )
+        barred: dict[str, None] = {}
+        for block in self.blocks:
+            barred |= dict.fromkeys(block.barred)
+        return list(barred)
 
     @property
     def few(self) -> dict[str, int]:
@@ -530,7 +547,10 @@ def _table(name: str, boards: Sequence[Board]) -> Tabular:
         name = f"{largest.group['plant']}, {largest.blocks[0].condition}"
     samples = "; ".join(dict.fromkeys(block.sample for block in largest.blocks))
     words = str([*itertools.chain(*cells.values())])
-    under = [text for word, text in UNDER.items() if word in words]
+    under = []
+    for word, text in UNDER.items():
+        if word in words:
+            under.append(text)
     if _few(boards):
         under.insert(1, FEW)
     return Tabular(
@@ -551,7 +571,10 @@ def _cell(board: Board, entry: BoardEntry) -> Cell:
             below.append(f"below {block.floor}")
             break
     alarms = [board.failures(entry)]
-    changes = [block.by_step[entry.law] for block in board.blocks if entry.law in block.by_step]
+    changes = []
+    for block in board.blocks:
+        if entry.law in block.by_step:
+            changes.append(block.by_step[entry.law])
     for before, after in changes[:1]:
         step = f"becomes {size(after, board.metric)} at half the step"
         alarms.append(f"{size(before, board.metric)} {step}")
@@ -562,8 +585,11 @@ def _cell(board: Board, entry: BoardEntry) -> Cell:
 
 def _few(boards: Sequence[Board]) -> bool:
     """Return whether an interval is of fewer than MIN_INTERVAL_SAMPLES samples."""
-    entries = itertools.chain.from_iterable(board.entries for board in boards)
-    return any(entry.interval.n < MIN_INTERVAL_SAMPLES for entry in entries)
+    for board in boards:
+        for entry in board.entries:
+            if entry.interval.n < MIN_INTERVAL_SAMPLES:
+                return True
+    return False
 
 
 def key(boards: Sequence[Board], tables: str) -> str:
@@ -574,7 +600,11 @@ def key(boards: Sequence[Board], tables: str) -> str:
     for word, text in MARKS.items():
         if word in tables:
             parts.append(text)
-    if last := joined([repr(word) for word in LAST if word in tables]):
+    held = []
+    for word in LAST:
+        if word in tables:
+            held.append(repr(word))
+    if last := joined(held):
         parts.append(f"Every value ranks before {last}.")
     parts.append(
         "A winner is better than every other law in a paired test. In each metric by itself, the "
@@ -605,4 +635,7 @@ def _verdicts(boards: Sequence[Board]) -> list[str]:
     labels: dict[str, list[str]] = {}
     for board in boards:
         labels.setdefault(f"{board.where}: {board.result}.", []).append(board.label)
-    return [f"{joined(names)}{result}" for result, names in labels.items()]
+    sentences = []
+    for result, names in labels.items():
+        sentences.append(f"{joined(names)}{result}")
+    return sentences

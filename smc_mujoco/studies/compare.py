@@ -22,7 +22,7 @@ from smc_mujoco.common.files import replacing
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import joined, number
 from smc_mujoco.control import gain_sets, source
-from smc_mujoco.control.component import Template, gain_text
+from smc_mujoco.control.component import Template, gains_text
 from smc_mujoco.control.law import Law, catalogue, suits
 from smc_mujoco.control.properties import suitable
 from smc_mujoco.mechanisms.named import as_plant
@@ -95,7 +95,7 @@ class Compared(Tables):
         """
         seeds = self.table.column("seed")
         rows = (seeds == seeds.min()).nonzero()[0].tolist()
-        return run([self.table.scenario(row) for row in rows])
+        return run(list(map(self.table.scenario, rows)))
 
     @property
     def verdicts(self) -> list[str]:
@@ -116,7 +116,10 @@ class Compared(Tables):
                 if any(words):
                     key = candidate.law.name, "; ".join(filter(None, words))
                     plants_of.setdefault(key, []).append(plant)
-        return [f"{law} on {joined(on)}: {words}." for (law, words), on in plants_of.items()]
+        remarks = []
+        for (law, words), on in plants_of.items():
+            remarks.append(f"{law} on {joined(on)}: {words}.")
+        return remarks
 
     @property
     def tables(self) -> list[Tabular]:
@@ -128,15 +131,15 @@ class Compared(Tables):
         for plant, candidates in self.candidates.items():
             for law, sets, _ in candidates:
                 # inf: no bound, or a number of the plant
-                best = []
+                best = {}
                 for k, v in law.gains.items():
                     if v != math.inf:
-                        best.append(f"{k}={gain_text(v)}")
+                        best[k] = v
                 if len(sets) > 1 and BEST_SET not in notes:
                     notes = [BEST_SET, *notes]
-                gains.append((plant, law.name, law.source.words, f"{len(sets)}", ", ".join(best)))
+                gains.append((plant, law.name, law.source.words, f"{len(sets)}", gains_text(best)))
             for name, time in self.times.get(plant, {}).items():
-                of_law = (number(value) for value in (time.ratio, time.median, time.high))
+                of_law = map(number, (time.ratio, time.median, time.high))
                 times.append((plant, name, *of_law))
         if times:
             tables.append(Tabular(headings=TIME_HEADINGS, rows=times, title=TIMES, left=2))
@@ -339,9 +342,9 @@ def compare(
         find("metric", name, dict.fromkeys((paired_runs.SETTLES, *CATALOGUE)))
     within = _class(worst)
     extent = QUICK if quick else FULL
-    machines = [
-        as_plant(plant) for plant in listed("plants", extent.plants if plants is None else plants)
-    ]
+    if plants is None:
+        plants = extent.plants
+    machines = list(map(as_plant, listed("plants", plants)))
     length = duration or extent.duration
     trial = Trial.of(
         machines,
@@ -367,9 +370,9 @@ def compare(
     if laws is None:
         of_all = None
     else:
-        of_all = [law_or_template(law) for law in listed_laws(laws)]
+        of_all = list(map(law_or_template, listed_laws(laws)))
     for plant in machines:
-        chosen[plant.name] = of_all or [law_or_template(law) for law in _usual(plant)]
+        chosen[plant.name] = of_all or list(map(law_or_template, _usual(plant)))
     trial.check(chosen)
     candidates = trial.candidates(chosen, seeds)
     table = trial.run(candidates, seeds)
@@ -401,8 +404,11 @@ def _leave_out_failed(holdout: Mapping[str, Holdout], table: Table) -> None:
     A failed run has no other metric either, but J has runs of its own, which may end before the law
     fails.
     """
-    columns = (table.column(name) for name in ("plant", "law", "failure"))
-    fine = {(plant, law) for plant, law, failure in zip(*columns, strict=True) if failure is None}
+    columns = map(table.column, ("plant", "law", "failure"))
+    fine = set()
+    for plant, law, failure in zip(*columns, strict=True):
+        if failure is None:
+            fine.add((plant, law))
     for plant, runs in holdout.items():
         for law, arrived in runs.arrived.items():
             arrived[:] = arrived & ((plant, law) in fine)
@@ -456,6 +462,8 @@ def _usual(plant: Plant) -> list[Any]:
     for name in gain_sets.COMPARED:
         if suits(catalogue()[name], plant):
             known.append(name)
-    known = [name for name in known if gain_sets.in_set(plant, name, "tuned")] or known
+    tuned = [name for name in known if gain_sets.in_set(plant, name, "tuned")]
+    if known:
+        return tuned or known
     left_out = {"none", *gain_sets.ALIASES}  # aliases have the gains of laws that are there already
-    return known or [law for law in suitable(plant=plant) if law.name not in left_out]
+    return [law for law in suitable(plant=plant) if law.name not in left_out]

@@ -72,7 +72,7 @@ class Candidate(NamedTuple):
         """Return J on instances, whether their runs have arrived, J of one in four at half the
         physics step, and the sets' numbers.
         """
-        laws = [self(instance) for instance in instances]
+        laws = list(map(self, instances))
         values, arrived = objectives(plant, laws, goal, instances, threads)
         every = slice(None, None, REPEATED_SEEDS)
         halves = np.full(len(laws), math.nan)
@@ -115,8 +115,10 @@ def _without_search(
                 if count < asked:
                     return None
                 count = asked
-        sets = tuple(gain_sets.law(plant, law.name, gains, seed) for seed in range(count))
-        return Candidate(gain_sets.law(plant, law.name, gains), sets)
+        sets = []
+        for seed in range(count):
+            sets.append(gain_sets.law(plant, law.name, gains, seed))
+        return Candidate(gain_sets.law(plant, law.name, gains), tuple(sets))
     return None
 
 
@@ -176,7 +178,7 @@ class Trial(NamedTuple):
         given = conditions
         if given is None:
             given = applicable(known, plants, duration)
-        found = [find_condition(name) for name in listed("conditions", given)]
+        found = list(map(find_condition, listed("conditions", given)))
         return cls(plants=plants, conditions=found, duration=duration, folder=Path(out), **fields)
 
     @property
@@ -204,10 +206,11 @@ class Trial(NamedTuple):
             made = list(map(coerce.law, of_plant))
             check_names(self.plants, made, self.conditions)
             for named in (self.plants, made, self.conditions):
-                names = [one.name for one in named]
-                for name in names:
-                    if names.count(name) > 1:
-                        raise ScenarioError(f"{name!r} is there twice: give it once")
+                names = set()
+                for one in named:
+                    if one.name in names:
+                        raise ScenarioError(f"{one.name!r} is there twice: give it once")
+                    names.add(one.name)
         for plant in self.plants:
             for condition in self.conditions:
                 check_moving([self.case(plant, "none", condition)])
@@ -223,7 +226,9 @@ class Trial(NamedTuple):
           ScenarioError: none of several laws can be tuned on a plant, so that there could be no
             winner, unless `defaults`. It is raised before the first search.
         """
-        known = {plant.name: self.known(plant, laws[plant.name]) for plant in self.plants}
+        known = {}
+        for plant in self.plants:
+            known[plant.name] = self.known(plant, laws[plant.name])
         if self.progress:
             for plant in self.plants:
                 self._say_if_few(known[plant.name], seeds)
@@ -245,7 +250,9 @@ class Trial(NamedTuple):
           ScenarioError: see `candidates`.
         """
         asked = self.asked if self.tune else None
-        known = [_without_search(plant, law, self.gain_set, asked) for law in laws]
+        known = []
+        for law in laws:
+            known.append(_without_search(plant, law, self.gain_set, asked))
         if self.tune and not self.defaults:
             self._check_tunable(plant, laws, known, self.rule(plant, known).goal)
         return known
@@ -321,8 +328,8 @@ class Trial(NamedTuple):
         """Return the objective of whole searches on a plant."""
         usual = Objective()
         fit = applicable([c.name for c in usual.conditions], [plant], usual.duration)
-        conditions = tuple(c for c in usual.conditions if c.name in fit)
-        return dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
+        kept = tuple(c for c in usual.conditions if c.name in fit)
+        return dataclasses.replace(usual, conditions=kept, starts=starts or usual.starts)
 
     def search_gains(self, plant: Plant, law: Component | Template, rule: GainRule) -> Candidate:
         """Return a law with gains that searches find, or found in an earlier call, or with its
@@ -429,7 +436,9 @@ class Trial(NamedTuple):
         self, plant: Plant, candidate: Candidate, goal: Objective, instances: range
     ) -> tuple[np.ndarray, ...]:
         """Return what `Candidate.holdout` does, which the folder keeps."""
-        keys = [run_key.key(goal.scenarios(plant, law)[0]) for law in candidate.sets]
+        keys = []
+        for law in candidate.sets:
+            keys.append(run_key.key(goal.scenarios(plant, law)[0]))
 
         def load(path: Path) -> tuple[np.ndarray, ...]:
             with np.load(path) as parts:

@@ -7,6 +7,7 @@ the plants and conditions of the table, over initial states and noise, and over 
 the laws ran.
 """
 
+import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
@@ -91,21 +92,14 @@ def leaderboard(
     for group in paired_runs.groups(table, by):
         sources = paired_runs.sources(table, group.rows[group.rows >= 0])
         ranked.append(RankedGroup(group, paired_runs.scenarios(table, group), sources))
-    words: list[str] = []
-    for each in ranked:
-        for scenario in filter(None, each.ran):
-            words += scenario.drive_train.words
-        defaults_ran = any(
-            source.kind == DEFAULT for its in each.sources.values() for source in its
-        )
-        if words and defaults_ran:
-            words.append("Default gains are for a force: tune them for this u first.")
-    boards.commands = [*dict.fromkeys(words)]
+    boards.commands = _commands(ranked)
     by_metric = {}
     for metric in dict.fromkeys(metrics):
         by_metric[metric] = _boards_of(table, metric, ranked, defaults, relevant)
     for i in range(len(ranked)):
-        boards += [made[i] for made in by_metric.values() if i in made]
+        for made in by_metric.values():
+            if i in made:
+                boards.append(made[i])
     return boards
 
 
@@ -115,6 +109,17 @@ class RankedGroup(NamedTuple):
     group: RunGroup
     ran: Sequence[Scenario | None]  # a scenario of each block
     sources: Sources
+
+
+def _commands(ranked: Sequence[RankedGroup]) -> list[str]:
+    """Return what the commands of the drives mean, and that default gains are for a force."""
+    words: list[str] = []
+    for each in ranked:
+        for scenario in filter(None, each.ran):
+            words += scenario.drive_train.words
+        if words and any(map(_is_default, itertools.chain(*each.sources.values()))):
+            words.append("Default gains are for a force: tune them for this u first.")
+    return [*dict.fromkeys(words)]
 
 
 def _boards_of(
@@ -185,14 +190,22 @@ def objective_boards(
 
 def _family(comparisons: Iterable[Comparison]) -> int:
     """Return the number of blocks for which winners are corrected."""
-    return sum(len(one.floors) for one in comparisons if len(one.laws) > 1) or 1
+    count = 0
+    for one in comparisons:
+        if len(one.laws) > 1:
+            count += len(one.floors)
+    return count or 1
 
 
 def _untuned(sources: Sources, defaults: bool) -> Names:
     """Return the laws with default gains, over which no winner is named; none if `defaults`."""
     if defaults:
         return ()
-    return tuple(law for law, known in sources.items() if any(map(_is_default, known)))
+    untuned = []
+    for law, known in sources.items():
+        if any(map(_is_default, known)):
+            untuned.append(law)
+    return tuple(untuned)
 
 
 def _is_default(source: Source) -> bool:
@@ -270,7 +283,11 @@ def _block(
     """Return block `at` of a comparison, with its plant and condition and the number of seeds."""
     laws = np.array(comparison.laws)
     sets = comparison.sets[:, at]
-    changes = {law: comparison.step_change(at, law) for law in comparison.laws}
+    by_step = {}
+    for law in comparison.laws:
+        change = comparison.step_change(at, law)
+        if change:
+            by_step[law] = change
     medians = dict(zip(comparison.laws, comparison.centres[:, at].tolist(), strict=True))
     lacking = dict(zip(comparison.laws, comparison.without_value[:, at].tolist(), strict=True))
     best = comparison.best[:, at]
@@ -280,7 +297,13 @@ def _block(
     winner = comparison.winners[at]
     # by failed runs, then by median
     order = sorted(comparison.laws, key=lambda law: (law != winner, lacking[law], medians[law]))
-    unbeaten = [law for law in order if law in laws[best]]
+    unbeaten = []
+    ranked = []
+    for law in order:
+        if law in laws[best]:
+            unbeaten.append(law)
+        if law not in laws[few]:
+            ranked.append(law)
     return Block(
         plant=name[0],
         condition=name[1],
@@ -292,10 +315,10 @@ def _block(
         away=tuple(laws[comparison.away[:, at].any(axis=1)].tolist()),
         worse=tuple(laws[comparison.worse[:, at]].tolist()),
         ahead=winner,
-        lead=_lead(comparison, at, [law for law in order if law not in laws[few]], floor),
+        lead=_lead(comparison, at, ranked, floor),
         level=bool(comparison.level[at][np.ix_(best, best)].all()),
         resolves=_resolves(comparison, at, unbeaten),
-        by_step={law: change for law, change in changes.items() if change},
+        by_step=by_step,
         seeds=seeds,
         runs=runs,
         samples=int(comparison.samples[at].max()) if len(laws) > 1 else runs,
@@ -313,7 +336,9 @@ def _lead(comparison: Comparison, at: int, order: Sequence[str], floor: str) -> 
     if len(order) < 2 or comparison.shares:
         return None
     first, *rivals = order
-    effects = {rival: comparison.effect(at, first, rival) for rival in rivals}
+    effects = {}
+    for rival in rivals:
+        effects[rival] = comparison.effect(at, first, rival)
     rival = max(rivals, key=lambda rival: effects[rival].high)
     a = comparison.laws.index(first)
     b = comparison.laws.index(rival)
@@ -333,7 +358,8 @@ def _resolves(comparison: Comparison, at: int, unbeaten: Sequence[str]) -> float
     """
     seen = [math.nan]
     if not comparison.shares:
-        seen += [comparison.visible(at, unbeaten[0], rival) for rival in unbeaten[1:]]
+        for rival in unbeaten[1:]:
+            seen.append(comparison.visible(at, unbeaten[0], rival))
     return max(seen, key=lambda lead: (not math.isnan(lead), lead))
 
 

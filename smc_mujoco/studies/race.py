@@ -182,7 +182,7 @@ def hopeless(J: Mapping[str, Sequence[float]]) -> dict[str, float]:
     """Return the laws to drop, law -> its least J over the largest one of the law that leads, which
     is more than FAR. Two laws stay.
     """
-    lead = min(max(values) for values in J.values())
+    lead = min(map(max, J.values()))
     shares = {law: min(values) / lead for law, values in J.items()}
     order = sorted(shares, key=lambda law: (shares[law], law))
     return {law: shares[law] for law in order[2:] if shares[law] > FAR}

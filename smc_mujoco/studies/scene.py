@@ -131,7 +131,11 @@ class Outcome:
             for name in self.traces:
                 leading.update(list(self._level(name, measure, 1.0)))
         most = len(measures) * len(self.traces)
-        return [label for label in self.labels if leading[label] == most]
+        leaders = []
+        for label in self.labels:
+            if leading[label] == most:
+                leaders.append(label)
+        return leaders
 
     def least(self, measure: Measure, unit: str = "") -> str:
         """Return whose value is smallest, with the value: "classical (1.12 s)", "a and b tied (1.12
@@ -157,7 +161,10 @@ class Outcome:
         kept = self.those(holds).traces
         parts = []
         for name, runs in self.traces.items():
-            others = [label for label in runs if label not in kept[name]]
+            others = []
+            for label in runs:
+                if label not in kept[name]:
+                    others.append(label)
             text = f"{len(kept[name])} of {len(runs)}"
             if not parts:
                 text += f" {plural}"
@@ -182,7 +189,10 @@ class Outcome:
                         break
                     tolerated = name
             last.setdefault(tolerated, []).append(label)
-        return ", ".join(f"{joined(labels)} {name}" for name, labels in last.items())
+        parts = []
+        for name, labels in last.items():
+            parts.append(f"{joined(labels)} {name}")
+        return ", ".join(parts)
 
     def changes(self, measure: Measure, one: str, other: str, unit: str = "") -> str:
         """Return each label's value in one condition and in another: "a 1.20 to 1.43 s"."""
@@ -200,13 +210,17 @@ class Outcome:
         largest, or tied with it; {} if the smallest is "never".
         """
         values = self[condition].values(measure)[condition]
-        known = {label: value for label, value in values.items() if not math.isnan(value)}
-        if isinstance(measure, str) and sign > 0.0 and not CATALOGUE[measure].error:
-            runs = self.traces[condition]  # who does nothing is calm
-            known = {label: value for label, value in known.items() if arrived(runs[label])}
-        if not known or min(sign * value for value in known.values()) == math.inf:
+        runs = self.traces[condition]
+        # who does nothing is calm
+        to_arrive = isinstance(measure, str) and sign > 0.0 and not CATALOGUE[measure].error
+        known = {}
+        for label, value in values.items():
+            if math.isnan(value) or (to_arrive and not arrived(runs[label])):
+                continue
+            known[label] = value
+        best = min(known.values(), key=lambda value: sign * value, default=math.nan)
+        if not known or sign * best == math.inf:
             return {}
-        best = min(known.values(), key=lambda value: sign * value)
         least = 0.0
         if isinstance(measure, str):
             least = floor(self.traces[condition][next(iter(known))].scenario, measure)
@@ -241,7 +255,8 @@ class Outcome:
             return ""
         units = set()
         for runs in self.traces.values():
-            units |= {CATALOGUE[measure].unit_in(run.scenario) for run in runs.values()}
+            for run in runs.values():
+                units.add(CATALOGUE[measure].unit_in(run.scenario))
         if len(units) > 1 or units == {"1"}:
             return ""
         return "".join(units)
@@ -251,7 +266,10 @@ def _range(values: Sequence[float], unit: str) -> str:
     """Return the value, or the smallest and the largest: "0.323 s", "1.12 to 1.13 s, 1 failed",
     "never"; "none" of none.
     """
-    known = [value for value in values if not math.isnan(value)]
+    known = []
+    for value in values:
+        if not math.isnan(value):
+            known.append(value)
     failed = len(values) - len(known)
     parts = []
     if known:

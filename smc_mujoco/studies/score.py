@@ -7,6 +7,7 @@ from typing import Any, overload
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns
 from smc_mujoco.common.constraints import constrained
+from smc_mujoco.common.data import attributes
 from smc_mujoco.common.errors import ScenarioError, find, has, has_items, items_of, shown
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.simulation.scenario import Scenario
@@ -70,9 +71,7 @@ def score(
     columns = {"plant": pa.string(), "law": pa.string(), "condition": pa.string()}
     columns |= {"seed": pa.int64()} | dict.fromkeys((*names, "diverged_at"), pa.float64())
     schema = pa.schema(list(columns.items()))
-    scored = ScoredRuns(
-        {name: getattr(catalogue, name) for name in names}, device, threads, worlds=True
-    )
+    scored = ScoredRuns(attributes(catalogue, names), device, threads, worlds=True)
     tables = []
     left = iter(runs)
     while chunk := list(itertools.islice(left, CHUNK)):

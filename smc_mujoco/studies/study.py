@@ -72,7 +72,10 @@ class Store:
         """Make the folder and list the runs in it. Without `resume`, remove them and the table."""
         try:
             self.parts.mkdir(parents=True, exist_ok=True)
-            parts = [path for path in sorted(self.parts.iterdir()) if PART.fullmatch(path.name)]
+            parts = []
+            for path in sorted(self.parts.iterdir()):
+                if PART.fullmatch(path.name):
+                    parts.append(path)
             for path in () if resume else (*parts, self.results):
                 path.unlink(missing_ok=True)
         except (OSError, ValueError) as error:  # ValueError: a name with a null character
@@ -128,10 +131,15 @@ class Store:
                     raise ScenarioError(
                         f"part {path} was removed or broken while the study ran: start it again"
                     )
-                parts.append(part.take([self.where[names[i]][1] for i in indices]))
+                places_in_part = []
+                for i in indices:
+                    places_in_part.append(self.where[names[i]][1])
+                parts.append(part.take(places_in_part))
             order = np.argsort(np.concatenate(list(places.values())))
             data = pa.concat_tables(parts).take(order).combine_chunks()
-            changed = set().union(*(changes.get(key, ()) for key in names))
+            changed = set()
+            for key in names:
+                changed.update(changes.get(key, ()))
             for name in sorted(changed):
                 pairs = zip(names, data[name].to_pylist(), strict=True)
                 values = []
@@ -222,11 +230,11 @@ def study(
     store = Store(Path(out))
     plants: run_key.Hashes = {}
     by_key = _by_key(_checked(scenarios), store, resume, plants)
-    if half_steps:
-        repeated = _repeated(by_key, plants)
-    else:
-        repeated = {}
-    every = by_key | {name: scenario for name, scenario in repeated.values() if name not in by_key}
+    repeated = _repeated(by_key, plants) if half_steps else {}
+    every = dict(by_key)
+    for name, scenario in repeated.values():
+        if name not in by_key:
+            every[name] = scenario
     missing = {name: scenario for name, scenario in every.items() if name not in store.where}
     if progress and (done := len(every) - len(missing)):
         print(f"{done} of {len(every)} runs are in {printable(str(store.parts))}", file=sys.stderr)
@@ -302,8 +310,16 @@ def _half_step_scores(repeated: Mapping[str, tuple[str, Scenario]], store: Store
     names = ["arrived", *(metric.name for metric in metrics())]
     scores = {}
     for row in store.rows({half for half, _ in repeated.values()}):
-        scores[row["hash"]] = to_json({name: row[name] for name in names if row[name] is not None})
-    return {name: scores[half] for name, (half, _) in repeated.items() if half in scores}
+        values = {}
+        for name in names:
+            if row[name] is not None:
+                values[name] = row[name]
+        scores[row["hash"]] = to_json(values)
+    found = {}
+    for name, (half, _) in repeated.items():
+        if half in scores:
+            found[name] = scores[half]
+    return found
 
 
 def _checked(scenarios: Any) -> Iterator[Scenario]:

@@ -116,6 +116,15 @@ def write(path: Path, schema: "pa.Schema", groups: "Iterable[pa.Table]") -> None
         writer.add_key_value_metadata({DIGEST: digest.hexdigest()})
 
 
+def _text(value: object) -> object:
+    """Return a value as a cell shows it."""
+    if value is None:
+        return ""
+    if isinstance(value, float):
+        return number(value)
+    return value
+
+
 def read(path: Path, sealed: bool = False) -> "pa.Table":
     """Return the rows that `write` wrote; if `sealed`, refuse a file without a digest, such as
     another program's.
@@ -124,7 +133,9 @@ def read(path: Path, sealed: bool = False) -> "pa.Table":
     import pyarrow.parquet as pq
 
     with pq.ParquetFile(path, page_checksum_verification=True) as file:
-        size = sum(file.metadata.row_group(i).total_byte_size for i in range(file.num_row_groups))
+        size = 0
+        for i in range(file.num_row_groups):
+            size += file.metadata.row_group(i).total_byte_size
         if size > max(MAX_UNPACKED, MAX_RATIO * Path(path).stat().st_size):
             raise ScenarioError(
                 f"it unpacks to {size / 1e6:,.0f} MB, and {MAX_UNPACKED / 1e6:,.0f} MB are allowed"
@@ -171,10 +182,9 @@ class Table:
             path = Path(path) / "results.parquet"
         with reading(path, "table", "give the results.parquet of a study that has ended") as file:
             data = read(file)
-            if missing := [
-                name for name in (*RUN_COLUMNS, *RESULT_COLUMNS) if name not in data.column_names
-            ]:
-                raise ScenarioError(f"it has no column {missing[0]!r}")
+            for name in (*RUN_COLUMNS, *RESULT_COLUMNS):
+                if name not in data.column_names:
+                    raise ScenarioError(f"it has no column {name!r}")
         return cls(data=data)
 
     def __len__(self) -> int:
@@ -185,10 +195,9 @@ class Table:
         return iter(self.rows())
 
     def __repr__(self) -> str:
-        counts = (
-            counted(len(set(self.column(name).tolist())), name)
-            for name in ("plant", "law", "condition")
-        )
+        counts = []
+        for name in ("plant", "law", "condition"):
+            counts.append(counted(len(set(self.column(name).tolist())), name))
         checked = (self.data.schema.metadata or {}).get(b"checked", b"").decode()
         return f"Table({len(self)} runs: {', '.join(counts)}{checked and '; '}{checked})"
 
@@ -197,15 +206,10 @@ class Table:
         for name in PREVIEW:
             if name in self.data.column_names:
                 names.append(name)
-        rows = [
-            list(row.values()) for row in self.data.select(names).slice(0, MAX_ROWS).to_pylist()
-        ]
         cells = []
-        for row in rows:
-            cells.append(
-                ["" if v is None else number(v) if isinstance(v, float) else v for v in row]
-            )
-        rest = len(self) - len(rows)
+        for row in self.data.select(names).slice(0, MAX_ROWS).to_pylist():
+            cells.append(list(map(_text, row.values())))
+        rest = len(self) - len(cells)
         if rest:
             note = f"and {rest} more: Table.rows, Table.column"
         else:

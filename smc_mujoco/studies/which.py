@@ -116,8 +116,7 @@ def which(
     compared, properties = _asked(machine, needs)
     chosen = _suited(machine, properties, laws)
     if minutes and machine.is_user_model and laws is None:
-        known = [law for law in chosen if law.name in gain_sets.COMPARED]
-        chosen = known or chosen
+        chosen = [law for law in chosen if law.name in gain_sets.COMPARED] or chosen
     trial = Trial.of(
         [machine],
         conditions,
