@@ -33,6 +33,8 @@ INPUTS = {  # what a controller may read -> expression of the law's measurement
     **{name: f"y.{name}" for name in ("x", "v", "q", "dq", "r", "dr", "ddr")},
 }
 DEFAULT_INPUTS = ("error", "error_rate")
+MATRICES = ("A", "B", "C", "D")  # attributes of a linear system of states
+POLYNOMIALS = ("num", "den")  # and of a transfer function
 MAX_STATES = 50
 CURE = "give a TransferFunction or StateSpace, (A, B, C, D, dt), or an array of gains"
 
@@ -238,8 +240,13 @@ def _of_all_channels(K: Any) -> Array | None:
     return gains
 
 
+def has_all(thing: Any, names: Iterable[str]) -> bool:
+    """Say whether a thing has all of these attributes."""
+    return all(hasattr(thing, name) for name in names)
+
+
 def _rows(matrix: Array) -> Matrix:
-    return tuple(tuple(row) for row in matrix.tolist())
+    return tuple(map(tuple, matrix.tolist()))
 
 
 def _system(K: Any) -> System:
@@ -249,11 +256,11 @@ def _system(K: Any) -> System:
     if isinstance(K, tuple | list) and K:
         with contextlib.suppress(TypeError, ValueError):
             K = np.asarray(K, float)
-    if all(hasattr(K, name) for name in "ABCD"):
+    if has_all(K, MATRICES):
         return _matrices(K.A, K.B, K.C, K.D, getattr(K, "dt", None))  # pyright: ignore[reportAttributeAccessIssue] see the line above
     if isinstance(K, np.ndarray) and K.ndim in (1, 2):
         return _matrices([], [], [], K, None)
-    if all(hasattr(K, name) for name in ("num", "den")):
+    if has_all(K, POLYNOMIALS):
         return _realisation(K.num, K.den, getattr(K, "dt", None))  # pyright: ignore[reportAttributeAccessIssue] see the line above
     raise ScenarioError(f"K is {shown(K)}: {CURE}")
 
@@ -263,13 +270,16 @@ def _matrices(a: Any, b: Any, c: Any, d: Any, dt: Any) -> System:
     column b or a row.
     """
     try:
-        arrays = [np.asarray(array) for array in (a, b, c, d)]
-        if any(np.iscomplexobj(array) for array in arrays):
-            raise ValueError
-        a, b, c, d = (array.astype(float) for array in arrays)
+        arrays = []
+        for given in (a, b, c, d):
+            array = np.asarray(given)
+            if np.iscomplexobj(array):
+                raise ValueError
+            arrays.append(array.astype(float))
+        a, b, c, d = arrays
         if b.ndim == 1:
             b = b[:, None]
-        a, b, c, d = (np.atleast_2d(array) for array in (a, b, c, d))
+        a, b, c, d = map(np.atleast_2d, (a, b, c, d))
         if not a.size:
             a = np.zeros((0, 0))
             b = np.zeros((0, d.shape[1]))
@@ -297,9 +307,10 @@ def _realisation(num: Any, den: Any, dt: Any) -> System:
             try:
                 forms.append(tf2ss(np.atleast_1d(above), np.atleast_1d(below)))
             except ValueError:
-                above, below = (len(np.trim_zeros(part, "f")) - 1 for part in (above, below))  # noqa: PLW2901
+                numerator = len(np.trim_zeros(above, "f")) - 1
+                denominator = len(np.trim_zeros(below, "f")) - 1
                 cure = "filter its derivative, as s / (tau s + 1)"
-                order = f"{above} over {below}"
+                order = f"{numerator} over {denominator}"
                 raise ScenarioError(f"K is improper, of order {order}: {cure}") from None
     a, b, c, d = zip(*forms, strict=True)  # of each transfer function
     return _matrices(block_diag(*a), block_diag(*b), np.hstack(c), np.hstack(d), dt)

@@ -152,7 +152,10 @@ def _onnx(onnxruntime: ModuleType, path: Path) -> Act:
     shape = list(inputs[0].shape)
     fits = len(inputs) == 1 and dtype is not None and len(shape) == 2
     if not fits or (isinstance(shape[0], int) and shape[0] != 1):
-        text = ", ".join(f"{tensor.name} {tensor.type} {tensor.shape}" for tensor in inputs)
+        tensors = []
+        for tensor in inputs:
+            tensors.append(f"{tensor.name} {tensor.type} {tensor.shape}")
+        text = ", ".join(tensors)
         raise ScenarioError(
             f"policy {path.name!r} takes {text}: export it for one input of floats, of shape (1, n)"
         )

@@ -23,7 +23,10 @@ def plain_equation(s: Any) -> bool:
 
 def exact_parts(s: Any) -> tuple[Part, ...]:
     """Return the parts whose dry friction is exact, see `Scenario.exact_friction`."""
-    dry = [part.exact for part in s.friction if not part.smooth]
+    dry = []
+    for part in s.friction:
+        if not part.smooth:
+            dry.append(part.exact)
     if s.plant.rubs:
         dry.append(DryFriction())
     exact = tuple(dict.fromkeys(dry))
@@ -62,4 +65,6 @@ def acting(s: Any) -> tuple[tuple[Part, str], ...]:
         for kind in ("force", "brake"):
             if getattr(part, kind) is not None:
                 acting.append((part, kind))
-    return (*acting, *((part, "stage_force") for part in s.exact_parts))
+    for part in s.exact_parts:
+        acting.append((part, "stage_force"))
+    return tuple(acting)

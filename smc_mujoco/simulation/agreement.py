@@ -50,7 +50,7 @@ def check_component(c: Component, n: int, driven: int) -> None:
         return
     python = python_functions.of_channel_component(c)
     record = Reading if c.kind == "estimator" else Measurement
-    inputs = [_input(record._fields, *at) for at in zip(TIMES, SIZES, strict=True)]
+    inputs = _inputs(record._fields)
     _check(made, name, python, inputs, c.numbers(1), c.memory, 2)
 
 
@@ -59,7 +59,7 @@ def check_signal(signal: Signal) -> None:
     made = cfunctions.compile_signal(signal)
     if _known(made, type(signal).value):
         return
-    inputs = [_input(state.INSTANT.names, *at) for at in zip(TIMES, SIZES, strict=True)]
+    inputs = _inputs(state.INSTANT.names)
     python = python_functions.of_signal(signal)
     numbers = cfunctions.signal_values(signal)
     _check(made, type(signal).__name__, python, inputs, numbers, max(signal.memory, 1), 3)
@@ -71,7 +71,7 @@ def check_part(part: Part, kind: str, numbers: Callable[[], Sequence[float]]) ->
     if kind not in cfunctions.OF_JOINTS or _known(made, getattr(part, kind)):
         return
     record = Sight if kind == "read" else JointState
-    inputs = [_input(record._fields, *at) for at in zip(TIMES, SIZES, strict=True)]
+    inputs = _inputs(record._fields)
     python = python_functions.of_part(part, kind)
     count = cfunctions.OF_JOINTS[kind][1]
     _check(made, type(part).__name__, python, inputs, numbers(), part.memory, count)
@@ -105,6 +105,11 @@ def _input(names: Sequence[str] | None, t: float, size: float) -> Array:
         if name == "t":
             values[-1] = t
     return np.array(values)
+
+
+def _inputs(names: Sequence[str] | None) -> list[Array]:
+    """Return one set of inputs by name for each time and size."""
+    return [_input(names, *at) for at in zip(TIMES, SIZES, strict=True)]
 
 
 def _joint_inputs(n: int, driven: int) -> list[Array]:
@@ -194,7 +199,10 @@ def _results(
     for numbers in inputs:
         outputs = np.zeros(count)
         arrays = numbers.copy(), parameters, kept, outputs
-        failed = call(*(array.ctypes.data_as(python_functions.DOUBLES) for array in arrays))
+        pointers = []
+        for array in arrays:
+            pointers.append(array.ctypes.data_as(python_functions.DOUBLES))
+        failed = call(*pointers)
         if python is not None and failed:
             cause = getattr(python.error, "__cause__", None)
             if cause is not None and not isinstance(cause, FAILURES):

@@ -17,20 +17,20 @@ def code_hashes(s: Scenario, plants: Hashes) -> list[str]:
     """Return hashes of the code that a run calls: law, estimator, surface, signals, and a user's
     parts and plant.
     """
-    functions = []
+    things = []
     for part in (*s.law.parts, s.velocity, s.surface):
         if part is not None:
-            functions.append(part.function)
-    known = (*dict.fromkeys(s.references), s.known_signal, *s.disturbance)
-    signals = [type(signal) for signal in known if signal is not None]
-    parts = [type(part) for part in (*s.friction, *s.compensated, *s.contact, *s.actuator)]
-    foreign = []
-    for kind in parts:
+            things.append(part.function)
+    for signal in (*dict.fromkeys(s.references), s.known_signal, *s.disturbance):
+        if signal is not None:
+            things.append(type(signal))
+    for part in (*s.friction, *s.compensated, *s.contact, *s.actuator):
+        kind = type(part)
         if not kind.__module__.startswith(PACKAGE):
-            foreign.append(kind)
+            things.append(kind)
     if s.plant not in plants:
         plants[s.plant] = _plant_codes(s.plant)
-    return [fingerprint.of(thing) for thing in (*functions, *signals, *foreign)] + plants[s.plant]
+    return [*map(fingerprint.of, things), *plants[s.plant]]
 
 
 def _plant_codes(plant: Plant) -> list[str]:
@@ -39,13 +39,10 @@ def _plant_codes(plant: Plant) -> list[str]:
     """
     builds = *plant.contacts.items(), *plant.mechanisms.items()
     if plant.build.__module__.startswith(PACKAGE):
-        return [
-            fingerprint.of(thing)
-            for thing in (plant.fields, plant.nominal, *builds)
-            if _of_a_user(thing)
-        ]
+        of_user = filter(_of_a_user, (plant.fields, plant.nominal, *builds))
+        return list(map(fingerprint.of, of_user))
     functions = plant.build, plant.fields, plant.nominal, builds
-    return [*(fingerprint.of(thing) for thing in functions), digest_of(plant.spec())]
+    return [*map(fingerprint.of, functions), digest_of(plant.spec())]
 
 
 def _of_a_user(thing: Any) -> bool:

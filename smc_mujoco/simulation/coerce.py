@@ -63,12 +63,17 @@ def plant(name: str, value: object, s: Any) -> Plant:
     among its parameters.
     """
     made = as_plant(value)
-    mismatch, jump = (vars(s).get(field) for field in ("mismatch", "jump"))
+    given = vars(s)
+    mismatch = given.get("mismatch")
+    jump = given.get("jump")
     changed: list[str] = []
     if isinstance(mismatch, Mapping):
         changed += dotted(mismatch)
     if isinstance(jump, Jump):
-        changed += [name for name in dotted(jump.of_plant) if name in joint_numbers(made)]
+        numbers = joint_numbers(made)
+        for path in dotted(jump.of_plant):
+            if path in numbers:
+                changed.append(path)
     return with_joint_numbers(made, changed)
 
 
@@ -85,7 +90,10 @@ def laws(name: str, value: Laws | None, s: Any) -> Law:
         value = s.plant.suggested.get("law")
     if not isinstance(value, Mapping | list | tuple):
         return _of_plant(value, s)
-    return by_channel([_of_plant(item, s) for item in one_per_channel(name, value, s.plant)])
+    channels = []
+    for item in one_per_channel(name, value, s.plant):
+        channels.append(_of_plant(item, s))
+    return by_channel(channels)
 
 
 def _of_plant(value: Any, s: Any) -> Law:
@@ -202,9 +210,10 @@ def state(name: str, value: float | Sequence[float] | None, s: Any) -> Floats | 
             f"{name} has {len(values)} values, and {s.plant.name} {counted(n, 'channel')}: give "
             f"{wanted}"
         )
-    return tuple(
-        number(name, item, low=-MAX_STATE, high=MAX_STATE) for item in values * (n // len(values))
-    )
+    states = []
+    for item in values * (n // len(values)):
+        states.append(number(name, item, low=-MAX_STATE, high=MAX_STATE))
+    return tuple(states)
 
 
 def physics_step(name: str, value: float | None, s: Any) -> float | None:
@@ -345,9 +354,15 @@ def _split(value: Any, plant: Plant) -> tuple[Any, list[Any]]:
     names = channel_names(plant)[plant.driven :] if plant.measured else ()
     if not any(name in value for name in names):
         return value, []
-    driven = {joint: signal for joint, signal in value.items() if joint not in names}
+    driven = {}
+    for joint, signal in value.items():
+        if joint not in names:
+            driven[joint] = signal
     goals = zip(names, plant.goal or (0.0,) * plant.free, strict=True)
-    return driven, [value.get(name, Constant(goal)) for name, goal in goals]
+    of_measured = []
+    for name, goal in goals:
+        of_measured.append(value.get(name, Constant(goal)))
+    return driven, of_measured
 
 
 def contact(name: str, value: object, s: Any) -> tuple[Obstacle, ...]:
@@ -422,7 +437,10 @@ def _by_joint(
                     items.append(dataclasses.replace(part, on=(joint,)))
         else:
             items += several_parts(name, item, s)
-    return [_placed(name, part, s.plant, joints(s.plant)) for part in items]
+    placed = []
+    for part in items:
+        placed.append(_placed(name, part, s.plant, joints(s.plant)))
+    return placed
 
 
 def _placed(name: str, part: P, plant: Plant, joints: Sequence[str]) -> P:
@@ -450,11 +468,22 @@ def actuator(name: str, value: Actuators | None, s: Any) -> tuple[Actuator, ...]
     items = _by_joint(name, value, s, Actuator, "smc.Lag(0.01)", driven_names)
     kept = _kept(items, s.plant)
     if kept:
-        before = [part for part in items if part.leads]
-        items = before + kept + [part for part in items if not part.leads]
+        before = []
+        after = []
+        for part in items:
+            if part.leads:
+                before.append(part)
+            else:
+                after.append(part)
+        items = before + kept + after
     for chain in dict.fromkeys(chains(items, driven)):
-        drives = tuple(part for part in chain if part.drives)
-        others = [type(part).__name__ for part in chain if not part.drives]
+        drives = []
+        others = []
+        for part in chain:
+            if part.drives:
+                drives.append(part)
+            else:
+                others.append(type(part).__name__)
         if len(others) > 1:
             raise ScenarioError(
                 f"{name} has {joined(others)}, and a joint has one rotor beside it: give one"
@@ -483,11 +512,19 @@ def _kept(items: Sequence[Actuator], plant: Plant) -> list[Actuator]:
     """
     found = []
     for joint, part in zip(driven_names(plant), plant.suggested.get("actuator", ()), strict=False):
-        given = [one for one in items if type(one) is type(part) and joint in (one.on or (joint,))]
-        if part is not None and not given:
+        if part is not None and not _given(items, part, joint):
             on = () if plant.driven == 1 else (joint,)
             found.append(dataclasses.replace(part, on=on))
     return found
+
+
+def _given(items: Sequence[Actuator], part: Actuator, joint: str) -> bool:
+    """Say whether a joint has a given drive of the part's kind; one without names is of all."""
+    for item in items:
+        on_joint = not item.on or joint in item.on
+        if on_joint and type(item) is type(part):
+            return True
+    return False
 
 
 def sensor(name: str, value: Sensors | None, s: Any) -> Encoder | tuple[Encoder, ...] | None:

@@ -34,6 +34,7 @@ steps here. Under "fault" every actuator loses half of its force at 2 s.
 import ast
 import contextlib
 import dataclasses
+import functools
 import inspect
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -171,20 +172,18 @@ class Condition:
         if self.name in NAMED or callable(self.fields):
             return self.name
         try:
-            texts = [f"{name}={_as_text(value)}" for name, value in self.fields.items()]
+            texts = _assignments(self.fields, _as_text)
         # the repr of a value that no scenario takes may fail; this text is for the error about it
         except Exception:
-            texts = [f"{name}={shown(value)}" for name, value in self.fields.items()]
-        return f"{self.name}: {', '.join(texts)}"
+            texts = _assignments(self.fields, shown)
+        return f"{self.name}: {texts}"
 
     def brief(self, plant: Plant, duration: float) -> str:
         """Return the fields on a plant as text, without values that are defaults; arguments and
         errors as in `on`.
         """
         fields = self.on(plant, duration)
-        return ", ".join(
-            f"{name}={_as_text(value, defaults=False)}" for name, value in fields.items()
-        )
+        return _assignments(fields, functools.partial(_as_text, defaults=False))
 
 
 def condition(name: str, **fields: Any) -> Condition:
@@ -290,12 +289,13 @@ def from_file(path: Path) -> list[Condition]:
     Empty lines and lines that begin with # are skipped.
     """
     with reading(path, "file of conditions", "give a text file, one condition a line") as file:
-        lines = [line.strip() for line in file.read_text(encoding="utf-8").splitlines()]
+        lines = file.read_text(encoding="utf-8").splitlines()
     conditions = []
     for count, line in enumerate(lines, 1):
+        text = line.strip()
         try:
-            if line and not line.startswith("#"):
-                conditions.append(find_condition(line))
+            if text and not text.startswith("#"):
+                conditions.append(find_condition(text))
         except ScenarioError as error:
             raise ScenarioError(f"line {count} of {str(path)!r}: {error}") from None
     if not conditions:
@@ -315,11 +315,11 @@ def _parsed(node: ast.expr) -> Any:  # noqa: PLR0911  # a table
         case ast.Tuple(elts=items) | ast.List(elts=items):
             return tuple(map(_parsed, items))
         case ast.Dict(keys=keys, values=values) if None not in keys:
-            return {
-                _parsed(key): _parsed(value)
-                for key, value in zip(keys, values, strict=True)
-                if key is not None
-            }
+            parsed = {}
+            for key, value in zip(keys, values, strict=True):
+                if key is not None:
+                    parsed[_parsed(key)] = _parsed(value)
+            return parsed
         case ast.BinOp(left=left, op=ast.Add(), right=right):
             first, second = _parsed(left), _parsed(right)
             if isinstance(first, Signal) and isinstance(second, Signal):
@@ -362,28 +362,35 @@ def _kinds() -> dict[str, Any]:
 
     If two have one name, the suite's is returned.
     """
-    kinds: list[type] = [Noise, Jump, Fault, Clock, *subclasses(Part), *subclasses(Signal)]
-    kinds = [kind for kind in kinds if kind not in ABSTRACT]
+    kinds: list[type] = [Noise, Jump, Fault, Clock]
+    for kind in (*subclasses(Part), *subclasses(Signal)):
+        if kind not in ABSTRACT:
+            kinds.append(kind)
     kinds.sort(key=lambda kind: kind.__module__.startswith("smc_mujoco."))
     return {kind.__name__: kind for kind in kinds}
 
 
+def _assignments(fields: Data, as_text: Callable[[Any], str]) -> str:
+    """Write fields as assignments, with commas between them."""
+    return ", ".join(f"{name}={as_text(value)}" for name, value in fields.items())
+
+
 def _as_text(value: Any, defaults: bool = True) -> str:
     """Return a value as `parse` reads it, with or without fields that have their default."""
+    as_text = functools.partial(_as_text, defaults=defaults)
     if isinstance(value, Component):
-        gains = ", ".join(f"{gain}={number!r}" for gain, number in value.gains.items())
-        return f"{value.name}({gains})"
+        return f"{value.name}({_assignments(value.gains, repr)})"
     if isinstance(value, Part | Signal | Noise | Jump | Fault | Clock):
-        texts = []
-        for name, content in stated(value, defaults).items():
-            texts.append(f"{name}={_as_text(content, defaults)}")
+        fields = stated(value, defaults)
         if getattr(value, "about", ""):
-            texts.append("about='goal'")
-        return f"{type(value).__name__}({', '.join(texts)})"
+            fields["about"] = "goal"
+        return f"{type(value).__name__}({_assignments(fields, as_text)})"
     if isinstance(value, tuple):
-        return f"({', '.join(_as_text(one, defaults) for one in value)},)"
+        return f"({', '.join(map(as_text, value))},)"
     if isinstance(value, Mapping):
-        items = [f"{key!r}: {_as_text(item, defaults)}" for key, item in value.items()]
+        items = []
+        for key, item in value.items():
+            items.append(f"{key!r}: {as_text(item)}")
         return f"{{{', '.join(items)}}}"
     return repr(value)
 
@@ -412,7 +419,9 @@ def _joined_fields(
 ) -> dict[str, Any]:
     """Return the fields of two conditions at once."""
     first, second = (condition.on(plant, duration) for condition in pair)
-    for field in [name for name in second if name in first]:
+    for field in second:
+        if field not in first:
+            continue
         if field in ADDITIVE_FIELDS:
             second[field] = *coerce.as_tuple(first[field]), *coerce.as_tuple(second[field])
         elif _differ(first[field], second[field]):
@@ -430,7 +439,10 @@ def _jump(size: str) -> Recipe:
 
     def fields(plant: Plant, duration: float) -> Data:
         if size not in plant.jumps:
-            with_jump = [name for name, other in plants().items() if size in other.jumps]
+            with_jump = []
+            for name, other in plants().items():
+                if size in other.jumps:
+                    with_jump.append(name)
             cure = f"choose another condition, or one of {', '.join(with_jump)}"
             raise ScenarioError(
                 f"condition 'jump_{size}' has no numbers for plant {plant.name!r}: {cure}"
@@ -538,7 +550,10 @@ def _own_joints(plant: Plant) -> list[Own]:
     ways = np.abs(np.subtract(usual_start(plant), plant.origin))[: plant.driven].tolist()
     limits = Scenario.recorded(plant=plant, law="none").drive_train.forces
     joints = zip(limits, inertias, ways, strict=True)
-    return [Own(limit, inertia, way or BESIDE) for limit, inertia, way in joints]
+    own = []
+    for limit, inertia, way in joints:
+        own.append(Own(limit, inertia, way or BESIDE))
+    return own
 
 
 def _fitted(usual: Actuator, fit: Callable[[Own], Actuator]) -> Recipe:

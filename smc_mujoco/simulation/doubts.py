@@ -132,16 +132,24 @@ def of_assumed_bound(s: Any) -> str:
         return ""
     suggested = plant.suggested.get("u_max", (None,) * plant.driven)
     own = plant.limits or (math.inf,) * plant.driven
-    free = [i for i, limit in enumerate(own) if limit == math.inf and suggested[i] is None]
+    free = []
+    for i, limit in enumerate(own):
+        if limit == math.inf and suggested[i] is None:
+            free.append(i)
     if not free:
         return ""
-    joints = joined(repr(channel_names(plant)[i]) for i in free)
-    bounds = joined(dict.fromkeys(f"{limits[i]:g} {plant.efforts[i]}" for i in free))
+    joints = []
+    bounds = []
+    for i in free:
+        joints.append(repr(channel_names(plant)[i]))
+        bounds.append(f"{limits[i]:g} {plant.efforts[i]}")
+    bounds_text = joined(dict.fromkeys(bounds))
     what = "joint" if len(free) == 1 else "joints"
     example = f"u_max={limits[free[0]]:g}"
     if plant.driven > 1:
         example = f"smc.Channel({example}) for each"
     return (
-        f"nothing limits the force on {what} {joints} of {plant.name}; |u| <= {bounds} is assumed "
-        f"from its load and inertia: give u_max, the limit of your motor, such as {example}"
+        f"nothing limits the force on {what} {joined(joints)} of {plant.name}; |u| <= "
+        f"{bounds_text} is assumed from its load and inertia: give u_max, the limit of your motor, "
+        f"such as {example}"
     )

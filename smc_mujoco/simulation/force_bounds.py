@@ -56,9 +56,10 @@ def _limits(plant: Plant) -> list[float]:
     from smc_mujoco.mechanisms.custom.scales import needs
 
     limits = plant.limits or (math.inf,) * plant.driven
-    return [
-        n if limit == math.inf else limit for n, limit in zip(needs(plant), limits, strict=True)
-    ]
+    bounds = []
+    for need, limit in zip(needs(plant), limits, strict=True):
+        bounds.append(need if limit == math.inf else limit)
+    return bounds
 
 
 def _unbounded(plant: Plant) -> bool:

@@ -72,7 +72,9 @@ def comparison(
     gains: str = "study",
 ) -> dict[str, Scenario]:
     """Return law name -> scenario, for one plant in one condition; arguments as of `scenario`."""
-    return {
-        name: scenario(plant, name, condition, duration=duration, changes=changes, gains=gains)
-        for name in laws
-    }
+    scenarios = {}
+    for name in laws:
+        scenarios[name] = scenario(
+            plant, name, condition, duration=duration, changes=changes, gains=gains
+        )
+    return scenarios

@@ -84,10 +84,10 @@ class Starts:
         plant = scenario.plant
         if plant.pose:
             middle = scenario.resolved.x0 if self.x0 is None else self.x0
-            far = max(abs(x - r) for x, r in zip(middle[:3], plant.rest, strict=False))
+            far = _farthest(middle[:3], plant.rest[:3])
             return far + self.spread + self.by
         middle = self.place(scenario, 0).resolved.x0
-        return max(abs(x - r) for x, r in zip(middle, plant.origin, strict=True)) or self.by
+        return _farthest(middle, plant.origin) or self.by
 
     def check_condition(self, name: str, fields: Data) -> None:
         """Raise ScenarioError if both the starts and the fields of a condition set x0."""
@@ -110,9 +110,12 @@ class Starts:
             scenario = dataclasses.replace(scenario, x0=beside_goal(scenario.plant))
         if seed == 0 and not scenario.plant.pose:
             return dataclasses.replace(scenario, seed=0)
-        z = [np.random.default_rng([seed, i]).uniform(-1.0, 1.0) for i in range(scenario.plant.n)]
-        if scenario.contact:
-            z = [-abs(factor) for factor in z]
+        z = []
+        for i in range(scenario.plant.n):
+            factor = np.random.default_rng([seed, i]).uniform(-1.0, 1.0)
+            if scenario.contact:
+                factor = -abs(factor)
+            z.append(factor)
         x0 = []
         for x, r, factor in zip(scenario.resolved.x0, scenario.plant.origin, z, strict=True):
             if scenario.plant.pose:
@@ -137,6 +140,11 @@ def _with_drawn_error(scenario: Scenario, seed: int) -> Scenario:
     most = abs(given.error)
     drawn = np.random.default_rng([seed, ERROR_STREAM]).uniform(-most, most)
     return dataclasses.replace(scenario, feedforward=dataclasses.replace(given, error=float(drawn)))
+
+
+def _farthest(start: Sequence[float], rest: Sequence[float]) -> float:
+    """Return the largest distance of a channel from its place of rest."""
+    return max(abs(x - r) for x, r in zip(start, rest, strict=True))
 
 
 def _at_goal(scenario: Scenario) -> bool:
@@ -347,21 +355,26 @@ def check_names(
     """Raise ScenarioError if two different plants, laws or conditions have the same name, as tables
     show only names.
     """
-    chosen_plants = [as_plant(plant) for plant in plants]
-    chosen_laws = [law if isinstance(law, str) else coerce.law(law) for law in laws]
+    of_plants = []
+    for plant in map(as_plant, plants):
+        of_plants.append((plant.name, plant, (plant.build, plant.parameters, plant.n)))
+    of_laws = []
+    for law in laws:
+        if isinstance(law, str):
+            of_laws.append((law, law, law))
+        else:
+            made = coerce.law(law)
+            of_laws.append((made.name, made, made))
+    of_conditions = [(condition.name, condition, str(condition)) for condition in conditions]
     # each thing with its name and what distinguishes it from others
     for what, cure, things in (
-        (
-            "plants",
-            "give each its own grid",
-            [(p.name, p, (p.build, p.parameters, p.n)) for p in chosen_plants],
-        ),
+        ("plants", "give each its own grid", of_plants),
         (
             "laws",
             "name one of them, as smc.law(...).named('slow') or --law \"slow: classical(k=2)\"",
-            [(law if isinstance(law, str) else law.name, law, law) for law in chosen_laws],
+            of_laws,
         ),
-        ("conditions", "give each its own name", [(c.name, c, str(c)) for c in conditions]),
+        ("conditions", "give each its own name", of_conditions),
     ):
         known = {}
         for name, thing, content in things:

@@ -68,11 +68,14 @@ def fastest_pole(s: Any) -> float:
     for factors in (s.mismatch, s.jump.factors if s.jump else {}):
         mass *= factors.get("mass", 1.0) * factors.get(s.plant.mass, 1.0)
         least = min(least, mass)
-    parts = (
-        *(part for part in s.actuator if not part.in_callback),
-        *(part for part in s.friction if part.smooth),
-    )
-    return poles.fastest_pole(s.plant, parts) / max(least, MIN_MASS)
+    parts = []
+    for part in s.actuator:
+        if not part.in_callback:
+            parts.append(part)
+    for part in s.friction:
+        if part.smooth:
+            parts.append(part)
+    return poles.fastest_pole(s.plant, tuple(parts)) / max(least, MIN_MASS)
 
 
 def longest_step(s: Any) -> float:

@@ -138,13 +138,15 @@ def check_free_body(s: Any) -> None:
             f"law {s.law.name!r} is of one channel, and {s.plant.name} is a free body, whose "
             "channels turn together: give a law of many joints, such as 'geometric'"
         )
-    given = {name: (words, getattr(s, name)) for name, words in NOT_OF_FREE_BODIES.items()}
     taken = {
         "clock": not s.clock.regular,
         "velocity": s.velocity.name != "measured",
         "friction": not all(part.on for part in s.friction),
     }
-    refused = [words for name, (words, value) in given.items() if taken.get(name, bool(value))]
+    refused = []
+    for name, words in NOT_OF_FREE_BODIES.items():
+        if taken.get(name, bool(getattr(s, name))):
+            refused.append(words)
     if any(d.sees for d in s.disturbance):
         refused.append("disturbance that sees the loop")
     if refused:

@@ -61,9 +61,15 @@ OBSTACLE = "the obstacle"
 def parts(scenario: Scenario) -> tuple[Part, ...]:
     """Return the scenario's parts, in the order in which they are added to the model."""
     added: list[Part] = [*scenario.contact]
-    added += [part for part in scenario.friction if part.side == "link"]
-    added += [part for part in scenario.actuator if not part.in_callback]
-    added += [part for part in scenario.friction if part.side == "motor"]  # on rotors
+    for part in scenario.friction:
+        if part.side == "link":
+            added.append(part)
+    for part in scenario.actuator:
+        if not part.in_callback:
+            added.append(part)
+    for part in scenario.friction:
+        if part.side == "motor":  # on rotors
+            added.append(part)
     return (*added, *scenario.sensors)
 
 
@@ -246,7 +252,11 @@ def _places(model: mujoco.MjModel, joint: int, site: str) -> np.ndarray:
     at = np.arange(len(PLACES))
     turns = np.arange(len(PLACES)) - 3
     for name, kinds in POSE_SENSORS.items():
-        first, second = (int(model.sensor_adr[model.sensor(site + kind).id]) for kind in kinds)
+        addresses = []
+        for kind in kinds:
+            sensor = model.sensor(site + kind).id
+            addresses.append(int(model.sensor_adr[sensor]))
+        first, second = addresses
         if name == "v_sensor":
             second = second + turns
         table[name] = np.where(turns < 0, first + at, second)
@@ -318,10 +328,13 @@ def without_scenery(spec: mujoco.MjSpec, pushed: Collection[str] = ()) -> None:
     for sensor in spec.sensors:
         needed |= {sensor.objname, sensor.refname}
     for tendon in spec.tendons:
-        needed |= {wrap.target.name for wrap in tendon.path if wrap.type in ROUND_WRAPS}
+        for wrap in tendon.path:
+            if wrap.type in ROUND_WRAPS:
+                needed.add(wrap.target.name)
     for body in reversed(spec.bodies[1:]):
         kept = [*body.sites, *body.bodies, *body.frames, body.explicitinertial]
-        kept += [geom.contype or geom.conaffinity or geom.name in needed for geom in body.geoms]
+        for geom in body.geoms:
+            kept.append(geom.contype or geom.conaffinity or geom.name in needed)
         if not any(kept) and _is_fixed(body) and body.name not in needed:
             spec.delete(body)
 

@@ -120,9 +120,12 @@ def _refuse_mistakes(s: Resolved, reason: str) -> None:
     """Raise BrokenLawError if a component does not compile for a reason that would end each run in
     Python, too.
     """
-    components = [part for part in (*s.law.parts, s.surface, s.velocity) if part is not None]
     about = reason.partition(" does not compile: ")[0]
-    of = next((part for part in components if about == f"{part.kind} {part.name!r}"), None)
+    of = None
+    for part in (*s.law.parts, s.surface, s.velocity):
+        if part is not None and about == f"{part.kind} {part.name!r}":
+            of = part
+            break
     if of is not None and (mistake := RETURNS_OTHERS.search(reason)):
         returned = re.sub("^1 numbers", "1 number", mistake[1])
         wanted = {"law": "u and s", "surface": "s and v_eq"}.get(of.kind, "a velocity")
@@ -222,7 +225,9 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
     for name, rows in tables.items():
         kind = KINDS.get(name, state.FUNCTION)
         arrays[name] = np.array([buffer.as_tuple(kind, row) for row in rows], kind)
-    values |= {name: state.address(array) for name, array in arrays.items() if len(array)}
+    for name, array in arrays.items():
+        if len(array):
+            values[name] = state.address(array)
     values |= {
         "n": s.plant.n,
         "driven": s.plant.driven,
@@ -367,7 +372,10 @@ def _shared_functions(s: Resolved, nominal: Native | None, buffer: Functions) ->
         fields["nominal"] = _function(buffer.nominal(s.plant), known_values(s), buffer)
     signals = {"feedforward": s.known_signal}
     signals |= {"position_error": s.noise.position_error, "velocity_error": s.noise.velocity_error}
-    return fields | {name: _signal(signal, buffer) for name, signal in signals.items() if signal}
+    for name, signal in signals.items():
+        if signal:
+            fields[name] = _signal(signal, buffer)
+    return fields
 
 
 def _signal(signal: Signal, buffer: Functions, channels: int = 1) -> dict[str, int]:
@@ -419,8 +427,11 @@ def _arrays(s: Resolved, buffer: Functions) -> dict[str, Any]:
     width = s.plant.n if s.law.joint else 1
     late = not s.clock.regular  # a late command may take effect after the next sample began
     slots = s.delay_steps // s.steps + 1 + late
+    seen = {"n": n}
+    for name in ("x", "v", "u"):
+        seen[name] = buffer.reserve(n)
     return {
-        "seen": {"n": n} | {name: buffer.reserve(n) for name in ("x", "v", "u")},
+        "seen": seen,
         "a": buffer.reserve(n),
         "other_forces": buffer.reserve(n) if s.model == "true" else 0,
         "width": width,
@@ -512,8 +523,8 @@ def _parts(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
     rows = []
     for part, kind in s.acting:
         run = run_of(prepared.scenario, part)
-        numbers = [buffer.put(row) for row in part.numbers(run)]
-        memories = [buffer.put(row) for row in part.start(run)]
+        numbers = list(map(buffer.put, part.numbers(run)))
+        memories = list(map(buffer.put, part.start(run)))
         compiled = buffer.part(part, kind)
         frictions = part.friction_rows(run)
         for place, i in enumerate(part.channels(s.plant)):

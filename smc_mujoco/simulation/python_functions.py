@@ -77,7 +77,7 @@ def as_floats(name: str, out: Any, expected: str, count: int) -> list[float]:
     else.
     """
     try:
-        values = [float(value) for value in out]
+        values = list(map(float, out))
     except (TypeError, ValueError, OverflowError):
         values = []
     if len(values) != count:
@@ -112,11 +112,13 @@ class PythonComponent:
         parts = c.of_channels(n)
         if len(parts) == 1:
             parts = parts * n
-        self.sizes = [part.memory for part in parts]
-        self.gains = [gains_of(part, self.driven) for part in parts]
+        self.sizes = []
+        self.gains = []
         plain = {}  # by id, as a callable object may have no hash
         self.functions = []
         for part in parts:
+            self.sizes.append(part.memory)
+            self.gains.append(gains_of(part, self.driven))
             function = plain.setdefault(id(part.function), rebuild(part.function, lambda f: f))
             if isinstance(function, jit.Uncompiled):
                 function = function.fresh()
@@ -278,7 +280,10 @@ def hearing_ctrl_c(functions: Sequence[PythonFunction]) -> Iterator[None]:
         yield
     finally:
         sys.unraisablehook = before
-    errors = [function.error for function in functions if function.error is not None]
+    errors = []
+    for function in functions:
+        if function.error is not None:
+            errors.append(function.error)
     for error in (*heard, *errors):
         if not isinstance(error, Exception):
             raise error

@@ -391,11 +391,18 @@ class ScenarioBatch:
 
     def _advance_to(self, end: int, report: Report) -> None:
         jumps = [s.jump_step for s in self.scenarios]
-        for stop in sorted({end, *(step for step in jumps if self.step < step <= end)}):
+        stops = {end}
+        for step in jumps:
+            if self.step < step <= end:
+                stops.add(step)
+        for stop in sorted(stops):
             self.advance(stop - self.step, report)
             self.step = stop
             if stop > 0:
-                jumping = [i for i, step in enumerate(jumps) if step == stop]
+                jumping = []
+                for i, step in enumerate(jumps):
+                    if step == stop:
+                        jumping.append(i)
                 self.set_parameters(stop, jumping)
                 for i in jumping:
                     put_after_jump(self.prepared[i], self.packed[i])

@@ -278,9 +278,10 @@ class Scenario:
         """
         from smc_mujoco.common import html
 
-        parameters = ", ".join(
-            f"{name} = {value:g}" for name, value in self.plant.parameters.items()
-        )
+        texts = []
+        for name, value in self.plant.parameters.items():
+            texts.append(f"{name} = {value:g}")
+        parameters = ", ".join(texts)
         rows = {
             "plant": f"{self.plant.name} ({parameters})",
             "law": self.law,
@@ -557,5 +558,8 @@ def _defaults(s: Scenario) -> dict[str, Any]:
         "velocity": estimator("measured" if s.sensor is None else "filtered_difference"),
         "integrator": integration.default_integrator(s),
     }
-    missing = {name: value for name, value in defaults.items() if getattr(s, name) is None}
+    missing = {}
+    for name, value in defaults.items():
+        if getattr(s, name) is None:
+            missing[name] = value
     return missing | {"law": nominal_gains.at_plant(s.law, s.plant)}

@@ -108,24 +108,33 @@ def check_signals(s: Any) -> None:
         raise ScenarioError(
             "only a reference may have a signal for each channel: give one signal for all"
         )
+    _check_forces(s)
+    for signal in dict.fromkeys(s.references):
+        check_function_of_time("reference", signal, "a smooth signal")
+    if s.known_signal:
+        check_function_of_time("feedforward", s.known_signal, "a known signal of u")
+
+
+def _check_forces(s: Any) -> None:
+    """Check that winds, pushes and forces have a body to act on."""
     for d in s.disturbance:
         if d.air and not flies(s.plant):
             raise ScenarioError(
                 f"disturbance {shown(d)} is a wind, and {s.plant.name} has no drag: give a force, "
                 "or plant 'quadrotor'"
             )
-    for push in [d for d in s.disturbance if isinstance(d, Push)]:
-        find(f"body of {s.plant.name} in a Push", push.body, dict.fromkeys(bodies(s.plant)))
-    forces = [d for d in s.disturbance if d.cartesian and not isinstance(d, Push)]
+    for d in s.disturbance:
+        if isinstance(d, Push):
+            find(f"body of {s.plant.name} in a Push", d.body, dict.fromkeys(bodies(s.plant)))
+    forces = []
+    for d in s.disturbance:
+        if d.cartesian and not isinstance(d, Push):
+            forces.append(d)
     if forces and s.plant.direct and not s.plant.pose:
         raise ScenarioError(
             f"disturbance {shown(forces[0])} is a force on a body, and disturbances of "
             f"{s.plant.name} act on its joints: give another signal"
         )
-    for signal in dict.fromkeys(s.references):
-        check_function_of_time("reference", signal, "a smooth signal")
-    if s.known_signal:
-        check_function_of_time("feedforward", s.known_signal, "a known signal of u")
 
 
 def check_reference_ranges(s: Any) -> None:
@@ -158,7 +167,12 @@ def check_function_of_time(name: str, signal: Signal, cure: str) -> None:
 def bodies(plant: Plant) -> tuple[str, ...]:
     """Return the names of a plant's bodies."""
     model = loaded(plant)
-    return tuple(name for i in range(1, model.nbody) if (name := model.body(i).name))
+    names = []
+    for i in range(1, model.nbody):
+        name = model.body(i).name
+        if name:
+            names.append(name)
+    return tuple(names)
 
 
 def check_obstacles(s: Any) -> None:

@@ -99,9 +99,9 @@ def _versions() -> dict[str, str]:
 
     It takes 5 ms.
     """
-    packages = {"smc_mujoco": __version__} | {
-        name: version(name) for name in ("mujoco", "numba", "numpy")
-    }
+    packages = {"smc_mujoco": __version__}
+    for name in ("mujoco", "numba", "numpy"):
+        packages[name] = version(name)
     return packages | {"arithmetic": arithmetic()}
 
 
@@ -113,8 +113,9 @@ def restore(data: dict, plant: Plant | None = None) -> Scenario:
     """
     fields = {name: (LATER | data)[name] for name in Scenario.fields()}
     fields |= {"plant": plant} if plant else {}
-    its = {name: value for name, value in fields.items() if value and value is not plant}
-    fields |= {name: RESTORERS.get(name, _restored)(value) for name, value in its.items()}
+    for name, value in fields.items():
+        if value and value is not plant:
+            fields[name] = RESTORERS.get(name, _restored)(value)
     fields["law"] = components.law(data["law"], data.get("source"))
     exact = Scenario.recorded(**fields)
     with_defaults = Scenario.recorded(**fields | dict.fromkeys(data.get("left_out", ())))
@@ -141,10 +142,9 @@ def _restored(data: Any) -> Any:
     if data["module"].rpartition(".")[0] in FOLDERS:  # else it is a user's, and imported already
         with contextlib.suppress(ImportError):
             importlib.import_module(data["module"])
-    kinds = {
-        (kind.__name__, kind.__module__): kind
-        for kind in (Feedforward, *subclasses(Signal), *subclasses(Part))
-    }
+    kinds = {}
+    for kind in (Feedforward, *subclasses(Signal), *subclasses(Part)):
+        kinds[(kind.__name__, kind.__module__)] = kind
     if (kind := kinds.get((data["kind"], data["module"]))) is None:
         raise ScenarioError(
             f"{data['kind']!r} is unknown here: first import {data['module']}, which defines it"

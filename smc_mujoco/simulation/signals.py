@@ -715,7 +715,10 @@ def parameter_factors(name: str, value: object) -> Frozen[float]:
             f"{name} is {shown(value)}: give parameter names with their factors, such as {{'M': "
             "1.3}"
         )
-    return frozen({str(key): number(f"{name} of {key}", factor) for key, factor in value.items()})
+    factors = {}
+    for key, factor in value.items():
+        factors[str(key)] = number(f"{name} of {key}", factor)
+    return frozen(factors)
 
 
 @register_jitable

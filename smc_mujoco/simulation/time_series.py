@@ -247,10 +247,13 @@ def _floats(what: str, items: object) -> Floats:
     values = list(itertools.islice(items, MAX_POINTS + 1))
     if len(values) > MAX_POINTS:
         raise ScenarioError(f"{what} are more than {MAX_POINTS:,}: give fewer")
-    return tuple(
-        x if type(x) is float and math.isfinite(x) else number(f"{what}[{i}]", x)
-        for i, x in enumerate(values)
-    )
+    floats = []
+    for i, value in enumerate(values):
+        if type(value) is float and math.isfinite(value):
+            floats.append(value)
+        else:
+            floats.append(number(f"{what}[{i}]", value))
+    return tuple(floats)
 
 
 def _check(what: str, times: Sequence[float], where: Callable[[int], str]) -> None:

@@ -115,8 +115,12 @@ class Trace:
         """Return the arrays by name; `held`, `damping` and `compensation` only if they are not
         None.
         """
-        arrays = {name: getattr(self, name) for name in (*ARRAYS, *OPTIONAL)}
-        return {name: array for name, array in arrays.items() if array is not None}
+        arrays = {}
+        for name in (*ARRAYS, *OPTIONAL):
+            array = getattr(self, name)
+            if array is not None:
+                arrays[name] = array
+        return arrays
 
     @property
     def holding(self) -> Array:
@@ -164,9 +168,8 @@ class Trace:
             rows["not resolved"] = self.unresolved
         for name, units in (("x", s.plant.units), ("u", s.efforts[: s.plant.driven])):
             for unit in dict.fromkeys(units):
-                values = getattr(self, name)[
-                    :, [i for i, other in enumerate(units) if other == unit]
-                ]
+                columns = [i for i, other in enumerate(units) if other == unit]
+                values = getattr(self, name)[:, columns]
                 known = values[np.isfinite(values)].tolist() or [math.nan]
                 rows[f"{name} ({unit})"] = f"{min(known):.3g} to {max(known):.3g}"
         return html.fields(rows, "Trace")
@@ -238,19 +241,18 @@ class Trace:
     def _units(self, name: str) -> list[str]:
         """Return the unit of an array for each channel, (n,)."""
         pairs = zip(self.scenario.plant.units, self.scenario.efforts, strict=True)
-        of_channels = []
+        found = []
         for x, u in pairs:
-            of_channels.append(
-                {
-                    "x": x,
-                    "r": x,
-                    "v": f"{x}/s",
-                    "u": u,
-                    "applied": u,
-                    "s": "",
-                }
-            )
-        return [units.get(name, EFFORT[units["x"]]) for units in of_channels]
+            units = {
+                "x": x,
+                "r": x,
+                "v": f"{x}/s",
+                "u": u,
+                "applied": u,
+                "s": "",
+            }
+            found.append(units.get(name, EFFORT[x]))
+        return found
 
     def _unit(self, name: str) -> str:
         """Return the unit of an array, or those of its channels where they differ: "m, rad"."""
@@ -344,7 +346,9 @@ class Trace:
 
 
 def _write_csv(trace: Trace, file: Path) -> None:
-    header = [f"{name} [{unit}]" if unit else name for name, unit in trace.units().items()]
+    header = []
+    for name, unit in trace.units().items():
+        header.append(f"{name} [{unit}]" if unit else name)
     with file.open("w", encoding="utf-8", newline="") as stream:
         csv.writer(stream, lineterminator="\n").writerow(header)
         for row in np.column_stack(list(trace.columns().values())):
@@ -469,7 +473,10 @@ def load(path: AnyPath) -> Trace:
         ) from None
     with reading(path, *FILE) as file, zipfile.ZipFile(file) as archive:
         found = archive.namelist()
-        names = (*ARRAYS, *(name for name in OPTIONAL if f"{name}.npy" in found))
+        names = list(ARRAYS)
+        for name in OPTIONAL:
+            if f"{name}.npy" in found:
+                names.append(name)
         arrays = {name: _checked_array(archive, name, scenario) for name in names}
     return Trace(**arrays, scenario=scenario, **end)
 

@@ -99,7 +99,10 @@ def _failed(future: Future) -> bool:
 def _on_worker(call: bytes, sender: dict[str, str]) -> Any:
     """Make a call, on a worker."""
     if (here := software()) != sender:
-        other = [f"{name} {here.get(name)}" for name in sender if here.get(name) != sender[name]]
+        other = []
+        for name, version in sender.items():
+            if here.get(name) != version:
+                other.append(f"{name} {here.get(name)}")
         raise ScenarioError(_other_software(", ".join(other)))
     try:
         function, arguments = pickle.loads(call)

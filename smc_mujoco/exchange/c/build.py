@@ -36,9 +36,10 @@ LIBRARY_FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
 SYMBOLIC_FLAGS = () if sys.platform in ("darwin", "win32") else ("-Wl,-Bsymbolic",)
 WARNING_FLAGS = ("-Wall", "-Wextra")
 # Compiler warnings that are errors here.
-STRICT_FLAGS = tuple(
-    f"-Werror={name}"
-    for name in ("incompatible-pointer-types", "implicit-function-declaration", "int-conversion")
+STRICT_FLAGS = (
+    "-Werror=incompatible-pointer-types",
+    "-Werror=implicit-function-declaration",
+    "-Werror=int-conversion",
 )
 ERROR = re.compile(
     r"^(?P<file>[^:\n]+):(?P<line>\d+):(?:\d+:)? (?:fatal )?error: (?P<what>.*)$", re.MULTILINE
@@ -137,7 +138,7 @@ def _sentence(source: Path, symbol: str, output: str) -> str:
         return undefined(source, symbol)
     error = ERROR.search(output)
     if error is None:  # from the linker or the command itself
-        lines = [line for line in output.splitlines() if line.strip()] or ["it says nothing"]
+        lines = list(filter(str.strip, output.splitlines())) or ["it says nothing"]
         telling = [line for line in lines if re.search(r"ndefined|cannot find|error:", line)]
         said = (telling or lines)[0].strip()
         command = " ".join(compiler())

@@ -40,11 +40,13 @@ def compensate_of(scenario: Scenario) -> Compensate | None:
     speed = {"reference": of_reference, "speed": of_joint}[given.on]
     gains = [nominal.gain for nominal in s.drive_train.nominal[: s.plant.driven]]
     if not s.law.joint:
-        if any(repr(one) != repr((terms[0], gains[0])) for one in zip(terms, gains, strict=True)):
-            raise ScenarioError(
-                "the scenario's Feedforward differs between its channels, but a law of one "
-                "channel is written once for all: give one that is the same for every channel"
-            )
+        first = repr((terms[0], gains[0]))
+        for of_channel in zip(terms, gains, strict=True):
+            if repr(of_channel) != first:
+                raise ScenarioError(
+                    "the scenario's Feedforward differs between its channels, but a law of one "
+                    "channel is written once for all: give one that is the same for every channel"
+                )
         return _of_channel(_added(terms[0], speed, given.eps, gains[0]))
     compensate: Compensate = add_nothing
     for i, (own, gain) in enumerate(zip(terms, gains, strict=True)):

@@ -114,7 +114,10 @@ def number_of_joints(law: Component, joints: int | None) -> int:
 
     `joints`, or the number of values of a gain; 0 for one channel.
     """
-    several = {name: len(value) for name, value in law.gains.items() if isinstance(value, tuple)}
+    several = {}
+    for name, value in law.gains.items():
+        if isinstance(value, tuple):
+            several[name] = len(value)
     if not law.joint:
         if joints is not None:
             raise ScenarioError(
@@ -187,7 +190,11 @@ def includes(code: str) -> list[str]:
         "math.h": rf"\b(?:{'|'.join(MATH)})f?\(|\bNAN\b|\bINFINITY\b",
         "stdint.h": r"\bint(?:16|32)_t\b",
     }
-    return [f"#include <{name}>" for name, needs in headers.items() if re.search(needs, code)]
+    lines = []
+    for name, needs in headers.items():
+        if re.search(needs, code):
+            lines.append(f"#include <{name}>")
+    return lines
 
 
 def gain_names(component: Component) -> list[str]:
@@ -218,7 +225,7 @@ def _fixed_point(law: Component) -> str:
         "ON_E": word(gains["k1"] * gains["e_range"] / 8.0, 16.0),
         "ON_DE": word(gains["de_range"] / 8.0, 16.0),
         "LAM": word(gains["lam"], gains["u_range"]),
-        "TABLE": rows([str(n) for n in q15.TABLE]),
+        "TABLE": rows(list(map(str, q15.TABLE))),
     }
     text = (build.FOLDER / "q15.c").read_text(encoding="utf-8").rstrip()
     return re.sub(r"@(\w+)@", lambda match: str(words[match[1]]), text)
@@ -230,7 +237,8 @@ def _facts(law: Component, slots: int, joints: int, single: bool) -> str:
     values = []
     for name, value in law.gains.items():
         numbers = [gain_at(value, i) for i in range(max(joints, 1))]
-        values += [_literal(number, single) for number in numbers]
+        for number in numbers:
+            values.append(_literal(number, single))
         if not isinstance(value, tuple):
             numbers = numbers[:1]
         texts.append(f"{plain(name)}={' '.join(map(repr, numbers))}")

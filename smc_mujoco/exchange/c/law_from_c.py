@@ -219,7 +219,9 @@ def check(
     library = _library(source, symbol, flags, timeout)
     about = _about(library, gains, memory)
     yield from library.warnings
-    texts = [f"{name} = {gain_text(gain.default)}" for name, gain in about.gains.items()]
+    texts = []
+    for name, gain in about.gains.items():
+        texts.append(f"{name} = {gain_text(gain.default)}")
     joints = f"{about.joints} joints; " if about.joints else ""
     given = ", ".join(texts) or "none"
     yield f"{source.name}: {symbol} is a law; {joints}gains {given}; memory {about.memory}"

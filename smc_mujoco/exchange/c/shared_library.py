@@ -102,9 +102,9 @@ class Requests:
         tip = ON_REQUEST(lambda nothing, parameters, memory, out: answer(out, jacobian))
         self.joints = joints
         self.functions = (product, tip)
-        addresses = [
-            float(ctypes.cast(function, ctypes.c_void_p).value or 0) for function in self.functions
-        ]
+        addresses = []
+        for function in self.functions:
+            addresses.append(float(ctypes.cast(function, ctypes.c_void_p).value or 0))
         self.table = doubles([*addresses, 0.0, 1.0])
         self.address = ctypes.addressof(self.table)
 

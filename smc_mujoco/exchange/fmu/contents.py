@@ -117,14 +117,19 @@ class ExportedLaw:
     def parts(self) -> dict[str, Component]:
         """Kind -> component, without those that are None."""
         parts = {"law": self.law, "surface": self.surface, "estimator": self.estimator}
-        return {kind: part for kind, part in parts.items() if part is not None}
+        given = {}
+        for kind, part in parts.items():
+            if part is not None:
+                given[kind] = part
+        return given
 
     @cached_property
     def code(self) -> dict[str, tuple[int, str]]:
         """Kind -> number of memory slots, and C code, of each component."""
-        code = {
-            kind: export_c.translated(part) for kind, part in self.parts.items() if kind != "law"
-        }
+        code = {}
+        for kind, part in self.parts.items():
+            if kind != "law":
+                code[kind] = export_c.translated(part)
         of_law = export_c.translated(
             self.law, joints=self.joints, plant=self.plant, compensate=self.compensate
         )

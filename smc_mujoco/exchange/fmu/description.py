@@ -52,7 +52,10 @@ def model_description(
     structure = xml.SubElement(root, "ModelStructure")
     for reference, variable in enumerate(listed):
         variables.append(_variable(reference, variable))
-    outputs = [str(reference) for reference, variable in enumerate(listed) if is_output(variable)]
+    outputs = []
+    for reference, variable in enumerate(listed):
+        if is_output(variable):
+            outputs.append(str(reference))
     for element in ("Output", "InitialUnknown"):
         for reference in outputs:
             xml.SubElement(structure, element, valueReference=reference)

@@ -132,10 +132,11 @@ def law_to_fmu(
 
 def _of_scenario(scenario: Scenario, chosen: Data) -> Fields:
     """Return a scenario's arguments of `_exported`. `chosen`: those that the user gives."""
-    if given := [name for name, value in chosen.items() if value is not None]:
-        raise ScenarioError(
-            f"a scenario has its own {given[0]}: leave {given[0]} out, or give its law instead"
-        )
+    for name, value in chosen.items():
+        if value is not None:
+            raise ScenarioError(
+                f"a scenario has its own {name}: leave {name} out, or give its law instead"
+            )
     s = scenario.resolved
     limits = set(scenario.limits)
     what = ""
@@ -228,12 +229,15 @@ def _files(exported: ExportedLaw, identifier: str) -> dict[str, str]:
     files["controller.h"] = contents.header(listed, exported, identifier, token)
     files["smc_fmu.h"] = (FOLDER / "smc_fmu.h").read_text(encoding="utf-8")
     files[build.HEADER.name] = build.HEADER.read_text(encoding="utf-8")
-    files |= {name: (FOLDER / "headers" / name).read_text(encoding="utf-8") for name in FMI_HEADERS}
-    return {
+    for name in FMI_HEADERS:
+        files[name] = (FOLDER / "headers" / name).read_text(encoding="utf-8")
+    placed = {
         "modelDescription.xml": description.model_description(listed, exported, identifier, token),
         "sources/buildDescription.xml": description.build_description(compiled, identifier),
-        **{f"sources/{name}": text for name, text in files.items()},
     }
+    for name, text in files.items():
+        placed[f"sources/{name}"] = text
+    return placed
 
 
 def platform_tuple() -> tuple[str, str]:
@@ -249,12 +253,18 @@ def _binary(files: Mapping[str, str], identifier: str) -> dict[str, bytes]:
     """
     machine, suffix = platform_tuple()
     with scratch() as folder:
-        sources = {Path(n).name: t for n, t in files.items() if n.startswith("sources/")}
+        sources = {}
+        for path, text in files.items():
+            if path.startswith("sources/"):
+                sources[Path(path).name] = text
         target = folder / "out"
         with no_room():
             for name, text in sources.items():
                 (folder / name).write_text(text, encoding="utf-8")
-        compiled = [str(folder / name) for name in sources if name.endswith(".c")]
+        compiled = []
+        for name in sources:
+            if name.endswith(".c"):
+                compiled.append(str(folder / name))
         done = build.compiled(
             [*BINARY_FLAGS, *compiled], target, "an FMU with a binary", COMPILE_TIMEOUT
         )

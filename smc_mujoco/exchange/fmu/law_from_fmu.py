@@ -275,7 +275,11 @@ def _meanings(
         errors.find(f"input of {file}", theirs, dict.fromkeys(ins, ""))
     taken = {*chosen.values(), *constants}
     inputs = _by_name(ins, INPUT_FIELDS, taken, chosen)
-    if strange := [n for n in ins if n not in {*inputs.values(), *constants}]:
+    strange = []
+    for theirs in ins:
+        if theirs not in {*inputs.values(), *constants}:
+            strange.append(theirs)
+    if strange:
         first = strange[0]
         raise ScenarioError(
             f"{file} has inputs that mean nothing that a law measures, {', '.join(strange[:4])}: "
@@ -296,7 +300,11 @@ def _meanings(
             raise ScenarioError(
                 f"{theirs!r} of {file} is not one number: export it without this variable"
             )
-    return inputs, {ours: outputs[ours] for ours in OUTPUTS if ours in outputs}
+    named = {}
+    for ours in OUTPUTS:
+        if ours in outputs:
+            named[ours] = outputs[ours]
+    return inputs, named
 
 
 def _by_name(
@@ -346,8 +354,9 @@ def _period(about: Any) -> float | None:
     inside = about.coSimulation
     if inside.canHandleVariableCommunicationStepSize:
         return None
-    steps = [
-        getattr(inside, "fixedInternalStepSize", None),
-        getattr(about.defaultExperiment, "stepSize", None),
-    ]
-    return next((float(step) for step in steps if step and float(step) > 0.0), None)
+    of_fmu = getattr(inside, "fixedInternalStepSize", None)
+    of_experiment = getattr(about.defaultExperiment, "stepSize", None)
+    for step in (of_fmu, of_experiment):
+        if step and float(step) > 0.0:
+            return float(step)
+    return None

@@ -140,9 +140,9 @@ class Program:
                 f"the constant {plain(name)}, which is not a one-dimensional array of numbers,",
             )
         of = {"i": "int", "f": "real"}[data.dtype.kind]
-        items = [
-            literal(number, self.single, ast.Constant(number)).text for number in data.tolist()
-        ]
+        items = []
+        for number in data.tolist():
+            items.append(literal(number, self.single, ast.Constant(number)).text)
         content = f"[{len(items)}] = {{\n{rows(items)}\n}};"
         if content not in self.constants:
             self.constants[content] = self.unique_name(name)
@@ -193,7 +193,9 @@ class Lines:
         self.counters = set[str]()  # variables of the present loops that are never negative
         self.changed = set[str]()  # names of arrays whose elements it changes
         if self.entry:
-            self.changed |= {name for name, kind in self.parameters.items() if kind.of == "memory"}
+            for name, kind in self.parameters.items():
+                if kind.of == "memory":
+                    self.changed.add(name)
         self.copies = list[tuple[frozenset[str], ast.AST]]()  # which must not change
         self.returned = set[int]()  # positions of arguments whose numbers a result may have
 
@@ -209,8 +211,10 @@ class Lines:
         for variable, kind in self.temporaries.items():
             declared[variable] = declaration(variable, kind)
         read = words(" ".join(line.partition(" = ")[2] or line for line in self.lines))
-        top = [line for line in declared.values() if line]
-        top += [f"(void){variable};" for variable in declared if variable not in read]
+        top = list(filter(None, declared.values()))
+        for variable in declared:
+            if variable not in read:
+                top.append(f"(void){variable};")
         lines = [*wrapped("", self.head(name)), "{"]
         depth = 1
         for line in [*top, *self.lines]:

@@ -260,7 +260,9 @@ class Expressions(Arrays):
         no = self.alone(self.number, node.orelse)
         if yes.kind.fields is None:
             return chosen(test, yes, no)._replace(sources=yes.sources | no.sources)
-        items = [chosen(test, *pair) for pair in zip(yes.elements(), no.elements(), strict=True)]
+        items = []
+        for pair in zip(yes.elements(), no.elements(), strict=True):
+            items.append(chosen(test, *pair))
         return gathered(items)
 
     def _tuple(self, node: ast.Tuple) -> Value:

@@ -86,7 +86,9 @@ class Function(Statements):
             if made.changed & made.parameters.keys():
                 return self.kept(value)
             return value
-        sources = frozenset[str]().union(*(values[i].sources for i in made.returned))
+        sources = frozenset[str]()
+        for i in made.returned:
+            sources |= values[i].sources
         items = self.results_in(made, arguments, sources)
         self.lines.append(f"{name}({', '.join(arguments)});")
         return items[0] if len(items) == 1 else gathered(items, made.fields)
@@ -102,7 +104,8 @@ class Function(Statements):
         if alike:
             array = self.temporary(Kind(kinds[0].of, (len(kinds),), made.fields))
             arguments.append(array.pointer)
-            arguments += [f"{array.pointer} + {i}" for i in range(1, len(kinds))]
+            for i in range(1, len(kinds)):
+                arguments.append(f"{array.pointer} + {i}")
             return [array._replace(sources=sources)]
         items = []
         for kind in kinds:

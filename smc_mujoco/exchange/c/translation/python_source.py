@@ -32,7 +32,10 @@ class PythonSource:
         self.position = {argument: i for i, argument in enumerate(self.arguments)}
         nodes = inside(self.tree.body)
         self.gives = any(isinstance(node, ast.Return) for node in nodes)
-        self.names = {node.id for node in nodes if isinstance(node, ast.Name)} | {*self.arguments}
+        self.names = {*self.arguments}
+        for node in nodes:
+            if isinstance(node, ast.Name):
+                self.names.add(node.id)
         self.assignments: dict[str, list[ast.AST]] = collections.defaultdict(list)
         self.read = set[str]()  # names that it reads: others need no variable
         for node in nodes:
@@ -42,7 +45,10 @@ class PythonSource:
                 self.read |= assigned(node)
             elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
                 self.read.add(node.id)
-        loops = [node for node in nodes if isinstance(node, ast.For | ast.While)]
+        loops = []
+        for node in nodes:
+            if isinstance(node, ast.For | ast.While):
+                loops.append(node)
         self.in_loops = {*inside(loops)}
 
     def check(self, count: int, gives: bool) -> None:
@@ -101,8 +107,11 @@ def inside(nodes: Iterable[ast.AST]) -> list[ast.AST]:
 def assigned(node: ast.AST) -> set[str]:
     """Return the names that an assignment or a loop binds; none of other code."""
     targets = getattr(node, "targets", None) or [getattr(node, "target", ast.Pass())]
-    names = [part for part in inside(targets) if isinstance(part, ast.Name)]
-    return {name.id for name in names if isinstance(name.ctx, ast.Store)}
+    names = set()
+    for part in inside(targets):
+        if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store):
+            names.add(part.id)
+    return names
 
 
 def returns(body: Sequence[ast.stmt]) -> bool:
