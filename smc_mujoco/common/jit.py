@@ -155,6 +155,11 @@ def floats(names: Iterable[str]) -> np.dtype:
     return np.dtype([(name, "f8") for name in names], align=True)
 
 
+def whole_numbers(names: Iterable[str]) -> np.dtype:
+    """Return the dtype of a record of int64."""
+    return np.dtype([(name, "i8") for name in names])
+
+
 def record_at(dtype: Any) -> Callable:
     """Return a compiled function (address, i) -> record i of the NumPy array of this dtype at an
     address.

@@ -33,12 +33,12 @@ def solve(
     model = plant.load()
     data = mujoco.MjData(model)
     data.qpos[:] = initial_pose(model)
-    names = [
-        getattr(model, kind)(i).name for i in range(model.nsite if kind == "site" else model.nbody)
-    ]
-    tip = find(
-        f"{kind} of {plant.name}", name, {known: i for i, known in enumerate(names) if known}
-    )
+    numbers = {}
+    for i in range(model.nsite if kind == "site" else model.nbody):
+        known = getattr(model, kind)(i).name
+        if known:
+            numbers[known] = i
+    tip = find(f"{kind} of {plant.name}", name, numbers)
     if kind == "site":
         places = data.site_xpos
         jacobian = mujoco.mj_jacSite
@@ -48,10 +48,8 @@ def solve(
     ids = joint_ids(model)
     moves = np.zeros((3, model.nv))
     limited = model.jnt_limited[ids].astype(bool)
-    low, high = (
-        np.where(limited, model.jnt_range[ids, side], end)
-        for side, end in enumerate((-np.inf, np.inf))
-    )
+    low = np.where(limited, model.jnt_range[ids, 0], -np.inf)
+    high = np.where(limited, model.jnt_range[ids, 1], np.inf)
     x = np.array(start, float)
     path = []
     away = np.zeros(3)

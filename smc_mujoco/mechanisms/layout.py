@@ -50,9 +50,11 @@ def joints(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
 
 def drive_ids(model: mujoco.MjModel) -> np.ndarray:
     """Return the indices of the actuators that take commands, (driven,)."""
-    return np.array(
-        [i for i in range(model.nactuator) if not model.actuator(i).name.startswith(PASSIVE)], int
-    )
+    ids = []
+    for i in range(model.nactuator):
+        if not model.actuator(i).name.startswith(PASSIVE):
+            ids.append(i)
+    return np.array(ids, int)
 
 
 def free_joint(model: mujoco.MjModel) -> int:

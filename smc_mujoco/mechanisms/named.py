@@ -77,8 +77,14 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
         return from_text(rest, folder, **{"others": others.strip()} | values)
     path = model["path"]
     joints = list(filter(str.strip, BETWEEN_JOINTS.split(model["joints"] or "")))
-    measured = [item[1] for item in map(MEASURED.fullmatch, joints) if item]
-    channels = dict(_channel(joint) for joint in joints if not MEASURED.fullmatch(joint))
+    measured = []
+    channels = {}
+    for joint in joints:
+        if item := MEASURED.fullmatch(joint):
+            measured.append(item[1])
+        else:
+            name, channel = _channel(joint)
+            channels[name] = channel
     if len(channels) + len(measured) < len(joints):
         raise ScenarioError(f"plant {text!r} names a joint twice: give each once")
     if measured:

@@ -185,15 +185,17 @@ class Plant:
         for name in ("parameters", "contacts", "mechanisms", "placed", "added"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
         for name in ("jumps", "sets"):
-            object.__setattr__(
-                self, name, frozen({key: frozen(part) for key, part in getattr(self, name).items()})
-            )
+            parts = {}
+            for key, part in getattr(self, name).items():
+                parts[key] = frozen(part)
+            object.__setattr__(self, name, frozen(parts))
 
     def __repr__(self) -> str:
         values = [repr(self.name)]
         if self.n > 1:
             values.append(f"n={self.n}")
-        values += [f"{name}={value:g}" for name, value in self.parameters.items()]
+        for name, value in self.parameters.items():
+            values.append(f"{name}={value:g}")
         return f"plant({', '.join(values)})"
 
     @property
@@ -325,12 +327,14 @@ class Plant:
         """Return a change of the parameters in words: "m × 1.3, payload + 2 kg". Factors are those
         of `values`.
         """
-        return ", ".join(
-            f"{name} {'−' if factor < 0.0 else '+'} {abs(factor):g} {self.added[name]}".rstrip()
-            if name in self.added
-            else f"{name} × {factor:g}"
-            for name, factor in factors.items()
-        )
+        texts = []
+        for name, factor in factors.items():
+            if name in self.added:
+                sign = "−" if factor < 0.0 else "+"
+                texts.append(f"{name} {sign} {abs(factor):g} {self.added[name]}".rstrip())
+            else:
+                texts.append(f"{name} × {factor:g}")
+        return ", ".join(texts)
 
     def __getattr__(self, name: str) -> Any:
         """Say where a parameter is."""

@@ -140,8 +140,13 @@ def as_text(joint: str, channel: Channel) -> str:
 
 def joints_of(channels: Pairs) -> list[str]:
     """Return the names of the driven joints, then those of their partners."""
-    partners = [channel.partner for _, channel in channels if channel.partner is not None]
-    return [*(joint for joint, _ in channels), *partners]
+    joints = []
+    partners = []
+    for joint, channel in channels:
+        joints.append(joint)
+        if channel.partner is not None:
+            partners.append(channel.partner)
+    return joints + partners
 
 
 def channel(joint: object, value: object) -> Channel:
@@ -170,7 +175,10 @@ def suggested(channels: Pairs) -> dict[str, tuple]:
     """Return field -> what each channel suggests to scenarios, None for nothing; without fields
     that none suggests.
     """
-    bare = [joint for joint, channel in channels if channel.law is None]
+    bare = []
+    for joint, channel in channels:
+        if channel.law is None:
+            bare.append(joint)
     if 0 < len(bare) < len(channels):
         raise ScenarioError(
             f"channel {bare[0]!r} has no law and others have: give each one, or none"
@@ -183,13 +191,18 @@ def suggested(channels: Pairs) -> dict[str, tuple]:
     return fields
 
 
+def _joint_names(model: mujoco.MjModel) -> list[str]:
+    """Return the names of all joints, by id."""
+    return [model.joint(i).name for i in range(model.njnt)]
+
+
 def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
     """Raise ScenarioError for joints that do not exist or cannot be channels, and for flags that
     forbid control.
     """
     joints = joints_of(channels)
-    names = [model.joint(i).name for i in range(model.njnt)]
-    named = [name for name in names if name]
+    names = _joint_names(model)
+    named = list(filter(None, names))
     if joints == [""] and named:
         raise ScenarioError(
             f"{label} names no joint: give some, as {label}:{'+'.join(named[:2])} or "
@@ -234,7 +247,7 @@ def measured_joints(
         raise ScenarioError(
             f"measured is {shown(given)}: give joints' names, such as ['pole', 'base']"
         )
-    names = [model.joint(i).name for i in range(model.njnt)]
+    names = _joint_names(model)
     free = [names[i] for i in np.flatnonzero(model.jnt_type == FREE)]
     taken = joints_of(channels)
     found = []
@@ -248,7 +261,7 @@ def measured_joints(
                 f"measured joint {joint!r} of {label} is a {kind.name[6:].lower()} joint: give one "
                 "that is a hinge, a slide or a free joint"
             )
-        bases = [other for other in found if other in free]
+        bases = set(found).intersection(free)
         if joint in (*taken, *found) or (kind == FREE and bases):
             raise ScenarioError(
                 f"measured joint {joint!r} of {label} is measured already, or a second base: "
@@ -269,14 +282,19 @@ def starts(
 
     x0 is that of the channel, else the goal.
     """
-    chosen = {joint: channel.x0 for joint, channel in channels if channel.x0 is not None}
-    chosen |= {
-        c.partner: c.partner_x0
-        for _, c in channels
-        if c.partner is not None and c.partner_x0 is not None
-    }
+    chosen = {}
+    for joint, channel in channels:
+        if channel.x0 is not None:
+            chosen[joint] = channel.x0
+    for _, channel in channels:
+        if channel.partner is not None and channel.partner_x0 is not None:
+            chosen[channel.partner] = channel.partner_x0
     x0 = dict(zip(joints, goals(model, joints, keyframe)[0], strict=True)) | chosen
-    return x0, [row for row in ranges(model, joints) if keyframe is not None or row[0] in chosen]
+    checked = []
+    for row in ranges(model, joints):
+        if keyframe is not None or row[0] in chosen:
+            checked.append(row)
+    return x0, checked
 
 
 def places(
@@ -329,8 +347,12 @@ def thrusters(model: mujoco.MjModel, joint: str) -> list[int]:
     """Return the actuators that act at a site of what a free joint moves."""
     root = model.body_rootid[model.joint(joint).bodyid[0]]
     at_site = model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE
-    sites = {i: int(model.actuator_trnid[i, 0]) for i in np.flatnonzero(at_site).tolist()}
-    return [i for i, site in sites.items() if model.body_rootid[model.site_bodyid[site]] == root]
+    drives = []
+    for i in np.flatnonzero(at_site).tolist():
+        site = int(model.actuator_trnid[i, 0])
+        if model.body_rootid[model.site_bodyid[site]] == root:
+            drives.append(i)
+    return drives
 
 
 def reach_of(label: str, model: mujoco.MjModel, joint: str) -> Floats:
@@ -365,7 +387,10 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> Floats:
     largest = np.abs(ends).max(axis=1)
     forces = unit_wrenches(model, model.joint(joint).id, drives)
     sizes = np.array([np.linalg.norm(forces[:, :3], axis=1), *np.abs(forces[:, 3:]).T]).T
-    reached = [float(np.sum(largest[column > 0.0] * column[column > 0.0])) for column in sizes.T]
+    reached = []
+    for column in sizes.T:
+        used = column > 0.0
+        reached.append(float(np.sum(largest[used] * column[used])))
     return (reached[0],) * 3 + tuple(reached[1:])
 
 
@@ -451,8 +476,7 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel, go
     part = None
     if model.jnt_actfrclimited[joint_id]:
         bounds.append(tuple(map(float, model.jnt_actfrcrange[joint_id])))
-    actuators = [i for i in range(model.nactuator) if model.actuator_trntype[i] in ONE_JOINT]
-    actuators = [i for i in actuators if model.actuator_trnid[i, 0] == joint_id]
+    actuators = _on_joint(model, joint_id)
     _limit(f"joint {joint!r} of {label} takes", "widen its actuatorfrcrange", *bounds)
     names = ", ".join(model.actuator(i).name or f"number {i}" for i in actuators)
     if channel.motor:
@@ -504,12 +528,24 @@ def bound_of_kept(label: str, model: mujoco.MjModel, joint: str, part: Actuator)
     )
 
 
+def _on_joint(model: mujoco.MjModel, joint_id: int) -> list[int]:
+    """Return the actuators that act on this joint alone."""
+    found = []
+    for i in range(model.nactuator):
+        if model.actuator_trntype[i] in ONE_JOINT and model.actuator_trnid[i, 0] == joint_id:
+            found.append(i)
+    return found
+
+
 def _limit(who: str, cure: str, *ranges: Floats) -> float:
     """Return the largest force that all ranges allow in both directions, N m or N, because |u| has
     one bound.
     """
-    low = max([-math.inf, *(low for low, _ in ranges)])
-    high = min([math.inf, *(high for _, high in ranges)])
+    low = -math.inf
+    high = math.inf
+    for lowest, highest in ranges:
+        low = max(low, lowest)
+        high = min(high, highest)
     if not low < 0.0 < high:
         raise ScenarioError(f"{who} {low:g} to {high:g}, but a law pushes both ways: {cure}")
     return min(-low, high)
@@ -557,7 +593,9 @@ def add_motors(spec: mujoco.MjSpec, motors: Sequence[Motor]) -> None:
     """Add the channels' motors, in this order, and keep the model's other actuators as passive
     parts.
     """
-    replaced = set().union(*(motor.replaced for motor in motors))
+    replaced = set()
+    for motor in motors:
+        replaced.update(motor.replaced)
     for i, actuator in enumerate(list(spec.actuators)):
         if i in replaced:
             spec.delete(actuator)

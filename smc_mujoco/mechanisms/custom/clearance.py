@@ -65,8 +65,9 @@ def deepest(
             continue
         if moved[bodies[0]] != moved[bodies[1]] and -contact.dist > found.depth:
             names = tuple(map(model.body, bodies.tolist()))
-            shown = [model.geom(i).name or body.name for i, body in zip(geoms, names, strict=True)]
-            named = [name or f"geom {i}" for name, i in zip(shown, geoms, strict=True)]
+            named = []
+            for i, body in zip(geoms, names, strict=True):
+                named.append(model.geom(i).name or body.name or f"geom {i}")
             found = Overlap(-contact.dist, tuple(named), tuple(body.name for body in names))
     return found
 

@@ -85,14 +85,21 @@ def with_joint_numbers(plant: Plant, names: Iterable[str]) -> Plant:
     nominal = plant.nominal
     if plant.by_mujoco:
         nominal = dataclasses.replace(nominal, fields=fields)
-    absent = {name: one.unit for name, one in added.items() if not one.value}
-    rubbing = [one.joint for one in added.values() if one.kind == "frictionloss"]
+    absent = {}
+    rubbing = []
+    parameters = dict(plant.parameters)
+    for name, one in added.items():
+        parameters[name] = one.value
+        if not one.value:
+            absent[name] = one.unit
+        if one.kind == "frictionloss":
+            rubbing.append(one.joint)
     # only MuJoCo's constraints are as soft as the file says
     model = loaded(plant)
     soft = any(says_how_soft(model, _place(model, joint, "frictionloss")) for joint in rubbing)
     return dataclasses.replace(
         plant,
-        parameters=dict(plant.parameters) | {name: one.value for name, one in added.items()},
+        parameters=parameters,
         fields=fields,
         nominal=nominal,
         added=dict(plant.added) | absent,

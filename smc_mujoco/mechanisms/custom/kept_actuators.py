@@ -43,10 +43,9 @@ def _no_plain_dcmotor(model: mujoco.MjModel, i: int) -> str:
     """Return what a `<dcmotor>` has besides resistance, torque constant, inductance and cogging;
     "" if nothing.
     """
-    winding, state, torque = (
-        numbers[i]
-        for numbers in (model.actuator_gainprm, model.actuator_dynprm, model.actuator_biasprm)
-    )
+    winding = model.actuator_gainprm[i]
+    state = model.actuator_dynprm[i]
+    torque = model.actuator_biasprm[i]
     # the first number of MuJoCo's state is the time constant of the winding
     if winding[2:].any() or state[1:].any() or torque[2:].any():
         return "is a <dcmotor> with a controller, heat, friction, a slew rate or a cogging phase"

@@ -187,7 +187,7 @@ def found(name: str, sha256: str) -> ModelSource:
     places = [Path(name), *sorted(Path().glob(f"*/{glob.escape(name)}"))]
     if sha256 in _known:
         places.insert(0, _known[sha256])
-    there = [place for place in places if place.is_file()]
+    there = list(filter(Path.is_file, places))
     for place in there:
         if digest(place) == sha256:
             return _of_file(Path(os.path.abspath(place)), sha256)
@@ -208,16 +208,20 @@ def _of_text(text: str, assets: Mapping[str, Any]) -> ModelSource:
         raise ScenarioError(
             f"assets is {shown(assets)}: give names of files with their contents, as bytes or text"
         )
-    assets = {name: v.encode() if isinstance(v, str) else bytes(v) for name, v in assets.items()}
-    given = {PurePosixPath(name).name for name in assets}
-    texts = [text, *(content for name, content in assets.items() if name.lower().endswith(XML))]
+    contents = {}
+    texts = [text]
+    for name, content in assets.items():
+        contents[name] = content.encode() if isinstance(content, str) else bytes(content)
+        if name.lower().endswith(XML):
+            texts.append(contents[name])
+    given = {PurePosixPath(name).name for name in contents}
     for name in _files(itertools.chain.from_iterable(map(_elements, texts))):
         if PurePosixPath(name).name not in given:
             cure = f"give assets={{{name!r}: its bytes}}, or the path of the model's file"
             raise ScenarioError(
                 f"the model names the file {shown(name)}, and a text has no folder: {cure}"
             )
-    pairs = tuple(sorted(assets.items()))
+    pairs = tuple(sorted(contents.items()))
     parts = [text.encode(errors="surrogatepass")]
     for name, content in pairs:
         parts += [name.encode(), content]
@@ -246,7 +250,8 @@ def _of_spec(spec: mujoco.MjSpec) -> ModelSource:
 def digest_of(spec: mujoco.MjSpec) -> str:
     """Hash an MjSpec as it is now, and the files that it names: SHA-256, 64 hex digits."""
     text = _full_precision_xml(spec)
-    return _sha256([text.encode(), *(part for _, part in sorted(_assets(spec, text).items()))])
+    assets = dict(sorted(_assets(spec, text).items()))
+    return _sha256([text.encode(), *assets.values()])
 
 
 def _assets(spec: mujoco.MjSpec, text: str) -> dict[str, bytes]:
@@ -255,9 +260,10 @@ def _assets(spec: mujoco.MjSpec, text: str) -> dict[str, bytes]:
     inner = {"", *_folders(elements)}
     assets = dict(spec.assets)
     for name in _files(elements):
-        places = [Path(spec.modelfiledir) / sub / name for sub in sorted(inner)]
-        if name not in assets and (there := [place for place in places if place.is_file()]):
-            assets[name] = there[0].read_bytes()
+        for folder in sorted(inner):
+            place = Path(spec.modelfiledir) / folder / name
+            if name not in assets and place.is_file():
+                assets[name] = place.read_bytes()
     return assets
 
 
@@ -292,8 +298,11 @@ def _difference(model: mujoco.MjModel, again: mujoco.MjModel) -> str:
 
 def fields(model: mujoco.MjModel) -> list[str]:
     """Return the names of the model's arrays of numbers."""
-    names = [name for name in dir(model) if name[0] != "_"]
-    return [name for name in names if isinstance(getattr(model, name), np.ndarray)]
+    names = []
+    for name in dir(model):
+        if name[0] != "_" and isinstance(getattr(model, name), np.ndarray):
+            names.append(name)
+    return names
 
 
 def broken(where: str, error: str, path: str) -> ScenarioError:
@@ -324,7 +333,7 @@ def pick(label: str, kind: str, name: object, names: Sequence[str]) -> int:
 
 def digest(path: Path) -> str:
     """Hash the file and every file that it names: SHA-256, 64 hex digits."""
-    return _sha256(file.read_bytes() for file in _named_files(path))
+    return _sha256(map(Path.read_bytes, _named_files(path)))
 
 
 def _named_files(path: Path) -> list[Path]:
@@ -366,8 +375,11 @@ def _unchanged(source: ModelSource) -> bool:
     """Return whether a file and those that it names are as when they were hashed."""
     with contextlib.suppress(OSError):
         known = _stamps.get(source.sha256, {})
-        now = {file: Path(file).stat() for file in known}
-        if known and all(known[f] == (at.st_mtime_ns, at.st_size) for f, at in now.items()):
+        same = bool(known)
+        for file, stamp in known.items():
+            now = Path(file).stat()
+            same = same and stamp == (now.st_mtime_ns, now.st_size)
+        if same:
             return True
     path = Path(source.path)
     if digest(path) != source.sha256:
@@ -378,7 +390,10 @@ def _unchanged(source: ModelSource) -> bool:
 
 def _sha256(parts: Iterable[bytes]) -> str:
     """Hash the hashes of the parts."""
-    return hashlib.sha256(b"".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
+    whole = hashlib.sha256()
+    for part in parts:
+        whole.update(hashlib.sha256(part).digest())
+    return whole.hexdigest()
 
 
 def _elements(model: Path | str | bytes) -> list[ET.Element]:
@@ -393,7 +408,9 @@ def _files(elements: Iterable[ET.Element]) -> list[str]:
     """Return the names of files in the attributes of elements."""
     names = []
     for element in elements:
-        names += [value for key, value in element.attrib.items() if key.startswith("file")]
+        for key, value in element.attrib.items():
+            if key.startswith("file"):
+                names.append(value)
     return names
 
 
@@ -411,10 +428,8 @@ def check_model(label: str, model: mujoco.MjModel) -> None:
     package uses itself.
     """
     arrays = [(name, getattr(model, name)) for name in fields(model)]
-    arrays += [
-        (f"opt.{name}", np.atleast_1d(getattr(model.opt, name)))
-        for name in ("gravity", "wind", "density")
-    ]
+    for name in ("gravity", "wind", "density"):
+        arrays.append((f"opt.{name}", np.atleast_1d(getattr(model.opt, name))))
     for field, values in arrays:
         if values.dtype.kind != "f" or any(part in field for part in UNUSED):
             continue
@@ -426,7 +441,8 @@ def check_model(label: str, model: mujoco.MjModel) -> None:
             raise ScenarioError(
                 f"{field}[{np.argwhere(wrong)[0][0]}] of {label} is {values[wrong][0]:g}: {cure}"
             )
-    for name in [text.decode() for text in model.names.split(b"\0")]:
+    for text in model.names.split(b"\0"):
+        name = text.decode()
         for kind in RESERVED_KINDS if name.startswith(RESERVED) else ():
             if mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind}"), name) >= 0:
                 own = f"names that begin with {', '.join(RESERVED)} are smc_mujoco's own"

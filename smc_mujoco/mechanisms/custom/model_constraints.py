@@ -59,8 +59,10 @@ def smooth(model: mujoco.MjModel, rubs: bool = False) -> bool:
 
 def harden(spec: mujoco.MjSpec) -> None:
     """Make dry friction hold, where the file does not say how softly: MuJoCo's default creeps."""
-    dry = [part for part in (*spec.joints, *spec.tendons) if part.frictionloss > 0.0]
-    hard = [part for part in dry if np.array_equal(part.solref_friction, SOFT_SOLREF)]
+    hard = []
+    for part in (*spec.joints, *spec.tendons):
+        if part.frictionloss > 0.0 and np.array_equal(part.solref_friction, SOFT_SOLREF):
+            hard.append(part)
     for part in hard:
         part.solref_friction = HARD_SOLREF
         part.solimp_friction = HARD_SOLIMP

@@ -32,7 +32,7 @@ import dataclasses
 import functools
 import math
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import mujoco
@@ -43,7 +43,7 @@ from numba import carray, types
 from smc_mujoco.common import fingerprint, libmujoco
 from smc_mujoco.common.aliases import Array, Numbers, Pair
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.jit import CompiledFunction, Key, floats, pointer, record_at
+from smc_mujoco.common.jit import CompiledFunction, Key, floats, pointer, record_at, whole_numbers
 from smc_mujoco.common.mjcb import silence
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.mechanisms import rotation
@@ -105,7 +105,7 @@ DYNAMICS = floats(
 )
 # Indices of a channel in qpos, qvel and ctrl; the last is -1 without an actuator. Driven channels
 # come first.
-PLACE = np.dtype([(name, "i8") for name in ("qpos", "qvel", "ctrl")])
+PLACE = whole_numbers(("qpos", "qvel", "ctrl"))
 nominal_at, dynamics_at, seen_at, place_at = map(record_at, (NOMINAL, DYNAMICS, SEEN, PLACE))
 _SLEEP = mujoco.mjtEnableBit.mjENBL_SLEEP.value
 _lock = threading.Lock()  # held while Python computes with the mjData of a model
@@ -166,7 +166,7 @@ class NominalModel:
         seen = np.full((2, len(places)), np.nan)
         solved = np.zeros((2, model.nv))
         arrays = data.qpos, data.qvel, data.ctrl, data.qacc_smooth, places, *seen, *solved
-        addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
+        addresses = _addresses(model, data, arrays)
         sizes = len(places), len(driven(places)), model.nv
         return Native(
             native().address, tuple(map(float, (*sizes, *addresses))), (model, borrowed, *arrays)
@@ -231,7 +231,7 @@ class NominalModel:
         moves = np.zeros(3 * model.nv)
         forces = data.qfrc_bias, data.qfrc_passive, data.qfrc_actuator
         arrays = data.qpos, data.qvel, *forces, places, dense, v, moves
-        addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
+        addresses = _addresses(model, data, arrays)
         site = model.site(tip).id if tip else -1
         values = (len(places), model.nv, *addresses, site, passive_alone(model), at_rest)
         free = free_joint(model)
@@ -239,6 +239,13 @@ class NominalModel:
         return Native(
             native_dynamics().address, tuple(map(float, values)), (model, borrowed, *arrays)
         )
+
+
+def _addresses(
+    model: mujoco.MjModel, data: mujoco.MjData, arrays: Iterable[Array]
+) -> tuple[int, ...]:
+    """Return where the model, its data and these arrays are in memory."""
+    return (model._address, data._address, *(array.ctypes.data for array in arrays))
 
 
 @dataclasses.dataclass(eq=False)

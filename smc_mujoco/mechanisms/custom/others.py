@@ -48,8 +48,10 @@ def limp(spec: mujoco.MjSpec, seen: Iterable[str]) -> list[str]:
     driven = dict.fromkeys(target_of(actuator) for actuator in spec.actuators)
     if not spec.actuators:
         follow = {equality.name1 for equality in spec.equalities}
-        bounded = [joint.name for joint in spec.joints if np.any(joint.actfrcrange)]
-        driven = dict.fromkeys(joint for joint in bounded if joint not in follow)
+        driven = {}
+        for joint in spec.joints:
+            if np.any(joint.actfrcrange) and joint.name not in follow:
+                driven[joint.name] = None
     return [joint for joint in driven if joint not in mine | served]
 
 
@@ -232,14 +234,22 @@ def _exclude(spec: mujoco.MjSpec, model: mujoco.MjModel, bodies: list[mujoco.Mjs
                 spec.add_exclude(bodyname1=pair[0], bodyname2=pair[1])
 
 
+def _lost_a_joint(tendon: mujoco.MjsTendon) -> bool:
+    """Say whether a tendon goes along a joint that was deleted."""
+    for wrap in tendon.path:
+        along_joint = wrap.type == mujoco.mjtWrap.mjWRAP_JOINT
+        if along_joint and wrap.target is None:
+            return True
+    return False
+
+
 def _delete_orphans(spec: mujoco.MjSpec) -> None:
     """Delete all keyframes, and what names a joint or a tendon that is gone."""
     left = {"", *(joint.name for joint in spec.joints)}
     orphans = [*spec.keys]
     gone = set()
     for tendon in spec.tendons:
-        wraps = [wrap for wrap in tendon.path if wrap.type == mujoco.mjtWrap.mjWRAP_JOINT]
-        if any(wrap.target is None for wrap in wraps):
+        if _lost_a_joint(tendon):
             orphans.append(tendon)
             gone.add(tendon.name)
     for actuator in spec.actuators:

@@ -176,8 +176,11 @@ def _overlaps(label: str, made: Plant, of_urdf: bool) -> list[str]:
     """Return a sentence on a start inside something from which the robot rises. Raise ScenarioError
     for a start or a goal inside something from which it does not.
     """
-    found = {what: overlap(made, x) for what, x in (("start", made.x0), ("goal", made.origin))}
-    deep = {what: inside for what, inside in found.items() if inside.depth > DEPTH}
+    deep = {}
+    for what, x in (("start", made.x0), ("goal", made.origin)):
+        found = overlap(made, x)
+        if found.depth > DEPTH:
+            deep[what] = found
     if not deep:
         return []
     if all(rises(made, x) for x in dict.fromkeys((made.x0, made.origin))):
@@ -368,8 +371,10 @@ def missing(model: mujoco.MjModel, joints: list[str], motors: Sequence[Motor]) -
         return f"equality constraints hold its joints together: {WITHOUT_MODEL}"
     if model.nplugin or model.nflex:
         return f"it has plugins or flexible bodies: {WITHOUT_MODEL}"
-    names = [model.joint(joint).name for joint in model.dof_jntid]
-    channel_dofs = [dof for dof, name in enumerate(names) if name in joints]
+    channel_dofs = []
+    for dof, joint in enumerate(model.dof_jntid):
+        if model.joint(joint).name in joints:
+            channel_dofs.append(dof)
     if any(is_free(model, joint) for joint in joints[1:]):
         return f"nothing is known of what its base stands on: {WITHOUT_MODEL}"
     idle = np.ones(model.nactuator, bool)

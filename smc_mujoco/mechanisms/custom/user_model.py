@@ -88,8 +88,12 @@ class UserModel:
             path = os.path.relpath(self.source.path)
         else:
             path = "FILE.xml"
-        joints = [own.as_text(joint, channel) for joint, channel in self.channels]
-        text = "+".join(joints + [f"{joint}(measured)" for joint in self.measured])
+        parts = []
+        for joint, channel in self.channels:
+            parts.append(own.as_text(joint, channel))
+        for joint in self.measured:
+            parts.append(f"{joint}(measured)")
+        text = "+".join(parts)
         if self.keyframe is not None:
             text += f"@{self.keyframe}"
         if self.others:

@@ -90,12 +90,9 @@ def buffers(spec: mujoco.MjSpec, side: str, sign: int) -> None:
 
 def bed(spec: mujoco.MjSpec, length: float) -> None:
     """Replace the rails by a rough bed from -length to length, m, on which the block lies."""
-    for geom in [
-        g
-        for g in spec.geoms
-        if g.name.startswith("bearing") or g.name in ("front_rail", "back_rail", "bed")
-    ]:
-        spec.delete(geom)
+    for geom in list(spec.geoms):
+        if geom.name.startswith("bearing") or geom.name in ("front_rail", "back_rail", "bed"):
+            spec.delete(geom)
     machine = spec.body("machine")
     cart = spec.body("cart")
     box(machine, "bed", (-length, -0.150, 0.225), (length, 0.150, BOTTOM_Z - 0.012), "graphite")

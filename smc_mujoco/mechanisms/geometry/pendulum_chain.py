@@ -145,7 +145,7 @@ def draw_spring(spec, i, start, end, radius, turns):
 
 def fields(model, p):
     """Yield the fields that p sets if torsion springs join the pendulums."""
-    springs = [model.tendon(f"coupling{i}").id for i in range(size(model) - 1)]
+    springs = _couplings(model)
     yield from pendulum_fields(model, p)
     yield Field("tendon_stiffness", springs, p.kc)
 
@@ -162,6 +162,11 @@ def pendulum_fields(model, p):
     for i in range(n):
         yield from geom_fields(model, f"p{i}/rod", (0.0, 0.0, side * p.l / 2), (1, p.l / 2))
         yield from geom_fields(model, f"p{i}/bob", (0.0, 0.0, side * p.l))
+
+
+def _couplings(model):
+    """Return the ids of the springs between neighbours."""
+    return [model.tendon(f"coupling{i}").id for i in range(size(model) - 1)]
 
 
 def size(model):
@@ -183,8 +188,9 @@ def bobs(spec):
     width = (n - 1) * ROW_PITCH
     for i in range(n):
         spec.body(f"p{i}/pendulum").frame.pos = (i * ROW_PITCH - width / 2, 0.0, HEIGHT)
-    for geom in [g for g in spec.body("machine").geoms if not g.name.startswith("p")]:
-        spec.delete(geom)
+    for geom in list(spec.body("machine").geoms):
+        if not geom.name.startswith("p"):
+            spec.delete(geom)
     stand_row(spec, n, width)
     hooked = bool(spec.sites)
     for skin in list(spec.skins):
@@ -218,7 +224,7 @@ def springs(spec):
 
 def spring_fields(model, p):
     """Yield the fields that p sets if real springs join the pendulums."""
-    couplings = [model.tendon(f"coupling{i}").id for i in range(size(model) - 1)]
+    couplings = _couplings(model)
     pitch = model.body("p1/pendulum").pos[0] - model.body("p0/pendulum").pos[0]
     yield from pendulum_fields(model, p)
     yield Field("tendon_stiffness", couplings, p.kc / HOOK_ARM**2)
@@ -227,7 +233,10 @@ def spring_fields(model, p):
 
 def draw_between_rods(spec, i, up):
     """Draw the spring between rods i and i + 1, `up` metres above their pivots."""
-    start, end = ((x, y, z + up) for x, y, z in (pivot(spec, i), pivot(spec, i + 1)))
+    x, y, z = pivot(spec, i)
+    start = (x, y, z + up)
+    x, y, z = pivot(spec, i + 1)
+    end = (x, y, z + up)
     draw_spring(spec, i, start, end, radius=0.020, turns=9)
 
 

@@ -119,8 +119,9 @@ class Contact(Obstacle):
         """Check that the plant offers this contact."""
         if self.kind != "none" and self.kind not in plant.contacts:
             raise unknown(f"contact of {plant.name}", self.kind, ["none", *plant.contacts])
-        given = [name for name in ("friction", "restitution") if getattr(self, name) is not None]
-        for name in given:
+        for name in ("friction", "restitution"):
+            if getattr(self, name) is None:
+                continue
             if self.kind == "none" or name not in _takes(
                 plant.build, plant.sizes[0], plant.contacts[self.kind]
             ):
@@ -168,7 +169,11 @@ def _takes(
     spec = build(n)
     edit(spec)
     sorts = {pair.name.partition(":")[0] + ":" for pair in spec.pairs}
-    return {name for name, sort in (("friction", RUB), ("restitution", HIT)) if sort in sorts}
+    taken = set()
+    for name, sort in (("friction", RUB), ("restitution", HIT)):
+        if sort in sorts:
+            taken.add(name)
+    return taken
 
 
 def damping_ratio(restitution: float) -> float:

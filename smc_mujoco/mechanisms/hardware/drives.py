@@ -449,15 +449,18 @@ def drive_step(actuator: tuple[Actuator, ...], step: float, rk4: bool) -> DriveS
     """Return the effect of a physics step of `step` s, of RK4 or another integrator; None if MuJoCo
     needs only u.
     """
-    drives = [part for part in actuator if part.drives]
     lags = []
-    for part in drives:
+    rate = None
+    motor = None
+    for part in actuator:
+        if not part.drives:
+            continue
         if isinstance(part, Lag) and part.tau:
             lags.append(min(step / part.tau, MAX_TIME_CONSTANTS))
-    rate = next((part.rate for part in drives if isinstance(part, RateLimit)), None)
-    motor = next(
-        (part for part in drives if isinstance(part, DCMotor) and (part.delay or part.ripple)), None
-    )
+        if rate is None and isinstance(part, RateLimit):
+            rate = part.rate
+        if motor is None and isinstance(part, DCMotor) and (part.delay or part.ripple):
+            motor = part
     if not lags and motor is None and rate is None:
         return None
     a = lags[0] if lags else math.inf

@@ -38,7 +38,7 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from smc_mujoco.common.jit import call, floats, record_at
+from smc_mujoco.common.jit import call, floats, record_at, whole_numbers
 
 # Indices of a channel in arrays of mjData, -1 if there is none:
 #   qpos, qvel, ctrl: in the arrays of these names
@@ -55,30 +55,27 @@ from smc_mujoco.common.jit import call, floats, record_at
 #   qfrc: in qfrc_applied, of users' models, whose disturbances act on joints
 #   turn: 0 to 2, which number of the rotation vector; qpos and x_sensor are then of the quaternion
 #   gathered: in qfrc_actuator, of a free body, on which each actuator may act along every channel
-CHANNEL = np.dtype(
-    [
-        (name, "i8")
-        for name in (
-            "qpos",
-            "qvel",
-            "x_sensor",
-            "v_sensor",
-            "ctrl",
-            "force",
-            "shaft",
-            "xfrc",
-            "sign",
-            "horizontal",
-            "axis",
-            "hinge_body",
-            "anchor",
-            "friction_force",
-            "qfrc",
-            "shaft_qpos",
-            "turn",
-            "gathered",
-        )
-    ]
+CHANNEL = whole_numbers(
+    (
+        "qpos",
+        "qvel",
+        "x_sensor",
+        "v_sensor",
+        "ctrl",
+        "force",
+        "shaft",
+        "xfrc",
+        "sign",
+        "horizontal",
+        "axis",
+        "hinge_body",
+        "anchor",
+        "friction_force",
+        "qfrc",
+        "shaft_qpos",
+        "turn",
+        "gathered",
+    )
 )
 
 # The state of a channel between calls:
@@ -145,7 +142,7 @@ Reach = namedtuple(
     "Reach",
     "qpos qvel ctrl xfrc_applied qfrc_applied actuator_force actuator_user body_user",
 )
-REACH = np.dtype([(name, "i8") for name in Reach._fields])  # their addresses
+REACH = whole_numbers(Reach._fields)  # their addresses
 
 channel_at, state_at, drive_at, reader_at, function_at, part_at = map(
     record_at, (CHANNEL, CHANNEL_STATE, DRIVE, READER, FUNCTION, PART)

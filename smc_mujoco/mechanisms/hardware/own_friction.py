@@ -204,7 +204,9 @@ def _step(function: Callable[[float], float], ahead: float) -> bool:
 
 def _check_signs(name: str, function: Callable[[float], Any]) -> None:
     """Raise ScenarioError for what cannot be a friction that holds, by its values beside rest."""
-    ahead, back, rest = (function(v) for v in (STICKING_SPEED, -STICKING_SPEED, 0.0))
+    ahead = function(STICKING_SPEED)
+    back = function(-STICKING_SPEED)
+    rest = function(0.0)
     if isinstance(ahead, tuple):
         if ahead[1] > ahead[2]:
             raise ScenarioError(

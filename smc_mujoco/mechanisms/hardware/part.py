@@ -213,11 +213,12 @@ class Friction(OnJoints):
                 f"{type(self).__name__} cannot be scaled: "
                 "name its fields that are forces in `forces`"
             )
-        values = {name: getattr(self, name) for name in self.forces}
-        given = {name: np.asarray(value) for name, value in values.items() if value is not None}
-        return dataclasses.replace(
-            self, **{name: (factor * value).tolist() for name, value in given.items()}
-        )
+        scaled = {}
+        for name in self.forces:
+            value = getattr(self, name)
+            if value is not None:
+                scaled[name] = (factor * np.asarray(value)).tolist()
+        return dataclasses.replace(self, **scaled)
 
     def check(self, plant: Plant) -> None:
         """Raise ScenarioError if it does not suit the plant."""
@@ -278,9 +279,11 @@ class Actuator(OnJoints):
         """Return the actuators that it changes."""
         if not self.on:
             return drive_actuators(spec)
-        return [
-            drive for drive in drive_actuators(spec) if drive.target.removeprefix(ROTOR) in self.on
-        ]
+        drives = []
+        for drive in drive_actuators(spec):
+            if drive.target.removeprefix(ROTOR) in self.on:
+                drives.append(drive)
+        return drives
 
     def drive_ids(self, model: mujoco.MjModel) -> np.ndarray:
         """Return their indices in the compiled model."""

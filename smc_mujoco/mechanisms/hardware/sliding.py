@@ -152,7 +152,11 @@ class Sliding(JointForce):
                     "the jump takes all dry friction of a joint away beside "
                     f"{type(self).__name__}: give a factor such as 1e-9"
                 )
-        return {i: found.index(dof) for i, dof in enumerate(run.dofs) if dof in found}
+        rows = {}
+        for i, dof in enumerate(run.dofs):
+            if dof in found:
+                rows[i] = found.index(dof)
+        return rows
 
 
 def _dry_joints(model: mujoco.MjModel) -> list[int]:
