@@ -92,9 +92,8 @@ def middle(values: Array) -> Array:
     """Return the median over the last axis, without NaN; NaN if all values are NaN."""
     ordered = np.sort(values, axis=-1)
     n = (~np.isnan(values)).sum(axis=-1, keepdims=True)
-    low, high = (
-        np.take_along_axis(ordered, np.maximum(at, 0), axis=-1) for at in ((n - 1) // 2, n // 2)
-    )
+    low = np.take_along_axis(ordered, np.maximum((n - 1) // 2, 0), axis=-1)
+    high = np.take_along_axis(ordered, np.maximum(n // 2, 0), axis=-1)
     return ((low + high) / 2)[..., 0]
 
 
@@ -110,7 +109,9 @@ def share_interval(share: float, n: int) -> Interval:
     z = NormalDist().inv_cdf((1 + LEVEL) / 2)
     centre = share + z * z / (2 * n)
     half = z * math.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2)
-    low, high = ((centre + side * half) / (1 + z * z / n) for side in (-1, 1))
+    scale = 1 + z * z / n
+    low = (centre - half) / scale
+    high = (centre + half) / scale
     # rounding aside, it has it
     return Interval(share, max(min(low, share), 0.0), min(max(high, share), 1.0), n)
 

@@ -17,7 +17,7 @@ import cmath
 import functools
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -161,7 +161,11 @@ def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chatte
             return _locked_ranges(loop, assumptions)
         return Chattering(assumptions=assumptions)
     fastest = max(omega for _, omega in stable)
-    one = min(one for one in stable if one[1] > fastest / (1.0 + SAME_CYCLE_TOLERANCE))
+    close = []
+    for cycle in stable:
+        if cycle[1] > fastest / (1.0 + SAME_CYCLE_TOLERANCE):
+            close.append(cycle)
+    one = min(close)
     if len(stable) > MAX_OTHER_CYCLES + 1:
         assumptions += ("N L is about 1 at many frequencies: do not trust the prediction",)
     elif len(stable) > 1:
@@ -173,12 +177,16 @@ def _threshold(loop: Loop, one: Balance, unstable: Sequence[Balance]) -> float:
     """Return the amplitude of x of the largest unstable cycle within a stable one in the same turn
     of L, or 0.
     """
-    smaller = [other for other in unstable if other[0] < one[0]]
+    smaller = []
+    for other in unstable:
+        if other[0] < one[0]:
+            smaller.append(other)
     *turns, turn = _turns(loop, [*smaller, one])
-    return max(
-        (a for (a, _), other in zip(smaller, turns, strict=True) if round(other - turn) == 0),
-        default=0.0,
-    )
+    threshold = 0.0
+    for (amplitude, _), other in zip(smaller, turns, strict=True):
+        if round(other - turn) == 0:
+            threshold = max(threshold, amplitude)
+    return threshold
 
 
 def switches(loop: Loop) -> bool:
@@ -186,9 +194,8 @@ def switches(loop: Loop) -> bool:
     amplitudes.
     """
     omega = 0.1 * math.pi / loop.scenario.control_period
-    smaller, small = (
-        abs(loop.gain(size * MIN_AMPLITUDE, omega, COARSE_SAMPLES)) for size in (1.0, 1e3)
-    )
+    smaller = abs(loop.gain(MIN_AMPLITUDE, omega, COARSE_SAMPLES))
+    small = abs(loop.gain(1e3 * MIN_AMPLITUDE, omega, COARSE_SAMPLES))
     return smaller > MIN_GAIN_GROWTH * small
 
 
@@ -218,13 +225,21 @@ def cycles(loop: Loop) -> tuple[list[Balance], list[Balance]]:
     """
     balances: list[Balance] = []
     for cells in _starts(loop):
-        one = next((balance for cell in cells if (balance := _balanced(loop, *cell))), None)
+        one = _first_balance(loop, cells)
         if one and all(
             np.abs(np.log(one) - np.log(other)).max() > SAME_CYCLE_TOLERANCE for other in balances
         ):
             balances.append(one)
     stable = _stable(loop, balances) or _of_two_samples(loop)
     return stable, [one for one in balances if one not in stable]
+
+
+def _first_balance(loop: Loop, cells: Iterable[tuple]) -> Balance | None:
+    """Return the balance of the first cell that has one."""
+    for cell in cells:
+        if balance := _balanced(loop, *cell):
+            return balance
+    return None
 
 
 def _starts(loop: Loop) -> Iterator[list[Cell]]:
@@ -345,9 +360,10 @@ def _nearest_cycle(loop: Loop, wave: Wave, shift: float) -> Wave | None:
     later = loop.later(-shift / wave.omega)
     stable, _ = cycles(later)
     sign = math.copysign(1.0, shift)
-    beside = [
-        cycle for cycle in stable if sign * math.log(cycle[1] / wave.omega) >= -SAME_CYCLE_TOLERANCE
-    ]
+    beside = []
+    for cycle in stable:
+        if sign * math.log(cycle[1] / wave.omega) >= -SAME_CYCLE_TOLERANCE:
+            beside.append(cycle)
     if not beside and shift > 0.0:
         beside = _of_two_samples(later)
     nearest = min(beside, key=lambda one: abs(one[1] - wave.omega), default=None)
@@ -384,7 +400,11 @@ def _stable(loop: Loop, balances: Sequence[Balance]) -> list[Balance]:
     A delay gives a row of such cycles, with a turn of phase between them, of which only the slowest
     is stable.
     """
-    decaying = sorted((one for one in balances if _decays(loop, *one)), key=lambda one: one[1])
+    decaying = []
+    for one in balances:
+        if _decays(loop, *one):
+            decaying.append(one)
+    decaying.sort(key=lambda one: one[1])
     turns = _turns(loop, decaying)
     stable = []
     for k, cycle in enumerate(decaying):
@@ -397,8 +417,10 @@ def _decays(loop: Loop, amplitude: float, omega: float) -> bool:
     def product(a: float, w: float) -> complex:
         return cmath.log(loop.gain(a, w) * loop.response(w) or SMALLEST)
 
-    up, down = (product(amplitude * (1 + d), omega) for d in (STABILITY_STEP, -STABILITY_STEP))
-    fast, slow = (product(amplitude, omega * (1 + d)) for d in (STABILITY_STEP, -STABILITY_STEP))
+    up = product(amplitude * (1 + STABILITY_STEP), omega)
+    down = product(amplitude * (1 - STABILITY_STEP), omega)
+    fast = product(amplitude, omega * (1 + STABILITY_STEP))
+    slow = product(amplitude, omega * (1 - STABILITY_STEP))
     return ((up - down) * (fast - slow).conjugate()).imag < 0.0
 
 
@@ -410,7 +432,10 @@ def _turns(loop: Loop, balances: Sequence[Balance]) -> Array:
     between = np.exp(
         np.arange(math.log(0.9 * min(omegas)), math.log(1.1 * max(omegas)), PHASE_STEP)
     )
-    phases = [np.angle(loop.response(omega * (1.0 - RESONANCE_DAMPING * 1j))) for omega in between]
+    phases = []
+    for omega in between:
+        response = loop.response(omega * (1.0 - RESONANCE_DAMPING * 1j))
+        phases.append(np.angle(response))
     return np.interp(omegas, between, np.unwrap(phases)) / math.tau
 
 
@@ -452,7 +477,9 @@ def _prediction(
     sizes = [math.nan]
     omegas = [math.nan]
     if ranges:
-        later, earlier = (_nearest_cycle(loop, sine, phase) for phase in loop.phases(*balance))
+        after, before = loop.phases(*balance)
+        later = _nearest_cycle(loop, sine, after)
+        earlier = _nearest_cycle(loop, sine, before)
         sizes = []
         omegas = []
         for locked in (sine, later, earlier):

@@ -23,7 +23,7 @@ def relative_range(values: Sequence[float], least: float = 0.0, first_order: boo
     """
     if first_order and len(values) > 1 and all(map(math.isfinite, values[:2])):
         values = [*values, 2.0 * values[1] - values[0]]
-    missing = [math.isnan(value) for value in values]
+    missing = list(map(math.isnan, values))
     if any(missing):
         return 0.0 if all(missing) else math.inf
     beyond = []

@@ -50,13 +50,13 @@ NEGLIGIBLE_SHARE = 1e-9  # of the first harmonic, below which another one is lef
 HARMONIC_PASSES = 2
 SAMPLE_POSITIONS = 16  # tried places of the first sample in its control period
 FIELDS = {name: i for i, name in enumerate(Measurement._fields)}
-T, DT, X, V, E, DE, F, G, A = (
-    FIELDS[name] for name in ("t", "dt", "x", "v", "e", "de", "f", "g", "a")
+T, DT, X, V, E, DE, F, G, A = map(
+    Measurement._fields.index, ("t", "dt", "x", "v", "e", "de", "f", "g", "a")
 )
-LIMIT, MODEL, HAS_SURFACE, S, V_EQ = (
-    FIELDS[name] for name in ("limit", "model", "has_surface", "s", "v_eq")
+LIMIT, MODEL, HAS_SURFACE, S, V_EQ = map(
+    Measurement._fields.index, ("limit", "model", "has_surface", "s", "v_eq")
 )
-Q, DQ, FQ, GQ = (FIELDS[name] for name in ("q", "dq", "fq", "gq"))
+Q, DQ, FQ, GQ = map(Measurement._fields.index, ("q", "dq", "fq", "gq"))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -121,7 +121,7 @@ class Loop:
             self.joints = [channel]
         self.controller = CompiledController(s.velocity, s.surface, s.law.of_channel(channel))
         self._linearise_mechanism()
-        self.nominal_models = [self._nominal_model(joint) for joint in self.joints]
+        self.nominal_models = list(map(self._nominal_model, self.joints))
         # all amplitudes of a frequency share an answer and a clock, and the loops of `later` share
         # them and the gains
         self._answer = functools.lru_cache(maxsize=1024)(self._solve)
@@ -139,12 +139,13 @@ class Loop:
         gaps.
         """
         s = self.scenario.resolved
-        motors: list[Actuator] = [
-            dataclasses.replace(part, inductance=0.0)
-            for part in s.actuator
-            if isinstance(part, DCMotor)
-        ]
-        motors += [part for part in s.actuator if isinstance(part, ElasticJoint | PositionServo)]
+        motors: list[Actuator] = []
+        for part in s.actuator:
+            if isinstance(part, DCMotor):
+                motors.append(dataclasses.replace(part, inductance=0.0))
+        for part in s.actuator:
+            if isinstance(part, ElasticJoint | PositionServo):
+                motors.append(part)
         gears = [part for part in s.actuator if isinstance(part, Backlash)]
         friction = s.friction
         if gears:  # the rotor is rigid on the joint here
@@ -193,7 +194,8 @@ class Loop:
         step = np.eye(plant.n)[joint] * DIFFERENCE_STEP
         p = copy.copy(plant.values({}))
         f, g = plant.nominal(zeros, zeros, joint, p)
-        fx, fv = (plant.nominal(x, v, joint, p)[0] for x, v in ((step, zeros), (zeros, step)))
+        fx = plant.nominal(step, zeros, joint, p)[0]
+        fv = plant.nominal(zeros, step, joint, p)[0]
         return f, g, (fx - f) / DIFFERENCE_STEP, (fv - f) / DIFFERENCE_STEP
 
     def response(self, omega: complex) -> complex:
@@ -406,16 +408,21 @@ class CompiledController:
 
     def __init__(self, *parts: Component | None):
         try:
-            functions = [
-                None if one is None else cfunctions.compile_component(one) for one in parts
-            ]
+            functions = []
+            for one in parts:
+                functions.append(None if one is None else cfunctions.compile_component(one))
         except NotCompilable as error:
             raise ScenarioError(
                 f"chattering is not predicted for a law that does not compile: {error}"
             ) from None
         self.functions, self.parts = functions, parts  # the functions keep their addresses alive
-        self.addresses = np.array([0 if one is None else one.address for one in functions])
-        self.gains = [np.array([*(one.gains.values() if one else ()), 0.0]) for one in parts]
+        addresses = []
+        self.gains = []
+        for one, function in zip(parts, functions, strict=True):
+            addresses.append(0 if function is None else function.address)
+            gains = () if one is None else one.gains.values()
+            self.gains.append(np.array([*gains, 0.0]))
+        self.addresses = np.array(addresses)
 
     def __call__(
         self,
@@ -463,8 +470,9 @@ def transition(
     from scipy.linalg import expm
 
     block = rates(model, data)
-    for drive in reversed([part for part in actuator if part.delay]):
-        block = _behind(drive, block, model)
+    for drive in reversed(actuator):
+        if drive.delay:
+            block = _behind(drive, block, model)
     n = len(block) - model.nu
     stepped = expm(block * float(model.opt.timestep))
     return stepped[:n, :n], stepped[:n, n:]

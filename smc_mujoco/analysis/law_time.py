@@ -60,7 +60,9 @@ def law_time(scenario: Scenario) -> LawTime | None:
     rounds = []
     for _ in range(ROUNDS):
         rounds.append((_round(timed, seen), _round(reference, seen)))
-    own, other = (np.min(each, axis=0) for each in zip(*rounds, strict=True))
+    of_timed, of_reference = zip(*rounds, strict=True)
+    own = np.min(of_timed, axis=0)
+    other = np.min(of_reference, axis=0)
     median, high = np.quantile(own, (0.5, 0.99)).tolist()
     return LawTime(median, high, median / float(np.median(other)))
 

@@ -224,17 +224,21 @@ def restoring_force(
     linear(plant)  # raises for a plant without linear theory
     p = SimpleNamespace(**plant.parameters)
     v = np.zeros(plant.n)
-    ratios = [plant.nominal(np.full(plant.n, 1.0), v, i, p) for i in range(plant.n)]
-    if np.ptp([f / g for f, g in ratios]) > EQUALITY_TOLERANCE * (
-        1.0 + abs(ratios[0][0] / ratios[0][1])
-    ):
+    ratios = []
+    for i in range(plant.n):
+        f, g = plant.nominal(np.full(plant.n, 1.0), v, i, p)
+        ratios.append(f / g)
+    if np.ptp(ratios) > EQUALITY_TOLERANCE * (1.0 + abs(ratios[0])):
         raise ScenarioError(
             f"{plant.name} has no linear theory at rest: give a plant with equal joints"
         )
 
     def force(x: Array) -> Array:
-        nominal = [plant.nominal(np.full(plant.n, position), v, 0, p) for position in x]
-        return np.minimum(rest.force(gains, x), u_max) - np.array([f / g for f, g in nominal])
+        at_rest = []
+        for position in x:
+            f, g = plant.nominal(np.full(plant.n, position), v, 0, p)
+            at_rest.append(f / g)
+        return np.minimum(rest.force(gains, x), u_max) - np.array(at_rest)
 
     return force
 

@@ -158,7 +158,10 @@ def untouched(table: RunColumns) -> list[str]:
         laws[law] = laws.get(law, True) and touched is False
     sentences = []
     for (plant, condition), laws in free.items():
-        clear = [law for law, alone in laws.items() if alone]
+        clear = []
+        for law, alone in laws.items():
+            if alone:
+                clear.append(law)
         of = "" if len(clear) == len(laws) else f" of {joined(clear)}"
         if clear:
             where = f"on {plant} under {condition}"
@@ -283,7 +286,11 @@ def _checked_sets(table: RunColumns, columns: Mapping[str, Array]) -> Array:
             about.pop(name, None)
         about["plant"].get("mjcf", {}).pop("path", None)  # models are identified by their contents
         first_law, expected = first.setdefault(tuple(cell), (law, about))
-        if differing := [name for name in expected if expected[name] != about.get(name)]:
+        differing = []
+        for name, value in expected.items():
+            if value != about.get(name):
+                differing.append(name)
+        if differing:
             raise ScenarioError(
                 f"runs of {cell[0]}, {cell[1]}, seed {cell[2]} are not alike: "
                 f"{', '.join(differing)} of {first_law} and {law} differ: give runs that differ "
@@ -322,8 +329,13 @@ def unit_of_x(plant: str, ran: Sequence[Scenario | None]) -> str:
     """Return the unit of positions on a plant, by its name or from runs on it; "" where it is not
     known.
     """
-    known = [catalogue().get(plant), *(scenario.plant for scenario in ran if scenario)]
-    return next((machine.unit for machine in known if machine), "")
+    known = catalogue().get(plant)
+    if known:
+        return known.unit
+    for scenario in ran:
+        if scenario:
+            return scenario.plant.unit
+    return ""
 
 
 def sources(table: RunColumns, rows: Array) -> dict[str, tuple[Source, ...]]:

@@ -64,7 +64,6 @@ first.
 """
 
 import functools
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Annotated, NamedTuple
@@ -460,7 +459,8 @@ def _linked(*sets: tuple[int, ...]) -> tuple[int, ...] | None:
     for numbers in map(np.array, sets):
         distinct = np.unique(numbers[numbers >= 0])
         if distinct.size > 1:
-            of_one_set += [numbers == number for number in distinct]
+            for number in distinct:
+                of_one_set.append(numbers == number)
     labels = np.arange(len(sets[0]))
     before = None
     while before is None or np.any(labels != before):
@@ -514,7 +514,10 @@ def needed_to_rank(laws: int) -> int:
 
 
 def _units(error: float) -> int:
-    return next(n for n in itertools.count(1) if min_p(n) <= error)
+    n = 1
+    while min_p(n) > error:
+        n += 1
+    return n
 
 
 def ranks(comparison: Comparison) -> list[Rank]:

@@ -65,7 +65,10 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
         dofs = dof_ids(model)
         _hold(model, data, driven, plant.name)
         block = rates(model, data)
-    order = [*dofs, *(i for i in range(model.nv) if i not in dofs)]
+    order = list(dofs)
+    for i in range(model.nv):
+        if i not in dofs:
+            order.append(i)
     order += [model.nv + i for i in order]
     n = len(order)
     a = block[:n, :n][np.ix_(order, order)]
@@ -75,7 +78,9 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
         labels = names
         drives = [model.actuator(i).name for i in driven]
     else:
-        labels = [model.joint(int(model.dof_jntid[i])).name for i in order[: model.nv]]
+        labels = []
+        for i in order[: model.nv]:
+            labels.append(model.joint(int(model.dof_jntid[i])).name)
         drives = names[: plant.driven]
     return StateSpace(
         a,

@@ -105,7 +105,10 @@ def nudged(scenario: Scenario) -> Scenario:
     plant's origin. A joint that starts there stays there.
     """
     places = zip(scenario.resolved.x0, scenario.plant.origin, strict=True)
-    return dataclasses.replace(scenario, x0=tuple(r + (1.0 + NUDGE) * (x - r) for x, r in places))
+    x0 = []
+    for x, r in places:
+        x0.append(r + (1.0 + NUDGE) * (x - r))
+    return dataclasses.replace(scenario, x0=tuple(x0))
 
 
 def chatters(trace: Trace) -> bool:
@@ -160,7 +163,7 @@ def step_halving(
             raise ScenarioError(f"traces has {shown(trace)}: give what smc.run returns")
         if channel is not None:
             channel = whole("channel", channel, 0, trace.scenario.plant.n - 1)
-    scenarios = [repetitions(trace) for trace in traces]
+    scenarios = list(map(repetitions, traces))
     again = iter(run(list(itertools.chain(*scenarios)), threads=threads))
     changes = []
     for trace, repeated in zip(traces, scenarios, strict=True):

@@ -63,8 +63,7 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
             s.plain_equation or (s.exact_friction and not plant.free) or rubs_by_force(s)
         ),
         "it has an actuator other than lags, rate limits and elastic joints": not all(
-            isinstance(part, ElasticJoint) or (part.in_callback and part.force is None)
-            for part in s.actuator
+            isinstance(part, ElasticJoint) or lags(part) for part in s.actuator
         ),
         f"its integrator is {s.integrator}": s.integrator
         != ("implicitfast" if rubs_by_force(s) else "RK4"),
@@ -77,16 +76,14 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
 
 def why_not_sampled(s: Resolved, metrics: Sequence[str], device: str) -> str:
     """Return what a scenario needs of a sample that this engine cannot do, by any integrator."""
-    parts = [part for part in (*s.law.parts, s.surface, s.velocity) if part is not None]
+    parts = _components(s)
     beyond = {
         "a law of many joints, or in C, is for the processor": device == "cuda"
         and any(_part(law).function is None for law in s.law.of_channels(s.plant.driven)),
         "a function of its user's may index beyond its memory, which only the processor checks": (
             device == "cuda" and not all(map(_indexes_within, _users(s)))
         ),
-        "a disturbance acts on a body": any(
-            d.cartesian or d.air or isinstance(d, Push) for d in s.disturbance
-        ),
+        "a disturbance acts on a body": any(map(_on_a_body, s.disturbance)),
         "numbers of its parts jump": len(s.machines) > 1,
         "its law does not compile": any(isinstance(part.function, Uncompiled) for part in parts),
     }
@@ -98,22 +95,49 @@ def why_not_sampled(s: Resolved, metrics: Sequence[str], device: str) -> str:
     return first_of(beyond)
 
 
+def lags(part: Any) -> bool:
+    """Say whether a part is a lag or a rate limit, which the callback steps itself."""
+    return part.in_callback and part.force is None
+
+
+def _on_a_body(disturbance: Any) -> bool:
+    return disturbance.cartesian or disturbance.air or isinstance(disturbance, Push)
+
+
+def _components(s: Resolved) -> list[Any]:
+    """Return the parts of the law, its surface and its estimator."""
+    return [part for part in (*s.law.parts, s.surface, s.velocity) if part is not None]
+
+
 def first_of(beyond: Mapping[str, bool]) -> str:
     """Return the first of some sentences that holds; "" if none does."""
-    return next((words for words, holds in beyond.items() if holds), "")
+    for words, so in beyond.items():
+        if so:
+            return words
+    return ""
 
 
 def _users(s: Resolved) -> list[tuple[Any, int]]:
     """Return the functions of a run that are not this package's, each with its memory."""
-    components = [part for part in (*s.law.parts, s.surface, s.velocity) if part is not None]
-    found = [(part.function, part.memory) for part in components]
-    signals = (*s.references, *s.disturbance, s.known_signal, *s.noise.errors)
-    found += [(type(one).value, one.memory) for one in signals if one is not None]
-    found += [(part.read, part.memory) for part in s.sensors]
-    found += [part.written for part in s.exact_parts]
-    found += [(part.steady, part.memory) for part in s.compensated]
-    found += [(part.force, part.memory) for part in _held(s)]
-    return [(function, memory) for function, memory in found if not fingerprint.ours(function)]
+    found = []
+    for part in _components(s):
+        found.append((part.function, part.memory))
+    for signal in (*s.references, *s.disturbance, s.known_signal, *s.noise.errors):
+        if signal is not None:
+            found.append((type(signal).value, signal.memory))
+    for part in s.sensors:
+        found.append((part.read, part.memory))
+    for part in s.exact_parts:
+        found.append(part.written)
+    for part in s.compensated:
+        found.append((part.steady, part.memory))
+    for part in _held(s):
+        found.append((part.force, part.memory))
+    users = []
+    for function, memory in found:
+        if not fingerprint.ours(function):
+            users.append((function, memory))
+    return users
 
 
 def _indexes_within(user: tuple[Any, int]) -> bool:
@@ -150,14 +174,21 @@ def _springs(s: Resolved) -> dict[int, Spring]:
 def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
     """Return the form of one run."""
     every = tuple(range(s.plant.n))
-    drives = [ChannelFunction(advanced, part.names, part.memory, every) for part in _drives(s)]
-    sensors = [ChannelFunction(part.read, part.names, part.memory, every) for part in s.sensors]
+    drives = []
+    for part in _drives(s):
+        drives.append(ChannelFunction(advanced, part.names, part.memory, every))
+    sensors = []
+    for part in s.sensors:
+        sensors.append(ChannelFunction(part.read, part.names, part.memory, every))
     laws = []
     for law in s.law.of_channels(s.plant.driven):
         laws.append(_part(law)._replace(channels=every if law.joint else ()))
     frictions = [_on_channels(part, part.stage_force, s) for part in s.exact_parts]
-    frictions += [_on_channels(part, part.force, s) for part in _held(s)]
-    compensated = [_on_channels(part, part.steady, s) for part in s.compensated]
+    for part in _held(s):
+        frictions.append(_on_channels(part, part.force, s))
+    compensated = []
+    for part in s.compensated:
+        compensated.append(_on_channels(part, part.steady, s))
     elastic = tuple(_springs(s))
     motor_side = set()
     for part in s.sensors:
@@ -243,7 +274,9 @@ def _oldest(s: Resolved) -> int:
 
 def wider(form: Form, other: Form) -> Form:
     """Return a form that also has what another one of the same `key` has, for a loop for both."""
-    flags = {name: max(getattr(form, name), getattr(other, name)) for name in VARYING}
+    flags = {}
+    for name in VARYING:
+        flags[name] = max(getattr(form, name), getattr(other, name))
     kinds = Counter(form.disturbances) | Counter(other.disturbances)
     return form._replace(**flags, disturbances=tuple(kinds.elements()))
 
@@ -333,8 +366,10 @@ class FormGroup:
 
     def _fill_hardware(self, row: np.ndarray, s: Resolved) -> None:
         parts: list[tuple[PartAt | None, Any]] = []
-        parts += [(self.layout.drive, part) for part in _drives(s)]
-        parts += [(self.layout.sensor, part) for part in s.sensors]
+        for part in _drives(s):
+            parts.append((self.layout.drive, part))
+        for part in s.sensors:
+            parts.append((self.layout.sensor, part))
         if self.form.frictions:  # else MuJoCo has them
             parts += zip(self.layout.frictions, (*s.exact_parts, *_held(s)), strict=True)
         parts += zip(self.layout.compensated, s.compensated, strict=True)

@@ -256,7 +256,9 @@ def _sensing(form: Form, compile_user: Compiler) -> Fields:
     if form.past:
         found |= _late_sensing(form)
     if any(form.errors):
-        of_x, of_v = (signal(error, compile_user) for error in at.errors)
+        error_of_x, error_of_v = at.errors
+        of_x = signal(error_of_x, compile_user)
+        of_v = signal(error_of_v, compile_user)
         found["errors"] = inlined(lambda view, t: (of_x(view, t, 0)[0], of_v(view, t, 0)[0]))
     if at.sensor:
         sensor = acting(at.sensor, compile_user)

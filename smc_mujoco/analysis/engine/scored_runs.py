@@ -161,7 +161,9 @@ class ScoredRuns:
         """
         others = self.by_mujoco([case for case, _ in self.drawn])
         warn_of_broken(self.broken)
-        refused = [f"MuJoCo made {n} runs: {why}" for why, n in self.refused.items()]
+        refused = []
+        for why, n in self.refused.items():
+            refused.append(f"MuJoCo made {n} runs: {why}")
         if not self.drawn:
             return "; ".join(refused)
         apart = dict.fromkeys(self.formulas, 0.0)
@@ -173,7 +175,9 @@ class ScoredRuns:
                 for name, value, other in zip(apart, ours, theirs, strict=True):
                     if value != other and not (math.isnan(value) and math.isnan(other)):
                         apart[name] = max(apart[name], abs(value - other))
-        parts = [f"{name} {value:.1g}" for name, value in apart.items()]
+        parts = []
+        for name, value in apart.items():
+            parts.append(f"{name} {value:.1g}")
         apart_by = (
             f"MuJoCo repeated {len(self.drawn)} runs: {failed} failed in one engine alone, the "
             f"others are apart by at most {', '.join(parts)}"

@@ -142,7 +142,11 @@ def values_of(runs: WorldRuns) -> dict[str, Array]:
     model = copy.copy(base)
     data = mujoco.MjData(model)
     each = [field_values(base, s, 0) for s in runs.scenarios]
-    names = {name for values in each for name in values if not _of_sensors(name)}
+    names = set()
+    for values in each:
+        for name in values:
+            if not _of_sensors(name):
+                names.add(name)
     if not names:
         return {}
     found: dict[str, list[Array]] = {name: [] for name in sorted(names.union(DERIVED))}
@@ -167,7 +171,10 @@ def worlds_of(
     for name, of_each in values.items():
         if np.any(of_each != of_each[0]) or name in DRY_FRICTION:
             varying[name] = of_each
-    sizes = {name: len(rows) for name in varying if not name.startswith("opt.")}
+    sizes = {}
+    for name in varying:
+        if not name.startswith("opt."):
+            sizes[name] = len(rows)
     model = mujoco_warp.put_model(host, batch_sizes=sizes)
     for name, of_each in varying.items():
         _put(model, name, of_each[members])

@@ -5,7 +5,14 @@ from collections.abc import Hashable, Sequence
 import numpy as np
 
 from smc_mujoco.analysis.engine.form import ChannelFunction, Form
-from smc_mujoco.analysis.engine.group import FormGroup, first_of, form_of, key, why_not_sampled
+from smc_mujoco.analysis.engine.group import (
+    FormGroup,
+    first_of,
+    form_of,
+    key,
+    lags,
+    why_not_sampled,
+)
 from smc_mujoco.analysis.engine.scores import holds
 from smc_mujoco.analysis.engine.world_callback import WorldRuns, calls_in_step, world_places
 from smc_mujoco.common.aliases import Array
@@ -29,9 +36,7 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cuda
         and bool(plant.by_mujoco or plant.unmodelled),
         "it measures joints that nothing drives": plant.measured > 0,
         "a part of it acts in MuJoCo's callback": any(kind != "act" for _, kind in s.acting),
-        "it has an actuator other than lags and rate limits": not all(
-            part.in_callback and part.force is None for part in s.actuator
-        ),
+        "it has an actuator other than lags and rate limits": not all(map(lags, s.actuator)),
         "its parameters jump": bool(s.jump),
         "a disturbance acts on a body": bool(s.disturbance) and not plant.direct,
     }

@@ -37,7 +37,7 @@ class Equations:
         self.threads = threads
         self.device = device
         self.group = FormGroup(cases, ("itae", "tv"))
-        self.columns = [self.group.gain_columns(name) for name in names]
+        self.columns = list(map(self.group.gain_columns, names))
 
     def __call__(self, candidates: Sequence[Floats], terms: Any) -> list[Pair]:
         count = len(self.cases)
@@ -46,7 +46,10 @@ class Equations:
             for value, columns in zip(gains, self.columns, strict=True):
                 rows[k * count : (k + 1) * count, columns] = value
         scores = self.group.run(rows, self.threads, self.device).tolist()
-        return [self._costs(self.cases[i % count], *score) for i, score in enumerate(scores)]
+        costs = []
+        for i, score in enumerate(scores):
+            costs.append(self._costs(self.cases[i % count], *score))
+        return costs
 
     def _costs(
         self, case: Scenario, failure: float, failed_step: float, itae: float, tv: float

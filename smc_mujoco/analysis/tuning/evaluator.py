@@ -108,9 +108,10 @@ class Evaluator:
             terms = self._terms_of_traces(candidates)
         made = []
         for k, gains in enumerate(candidates):
-            tracking, variation = (
-                float(sum(term)) for term in zip(*terms[k * size : (k + 1) * size], strict=True)
-            )
+            terms_of_set = terms[k * size : (k + 1) * size]
+            of_tracking, of_variation = zip(*terms_of_set, strict=True)
+            tracking = float(sum(of_tracking))
+            variation = float(sum(of_variation))
             cost = tracking + self.goal.weight * variation + self.excess(gains)
             made.append(Evaluation(gains, cost, tracking, variation))
         return made
@@ -141,7 +142,7 @@ class Evaluator:
                 for case in self.cases:
                     cases.append(dataclasses.replace(case, law=law))
             traces = run(cases, self.threads)
-        return [self.goal.terms_of_run(trace) for trace in traces]
+        return list(map(self.goal.terms_of_run, traces))
 
     def _terms(self, case: Scenario, failed_at: float | None, log: np.ndarray) -> Pair:
         """Return tracking and variation of the run of a case, see `Terms`."""

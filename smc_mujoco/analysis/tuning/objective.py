@@ -290,7 +290,7 @@ def shares(
     costs = []
     laws = [law] * len(instances)
     for _, runs in _unseen(plant, laws, goal, instances, threads, doubled=True):
-        terms = np.array([goal.terms_of_run(trace) for trace in runs])
+        terms = np.array(list(map(goal.terms_of_run, runs)))
         costs.append(terms @ (1.0, goal.weight))
     total = np.sum(costs, axis=0)
     names = [condition.name for condition in goal.conditions]

@@ -173,9 +173,11 @@ def tune(
         goal = objective
     else:
         goal = find("objective", objective, OBJECTIVES)
-    goal = dataclasses.replace(
-        goal, **{name: value for name, value in changes.items() if value is not None}
-    )
+    given = {}
+    for name, value in changes.items():
+        if value is not None:
+            given[name] = value
+    goal = dataclasses.replace(goal, **given)
     task = task_of(plant, coerce.law(law), goal, budget, seed, threads, outside_theorem)
     task = task._replace(device=device, quick=quick)
     if why := falls(task.plant):
@@ -186,8 +188,14 @@ def tune(
     words = f"tuning {task.law.name} for {task.plant.name}: evaluation"
     with bar(words, searches * task.size, shown=progress, counted=True) as shown:
         files = [] if folder is None else [task.file(i, folder) for i in range(searches)]
-        found = {i: made for i, file in enumerate(files) if (made := file.read())}
-        missing = [i for i in range(searches) if i not in found]
+        found = {}
+        missing = []
+        for i in range(searches):
+            made = files[i].read() if files else None
+            if made:
+                found[i] = made
+            else:
+                missing.append(i)
         shown.advance(len(found) * task.size)
         writable(*(files[i].path for i in missing if files))
         if executor is None:
@@ -475,9 +483,10 @@ def _cheap(accurate: Evaluator, at_period: bool = False) -> Evaluator:
         return accurate
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ScenarioWarning)
-        cases = [_coarse(case) for case in accurate.cases]
-        if at_period:
-            cases = [_at_period(case) for case in cases]
+        cases = []
+        for case in accurate.cases:
+            coarse = _coarse(case)
+            cases.append(_at_period(coarse) if at_period else coarse)
     constraints = not all(map(_only_limits, accurate.cases))
     goal = accurate.goal
     names = accurate.names

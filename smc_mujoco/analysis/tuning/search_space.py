@@ -84,12 +84,12 @@ def unit(law: Component, name: str) -> Unit | None:
 
 def without_unit(law: Component) -> dict[str, float]:
     """Return gain -> default of the searched gains whose unit is not known."""
-    gains = {}
+    defaults = {}
     for name in law.gains:
-        gains[name] = _gain(law, name)
-    return {
-        name: gain.default for name, gain in gains.items() if gain.unit is None and not gain.held
-    }
+        gain = _gain(law, name)
+        if gain.unit is None and not gain.held:
+            defaults[name] = gain.default
+    return defaults
 
 
 def unit_texts(law: Component, names: Sequence[str], scenario: Scenario) -> dict[str, str]:
@@ -111,9 +111,10 @@ def _scales_of(gain: Gain, scales: Numbers) -> Numbers:
     """Return F, X and T of the channels that a gain is of; of a plant without a pose there is one
     set.
     """
-    return {
-        name: scales.get(name + OF_TURNS * gain.turns, scales[name]) for name in ("F", "X", "T")
-    }
+    sizes = {}
+    for name in ("F", "X", "T"):
+        sizes[name] = scales.get(name + OF_TURNS * gain.turns, scales[name])
+    return sizes
 
 
 def scales(
@@ -132,10 +133,13 @@ def scales(
     if plant.pose and plant.by_mujoco:
         M = plant.nominal.dynamics(np.array(plant.x0), np.zeros(plant.n), plant.values({})).M
         limits = plant.limits
-        force, torque = (min([u_max, *limits[i : i + 3]]) for i in (0, 3))
+        force = min([u_max, *limits[:3]])
+        torque = min([u_max, *limits[3:6]])
         of_turns = _scales(1.0 / max(np.diag(M)[3:]), torque, 1.0)
         own = _scales(1.0 / M[0, 0], force, SPREAD if reach is None else reach)
-        return own | {name + OF_TURNS: value for name, value in of_turns.items()}
+        for name, value in of_turns.items():
+            own[name + OF_TURNS] = value
+        return own
     if reach is None:
         X = max(abs(x - r) for x, r in zip(plant.x0, plant.origin, strict=True))
     else:
@@ -200,15 +204,12 @@ def box(law: Component, plant_scales: Numbers) -> dict[str, Pair]:
 
 def at_bound(gains: Numbers, bounds: Box) -> dict[str, str]:
     """Return gain -> "lower" or "upper" for gains within 2 % of a bound in log space."""
-    places = {
-        name: math.log(gains[name] / low) / math.log(high / low)
-        for name, (low, high) in bounds.items()
-    }
-    near = {}
-    for name, place in places.items():
+    edges = {}
+    for name, (low, high) in bounds.items():
+        place = math.log(gains[name] / low) / math.log(high / low)
         if min(place, 1.0 - place) <= BOUND_MARGIN:
-            near[name] = place
-    return {name: "lower" if place < 0.5 else "upper" for name, place in near.items()}
+            edges[name] = "lower" if place < 0.5 else "upper"
+    return edges
 
 
 def edges_in_words(gains: Numbers, edges: Mapping[str, str]) -> list[str]:
@@ -216,11 +217,11 @@ def edges_in_words(gains: Numbers, edges: Mapping[str, str]) -> list[str]:
     what `at_bound` returns.
     """
     beyond = {"lower": "smaller", "upper": "larger"}
-    return [
-        f"{name} = {gains[name]:.4g} is at the {side} end of its box: a {beyond[side]} one may be "
-        "better"
-        for name, side in edges.items()
-    ]
+    sentences = []
+    for name, side in edges.items():
+        place = f"{name} = {gains[name]:.4g} is at the {side} end of its box"
+        sentences.append(f"{place}: a {beyond[side]} one may be better")
+    return sentences
 
 
 def force_limits(law: Component, gains: Numbers, u_max: float) -> dict[str, float]:
@@ -230,11 +231,11 @@ def force_limits(law: Component, gains: Numbers, u_max: float) -> dict[str, floa
     declared = law.template.gains if law.template else {}
     values = {**law.gains, **gains}
     largest = u_max * 10 ** (HALF_WIDTH + WIDENING)
-    return {
-        name: largest * values[gain.over]
-        for name, gain in declared.items()
-        if gain.over is not None
-    }
+    limits = {}
+    for name, gain in declared.items():
+        if gain.over is not None:
+            limits[name] = largest * values[gain.over]
+    return limits
 
 
 def widened(bounds: Box) -> dict[str, Pair]:

@@ -57,7 +57,7 @@ class Trials:
 
     def screen(self, logs: Array) -> Array:
         """Return J of candidates (candidates, gains), given as log10 gains, from cheap runs."""
-        return self._costs([self.gains(row) for row in logs.tolist()], self.cheap, self.screened)
+        return self._costs(list(map(self.gains, logs.tolist())), self.cheap, self.screened)
 
     def cost(self, logs: Array) -> float:
         """Return the accurate J of a candidate, given as log10 gains (gains,)."""
@@ -89,7 +89,9 @@ class Trials:
 
     def gains(self, logs: Sequence[float]) -> Gains:
         """Return the gains of a candidate, with four digits."""
-        gains = {name: _rounded(10.0**z) for name, z in zip(self.names, logs, strict=True)}
+        gains = {}
+        for name, z in zip(self.names, logs, strict=True):
+            gains[name] = _rounded(10.0**z)
         for name, largest in self.limit(gains).items():
             gains[name] = min(gains[name], _rounded(largest))
         return tuple(gains.values())
@@ -140,9 +142,10 @@ def evolved(
     seed = int(random.integers(2**31))
     evolution = CMA(mean=logs, sigma=FIRST_DEVIATION, bounds=bounds, seed=seed)
     for _ in range(size // evolution.population_size):
-        candidates = np.array(
-            [trials.drawn(evolution.ask, logs) for _ in range(evolution.population_size)]
-        )
+        drawn = []
+        for _ in range(evolution.population_size):
+            drawn.append(trials.drawn(evolution.ask, logs))
+        candidates = np.array(drawn)
         costs = trials.screen(candidates)
         evolution.tell(list(zip(candidates, costs, strict=True)))
         if costs.min() < cost:
