@@ -66,7 +66,8 @@ def runs(
             base += all_combinations(
                 [plant], lambda _: found, nominal, range(seeds), duration, around
             )
-        scenarios.extend(dataclasses.replace(scenario, **fields).named(name) for scenario in base)
+        for scenario in base:
+            scenarios.append(dataclasses.replace(scenario, **fields).named(name))
     return scenarios
 
 
@@ -81,8 +82,11 @@ def objective(rig: Rig, starts: Starts | None = None) -> Objective:
         fields["u_max"] = None
     first = Scenario(**fields)
     period = first.control_period
+    conditions = []
+    for name, fields in machines.items():
+        conditions.append(Condition(name, fields))
     return Objective(
-        conditions=tuple(Condition(name, fields) for name, fields in machines.items()),
+        conditions=tuple(conditions),
         starts=around,
         control_period=period,
         weight=period,
@@ -206,7 +210,10 @@ def verdict(boards: Sequence[Any]) -> str:
         if board.winner:
             lines.append(f"{board.metric}: {board.winner} wins on all {count} parameter sets")
             continue
-        wins = Counter(block.winner for block in board.blocks if block.winner).most_common()
-        others = ", ".join(f"{law} on {number}" for law, number in wins) or "none on any"
+        wins = Counter(filter(None, (block.winner for block in board.blocks)))
+        words = []
+        for law, number in wins.most_common():
+            words.append(f"{law} on {number}")
+        others = ", ".join(words) or "none on any"
         lines.append(f"{board.metric}: no law wins on all {count} parameter sets ({others})")
     return "\n".join(lines)

@@ -23,7 +23,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import AnyPath, Array, Fields, Floats, Numbers
 from smc_mujoco.common.constraints import Natural, Positive, constrained
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import attributes, named_data
 from smc_mujoco.common.errors import ScenarioError, find, items_of, number, shown
 from smc_mujoco.common.files import as_path, replacing
 from smc_mujoco.control.from_text import law as find_law
@@ -102,7 +102,8 @@ class ExcitingMotion:
     @property
     def mean_share(self) -> float:
         """The geometric mean of the expected errors over their values."""
-        return math.exp(sum(math.log(self.share(name)) for name in self.errors) / len(self.errors))
+        logarithms = [math.log(self.share(name)) for name in self.errors]
+        return math.exp(sum(logarithms) / len(logarithms))
 
 
 @named_data
@@ -116,7 +117,9 @@ class Excitation:
         """Return a line for each motion, and why the last is last."""
         lines = []
         for motion in self.motions:
-            errors = [f"{name} {100.0 * motion.share(name):.2g} %" for name in motion.errors]
+            errors = []
+            for name in motion.errors:
+                errors.append(f"{name} {100.0 * motion.share(name):.2g} %")
             lines.append(
                 f"{motion.name}: condition number {motion.condition:.3g}; expected errors "
                 f"{', '.join(errors)}; |u| up to {motion.largest_u:.3g}, |v| up to "
@@ -135,10 +138,7 @@ class Excitation:
     def about(self) -> Fields:
         """Return what a log of each motion would tell as JSON data, best first."""
         told = ("condition", "errors", "values", "largest_u", "largest_v", "worst_pair", "rest")
-        found = {}
-        for motion in self.motions:
-            found[motion.name] = {name: getattr(motion, name) for name in told}
-        return found
+        return {motion.name: attributes(motion, told) for motion in self.motions}
 
     def save(self, path: AnyPath, name: str | None = None) -> Path:
         """Write the reference of a motion as CSV, the best by default: t, and r or r_JOINT, rad or
@@ -229,9 +229,9 @@ def _ways(plant: Plant, amplitude: float | Sequence[float] | None) -> Array:
     """Return the largest way of each driven joint to each side of its goal, (driven,)."""
     if amplitude is not None:
         given: Any = [amplitude] if np.ndim(amplitude) == 0 else amplitude
-        ways = np.array(
-            [number("amplitude", way, above=0.0) for way in items_of("amplitude", given)]
-        )
+        ways = []
+        for way in items_of("amplitude", given):
+            ways.append(number("amplitude", way, above=0.0))
         if len(ways) not in (1, plant.driven):
             raise ScenarioError(f"amplitude has {len(ways)} values: give one, or {plant.driven}")
         return np.broadcast_to(ways, (plant.driven,)).copy()
@@ -377,9 +377,12 @@ def _motions(
         times = (period * np.arange(positions.shape[1])).tolist()
         start = list(plant.rest or (0.0,) * plant.n)
         start[: plant.driven] = positions[:, 0].tolist()
+        references = []
+        for row in positions:
+            references.append(TimeSeries(times, row.tolist()))
         fields = rig.machine(Values(**rig.values)) | {
             "law": laws,
-            "reference": [TimeSeries(times, row.tolist()) for row in positions],
+            "reference": references,
             "duration": times[-1],
             "control_period": period,
             "x0": tuple(start),
@@ -395,12 +398,15 @@ def _motions(
     for (name, positions), trace in zip(moved.items(), run(scenarios), strict=True):
         if not trace.failure:
             told = _told(rig, names, trace)
+            values = {}
+            for one in names:
+                values[one] = rig.values[one]
             found.append(
                 ExcitingMotion(
                     name=name,
                     times=tuple(trace.t.tolist()),
-                    positions=tuple(tuple(row) for row in positions.tolist()),
-                    values={one: rig.values[one] for one in names},
+                    positions=tuple(map(tuple, positions.tolist())),
+                    values=values,
                     largest_u=float(np.abs(trace.u).max()),
                     largest_v=float(np.abs(trace.v).max()),
                     rest=_rest(trace.v),
@@ -430,7 +436,9 @@ def _told(rig: OwnRig, names: list[str], trace: Trace) -> dict[str, Any]:
     i, j = np.unravel_index(np.argmax(np.abs(apart)), apart.shape)
     worst = (names[i], names[j] if len(names) > 1 else "", float(apart[i, j]))
     condition = float(singular[0] / max(singular[-1], 1e-300))
-    errors = {name: math.inf if math.isnan(error) else error for name, error in errors.items()}
+    for name, error in errors.items():
+        if math.isnan(error):
+            errors[name] = math.inf
     return {"condition": condition, "errors": errors, "worst_pair": worst}
 
 

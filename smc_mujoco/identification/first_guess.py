@@ -26,7 +26,7 @@ from smc_mujoco.identification.inverse_dynamics import (
 )
 from smc_mujoco.identification.own_rig import OwnRig
 from smc_mujoco.identification.paths import DELAY, MAX_DELAY, slope, steady_force
-from smc_mujoco.identification.records import Columns, Record, step_of
+from smc_mujoco.identification.records import Columns, Record, stacked, step_of
 from smc_mujoco.mechanisms.custom.joint_numbers import KINDS
 from smc_mujoco.mechanisms.hardware.part import Friction
 from smc_mujoco.mechanisms.layout import channel_names, driven_names
@@ -82,15 +82,25 @@ def first_guess(rig: OwnRig, data: Sequence[Data]) -> OwnRig:
 def _usable(rig: OwnRig, data: Sequence[Data]) -> list[Record]:
     """Return the logs whose forces can be compared: none where the command is no force."""
     columns = dataclasses.replace(rig.columns, torque=rig.columns.x)
-    logs = [rig.checked(record) for record in data] if rig.base.force_command else []
-    return [record for record in logs if inverse_dynamics.long_enough(record, columns)]
+    usable = []
+    for log in data if rig.base.force_command else ():
+        record = rig.checked(log)
+        if inverse_dynamics.long_enough(record, columns):
+            usable.append(record)
+    return usable
 
 
 def _guessed(
     rig: OwnRig, data: Sequence[Data], logs: Sequence[Forces], delays: Sequence[float]
 ) -> OwnRig:
     """Return the rig with the values of least squares, and the delay whose residual is least."""
-    gained = [i for i, joint in enumerate(driven_names(rig.plant)) if f"{joint}.gain" in rig.free]
+    gained = []
+    found_gains = []
+    for i, joint in enumerate(driven_names(rig.plant)):
+        gain = f"{joint}.gain"
+        if gain in rig.free:
+            gained.append(i)
+            found_gains.append(gain)
     A = np.concatenate([log.slopes for log in logs])
     best: tuple[float, float, Array] | None = None
     for k, late in enumerate(delays):
@@ -106,8 +116,7 @@ def _guessed(
         if best is None or left < best[0]:
             best = left, late, found
     assert best is not None
-    joints = driven_names(rig.plant)
-    names = [*linear(rig), *(f"{joints[i]}.gain" for i in gained)]
+    names = [*linear(rig), *found_gains]
     values = dict(zip(names, best[2].tolist(), strict=True))
     for name in names:
         if not starts_from_zero(rig, name):
@@ -160,7 +169,8 @@ def _within(rig: OwnRig, values: Numbers, data: Sequence[Data]) -> OwnRig:
     """
     u = 0.0
     for record in data:
-        u = max(u, *(float(np.std(record[name])) for name in rig.columns.inputs))
+        for name in rig.columns.inputs:
+            u = max(u, float(np.std(record[name])))
     inertia = float(np.min(rig.plant.load().dof_M0))
     changed = dict(rig.quantities)
     for name, value in values.items():
@@ -205,7 +215,7 @@ def forces(rig: OwnRig, record: Record, delays: Sequence[float]) -> Forces:
     def inertial(parameters: Numbers) -> Array:
         plant = dataclasses.replace(rig.plant, parameters=parameters)
         needed = inverse_dynamics.torques(plant, record, columns, limit)
-        return np.column_stack([needed[name] for name in rig.columns.x])
+        return stacked(needed, rig.columns.x)
 
     plain = inertial(base)
     rigid = plain + _of_parts(rig, filtered, v)
@@ -216,7 +226,9 @@ def forces(rig: OwnRig, record: Record, delays: Sequence[float]) -> Forces:
             slopes.append(((inertial(base | {name: base[name] + step}) - plain) / step).ravel())
         else:
             slopes.append(_column(rig, name, filtered, (x, v, a)).ravel())
-    commands = [_low_commands(rig, record, filtered, late) for late in delays]
+    commands = []
+    for late in delays:
+        commands.append(_low_commands(rig, record, filtered, late))
     columns_of = np.column_stack(slopes) if slopes else np.zeros((plain.size, 0))
     return Forces(columns_of, rigid.ravel(), commands)
 
@@ -236,9 +248,11 @@ def motion_forces(rig: OwnRig, record: Record, late: float) -> tuple[Array, Arra
     columns = dataclasses.replace(rig.columns, torque=rig.columns.x)
     filtered = Filter(record, columns)
     needed = inverse_dynamics.torques(rig.plant, record, columns)
-    speeds = [filtered.low(filtered.cubic(name, 1)) for name in rig.columns.x]
-    forces_of = np.column_stack([needed[name] for name in rig.columns.x])
-    return np.column_stack(speeds), forces_of, _low_commands(rig, record, filtered, late)
+    speeds = []
+    for name in rig.columns.x:
+        speeds.append(filtered.low(filtered.cubic(name, 1)))
+    commands = _low_commands(rig, record, filtered, late)
+    return np.column_stack(speeds), stacked(needed, rig.columns.x), commands
 
 
 def _of_parts(rig: OwnRig, filtered: Filter, v: Array) -> Array:

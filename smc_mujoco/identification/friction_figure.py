@@ -119,9 +119,10 @@ def measured_friction(rig: OwnRig, record: Record) -> tuple[Array, Array]:
     """Return speeds, and the forces of a log less those of inertia, gravity and springs, (M, n)
     each, below 5 Hz: what is left is friction.
     """
-    rubbing = {
-        name: 0.0 for name in rig.plant.parameters if name.endswith((".damping", ".frictionloss"))
-    }
+    rubbing = {}
+    for name in rig.plant.parameters:
+        if name.endswith((".damping", ".frictionloss")):
+            rubbing[name] = 0.0
     frictionless = dataclasses.replace(
         rig,
         plant=dataclasses.replace(

@@ -80,7 +80,9 @@ def by_halving(replays: Replays, slopes: Slopes) -> Array:
     steps, replays.steps = replays.steps, {"physics_step": plain.resolved.physics_step / 2.0}
     (residuals,) = replays.residuals([point])
     replays.steps = steps
-    changed = [half - full for half, full in zip(residuals, slopes.residuals, strict=True)]
+    changed = []
+    for half, full in zip(residuals, slopes.residuals, strict=True):
+        changed.append(half - full)
     J = np.concatenate(slopes.freed(slopes.by_values))
     return 2.0 * np.abs(np.linalg.lstsq(J, np.concatenate(slopes.freed(changed)), rcond=None)[0])
 
@@ -139,7 +141,9 @@ def _best_step(replays: Replays, slopes: Slopes) -> tuple[Point, float]:
 
     Each piece chooses the best move of its own states.
     """
-    groups = [_variants(replays, slopes, _moved(replays, slopes, damping)) for damping in DAMPINGS]
+    groups = []
+    for damping in DAMPINGS:
+        groups.append(_variants(replays, slopes, _moved(replays, slopes, damping)))
     costs = replays.costs(list(itertools.chain(*groups)))
     reached = []
     for group, of_group in zip(groups, np.split(costs, len(groups)), strict=True):
@@ -170,7 +174,8 @@ def _variants(replays: Replays, slopes: Slopes, values: Array) -> list[Point]:
 
 def _moved(replays: Replays, slopes: Slopes, damping: float) -> Array:
     """Return the quantities after a damped Gauss-Newton step, within their ranges, (p,)."""
-    J, r = (np.concatenate(slopes.freed(rows)) for rows in (slopes.by_values, slopes.residuals))
+    J = np.concatenate(slopes.freed(slopes.by_values))
+    r = np.concatenate(slopes.freed(slopes.residuals))
     values = slopes.point.values
     low = replays.low
     high = replays.high

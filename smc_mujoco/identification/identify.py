@@ -130,12 +130,12 @@ class Identified:
                 "presliding: in the logs dry friction gives way before it slides, "
                 f"{self.gives_way}; the errors include what that may change"
             )
-        worst = min(min(fit.values()) for fit in self.by_pieces or self.fits)
+        worst = _worst(self.by_pieces or self.fits)
         if self.independent < BLOCKS[0] and worst < PERFECT_FIT and self.rig.controller is None:
             notes.append(SLOW)
         if worst < POOR_FIT:
             notes.append(POOR)
-        elif self.by_pieces and min(min(fit.values()) for fit in self.fits) < POOR_FIT:
+        elif self.by_pieces and _worst(self.fits) < POOR_FIT:
             notes.append(LEFT)
         if isinstance(self.rig, OwnRig) and (absent := self.rig.not_in_runs):
             notes.append(
@@ -188,7 +188,9 @@ class Identified:
 
     def __str__(self) -> str:
         """Return the numbers as a table, the fits and the notes."""
-        units = {name: self.rig.quantities[name].unit for name in self.values}
+        units = {}
+        for name in self.values:
+            units[name] = self.rig.quantities[name].unit
         heads = [f"log {i}" for i in range(1, len(self.fits) + 1)]
         fits = list(self.fits)
         pieces = list(self.by_pieces or [{}] * len(fits))
@@ -198,7 +200,9 @@ class Identified:
             pieces.append(self.held_out.by_pieces)
         lines = number_text.table(self.values, self.errors, units)
         lines += ["", *number_text.fits(heads, fits, pieces)]
-        return "\n".join(lines + [f"note: {note}" for note in self.notes])
+        for note in self.notes:
+            lines.append(f"note: {note}")
+        return "\n".join(lines)
 
     def about(self) -> Fields:
         """Return values, errors, correlations and fits as JSON data."""
@@ -221,7 +225,7 @@ class Identified:
                 about[key].append(
                     {name: str(value) for name, value in fit.items()} if falls else fit
                 )
-        about["fits_by_pieces"] = [dict(fit) for fit in self.by_pieces]
+        about["fits_by_pieces"] = list(map(dict, self.by_pieces))
         if self.held_out:
             about["held_out"] = dataclasses.asdict(self.held_out)
         return about
@@ -377,16 +381,22 @@ def check(rig: Rig, log: Log, columns: Mapping[str, str] | None = None) -> HeldO
     return HeldOutFit(fit, fits_by_pieces(replays, slopes)[0])
 
 
+def _worst(fits: Sequence[Numbers]) -> float:
+    """Return the worst fit of any column of any log."""
+    return min(min(fit.values()) for fit in fits)
+
+
 def fits_by_pieces(replays: Replays, slopes: Slopes) -> list[dict[str, float]]:
     """Return the fit of each column of each record, percent, in pieces whose starts were found."""
     found = []
     for k in range(len(replays.data)):
         rows = []
+        columns = {}
         for piece, residuals in zip(replays.pieces, slopes.residuals, strict=True):
             if piece.record == k:
                 rows.append(residuals.reshape(-1, slopes.columns))
+                columns = piece.measured
         shares = np.linalg.norm(np.concatenate(rows), axis=0)
-        columns = next(piece.measured for piece in replays.pieces if piece.record == k)
         percent = (100.0 * (1.0 - shares)).tolist()
         found.append(dict(zip(columns, percent, strict=True)))
     return found
@@ -427,15 +437,23 @@ def _named_plant(text: str, logs: Sequence[Any]) -> Plant:
     model = MODEL.fullmatch(text)
     if model is None or model["joints"] is not None or not isinstance(logs[0], Mapping):
         return as_plant(text)
-    driven = [name[2:] for name in logs[0] if name.startswith("u_")]
-    seen = [name[2:] for name in logs[0] if name.startswith("x_")]
-    joints = driven + [f"{joint}(measured)" for joint in seen if joint not in driven]
+    driven = []
+    seen = []
+    for name in logs[0]:
+        if name.startswith("u_"):
+            driven.append(name[2:])
+        elif name.startswith("x_"):
+            seen.append(name[2:])
     if seen and not driven:
+        positions = joined(f"x_{joint}" for joint in seen)
         wanted = joined(f"u_{joint}" for joint in seen)
         raise ScenarioError(
-            f"the log has {joined(f'x_{joint}' for joint in seen)} and no command: give {wanted}, "
-            "the motors' commands, too"
+            f"the log has {positions} and no command: give {wanted}, the motors' commands, too"
         )
+    joints = list(driven)
+    for joint in seen:
+        if joint not in driven:
+            joints.append(f"{joint}(measured)")
     if not driven:
         joints = [joint.name for joint in mjcf.source(text).spec().joints if joint.name]
         if len(joints) != 1:
@@ -493,7 +511,7 @@ def _solved(
     closed = Replays(twin, names, data, True, report)
     points = [closed.start, Point(reached.point.values, closed.start.states)]
     if len(closed.free):  # a record may begin at rest with a jump of the command
-        points += [closed.at_rest(point) for point in points]
+        points += list(map(closed.at_rest, points))
     slopes = gauss_newton.refine(closed, gauss_newton.better(closed, *points), most)
     closed.evaluations += pieces.evaluations
     return closed, slopes, np.zeros(len(names))
@@ -515,7 +533,7 @@ def _starting_states(
     repeats = Replays(fitted, [], data, False, whole=True)
     repeats.steps = replays.short_steps
     of_records = [piece.record for piece in replays.pieces]
-    firsts = [of_records.index(i) for i in range(len(data))]
+    firsts = list(map(of_records.index, range(len(data))))
     none = np.zeros(0)
     candidates = [repeats.start, Point(none, point.states[firsts])]
     for candidate in tuple(candidates):
@@ -523,4 +541,7 @@ def _starting_states(
         candidates.append(Point(none, candidate.states + moves))
     costs = repeats.costs(candidates)
     best = costs.argmin(axis=0)
-    return [repeats.state(candidates[best[i]], i) for i in range(len(data))]
+    states = []
+    for i in range(len(data)):
+        states.append(repeats.state(candidates[best[i]], i))
+    return states

@@ -65,7 +65,10 @@ class Filter:
         """Return columns, their rates and their second derivatives, (N, n) each."""
         found = []
         for order in range(3):
-            found.append(np.column_stack([self.cubic(name, order) for name in names]))
+            columns = []
+            for name in names:
+                columns.append(self.cubic(name, order))
+            found.append(np.column_stack(columns))
         return found
 
     def low(self, values: Array) -> Array:
@@ -94,7 +97,10 @@ def times(data: Record, columns: Columns) -> Array:
 def measured(data: Record, columns: Columns) -> Record:
     """Return the recorded torque of each joint, below CUTOFF, N m."""
     filtered = Filter(data, columns)
-    return {name: filtered.low(filtered.cubic(name)) for name in columns.torque}
+    found = {}
+    for name in columns.torque:
+        found[name] = filtered.low(filtered.cubic(name))
+    return found
 
 
 def long_enough(data: Record, columns: Columns) -> bool:
@@ -119,4 +125,7 @@ def torques(plant: Plant, data: Record, columns: Columns, cutoff: float = CUTOFF
         state.qpos[at], state.qvel[dofs], state.qacc[dofs] = x[k], v[k], a[k]
         mujoco.mj_inverse(model, state)
         forces[k] = state.qfrc_inverse[dofs]
-    return {name: filtered.low(forces[:, i]) for i, name in enumerate(columns.torque)}
+    found = {}
+    for i, name in enumerate(columns.torque):
+        found[name] = filtered.low(forces[:, i])
+    return found

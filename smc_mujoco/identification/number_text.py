@@ -26,7 +26,9 @@ def table(values: Numbers, errors: Numbers, units: Mapping[str, str]) -> list[st
     rows = [("number", "value", "±", "unit")]
     for name, value in values.items():
         rows.append((name, to_error(value, errors[name]), f"{errors[name]:.2g}", units[name]))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    widths = []
+    for column in zip(*rows, strict=True):
+        widths.append(max(map(len, column)))
     lines = []
     for name, value, error, unit in rows:
         line = f"{name:<{widths[0]}}  {value:>{widths[1]}}  {error:>{widths[2]}}  {unit}"
@@ -55,4 +57,7 @@ def save_condition(file: Path, text: str, condition: Condition) -> Path:
 
 def _percent(fit: Numbers) -> str:
     """Return the fit of each column, such as "x 99.1 %"."""
-    return ", ".join(f"{name} {value:.1f} %" for name, value in fit.items())
+    texts = []
+    for name, value in fit.items():
+        texts.append(f"{name} {value:.1f} %")
+    return ", ".join(texts)

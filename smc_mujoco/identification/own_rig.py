@@ -76,7 +76,10 @@ class OwnRig(Rig):
         """Return the parameters of the plant with some values, by default the rig's own."""
         found = self.values if values is None else values
         parameters = dict(self.plant.parameters)
-        return parameters | {name: found[name] for name in parameters if name in found}
+        for name in parameters:
+            if name in found:
+                parameters[name] = found[name]
+        return parameters
 
     def numbers_of(self, values: Values) -> Fields:
         """Return the fields of a Scenario whose parts and plant have some values."""
@@ -113,7 +116,8 @@ class OwnRig(Rig):
             if isinstance(log, Trace):
                 columns = {self.columns.time: log.t}
                 columns |= records.positions(log, self.columns, noisy=True)
-                columns |= {name: log.u[:, i] for i, name in enumerate(self.columns.inputs)}
+                for i, name in enumerate(self.columns.inputs):
+                    columns[name] = log.u[:, i]
                 data.append(columns)
             else:
                 data.append(self._named(log))
@@ -125,7 +129,10 @@ class OwnRig(Rig):
             return log
         joint = channel_names(self.plant)[0]
         names = {f"{kind}_{joint}": kind for kind in "xu" if kind not in log}
-        return {names.get(name, name): values for name, values in log.items()}
+        found = {}
+        for name, values in log.items():
+            found[names.get(name, name)] = values
+        return found
 
     def part(
         self,
@@ -141,7 +148,7 @@ class OwnRig(Rig):
         stride = math.ceil(period / MAX_PERIOD - 1e-9)
         first = self._first(start, period)
         count = round(plain.fields["duration"] / period) + 1
-        u = np.column_stack([data[name] for name in self.columns.inputs])
+        u = records.stacked(data, self.columns.inputs)
         ahead = math.ceil(MAX_DELAY / period) + 2
         padded = np.concatenate([np.repeat(u[:1], ahead, axis=0), u])
         commands = np.repeat(padded[first : first + ahead + count], stride, axis=0)
@@ -169,15 +176,20 @@ class OwnRig(Rig):
 
     def of_motors(self, kind: str, default: float) -> Array:
         """Return a quantity of each motor, (driven,)."""
+        return self._of_joints(driven_names(self.plant), kind, default)
+
+    def _of_joints(self, joints: Sequence[str], kind: str, default: float) -> Array:
+        """Return a quantity of each of some joints, (joints,)."""
         values = self.values
-        joints = driven_names(self.plant)
-        return np.array([values.get(f"{joint}.{kind}", default) for joint in joints])
+        found = []
+        for joint in joints:
+            found.append(values.get(f"{joint}.{kind}", default))
+        return np.array(found)
 
     @property
     def zeros(self) -> Array:
         """What the encoders read at 0, (n,)."""
-        values = self.values
-        return np.array([values.get(f"{joint}.zero", 0.0) for joint in channel_names(self.plant)])
+        return self._of_joints(channel_names(self.plant), "zero", 0.0)
 
     def repeated(
         self, part: RecordPart, rounded: bool = False, state: Array | None = None, **changes: Any
@@ -194,14 +206,18 @@ class OwnRig(Rig):
             for sensor in sensors:
                 x[list(sensor.channels(plant))] -= sensor.bias
             if not rounded:
-                fields["sensor"] = tuple(
-                    dataclasses.replace(sensor, counts=math.inf) for sensor in sensors
-                )
+                unrounded = []
+                for sensor in sensors:
+                    unrounded.append(dataclasses.replace(sensor, counts=math.inf))
+                fields["sensor"] = tuple(unrounded)
         u = self.command(part)
         times = (part.period * np.arange(len(u))).tolist()
+        references = []
+        for column in u.T:
+            references.append(TimeSeries(times, column.tolist()))
         replayed: Fields = {
             "law": as_recorded(),
-            "reference": tuple(TimeSeries(times, column.tolist()) for column in u.T),
+            "reference": tuple(references),
             "duration": times[-1],
             "control_period": part.period,
             "u_max": math.inf,
@@ -227,9 +243,17 @@ class OwnRig(Rig):
     def not_in_runs(self) -> Names:
         """The quantities that replays have and runs of the machine leave out."""
         joints = driven_names(self.plant)
-        motors = [name for name in self.quantities if name.endswith((".gain", ".offset"))]
-        faulty = {name.rpartition(".")[0] for name in motors}.intersection(joints)
-        zeros = [name for name in self.quantities if name.endswith(".zero")]
+        motors = []
+        zeros = []
+        faulty = set()
+        for name in self.quantities:
+            joint, _, kind = name.rpartition(".")
+            if kind == "zero" and joint:
+                zeros.append(name)
+            elif kind in ("gain", "offset") and joint:
+                motors.append(name)
+                if joint in joints:
+                    faulty.add(joint)
         return tuple(zeros + (motors if len(faulty) > 1 else []))
 
 
@@ -300,5 +324,8 @@ def condition_fields(rig: OwnRig) -> Fields:
         if change != (0.0 if name in rig.plant.added else 1.0):
             mismatch[name] = change
     kept = (*FIELDS, "fault", DELAY, "physics_step")
-    found = {name: fields[name] for name in kept if name in fields}
+    found = {}
+    for name in kept:
+        if name in fields:
+            found[name] = fields[name]
     return found | ({"mismatch": mismatch} if mismatch else {})

@@ -38,7 +38,11 @@ def pairs_figure(
     paths = pages.files(path)
     v, torque = pairs
     colour, *more = style.spread(len(forces))
-    rivals = dict(zip([model for model in forces if model != taken], more, strict=True))
+    others = []
+    for model in forces:
+        if model != taken:
+            others.append(model)
+    rivals = dict(zip(others, more, strict=True))
     handles: list[Line2D | Patch] = [
         Line2D([], [], ls="", marker=".", color=style.INK, label="pairs"),
         Line2D([], [], color=colour, lw=1.8, label=f"taken: {taken}"),

@@ -80,7 +80,9 @@ def presliding(replays: Replays, slopes: Slopes) -> Presliding:
     for way, yielding in _ways(rig).items():
         trial.twin = yielding
         (residuals,) = trial.residuals([slopes.point])
-        changed = [after - before for after, before in zip(residuals, holding, strict=True)]
+        changed = []
+        for after, before in zip(residuals, holding, strict=True):
+            changed.append(after - before)
         c = np.concatenate(slopes.freed(changed))
         share = float(np.linalg.lstsq(np.column_stack([J, c]), -r, rcond=None)[0][-1])
         share = min(max(share, 0.0), 1.0)

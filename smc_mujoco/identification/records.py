@@ -7,7 +7,7 @@ rig.
 import dataclasses
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -105,7 +105,10 @@ def given(record: Any, columns: Mapping[str, str] | None = None) -> Any:
     if isinstance(record, str | os.PathLike):
         return load_record(record, columns)
     if hasattr(record, "to_dict") and hasattr(record, "columns"):  # a data frame
-        record = {str(name): np.asarray(record[name]) for name in record.columns}
+        frame = record
+        record = {}
+        for name in frame.columns:
+            record[str(name)] = np.asarray(frame[name])
     if isinstance(record, Mapping):
         return renamed(record, columns, "the record")
     return record
@@ -118,7 +121,9 @@ def _csv(file: Path) -> Record:
         raise ScenarioError(
             f"{file} has {len(rows)} lines: give a first line with the columns' names, and samples"
         )
-    heads = [name.split("[")[0].strip().lstrip("# ") for name in rows[0]]
+    heads = []
+    for name in rows[0]:
+        heads.append(name.split("[")[0].strip().lstrip("# "))
     values = []
     for number, row in enumerate(rows, 1):
         if len(row) != len(heads):
@@ -149,7 +154,9 @@ def positions(trace: Trace, columns: Columns, noisy: bool = False) -> Record:
         if sensor is not None:
             x = x + sensor.bias
         if noisy and s.noise.position:
-            normals = [philox.normals(s.seed, i, philox.MEASUREMENT, k)[0] for k in range(len(x))]
+            normals = []
+            for k in range(len(x)):
+                normals.append(philox.normals(s.seed, i, philox.MEASUREMENT, k)[0])
             x = x + s.noise.position * np.array(normals)
         if sensor is not None and (quantum := sensor.quantum(s.plant.units[i] == "rad")):
             x = quantum * np.floor(x / quantum + 0.5)
@@ -181,14 +188,20 @@ def checked(record: Data, columns: Columns, period: float | None, rig: str) -> R
         raise ScenarioError(
             f"record is {shown(record)}: give a mapping of columns, such as numpy.load(file)"
         )
-    missing = [name for name in columns.needed(period is not None) if name not in record]
+    missing = []
+    for name in columns.needed(period is not None):
+        if name not in record:
+            missing.append(name)
     if missing:
         raise ScenarioError(
             f"the record of {rig} has no column {', '.join(missing)} "
             f"(it has {', '.join(map(str, record)) or 'none'}): add it, or say which it is, as "
             f"--columns {missing[0]}=NAME (in Python columns={{{missing[0]!r}: 'NAME'}})"
         )
-    data = {name: _numbers(name, record[name], rig) for name in columns.known if name in record}
+    data = {}
+    for name in columns.known:
+        if name in record:
+            data[name] = _numbers(name, record[name], rig)
     t = data[columns.time]
     for name, values in data.items():
         if len(values) != len(t):
@@ -199,7 +212,8 @@ def checked(record: Data, columns: Columns, period: float | None, rig: str) -> R
     step = _checked_step(t, period, rig)
     if period is None:
         even = t[0] + step * np.arange(int((t[-1] - t[0]) / step + 1e-6) + 1)
-        data = {name: np.interp(even, t, values) for name, values in data.items()}
+        for name, values in data.items():
+            data[name] = np.interp(even, t, values)
     for name, offset in zip(columns.x, columns.offset, strict=False):
         data[name] = data[name] - offset
     return data
@@ -253,7 +267,9 @@ def noise(data: Record, columns: Columns) -> float:
     have the standard deviation sqrt(70) sigma for white noise of sigma. Their median ignores short
     transients.
     """
-    medians = [np.median(np.abs(np.diff(data[name], 4))) for name in columns.x]
+    medians = []
+    for name in columns.x:
+        medians.append(np.median(np.abs(np.diff(data[name], 4))))
     return float(min(medians)) / (NORMAL_MEDIAN * math.sqrt(70.0))
 
 
@@ -274,6 +290,11 @@ def _numbers(name: str, values: Any, rig: str) -> Array:
     return array
 
 
+def stacked(data: Record, names: Sequence[str]) -> Array:
+    """Return some columns side by side, (K, names)."""
+    return np.column_stack([data[name] for name in names])
+
+
 def state(data: Record, columns: Columns, period: float, at: int) -> ArrayPair:
     """Return positions and velocities at a sample, (n,) each.
 
@@ -286,11 +307,13 @@ def state(data: Record, columns: Columns, period: float, at: int) -> ArrayPair:
     first = max(0, at - STATE_SAMPLES)
     last = min(len(data[columns.time]), at + STATE_SAMPLES + 1)
     times = period * (np.arange(first, last) - at)
-    cubics = [np.polyfit(times, data[name][first:last], 3) for name in columns.x]
-    x = np.array([cubic[3] for cubic in cubics])
-    if not at:
-        x = np.array([data[name][0] for name in columns.x])
-    return x, np.array([cubic[2] for cubic in cubics])
+    x = []
+    v = []
+    for name in columns.x:
+        _, _, slope, value = np.polyfit(times, data[name][first:last], 3)
+        x.append(value if at else data[name][0])
+        v.append(slope)
+    return np.array(x), np.array(v)
 
 
 def rate(values: Array, period: float, order: int = 1) -> Array:

@@ -90,7 +90,10 @@ class Slopes:
         cause.
         """
         pairs = zip(self.by_states, rows, strict=True)
-        return [row - S @ np.linalg.lstsq(S, row, rcond=SINGULAR_RATIO)[0] for S, row in pairs]
+        freed = []
+        for S, row in pairs:
+            freed.append(row - S @ np.linalg.lstsq(S, row, rcond=SINGULAR_RATIO)[0])
+        return freed
 
     def moves(self, step: Array) -> Array:
         """Return the moves of each piece's states, (pieces, s), that suit a step of the quantities
@@ -159,7 +162,7 @@ class Replays:
         self.report = report
         self.whole = whole or closed or not twin.window
         self.known = known = [twin.quantities[name] for name in names]
-        self.scales = np.array([_scale(quantity) for quantity in known])
+        self.scales = np.array(list(map(_scale, known)))
         self.low = np.array([quantity.least for quantity in known]) / self.scales
         self.high = np.array([quantity.most for quantity in known]) / self.scales
         n = len(twin.columns.x)
@@ -219,9 +222,10 @@ class Replays:
 
     def residuals(self, points: Sequence[Point]) -> list[list[Array]]:
         """Return the residuals of each piece, (N,), at each point. All replays are one batch."""
-        return [
-            list(map(self.relative, self.pieces, by_piece)) for by_piece in self.predicted(points)
-        ]
+        relative = []
+        for by_piece in self.predicted(points):
+            relative.append(list(map(self.relative, self.pieces, by_piece)))
+        return relative
 
     def costs(self, points: Sequence[Point]) -> Array:
         """Return the sum of squares of each piece at each point, (points, pieces)."""
@@ -233,7 +237,7 @@ class Replays:
     def predicted(self, points: Sequence[Point]) -> list[list[Record]]:
         """Return the predicted columns of each piece at each point."""
         self.evaluations += len(points)
-        rigs = [self.rig(point) for point in points]
+        rigs = list(map(self.rig, points))
         if self.twin.dynamics is not None:
             predictions = []
             for rig in rigs:
@@ -257,14 +261,15 @@ class Replays:
         if not (plain := rig.repeated(self._part(0))).realistic:
             return False
         self.steps = _steps(plain, 0)
-        found = [
-            self._replayed([rig], [point], _steps(plain, k))[0] for k in (0, halvings - 1, halvings)
-        ]
+        found = []
+        for k in (0, halvings - 1, halvings):
+            found += self._replayed([rig], [point], _steps(plain, k))
         self.corrections = []
         for plain_steps, coarse, fine in zip(*found, strict=True):
-            self.corrections.append(
-                {name: 2.0 * fine[name] - coarse[name] - plain_steps[name] for name in fine}
-            )
+            correction = {}
+            for name in fine:
+                correction[name] = 2.0 * fine[name] - coarse[name] - plain_steps[name]
+            self.corrections.append(correction)
         return True
 
     @property
@@ -328,9 +333,8 @@ class Replays:
             for e in np.eye(p):
                 values = np.clip(point.values + step * e, self.low, self.high)
                 moved.append(Point(values, point.states))
-            moved.extend(
-                Point(point.values, point.states + step * e) for e in np.eye(len(self.free))
-            )
+            for e in np.eye(len(self.free)):
+                moved.append(Point(point.values, point.states + step * e))
         residuals, *rows = self.residuals([point, *moved])
         count = len(moved) // 2
         gaps = np.full(count, 2.0 * DIFFERENCE_STEP)
@@ -354,7 +358,9 @@ class Replays:
         data = self.twin.checked(self.data[i])
         if twin.dynamics is not None:
             measured = inverse_dynamics.measured(data, twin.columns)
-            spread = {name: _norm(values) for name, values in measured.items()}
+            spread = {}
+            for name, values in measured.items():
+                spread[name] = _norm(values)
             return [Piece(i, None, 0, measured, spread, np.zeros(0))]
         period = twin.step(data)
         first = round(twin.start / period)

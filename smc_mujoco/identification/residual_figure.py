@@ -32,7 +32,8 @@ def residual_figure(
     paths = pages.files(path)
     colours = dict(zip(predicted, style.spread(len(predicted)), strict=True))
     handles = [Line2D([], [], color=style.INK, label="measured")]
-    handles += [Line2D([], [], color=colour, label=twin) for twin, colour in colours.items()]
+    for twin, colour in colours.items():
+        handles.append(Line2D([], [], color=colour, label=twin))
     with style.page():
         height = pages.head_height(style.FULL_WIDTH, handles) + ROW_HEIGHT * len(measured)
         page = pages.blank(style.FULL_WIDTH, height)

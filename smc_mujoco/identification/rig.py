@@ -362,11 +362,17 @@ class Rig:
 
         It repeats a trace by its law, from its start.
         """
-        traces = [record for record in many if isinstance(record, Trace)]
+        traces = []
+        logs = []
+        for record in many:
+            if isinstance(record, Trace):
+                traces.append(record)
+            else:
+                logs.append(record)
         if not traces:
-            return self, [record for record in many if not isinstance(record, Trace)]
+            return self, logs
         law = traces[0].scenario.law
-        if len(traces) < len(many) or any(trace.scenario.law != law for trace in traces):
+        if logs or any(trace.scenario.law != law for trace in traces):
             raise ScenarioError(
                 "records are traces of one law, or columns: give one kind at a time"
             )
@@ -445,7 +451,7 @@ class Rig:
         the replays that differ, such as their physics step.
         """
         names = self.columns
-        data = [self.checked(record) for record in many]
+        data = list(map(self.checked, many))
         found = []
         if self.dynamics is not None:
             plant = self.dynamics(Values(**self.values))
@@ -454,7 +460,7 @@ class Rig:
                 torques = inverse_dynamics.torques(plant, columns, names)
                 found.append((torques, measured, inverse_dynamics.times(columns, names)))
             return found
-        parts = [self.part(record) for record in many]
+        parts = list(map(self.part, many))
         scenarios = []
         for part, state in zip(parts, states or [None] * len(many), strict=True):
             scenarios.append(self.repeated(part, state=state, **changes))
@@ -472,7 +478,9 @@ class Rig:
             predicted = self.predicted(trace)
             for name, values in predicted.items():
                 predicted[name] = values[:: part.stride][after:]
-            measured = {name: columns[name][scored] for name in predicted}
+            measured = {}
+            for name in predicted:
+                measured[name] = columns[name][scored]
             found.append((predicted, measured, columns[names.time][scored]))
         return found
 

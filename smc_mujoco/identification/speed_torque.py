@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.aliases import AnyPath, Array, Fields, Numbers
+from smc_mujoco.common.data import attributes
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import as_path, write_json
 from smc_mujoco.identification import number_text, records
@@ -132,9 +133,7 @@ class FrictionFound:
     def about(self) -> Fields:
         """Return the fits as JSON data."""
         told = ("numbers", "errors", "rms", "held_out", "r2")
-        fits = {}
-        for model, fit in self.fits.items():
-            fits[model] = {name: getattr(fit, name) for name in told}
+        fits = {model: attributes(fit, told) for model, fit in self.fits.items()}
         return {"best": self.best.model, "fits": fits}
 
     def save(self, path: AnyPath) -> Path:
@@ -164,7 +163,8 @@ class FrictionFound:
             mark = "*" if fit is self.best else " "
             rows.append(f"{fit.model:<29}{mark} {fit.rms:8.4f} {fit.held_out:8.4f} {fit.r2:6.3f}")
         rows += ["", *number_text.table(self.best.numbers, self.best.errors, UNITS)]
-        rows += [f"{name} would be negative, and is 0" for name in self.best.at_zero]
+        for name in self.best.at_zero:
+            rows.append(f"{name} would be negative, and is 0")
         return "\n".join([*rows, *filter(None, [self.no_friction])])
 
 
@@ -260,7 +260,10 @@ def _columns(terms: tuple[str, ...], v: Array, speed: float) -> Array:
         "viscous": lambda: v,
         "offset": lambda: np.ones_like(v),
     }
-    return np.column_stack([known[term]() for term in terms])
+    columns = []
+    for term in terms:
+        columns.append(known[term]())
+    return np.column_stack(columns)
 
 
 def _solved(terms: tuple[str, ...], v: Array, force: Array, speed: float) -> Array:
@@ -270,7 +273,10 @@ def _solved(terms: tuple[str, ...], v: Array, force: Array, speed: float) -> Arr
     while True:
         numbers = np.zeros(len(terms))
         numbers[free] = np.linalg.lstsq(columns[:, free], force, rcond=None)[0]
-        negative = [i for i in free if terms[i] in NATURAL and numbers[i] < 0.0]
+        negative = []
+        for i in free:
+            if terms[i] in NATURAL and numbers[i] < 0.0:
+                negative.append(i)
         if not negative:
             return numbers
         free.remove(min(negative, key=lambda i: numbers[i]))
@@ -290,7 +296,7 @@ def _speed(terms: tuple[str, ...], v: Array, force: Array) -> float:
 
     low, high = 2.0 * np.abs(v).min(), 0.5 * np.abs(v).max()
     grid = np.linspace(np.log(low), np.log(max(high, 2.0 * low)), SCAN)
-    best = int(np.argmin([loss(one) for one in grid]))
+    best = int(np.argmin(list(map(loss, grid))))
     around = grid[max(best - 1, 0)], grid[min(best + 1, SCAN - 1)]
     found: Any = minimize_scalar(loss, bounds=around, method="bounded")
     return float(np.exp(found.x))
@@ -312,12 +318,20 @@ def _fitted(
         first, last = (v[:cut], force[:cut]), (v[cut:], force[cut:])
     used = _speed(terms, *first)
     rest = last[1] - _columns(terms, last[0], used) @ _solved(terms, *first, used)
-    names = ["level" if term == "smooth" else term for term in terms]
+    names = []
+    speeds = []
+    for term in terms:
+        names.append("level" if term == "smooth" else term)
+        if term in SPEED_OF:
+            speeds.append(SPEED_OF[term])
     found = dict(zip(names, numbers.tolist(), strict=True))
-    speeds = [SPEED_OF[term] for term in terms if term in SPEED_OF]
     found |= dict.fromkeys(speeds, speed)
     covariance, losses = _covariance(terms, pairs, numbers, speed)
     errors = np.sqrt(np.diag(covariance))
+    zeros = []
+    for name in names:
+        if name != "offset" and found[name] == 0.0:
+            zeros.append(name)
     fit = FrictionFit(
         model,
         found,
@@ -326,7 +340,7 @@ def _fitted(
         float(np.sqrt(np.mean(rest**2))),
         float(1.0 - np.sum(residual**2) / np.sum((force - force.mean()) ** 2)),
         covariance,
-        tuple(name for name in names if name != "offset" and found[name] == 0.0),
+        tuple(zeros),
     )
     return fit, losses
 
@@ -339,7 +353,8 @@ def _slopes(v: Array, terms: tuple[str, ...], numbers: Array, speed: float) -> A
     if not set(terms) & SPEED_OF.keys():
         return slopes
     step = 1e-4 * speed
-    faster, slower = (_columns(terms, v, speed + sign * step) for sign in (1.0, -1.0))
+    faster = _columns(terms, v, speed + step)
+    slower = _columns(terms, v, speed - step)
     return np.column_stack([slopes, (faster - slower) @ numbers / (2.0 * step)])
 
 
@@ -356,7 +371,7 @@ def _covariance(
     slopes = _slopes(v, terms, numbers, speed)
     residual = force - _columns(terms, v, speed) @ numbers
     free = np.any(slopes != 0.0, axis=0)
-    free[: len(terms)] &= (numbers != 0.0) | np.array([term == "offset" for term in terms])
+    free[: len(terms)] &= (numbers != 0.0) | (np.array(terms) == "offset")
     kept = np.flatnonzero(free)
     slopes = slopes[:, kept]
     whole = slopes.T @ slopes

@@ -96,7 +96,7 @@ def between(slopes: Slopes, groups: Sequence[int]) -> Array:
     Survey Methodology 28(2), 2002 (CR2).
     """
     p = slopes.by_values[0].shape[1]
-    every = {group: (np.zeros((p, p)), np.zeros(p)) for group in groups}
+    every = dict.fromkeys(groups, (np.zeros((p, p)), np.zeros(p)))
     pieces = zip(groups, slopes.residuals, slopes.by_values, slopes.by_states, strict=True)
     for group, r, J, S in pieces:
         A, g = _normal(r, J, S)
@@ -191,13 +191,17 @@ def _fed_back(replays: Replays, point: Point, J: Array) -> Array:
         noises.append(dataclasses.replace(rounded, noise=Noise(noise)))
     scenarios = list(calm)
     for repeat in range(REPEATS):
-        scenarios += [dataclasses.replace(scenario, seed=repeat) for scenario in noises]
+        for scenario in noises:
+            scenarios.append(dataclasses.replace(scenario, seed=repeat))
     traces = iter(run(scenarios))
     rows = []
     for _ in range(1 + REPEATS):
         predicted = replays.by_piece(rig, traces)
         rows.append(np.concatenate(list(map(replays.relative, replays.pieces, predicted))))
     expected, *repeats = rows
-    moved = np.array([np.linalg.lstsq(J, repeat - expected, rcond=None)[0] for repeat in repeats])
+    moves = []
+    for repeat in repeats:
+        moves.append(np.linalg.lstsq(J, repeat - expected, rcond=None)[0])
+    moved = np.array(moves)
     replays.report(1)
     return np.sqrt(np.mean(moved**2, axis=0))
