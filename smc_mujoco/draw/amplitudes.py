@@ -106,7 +106,9 @@ def amplitudes(
         handles.append(pages.entry(label, style.PAPER, mec=style.MUTED, **dot))
         plant = next(iter(runs.values()))[0].scenario.plant
         factor, unit = style.prefixed(ax.dataLim.ymax, f"{plant.unit}/s")
-        ticks = set().union(*(over_lag.lags for over_lag in drawn))
+        ticks = set()
+        for over_lag in drawn:
+            ticks.update(over_lag.lags)
         set_axes(ax, sorted(ticks), factor, unit)
         pages.set_head(page, style.FULL_WIDTH, title, handles, shared)
         return pages.write(page, pages.files(path))

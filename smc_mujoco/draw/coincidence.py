@@ -36,7 +36,10 @@ def agreements(lines: Sequence[Line], limits: Pair, logarithmic: bool = False) -
     last = max(float(t[-1]) for t, _ in lines)
     until = []
     for one in lines:
-        until.append([_parting(one, other, limits, logarithmic) for other in lines])
+        partings = []
+        for other in lines:
+            partings.append(_parting(one, other, limits, logarithmic))
+        until.append(partings)
     found = []
     left = list(range(len(lines)))
     if MIN_AGREEMENT * last <= min(until[0]) < last:
@@ -84,7 +87,8 @@ def tell_agreements(ax: Axes, shared: Sequence[Agreement], names: Sequence[str])
     height = 72 * ax.get_window_extent().height / ax.figure.dpi  # points
     room = 72 * ax.get_window_extent().width / ax.figure.dpi - size
     forever = [one for one in shared if one[1] == np.inf]
-    for said in [agreement_words(which, names) for which in (shared, forever)]:
+    for which in (shared, forever):
+        said = agreement_words(which, names)
         words = style.wrapped(said, room, size, 2)
         lines = 1 + words.count("\n")
         if words and "…" not in words and height >= MIN_WORDS * size * lines:

@@ -34,6 +34,11 @@ class Envelope(NamedTuple):
     high: Array
 
 
+def arrays_within(trace: Trace, part: slice) -> dict[str, Array]:
+    """Return name -> array of a part of a trace's samples."""
+    return {name: array[part] for name, array in trace.arrays().items()}
+
+
 def finite(trace: Trace) -> Trace:
     """Return the trace up to its last finite sample; if there is none, one sample with the initial
     state.
@@ -42,7 +47,7 @@ def finite(trace: Trace) -> Trace:
     if not bad.any():
         return trace
     count = int(np.argmax(bad))
-    part = {name: array[: max(1, count)] for name, array in trace.arrays().items()}
+    part = arrays_within(trace, slice(max(1, count)))
     if count == 0:
         part |= {
             "x": np.array([trace.scenario.resolved.x0]),
@@ -143,7 +148,7 @@ def close_reversals(first: Array, last: Array, near: int) -> list[Array]:
     brief = np.flatnonzero(last - first <= near)
     pauses = first[brief[1:]] - last[brief[:-1]]
     parts = np.split(brief, np.flatnonzero(pauses > near) + 1)
-    return [part for part in parts if len(part)]
+    return list(filter(len, parts))
 
 
 def smooth(y: Array, width: int) -> Array:

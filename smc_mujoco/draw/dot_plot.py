@@ -130,7 +130,9 @@ def _dots(table: RunColumns, metrics: Sequence[str], winners: Collection[Cell]) 
     for name in metrics:
         if name != SETTLES and name not in CATALOGUE:
             raise unknown("metric", name, [SETTLES, *CATALOGUE])
-    plants, laws, conditions = (_distinct(table, name) for name in ("plant", "law", "condition"))
+    plants = _distinct(table, "plant")
+    laws = _distinct(table, "law")
+    conditions = _distinct(table, "condition")
     if not plants or not metrics:
         raise ScenarioError(
             "no runs or no metrics to draw: give a table with rows, and at least one metric"
@@ -139,21 +141,33 @@ def _dots(table: RunColumns, metrics: Sequence[str], winners: Collection[Cell]) 
     ran = set(zip(table.column("plant").tolist(), table.column("condition").tolist(), strict=True))
     conditions_of = {}
     for plant in plants:
-        conditions_of[plant] = [name for name in conditions if (plant, name) in ran]
+        on_plant = []
+        for name in conditions:
+            if (plant, name) in ran:
+                on_plant.append(name)
+        conditions_of[plant] = on_plant
     units = {}
     labels = {}
     for group in groups(table, GROUPS[:1]):
         plant = group.name["plant"]
         runs = scenarios(table, group)
         units[plant] = unit_of_x(plant, runs)
-        labels[plant] = next((one.plant for one in runs if one), plant)
+        labels[plant] = plant
+        for scenario in runs:
+            if scenario:
+                labels[plant] = scenario.plant
+                break
+    logarithmic = set()
+    for name in metrics:
+        if _differs_much(intervals, name):
+            logarithmic.add(name)
     return Dots(
         metrics=list(metrics),
         conditions=conditions_of,
         looks=_looks(laws),
         intervals=intervals,
         won=intervals.keys() & set(winners),
-        logarithmic={name for name in metrics if _differs_much(intervals, name)},
+        logarithmic=logarithmic,
         units=units,
         labels=labels,
         heading=style.heading([*labels.values()], conditions, short=len(plants) > 1),
@@ -174,7 +188,10 @@ def _differs_much(intervals: Mapping[Cell, Interval], metric: str) -> bool:
         return False
     found = False
     for plant in dict.fromkeys(cell[1] for cell in intervals):
-        here = [its for cell, its in intervals.items() if cell[:2] == (metric, plant)]
+        here = []
+        for cell, its in intervals.items():
+            if cell[:2] == (metric, plant):
+                here.append(its)
         sizes = _finite(here)
         if sizes.size and not sizes.min() > 0.0:
             return False
@@ -202,8 +219,13 @@ def _draw_plant(row: Array, dots: Dots, plant: str, named: bool) -> None:
     """
     for ax, name in zip(row, dots.metrics, strict=True):
         here = name, plant
-        of_panel = {cell[2:]: its for cell, its in dots.intervals.items() if cell[:2] == here}
-        rings = [cell[2:] for cell in dots.won if cell[:2] == here]
+        of_panel = {}
+        rings = []
+        for cell, interval in dots.intervals.items():
+            if cell[:2] == here:
+                of_panel[cell[2:]] = interval
+                if cell in dots.won:
+                    rings.append(cell[2:])
         decades = name in dots.logarithmic
         _panel(ax, of_panel, dots.conditions[plant], dots.looks, name, rings, decades)
         ax.set_xlabel(_label(name, dots.units[plant]))

@@ -141,18 +141,25 @@ def figure(
         return pages.save(ax.figure, paths)
     width, height = pages.measure(size, fig)
     runs = DrawnRuns.of(traces, labels)
-    if panels is None:
-        traces = runs.traces
-        chosen = _default(traces, width)
-        if traces[0].scenario.tracks == "speed":  # x is x', which has no portrait
-            chosen = [name for name in chosen if name != "phase"]
-        if size == "slide":
-            chosen = [name for name in chosen if name in SLIDE_PANELS]
-    else:
-        chosen = [find("panel", name, PANEL_NAMES) for name in items_of("panels", panels)]
+    chosen = _chosen(runs.traces, panels, size, width)
     with style.page(width):
         page = _composed_page(runs, chosen, (width, height), title, fig)
         return pages.write(page, paths)
+
+
+def _chosen(
+    traces: Sequence[Trace], panels: Sequence[str] | None, size: Size, width: float
+) -> list[str]:
+    """Return the names of the panels to draw: those asked for, or the usual ones of these runs."""
+    if panels is not None:
+        return [find("panel", name, PANEL_NAMES) for name in items_of("panels", panels)]
+    chosen = []
+    for name in _default(traces, width):
+        if name == "phase" and traces[0].scenario.tracks == "speed":  # x is x': no portrait
+            continue
+        if size != "slide" or name in SLIDE_PANELS:
+            chosen.append(name)
+    return chosen
 
 
 def _composed_page(
@@ -190,7 +197,7 @@ def _composed_page(
     free = 72 * (page.bbox.height / page.dpi - space - 0.4)  # points
     cells = _cells(page, list(columns), heights)
     for k, panels in ((0, blocks.left), (1, blocks.right)):
-        rows = next((high for column, high in columns.items() if k in column), 1.0)
+        rows = _height_of(columns, k)
         pitch = free / max(1.0, rows)
         words = drawing.titles(panels, (pitch * np.array(heights[k])).tolist())
         _draw_over_time(page, cells[k], list(zip(panels, words, strict=True)), runs, k == 0)
@@ -217,9 +224,19 @@ class Blocks(NamedTuple):
         return list(map(_height, self.left)), list(map(_height, self.right)), beside
 
 
+def _height_of(columns: Mapping[tuple[int, ...], float], block: int) -> float:
+    """Return the height of the column that has a block, in rows."""
+    for blocks, high in columns.items():
+        if block in blocks:
+            return high
+    return 1.0
+
+
 def _blocks(runs: DrawnRuns, chosen: Sequence[str]) -> Blocks:
     """Return the chosen panels of traces."""
-    early = [horizon.until(trace, runs.span[0]) for trace in runs.traces]
+    early = []
+    for trace in runs.traces:
+        early.append(horizon.until(trace, runs.span[0]))
     left: list[Panel] = []
     right: list[Panel] = []
     left_out = ""
@@ -235,7 +252,7 @@ def _blocks(runs: DrawnRuns, chosen: Sequence[str]) -> Blocks:
         if name in chosen:
             panels = drawing.over_groups(early, quantity)
             left += panels if name == "d" else _by_joint(panels)
-    groups = [Panel("x", *each) for each in style.split(runs.traces).items()]
+    groups = drawing.of_groups(runs.traces, "x")
     portraits = _by_joint(groups)
     beside = []
     for name in chosen:
@@ -253,7 +270,11 @@ def _columns(blocks: Blocks, narrow: bool) -> dict[tuple[int, ...], float]:
         columns = {(0, 1, 2): sum(sums)}
     else:
         columns = {(0,): sums[0], (1, 2): sums[1] + sums[2]}
-    return {column: high for column, high in columns.items() if high}
+    filled = {}
+    for column, high in columns.items():
+        if high:
+            filled[column] = high
+    return filled
 
 
 def _usual_height(width: float, space: float, rows: float, panels: int) -> float:
@@ -271,7 +292,11 @@ def _controls(errors: Sequence[Panel], traces: Sequence[Trace]) -> list[Panel]:
     """Return the panels of u of the channels of these errors; of a free body, of its actuators."""
     if traces[0].scenario.plant.pose:
         return drawing.actuators(traces)
-    return [error._replace(quantity="u") for error in errors if error.group.driven]
+    controls = []
+    for error in errors:
+        if error.group.driven:
+            controls.append(error._replace(quantity="u"))
+    return controls
 
 
 def _cells(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from smc_mujoco.draw import style
-from smc_mujoco.draw.decimate import end
+from smc_mujoco.draw.decimate import arrays_within, end
 from smc_mujoco.draw.quantities import span
 from smc_mujoco.simulation.trace import Trace
 
@@ -43,14 +43,14 @@ def horizon(traces: Sequence[Trace]) -> float:
 def until(trace: Trace, time: float) -> Trace:
     """Return the trace up to a time, s, with two samples at least."""
     count = max(2, int(np.searchsorted(trace.t, time + 1e-9)))
-    part = {name: array[:count] for name, array in trace.arrays().items()}
+    part = arrays_within(trace, slice(count))
     return dataclasses.replace(trace, **part)
 
 
 def since(trace: Trace, time: float) -> Trace:
     """Return the trace from a time on, s, as a run of its own, which is not smoothed."""
     first = min(int(np.searchsorted(trace.t, time - 1e-9)), len(trace.t) - 2)
-    part = {name: array[first:] for name, array in trace.arrays().items()}
+    part = arrays_within(trace, slice(first, None))
     part["t"] = part["t"] - part["t"][0]
     calm = {"duration": float(part["t"][-1]), "jump": None, "fault": None}
     scenario = dataclasses.replace(trace.scenario, **calm)

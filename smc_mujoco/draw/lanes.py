@@ -96,7 +96,9 @@ def in_lanes(panel: Panel) -> bool:
     if panel.quantity != "u" or len(panel.traces) < 2:
         return False
     least = MIN_WIDE_BAND * np.ptp(limits(panel.traces, "u"))
-    switches = [np.sum(np.abs(np.diff(trace.u, axis=0)) > least) for trace in panel.traces]
+    switches = []
+    for trace in panel.traces:
+        switches.append(np.sum(np.abs(np.diff(trace.u, axis=0)) > least))
     return max(switches) > MAX_SWITCHES or crowded(panel, 0)
 
 

@@ -90,9 +90,15 @@ def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour:
     unit = -cycle.response
     fastest = math.pi / scenario.control_period
     omegas = np.geomspace(omega / SPAN_FACTOR, min(omega * SPAN_FACTOR, fastest), 400)
-    response = np.array([loop.response(w) for w in omegas]) / unit
+    responses = []
+    for w in omegas:
+        responses.append(loop.response(w))
+    response = np.array(responses) / unit
     amplitudes = cycle.amplitude_x * np.geomspace(1 / SPAN_FACTOR, SPAN_FACTOR, 60)
-    inverse = np.array([1.0 / (loop.gain(a, omega) or math.nan) for a in amplitudes]) / unit
+    inverses = []
+    for a in amplitudes:
+        inverses.append(1.0 / (loop.gain(a, omega) or math.nan))
+    inverse = np.array(inverses) / unit
     wide = style.points(1.6)
     curve = {"color": style.INK, "lw": wide, "label": "L, over frequency"}
     ax.plot(response.real, response.imag, **curve)

@@ -169,7 +169,7 @@ def _legend(handles: Sequence[Handle], width: float) -> tuple[list[str], int]:
         for one in handles:
             label = style.wrapped(str(one.get_label()), share * page - beside, size, lines=2)
             labels.append(label)
-            widths.append(beside + max(style.width(line, size) for line in label.split("\n")))
+            widths.append(beside + style.widest(label.split("\n"), size))
         for columns in range(len(widths), 1, -1):
             if sum(map(max, np.array_split(widths, columns))) < page - 16:
                 return labels, columns
@@ -244,10 +244,13 @@ def gain_sources(sources: Sequence[Iterable[Source]]) -> tuple[list[str], str]:
     for its in sources:
         source = kinds(its)
         words.append("" if source in ("", NONE) else f"gains: {source}")
-    different = {text for text in words if text}
+    different = set(filter(None, words))
     if len(different) == 1:
         return [""] * len(words), different.pop()
-    return [f", {text}" if text else "" for text in words], ""
+    told = []
+    for text in words:
+        told.append(f", {text}" if text else "")
+    return told, ""
 
 
 def files(path: str | os.PathLike[str] | None, format: str | None = None) -> list[Path]:

@@ -166,6 +166,11 @@ def is_shared(panel: Panel) -> bool:
     return all(np.array_equal(first.d, other.d, equal_nan=True) for other in others)
 
 
+def of_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
+    """Return a panel of the quantity for each group of channels."""
+    return [Panel(quantity, *each) for each in style.split(traces).items()]
+
+
 def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
     """Return the panels of a quantity over time, one for each group of channels that has it; a tip
     has one panel.
@@ -173,7 +178,7 @@ def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
     scenarios = [trace.scenario for trace in traces]
     if quantity == "s":
         traces = [trace if slides(trace) else without_s(trace) for trace in traces]
-    panels = [Panel(quantity, *each) for each in style.split(traces).items()]
+    panels = of_groups(traces, quantity)
     if quantity == "tip":
         return [panels[0]._replace(traces=traces)] if all(s.plant.tip for s in scenarios) else []
     if quantity == "contact":
@@ -212,16 +217,18 @@ def worst_first(traces: Sequence[Trace]) -> list[Panel]:
     found = []
     for group, parts in style.split(traces).items():
         size = max(map(scale, parts))
-        found.extend(
-            (mean_error(panel) / size, panel) for panel in by_channel(Panel("e", group, parts))
-        )
+        for panel in by_channel(Panel("e", group, parts)):
+            found.append((mean_error(panel) / size, panel))
     found.sort(key=lambda one: -one[0])
     return [panel for _, panel in found]
 
 
 def mean_error(panel: Panel) -> float:
     """Return the largest mean |x - r| of a panel's runs, those that failed included."""
-    return max(float(np.nansum(np.abs(run.x - run.r))) / len(run.t) for run in panel.traces)
+    errors = []
+    for run in panel.traces:
+        errors.append(float(np.nansum(np.abs(run.x - run.r))) / len(run.t))
+    return max(errors)
 
 
 def by_channel(panel: Panel) -> list[Panel]:
@@ -245,7 +252,10 @@ def actuators(traces: Sequence[Trace]) -> list[Panel]:
     """
     group, parts = next(iter(style.split(traces).items()))
     first = dataclasses.replace(group, channels=(0,))
-    pushing = np.any([np.nan_to_num(part.u).any(axis=0) for part in parts], axis=0)
+    pushed = []
+    for part in parts:
+        pushed.append(np.nan_to_num(part.u).any(axis=0))
+    pushing = np.any(pushed, axis=0)
     panels = []
     for j in np.flatnonzero(pushing).tolist():
         runs = []
@@ -316,7 +326,10 @@ def meaning(panels: Sequence[Panel]) -> dict[str, str]:
 def titles(panels: Sequence[Panel], heights: Sequence[float]) -> list[str]:
     """Return the labels of panels of these heights in points, long ones on several lines."""
     pairs = zip(panels, heights, strict=True)
-    return [style.folded(panel.label, 0.95 * height) for panel, height in pairs]
+    folded = []
+    for panel, height in pairs:
+        folded.append(style.folded(panel.label, 0.95 * height))
+    return folded
 
 
 def curve(trace: Trace, y: Array, name: str) -> ArrayPair:
@@ -397,7 +410,9 @@ def over_time(
             ending: Fields = {"color": colour, "clip_on": False, "zorder": 5, **cross()}
             artists += ax.plot(trace.t[-1], last, "X", **ending)
     if names and (name in SINGLE or len(panel.group.channels) == 1):
-        lines = [(trace.t, y) for trace, y in zip(traces, means, strict=True)]
+        lines = []
+        for trace, y in zip(traces, means, strict=True):
+            lines.append((trace.t, y))
         tell_agreements(ax, agreements(lines, heights, name in PEAKS), names)
     return artists
 
@@ -549,8 +564,8 @@ def phase(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
     names = "x", "v"
     if any(np.nan_to_num(np.ptp(trace.r, axis=0)).any() for trace in traces):
         names = "e", "de"
-    pair = [panel._replace(quantity=name) for name in names]
-    for axis, words in zip((ax.xaxis, ax.yaxis), pair, strict=True):
+    for axis, name in zip((ax.xaxis, ax.yaxis), names, strict=True):
+        words = panel._replace(quantity=name)
         set_numbers(axis, words)
         axis.set_label_text(style.folded(words.label))
     ax.set(xlim=limits(traces, names[0]), ylim=limits(traces, names[1]))

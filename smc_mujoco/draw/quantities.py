@@ -79,18 +79,25 @@ def lasting(traces: Sequence[Trace], name: str) -> list[Array]:
     """Return the values of successful runs; if there are none, of failed ones without their
     ends.
     """
-    values = [QUANTITIES[name](trace) for trace in traces if trace.diverged_at is None]
+    values = []
+    for trace in traces:
+        if trace.diverged_at is None:
+            values.append(QUANTITIES[name](trace))
     if not values:
         for trace in traces:
             y = QUANTITIES[name](trace)
             share = UNDIVERGED_SHARE if trace.plant_diverged else 1.0
             values.append(y[: max(1, int(share * len(y)))])
-    return [y for y in values if np.isfinite(y).all()]
+    lasts = []
+    for y in values:
+        if np.isfinite(y).all():
+            lasts.append(y)
+    return lasts
 
 
 def span(traces: Sequence[Trace], name: str) -> Pair:
     """Return the least and largest value of the runs that last."""
-    values = np.concatenate([np.ravel(y) for y in lasting(traces, name)] or [np.zeros(1)])
+    values = np.concatenate(list(map(np.ravel, lasting(traces, name))) or [np.zeros(1)])
     return float(values.min()), float(values.max())
 
 
@@ -113,7 +120,10 @@ def limits(traces: Sequence[Trace], name: str) -> Pair:
     """
     low, high = span(traces, name)
     if name == "x":
-        r = np.concatenate([trace.r[np.isfinite(trace.r)] for trace in traces])
+        references = []
+        for trace in traces:
+            references.append(trace.r[np.isfinite(trace.r)])
+        r = np.concatenate(references)
         low = min(low, r.min(initial=low))
         high = max(high, r.max(initial=high))
     if name == "e":

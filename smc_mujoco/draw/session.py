@@ -122,10 +122,11 @@ class Session:
         and says why.
         """
         try:
-            self.begin(
-                [changed(s) if run in {None, i} else s for i, s in enumerate(self.scenarios)],
-                sample,
-            )
+            scenarios = list(self.scenarios)
+            for i, scenario in enumerate(self.scenarios):
+                if run in {None, i}:
+                    scenarios[i] = changed(scenario)
+            self.begin(scenarios, sample)
             self.message = ""
         except ScenarioError as error:
             self.message = str(error)
@@ -196,7 +197,9 @@ class Session:
         """Write a new scene file whose runs are these to the bit; refuse what it could not
         repeat.
         """
-        runs = {f"{s.law.name} {i + 1}": describe(s) for i, s in enumerate(self.scenarios)}
+        runs = {}
+        for i, s in enumerate(self.scenarios):
+            runs[f"{s.law.name} {i + 1}"] = describe(s)
         runs = json.loads(json.dumps(runs))
         if tuple(map(restore, runs.values())) != self.scenarios:
             raise ScenarioError(

@@ -50,9 +50,15 @@ def timeline(
     shown = played(trace.t) if played else trace.t
     gap = backlash_gap(trace.scenario)
     hits = contacts(trace, shown)
-    rest = np.array([~extended(~on, shown, MIN_STATE_TIME) for on in at_rest(trace).T])
+    resting = []
+    for on in at_rest(trace).T:
+        resting.append(~extended(~on, shown, MIN_STATE_TIME))
+    rest = np.array(resting)
     rest &= has_dry_friction(trace.scenario)
-    sides = np.array([backlash_side(flank, shown, MIN_STATE_TIME) for flank in flanks(trace).T])
+    sides_of_flanks = []
+    for flank in flanks(trace).T:
+        sides_of_flanks.append(backlash_side(flank, shown, MIN_STATE_TIME))
+    sides = np.array(sides_of_flanks)
     plant = trace.scenario.plant
     names = () if plant.network and not plant.direct else channel_names(plant)
     states: list[State | None] = []
@@ -134,21 +140,26 @@ def has_dry_friction(scenario: Scenario) -> bool:
     plant = scenario.plant
     if plant.rubs or any(plant.parameters[name] > 0.0 for name in plant.dry):
         return True
-    on_joints = [part for part in scenario.friction if part.side == "link"]
-    if any((isinstance(f, Coulomb) and f.level > 0.0) or f.keeps_state for f in on_joints):
-        return True
+    for part in scenario.friction:
+        rubs = (isinstance(part, Coulomb) and part.level > 0.0) or part.keeps_state
+        if part.side == "link" and rubs:
+            return True
     if not scenario.contact:
         return False
     model = shapes(scenario)[0].model
-    return any(
-        model.pair(i).name.startswith(RUB) and model.pair_friction[i, 0] > 0.0
-        for i in range(model.npair)
-    )
+    for i in range(model.npair):
+        rubs = model.pair(i).name.startswith(RUB)
+        if rubs and model.pair_friction[i, 0] > 0.0:
+            return True
+    return False
 
 
 def backlash_gap(scenario: Scenario) -> float:
     """Return the gap of the scenario's backlash in rad or m, 0 without one."""
-    return next((part.gap for part in scenario.actuator if isinstance(part, Backlash)), 0.0)
+    for part in scenario.actuator:
+        if isinstance(part, Backlash):
+            return part.gap
+    return 0.0
 
 
 def flanks(trace: Trace) -> Array:
@@ -189,7 +200,10 @@ def stick_words(sticks: Array, names: Sequence[str] = ()) -> str:
     if sticks.all():
         return "sticks"
     if names:
-        who = [name for name, stuck in zip(names, sticks, strict=True) if stuck]
+        who = []
+        for name, stuck in zip(names, sticks, strict=True):
+            if stuck:
+                who.append(name)
         return f"{joined(who)} {'sticks' if len(who) == 1 else 'stick'}"
     return f"{sticks.sum()} of {len(sticks)} stick"
 
@@ -198,4 +212,4 @@ def backlash_words(sides: Sequence[int] | Array) -> str:
     """Return words for channels in their backlash."""
     if len(set(sides)) == 1:
         return SIDES[int(sides[0])]
-    return f"{sum(side == 0 for side in sides)} of {len(sides)} in play"
+    return f"{list(sides).count(0)} of {len(sides)} in play"

@@ -148,9 +148,11 @@ def runs_of(
             raise ScenarioError(
                 f"scenario is {shown(scenario)}: give a Scenario or two, or a plant"
             )
-        runs = [
-            dataclasses.replace(runs[0], law=law_for(runs[0].plant, law)) for law in wanted
-        ] or list(runs)
+        first = runs[0]
+        of_laws = []
+        for law in wanted:
+            of_laws.append(dataclasses.replace(first, law=law_for(first.plant, law)))
+        runs = of_laws or list(runs)
     else:
         plant = as_plant(runs)
         runs = []

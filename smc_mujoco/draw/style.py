@@ -15,7 +15,7 @@ import json
 import math
 import re
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -217,7 +217,10 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
     places = dict.fromkeys(palette()["stated"], 0)
     for place, name in enumerate(palette()["chosen"], 1):
         places[name] = place
-    library = [i for i in everyone if names[i] in places]
+    library = []
+    for i in everyone:
+        if names[i] in places:
+            library.append(i)
     library.sort(key=lambda i: (places[names[i]], names[i]))
     colours: dict[int, str] = {}
     changed = []
@@ -362,7 +365,10 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
             raise ScenarioError(
                 f"labels are {shown(given)} for {len(traces)} traces: give one string a trace"
             )
-        return [label if isinstance(label, str) else shown(label) for label in given]
+        texts = []
+        for label in given:
+            texts.append(label if isinstance(label, str) else shown(label))
+        return texts
     names = [law_name(trace.scenario.law) for trace in traces]
     told = []
     for trace, name in zip(traces, names, strict=True):
@@ -382,8 +388,14 @@ def differences(trace: Trace, others: Sequence[Trace]) -> str:
     Where the condition differs, its name replaces the fields that are equal in all its runs.
     """
     scenario = trace.scenario
-    alike = [run for run in others if law_name(run.scenario.law) == law_name(scenario.law)]
-    same = [run for run in alike if run.scenario.condition == scenario.condition]
+    law = law_name(scenario.law)
+    alike = []
+    same = []
+    for run in others:
+        if law_name(run.scenario.law) == law:
+            alike.append(run)
+            if run.scenario.condition == scenario.condition:
+                same.append(run)
     parts = []
     for name, words in _settings(trace).items():
         runs = same if name in CONDITION_FIELDS else alike
@@ -393,6 +405,10 @@ def differences(trace: Trace, others: Sequence[Trace]) -> str:
         if any(_parameters(run)[name] != words for run in others):
             parts.append(f"plant's {words}" if name in scenario.law.gains else words)
     return ", ".join(parts)
+
+
+def _as_words(values: Mapping[str, Any]) -> dict[str, str]:
+    return {name: _setting(name, value) for name, value in values.items()}
 
 
 @once_per_trace
@@ -405,7 +421,7 @@ def _settings(trace: Trace) -> Mapping[str, str]:
     for name in Scenario.fields():
         if name not in ("law", "plant", "mismatch"):
             values[name] = getattr(scenario, name)
-    words = {name: _setting(name, value) for name, value in values.items()}
+    words = _as_words(values)
     if scenario.plant.is_user_model:  # whose file may have some
         words["friction"] = _setting("added friction", scenario.friction)
     return words
@@ -414,7 +430,7 @@ def _settings(trace: Trace) -> Mapping[str, str]:
 def _parameters(trace: Trace) -> dict[str, str]:
     """Return the true parameters of a run's machine in words."""
     true = vars(trace.scenario.plant.values(trace.scenario.mismatch))
-    return {name: _setting(name, value) for name, value in true.items()}
+    return _as_words(true)
 
 
 def distinct(names: Sequence[str]) -> list[str]:
@@ -530,7 +546,9 @@ def pushes(traces: Sequence[Trace]) -> list[Push]:
     for trace in traces:
         plant = trace.scenario.plant
         if plant.tip or (plant.is_user_model and not plant.pose):
-            found += [push for push in trace.scenario.disturbance if isinstance(push, Push)]
+            for push in trace.scenario.disturbance:
+                if isinstance(push, Push):
+                    found.append(push)
     return found
 
 
@@ -549,6 +567,11 @@ def font(size: float, bold: bool = False):
 def width(text: str, size: float, bold: bool = False) -> float:
     """Return the width of a text, in the unit of `size`, the height of its letters."""
     return font(10 * size, bold).getlength(text) / 10  # Pillow rounds small letters to pixels
+
+
+def widest(lines: Iterable[str], size: float) -> float:
+    """Return the width of the widest of these lines, in the unit of `size`."""
+    return max(width(line, size) for line in lines)
 
 
 def cropped(text: str, room: float, size: float, bold: bool = False) -> str:

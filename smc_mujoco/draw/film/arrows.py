@@ -149,7 +149,10 @@ def loads(trace: Trace, edges: Array) -> dict[str, Envelope]:
         "reaction": trace.reaction,
         "force": trace.force,
     }
-    return {name: windows(trace.t, y, edges) for name, y in signals.items()}
+    envelopes = {}
+    for name, y in signals.items():
+        envelopes[name] = windows(trace.t, y, edges)
+    return envelopes
 
 
 class Scale(NamedTuple):
@@ -188,7 +191,9 @@ def scales(traces: Sequence[Trace]) -> dict[ChannelGroup, Scale]:
     brief = [0.0]
     for group, parts in _of_one_unit(traces).items():
         if traces[0].scenario.plant.pose:
-            pushes = [np.linalg.norm(trace.d[:, :3], axis=1).max() for trace in traces]
+            pushes = []
+            for trace in traces:
+                pushes.append(np.linalg.norm(trace.d[:, :3], axis=1).max())
             push = float(max(pushes)) if group.unit == "m" else 0.0
             found[group] = Scale(0.0, push)
             lasting.append(push)
@@ -201,7 +206,7 @@ def scales(traces: Sequence[Trace]) -> dict[ChannelGroup, Scale]:
             found[group] = Scale(0.0, 0.0, reaction)
             continue
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
-        drive = same and any(_drives(trace) for trace in traces)
+        drive = same and any(map(_drives, traces))
         control = quantities.usual(parts, "applied")
         if drive:
             control = max(control, quantities.usual(parts, "force"))
@@ -309,7 +314,11 @@ def arrows(
         drawn.append(Arrow(0.0, mean, shade, layer, size, words=words))
         if layer == 0 and scale.control and high - low > MIN_BAR:
             drawn.append(Arrow(low, high, rgba(colour, 0.4), head=False))
-    return [arrow for arrow in drawn if abs(arrow.high - arrow.low) > MIN_LENGTH]
+    visible = []
+    for arrow in drawn:
+        if abs(arrow.high - arrow.low) > MIN_LENGTH:
+            visible.append(arrow)
+    return visible
 
 
 def frames(
@@ -334,7 +343,8 @@ def frames(
             drawn = flying(acting, k, sizes[0])
         else:
             for i, size in shown:
-                drawn += [(i, arrow) for arrow in arrows(acting, k, i, size, colour)]
+                for arrow in arrows(acting, k, i, size, colour):
+                    drawn.append((i, arrow))
             for body, peak in blows(trace, edges[k] - holds[k], time) if sizes else ():
                 drawn.append((0, along(peak, sizes[0], body)))
         found.append(Drawn(time, drawn))
@@ -348,7 +358,9 @@ def is_network(plant: Plant) -> bool:
 
 def mean_of(acting: Envelope) -> Envelope:
     """Return what acts on the mean channel, for each of them."""
-    parts = [np.repeat(part.mean(axis=1, keepdims=True), part.shape[1], 1) for part in acting[1:]]
+    parts = []
+    for part in acting[1:]:
+        parts.append(np.repeat(part.mean(axis=1, keepdims=True), part.shape[1], 1))
     return Envelope(acting.t, *parts)
 
 
@@ -439,7 +451,10 @@ def outline(line: Array, width: float, head: bool = True) -> Array:
     width = min(width, MAX_THICKNESS * way[-1])
     long = min(HEAD_LENGTH * HEAD_WIDTH * width, 0.7 * way[-1]) * head
     at = np.linspace(0.0, way[-1] - long, len(line))
-    shaft = np.column_stack([np.interp(at, way, part) for part in line.T])
+    rows = []
+    for part in line.T:
+        rows.append(np.interp(at, way, part))
+    shaft = np.column_stack(rows)
     along = np.gradient(shaft, axis=0)
     across = 0.5 * width * along[:, ::-1] * (-1, 1) / np.linalg.norm(along, axis=1)[:, None]
     wing = long / HEAD_LENGTH / (0.5 * width) * across[-1]
@@ -473,6 +488,11 @@ def stamp(
     write(image, arrow.words, end, end - other, arrow.rgba, scale)
 
 
+def bytes_of(rgba: Sequence[float]) -> tuple[int, ...]:
+    """Return red, green and blue as whole numbers of 0 to 255."""
+    return tuple(round(255 * part) for part in rgba[:3])
+
+
 def write(
     image: Image.Image, words: str, end: Array, way: Array, rgba: Sequence[float], scale: float
 ) -> None:
@@ -487,7 +507,7 @@ def write(
         y -= high  # over the arrow
     y = min(max(y, high), image.height - high)
     rim = {"stroke_width": round(2 * scale), "stroke_fill": style.PAPER}
-    fill = tuple(round(255 * part) for part in rgba[:3])
+    fill = bytes_of(rgba)
     ImageDraw.Draw(image).text((x, y), words, fill, style.font(high, True), anchor="lm", **rim)
 
 
@@ -503,7 +523,7 @@ def paint(image: Image.Image, edge: Array, rgba: Sequence[float], rim: int = 0) 
     if rim:
         wide = mask.filter(ImageFilter.MaxFilter(2 * rim + 1))
         image.paste(style.rgb(style.PAPER), place, wide)
-    image.paste(tuple(round(255 * part) for part in rgba[:3]), place, mask)
+    image.paste(bytes_of(rgba), place, mask)
 
 
 def arrow_geom(model: mujoco.MjModel, body: int) -> int:

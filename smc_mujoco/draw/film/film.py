@@ -305,7 +305,10 @@ def pictures(frames: Frames) -> Generator[Array]:
         yield from drawn(clock, stages, overlays, sheet)
         if close := clock.close:
             start = float(close.times[0])
-            last = runs._replace(traces=[horizon.since(trace, start) for trace in runs.traces])
+            closing = []
+            for trace in runs.traces:
+                closing.append(horizon.since(trace, start))
+            last = runs._replace(traces=closing)
             last = last._replace(span=(end(last.traces), end(last.traces)))
             said = [f"last periods, deflections × {close.factor:g}"]
             sheet = Sheet(last, size, placed.tiles, placed.labels, frames.title, said, start)
@@ -334,10 +337,8 @@ def drawn(
     """Yield the pictures at the times of a clock."""
     for frame, time in enumerate(clock.times.tolist()):
         machines = [stage.shot(frame, time) for stage in stages]
-        if overlays:
-            machines = [
-                over.over(shown, frame) for over, shown in zip(overlays, machines, strict=True)
-            ]
+        for k, over in enumerate(overlays):
+            machines[k] = over.over(machines[k], frame)
         states = [stage.track.states[frame] for stage in stages]
         yield sheet.picture(Moment(time, float(clock.speeds[frame]), states), machines)
 
@@ -365,7 +366,9 @@ def placement(
     """Return where machines stand in a film of some size, px, before the chosen camera."""
     puppets = [Puppet.of(track.trace.scenario) for track in tracks]
     turn = puppets[0].turn(chosen)
-    courses = [puppet.course(track) for track, puppet in zip(tracks, puppets, strict=True)]
+    courses = []
+    for track, puppet in zip(tracks, puppets, strict=True):
+        courses.append(puppet.course(track))
     followed = any(map(Puppet.travels, puppets, courses))
     reaches = []
     for i, track in enumerate(tracks):

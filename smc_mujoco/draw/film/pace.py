@@ -95,6 +95,11 @@ def clock(traces: Trace | Sequence[Trace], fps: Rate, speed: Speed | None = None
     return FilmClock(frames, speeds_there, close_up(traces, fps))
 
 
+def _rests_at_the_end(run: Trace) -> bool:
+    """Say whether dry friction holds all joints at the end of a run."""
+    return states.has_dry_friction(run.scenario) and states.at_rest(run)[-1].all()
+
+
 def close_up(traces: Sequence[Trace], fps: float) -> FilmClock | None:
     """Return the last periods of runs in which a film shows nothing moving: those that chatter
     about one place, rattle in a backlash or stick. None of others.
@@ -104,11 +109,12 @@ def close_up(traces: Sequence[Trace], fps: float) -> FilmClock | None:
     if not runs or scenario.plant.has_path:
         return None
     sizes = visible_sizes(scenario)
-    way = max(float((np.ptp(run.x, axis=0) / sizes).max()) for run in runs)
+    ways = []
+    for run in runs:
+        ways.append(float((np.ptp(run.x, axis=0) / sizes).max()))
+    way = max(ways)
     rattles = any(states.backlash_gap(run.scenario) for run in runs)
-    sticks = all(
-        states.has_dry_friction(run.scenario) and states.at_rest(run)[-1].all() for run in runs
-    )
+    sticks = all(map(_rests_at_the_end, runs))
     if way > LITTLE and not rattles and not sticks:
         return None
     largest = max(runs, key=lambda run: np.nan_to_num(chattering_amplitude(run)))

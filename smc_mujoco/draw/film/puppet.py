@@ -189,7 +189,10 @@ class Puppet:
                 f"nothing that moves on {trace.scenario.plant.name} has a shape to be filmed: "
                 "give its bodies geoms, or its links <visual>"
             )
-        falling = np.array([model.body(i).name.startswith(OWN) for i in model.geom_bodyid])
+        falling_parts = []
+        for i in model.geom_bodyid:
+            falling_parts.append(model.body(i).name.startswith(OWN))
+        falling = np.array(falling_parts)
         loose = ~links & ~plane & ~world.still(model) & ~falling
         roots = model.body_rootid[model.geom_bodyid]
         body = links | (loose & np.isin(roots, roots[links]))
@@ -219,7 +222,10 @@ class Puppet:
         turns = model.jnt_type[model.body_jntadr[body]] == world.HINGE
         if turns and model.body_weldid[model.body_parentid[body]] == 0:
             return False
-        own = max(float(np.ptp(points, axis=0).max()) for points in course.places)
+        sizes = []
+        for points in course.places:
+            sizes.append(float(np.ptp(points, axis=0).max()))
+        own = max(sizes)
         return float(np.ptp(course.middle, axis=0).max()) > FOLLOWED_TRAVEL * own
 
     def placed(
@@ -238,15 +244,24 @@ class Puppet:
         radius = arrows.BENT_SIZE * float(sides.max(initial=0.0))
         ids = self.ids.tolist()
         found = arrows.mounts(self.scenario, ids, self.slides.tolist(), self.rail, front)
-        mounts = [mount._replace(radius=min(mount.radius, radius)) for mount in found]
+        mounts = []
+        for mount in found:
+            mounts.append(mount._replace(radius=min(mount.radius, radius)))
         lines = self.lines(track, mounts)
+        line_times = []
+        curves = []
+        for time, curve in lines:
+            line_times.append(time)
+            curves.append(curve)
         if followed:
-            places = course.followed(np.array([*course.times, *(time for time, _ in lines)]))
-            seen = [*course.places, *(line for _, line in lines)]
-            points = np.concatenate([part - at for part, at in zip(seen, places, strict=True)])
+            places = course.followed(np.array([*course.times, *line_times]))
+            relative = []
+            for part, at in zip([*course.places, *curves], places, strict=True):
+                relative.append(part - at)
+            points = np.concatenate(relative)
             height = max(0.0, -float(np.concatenate(course.places)[:, 2].min()))
         else:
-            points = np.concatenate([course.reached, *(line for _, line in lines)])
+            points = np.concatenate([course.reached, *curves])
             height = 0.0
         return points, dataclasses.replace(self, mounts=mounts, height=height)
 
@@ -257,7 +272,10 @@ class Puppet:
         Of other things, those that move loosely and what stands still, only the part close to these
         counts, such as the upper half of a stand; rails and columns end there.
         """
-        around = np.concatenate([np.concatenate(course.others) for course in courses])
+        others = []
+        for course in courses:
+            others.append(np.concatenate(course.others))
+        around = np.concatenate(others)
         lowest = min(course.reached[:, 2].min() for course in courses)
         model = self.model
         on_stage = self.scenario.plant.on_stage

@@ -86,7 +86,7 @@ def label_sizes(names: Sequence[str], size: tuple[int, int], room: float) -> Arr
     found = []
     for name in style.distinct(names):
         lines = style.wrapped(name, room - high, high, MAX_LINES).split("\n")
-        wide = max(style.width(line, high) for line in lines)
+        wide = style.widest(lines, high)
         if any("…" in line for line in lines):
             wide = style.width(name, high)
         found.append((wide + high, (LINE_PITCH * len(lines) + SAMPLE) * high))
@@ -268,7 +268,10 @@ class Sheet:
         for ax, cursor, dots in self.moving:
             if time <= ax.get_xlim()[1]:
                 cursor.set_xdata([time, time])
-                drawn += [cursor, *(words for words in ax.texts if words.get_bbox_patch())]
+                drawn.append(cursor)
+                for words in ax.texts:
+                    if words.get_bbox_patch():
+                        drawn.append(words)
             for shown, t, y in dots:
                 if time <= min(t[-1], ax.get_xlim()[1]) + 1e-9 and np.isfinite(y[0]):
                     shown.set_data([time], [np.interp(time, t, y)])

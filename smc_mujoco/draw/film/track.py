@@ -98,9 +98,10 @@ def motion(trace: Trace, times: Array) -> Motion | None:
     if scenario.plant.on_stage and not any(part.loose for part in scenario.contact):
         return None
     model = models.compile_model(scenario)
-    names = [model.joint(i).name for i in joint_ids(model)]
-    known = len(names)
-    for name in names:
-        known += mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + name) >= 0
+    ids = joint_ids(model)
+    known = len(ids)
+    for i in ids:
+        rotor = ROTOR + model.joint(i).name
+        known += mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, rotor) >= 0
     moved = None if known == model.nv else poses(trace, times)
     return None if moved is None else Motion(times, moved)

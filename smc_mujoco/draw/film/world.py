@@ -111,9 +111,14 @@ def users_machine(machine: mujoco.MjSpec, film: mujoco.MjSpec) -> mujoco.MjSpec:
             if not field.startswith("_"):
                 setattr(getattr(machine.visual, name), field, getattr(settings, field))
     sky = mujoco.mjtTexture.mjTEXTURE_SKYBOX
-    planes = [geom for geom in machine.geoms if geom.type == PLANE]
-    skies = [texture for texture in machine.textures if texture.type == sky]
-    strip(machine, *machine.equalities, *machine.texts, *planes, *skies, *machine.lights)
+    removed = [*machine.equalities, *machine.texts]
+    for geom in machine.geoms:
+        if geom.type == PLANE:
+            removed.append(geom)
+    for texture in machine.textures:
+        if texture.type == sky:
+            removed.append(texture)
+    strip(machine, *removed, *machine.lights)
     return machine
 
 
@@ -149,7 +154,10 @@ def turn(model: mujoco.MjModel, pose: Array, chosen: Camera | None, whose: str) 
     """
     if not isinstance(chosen, str):
         return camera.turn(*(chosen or view(model)))
-    names = {model.camera(i).name: i for i in range(model.ncam) if model.camera(i).name}
+    names = {}
+    for i in range(model.ncam):
+        if model.camera(i).name:
+            names[model.camera(i).name] = i
     which = find(f"camera of {whose}", chosen, names)
     data = mujoco.MjData(model)
     data.qpos[:] = pose
@@ -171,7 +179,11 @@ def view(model: mujoco.MjModel) -> tuple[float, float]:
         return float(azimuth), min(float(elevation), LOW_ELEVATION)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    axes = data.xaxis[[i for i in joint_ids(model) if model.jnt_type[i] == HINGE]]
+    hinges = []
+    for i in joint_ids(model):
+        if model.jnt_type[i] == HINGE:
+            hinges.append(i)
+    axes = data.xaxis[hinges]
     if not len(axes):
         return FRONT
     if (np.abs(axes @ axes[0]) < PARALLEL_COSINE).any():
@@ -226,7 +238,9 @@ def first_channels(scenario: Scenario) -> Scenario:
 
 def restyle(model: mujoco.MjModel) -> None:
     """Enlarge the bobs of pendulums, to which the eye should go, and make dials translucent."""
-    names = [model.geom(i).name.rpartition("/")[2] for i in range(model.ngeom)]
+    names = []
+    for i in range(model.ngeom):
+        names.append(model.geom(i).name.rpartition("/")[2])
     dial = np.isin(names, ("face", "bezel"))
     model.geom_rgba[dial] = model.mat_rgba[model.geom_matid[dial]] * (1.0, 1.0, 1.0, 0.4)
     model.geom_matid[dial] = -1
