@@ -55,7 +55,8 @@ def mark_crossover(ax: Axes, equal: float) -> None:
     """Draw a line at the lag, ms, at which two laws chatter equally; none at NaN."""
     if math.isnan(equal):
         return
-    ax.axvline(equal, color=style.RULE, lw=style.points(1.0), ls=(0, (4, 3)))
+    dashes = (0, (4, 3))
+    ax.axvline(equal, color=style.RULE, lw=style.points(1.0), ls=dashes)
     words = f"equal at {style.short(equal)} ms"
     place = (equal, 0.0), (-4, 4), ("data", "axes fraction"), "offset points"
     ax.annotate(words, *place, ha="right", va="bottom")
@@ -79,7 +80,10 @@ def amplitudes(
     for its in runs.values():
         its.sort(key=lambda trace: lag(trace.scenario))
         laws.append(its[0].scenario.law)
-        sources.append([trace.scenario.law.source for trace in its])
+        of_law = []
+        for trace in its:
+            of_law.append(trace.scenario.law.source)
+        sources.append(of_law)
     gains, shared = pages.gain_sources(sources)
     handles = []
     drawn = []

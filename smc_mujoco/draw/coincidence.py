@@ -59,7 +59,9 @@ def _parting(one: Line, other: Line, limits: Pair, logarithmic: bool) -> float:
     from scipy.ndimage import maximum_filter1d
 
     t = one[0][one[0] <= other[0][-1] + 1e-9]
-    y = np.stack([one[1][: len(t)], np.interp(t, *other)])
+    of_one = one[1][: len(t)]
+    of_other = np.interp(t, *other)
+    y = np.stack([of_one, of_other])
     drawn = y
     sides = limits
     if logarithmic:
@@ -75,7 +77,8 @@ def _parting(one: Line, other: Line, limits: Pair, logarithmic: bool) -> float:
     low = maximum_filter1d(-y, window, mode="nearest")
     for pair, room in ((drawn, apart), (high, highest), (low, highest)):
         near = np.abs(pair[0] - pair[1]) <= room
-        held &= near & (np.cumsum(near) / np.arange(1, len(t) + 1) >= COINCIDENT_SHARE)
+        share = np.cumsum(near) / np.arange(1, len(t) + 1)
+        held &= near & (share >= COINCIDENT_SHARE)
     return float(t[held].max(initial=-np.inf))
 
 
@@ -98,7 +101,8 @@ def tell_agreements(ax: Axes, shared: Sequence[Agreement], names: Sequence[str])
     free = 1.0 - (0.6 + 1.2 * lines) * size / height
     axis = ax.yaxis.get_transform()
     low, high = axis.transform(np.array(ax.get_ylim()))
-    ax.set_ylim(top=float(axis.inverted().transform(np.array([low + (high - low) / free]))[0]))
+    top = axis.inverted().transform(np.array([low + (high - low) / free]))
+    ax.set_ylim(top=float(top[0]))
     place = {"xytext": (-0.5 * size, -0.4 * size), "textcoords": "offset points"}
     look: Fields = {"ha": "right", "va": "top", "fontsize": size, "in_layout": False}
     look["bbox"] = {"fc": style.PAPER, "ec": "none", "pad": 0.1 * size}  # hides lines of times

@@ -43,7 +43,9 @@ def finite(trace: Trace) -> Trace:
     """Return the trace up to its last finite sample; if there is none, one sample with the initial
     state.
     """
-    bad = ~np.isfinite(trace.x).all(axis=1) | ~np.isfinite(trace.v).all(axis=1)
+    lost_x = ~np.isfinite(trace.x).all(axis=1)
+    lost_v = ~np.isfinite(trace.v).all(axis=1)
+    bad = lost_x | lost_v
     if not bad.any():
         return trace
     count = int(np.argmax(bad))
@@ -67,12 +69,16 @@ def windows(t: Array, y: Array, edges: Array) -> Envelope:
 
     A window has the samples in it and the one held at its left edge.
     """
-    start = np.clip(np.searchsorted(t, edges + 1e-9, side="right") - 1, 0, len(t) - 1)
+    places = np.searchsorted(t, edges + 1e-9, side="right") - 1
+    start = np.clip(places, 0, len(t) - 1)
     y = y[: start[-1] + 1]
-    count = np.maximum(np.diff([*start[:-1], start[-1] + 1]), 1)[:, None]
+    ends = [*start[:-1], start[-1] + 1]
+    count = np.maximum(np.diff(ends), 1)[:, None]
     low = np.minimum.reduceat(y, start[:-1])
     mean = np.add.reduceat(y, start[:-1]) / count
-    return Envelope((edges[:-1] + edges[1:]) / 2, low, mean, np.maximum.reduceat(y, start[:-1]))
+    middle = (edges[:-1] + edges[1:]) / 2
+    high = np.maximum.reduceat(y, start[:-1])
+    return Envelope(middle, low, mean, high)
 
 
 def band(t: Array, y: Array) -> tuple[Array, Array, Array]:
@@ -87,11 +93,14 @@ def band(t: Array, y: Array) -> tuple[Array, Array, Array]:
     if count <= COLUMNS:
         return t, y.min(axis=1), y.max(axis=1)
     edges = t[:: 2 * -(-count // (2 * COLUMNS))]
-    e = windows(t, y, edges if edges[-1] == t[-1] else np.append(edges, t[-1]))
+    ends = edges if edges[-1] == t[-1] else np.append(edges, t[-1])
+    e = windows(t, y, ends)
     low = e.low.min(axis=1)
     high = e.high.max(axis=1)
     size = 1 + int(MAX_GAP / (e.t[1] - e.t[0]))
-    return e.t, grey_opening(low, size, mode="nearest"), grey_closing(high, size, mode="nearest")
+    lower = grey_opening(low, size, mode="nearest")
+    upper = grey_closing(high, size, mode="nearest")
+    return e.t, lower, upper
 
 
 def window(trace: Trace) -> int:
@@ -138,7 +147,8 @@ def chattering_parts(y: Array, width: int) -> list[slice]:
 def reversals(y: Array) -> tuple[Array, Array]:
     """Return the indices of the two moves of each reversal of y (K+1,)."""
     step = np.diff(y)
-    moving = np.flatnonzero(np.abs(step) > MIN_MOVE * np.abs(y).max())
+    least = MIN_MOVE * np.abs(y).max()
+    moving = np.flatnonzero(np.abs(step) > least)
     turns = np.flatnonzero(np.diff(np.sign(step[moving])))
     return moving[turns], moving[turns + 1]
 
@@ -195,9 +205,10 @@ def line(t: Array, y: Array, width: int) -> tuple[Array, Array]:
     """
     y, size = smooth(y, width), -(-len(t) // LINE_PARTS)
     starts = np.arange(0, len(t), size)
-    padded = np.pad(y, (0, len(starts) * size - len(y)), "edge").reshape(-1, size)
-    keep = np.unique(
-        [0, *starts + padded.argmin(axis=1), *starts + padded.argmax(axis=1), len(t) - 1]
-    )
+    missing = len(starts) * size - len(y)
+    padded = np.pad(y, (0, missing), "edge").reshape(-1, size)
+    lowest = starts + padded.argmin(axis=1)
+    highest = starts + padded.argmax(axis=1)
+    keep = np.unique([0, *lowest, *highest, len(t) - 1])
     keep = keep[keep < len(t)]
     return t[keep], y[keep]

@@ -85,12 +85,14 @@ def plot(
     dots = _dots(table, items_of("metrics", metrics), winners)
     head = style.titled(title, f"Medians: {dots.heading}")
     with style.page(width):
-        key, shared = _key(table, dots.looks, list(dots.intervals.values()), bool(dots.won))
+        intervals = list(dots.intervals.values())
+        key, shared = _key(table, dots.looks, intervals, bool(dots.won))
         across = 1 if width < pages.NARROW else len(dots.metrics)
         tall = WORDS_HEIGHT + LINE_HEIGHT * dots.lines
         heights = np.repeat(tall, len(dots.metrics) // across)
         space = pages.head_height(width, key) + style.points(0.6)
-        page = pages.blank(width, height or space + style.points(heights.sum()), fig)
+        tall = height or space + style.points(heights.sum())
+        page = pages.blank(width, tall, fig)
         axes = page.subplots(len(heights), across, squeeze=False, height_ratios=heights.tolist())
         by_plant = axes.reshape(len(dots.conditions), -1)
         for plant, high, row in zip(dots.conditions, tall, by_plant, strict=True):
@@ -138,7 +140,9 @@ def _dots(table: RunColumns, metrics: Sequence[str], winners: Collection[Cell]) 
             "no runs or no metrics to draw: give a table with rows, and at least one metric"
         )
     intervals = _intervals(table, metrics)
-    ran = set(zip(table.column("plant").tolist(), table.column("condition").tolist(), strict=True))
+    of_plants = table.column("plant").tolist()
+    of_conditions = table.column("condition").tolist()
+    ran = set(zip(of_plants, of_conditions, strict=True))
     conditions_of = {}
     for plant in plants:
         on_plant = []
@@ -161,6 +165,7 @@ def _dots(table: RunColumns, metrics: Sequence[str], winners: Collection[Cell]) 
     for name in metrics:
         if _differs_much(intervals, name):
             logarithmic.add(name)
+    heading = style.heading([*labels.values()], conditions, short=len(plants) > 1)
     return Dots(
         metrics=list(metrics),
         conditions=conditions_of,
@@ -170,7 +175,7 @@ def _dots(table: RunColumns, metrics: Sequence[str], winners: Collection[Cell]) 
         logarithmic=logarithmic,
         units=units,
         labels=labels,
-        heading=style.heading([*labels.values()], conditions, short=len(plants) > 1),
+        heading=heading,
     )
 
 
@@ -269,7 +274,8 @@ def _key(
     gains, shared = pages.gain_sources([known.get(law, ()) for law in looks])
     for (law, look), source in zip(looks.items(), gains, strict=True):
         label = style.law_name(law) + source
-        key.append(pages.entry(label, look["color"], marker=look["marker"], mec="none", **line))
+        sample = pages.entry(label, look["color"], marker=look["marker"], mec="none", **line)
+        key.append(sample)
     label = "95 % interval"
     if min(interval.n for interval in intervals) < MIN_INTERVAL_SAMPLES:
         label += f" (the range, with fewer than {MIN_INTERVAL_SAMPLES} samples)"
@@ -277,7 +283,8 @@ def _key(
     if ringed:
         key.append(pages.entry("winner", style.INK, lw=0.0, **RING))
     if any(interval.median == MIN_SIZE for interval in intervals):
-        key.append(pages.entry(number(MIN_SIZE / 2), lw=0.0, marker="<"))
+        smallest = number(MIN_SIZE / 2)
+        key.append(pages.entry(smallest, lw=0.0, marker="<"))
     return key, shared
 
 
@@ -302,7 +309,8 @@ def _panel(
             interval = intervals[condition, law]
             _dot(ax, interval, j * height + k, looks[law])
             if (condition, law) in rings:
-                ax.plot(interval.median, j * height + k, ms=style.points(12), **RING)
+                size = style.points(12)
+                ax.plot(interval.median, j * height + k, ms=size, **RING)
     if not sizes.size:
         ax.set_xticks([])
     if any(not np.isfinite(interval.median) for interval in intervals.values()):
@@ -349,4 +357,6 @@ def _label(metric: str, x: str) -> str:
     if metric == SETTLES:
         return "share of runs\nthat settle"
     words, bracket, unit = CATALOGUE[metric].heading(x).partition(" (")
-    return words + bracket.replace(" ", "\n") + unit.replace("^2", "²").replace(" ", "·")
+    folded = bracket.replace(" ", "\n")
+    shown_unit = unit.replace("^2", "²").replace(" ", "·")
+    return words + folded + shown_unit

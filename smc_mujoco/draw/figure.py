@@ -199,8 +199,10 @@ def _composed_page(
     for k, panels in ((0, blocks.left), (1, blocks.right)):
         rows = _height_of(columns, k)
         pitch = free / max(1.0, rows)
-        words = drawing.titles(panels, (pitch * np.array(heights[k])).tolist())
-        _draw_over_time(page, cells[k], list(zip(panels, words, strict=True)), runs, k == 0)
+        room = (pitch * np.array(heights[k])).tolist()
+        words = drawing.titles(panels, room)
+        titled = list(zip(panels, words, strict=True))
+        _draw_over_time(page, cells[k], titled, runs, k == 0)
     _draw_beside(page, cells[2], blocks.beside, blocks.places, runs)
     pages.set_head(page, width, style.titled(title, runs.head), handles, gains)
     page.set_label("; ".join(str(one.get_label()) for one in key))
@@ -221,7 +223,9 @@ class Blocks(NamedTuple):
     def heights(self) -> tuple[list[float], list[float], list[float]]:
         """The relative heights of the panels of each block."""
         beside = [SIDE_PANELS[name] for name in self.beside]
-        return list(map(_height, self.left)), list(map(_height, self.right)), beside
+        left = list(map(_height, self.left))
+        right = list(map(_height, self.right))
+        return left, right, beside
 
 
 def _height_of(columns: Mapping[tuple[int, ...], float], block: int) -> float:
@@ -331,13 +335,15 @@ def _height(panel: Panel) -> float:
 def _default(traces: Sequence[Trace], width: float) -> list[str]:
     """Return the names of the panels that suit the plant and the page."""
     several = any(len(group.channels) > 1 for group in style.split(traces))
-    names = ["d"] if any(np.nan_to_num(trace.d).any() for trace in traces) else []
+    disturbed = any(np.nan_to_num(trace.d).any() for trace in traces)
+    names = ["d"] if disturbed else []
     if several and traces[0].scenario.plant.direct:
         return [*names, "channels", "tip", "contact", "settling"]
     names += ["x", "spread", "u", "delivered", "reaction"]
     if several:
         return [*names, "settling"]
-    if np.nan_to_num(np.concatenate([trace.s for trace in traces])).any():
+    s = np.concatenate([trace.s for trace in traces])
+    if np.nan_to_num(s).any():
         names.append("s")
     if width < pages.NARROW:
         return [*names, "settling"]
@@ -402,7 +408,8 @@ def _draw_alone(ax: Axes, runs: DrawnRuns, name: str, title: str | None) -> None
     if blocks.beside:
         _draw_side(ax, name, places[0], runs)
     else:
-        ax.set(xlim=(0.0, runs.span[0]), xlabel=_time_words(runs), ylabel=places[0].label)
+        words = _time_words(runs)
+        ax.set(xlim=(0.0, runs.span[0]), xlabel=words, ylabel=places[0].label)
         drawing.over_time(ax, places[0], runs.colours, names=runs.names)
         drawing.mark(ax, runs.marks, named=title is None)
     if title is not None:
@@ -434,18 +441,21 @@ def _rows(
     if drawing.is_shared(panel):
         ax = page.add_subplot(cell, sharex=share)
         drawing.note(ax, "the same in all runs")
-        return ax, [lanes.Row(ax, panel._replace(traces=panel.traces[:1]), [style.DISTURBANCE])]
+        shared = panel._replace(traces=panel.traces[:1])
+        return ax, [lanes.Row(ax, shared, [style.DISTURBANCE])]
     if not lanes.crowded(panel):
         ax = page.add_subplot(cell, sharex=share)
         return ax, [lanes.Row(ax, panel, runs.colours)]
     frame = page.add_subplot(cell, frameon=False, xticks=[])
     size = style.points(8.5)
-    room = 72 * cell.get_position(page).width * page.bbox.width / page.dpi - 4.0 * size
+    wide = 72 * cell.get_position(page).width * page.bbox.width / page.dpi
+    room = wide - 4.0 * size
     look = {"fontsize": size, "edgecolor": "none", "borderaxespad": 0.2, "borderpad": 0.0}
     look |= {"loc": "upper right", "frameon": True, "framealpha": 0.75}
     rows = lanes.rows(frame, panel, runs.colours, share=share)
     for row, name in zip(rows, runs.names, strict=True):
-        key = row.axes.legend(handles=[pages.entry(".", row.colours[0])], handlelength=1.0, **look)
+        sample = pages.entry(".", row.colours[0])
+        key = row.axes.legend(handles=[sample], handlelength=1.0, **look)
         key.get_texts()[0].set_text(style.cropped(name, room, size))
         key.get_texts()[0].set_parse_math(False)
         key.set_in_layout(False)
@@ -473,7 +483,8 @@ def _equal_ranges(frame: Axes, rows: Sequence[lanes.Row]) -> None:
         ticks = [-bound, bound]
     else:
         places = MaxNLocator(3).tick_values(low, high)
-        ticks = places[(places >= low) & (places <= high)][[0, -1]]
+        seen = places[(places >= low) & (places <= high)]
+        ticks = seen[[0, -1]]
     frame.set(ylim=(low, high), yticks=ticks)
     for ax, *_ in rows:
         ax.set(ylim=(low, high), yticks=ticks)
@@ -509,7 +520,8 @@ def _draw_side(ax: Axes, name: str, place: Panel, runs: DrawnRuns) -> None:
         letter = "control u"
         if plant.driven > 1 or plant.direct:
             letter = f"{channel_names(plant)[0]} u"
-        ax.set(xlabel="time before the end (ms)", ylabel=style.folded(letter + panel.scale[1]))
+        words = style.folded(letter + panel.scale[1])
+        ax.set(xlabel="time before the end (ms)", ylabel=words)
     elif name == "phase":
         drawing.phase(ax, place, runs.colours)
     else:

@@ -27,8 +27,11 @@ def horizon(traces: Sequence[Trace]) -> float:
     for group, parts in style.split(traces).items():
         low, high = span(parts, "x")
         for trace in parts:
-            moved = np.abs(trace.x - trace.x[-1]).max(axis=1) > REST_BAND * (high - low)
-            acted = (trace.d != 0.0).any(axis=1) | (trace.r != trace.r[-1]).any(axis=1)
+            away = np.abs(trace.x - trace.x[-1]).max(axis=1)
+            moved = away > REST_BAND * (high - low)
+            pushed = (trace.d != 0.0).any(axis=1)
+            led = (trace.r != trace.r[-1]).any(axis=1)
+            acted = pushed | led
             times = trace.t[moved | (acted & group.driven)]
             last = max(last, *times[-1:], trace.diverged_at or 0.0)
             if trace.scenario.jump:
@@ -49,7 +52,8 @@ def until(trace: Trace, time: float) -> Trace:
 
 def since(trace: Trace, time: float) -> Trace:
     """Return the trace from a time on, s, as a run of its own, which is not smoothed."""
-    first = min(int(np.searchsorted(trace.t, time - 1e-9)), len(trace.t) - 2)
+    place = int(np.searchsorted(trace.t, time - 1e-9))
+    first = min(place, len(trace.t) - 2)
     part = arrays_within(trace, slice(first, None))
     part["t"] = part["t"] - part["t"][0]
     calm = {"duration": float(part["t"][-1]), "jump": None, "fault": None}

@@ -72,7 +72,8 @@ def below_film(
     if laned:
         letters = style.points(float(style.RC["font.size"]))
         room = 72 * ax.get_window_extent().width / ax.figure.dpi
-        found = rows(ax, panel, colours, 1.0 - (style.width("smooth", letters) + 2.0) / room)
+        beside = (style.width("smooth", letters) + 2.0) / room
+        found = rows(ax, panel, colours, 1.0 - beside)
         for row in found:
             row.axes.set(xlim=ax.get_xlim(), xticks=ax.get_xticks())
             row.axes.set_xticklabels(ax.get_xticklabels())
@@ -98,7 +99,8 @@ def in_lanes(panel: Panel) -> bool:
     least = MIN_WIDE_BAND * np.ptp(limits(panel.traces, "u"))
     switches = []
     for trace in panel.traces:
-        switches.append(np.sum(np.abs(np.diff(trace.u, axis=0)) > least))
+        changes = np.abs(np.diff(trace.u, axis=0))
+        switches.append(np.sum(changes > least))
     return max(switches) > MAX_SWITCHES or crowded(panel, 0)
 
 
@@ -114,7 +116,8 @@ def settled(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Artist]:
         error = np.abs(trace.x - trace.r).max(axis=1)
         time = last_exit(trace.t, error, settling_band(trace.scenario, scale(trace)))
         if trace.diverged_at is None and 0.0 < time < min(trace.t[-1], ax.get_xlim()[1]):
-            y = float(np.interp(time, trace.t, trace.x.mean(axis=1)))
+            mean = trace.x.mean(axis=1)
+            y = float(np.interp(time, trace.t, mean))
             marks += ax.plot(time, y, "v", color=colour, zorder=6, clip_on=False, **look)
     return marks
 
@@ -126,7 +129,8 @@ def tell_swing(lane: Axes, trace: Trace, colour: str) -> None:
     low, high = lane.get_ylim()
     for swings in lane.collections:
         swings.set_alpha(LANE_BAND)
-    u = trace.u[-max(2, round(END_SHARE * len(trace.t))) :]
+    count = max(2, round(END_SHARE * len(trace.t)))
+    u = trace.u[-count:]
     u = u[np.isfinite(u)]
     least = float(u.min(initial=np.inf))
     most = float(u.max(initial=-np.inf))

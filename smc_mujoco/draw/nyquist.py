@@ -122,7 +122,8 @@ def last_periods(ax: Axes, trace: Trace, cycle: Chattering, channel: int, colour
     part = trace.t >= start
     s = trace.s[part, channel]
     unit = f"{trace.scenario.plant.units[channel]}/s"
-    factor, unit = style.prefixed(float(np.abs(s).max()), unit)
+    largest = float(np.abs(s).max())
+    factor, unit = style.prefixed(largest, unit)
     s = factor * s
     t = trace.t[part] - trace.t[part][0]
     if cycle:

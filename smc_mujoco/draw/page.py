@@ -114,7 +114,8 @@ def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, f
 
 def entry(label: str, colour: str = style.MUTED, **look: Any) -> Line2D:
     """Return a legend's entry with a line, of 3 points by default."""
-    return Line2D([], [], label=label, color=colour, **{"lw": style.points(3.0), **look})
+    stated = {"lw": style.points(3.0), **look}
+    return Line2D([], [], label=label, color=colour, **stated)
 
 
 def given_axes(
@@ -167,7 +168,8 @@ def _legend(handles: Sequence[Handle], width: float) -> tuple[list[str], int]:
         labels = []
         widths = []
         for one in handles:
-            label = style.wrapped(str(one.get_label()), share * page - beside, size, lines=2)
+            words = str(one.get_label())
+            label = style.wrapped(words, share * page - beside, size, lines=2)
             labels.append(label)
             widths.append(beside + style.widest(label.split("\n"), size))
         for columns in range(len(widths), 1, -1):
@@ -197,7 +199,8 @@ def set_head(
         text = Annotation(note, (1.0, 1.0), xycoords=page.transSubfigure, **place, **look)
         page.add_artist(text).set_in_layout(False)
     if title:
-        big = max(size, min(big, big * room / style.width(title, big, bold=True)))
+        wide = style.width(title, big, bold=True)
+        big = max(size, min(big, big * room / wide))
     legend = page.legend(
         handles=handles or [Line2D([], [], lw=0)],
         labels=["."] * len(words) or [""],  # matplotlib leaves out labels that begin with _
@@ -335,4 +338,5 @@ def space_ticks(page: Figure | SubFigure) -> None:
         if isinstance(ax.xaxis.get_major_locator(), MaxNLocator):
             room = 72 * ax.get_window_extent().width / ax.figure.dpi
             count = int(room / style.width("0" * TICK_LETTERS, size))
-            ax.xaxis.set_major_locator(MaxNLocator(min(max(count, 1), MAX_TICKS), steps=STEPS))
+            most = min(max(count, 1), MAX_TICKS)
+            ax.xaxis.set_major_locator(MaxNLocator(most, steps=STEPS))

@@ -98,7 +98,8 @@ class Panel(NamedTuple):
         unit = style.units(self.group)[QUANTITY_OF_UNIT.get(self.quantity, self.quantity)]
         if self.quantity in PEAKS:
             return 1.0, f" ({unit})"
-        factor, prefixed = style.prefixed(max(map(abs, limits(self.traces, self.quantity))), unit)
+        largest = max(map(abs, limits(self.traces, self.quantity)))
+        factor, prefixed = style.prefixed(largest, unit)
         if self.quantity != "s" or all(map(slides_on_speed, filter(slides, self.traces))):
             return factor, f" ({prefixed})"
         return factor, "" if factor == 1.0 else f" / {1.0 / factor:g}"
@@ -227,7 +228,8 @@ def mean_error(panel: Panel) -> float:
     """Return the largest mean |x - r| of a panel's runs, those that failed included."""
     errors = []
     for run in panel.traces:
-        errors.append(float(np.nansum(np.abs(run.x - run.r))) / len(run.t))
+        sizes = np.abs(run.x - run.r)
+        errors.append(float(np.nansum(sizes)) / len(run.t))
     return max(errors)
 
 
@@ -262,7 +264,8 @@ def actuators(traces: Sequence[Trace]) -> list[Panel]:
         for part in parts:
             u = part.u[:, j : j + 1]
             runs.append(dataclasses.replace(group_trace(part, first), u=u))
-        panels.append(Panel("u", dataclasses.replace(group, channels=(j,)), runs, j))
+        own = dataclasses.replace(group, channels=(j,))
+        panels.append(Panel("u", own, runs, j))
     return panels
 
 
@@ -398,7 +401,8 @@ def over_time(
         y = QUANTITIES[name](trace)
         look |= {"color": colour, "drawstyle": steps(trace, name)}
         if bands and name not in UNBANDED:
-            artists.append(ax.fill_between(*band(trace.t, y), color=colour, alpha=0.22, lw=0))
+            edges = band(trace.t, y)
+            artists.append(ax.fill_between(*edges, color=colour, alpha=0.22, lw=0))
         if y.shape[1] > 1:
             artists += channels(ax, trace, y, name, look)
         else:
@@ -447,7 +451,8 @@ def channels(ax: Axes, trace: Trace, y: Array, name: str, look: Data) -> list[Ar
     artists: list[Artist] = []
     slowest = -1
     if name == "x":
-        slowest = int(np.nansum(np.abs(y - trace.r), axis=0).argmax())
+        misses = np.nansum(np.abs(y - trace.r), axis=0)
+        slowest = int(misses.argmax())
     for i in sorted({*drawn_channels(y), slowest} - {-1}):
         width, alpha = (SLOWEST_LINE, 1.0) if i == slowest else (LIGHT_LINE, 0.55)
         line = curve(trace, y[:, i], name)
@@ -487,8 +492,10 @@ def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
     look = {"ls": "", "ms": style.points(5), "mew": style.points(1.2), "clip_on": False}
     for trace, colour in zip(panel.traces, colours, strict=True):
         for side, mark in ((1, 2), (-1, 3)):  # matplotlib's ticks up and down, outside the axes
-            beyond = (np.nan_to_num(side * trace.reaction).max(axis=1) > top).astype(int)
-            starts = trace.t[np.flatnonzero(np.diff(beyond, prepend=0) > 0)]
+            largest = np.nan_to_num(side * trace.reaction).max(axis=1)
+            beyond = (largest > top).astype(int)
+            begins = np.diff(beyond, prepend=0) > 0
+            starts = trace.t[np.flatnonzero(begins)]
             heights = np.full(len(starts), side * top)
             ax.plot(starts, heights, color=colour, marker=mark, in_layout=False, **look)
     note(ax, f"|reaction| up to {style.short(peak, 3)} {style.units(panel.group)['force']}")
@@ -538,7 +545,8 @@ def mark(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
     room = ax.get_window_extent().width * 72 / ax.figure.dpi  # points
     ends: list[float] = []  # of the words in each row above the axes, in points
     for time, change in sorted(changes.items()):
-        ax.axvline(time, color=style.INK, lw=style.points(0.9), ls=(0, (2, 2)), zorder=1.5)
+        dashes = (0, (2, 2))
+        ax.axvline(time, color=style.INK, lw=style.points(0.9), ls=dashes, zorder=1.5)
         if not named:
             continue
         words = style.cropped(change, room, size)
@@ -582,8 +590,9 @@ def phase(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
             ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=style.points(6), zorder=4)
         if trace.diverged_at is not None:
             ax.plot(places[-1, 0], speeds[-1, 0], "X", color=colour, zorder=5, **cross())
-    ax.axhline(0.0, color=style.RULE, lw=style.points(0.9), zorder=1)
-    ax.axvline(0.0, color=style.RULE, lw=style.points(0.9), zorder=1)
+    rule = {"color": style.RULE, "lw": style.points(0.9), "zorder": 1}
+    ax.axhline(0.0, **rule)
+    ax.axvline(0.0, **rule)
 
 
 def last_samples(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
@@ -632,4 +641,6 @@ def drawn_channels(y: Array) -> list[int]:
     if n <= MAX_DRAWN_CHANNELS:
         return list(range(n))
     chosen = np.linspace(0, n - 1, MAX_DRAWN_CHANNELS).round().astype(int)
-    return sorted({*chosen.tolist(), int(np.nanargmin(y)) % n, int(np.nanargmax(y)) % n})
+    lowest = int(np.nanargmin(y)) % n
+    highest = int(np.nanargmax(y)) % n
+    return sorted({*chosen.tolist(), lowest, highest})

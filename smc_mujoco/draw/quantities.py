@@ -35,7 +35,8 @@ def contact_force(trace: Trace) -> Array:
 
 def share_of_limit(trace: Trace) -> Array:
     """Return the largest |u| of a joint, as a share of its limit, (K+1, 1) %."""
-    return 100.0 * (np.abs(trace.applied) / trace.scenario.limits).max(axis=1, keepdims=True)
+    shares = np.abs(trace.applied) / trace.scenario.limits
+    return 100.0 * shares.max(axis=1, keepdims=True)
 
 
 QUANTITIES: dict[str, Callable[[Trace], Array]] = {  # name -> (K+1, n)
@@ -97,7 +98,8 @@ def lasting(traces: Sequence[Trace], name: str) -> list[Array]:
 
 def span(traces: Sequence[Trace], name: str) -> Pair:
     """Return the least and largest value of the runs that last."""
-    values = np.concatenate(list(map(np.ravel, lasting(traces, name))) or [np.zeros(1)])
+    parts = list(map(np.ravel, lasting(traces, name)))
+    values = np.concatenate(parts or [np.zeros(1)])
     return float(values.min()), float(values.max())
 
 
@@ -110,7 +112,8 @@ def usual(traces: Sequence[Trace], name: str) -> float:
     peak = max(map(abs, span(traces, name)))
     largest = 0.0
     for y in lasting(traces, name):
-        largest = max(largest, float(np.quantile(np.abs(y), LASTING_QUANTILE, axis=0).max()))
+        usual_sizes = np.quantile(np.abs(y), LASTING_QUANTILE, axis=0)
+        largest = max(largest, float(usual_sizes.max()))
     return largest if peak > 2.0 * largest else peak
 
 

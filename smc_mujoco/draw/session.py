@@ -206,7 +206,8 @@ class Session:
                 "the session cannot be saved: a scene file cannot name its law or plant"
             )
         title = f"A view of {self.scenarios[0].plant.name}"
-        text = SAVED.format(title=title, runs=pformat(runs, width=110, sort_dicts=False))
+        pretty = pformat(runs, width=110, sort_dicts=False)
+        text = SAVED.format(title=title, runs=pretty)
         try:
             with path.open("x", encoding="utf-8") as file:
                 file.write(text)

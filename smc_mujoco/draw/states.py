@@ -97,7 +97,8 @@ def contacts(trace: Trace, shown: Array) -> list[State | None]:
     on: Array = np.asarray(touch.any(axis=1))
     said: list[State | None] = [None] * len(on)
     held = extended(on, shown, MIN_STATE_TIME)
-    edges = np.flatnonzero(np.diff(held.astype(int), prepend=0, append=0))
+    changes = np.diff(held.astype(int), prepend=0, append=0)
+    edges = np.flatnonzero(changes)
     for first, stop in edges.reshape(-1, 2).tolist():
         during = np.flatnonzero(on[first:stop]) + first
         words = "contact"
@@ -107,7 +108,8 @@ def contacts(trace: Trace, shown: Array) -> list[State | None]:
         for k in range(first, stop):
             last = k if on[k] else last
             fade = 1.0 - (shown[k] - shown[last]) / MIN_STATE_TIME
-            said[k] = State(words, style.REACTION, min(1.0, max(0.0, float(fade))))
+            opacity = min(1.0, max(0.0, float(fade)))
+            said[k] = State(words, style.REACTION, opacity)
     return said
 
 
@@ -115,7 +117,8 @@ def hit_size(trace: Trace, touch: Array, during: Array) -> str:
     """Return the largest reaction at samples of a hit, of the channels that touch, with its
     unit.
     """
-    sizes = np.abs(np.nan_to_num(trace.reaction[during])).max(axis=0)
+    reactions = np.abs(np.nan_to_num(trace.reaction[during]))
+    sizes = reactions.max(axis=0)
     sizes = np.where(touch[during].any(axis=0), sizes, 0.0)
     channel = int(sizes.argmax())
     for group in conventions.groups(trace.scenario):
@@ -190,8 +193,10 @@ def backlash_side(flank: Array, t: Array, hold: float) -> Array:
     crossed = touched[1:][np.diff(flank[touched]) != 0]
     rattles = np.zeros(len(t), bool)
     rattles[crossed[1:][np.diff(t[crossed]) < hold]] = True
-    latest = np.maximum.accumulate(np.where(flank != 0, np.arange(len(t)), 0))
-    sides = np.where(extended(flank != 0, t, hold), flank[latest], 0.0)
+    places = np.where(flank != 0, np.arange(len(t)), 0)
+    latest = np.maximum.accumulate(places)
+    touching = extended(flank != 0, t, hold)
+    sides = np.where(touching, flank[latest], 0.0)
     return np.where(extended(rattles, t, hold), 2, sides).astype(int)
 
 

@@ -178,7 +178,9 @@ def neutral_on_dark() -> dict[Any, str]:
         return {}
     ink = to_hex(rcParams["text.color"]).upper()
     shares = {GRID: 0.16, BAND: 0.25, RULE: 0.4, FAILED: 0.55, MUTED: 0.7, DISTURBANCE: 0.85}
-    mixtures = {colour: mixed(paper, ink, share) for colour, share in shares.items()}
+    mixtures = {}
+    for colour, share in shares.items():
+        mixtures[colour] = mixed(paper, ink, share)
     return {PAPER: paper, INK: ink, **mixtures}
 
 
@@ -195,7 +197,8 @@ def law_colour(law: Component | str) -> str:
     if template and template.colour:
         return template.colour
     chosen = palette()["chosen"]
-    return chosen.get(name) or list(chosen.values())[zlib.crc32(name.encode()) % len(chosen)]
+    colours = list(chosen.values())
+    return chosen.get(name) or colours[zlib.crc32(name.encode()) % len(colours)]
 
 
 def trace_colours(traces: Sequence[Trace]) -> list[str]:
@@ -275,7 +278,8 @@ def _farthest(used: Sequence[str], count: int) -> list[str]:
     chosen = list(used)
     for _ in range(count):
         beside = np.array(list(map(_seen, chosen)))
-        apart = np.linalg.norm(grid[:, None] - beside, axis=-1).min(axis=(1, 2))
+        distances = np.linalg.norm(grid[:, None] - beside, axis=-1)
+        apart = distances.min(axis=(1, 2))
         chosen.append(_grid()[int(apart.argmax())])
     return chosen[len(used) :]
 
@@ -296,22 +300,26 @@ def _grid() -> list[str]:
 @functools.cache
 def _seen(colour: str) -> np.ndarray:
     """Return a colour in CIELAB (D65) as each of SIGHTS sees it, (4, 3)."""
-    t = np.clip(SIGHTS @ _linear(colour), 0.0, 1.0) @ XYZ.T / XYZ.sum(axis=1)
-    x, y, z = np.where(t > (6 / 29) ** 3, np.cbrt(t), t / (3 * (6 / 29) ** 2) + 4 / 29).T
+    seen = np.clip(SIGHTS @ _linear(colour), 0.0, 1.0)
+    t = seen @ XYZ.T / XYZ.sum(axis=1)
+    straight = t / (3 * (6 / 29) ** 2) + 4 / 29
+    x, y, z = np.where(t > (6 / 29) ** 3, np.cbrt(t), straight).T
     return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)]).T
 
 
 def _linear(colour: str) -> np.ndarray:
     """Return the linear red, green and blue of a colour of sRGB, 0 .. 1."""
     c = np.array(rgb(colour)) / 255
-    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+    curved = ((c + 0.055) / 1.055) ** 2.4
+    return np.where(c <= 0.04045, c / 12.92, curved)
 
 
 def distance(one: str, other: str) -> float:
     """Return the least distance of two colours in CIELAB over normal sight and three kinds of
     colour blindness.
     """
-    return float(np.linalg.norm(_seen(one) - _seen(other), axis=1).min())
+    apart = _seen(one) - _seen(other)
+    return float(np.linalg.norm(apart, axis=1).min())
 
 
 def law_name(law: Component | str) -> str:
@@ -607,7 +615,8 @@ def folded(label: str, room: float = 120.0) -> str:
     """Return an axis's label on up to four lines of a room in points, broken after underscores
     too.
     """
-    return wrapped(label.replace("_", "_ "), room, points(RC["font.size"]), 4).replace("_ ", "_")
+    breakable = label.replace("_", "_ ")
+    return wrapped(breakable, room, points(RC["font.size"]), 4).replace("_ ", "_")
 
 
 def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
@@ -732,7 +741,8 @@ def ramp(colour: str, count: int, lightest: float = LIGHTEST) -> list[str]:
             shades.append(mixed(colour, other, share))
     lightness = np.array([_seen(shade)[0][0] for shade in shades])
     wanted = np.linspace(lightest, DARKEST, count)
-    return [shades[i] for i in np.abs(lightness - wanted[:, None]).argmin(axis=1)]
+    nearest = np.abs(lightness - wanted[:, None]).argmin(axis=1)
+    return [shades[i] for i in nearest]
 
 
 @functools.cache

@@ -94,8 +94,10 @@ class Overlay:
         mask = Image.new("L", tuple((fine * sides).tolist()))
         places = list(map(tuple, line.tolist()))
         thick = round(fine * width * self.scale)
-        ImageDraw.Draw(mask).line(places, round(255 * opacity), thick, joint="curve")
-        image.paste(style.rgb(colour), (0, 0), mask.reduce(fine))
+        opaque = round(255 * opacity)
+        ImageDraw.Draw(mask).line(places, opaque, thick, joint="curve")
+        shrunk = mask.reduce(fine)
+        image.paste(style.rgb(colour), (0, 0), shrunk)
 
     def arrow(self, image: Image.Image, tail: Array, tip: Array, force: float, hits: str) -> None:
         """Draw the arrow of a force, N, between two points, (3,) m: of a contact, or of a blow that
@@ -106,15 +108,18 @@ class Overlay:
         way = free - fixed
         rim = RIM * self.scale
         edge = np.where(way > 0.0, np.array(image.size) - rim, rim)
-        shares = np.divide(edge - fixed, way, out=np.ones(2), where=way != 0.0)
+        moves = way != 0.0
+        shares = np.divide(edge - fixed, way, out=np.ones(2), where=moves)
         share = float(shares.clip(0.0, 1.0).min())
         free += (share - 1.0) * way  # in the line
         colour = style.DISTURBANCE if hits else style.REACTION
         words = f"{force:.0f} N"
-        arrow = arrows.Arrow(0.0, share, arrows.rgba(colour), body=hits, words=words)
+        shade = arrows.rgba(colour)
+        arrow = arrows.Arrow(0.0, share, shade, body=hits, words=words)
         if np.linalg.norm(way) > 1.0:
             points = np.linspace(line[0], line[1], 40)
-            arrows.stamp(image, points, SHAFT_WIDTH * self.scale, arrow, self.scale, 0, share < 1.0)
+            width = SHAFT_WIDTH * self.scale
+            arrows.stamp(image, points, width, arrow, self.scale, 0, share < 1.0)
 
 
 def overlays(stages: Sequence[Stage]) -> list[Overlay]:

@@ -193,7 +193,8 @@ def scales(traces: Sequence[Trace]) -> dict[ChannelGroup, Scale]:
         if traces[0].scenario.plant.pose:
             pushes = []
             for trace in traces:
-                pushes.append(np.linalg.norm(trace.d[:, :3], axis=1).max())
+                forces = np.linalg.norm(trace.d[:, :3], axis=1)
+                pushes.append(forces.max())
             push = float(max(pushes)) if group.unit == "m" else 0.0
             found[group] = Scale(0.0, push)
             lasting.append(push)
@@ -245,12 +246,14 @@ def along(force: Array, scale: Scale, body: str) -> Arrow:
     size = float(np.linalg.norm(force))
     length = size / scale.longest
     words = f"{style.short(size)} N" if length > MAX_BLOW else ""
-    return Arrow(0.0, length, rgba(style.DISTURBANCE), way=force / size, body=body, words=words)
+    shade = rgba(style.DISTURBANCE)
+    return Arrow(0.0, length, shade, way=force / size, body=body, words=words)
 
 
 def rgba(colour: str, opacity: float = 1.0) -> tuple[float, ...]:
     """Return red, green, blue and opacity, 0 .. 1."""
-    return (*(np.array(style.rgb(colour)) / 255).tolist(), opacity)
+    shade = np.array(style.rgb(colour)) / 255
+    return (*shade.tolist(), opacity)
 
 
 def key(traces: Sequence[Trace], scales: Mapping[ChannelGroup, Scale]) -> list[str]:
@@ -360,7 +363,8 @@ def mean_of(acting: Envelope) -> Envelope:
     """Return what acts on the mean channel, for each of them."""
     parts = []
     for part in acting[1:]:
-        parts.append(np.repeat(part.mean(axis=1, keepdims=True), part.shape[1], 1))
+        mean = part.mean(axis=1, keepdims=True)
+        parts.append(np.repeat(mean, part.shape[1], 1))
     return Envelope(acting.t, *parts)
 
 
@@ -369,7 +373,8 @@ def blows(trace: Trace, start: float, stop: float) -> list[tuple[str, Array]]:
     found = []
     for push in style.pushes([trace]):
         if start <= push.time + push.width and stop >= push.time:
-            found.append((push.body, np.array([push.x, push.y, push.z])))
+            force = np.array([push.x, push.y, push.z])
+            found.append((push.body, force))
     return found
 
 
@@ -401,11 +406,13 @@ def path(
     low, high = np.clip((arrow.low, arrow.high), -1.0, 1.0)
     along = np.linspace(low, high, 40)[:, None]  # of the longest
     if mount.radius:
-        right = np.cross(axis, mount.front + np.array([0.0, 0.0, BENT_RAISE]))
+        front = mount.front + np.array([0.0, 0.0, BENT_RAISE])
+        right = np.cross(axis, front)
         if not right.any():
             return None
         right /= np.linalg.norm(right)
-        out = np.cos(MAX_SWEEP * along) * np.cross(right, axis) + np.sin(MAX_SWEEP * along) * right
+        sideways = np.cross(right, axis)
+        out = np.cos(MAX_SWEEP * along) * sideways + np.sin(MAX_SWEEP * along) * right
         radius = mount.radius * (1.0 + BENT_DISTANCE * arrow.layer)
         return anchor + radius * out, arrow.size * BENT_WIDTH * mount.radius
     body = arrow_geom(model, owner)
@@ -423,7 +430,8 @@ def path(
         width = RADIUS_SHARE * radius + LENGTH_SHARE * mount.unit * min(length, LONG_PENDULUM)
         start = radius + ARC_DISTANCE * width
         if mount.beyond:
-            out = np.array([0.0, 0.0, -1.0 if out[2] > 0.0 else 1.0])
+            down = -1.0 if out[2] > 0.0 else 1.0
+            out = np.array([0.0, 0.0, down])
             place = anchor
             axis = -axis
         way = np.cross(axis, out)
@@ -438,7 +446,8 @@ def path(
                 out = across / np.linalg.norm(across) * (1.0 if across[2] >= 0.0 else -1.0)
         turned = out @ data.geom_xmat[body].reshape(3, 3)
         box = model.geom_aabb[body]
-        start = box[:3] @ turned + box[3:] @ np.abs(turned) + RAIL_DISTANCE * width
+        reach = box[3:] @ np.abs(turned)
+        start = box[:3] @ turned + reach + RAIL_DISTANCE * width
     start += LAYER_DISTANCE * width * arrow.layer
     return place + start * out + reach * along * way, arrow.size * width
 
@@ -447,7 +456,8 @@ def outline(line: Array, width: float, head: bool = True) -> Array:
     """Return the outline, (points, 2) px, of an arrow along a line (m, 2) px whose shaft is `width`
     px wide.
     """
-    way = np.append(0.0, np.linalg.norm(np.diff(line, axis=0), axis=1).cumsum())
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    way = np.append(0.0, steps.cumsum())
     width = min(width, MAX_THICKNESS * way[-1])
     long = min(HEAD_LENGTH * HEAD_WIDTH * width, 0.7 * way[-1]) * head
     at = np.linspace(0.0, way[-1] - long, len(line))
@@ -456,10 +466,12 @@ def outline(line: Array, width: float, head: bool = True) -> Array:
         rows.append(np.interp(at, way, part))
     shaft = np.column_stack(rows)
     along = np.gradient(shaft, axis=0)
-    across = 0.5 * width * along[:, ::-1] * (-1, 1) / np.linalg.norm(along, axis=1)[:, None]
+    sizes = np.linalg.norm(along, axis=1)[:, None]
+    across = 0.5 * width * along[:, ::-1] * (-1, 1) / sizes
     wing = long / HEAD_LENGTH / (0.5 * width) * across[-1]
     tip = [shaft[-1] + wing, line[-1], shaft[-1] - wing]
-    return np.concatenate([shaft + across, tip, (shaft - across)[::-1]])
+    back = (shaft - across)[::-1]
+    return np.concatenate([shaft + across, tip, back])
 
 
 def stamp(
@@ -484,7 +496,9 @@ def stamp(
         across = way[::-1] * (-0.9, 0.9) + 0.3 * way
         corners = [across + 0.3 * way, across - 0.3 * way, -across - 0.3 * way, 0.3 * way - across]
         paint(image, line[k] + np.array(corners), WHITE)
-    end, other = (line[0], line[-1]) if arrow.body else (line[-1], line[0])
+    end, other = line[-1], line[0]
+    if arrow.body:
+        end, other = other, end
     write(image, arrow.words, end, end - other, arrow.rgba, scale)
 
 
@@ -508,7 +522,8 @@ def write(
     y = min(max(y, high), image.height - high)
     rim = {"stroke_width": round(2 * scale), "stroke_fill": style.PAPER}
     fill = bytes_of(rgba)
-    ImageDraw.Draw(image).text((x, y), words, fill, style.font(high, True), anchor="lm", **rim)
+    letters = style.font(high, True)
+    ImageDraw.Draw(image).text((x, y), words, fill, letters, anchor="lm", **rim)
 
 
 def paint(image: Image.Image, edge: Array, rgba: Sequence[float], rim: int = 0) -> None:
@@ -516,7 +531,8 @@ def paint(image: Image.Image, edge: Array, rgba: Sequence[float], rim: int = 0) 
     corner = np.floor(edge.min(axis=0)).astype(int) - rim
     far = np.ceil(edge.max(axis=0)).astype(int) + 1 + rim
     place = tuple(corner.tolist())
-    mask = Image.new("L", tuple((SUPERSAMPLING * (far - corner)).tolist()))
+    size = SUPERSAMPLING * (far - corner)
+    mask = Image.new("L", tuple(size.tolist()))
     points = list(map(tuple, (SUPERSAMPLING * (edge - corner)).tolist()))
     ImageDraw.Draw(mask).polygon(points, round(255 * rgba[3]))
     mask = mask.reduce(SUPERSAMPLING)

@@ -64,7 +64,8 @@ def turn(azimuth: float, elevation: float) -> Array:
     down.
     """
     a, e = np.radians([azimuth, elevation])
-    ahead = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    level = np.cos(e)
+    ahead = np.array([level * np.cos(a), level * np.sin(a), np.sin(e)])
     right = np.array([np.sin(a), -np.cos(a), 0.0])
     return np.column_stack([right, np.cross(right, ahead), -ahead])
 
@@ -89,7 +90,8 @@ def fit(points: Array, turn: Array, size: tuple[int, int], room: Room) -> Array:
     sides = [(across, left, right), (up, low, high)]
     distance = -np.inf
     for p, a, b in sides:
-        distance = max(distance, (np.max(p - b * z) - np.min(p - a * z)) / (b - a))
+        span = np.max(p - b * z) - np.min(p - a * z)
+        distance = max(distance, span / (b - a))
     centre = []
     for p, a, b in sides:
         nearest = np.max(p - b * z) - b * distance
@@ -103,12 +105,14 @@ def project(points: Array, turn: Array, place: Array, size: tuple[int, int]) -> 
     left.
     """
     seen = (points - place) @ turn
-    return np.array(size) / 2 + seen[:, :2] / -seen[:, 2:] / pixel(size) * (1, -1)
+    scaled = seen[:, :2] / -seen[:, 2:] / pixel(size)
+    return np.array(size) / 2 + scaled * (1, -1)
 
 
 def pixel(size: tuple[int, int]) -> float:
     """Return the tangent of one px at the picture's middle."""
-    return float(np.tan(np.radians(FOVY) / 2) / (size[1] / 2))
+    half = np.tan(np.radians(FOVY) / 2)
+    return float(half / (size[1] / 2))
 
 
 def layout(
@@ -131,7 +135,8 @@ def layout(
             continue
         pitch = np.array([(room.right - room.left) / columns, (room.bottom - room.top) / rows])
         wide, tall = (pitch - TILE_GAP).astype(int).tolist()
-        across, down = sizes(MAX_BESIDE * wide if beside else wide).max(axis=0).tolist()
+        most = MAX_BESIDE * wide if beside else wide
+        across, down = sizes(most).max(axis=0).tolist()
         fits = down <= tall if beside else across <= wide
         if beside:
             fits &= across <= MAX_BESIDE * wide
@@ -143,19 +148,18 @@ def layout(
         head = min(HEAD_ROOM * (room.right - room.left), 0.5 * size[1])
         inside = Room(edge, max(edge, head), size[0] - edge, size[1] - edge)
         place = fit(points, turn, size, inside)
-        distance = float((place - points.mean(axis=0)) @ turn[:, 2])
-        layouts.append(
-            ((fits, 1.0 / (pixel(size) * distance)), columns, pitch, View(size, turn, place))
-        )
+        away = place - points.mean(axis=0)
+        distance = float(away @ turn[:, 2])
+        rank = (fits, 1.0 / (pixel(size) * distance))
+        layouts.append((rank, columns, pitch, View(size, turn, place)))
     _, columns, pitch, view = max(layouts, key=lambda one: one[0])
     wide, tall = view.size
     left, foot = (pitch - TILE_GAP - view.size).astype(int).tolist()
+    corner = np.array([room.left, room.top])
     tiles = []
     labels = []
     for k in range(count):
-        x, y = (
-            (np.array([room.left, room.top]) + pitch * (k % columns, k // columns)).round().tolist()
-        )
+        x, y = (corner + pitch * (k % columns, k // columns)).round().tolist()
         tiles.append((x + left, y, x + left + wide, y + tall))
         if left > foot:
             labels.append((x, y, x + left, y + tall))

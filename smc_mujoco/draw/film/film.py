@@ -274,7 +274,8 @@ def _checked_size(size: Iterable[int]) -> tuple[int, int]:
     sides = items_of("size", size)
     fit = len(sides) == 2
     for side, low, high in zip(sides, MIN_SIZE, MAX_SIZE, strict=False):
-        fit &= isinstance(side, int | np.integer) and low <= side <= high and side % 2 == 0
+        whole = isinstance(side, int | np.integer)
+        fit &= whole and low <= side <= high and side % 2 == 0
     if not fit:
         wanted = f"two even numbers from {MIN_SIZE} to {MAX_SIZE}"
         raise ScenarioError(f"a film of {errors.shown(size)} px: give {wanted}")
@@ -309,7 +310,8 @@ def pictures(frames: Frames) -> Generator[Array]:
             for trace in runs.traces:
                 closing.append(horizon.since(trace, start))
             last = runs._replace(traces=closing)
-            last = last._replace(span=(end(last.traces), end(last.traces)))
+            stop = end(last.traces)
+            last = last._replace(span=(stop, stop))
             said = [f"last periods, deflections × {close.factor:g}"]
             sheet = Sheet(last, size, placed.tiles, placed.labels, frames.title, said, start)
             for stage, track in zip(stages, tracks_at(close, runs, scales), strict=True):
@@ -324,7 +326,8 @@ def tracks_at(
 ) -> list[MachineTrack]:
     """Return what the runs do at the frames of a clock."""
     stop = runs.span[1]
-    grid = np.linspace(0.0, stop, 1 + min(MAX_GRID, max(1, round(FPS * stop))))  # also for a still
+    count = max(1, round(FPS * stop))
+    grid = np.linspace(0.0, stop, 1 + min(MAX_GRID, count))  # also for a still
     found = []
     for trace, colour in zip(runs.traces, runs.colours, strict=True):
         found.append(MachineTrack(trace, colour, clock, grid, scales))
@@ -340,7 +343,8 @@ def drawn(
         for k, over in enumerate(overlays):
             machines[k] = over.over(machines[k], frame)
         states = [stage.track.states[frame] for stage in stages]
-        yield sheet.picture(Moment(time, float(clock.speeds[frame]), states), machines)
+        moment = Moment(time, float(clock.speeds[frame]), states)
+        yield sheet.picture(moment, machines)
 
 
 class Placement(NamedTuple):
@@ -393,6 +397,7 @@ def staged(tracks: Sequence[MachineTrack], placed: Placement, times: Array) -> I
         puppet = placed.puppets[k]
         path = None
         if placed.followed:
-            path = placed.followed[k].followed(times) + np.array([0.0, 0.0, puppet.height])
+            raised = np.array([0.0, 0.0, puppet.height])
+            path = placed.followed[k].followed(times) + raised
         alone = len(tracks) == 1
         yield Stage(track, puppet, placed.view, placed.points, placed.scale, alone, path)

@@ -21,7 +21,8 @@ def plane(traces: Sequence[Trace]) -> Array:
     """Return the two of the axes x, y and z along which the references of free bodies vary most,
     (2,).
     """
-    sides = np.ptp(np.concatenate([trace.r for trace in traces]), axis=0)
+    goals = np.concatenate([trace.r for trace in traces])
+    sides = np.ptp(goals, axis=0)
     return np.sort(np.argsort(-sides, kind="stable")[:2])
 
 
@@ -48,8 +49,10 @@ def draw_map(
     low = seen[:, axes].min(axis=0)
     high = seen[:, axes].max(axis=0)
     sides = np.array(ax.get_window_extent().size)
-    half = (0.5 + quantities.MARGIN) * ((high - low) / sides).max() * sides
-    ends = np.transpose((low + high) / 2 + np.array([-half, half]))
+    scale = ((high - low) / sides).max()
+    half = (0.5 + quantities.MARGIN) * scale * sides
+    around = np.array([-half, half])
+    ends = np.transpose((low + high) / 2 + around)
     ax.set(xlim=ends[0], ylim=ends[1])
     artists: list[Artist] = []
     flights = []
@@ -61,5 +64,6 @@ def draw_map(
         ax.plot(*trace.r[:, axes].T, **goal)
         wide = {"color": colour, "lw": style.points(PAST_LINE), "animated": True}
         (past,) = ax.plot([], [], **wide)
-        flights.append(Flight(past, panels.dot(ax, colour), trace.t, places))
+        dot = panels.dot(ax, colour)
+        flights.append(Flight(past, dot, trace.t, places))
     return artists, flights

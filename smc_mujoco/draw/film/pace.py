@@ -65,9 +65,12 @@ class FilmClock(NamedTuple):
         """Return when the film shows times t of the run, s: before its start and after its end in
         real time.
         """
-        shown = np.append(0.0, np.cumsum(np.diff(self.times) / self.speeds[1:]))
+        passed = np.diff(self.times) / self.speeds[1:]
+        shown = np.append(0.0, np.cumsum(passed))
         inside = np.interp(t, self.times, shown)
-        return inside + np.minimum(t - self.times[0], 0.0) + np.maximum(t - self.times[-1], 0.0)
+        before = np.minimum(t - self.times[0], 0.0)
+        after = np.maximum(t - self.times[-1], 0.0)
+        return inside + before + after
 
     def part(self, start: float, stop: float) -> "FilmClock":
         """Return the frames from `start` to `stop` of the run, s."""
@@ -83,12 +86,14 @@ def clock(traces: Trace | Sequence[Trace], fps: Rate, speed: Speed | None = None
     traces = style.same_plant(traces)
     whole = end(traces)
     if speed is not None:
-        times = np.arange(int(whole * fps / speed + 1e-6) + 1) * (speed / fps)
+        count = int(whole * fps / speed + 1e-6) + 1
+        times = np.arange(count) * (speed / fps)
         return FilmClock(times, np.full(len(times), speed))
     grid, wanted = speeds(traces, fps)
     times = [0.0]
     while times[-1] < whole - 1e-9:
-        now = wanted[np.searchsorted(grid, times[-1] + 1e-9, side="right") - 1]
+        at = np.searchsorted(grid, times[-1] + 1e-9, side="right") - 1
+        now = wanted[at]
         times.append(min(times[-1] + now / fps, whole))
     frames = np.array(times)
     speeds_there = wanted[np.searchsorted(grid, frames + 1e-9, side="right") - 1]
@@ -111,7 +116,8 @@ def close_up(traces: Sequence[Trace], fps: float) -> FilmClock | None:
     sizes = visible_sizes(scenario)
     ways = []
     for run in runs:
-        ways.append(float((np.ptp(run.x, axis=0) / sizes).max()))
+        spans = np.ptp(run.x, axis=0) / sizes
+        ways.append(float(spans.max()))
     way = max(ways)
     rattles = any(states.backlash_gap(run.scenario) for run in runs)
     sticks = all(map(_rests_at_the_end, runs))
@@ -126,7 +132,8 @@ def close_up(traces: Sequence[Trace], fps: float) -> FilmClock | None:
     deflections = []
     for run in runs:
         x = run.x[run.t >= start]
-        deflections.append(float((np.abs(x - x.mean(axis=0)) / sizes).max()))
+        away = np.abs(x - x.mean(axis=0)) / sizes
+        deflections.append(float(away.max()))
     factor = rounded(1.0 / max(*deflections, 1e-12))
     if factor < MIN_FACTOR:
         return None
@@ -158,7 +165,8 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[Array, Array]:
     grid = np.arange(max(1, round(whole * fps))) / fps
     runs = list(map(finite, traces))
     travel = travel_of(runs, np.append(grid, whole))
-    powers = np.ceil(np.log2(np.maximum(travel / MAX_TRAVEL, 1.0)) - 1e-9)
+    beyond = np.maximum(travel / MAX_TRAVEL, 1.0)
+    powers = np.ceil(np.log2(beyond) - 1e-9)
     powers = np.asarray(
         maximum_filter1d(powers, 2 * round(MOTION_MARGIN * fps) + 1, mode="nearest")
     )
@@ -166,7 +174,8 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[Array, Array]:
         powers[np.abs(grid + 0.5 / fps - start) <= IMPACT_TIME] = MAX_HALVINGS
     pushed = np.zeros(len(grid), bool)
     for push in style.pushes(runs):
-        pushed |= np.abs(grid + 0.5 / fps - push.time - 0.5 * push.width) <= IMPACT_TIME
+        away = grid + 0.5 / fps - push.time - 0.5 * push.width
+        pushed |= np.abs(away) <= IMPACT_TIME
     moved = (travel > REST_TRAVEL) | pushed
     moving = np.asarray(
         maximum_filter1d(moved, 2 * round(REST_MARGIN * fps) + 1, mode="nearest"), bool
@@ -176,7 +185,8 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[Array, Array]:
     for saved in range(2 * MAX_HALVINGS + 1):  # first around other motion, then around pushes
         slowest = max(0, MAX_HALVINGS - saved)
         around_pushes = min(MAX_HALVINGS, 2 * MAX_HALVINGS - saved)
-        playback = np.where(moving | (powers > 0.0), 0.5 ** np.minimum(powers, slowest), REST_SPEED)
+        slowed = 0.5 ** np.minimum(powers, slowest)
+        playback = np.where(moving | (powers > 0.0), slowed, REST_SPEED)
         playback[pushed] = 0.5**around_pushes
         if (1.0 / playback).sum() / fps <= longest:
             break
@@ -196,7 +206,8 @@ def travel_of(runs: Sequence[Trace], edges: Array) -> Array:
     for trace in runs:
         x = np.clip(trace.x, low, high)  # what has left the world does not count
         seen = np.stack([np.interp(edges, trace.t, channel) for channel in x.T], axis=1)
-        travel = np.maximum(travel, (np.abs(np.diff(seen, axis=0)) / size).max(axis=1))
+        change = np.abs(np.diff(seen, axis=0)) / size
+        travel = np.maximum(travel, change.max(axis=1))
     return travel
 
 
@@ -207,5 +218,6 @@ def impacts(runs: Sequence[Trace]) -> list[float]:
         touch = states.extended(
             np.asarray(states.in_contact(trace).any(axis=1)), trace.t, states.MIN_STATE_TIME
         )
-        starts += trace.t[np.flatnonzero(np.diff(touch.astype(int), prepend=1) > 0)].tolist()
+        begins = np.diff(touch.astype(int), prepend=1) > 0
+        starts += trace.t[np.flatnonzero(begins)].tolist()
     return starts

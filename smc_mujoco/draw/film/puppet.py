@@ -104,7 +104,8 @@ class Puppet:
             for shape in found:
                 world.restyle(shape.model)
             if plant.unit != "rad" and not plant.pose:
-                rail = float(2 * np.abs(world.fixed_boxes(model)[..., 0]).max())
+                widths = np.abs(world.fixed_boxes(model)[..., 0])
+                rail = float(2 * widths.max())
         else:
             start = models.initial_state(model, scenario)[0]
         rotors = []
@@ -151,7 +152,8 @@ class Puppet:
         channel are taken from the pose `rest`, (nq,), by default that of the start.
         """
         model = self.model
-        x = np.where(self.slides, np.clip(x, -self.rail / 2, self.rail / 2), x)
+        on_rail = np.clip(x, -self.rail / 2, self.rail / 2)
+        x = np.where(self.slides, on_rail, x)
         if self.scenario.plant.pose or self.scenario.plant.base >= 0:
             pose = models.state_with(model, self.ids, x, 0.0)[0]
         else:
@@ -226,7 +228,8 @@ class Puppet:
         for points in course.places:
             sizes.append(float(np.ptp(points, axis=0).max()))
         own = max(sizes)
-        return float(np.ptp(course.middle, axis=0).max()) > FOLLOWED_TRAVEL * own
+        way = float(np.ptp(course.middle, axis=0).max())
+        return way > FOLLOWED_TRAVEL * own
 
     def placed(
         self, track: MachineTrack, course: Course, followed: bool, front: Array
@@ -259,7 +262,8 @@ class Puppet:
             for part, at in zip([*course.places, *curves], places, strict=True):
                 relative.append(part - at)
             points = np.concatenate(relative)
-            height = max(0.0, -float(np.concatenate(course.places)[:, 2].min()))
+            lowest = float(np.concatenate(course.places)[:, 2].min())
+            height = max(0.0, -lowest)
         else:
             points = np.concatenate([course.reached, *curves])
             height = 0.0
@@ -292,8 +296,11 @@ class Puppet:
             far = MAX_FIXED_SIZE * size
 
             def close(boxes: Array) -> Array:
-                inside = ((boxes < high + far) & (boxes > low - far)).all(axis=(1, 2))
-                return boxes[inside & (np.ptp(boxes, axis=1).max(axis=1) < far)]
+                below = boxes < high + far
+                above = boxes > low - far
+                inside = (below & above).all(axis=(1, 2))
+                extent = np.ptp(boxes, axis=1).max(axis=1)
+                return boxes[inside & (extent < far)]
 
             around = close(around)
             standing = close(standing)
@@ -303,7 +310,8 @@ class Puppet:
             standing = standing.clip(low - (near, near, stand), high + near)
         if on_stage and self.slides.all():  # of a cart the rail, not its feet nor what is behind it
             stand = world.CUT_MARGIN * size
-            standing[..., 1:] = standing[..., 1:].clip(low[1:] - (0.0, stand), high[1:])
+            least = low[1:] - (0.0, stand)
+            standing[..., 1:] = standing[..., 1:].clip(least, high[1:])
         standing[..., 2] = standing[..., 2].clip(low[2] - stand, high[2] + stand)
         points = np.concatenate([points, around.reshape(-1, 3), standing.reshape(-1, 3)])
         height = -raised

@@ -75,7 +75,9 @@ def letters(size: tuple[int, int]) -> float:
 
 def room_of(size: tuple[int, int]) -> Room:
     """Return the room for machines and their labels in a film of this size."""
-    return Room(0.0, 2.1 * LINE_PITCH * letters(size), size[0], (1.0 - CHARTS_SHARE) * size[1])
+    top = 2.1 * LINE_PITCH * letters(size)
+    foot = (1.0 - CHARTS_SHARE) * size[1]
+    return Room(0.0, top, size[0], foot)
 
 
 def label_sizes(names: Sequence[str], size: tuple[int, int], room: float) -> Array:
@@ -89,7 +91,8 @@ def label_sizes(names: Sequence[str], size: tuple[int, int], room: float) -> Arr
         wide = style.widest(lines, high)
         if any("…" in line for line in lines):
             wide = style.width(name, high)
-        found.append((wide + high, (LINE_PITCH * len(lines) + SAMPLE) * high))
+        high_of_lines = (LINE_PITCH * len(lines) + SAMPLE) * high
+        found.append((wide + high, high_of_lines))
     return np.array(found)
 
 
@@ -156,9 +159,11 @@ class Sheet:
         left = EDGE * high
         right = self.size[0] - left
         words = " ".join(title.split())
-        share = max(LEAST_TITLE, min(1.0, (right - left) / style.width(words, high, bold=True)))
+        wide = style.width(words, high, bold=True)
+        share = max(LEAST_TITLE, min(1.0, (right - left) / wide))
         words = style.cropped(words, right - left, share * high, bold=True)
-        first, second = (np.array([0.62, 1.57]) * LINE_PITCH * high).tolist()
+        lines = np.array([0.62, 1.57]) * LINE_PITCH * high
+        first, second = lines.tolist()
         title_size = share * ONE_SIZE["axes.titlesize"]
         self.write(left, first, words, va="center", weight="bold", fontsize=title_size)
         self.clock = self.write(right, second, ha="right", va="center", weight="bold")
@@ -234,7 +239,8 @@ class Sheet:
         count = int(narrow / style.width("0.0000", self.letters))
         locator = MaxNLocator(min(max(count, 1), TIME_TICKS), steps=pages.STEPS)
         ticks = np.asarray(locator.tick_values(0.0, stop))
-        ticks = ticks[(ticks >= 0.0) & (ticks <= stop * (1.0 + 1e-9))].tolist()
+        seen = (ticks >= 0.0) & (ticks <= stop * (1.0 + 1e-9))
+        ticks = ticks[seen].tolist()
         ax.set_xlim(0.0, stop)
         ax.set_xticks(ticks, [*(f"{tick:g}" for tick in ticks[:-1]), f"{ticks[-1]:g} s"])
         for label, side in zip(ax.get_xticklabels()[:: len(ticks) - 1 or 1], SIDES, strict=False):
@@ -311,7 +317,9 @@ def set_moving(row: Row) -> Moving:
     dots = []
     for trace, colour in reversed(list(zip(panel.traces, colours, strict=True))):
         t, y = panels.middle(trace, panel.quantity)
-        dots.append((panels.dot(ax, colour), t, np.clip(y, *ax.get_ylim())))  # the first on top
+        dot = panels.dot(ax, colour)
+        clipped = np.clip(y, *ax.get_ylim())
+        dots.append((dot, t, clipped))  # the first on top
     return Moving(ax, cursor, dots)
 
 

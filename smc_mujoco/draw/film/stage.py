@@ -59,9 +59,12 @@ class Stage:
         self.aimed = False
         material = self.model.geom_matid
         painted = self.model.mat_rgba[material]
-        self.paint = np.where((material >= 0)[:, None], painted, self.model.geom_rgba)
-        visible = (self.model.geom_group < GROUPS) & (self.paint[:, 3] > 0.0)
-        distance = float((self.place - points.mean(axis=0)) @ self.turn[:, 2])
+        stated = (material >= 0)[:, None]
+        self.paint = np.where(stated, painted, self.model.geom_rgba)
+        opaque = self.paint[:, 3] > 0.0
+        visible = (self.model.geom_group < GROUPS) & opaque
+        away = self.place - points.mean(axis=0)
+        distance = float(away @ self.turn[:, 2])
         tall = self.size[1] * camera.pixel(self.size) * distance  # m
         self.find_joints(visible, arrows.MAX_BENT_SHARE * tall)
         self.shape = -1
@@ -200,10 +203,13 @@ class Stage:
             return
         points, width = found
         line = self.project(points)
-        if np.linalg.norm(np.diff(line, axis=0), axis=1).sum() < arrows.MIN_PIXELS * self.scale:
+        length = np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
+        if length < arrows.MIN_PIXELS * self.scale:
             return
-        across = self.project(np.array([points[0], points[0] + width * self.turn[:, 1]]))
-        thick = max(float(np.ptp(across[:, 1])), arrows.MIN_SHAFT * self.scale * arrow.size)
+        beside = points[0] + width * self.turn[:, 1]
+        across = self.project(np.array([points[0], beside]))
+        least = arrows.MIN_SHAFT * self.scale * arrow.size
+        thick = max(float(np.ptp(across[:, 1])), least)
         rim = 0
         if mount.radius and not arrow.body:  # it lies over a link of its colour
             anchor = self.project(self.data.xanchor[[mount.joint]])[0]

@@ -27,7 +27,8 @@ class Motion(NamedTuple):
 
     def at(self, time: float) -> Array:
         """Return the pose at a time, (nq,): the one before."""
-        return self.poses[max(int(np.searchsorted(self.times, time + 1e-9)) - 1, 0)]
+        sample = int(np.searchsorted(self.times, time + 1e-9)) - 1
+        return self.poses[max(sample, 0)]
 
 
 class MachineTrack:

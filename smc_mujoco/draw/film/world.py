@@ -131,10 +131,13 @@ def set_floor(model: mujoco.MjModel, view: camera.View, points: Array, moved: Ar
     place = place + moved
     model.stat.center[:] = (points.min(axis=0) + points.max(axis=0)) / 2
     model.stat.extent = extent = np.ptp(points, axis=0).max()
-    cells = np.outer(10.0 ** np.arange(-4, 5), (1.0, 2.0, 5.0)).ravel()  # m
-    cell = cells[np.abs(np.log(FLOOR_CELLS * cells / extent)).argmin()]
+    decades = 10.0 ** np.arange(-4, 5)
+    cells = np.outer(decades, (1.0, 2.0, 5.0)).ravel()  # m
+    misfit = np.abs(np.log(FLOOR_CELLS * cells / extent))
+    cell = cells[misfit.argmin()]
     model.mat_texrepeat[model.material("floor").id] = 1.0 / cell
-    start = float(((points - place) @ -turn[:, 2]).max())
+    depth = (points - place) @ -turn[:, 2]
+    start = float(depth.max())
     half = turn[:, 1] * camera.pixel(size) * size[1] / 2
     low = -half - turn[:, 2]
     if low[2] < 0.0:  # where the foot of the picture meets the floor, below what flies
@@ -175,7 +178,8 @@ def view(model: mujoco.MjModel) -> tuple[float, float]:
     for frame in model.cam_mat0[fixed].reshape(-1, 3, 3):
         right, _, back = frame.T
         azimuth = np.degrees(np.arctan2(right[0], -right[1]))
-        elevation = np.degrees(np.arcsin(np.clip(-back[2], -1.0, 1.0)))
+        climb = np.clip(-back[2], -1.0, 1.0)
+        elevation = np.degrees(np.arcsin(climb))
         return float(azimuth), min(float(elevation), LOW_ELEVATION)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -191,7 +195,8 @@ def view(model: mujoco.MjModel) -> tuple[float, float]:
     x, y, z = axes[0]
     if abs(z) > PARALLEL_COSINE:
         return ABOVE
-    return float(np.degrees(np.arctan2(abs(y), x * np.sign(y or 1.0)))), LOW_ELEVATION
+    azimuth = np.degrees(np.arctan2(abs(y), x * np.sign(y or 1.0)))
+    return float(azimuth), LOW_ELEVATION
 
 
 def forward(model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -209,7 +214,8 @@ def boxes(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     rods = model.geom_type == CAPSULE  # their compiled boxes are not those of a run that changes it
     half[rods, 2] = model.geom_size[rods, 0] + model.geom_size[rods, 1]
     local = model.geom_aabb[:, None, :3] + CORNERS * half[:, None]
-    turned = np.einsum("gij,gcj->gci", data.geom_xmat.reshape(-1, 3, 3), local)
+    turns = data.geom_xmat.reshape(-1, 3, 3)
+    turned = np.einsum("gij,gcj->gci", turns, local)
     return turned + data.geom_xpos[:, None]
 
 
@@ -242,7 +248,8 @@ def restyle(model: mujoco.MjModel) -> None:
     for i in range(model.ngeom):
         names.append(model.geom(i).name.rpartition("/")[2])
     dial = np.isin(names, ("face", "bezel"))
-    model.geom_rgba[dial] = model.mat_rgba[model.geom_matid[dial]] * (1.0, 1.0, 1.0, 0.4)
+    painted = model.mat_rgba[model.geom_matid[dial]]
+    model.geom_rgba[dial] = painted * (1.0, 1.0, 1.0, 0.4)
     model.geom_matid[dial] = -1
     for field in (model.geom_size, model.geom_aabb, model.geom_rbound):
         field[np.isin(names, "bob")] *= 1.3
@@ -303,7 +310,8 @@ def cut(machines: Sequence[mujoco.MjModel], points: Array, slides: Array, own: b
                 model.geom_group[geom] = HIDDEN_GROUP
             if way.any():
                 model.geom_sameframe[geom] = 0  # else MuJoCo takes it to be where its body is
-            model.geom_pos[geom] += way @ data.xmat[model.geom_bodyid[geom]].reshape(3, 3)
+            turned = data.xmat[model.geom_bodyid[geom]].reshape(3, 3)
+            model.geom_pos[geom] += way @ turned
         raised = first - start if upright else 0.0
     for other, name in itertools.product(machines[1:], CUT_FIELDS):
         getattr(other, name)[fixed] = getattr(model, name)[fixed]
@@ -312,7 +320,8 @@ def cut(machines: Sequence[mujoco.MjModel], points: Array, slides: Array, own: b
 
 def _slender(sides: Array, axis: int) -> Array:
     """Return which boxes, (k, 3) m, are long and narrow along an axis, (k,)."""
-    return sides[:, axis] > SLENDER * np.delete(sides, axis, axis=1).max(axis=1)
+    others = np.delete(sides, axis, axis=1).max(axis=1)
+    return sides[:, axis] > SLENDER * others
 
 
 def lengthen(model: mujoco.MjModel, geom: int, side: int, longer: float) -> None:
