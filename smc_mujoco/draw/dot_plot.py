@@ -91,8 +91,8 @@ def plot(
         tall = WORDS_HEIGHT + LINE_HEIGHT * dots.lines
         heights = np.repeat(tall, len(dots.metrics) // across)
         space = pages.head_height(width, key) + style.points(0.6)
-        tall = height or space + style.points(heights.sum())
-        page = pages.blank(width, tall, fig)
+        whole = height or space + style.points(heights.sum())
+        page = pages.blank(width, whole, fig)
         axes = page.subplots(len(heights), across, squeeze=False, height_ratios=heights.tolist())
         by_plant = axes.reshape(len(dots.conditions), -1)
         for plant, high, row in zip(dots.conditions, tall, by_plant, strict=True):

@@ -446,8 +446,8 @@ def path(
                 out = across / np.linalg.norm(across) * (1.0 if across[2] >= 0.0 else -1.0)
         turned = out @ data.geom_xmat[body].reshape(3, 3)
         box = model.geom_aabb[body]
-        reach = box[3:] @ np.abs(turned)
-        start = box[:3] @ turned + reach + RAIL_DISTANCE * width
+        half = box[3:] @ np.abs(turned)
+        start = box[:3] @ turned + half + RAIL_DISTANCE * width
     start += LAYER_DISTANCE * width * arrow.layer
     return place + start * out + reach * along * way, arrow.size * width
 

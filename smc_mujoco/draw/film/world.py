@@ -310,8 +310,8 @@ def cut(machines: Sequence[mujoco.MjModel], points: Array, slides: Array, own: b
                 model.geom_group[geom] = HIDDEN_GROUP
             if way.any():
                 model.geom_sameframe[geom] = 0  # else MuJoCo takes it to be where its body is
-            turned = data.xmat[model.geom_bodyid[geom]].reshape(3, 3)
-            model.geom_pos[geom] += way @ turned
+            pose = data.xmat[model.geom_bodyid[geom]].reshape(3, 3)
+            model.geom_pos[geom] += way @ pose
         raised = first - start if upright else 0.0
     for other, name in itertools.product(machines[1:], CUT_FIELDS):
         getattr(other, name)[fixed] = getattr(model, name)[fixed]
