@@ -1,7 +1,6 @@
 """Advice: which law to use on a plant, with its gains, and how certain that is, in words."""
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 
@@ -66,17 +65,20 @@ class Advice(Tables):
             return f"no law is reliable here; this one settles in {share}"
         if len(self.laws) < 2:
             return "there is no second law"
-        barred = dict.fromkeys(itertools.chain.from_iterable(board.barred for board in boards))
-        barred.pop(self.law.name, None)
-        if barred:
-            first = next(iter(barred))
-            return f"first so far; --defaults lets a law win over {first}'s default gains"
+        for board in boards:
+            for barred in board.barred:
+                if barred != self.law.name:
+                    cure = f"--defaults lets a law win over {barred}'s default gains"
+                    return f"first so far; {cure}"
         if all(board.too_few for board in boards):
             return f"first so far; {boards[0].too_few}"
         name = self.law.name
         blocks = sum(len(board.blocks) for board in boards)
-        wins = sum(len(board.wins(name)) for board in boards)
-        losses = sum(len(board.losses(name)) for board in boards)
+        wins = 0
+        losses = 0
+        for board in boards:
+            wins += len(board.wins(name))
+            losses += len(board.losses(name))
         text = f"it wins {wins} of {blocks} comparisons, and another law wins {losses}"
         if wins:
             return text
@@ -152,7 +154,8 @@ class RaceAdvice(Advice):
             )
         text = _verdict(comparison, race.running)
         ranked = _ranked(comparison, race.running)
-        if few := [law for law in race.running if law not in ranked]:
+        few = [law for law in race.running if law not in ranked]
+        if few:
             text += f"; {joined(few)} cannot be told from others, with fewer than {LOOKS[0]} sets"
         if race.winner or len(ranked) < 2:
             return text
@@ -189,11 +192,13 @@ class RaceAdvice(Advice):
     def _where(self) -> str:
         """In how many runs of which conditions the first law settles."""
         found = self.settled[self.law.name]
-        rare = {name: pair for name, pair in found.items() if pair[0] < RELIABLE * pair[1]}
-        runs = next(iter(found.values()))[1]
+        rare = []
+        for name, (done, of) in found.items():
+            if done < RELIABLE * of:
+                rare.append(f"{done} of {of} runs under {name}")
         if rare:
-            parts = [f"{done} of {of} runs under {name}" for name, (done, of) in rare.items()]
-            return f"not reliably: in {joined(parts)}"
+            return f"not reliably: in {joined(rare)}"
+        runs = next(iter(found.values()))[1]
         least = min(done for done, _ in found.values())
         share = f"all {runs}" if least == runs else f"at least {least} of {runs}"
         return f"in {share} unseen runs in {_each(len(found))}"
@@ -202,7 +207,10 @@ class RaceAdvice(Advice):
     def _weighs(self) -> str:
         """Which share of J of the first law each condition has, the largest first."""
         order = sorted(self.weighs, key=lambda name: -self.weighs[name])
-        return joined([f"{100.0 * self.weighs[name]:.0f} % {name}" for name in order])
+        parts = []
+        for name in order:
+            parts.append(f"{100.0 * self.weighs[name]:.0f} % {name}")
+        return joined(parts)
 
     @property
     def _margins(self) -> str:
@@ -273,7 +281,10 @@ def _verdict(comparison: Comparison, order: Sequence[str]) -> str:
     if not names:
         return "open: no law has sets or runs enough"
     first = winner or names[0]
-    effects = {law: comparison.effect(0, first, law) for law in names if law != first}
+    effects = {}
+    for law in names:
+        if law != first:
+            effects[law] = comparison.effect(0, first, law)
     rival = max(effects, key=lambda law: effects[law].high)
     at = comparison.laws.index(first), comparison.laws.index(rival)
     p = number(float(comparison.p[0][at]), 2)

@@ -160,7 +160,8 @@ def race(
             if k + 1 == FIRST:
                 values = {name: one.values for name, one in running.items()}
                 dropped = hopeless(values)
-                running = {name: running[name] for name in running if name not in dropped}
+                for name in dropped:
+                    del running[name]
             _expect(shown, k + 1, len(running))
             if k + 1 in LOOKS:
                 comparison = judged(running, goal, relevant)
@@ -209,7 +210,7 @@ def judged(running: Mapping[str, Entrant], goal: Objective, relevant: float) -> 
     numbers = {}
     fine = {}
     for name, one in running.items():
-        J = [unseen for unseen in one.J if unseen]
+        J = list(filter(None, one.J))
         values[name] = np.array([unseen.value for unseen in J])
         halves[name] = np.array([unseen.half for unseen in J])
         numbers[name] = np.arange(len(J)) % one.count
@@ -226,10 +227,12 @@ def needed(comparison: Comparison) -> float:
     if count < 2:
         return math.inf
     first, *others = np.argsort(middles, kind="stable")[:count].tolist()
-    return max(
-        units_needed(comparison.leads[0, first, other], comparison.error, comparison.relevant)
-        for other in others
-    )
+    needs = []
+    for other in others:
+        needs.append(
+            units_needed(comparison.leads[0, first, other], comparison.error, comparison.relevant)
+        )
+    return max(needs)
 
 
 def compared(
@@ -267,11 +270,15 @@ def _searched(
     """Yield the search k of each entrant, of a draw, in order, as the folder keeps it."""
     files = [_file(trial, *piece) for piece in pieces]
     found = [file.read() for file in files]
-    missing = [i for i, made in enumerate(found) if made is None]
-    writable(*(files[i].path for i in missing))
+    missing = []
+    for i, file in enumerate(files):
+        if found[i] is None:
+            missing.append(i)
+            writable(file.path)
     if missing and trial.executor is not None:
         calls = []
-        for one, k, draw in (pieces[i] for i in missing):
+        for i in missing:
+            one, k, draw = pieces[i]
             calls.append(one.call(k, draw))
         with opened(trial.executor) as pool:
             for j, made in called(pool, search.searched, calls):
@@ -300,11 +307,16 @@ def _judge(
 ) -> None:
     """Compute J of the first sets, on unseen runs, where it is not known."""
     wanted = []
+    laws = []
+    numbers = []
     for one in running:
         one.J += [None] * (count - len(one.J))
-        wanted += [(one, k) for k in range(count) if one.J[k] is None]
-    laws = [one.gains(k) for one, k in wanted]
-    values, halves = unseen(trial, plant, laws, goal, [k for _, k in wanted])
+        for k in range(count):
+            if one.J[k] is None:
+                wanted.append((one, k))
+                laws.append(one.gains(k))
+                numbers.append(k)
+    values, halves = unseen(trial, plant, laws, goal, numbers)
     for (one, k), value, half in zip(wanted, values.tolist(), halves.tolist(), strict=True):
         one.J[k] = Unseen(value, half)
 
@@ -322,10 +334,15 @@ def unseen(
     instances = [first + k for k in numbers]
     values, _ = objectives(plant, laws, goal, instances, trial.threads, doubled=True)
     halves = np.full(len(laws), math.nan)
-    again = [i for i, k in enumerate(numbers) if k % REPEATED_SEEDS == 0]
+    again = []
+    some = []
+    repeated = []
+    for i, k in enumerate(numbers):
+        if k % REPEATED_SEEDS == 0:
+            again.append(i)
+            some.append(laws[i])
+            repeated.append(instances[i])
     if again:
-        some = [laws[i] for i in again]
-        repeated = [instances[i] for i in again]
         halves[again], _ = objectives(
             plant, some, goal, repeated, trial.threads, halved=True, doubled=True
         )
