@@ -168,7 +168,8 @@ class Setting:
             if name == "v0":
                 v = state
             else:
-                check_ranges(self.scenario.plant.name, self.scenario.plant.ranges, state)
+                plant = self.scenario.plant
+                check_ranges(plant.name, plant.ranges, state, plant.units)
                 x = state
         if self.scenario.contact:
             self.check_start(x)

@@ -30,6 +30,7 @@ from smc_mujoco.identification.records import Columns, Record, stacked, step_of
 from smc_mujoco.mechanisms.custom.joint_numbers import KINDS
 from smc_mujoco.mechanisms.hardware.part import Friction
 from smc_mujoco.mechanisms.layout import channel_names, driven_names
+from smc_mujoco.mechanisms.plant import degrees_meant
 
 # least squares, one after the other, in which parameters of a plant of the library may be no
 # linear factors of forces; chosen
@@ -46,6 +47,7 @@ SMALL = (
 )
 SHIFT = 0.01  # of a parameter, for the slope of forces by it
 LARGEST_ANGLE = 3.0 * math.pi  # rad: a larger one may be in degrees; chosen
+MAX_BEYOND = 0.1  # of a joint's range, by which a log may pass it, as stops are soft; chosen
 TOO_SMALL = 0.1  # of the force that a motion takes: angles may be in degrees; chosen
 TOO_LARGE = 50.0  # times that force: a command may be in another unit; chosen
 
@@ -343,9 +345,27 @@ def force_shares(rig: OwnRig, log: Forces) -> list[float]:
     return found
 
 
+def _beyond_ranges(rig: OwnRig, record: Record) -> list[str]:
+    """Return sentences on joints that leave their range in a log."""
+    said = []
+    ranges = zip(rig.columns.x, rig.plant.ranges, rig.plant.units, strict=False)
+    for name, (joint, low, high), unit in ranges:
+        farthest = float(max(record[name], key=abs))
+        beyond = max(low - farthest, farthest - high)
+        if beyond > MAX_BEYOND * (high - low):
+            said.append(
+                f"{name} reaches {farthest:.4g} {unit}, beyond the range of {joint} in the model "
+                f"from {low:.4g} to {high:.4g}: correct the file"
+                f"{degrees_meant((low, high), farthest, unit)}"
+            )
+    return said
+
+
 def doubts(rig: OwnRig, data: Sequence[Data]) -> list[str]:
     """Return sentences on columns that may be in another unit."""
     said = []
+    for record in map(rig.checked, data):
+        said += _beyond_ranges(rig, record)
     for record in _usable(rig, data):
         log = forces(rig, record, [0.0])
         shares = force_shares(rig, log)

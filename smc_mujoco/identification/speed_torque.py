@@ -43,6 +43,8 @@ BLOCKS = 20  # of time, each of which counts once: neighbouring pairs depend on 
 SCAN = 40  # speeds that are tried, from twice the slowest pair to half of the fastest; chosen
 MIN_PAIRS = 100  # that move, five in a block; chosen
 MIN_R2 = 0.5  # of the variation of torque: below there is no friction in it
+MOSTLY = 0.5  # of the held-out mean square: a mean that is more is told; chosen
+WORSE = 1.5  # times the rms: held-out pairs that are better need no sentence; chosen
 FITTED = 2 / 3  # of the pairs; what follows is held out, unless another log is given
 Pairs = tuple[Array, Array]  # speeds and torques, (K,) each
 
@@ -56,6 +58,7 @@ class FrictionFit:
     errors: Numbers  # their standard errors: those of blocks of time, or of white noise if larger
     rms: float  # N m (N), of the residuals
     held_out: float  # N m (N), the same on pairs that were not used
+    held_out_offset: float  # N m (N), the mean of these residuals
     r2: float  # share of the variation of torque that it explains
     covariance: Array = dataclasses.field(repr=False)  # of the errors, (p, p), as `numbers`
     at_zero: tuple[str, ...] = ()  # numbers that would be negative
@@ -117,6 +120,19 @@ class FrictionFound:
         return self.best.part
 
     @property
+    def offset_moved(self) -> str:
+        """A sentence if the residuals of the pairs held out are mostly another offset; else ""."""
+        rms, mean = self.best.held_out, self.best.held_out_offset
+        if mean**2 < MOSTLY * rms**2 or rms < WORSE * self.best.rms:
+            return ""
+        spread = np.sqrt(rms**2 - mean**2)
+        return (
+            f"the offset of the pairs held out differs by {mean:+.3g} N m: apart from it their rms "
+            f"is {spread:.3g}. A load or the zero of the torque has changed, so find the offset of "
+            "each log"
+        )
+
+    @property
     def no_friction(self) -> str:
         """A sentence if no model explains half of the variation of torque; else ""."""
         if self.best.r2 >= MIN_R2:
@@ -165,7 +181,7 @@ class FrictionFound:
         rows += ["", *number_text.table(self.best.numbers, self.best.errors, UNITS)]
         for name in self.best.at_zero:
             rows.append(f"{name} would be negative, and is 0")
-        return "\n".join([*rows, *filter(None, [self.no_friction])])
+        return "\n".join([*rows, *filter(None, [self.no_friction, self.offset_moved])])
 
 
 def identify_friction(speed: Any, torque: Any, held_out: Any = None) -> FrictionFound:
@@ -338,6 +354,7 @@ def _fitted(
         dict(zip(found, errors.tolist(), strict=True)),
         float(np.sqrt(np.mean(residual**2))),
         float(np.sqrt(np.mean(rest**2))),
+        float(np.mean(rest)),
         float(1.0 - np.sum(residual**2) / np.sum((force - force.mean()) ** 2)),
         covariance,
         tuple(zeros),

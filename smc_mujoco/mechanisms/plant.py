@@ -10,6 +10,7 @@ found in the compiled model.
 import dataclasses
 import functools
 import inspect
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from types import SimpleNamespace
@@ -409,14 +410,30 @@ def field_array(model: mujoco.MjModel, name: str) -> Array:
     return getattr(owner, name.removeprefix("opt."))
 
 
-def check_ranges(plant: str, ranges: Iterable[Range], x0: Iterable[float]) -> None:
+def check_ranges(
+    plant: str, ranges: Iterable[Range], x0: Iterable[float], units: Iterable[str]
+) -> None:
     """Raise ScenarioError for a start outside a joint's range."""
-    for (joint, low, high), x in zip(ranges, x0, strict=False):
+    for (joint, low, high), x, unit in zip(ranges, x0, units, strict=False):
         if not low - MAX_EXCESS <= x <= high + MAX_EXCESS:
             outside = f"outside its range from {low:g} to {high:g}"
             raise ScenarioError(
                 f"x0 of joint {joint!r} of {plant} is {x:g}, {outside}: give another x0"
+                f"{degrees_meant((low, high), x, unit)}"
             )
+
+
+def degrees_meant(ends: tuple[float, float], x: float, unit: str) -> str:
+    """Return a clause for a range that was written in rad and read in degrees, as x within the
+    same numbers in rad suggests; "" for others.
+    """
+    low, high = (math.degrees(end) for end in ends)
+    if unit != "rad" or max(-low, high) > math.tau or not low <= x <= high:
+        return ""
+    return (
+        f". If the file means {low:.4g} to {high:.4g} rad: MuJoCo reads degrees unless it has "
+        '<compiler angle="radian"/>'
+    )
 
 
 def model_path(name: str) -> Path:

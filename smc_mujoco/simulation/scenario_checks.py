@@ -16,7 +16,7 @@ from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
 from smc_mujoco.mechanisms.hardware.part import Friction
 from smc_mujoco.mechanisms.hardware.rotors import flies
 from smc_mujoco.mechanisms.layout import driven_names, loaded
-from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant, check_ranges
+from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant, check_ranges, degrees_meant
 from smc_mujoco.simulation.law_checks import check_inertia, check_law
 from smc_mujoco.simulation.signals import (
     Dryden,
@@ -45,7 +45,7 @@ def check_start(s: Any) -> None:
 
     Runs that were recorded before these checks are read without them.
     """
-    check_ranges(s.plant.name, s.plant.ranges, s.x0)
+    check_ranges(s.plant.name, s.plant.ranges, s.x0, s.plant.units)
     check_reference_ranges(s)
     check_inertia(s)
     check_obstacles(s)
@@ -141,12 +141,15 @@ def check_reference_ranges(s: Any) -> None:
     """Check that each reference stays within its joint's range."""
     if not s.plant.ranges:
         return
-    for (joint, low, high), signal in zip(s.plant.ranges, s.references, strict=False):
+    for (joint, low, high), signal, unit in zip(
+        s.plant.ranges, s.references, s.plant.units, strict=False
+    ):
         least, most = extremes(signal, s.duration)
         if not low - MAX_EXCESS <= least <= most <= high + MAX_EXCESS:
             raise ScenarioError(
                 f"the reference of joint {joint!r} of {s.plant.name} goes from {least:.4g} to "
                 f"{most:.4g}, beyond its range from {low:g} to {high:g}: give another reference"
+                f"{degrees_meant((low, high), max(least, most, key=abs), unit)}"
             )
 
 

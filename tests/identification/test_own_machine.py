@@ -439,3 +439,40 @@ def test_the_friction_s_curve_is_the_model_s_and_its_parts_with_the_errors_of_bo
     np.testing.assert_allclose(friction(rig, rig.values, 0, v), 0.4 * v + 0.4 * np.sign(v))
     error = curve_error(rig, np.diag([0.01**2, 0.02**2, 0.0]), 0, v)
     np.testing.assert_allclose(error, np.hypot(0.01 * v, 0.02), rtol=1e-6)
+
+
+def test_a_range_in_degrees_that_was_meant_in_rad_is_told(refused):
+    """MuJoCo reads the file's 1.57 as degrees where its compiler does not say radian."""
+    limited = ONE.replace('name="j1"', 'name="j1" limited="true" range="-1.57 1.57"')
+    slack = limited.replace('name="j1"', 'name="j1" solreflimit="0.001 1"')
+    arm = smc.plant_from(slack.replace('<compiler angle="radian"/>', ""), ["j1"])
+    words = "-1.57 to 1.57 rad", 'angle="radian"'
+    refused(lambda: smc.Scenario(plant=arm, law="none", x0=0.3), *words)
+    refused(lambda: smc.Scenario(plant=arm, law="none", reference=smc.Constant(0.5)), *words)
+    t = np.arange(0.0, 2.0, 0.002)
+    run = {"t": t, "x": 0.5 * np.sin(3.0 * t), "u": np.sin(3.0 * t)}
+    note = smc.identify(arm, run, ["j1.damping"]).notes[0]
+    assert "x reaches 0.5 rad, beyond the range of j1" in note, note
+    assert all(word in note for word in words)
+    far = smc.plant_from(limited, ["j1"])
+    said = refused(lambda: smc.Scenario(plant=far, law="none", x0=2.0), "outside its range")
+    assert "radian" not in said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("integrator", "lead"), [("RK4", 0.0), ("implicitfast", 0.5)])
+def test_the_delay_of_a_simulated_log_is_short_by_half_a_step_of_its_integrator(integrator, lead):
+    """implicitfast moves positions by the speeds of a step's end, and RK4 does not."""
+    arm = smc.plant_from(ONE, ["j1"])
+    step = 1e-3
+    true = {"j1.damping": 0.3, "j1.armature": 0.02}
+    machine = {"plant": arm, "mismatch": true, "input_delay": 0.004, "control_period": 0.002}
+    law = smc.law("pid", kp=20.0, ki=0.0, kd=1.5)
+    motion = smc.Sine(0.5, 2.5) + smc.Sine(0.25, 9.0)
+    given = {"law": law, "reference": motion, "noise": smc.Noise(2e-5), "duration": 3.0}
+    run = smc.Scenario(**machine, **given, physics_step=step, integrator=integrator)
+    found = smc.identify(arm, smc.run(run), [*true, "input_delay"])
+    assert found.values["input_delay"] == pytest.approx(0.004 - lead * step, abs=0.01 * step)
+    # it also counts half of the damping of a step as inertia
+    inertia = 0.02 + lead * step * 0.3
+    assert found.values["j1.armature"] == pytest.approx(inertia, abs=2e-5)

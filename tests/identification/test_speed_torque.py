@@ -76,9 +76,17 @@ def test_the_model_that_made_the_pairs_is_taken_and_its_part_is_they(model):
 def test_held_out_is_of_the_other_log_by_the_numbers_of_this():
     model = "level, viscous, offset"
     other = SPEED, pairs(model, noise=0.0) + 0.2
-    fit = smc.identify_friction(SPEED, pairs(model, noise=0.0), other).fits[model]
+    found = smc.identify_friction(SPEED, pairs(model, noise=0.0), other)
+    fit = found.fits[model]
     assert fit.rms < 1e-9
     assert fit.held_out == pytest.approx(0.2)
+    assert "offset of the pairs held out differs by +0.2 N m" in str(found)
+
+
+def test_a_held_out_log_that_differs_by_more_than_its_offset_has_no_such_sentence():
+    model = "level, viscous, offset"
+    for other in (pairs(model), 1.5 * pairs(model), pairs(model) + 0.001):
+        assert "offset of" not in str(smc.identify_friction(SPEED, pairs(model), (SPEED, other)))
 
 
 def test_what_would_be_negative_is_0_and_told():

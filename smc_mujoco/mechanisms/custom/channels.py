@@ -204,9 +204,12 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
     names = _joint_names(model)
     named = list(filter(None, names))
     if joints == [""] and named:
+        of_file = f"{label}:{'+'.join(named[:2])} or "
+        if label.startswith("the text of"):
+            of_file = ""
         raise ScenarioError(
-            f"{label} names no joint: give some, as {label}:{'+'.join(named[:2])} or "
-            f"channels={named[:2]}; it has {one_line(', '.join(named))}"
+            f"no joint of {label} is chosen: give some, as {of_file}channels={named[:2]}; it has "
+            f"{one_line(', '.join(named))}"
         )
     for joint in joints:
         kind = mujoco.mjtJoint(model.jnt_type[pick(label, "joint", joint, names)])

@@ -325,8 +325,10 @@ def _places(
         return units, {"x0": x0, "rest": x0}
     alone = [joint for joint in joints if not is_free(model, joint)]
     start, checked = own.starts(model, alone, pairs, keyframe)
-    check_ranges(plant, checked, [start[joint] for joint, _, _ in checked])
     names, units, x0 = own.places(model, joints, start, keyframe)
+    unit_of = dict(zip(names, units, strict=True))
+    named = [joint for joint, _, _ in checked]
+    check_ranges(plant, checked, map(start.get, named), map(unit_of.get, named))
     goals = _goals(model, alone, keyframe)
     rest = own.places(model, joints, goals, keyframe)[2]
     fields: Fields = {"x0": x0, "ranges": own.ranges(model, names)}

@@ -149,7 +149,7 @@ def test_a_plant_is_named_by_its_file_and_joints(tmp_path, monkeypatch):
     for text, words in (
         ("arm.xml: lift, elbow", "motor=True"),  # a menagerie's servos are not motors
         ("arm.xml:lift+elbow", "motor=True"),
-        ("arm.xml", "names no joint"),
+        ("arm.xml", "no joint of arm.xml is chosen"),
         ("no.xml:a", "no model at"),
         ("arm.xml:ift", "mean 'lift'"),
     ):
