@@ -70,7 +70,8 @@ def median_of(values: Array, samples: Sequence[int] | None = None) -> Interval:
         drawn = draws(n)[list(samples)]
     lower, upper = np.empty((2, RESAMPLES, len(values)))
     for k, block in enumerate(values):
-        order = np.argsort(block)[: (~np.isnan(block)).sum()]
+        known = ~np.isnan(block)
+        order = np.argsort(block)[: known.sum()]
         counts = drawn[order]
         ordered = block[order]
         # a resample that draws no run of the block takes each of them once
@@ -80,20 +81,25 @@ def median_of(values: Array, samples: Sequence[int] | None = None) -> Interval:
         lower[:, k] = ordered[(counted < total).sum(axis=0)]
         upper[:, k] = ordered[(counted <= total).sum(axis=0)]
     # T. C. Hesterberg's expanded percentile, with Student's t of n - 1 degrees of freedom
-    tail = ndtr(-math.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 + LEVEL) / 2))
+    quantile = stdtrit(n - 1, (1 + LEVEL) / 2)
+    tail = ndtr(-math.sqrt(n / (n - 1)) * quantile)
     # index of the resample at which the interval ends, from either end
     at = max(1, math.floor(tail * (RESAMPLES + 1)))
     lower = np.sort(middle(lower))
     upper = np.sort(middle(upper))
-    return Interval(centre, float(lower[at - 1]), float(upper[RESAMPLES - at]), n)
+    low = float(lower[at - 1])
+    high = float(upper[RESAMPLES - at])
+    return Interval(centre, low, high, n)
 
 
 def middle(values: Array) -> Array:
     """Return the median over the last axis, without NaN; NaN if all values are NaN."""
     ordered = np.sort(values, axis=-1)
     n = (~np.isnan(values)).sum(axis=-1, keepdims=True)
-    low = np.take_along_axis(ordered, np.maximum((n - 1) // 2, 0), axis=-1)
-    high = np.take_along_axis(ordered, np.maximum(n // 2, 0), axis=-1)
+    lower_place = np.maximum((n - 1) // 2, 0)
+    low = np.take_along_axis(ordered, lower_place, axis=-1)
+    upper_place = np.maximum(n // 2, 0)
+    high = np.take_along_axis(ordered, upper_place, axis=-1)
     return ((low + high) / 2)[..., 0]
 
 
@@ -108,16 +114,20 @@ def share_interval(share: float, n: int) -> Interval:
     """
     z = NormalDist().inv_cdf((1 + LEVEL) / 2)
     centre = share + z * z / (2 * n)
-    half = z * math.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2)
+    variance = share * (1 - share) / n
+    half = z * math.sqrt(variance + (z / (2 * n)) ** 2)
     scale = 1 + z * z / n
     low = (centre - half) / scale
     high = (centre + half) / scale
     # rounding aside, it has it
-    return Interval(share, max(min(low, share), 0.0), min(max(high, share), 1.0), n)
+    least = max(min(low, share), 0.0)
+    most = min(max(high, share), 1.0)
+    return Interval(share, least, most, n)
 
 
 @functools.lru_cache(maxsize=8)
 def draws(n: int) -> Array:
     """Return how often each of n samples is drawn in each resample, (n, RESAMPLES)."""
-    drawn = np.random.default_rng(0).multinomial(n, np.full(n, 1 / n), size=RESAMPLES)
+    equal = np.full(n, 1 / n)
+    drawn = np.random.default_rng(0).multinomial(n, equal, size=RESAMPLES)
     return np.ascontiguousarray(drawn.T, np.int32)

@@ -260,11 +260,14 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
     @functools.cache
     def product(i: int, k: int) -> complex:
         omega = math.exp(slow + i * dw)
-        return loop.gain(math.exp(low + k * dz), omega, COARSE_SAMPLES) * loop.response(omega)
+        gain = loop.gain(math.exp(low + k * dz), omega, COARSE_SAMPLES)
+        return gain * loop.response(omega)
 
     def at_corners(cells: Array, side: int) -> Array:
-        places = (cells[:, None] + side * CORNERS).reshape(-1, 2).tolist()
-        return np.array([product(i, k) for i, k in places]).reshape(-1, len(CORNERS))
+        corners = cells[:, None] + side * CORNERS
+        places = corners.reshape(-1, 2).tolist()
+        products = np.array([product(i, k) for i, k in places])
+        return products.reshape(-1, len(CORNERS))
 
     # each by the indices of its lowest omega and amplitude
     cells, side = CUTS * np.argwhere(np.ones(count)), CUTS
@@ -274,8 +277,10 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
         cells = (cells[:, None] + side * CORNERS).reshape(-1, 2)
     winding = np.zeros(CUTS * count)
     around = at_corners(cells, 1) - 1.0
-    angles = np.angle(np.roll(around, -1, axis=1) * around.conj())
-    winding[tuple(cells.T)] = np.round(angles.sum(axis=1) / math.tau)  # -1, 0 or 1 times around 1
+    ahead = np.roll(around, -1, axis=1)
+    angles = np.angle(ahead * around.conj())
+    wound = angles.sum(axis=1) / math.tau
+    winding[tuple(cells.T)] = np.round(wound)  # -1, 0 or 1 times around 1
     neighbours, groups = label(winding, np.ones((3, 3)))  # type: ignore[misc]
     for group in range(1, groups + 1):
         cells = np.argwhere(neighbours == group)
@@ -295,10 +300,15 @@ def _may_balance(products: Array, sides: Array) -> Array:
     margin.
     """
     sizes = np.log(np.maximum(np.abs(products), SMALLEST))
-    margins = CELL_MARGIN * np.maximum(np.ptp(sizes, axis=1), max(sides[1], COARSE_NOISE))
-    near = (sizes.min(axis=1) <= margins) & (sizes.max(axis=1) >= -margins)
-    largest = np.take_along_axis(products, np.abs(products).argmax(axis=1)[:, None], axis=1)
-    phases = np.angle(largest) + np.angle(np.where(products == 0.0, 1.0, products * largest.conj()))
+    spans = np.ptp(sizes, axis=1)
+    margins = CELL_MARGIN * np.maximum(spans, max(sides[1], COARSE_NOISE))
+    below = sizes.min(axis=1) <= margins
+    above = sizes.max(axis=1) >= -margins
+    near = below & above
+    strongest = np.abs(products).argmax(axis=1)[:, None]
+    largest = np.take_along_axis(products, strongest, axis=1)
+    relative = np.where(products == 0.0, 1.0, products * largest.conj())
+    phases = np.angle(largest) + np.angle(relative)
     margins = CELL_MARGIN * np.maximum(np.ptp(phases, axis=1), max(sides[0], COARSE_NOISE))
     lowest = phases.min(axis=1) - margins
     highest = phases.max(axis=1) + margins
@@ -311,7 +321,8 @@ def _balanced(loop: Loop, low: Array, high: Array) -> Balance | None:
 
     least = low - MAX_SHIFT
     largest = high + MAX_SHIFT
-    largest[1] = min(largest[1], math.log(math.pi / loop.scenario.control_period))
+    nyquist = math.pi / loop.scenario.control_period
+    largest[1] = min(largest[1], math.log(nyquist))
 
     def excess(z: Array) -> Array:
         inside = np.clip(z, least, largest)
@@ -326,7 +337,8 @@ def _balanced(loop: Loop, low: Array, high: Array) -> Balance | None:
         yield _bisected(excess, low, high)
 
     for z in solved():
-        if (z == np.clip(z, least, largest)).all() and np.abs(excess(z)).max() < BALANCE_TOLERANCE:
+        within = (z == np.clip(z, least, largest)).all()
+        if within and np.abs(excess(z)).max() < BALANCE_TOLERANCE:
             amplitude, omega = np.exp(z).tolist()
             return amplitude, omega
     return None
@@ -429,9 +441,9 @@ def _turns(loop: Loop, balances: Sequence[Balance]) -> Array:
     omegas = [omega for _, omega in balances]
     if len(omegas) < 2:
         return np.zeros(len(omegas))
-    between = np.exp(
-        np.arange(math.log(0.9 * min(omegas)), math.log(1.1 * max(omegas)), PHASE_STEP)
-    )
+    slowest = math.log(0.9 * min(omegas))
+    fastest = math.log(1.1 * max(omegas))
+    between = np.exp(np.arange(slowest, fastest, PHASE_STEP))
     phases = []
     for omega in between:
         response = loop.response(omega * (1.0 - RESONANCE_DAMPING * 1j))
@@ -449,7 +461,8 @@ def _with_harmonics(loop: Loop, wave: Wave) -> Wave:
         return wave
 
     def excess(z: Array) -> list[float]:
-        product = np.log(loop.wave(*np.exp(z)).gain * loop.response(math.exp(z[1])))
+        gain = loop.wave(*np.exp(z)).gain
+        product = np.log(gain * loop.response(math.exp(z[1])))
         return [product.real, product.imag]
 
     start = np.log([wave.amplitude, wave.omega])

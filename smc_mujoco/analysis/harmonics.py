@@ -177,7 +177,8 @@ class Loop:
                 model, dataclasses.replace(ideal, x0=0.0, v0=0.0)
             )
             self.a, b = transition(model, data, chain)
-            self.b = b[:, drive_ids(model)[self.channel]] * s.drive_train.scales[self.channel]
+            of_channel = b[:, drive_ids(model)[self.channel]]
+            self.b = of_channel * s.drive_train.scales[self.channel]
             self.rows = dof_ids(model)
             shafts = model.jnt_dofadr[moving_joints(model)[1]]
             for sensor in s.sensors:
@@ -200,16 +201,17 @@ class Loop:
 
     def response(self, omega: complex) -> complex:
         """Return the amplitude of x at control samples per unit of sampled and held u, rad or m."""
-        return complex(
-            self._answer(omega)[self.rows[self.channel]] * np.exp(-1j * omega * self.delay)
-        )
+        late = np.exp(-1j * omega * self.delay)
+        return complex(self._answer(omega)[self.rows[self.channel]] * late)
 
     def coupling(self, omega: float) -> float:
         """Return the largest amplitude of another driven channel under this one's u, over that of
         its own x.
         """
-        answer = np.abs(self._answer(omega)[self.rows[: self.scenario.plant.driven]])
-        return float(np.delete(answer, self.channel).max(initial=0.0) / answer[self.channel])
+        driven = self.rows[: self.scenario.plant.driven]
+        answer = np.abs(self._answer(omega)[driven])
+        others = np.delete(answer, self.channel)
+        return float(others.max(initial=0.0) / answer[self.channel])
 
     def _solve(self, omega: complex) -> Array:
         """Return the state at samples per unit of held u, with u's images at omega + 2 pi m /
@@ -217,13 +219,13 @@ class Loop:
         """
         s = self.scenario.resolved
         count = round(s.control_period / self.step)
-        z = np.exp(1j * (omega * self.step + math.tau * np.arange(count) / count))
+        turns = math.tau * np.arange(count) / count
+        z = np.exp(1j * (omega * self.step + turns))
         passed = sum(z**-i for i in range(count)) / count  # by the hold
         passed = passed * z ** -round(s.input_delay / self.step)
 
-        answers = np.linalg.solve(z[:, None, None] * np.eye(len(self.a)) - self.a, self.b[:, None])[
-            :, :, 0
-        ]
+        resolvent = z[:, None, None] * np.eye(len(self.a)) - self.a
+        answers = np.linalg.solve(resolvent, self.b[:, None])[:, :, 0]
         if (sensor := s.encoder(self.channel)) is not None:
             answers = answers * np.exp(-1j * omega * sensor.delay)
         return passed @ answers
@@ -272,14 +274,14 @@ class Loop:
         """
         h = max(self.scenario.control_period, math.tau / omega / MAX_SAMPLES_PER_PERIOD)
         # of an even number of samples, four or more
-        locked = math.tau / h / (2 * max(round(math.pi / omega / h), 2))
+        half_samples = round(math.pi / omega / h)
+        locked = math.tau / h / (2 * max(half_samples, 2))
         mean = self.gain(amplitude, 1.001 * locked)
         shifts = []
         for position in (np.arange(SAMPLE_POSITIONS) + 0.5) / SAMPLE_POSITIONS:
             angles, u, _ = self._excited([amplitude], locked, MAX_SAMPLES_PER_PERIOD, position)
-            shifts.append(
-                float(np.angle(self._gain_of(_harmonic(u, angles), amplitude, locked) / mean))
-            )
+            at_locked = self._gain_of(_harmonic(u, angles), amplitude, locked)
+            shifts.append(float(np.angle(at_locked / mean)))
         scale = omega / locked
         return scale * min(*shifts, 0.0), scale * max(*shifts, 0.0)
 
@@ -333,10 +335,10 @@ class Loop:
         """Return the harmonics of e: the given amplitude, then the mechanism's answer to the other
         harmonics of u.
         """
-        highest = min(MAX_HARMONICS, math.ceil(math.pi / self.scenario.control_period / omega) - 1)
-        powers = itertools.accumulate(
-            itertools.repeat(np.exp(-1j * angles), max(highest, 1)), np.multiply
-        )
+        below_nyquist = math.ceil(math.pi / self.scenario.control_period / omega) - 1
+        highest = min(MAX_HARMONICS, below_nyquist)
+        one_back = np.exp(-1j * angles)
+        powers = itertools.accumulate(itertools.repeat(one_back, max(highest, 1)), np.multiply)
         first = _first(u, next(powers))
         rest = []
         for n, power in enumerate(powers, 2):
@@ -378,7 +380,8 @@ class Loop:
             motion += [x, v]
         u, s = self._controlled(clock.h, motion)
         limit = self.scenario.limits[self.channel]
-        return clock.angles, np.clip(u[clock.first :], -limit, limit), s[clock.first :]
+        clipped = np.clip(u[clock.first :], -limit, limit)
+        return clock.angles, clipped, s[clock.first :]
 
     def _clock_of(self, omega: float, max_samples: float, position: float) -> "SampleTimes":
         period = math.tau / omega

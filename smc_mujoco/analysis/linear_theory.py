@@ -85,7 +85,8 @@ def linear(plant: Plant) -> Linear:
         found = np.empty((n, n))
         for j, z in enumerate(DIFFERENCE_STEP * np.eye(n)):
             for i in range(n):
-                found[i, j] = (at(-z, i) - at(z, i)) / (2.0 * DIFFERENCE_STEP * g[i])
+                difference = at(-z, i) - at(z, i)
+                found[i, j] = difference / (2.0 * DIFFERENCE_STEP * g[i])
         return found
 
     stiffness = slopes(lambda x, i: plant.nominal(x, rest, i, p)[0])
@@ -100,9 +101,8 @@ def linear(plant: Plant) -> Linear:
             f"{plant.name} has no linear theory: give a plant whose joints are coupled only by "
             "springs"
         )
-    return Linear(
-        inertia=float(1.0 / g[0]), damping=float(d), stiffness=(stiffness + stiffness.T) / 2.0
-    )
+    symmetric = (stiffness + stiffness.T) / 2.0
+    return Linear(inertia=float(1.0 / g[0]), damping=float(d), stiffness=symmetric)
 
 
 def linear_gains(law: Law) -> Pair | None:
@@ -194,8 +194,11 @@ def _crossing(at: Linear, stiffness: float, lam: float, k1: float, h: float) -> 
     for root in np.roots(equation):
         if abs(root.imag) <= 1e-9 * abs(root) and 0.0 < (y := float(root.real)) <= 2.0:
             w = complex(-y, math.sqrt(y * (2.0 - y)))
-            turned = np.angle(-(n1 * w + n0) / (w * w - t * w + d)) % math.tau
-            periods.append(turned / (2.0 * math.asin(math.sqrt(y / 2.0))))
+            top = n1 * w + n0
+            bottom = w * w - t * w + d
+            turned = np.angle(-top / bottom) % math.tau
+            angle = 2.0 * math.asin(math.sqrt(y / 2.0))
+            periods.append(turned / angle)
     return float(h * min(periods))
 
 
@@ -208,7 +211,8 @@ def steady_error(plant: Plant, lam: Natural, k1: Natural, d: Finite) -> float:
     (lam k1 + K).
     """
     loop = linear(plant).stiffness + lam * k1 * np.eye(plant.n)
-    return float(np.abs(np.linalg.solve(loop, np.full(plant.n, d))).max())
+    moved = np.linalg.solve(loop, np.full(plant.n, d))
+    return float(np.abs(moved).max())
 
 
 def restoring_force(
@@ -226,7 +230,8 @@ def restoring_force(
     v = np.zeros(plant.n)
     ratios = []
     for i in range(plant.n):
-        f, g = plant.nominal(np.full(plant.n, 1.0), v, i, p)
+        ones = np.full(plant.n, 1.0)
+        f, g = plant.nominal(ones, v, i, p)
         ratios.append(f / g)
     if np.ptp(ratios) > EQUALITY_TOLERANCE * (1.0 + abs(ratios[0])):
         raise ScenarioError(
@@ -236,7 +241,8 @@ def restoring_force(
     def force(x: Array) -> Array:
         at_rest = []
         for position in x:
-            f, g = plant.nominal(np.full(plant.n, position), v, 0, p)
+            places = np.full(plant.n, position)
+            f, g = plant.nominal(places, v, 0, p)
             at_rest.append(f / g)
         return np.minimum(rest.force(gains, x), u_max) - np.array(at_rest)
 
@@ -258,7 +264,8 @@ def tolerated_force(
     force = restoring_force(plant, law, u_max)
     if force is None:
         return None
-    falls = np.flatnonzero(np.diff(np.r_[0.0, force(DISPLACEMENTS)]) < 0.0)
+    forces = np.r_[0.0, force(DISPLACEMENTS)]
+    falls = np.flatnonzero(np.diff(forces) < 0.0)
     # of the DISPLACEMENTS up to the force's first maximum
     if falls.size:
         size = falls[0]

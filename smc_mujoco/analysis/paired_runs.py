@@ -192,13 +192,16 @@ class RunGroup:
 
     def __init__(self, name: Mapping[str, str], rows: Array, columns: Mapping[str, Array]):
         self.name = name  # the plant that they share, or plant and condition, as column -> value
-        keys = list(zip(columns["plant"].tolist(), columns["condition"].tolist(), strict=True))
+        plants = columns["plant"].tolist()
+        conditions = columns["condition"].tolist()
+        keys = list(zip(plants, conditions, strict=True))
         self.blocks = tuple(dict.fromkeys(keys))  # (plant, condition)
         laws, law = np.unique(columns["law"], return_inverse=True)
         self.laws = tuple(laws.tolist())
         numbers, seed = np.unique(columns["seed"], return_inverse=True)
         cells = law, [self.blocks.index(key) for key in keys], seed
-        cubes = np.full((3, len(laws), len(self.blocks), len(numbers)), -1)
+        shape = (3, len(laws), len(self.blocks), len(numbers))
+        cubes = np.full(shape, -1)
         for cube, of_run in zip(cubes, (rows, columns["outcome"], columns["sets"]), strict=True):
             cube[cells] = of_run
         # the run's row in the table, a number equal for runs that differ by rounding alone, and one
@@ -224,7 +227,8 @@ class RunGroup:
         """Return the scores of the laws in the blocks in which a metric applies."""
         cubes = []
         for row in by_row:
-            cubes.append(np.where(self.rows >= 0, row[self.rows], np.nan))
+            of_runs = np.where(self.rows >= 0, row[self.rows], np.nan)
+            cubes.append(of_runs)
         cube = cubes[0]
         if np.isnan(cube).all():
             return Scores([], *[{}] * 6)
@@ -238,7 +242,8 @@ class RunGroup:
         common &= first_of_kind(self.outcome, self.common)
         cube[:, ~common] = np.nan
         blocks = np.flatnonzero(common.any(axis=1))
-        kept = np.ix_(np.arange(len(self.laws)), blocks, np.flatnonzero(common.any(axis=0)))
+        seeds = np.flatnonzero(common.any(axis=0))
+        kept = np.ix_(np.arange(len(self.laws)), blocks, seeds)
         parts = []
         for values in (cube, self.outcome, self.sets, *cubes[1:]):
             parts.append(dict(zip(self.laws, values[kept], strict=True)))
@@ -260,12 +265,14 @@ def groups(table: RunColumns, by: Sequence[str]) -> list[RunGroup]:
     columns["outcome"] = _outcomes(table)
     columns["sets"] = _checked_sets(table, columns)
     rows_of: dict[tuple[str, ...], list[int]] = {}
-    for row, key in enumerate(zip(*(columns[name].tolist() for name in by), strict=True)):
+    keys = zip(*(columns[name].tolist() for name in by), strict=True)
+    for row, key in enumerate(keys):
         rows_of.setdefault(key, []).append(row)
     made = []
     for key, rows in rows_of.items():
         of_group = {name: column[rows] for name, column in columns.items()}
-        made.append(RunGroup(dict(zip(by, key, strict=True)), np.array(rows), of_group))
+        shared = dict(zip(by, key, strict=True))
+        made.append(RunGroup(shared, np.array(rows), of_group))
     return made
 
 
@@ -342,7 +349,8 @@ def sources(table: RunColumns, rows: Array) -> dict[str, tuple[Source, ...]]:
     """Return law -> sources of its gains in some rows."""
     columns = [np.asarray(table.column(name))[rows] for name in ("law", "source", "search")]
     by_law: dict[str, tuple[Source, ...]] = {}
-    for law, kind, search in sorted(set(zip(*columns, strict=True)), key=str):
+    of_laws = set(zip(*columns, strict=True))
+    for law, kind, search in sorted(of_laws, key=str):
         about = {"kind": kind, "search": search and json.loads(search)}
         by_law[law] = (*by_law.get(law, ()), restore(about))
     return by_law

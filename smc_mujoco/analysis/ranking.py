@@ -167,7 +167,8 @@ class Comparison:
         self.beyond = relevant if shares else -math.log1p(-relevant)  # what d must exceed
         ran = ~np.isnan(self.cells[0])
         # runs that failed, have no value or have not arrived
-        self.away = np.isinf(self.cells) | (self._cube(arrived, 1) == 0)
+        missing = self._cube(arrived, 1) == 0
+        self.away = np.isinf(self.cells) | missing
         self.below = np.zeros((count, blocks), bool)
         self.sets = np.ones((count, blocks), int)  # number of sets of gains of a law's runs
         self.units = np.zeros((count, blocks), int)  # of each law alone: its sets, or its runs
@@ -218,7 +219,8 @@ class Comparison:
     ) -> None:
         """Set the lead of a law over a rival by unit, and that without halves and trends."""
         seeds = self.cells.shape[2]
-        charged = _difference(self.low[rival, block], self.high[law, block])[runs]
+        difference = _difference(self.low[rival, block], self.high[law, block])
+        charged = difference[runs]
         as_run = _difference(plain[rival, block], plain[law, block])[runs]
         self.leads[block, law, rival] = _by_unit(charged, units, seeds)
         self.plain[block, law, rival] = _by_unit(as_run, units, seeds)
@@ -275,7 +277,8 @@ class Comparison:
         better = (self.p <= self.limit) & self._eligible
         for block, ranked, winner in zip(better, self.ranked.T, self.winners, strict=True):
             if winner is not None:
-                block[self.laws.index(winner)] |= ranked & (np.array(self.laws) != winner)
+                others = np.array(self.laws) != winner
+                block[self.laws.index(winner)] |= ranked & others
         return better
 
     @property
@@ -284,8 +287,10 @@ class Comparison:
         (blocks, laws); 1 of a law that is not.
         """
         ranked = self.ranked.T
-        against = ranked[:, None, :] & ~np.eye(len(self.laws), dtype=bool)
-        return np.where(ranked, np.where(against, self.p, 0.0).max(axis=2), 1.0)
+        itself = np.eye(len(self.laws), dtype=bool)
+        against = ranked[:, None, :] & ~itself
+        worst = np.where(against, self.p, 0.0).max(axis=2)
+        return np.where(ranked, worst, 1.0)
 
     @property
     def winners(self) -> list[str | None]:
@@ -294,7 +299,8 @@ class Comparison:
         wins = (self.winner_p <= self.winning) & np.all(eligible, axis=2)
         wins &= ~self.away.any(axis=2).T
         names = np.array([*self.laws, None])
-        return names[np.where(wins.any(axis=1), wins.argmax(axis=1), -1)].tolist()
+        first = np.where(wins.any(axis=1), wins.argmax(axis=1), -1)
+        return names[first].tolist()
 
     @property
     def worse(self) -> np.ndarray:
@@ -344,7 +350,8 @@ class Comparison:
             low = 0.0
             high = 1.0
             if self.better[block, a, b]:
-                high = math.exp(math.log(self.floors[block]) - np.nanmedian(self.low[b, block]))
+                nearest = np.nanmedian(self.low[b, block])
+                high = math.exp(math.log(self.floors[block]) - nearest)
             value = high
         return Effect(
             value=float(np.clip(value, low, high)),
@@ -366,8 +373,10 @@ class Comparison:
         if self.below[list(at[1:]), block].any():
             return math.nan
         lead = least_visible_lead(self.leads[at], self.first, self.relevant)
-        charged = np.nan_to_num(middle(_difference(self.plain[at], self.leads[at])))
-        return 1.0 - (1.0 - lead) * math.exp(-max(float(charged), 0.0))
+        difference = _difference(self.plain[at], self.leads[at])
+        charged = np.nan_to_num(middle(difference))
+        lost = math.exp(-max(float(charged), 0.0))
+        return 1.0 - (1.0 - lead) * lost
 
     def step_change(self, block: int, law: str) -> tuple[float, float] | None:
         """Return the medians of a law's runs that were repeated at half the physics step, before
@@ -404,24 +413,29 @@ def bounds(
     with np.errstate(divide="ignore"):
         rise = np.log(middle(trends))[..., None]
     matters = np.abs(rise) > (relevant or RELEVANT)
-    rise = TREND_POWER * np.where(matters, np.clip(rise, -MAX_RISE, MAX_RISE), 0.0)
+    clipped = np.clip(rise, -MAX_RISE, MAX_RISE)
+    rise = TREND_POWER * np.where(matters, clipped, 0.0)
     q = _logarithms(floors[:, None])
     once = np.isnan(half)
-    low = np.fmin(whole, np.where(once, whole - widening, half)) + np.minimum(rise, 0.0)
-    high = np.fmax(whole, np.where(once, whole + widening, half)) + np.maximum(rise, 0.0)
+    lowest = np.where(once, whole - widening, half)
+    low = np.fmin(whole, lowest) + np.minimum(rise, 0.0)
+    highest = np.where(once, whole + widening, half)
+    high = np.fmax(whole, highest) + np.maximum(rise, 0.0)
     return np.maximum(low, q), np.maximum(high, q)
 
 
 def _logarithms(values: np.ndarray, floors: ArrayLike = 0.0) -> np.ndarray:
     """Return the logarithms of values (laws, blocks, seeds), at least those of the floors."""
-    least = np.maximum(np.reshape(floors, (-1, 1)), np.finfo(float).tiny)
+    floor = np.reshape(floors, (-1, 1))
+    least = np.maximum(floor, np.finfo(float).tiny)
     return np.log(np.maximum(np.abs(values), least))
 
 
 def _difference(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return a - b; 0 where both are the same infinity."""
     with np.errstate(invalid="ignore"):
-        return np.where((a == b) & np.isinf(a), 0.0, a - b)
+        same = (a == b) & np.isinf(a)
+        return np.where(same, 0.0, a - b)
 
 
 def _by_unit(by_run: np.ndarray, units: tuple[int, ...] | None, size: int) -> np.ndarray:
@@ -433,7 +447,8 @@ def _by_unit(by_run: np.ndarray, units: tuple[int, ...] | None, size: int) -> np
     for unit in range(max(units) + 1):
         of_unit = by_run[np.array(units) == unit]
         # between two opposite infinite values lies 0
-        centres[unit] = np.nan_to_num(middle(of_unit), nan=0.0, posinf=np.inf, neginf=-np.inf)
+        centre = middle(of_unit)
+        centres[unit] = np.nan_to_num(centre, nan=0.0, posinf=np.inf, neginf=-np.inf)
     return centres
 
 
@@ -541,7 +556,8 @@ def ranks_by_block(
     value, then by median. Irrelevant differences and laws that are `tied` share the mean of ranks.
     """
     behind = lacking[:, None] > lacking
-    larger = exceeds(centres[:, None], centres, floors, relevant) & ~np.asarray(tied)
+    beats = exceeds(centres[:, None], centres, floors, relevant)
+    larger = beats & ~np.asarray(tied)
     behind |= (lacking[:, None] == lacking) & larger
     return (len(centres) + 1 + behind.sum(axis=1) - behind.sum(axis=0)) / 2
 
@@ -556,10 +572,13 @@ def placed(
       best: whether a law may be the best, (laws,).
     """
     means = by_block.mean(axis=1).tolist()
-    order = list(zip(lacking.sum(axis=1).tolist(), np.round(means, 9).tolist(), strict=True))
+    lacked = lacking.sum(axis=1).tolist()
+    rounded = np.round(means, 9).tolist()
+    order = list(zip(lacked, rounded, strict=True))
     found = []
     for law, mean, own, star in zip(laws, means, order, best.tolist(), strict=True):
-        place = sum(other < own for other in order) + (1 + order.count(own)) / 2
+        better = sum(other < own for other in order)
+        place = better + (1 + order.count(own)) / 2
         found.append(Rank(law, mean, place, star))
     return sorted(found, key=lambda rank: (rank.place, rank.law))
 

@@ -83,7 +83,8 @@ def lqr(
             f"no command keeps {plant.name} at its goal: drive another joint, or give weights "
             "that are not 0"
         ) from None
-    return state_feedback(np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A), "state_feedback")
+    gain = np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A)
+    return state_feedback(gain, "state_feedback")
 
 
 def _sampled(plant: Plant, control_period: float) -> tuple[np.ndarray, np.ndarray]:

@@ -39,7 +39,8 @@ def p_values(differences: ArrayLike) -> np.ndarray:
         if known.size:
             with np.errstate(invalid="ignore"):  # the sum of opposite infinities is not above 0
                 above = known[:, None] + known > 0.0  # each pair i < j twice
-            p[at] = _tail(known.size, int(above.sum() + above.trace()) // 2)
+            total = int(above.sum() + above.trace()) // 2
+            p[at] = _tail(known.size, total)
     return p
 
 
@@ -54,7 +55,8 @@ def interval(differences: ArrayLike, error: float) -> tuple[float, float, float]
         return math.nan, math.nan, math.nan
     i, j = np.triu_indices(known.size)
     low, high = _ends(known[None], error)
-    return float(np.median(known[i] + known[j])) / 2, float(low[0]), float(high[0])
+    centre = float(np.median(known[i] + known[j])) / 2
+    return centre, float(low[0]), float(high[0])
 
 
 def _finite(differences: ArrayLike) -> np.ndarray:
@@ -66,11 +68,14 @@ def _finite(differences: ArrayLike) -> np.ndarray:
 def _ends(samples: np.ndarray, error: float) -> np.ndarray:
     """Return the ends of the intervals of samples (m, n), as (2, m); infinite if n is too small."""
     i, j = np.triu_indices(samples.shape[1])
-    enough = np.flatnonzero(_tail(samples.shape[1], np.arange(i.size + 1)) <= error)
+    tails = _tail(samples.shape[1], np.arange(i.size + 1))
+    enough = np.flatnonzero(tails <= error)
     if not enough.size:
-        return np.array([[-math.inf], [math.inf]]).repeat(len(samples), axis=1)
+        ends = np.array([[-math.inf], [math.inf]])
+        return ends.repeat(len(samples), axis=1)
     at = i.size - enough[0], enough[0] - 1
-    sums = np.partition(samples[:, i] + samples[:, j], at, axis=1)
+    pairs = samples[:, i] + samples[:, j]
+    sums = np.partition(pairs, at, axis=1)
     return sums[:, at].T / 2
 
 
@@ -88,7 +93,8 @@ def _tail(n: int, sums: int | np.ndarray) -> np.ndarray:
     from scipy.special import ndtr
 
     mean = n * (n + 1) / 4
-    deviation = math.sqrt(n * (n + 1) * (2 * n + 1) / 6) / 2
+    variance = n * (n + 1) * (2 * n + 1) / 6
+    deviation = math.sqrt(variance) / 2
     return ndtr((mean - sums + 0.5) / deviation)
 
 
@@ -122,7 +128,8 @@ def units_needed(leads: ArrayLike, error: float, relevant: float) -> float:
 
     known = _finite(leads)
     i, j = np.triu_indices(known.size, 1)
-    deviation = float(np.median(np.abs(known[i] - known[j]))) / MEDIAN_DISTANCE
+    spread = np.median(np.abs(known[i] - known[j]))
+    deviation = float(spread) / MEDIAN_DISTANCE
     centre = interval(known, error)[0] + math.log1p(-relevant)
     if not centre > 0.0:
         return math.inf
@@ -156,8 +163,10 @@ def least_visible_lead(leads: ArrayLike, error: float, relevant: float) -> float
     n = known.size
     if n < 2 or min_p(n) > error:
         return 1.0
-    centred = math.sqrt(n / (n - 1)) * (known - interval(known, error)[0])
-    seed = int.from_bytes(hashlib.sha256(known.tobytes()).digest()[:8])
+    centre = interval(known, error)[0]
+    centred = math.sqrt(n / (n - 1)) * (known - centre)
+    digest = hashlib.sha256(known.tobytes()).digest()
+    seed = int.from_bytes(digest[:8])
     drawn = np.random.default_rng(seed).integers(n, size=(LEAD_RESAMPLES, n))
     needed = []
     for indices in np.array_split(drawn, 1 + drawn.size * n // MAX_SUMS):

@@ -65,11 +65,7 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
         dofs = dof_ids(model)
         _hold(model, data, driven, plant.name)
         block = rates(model, data)
-    order = list(dofs)
-    for i in range(model.nv):
-        if i not in dofs:
-            order.append(i)
-    order += [model.nv + i for i in order]
+    order = _order(model, dofs)
     n = len(order)
     a = block[:n, :n][np.ix_(order, order)]
     b = block[:n, n:][np.ix_(order, driven)]
@@ -92,6 +88,15 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
         outputs=_of("x", names),
         name=plant.name,
     )
+
+
+def _order(model: mujoco.MjModel, dofs: Array) -> list[int]:
+    """Return the indices of positions and then of velocities, those of channels first."""
+    order = list(dofs)
+    for i in range(model.nv):
+        if i not in dofs:
+            order.append(i)
+    return order + [model.nv + i for i in order]
 
 
 def _of(kind: str, names: Sequence[str]) -> list[str]:
@@ -131,7 +136,8 @@ def rates(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
 
     block = np.zeros((n + model.nu, n + model.nu))
     for i, offset in enumerate(DIFFERENCE_STEP * np.eye(n + model.nu)):
-        block[:n, i] = (rates_at(offset) - rates_at(-offset)) / (2.0 * DIFFERENCE_STEP)
+        difference = rates_at(offset) - rates_at(-offset)
+        block[:n, i] = difference / (2.0 * DIFFERENCE_STEP)
     model.opt.timestep = step
     data.qpos[:], data.qvel[:], data.act[:], data.ctrl[:] = point
     return block

@@ -119,8 +119,10 @@ def chatters(trace: Trace) -> bool:
     part = last_part(trace)
     u = trace.applied if scenario.plant.pose else trace.u
     bounds = np.array(scenario.limits)
-    steps = np.abs(np.diff(u[part, : bounds.size], axis=0)).sum(axis=0)
-    return bool(np.any(steps > CHATTERS * bounds * np.ptp(trace.t[part])))
+    changes = np.diff(u[part, : bounds.size], axis=0)
+    steps = np.abs(changes).sum(axis=0)
+    largest = CHATTERS * bounds * np.ptp(trace.t[part])
+    return bool(np.any(steps > largest))
 
 
 def repetitions(trace: Trace) -> list[Scenario]:

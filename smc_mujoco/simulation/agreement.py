@@ -46,7 +46,8 @@ def check_component(c: Component, n: int, driven: int) -> None:
     name = f"{c.kind} {c.name!r}"
     if c.joint:
         python = python_functions.of_joint_law(c, n, driven, NoDynamics)
-        _check(made, name, python, _joint_inputs(n, driven), c.numbers(driven), c.memory * n, 2 * n)
+        joint_inputs = _joint_inputs(n, driven)
+        _check(made, name, python, joint_inputs, c.numbers(driven), c.memory * n, 2 * n)
         return
     python = python_functions.of_channel_component(c)
     record = Reading if c.kind == "estimator" else Measurement
@@ -62,7 +63,8 @@ def check_signal(signal: Signal) -> None:
     inputs = _inputs(state.INSTANT.names)
     python = python_functions.of_signal(signal)
     numbers = cfunctions.signal_values(signal)
-    _check(made, type(signal).__name__, python, inputs, numbers, max(signal.memory, 1), 3)
+    memory = max(signal.memory, 1)
+    _check(made, type(signal).__name__, python, inputs, numbers, memory, 3)
 
 
 def check_part(part: Part, kind: str, numbers: Callable[[], Sequence[float]]) -> None:
@@ -116,7 +118,8 @@ def _joint_inputs(n: int, driven: int) -> list[Array]:
     dtype = stored_dtype(n)
     found = []
     for t, size in zip(TIMES, SIZES, strict=True):
-        numbers = _input(tuple(map(str, range(dtype.itemsize // 8))), t, size)
+        names = tuple(map(str, range(dtype.itemsize // 8)))
+        numbers = _input(names, t, size)
         record = numbers.view(dtype)[0]
         for name in ("dt", "model", "dynamics", "limit"):
             record[name] = FIXED[name]

@@ -93,7 +93,8 @@ def _stopped(plant: Plant, rubs: float) -> list[Stopped]:
         damping = max(at.D[dof, dof], 0.0) + 0.5 * rubs * bounds[j]
         momentum = math.sqrt(2.0 * REACH * mass * force * near) + force * WIDTH + damping * near
         ends = sorted((goal[j] + side * near, goal[j] - side * far))
-        found.append(Stopped(float(momentum), side, names[j], (float(ends[0]), float(ends[1]))))
+        ends_of_reach = (float(ends[0]), float(ends[1]))
+        found.append(Stopped(float(momentum), side, names[j], ends_of_reach))
     return found
 
 

@@ -511,7 +511,8 @@ def _kept(items: Sequence[Actuator], plant: Plant) -> list[Actuator]:
     their kind.
     """
     found = []
-    for joint, part in zip(driven_names(plant), plant.suggested.get("actuator", ()), strict=False):
+    kept = plant.suggested.get("actuator", ())
+    for joint, part in zip(driven_names(plant), kept, strict=False):
         if part is not None and not _given(items, part, joint):
             on = () if plant.driven == 1 else (joint,)
             found.append(dataclasses.replace(part, on=on))

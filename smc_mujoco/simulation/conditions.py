@@ -547,7 +547,8 @@ def _own_joints(plant: Plant) -> list[Own]:
     """Return the sizes of the driven joints."""
     at = at_goal(plant)
     inertias = np.diag(at.M)[at.dofs].tolist()
-    ways = np.abs(np.subtract(usual_start(plant), plant.origin))[: plant.driven].tolist()
+    apart = np.subtract(usual_start(plant), plant.origin)
+    ways = np.abs(apart)[: plant.driven].tolist()
     limits = Scenario.recorded(plant=plant, law="none").drive_train.forces
     joints = zip(limits, inertias, ways, strict=True)
     own = []

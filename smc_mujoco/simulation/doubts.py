@@ -102,7 +102,8 @@ def _weak_motors(s: Any) -> Iterator[str]:
             if motor.stall is None:
                 continue
             with np.errstate(all="ignore"):
-                f, g = s.plant.nominal(np.array(s.x0), np.zeros(s.plant.n), i, s.plant.values({}))
+                values = s.plant.values({})
+                f, g = s.plant.nominal(np.array(s.x0), np.zeros(s.plant.n), i, values)
             need = abs(f) / abs(g) if g else 0.0
             if motor.stall < need and (need <= s.limits[i] or not s.force_command):
                 yield (

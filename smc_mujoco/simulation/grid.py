@@ -357,7 +357,8 @@ def check_names(
     """
     of_plants = []
     for plant in map(as_plant, plants):
-        of_plants.append((plant.name, plant, (plant.build, plant.parameters, plant.n)))
+        machine = (plant.build, plant.parameters, plant.n)
+        of_plants.append((plant.name, plant, machine))
     of_laws = []
     for law in laws:
         if isinstance(law, str):

@@ -158,7 +158,9 @@ def check_free_body(s: Any) -> None:
 def check_inertia(s: Any) -> None:
     """Check that the nominal M of a law of many joints can be inverted at the start."""
     if s.law.joint and s.model != "none" and s.plant.by_mujoco:
-        M = s.plant.nominal.dynamics(np.array(s.x0), np.array(s.v0), s.plant.values({})).M
+        x0 = np.array(s.x0)
+        v0 = np.array(s.v0)
+        M = s.plant.nominal.dynamics(x0, v0, s.plant.values({})).M
         if not np.linalg.cond(M) < MAX_CONDITION_NUMBER:
             raise ScenarioError(
                 f"the mass matrix of {s.plant.name} is singular at x0 {shown(s.x0)}, as where two "

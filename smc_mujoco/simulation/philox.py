@@ -98,5 +98,6 @@ def uniform(seed, channel, stream, k):
 def random_words(seed: int, channel: int, stream: int, k: int) -> tuple[int, int]:
     """Return two whole numbers of 53 random bits, from numpy's generator."""
     counter = (k - 1 + (stream << 64)) % 2**256
-    first, second = np.random.Philox(key=seed + (channel << 64), counter=counter).random_raw(2)
+    generator = np.random.Philox(key=seed + (channel << 64), counter=counter)
+    first, second = generator.random_raw(2)
     return int(first) >> 11, int(second) >> 11

@@ -330,7 +330,8 @@ def _tables(prepared: Prepared, buffer: Functions) -> dict[str, list[dict[str, A
     size = s.plant.driven if s.law.joint else 1  # numbers of a gain
     laws = []
     for law in buffer.laws():
-        laws.append(_function(buffer.component(law), law.numbers(size), buffer) | memory)
+        function = _function(buffer.component(law), law.numbers(size), buffer)
+        laws.append(function | memory)
     disturbances = []
     for i, d in enumerate(s.disturbance):
         body = -1
@@ -457,7 +458,8 @@ def pause_phase(s: Resolved) -> int:
     others.
     """
     samples = s.clock.pauses(s.control_period, s.physics_step)[1]
-    return int(philox.random_words(s.seed, 0, philox.PAUSE, 0)[0] * 2.0**-53 * samples)
+    drawn = philox.random_words(s.seed, 0, philox.PAUSE, 0)[0]
+    return int(drawn * 2.0**-53 * samples)
 
 
 def _joint_measurement(
@@ -482,7 +484,8 @@ def _native_nominal(s: Resolved) -> Native | None:
     if not s.plant.by_mujoco:
         return None
     if not s.law.joint:
-        return s.plant.nominal.native(dict(zip(s.plant.parameters, known_values(s), strict=True)))
+        known = dict(zip(s.plant.parameters, known_values(s), strict=True))
+        return s.plant.nominal.native(known)
     if s.model == "none":
         return None
     at_rest = "g" in read_by(s.law.function)

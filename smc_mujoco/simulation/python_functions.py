@@ -129,7 +129,8 @@ class PythonComponent:
         acceleration.
         """
         try:
-            out = self.functions[i](y, self.gains[i], self.memory[i, : self.sizes[i]])
+            memory = self.memory[i, : self.sizes[i]]
+            out = self.functions[i](y, self.gains[i], memory)
         except USER_EXCEPTIONS as error:
             raise failure_of(self.name, error, channel=i) from error
         if isinstance(y, Reading) and not isinstance(out, tuple):
@@ -340,7 +341,8 @@ def of_joint_law(
 
     def body(inputs, _, memory):
         component.memory = memories[memory]
-        stored = np.ctypeslib.as_array(inputs, (dtype.itemsize // 8,)).view(dtype)[0]
+        flat = np.ctypeslib.as_array(inputs, (dtype.itemsize // 8,))
+        stored = flat.view(dtype)[0]
         dynamics = dynamics_at(stored["x"], stored["v"])
         outputs = np.zeros((2, n))
         outputs[:, :driven] = component.call_joint(measurement_of(stored, dynamics))

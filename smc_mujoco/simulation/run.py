@@ -304,9 +304,8 @@ class ScenarioBatch:
         # The shared model has the first scenario's values. Scenarios that do not set these fields
         # need the base values.
         self.base_values = {name: field_array(self.base, name) for name in set_fields}
-        self.logs = [
-            np.full((first.samples + 1, first.plant.n), np.nan, state.LOG) for _ in scenarios
-        ]
+        shape = (first.samples + 1, first.plant.n)
+        self.logs = [np.full(shape, np.nan, state.LOG) for _ in scenarios]
         self.records = np.zeros(count, state.SIMULATION)
         self.packed = []  # the arrays whose addresses are in the records
         self.called: list[Any] = []  # functions that are called in Python
@@ -586,7 +585,8 @@ class ScenarioBatch:
         channel = int(record["seen"]["i"])
         width = int(record["width"])
         commands = state.view(numbers, int(record["commands"]), (2, width))
-        memory = state.view(numbers, int(record["law"]["memory"]), (n, s.law.memory)).copy()
+        start = int(record["law"]["memory"])
+        memory = state.view(numbers, start, (n, s.law.memory)).copy()
         if s.law.joint:
             law = s.law
             y = int(record["joint"])

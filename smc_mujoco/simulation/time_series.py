@@ -314,7 +314,8 @@ def _knots(first: float, last: float) -> Array:
         raise ScenarioError(
             f"times span {last - first:g} s: give a path of {MAX_KNOTS * KNOT_SPACING:g} s at most"
         )
-    return np.linspace(first, last, max(2, int(np.ceil(steps - 1e-9)) + 1))
+    count = max(2, int(np.ceil(steps - 1e-9)) + 1)
+    return np.linspace(first, last, count)
 
 
 def cartesian_path(

@@ -312,7 +312,8 @@ class Trace:
         about = {"scenario": to_json(scenario_json.describe(self.scenario))}
         variables = {}
         for n in ARRAYS[1:]:
-            variables[n] = (("t", "channel"), getattr(self, n), {"units": self._unit(n)})
+            attributes = {"units": self._unit(n)}
+            variables[n] = (("t", "channel"), getattr(self, n), attributes)
         joints = "channel", list(channel_names(self.scenario.plant))
         coords = {
             "t": ("t", self.t, {"units": "s"}),
@@ -360,9 +361,10 @@ def _write_mat(trace: Trace, file: Path) -> None:
 
     about = to_json(scenario_json.describe(trace.scenario))
     arrays = {name: getattr(trace, name) for name in ARRAYS}
+    units = {n: trace._unit(n) for n in ARRAYS}
     savemat(
         file,
-        arrays | {"units": {n: trace._unit(n) for n in ARRAYS}, "scenario": about},
+        arrays | {"units": units, "scenario": about},
         oned_as="column",
     )
 

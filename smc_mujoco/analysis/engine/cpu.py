@@ -100,7 +100,8 @@ def _pieces(form: Form, rows: Array, threads: int) -> Iterator[slice]:
     """Yield the runs of a call: a share for each thread, of at most PIECE_STEPS."""
     if not len(rows):
         return
-    longest = np.max(rows[:, SETTING.samples] * rows[:, SETTING.steps]) * form.n
+    steps = rows[:, SETTING.samples] * rows[:, SETTING.steps]
+    longest = np.max(steps) * form.n
     size = max(1, min(-(-len(rows) // threads), int(PIECE_STEPS // longest)))
     for first in range(0, len(rows), size):
         yield slice(first, first + size)

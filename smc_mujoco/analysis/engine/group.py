@@ -342,11 +342,14 @@ class FormGroup:
         _put(row, at.v0, s.v0)
         _put(row, at.limits, s.limits)
         scales = _scales(s)
-        _put(row, at.bands, np.array([settling_band(s, scale) for scale in scales]))
+        bands = np.array([settling_band(s, scale) for scale in scales])
+        _put(row, at.bands, bands)
         _put(row, at.shares, SETTLING_BAND * scales)
         _put(row, at.known, known_values(s))
-        _put(row, at.before, [*vars(s.plant.values(s.factors(0))).values()])
-        _put(row, at.after, [*vars(s.plant.values(s.factors(max(s.jump_step, 0)))).values()])
+        first = s.plant.values(s.factors(0))
+        _put(row, at.before, [*vars(first).values()])
+        later = s.plant.values(s.factors(max(s.jump_step, 0)))
+        _put(row, at.after, [*vars(later).values()])
         if self.form.noise:
             row[at.draw] = noise.drawing().address
         if s.sensors:
@@ -376,7 +379,8 @@ class FormGroup:
         for at, part in parts:
             assert at is not None  # one loop's scenarios have the same parts
             names = len(part.names)
-            table = row[at.numbers : at.numbers + self.form.n * names].reshape(-1, names)
+            last = at.numbers + self.form.n * names
+            table = row[at.numbers : last].reshape(-1, names)
             channels = [*part.channels(s.plant)]
             table[channels] = part.numbers(run_of(s, part))
             if part.counted:

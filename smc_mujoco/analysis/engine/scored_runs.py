@@ -86,7 +86,8 @@ class ScoredRuns:
             if key is None:
                 scored = self.by_mujoco(some, report)
             else:
-                made = key[0](some, tuple(self.formulas), self.forms.get(key, []))
+                known = self.forms.get(key, [])
+                made = key[0](some, tuple(self.formulas), known)
                 self.forms[key] = [made.form]
                 scored = made.scored(self.device, self.threads)
                 report(sum(case.work for case in some))

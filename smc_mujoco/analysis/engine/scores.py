@@ -279,7 +279,8 @@ def over_log(folds: Sequence[Fold], log: np.ndarray, n: int, period: float) -> l
     row[SETTING.early] = first_sample("early", t)
     row[SETTING.late] = first_sample("late", t)
     scores = np.zeros(SCORES + len(folds))
-    samples = np.ascontiguousarray(log).view(np.float64).reshape(len(log), -1)
+    numbers = np.ascontiguousarray(log).view(np.float64)
+    samples = numbers.reshape(len(log), -1)
     _over_samples(tuple(folds), n)(row, samples, scores)
     return scores[SCORES:].tolist()
 

@@ -197,7 +197,8 @@ def _put(model: Any, name: str, values: Array) -> None:
     field = name.rpartition(".")[2]
     array = getattr(owner, field)
     shape = (len(values), *array.numpy().shape[1:])
-    setattr(owner, field, warp.array(values.reshape(shape), dtype=array.dtype))
+    shaped = values.reshape(shape)
+    setattr(owner, field, warp.array(shaped, dtype=array.dtype))
 
 
 def _room(model: mujoco.MjModel, contacts: int) -> dict[str, int]:
@@ -207,7 +208,8 @@ def _room(model: mujoco.MjModel, contacts: int) -> dict[str, int]:
     """
     flags = mujoco.mjtDisableBit
     off = model.opt.disableflags
-    touching = model.npair or (np.any(model.geom_contype) and np.any(model.geom_conaffinity))
+    collides = np.any(model.geom_contype) and np.any(model.geom_conaffinity)
+    touching = model.npair or collides
     if not touching or off & flags.mjDSBL_CONTACT:
         contacts = 0
     rows = ROWS_OF_EQUALITY * model.neq

@@ -110,7 +110,8 @@ def calls_in_step(form: Form, s: Resolved) -> int:
 
 def steps(rows: Array) -> int:
     """Return how many physics steps the longest run has."""
-    return int((rows[:, SETTING.samples] * rows[:, SETTING.steps]).max())
+    steps = rows[:, SETTING.samples] * rows[:, SETTING.steps]
+    return int(steps.max())
 
 
 def controlling(form: Form, compile_user: Compiler) -> Any:

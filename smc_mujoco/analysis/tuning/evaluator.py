@@ -81,10 +81,12 @@ class Evaluator:
         members: dict[tuple[Hashable, Hashable], list[int]] = {}
         for i, item in enumerate(prepared):
             fast = equation.key_of(self.cases[i], device) if by_equation else None
-            members.setdefault((fast, None if fast else item.key), []).append(i)
+            own_key = None if fast else item.key
+            members.setdefault((fast, own_key), []).append(i)
         self.engine = MUJOCO
         # as many candidates at once as fit the memory of a batch
-        slots = max(1, min(slots, BATCH_BYTES // sum(item.bytes for item in prepared)))
+        of_one = sum(item.bytes for item in prepared)
+        slots = max(1, min(slots, BATCH_BYTES // of_one))
         with memory_for(prepared), callback.installed():
             for (fast, _), indices in members.items():
                 if fast:
@@ -128,7 +130,8 @@ class Evaluator:
         """Return what a candidate's predicted chattering costs, s^2."""
         if self.goal.chattering is None:
             return 0.0
-        return self.goal.excess(dataclasses.replace(self.cases[0], law=self.law(gains)))
+        case = dataclasses.replace(self.cases[0], law=self.law(gains))
+        return self.goal.excess(case)
 
     def _terms_of_traces(self, candidates: Sequence[Floats]) -> list[Pair]:
         laws = []
@@ -160,7 +163,8 @@ class Evaluator:
 
 def with_gains(law: Component, names: Sequence[str], values: Sequence[float]) -> Component:
     """Return the law with other gains, without a warning for violated conditions of its theorem."""
-    return dataclasses.replace(law, gains=dict(law.gains) | dict(zip(names, values, strict=True)))
+    gains = dict(law.gains) | dict(zip(names, values, strict=True))
+    return dataclasses.replace(law, gains=gains)
 
 
 def _putter(

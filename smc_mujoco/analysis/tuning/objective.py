@@ -173,7 +173,8 @@ class Objective:
 
     def evaluation(self, case: Scenario, traces: list[Trace], gains: Floats = ()) -> Evaluation:
         """Return the evaluation of a candidate, given its first case and the traces of all."""
-        tracking, variation = map(sum, zip(*map(self.terms_of_run, traces), strict=True))
+        terms = zip(*map(self.terms_of_run, traces), strict=True)
+        tracking, variation = map(sum, terms)
         cost = tracking + self.weight * variation + self.excess(case)
         return Evaluation(gains, float(cost), float(tracking), float(variation))
 
@@ -209,9 +210,12 @@ class Objective:
         e = np.abs(pose_errors(x, r))
         t = case.control_period * np.arange(len(x))
         turns = [i for i in case.plant.scored_channels if i >= 3]
-        parts = e[:, :3].sum(axis=1), e[:, turns].sum(axis=1)
+        of_place = e[:, :3].sum(axis=1)
+        of_turn = e[:, turns].sum(axis=1)
+        parts = of_place, of_turn
         tracking = sum(metrics.ITAE.of(t, part[:, None]) / (part[0] or 1.0) for part in parts)
-        variation = metrics.TV.channels(t, u) / (np.array(case.limits) * self.duration)
+        room = np.array(case.limits) * self.duration
+        variation = metrics.TV.channels(t, u) / room
         return min(float(tracking), FAILURE_COST), float(variation.max())
 
     def terms_of_failure(self, time: float) -> Pair:
@@ -294,7 +298,8 @@ def shares(
         costs.append(terms @ (1.0, goal.weight))
     total = np.sum(costs, axis=0)
     names = [condition.name for condition in goal.conditions]
-    return dict(zip(names, (total / total.sum()).tolist(), strict=True))
+    parts = (total / total.sum()).tolist()
+    return dict(zip(names, parts, strict=True))
 
 
 def _unseen(

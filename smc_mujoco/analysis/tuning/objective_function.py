@@ -64,7 +64,8 @@ class ObjectiveFunction:
 
     def law(self, gains: Iterable[float]) -> Component:
         """Return the law with a set of gains, to run it, or to compare it with others."""
-        return self._task.law(**dict(zip(self.bounds, self._values(gains), strict=True)))
+        by_name = dict(zip(self.bounds, self._values(gains), strict=True))
+        return self._task.law(**by_name)
 
     def _values(self, gains: Iterable[float]) -> tuple[float, ...]:
         """Return gains as numbers, or refuse them."""

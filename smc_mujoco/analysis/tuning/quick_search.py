@@ -58,11 +58,13 @@ def search(
     usual = int(SCREENED_SHARE * size)
     hypercube(alone, space.box, random, WIDER * usual, space.inside)
     spent = round(alone.count / len(every.cheap.cases))
-    kept = sorted(alone.decided.values(), key=_objective)[: max(FEWEST, int(KEPT * usual))]
+    count = max(FEWEST, int(KEPT * usual))
+    kept = sorted(alone.decided.values(), key=_objective)[:count]
     rows = np.log10([one.gains for one in kept]) if kept else space.inside[None]
     costs = every.screen(rows)
     logs = rows[np.argmin(costs)]
-    logs = evolved(every, space.searched, random, logs, costs.min(), int(EVOLVED_SHARE * size))
+    share = int(EVOLVED_SHARE * size)
+    logs = evolved(every, space.searched, random, logs, costs.min(), share)
     descend(every, space.searched, logs, size - every.count - spent)
     return spent
 

@@ -115,7 +115,8 @@ class Tuned(Tables):
 
     def sourced(self) -> "Tuned":
         """Return the tuning with a law that names these searches as the source of its gains."""
-        return dataclasses.replace(self, law=self.law.sourced(source.TUNED, self.search))
+        law = self.law.sourced(source.TUNED, self.search)
+        return dataclasses.replace(self, law=law)
 
     def of_law(self, law: Component) -> "Tuned":
         """Return the tuning with another of its sets of gains as that of the law."""

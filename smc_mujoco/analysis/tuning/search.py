@@ -278,7 +278,8 @@ class TuningTask(NamedTuple):
         template = self.law.template
         if self.outside_theorem or template is None:
             return True
-        return not template.unmet({**self.law.gains, **dict(zip(self.box, gains, strict=True))})
+        tried = {**self.law.gains, **dict(zip(self.box, gains, strict=True))}
+        return not template.unmet(tried)
 
     @property
     def size(self) -> int:
@@ -357,7 +358,8 @@ class TuningTask(NamedTuple):
         """Make a search, from the box, within the bounds `searched`."""
         size = int(SCREENED_SHARE * self.size)
         logs, cost = hypercube(trials, self.box, random, size, self.inside)
-        logs = evolved(trials, self.searched, random, logs, cost, int(EVOLVED_SHARE * self.size))
+        share = int(EVOLVED_SHARE * self.size)
+        logs = evolved(trials, self.searched, random, logs, cost, share)
         descend(trials, self.searched, logs, self.size - trials.count)
         return trials
 
@@ -548,7 +550,8 @@ def result_of(task: TuningTask, found: tuple[SearchResult, ...]) -> Tuned:
         versions=versions(),
     )
     cases = task.cases(found.index(tuned.best))
-    before = task.goal.evaluation(cases[0], run(cases, task.threads)).objective
+    traces = run(cases, task.threads)
+    before = task.goal.evaluation(cases[0], traces).objective
     law = with_gains(task.law, tuple(task.box), tuned.best.best.gains)
     return dataclasses.replace(tuned, law=law, before=before)
 

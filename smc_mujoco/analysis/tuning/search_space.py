@@ -131,11 +131,13 @@ def scales(
       per_u: force per unit of u, N m/V or N/V; None: u is an acceleration.
     """
     if plant.pose and plant.by_mujoco:
-        M = plant.nominal.dynamics(np.array(plant.x0), np.zeros(plant.n), plant.values({})).M
+        start = np.array(plant.x0)
+        M = plant.nominal.dynamics(start, np.zeros(plant.n), plant.values({})).M
         limits = plant.limits
         force = min([u_max, *limits[:3]])
         torque = min([u_max, *limits[3:6]])
-        of_turns = _scales(1.0 / max(np.diag(M)[3:]), torque, 1.0)
+        most = max(np.diag(M)[3:])
+        of_turns = _scales(1.0 / most, torque, 1.0)
         own = _scales(1.0 / M[0, 0], force, SPREAD if reach is None else reach)
         for name, value in of_turns.items():
             own[name + OF_TURNS] = value
@@ -167,7 +169,8 @@ def scales(
 
 def _scales(g: float, u_max: float, X: float) -> dict[str, float]:
     """Return the scales of channels with this g, bound on u and X."""
-    return {"X": X, "F": u_max, "M": 1.0 / g, "T": math.sqrt(X / (g * u_max))}
+    time = math.sqrt(X / (g * u_max))
+    return {"X": X, "F": u_max, "M": 1.0 / g, "T": time}
 
 
 def left_out(law: Component, name: str) -> bool:
@@ -189,7 +192,8 @@ def box(law: Component, plant_scales: Numbers) -> dict[str, Pair]:
         if name in defaults:
             if not defaults[name] > 0.0:
                 unit(law, name)  # raises: there is neither a unit nor a size
-            bounds[name] = (defaults[name] * 10**-HALF_WIDTH, defaults[name] * 10**HALF_WIDTH)
+            default = defaults[name]
+            bounds[name] = (default * 10**-HALF_WIDTH, default * 10**HALF_WIDTH)
         elif (gain_unit := unit(law, name)) is not None and not (
             _gain(law, name).held or left_out(law, name)
         ):

@@ -48,7 +48,8 @@ class Trials:
     @property
     def count(self) -> int:
         """The number of evaluations."""
-        return len(self.decided) + (0 if self.screened is self.decided else len(self.screened))
+        screened = 0 if self.screened is self.decided else len(self.screened)
+        return len(self.decided) + screened
 
     @property
     def best(self) -> Evaluation:
@@ -57,7 +58,8 @@ class Trials:
 
     def screen(self, logs: Array) -> Array:
         """Return J of candidates (candidates, gains), given as log10 gains, from cheap runs."""
-        return self._costs(list(map(self.gains, logs.tolist())), self.cheap, self.screened)
+        candidates = list(map(self.gains, logs.tolist()))
+        return self._costs(candidates, self.cheap, self.screened)
 
     def cost(self, logs: Array) -> float:
         """Return the accurate J of a candidate, given as log10 gains (gains,)."""
@@ -120,7 +122,8 @@ def hypercube(
     low, high = np.log10(list(box.values())).T
     if not size:
         return inside, np.inf
-    logs = low + (high - low) * LatinHypercube(len(low), rng=random).random(size)
+    drawn = LatinHypercube(len(low), rng=random).random(size)
+    logs = low + (high - low) * drawn
     for i, gains in enumerate(logs):
         if not trials.within(gains):
             logs[i] = trials.drawn(lambda: random.uniform(low, high), inside)
@@ -169,7 +172,8 @@ def descend(trials: Trials, box: Box, logs: Array, size: int) -> None:
     window = 2 * len(logs) + 2
 
     def cost(z: Array) -> float:
-        costs.append(trials.cost(trials.drawn_back(np.clip(z, low, high), logs)))
+        gains = trials.drawn_back(np.clip(z, low, high), logs)
+        costs.append(trials.cost(gains))
         if len(costs) > 2 * window and min(costs[:-window]) <= min(costs) * (1.0 + PATIENCE):
             raise _DescentEnded
         return np.log(costs[-1])
@@ -181,4 +185,5 @@ def descend(trials: Trials, box: Box, logs: Array, size: int) -> None:
         {"initial_tr_radius": FIRST_RADIUS, "final_tr_radius": LAST_RADIUS},
     )  # pyright: ignore[reportArgumentType]
     with contextlib.suppress(_DescentEnded):
-        minimize(cost, logs, method="COBYQA", bounds=bounds, options={"maxfev": size - 1, **radii})
+        options = {"maxfev": size - 1, **radii}
+        minimize(cost, logs, method="COBYQA", bounds=bounds, options=options)

@@ -223,7 +223,8 @@ def _files(exported: ExportedLaw, identifier: str) -> dict[str, str]:
         if kind != "law":
             files[f"{kind}.c"] = contents.component_file(exported.parts[kind], slots, text)
     files = {"fmu.c": (FOLDER / "fmu.c").read_text(encoding="utf-8"), **files}
-    content = "\0".join([*files.values(), contents.header(listed, exported, identifier, "")])
+    header = contents.header(listed, exported, identifier, "")
+    content = "\0".join([*files.values(), header])
     token = f"{{{uuid.UUID(bytes=hashlib.sha256(content.encode()).digest()[:16])}}}"
     compiled = list(files)
     files["controller.h"] = contents.header(listed, exported, identifier, token)

@@ -292,7 +292,8 @@ def starts(
     for _, channel in channels:
         if channel.partner is not None and channel.partner_x0 is not None:
             chosen[channel.partner] = channel.partner_x0
-    x0 = dict(zip(joints, goals(model, joints, keyframe)[0], strict=True)) | chosen
+    at_goal = goals(model, joints, keyframe)[0]
+    x0 = dict(zip(joints, at_goal, strict=True)) | chosen
     checked = []
     for row in ranges(model, joints):
         if keyframe is not None or row[0] in chosen:
@@ -313,7 +314,8 @@ def places(
     for joint in joints:
         if joint in start:
             names.append(joint)
-            units += (UNIT_OF_JOINT[mujoco.mjtJoint(model.joint(joint).type[0])],)
+            kind = mujoco.mjtJoint(model.joint(joint).type[0])
+            units += (UNIT_OF_JOINT[kind],)
             x0 += (start[joint],)
         else:
             names += [joint] * len(PLACES)
@@ -383,13 +385,16 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> Floats:
             )
     ends = model.actuator_gainprm[drives, :1] * model.actuator_ctrlrange[drives]
     ends[model.actuator_ctrllimited[drives] == 0] = math.inf
-    clamped = np.clip(ends, *model.actuator_forcerange[drives].T[:, :, None])
+    allowed = model.actuator_forcerange[drives].T[:, :, None]
+    clamped = np.clip(ends, *allowed)
     ends[model.actuator_forcelimited[drives] == 1] = clamped[
         model.actuator_forcelimited[drives] == 1
     ]
     largest = np.abs(ends).max(axis=1)
     forces = unit_wrenches(model, model.joint(joint).id, drives)
-    sizes = np.array([np.linalg.norm(forces[:, :3], axis=1), *np.abs(forces[:, 3:]).T]).T
+    together = np.linalg.norm(forces[:, :3], axis=1)
+    alone = np.abs(forces[:, 3:])
+    sizes = np.array([together, *alone.T]).T
     reached = []
     for column in sizes.T:
         used = column > 0.0
@@ -402,7 +407,8 @@ def held_pose(label: str, model: mujoco.MjModel, joint: str) -> Literal["all", "
     its heading.
     """
     forces = unit_wrenches(model, model.joint(joint).id, thrusters(model, joint))
-    rank = np.linalg.matrix_rank(forces, tol=1e-9 * np.abs(forces).max())
+    least = 1e-9 * np.abs(forces).max()
+    rank = np.linalg.matrix_rank(forces, tol=least)
     if rank < FLIES:
         text = (
             f"the actuators of {label} give {rank} independent forces and torques, "
@@ -424,7 +430,8 @@ def pose_at_start(model: mujoco.MjModel, joint: str, keyframe: str | None) -> Fl
         qpos = model.qpos0
     else:
         qpos = model.key_qpos[model.key(keyframe).id]
-    place = qpos[model.joint(joint).qposadr[0] :][:7].tolist()
+    first = model.joint(joint).qposadr[0]
+    place = qpos[first:][:7].tolist()
     return *place[:3], *rotation_vector(*place[3:])
 
 
@@ -440,7 +447,8 @@ def add_pose(spec: mujoco.MjSpec, joint: str, drives: Sequence[int]) -> None:
 
 def add_pose_sensors(spec: mujoco.MjSpec, joint: str, name: str) -> None:
     """Add a site of this name to the body of a free joint, and sensors of its pose and rates."""
-    site = spec.joint(joint).parent.add_site(name=name, size=(1e-6,) * 3, group=5)
+    body = spec.joint(joint).parent
+    site = body.add_site(name=name, size=(1e-6,) * 3, group=5)
     site.pos = (0.0, 0.0, 0.0)
     site.quat = (1.0, 0.0, 0.0, 0.0)
     kinds = mujoco.mjtSensor

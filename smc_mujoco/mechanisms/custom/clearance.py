@@ -63,12 +63,14 @@ def deepest(
         bodies = model.geom_bodyid[geoms]
         if min(geoms) < 0 or not counts[bodies].all():
             continue
-        if moved[bodies[0]] != moved[bodies[1]] and -contact.dist > found.depth:
+        meets = moved[bodies[0]] != moved[bodies[1]]
+        if meets and -contact.dist > found.depth:
             names = tuple(map(model.body, bodies.tolist()))
             named = []
             for i, body in zip(geoms, names, strict=True):
                 named.append(model.geom(i).name or body.name or f"geom {i}")
-            found = Overlap(-contact.dist, tuple(named), tuple(body.name for body in names))
+            owners = tuple(body.name for body in names)
+            found = Overlap(-contact.dist, tuple(named), owners)
     return found
 
 

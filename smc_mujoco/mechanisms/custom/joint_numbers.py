@@ -58,7 +58,8 @@ def joint_numbers(plant: Plant) -> dict[str, JointNumber]:
     for joint in all_joints(plant):
         slides = model.jnt_type[model.joint(joint).id] == SLIDE
         for name, kind in KINDS.items():
-            value = float(np.ravel(getattr(model, kind.field)[_place(model, joint, name)])[0])
+            values = getattr(model, kind.field)[_place(model, joint, name)]
+            value = float(np.ravel(values)[0])
             unit = kind.slide if slides else kind.hinge
             found[f"{joint}.{name}"] = JointNumber(joint, name, value, unit)
     return found

@@ -29,7 +29,8 @@ def not_kept(model: mujoco.MjModel, i: int) -> str:
     if model.actuator_gaintype[i] != FIXED or model.actuator_biastype[i] != AFFINE or not stiffness:
         return no_motor(model, i) or "is a motor, whose command is a force"
     if model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
-        lag = mujoco.mjtDyn(model.actuator_dyntype[i]).name.removeprefix("mjDYN_").lower()
+        kind = mujoco.mjtDyn(model.actuator_dyntype[i]).name
+        lag = kind.removeprefix("mjDYN_").lower()
         return f"is a servo with dynamics (dyntype {lag})"
     gain = float(model.actuator_gainprm[i, 0])
     if bias or not math.isclose(gain, -stiffness, rel_tol=EQUAL):

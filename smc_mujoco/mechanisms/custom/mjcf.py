@@ -399,7 +399,8 @@ def _sha256(parts: Iterable[bytes]) -> str:
 def _elements(model: Path | str | bytes) -> list[ET.Element]:
     """Return the elements of an XML file or text; [] if it cannot be parsed: MuJoCo says so."""
     try:
-        return list(ET.fromstring(model.read_bytes() if isinstance(model, Path) else model).iter())
+        text = model.read_bytes() if isinstance(model, Path) else model
+        return list(ET.fromstring(text).iter())
     except (OSError, ValueError, ET.ParseError):
         return []
 

@@ -36,7 +36,9 @@ def touches(model: mujoco.MjModel) -> bool:
     parent = model.body_weldid[model.body_parentid[body]]
     a, b = body[first], body[second]
     # the world is no parent here, as MuJoCo does not count it
-    kin = (a == b) | ((parent[first] == b) & (b > 0)) | ((parent[second] == a) & (a > 0))
+    child = (parent[first] == b) & (b > 0)
+    parent_of = (parent[second] == a) & (a > 0)
+    kin = (a == b) | child | parent_of
     return bool(np.any((masks != 0) & ~kin))
 
 
@@ -46,7 +48,8 @@ def smooth(model: mujoco.MjModel, rubs: bool = False) -> bool:
     """
     if model.opt.disableflags & FLAGS.mjDSBL_CONSTRAINT.value:
         return True
-    touching = np.any((model.geom_contype > 0) | (model.geom_conaffinity > 0)) or model.npair
+    collides = (model.geom_contype > 0) | (model.geom_conaffinity > 0)
+    touching = np.any(collides) or model.npair
     limited = np.any(model.jnt_limited) or np.any(model.tendon_limited)
     dry = np.any(model.tendon_frictionloss) or (np.any(model.dof_frictionloss) and not rubs)
     return not (
@@ -129,8 +132,10 @@ def _giving(model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
         # a time constant and a damping ratio, or a stiffness and a damping, both negative
         w = np.where(first > 0.0, 1.0 / np.abs(first * second), np.sqrt(np.abs(first)))
         z = np.where(first > 0.0, second, -second / (2.0 * w))
-        blow = np.max(1.0 / (w * (1.0 + (math.e - 1.0) * z)), initial=0.0)
-        rest = np.max((1.0 - solimp[:, 1]) * load / w**2, initial=0.0)
+        decay = 1.0 + (math.e - 1.0) * z
+        blow = np.max(1.0 / (w * decay), initial=0.0)
+        loose = 1.0 - solimp[:, 1]
+        rest = np.max(loose * load / w**2, initial=0.0)
         if blow > MAX_GIVE:
             size = f"{1e3 * blow:.2g} and {1e3 * rest:.1g} mrad or mm"
             parts.append(f"at its {what} by {size} ({option})")

@@ -155,7 +155,8 @@ class NominalModel:
             data.qpos[places["qpos"]] = x
             if (free := free_joint(model)) >= 0:
                 first = model.jnt_qposadr[free]
-                data.qpos[first : first + 7] = [*x[:3], *rotation.quaternion(*x[3:])]
+                turn = rotation.quaternion(*x[3:])
+                data.qpos[first : first + 7] = [*x[:3], *turn]
             mujoco.mj_fwdPosition(model, data)
             yield model, places, data
 
@@ -168,9 +169,8 @@ class NominalModel:
         arrays = data.qpos, data.qvel, data.ctrl, data.qacc_smooth, places, *seen, *solved
         addresses = _addresses(model, data, arrays)
         sizes = len(places), len(driven(places)), model.nv
-        return Native(
-            native().address, tuple(map(float, (*sizes, *addresses))), (model, borrowed, *arrays)
-        )
+        numbers = tuple(map(float, (*sizes, *addresses)))
+        return Native(native().address, numbers, (model, borrowed, *arrays))
 
     def _borrow(self, parameters: Numbers) -> "tuple[mujoco.MjModel, np.ndarray, BorrowedData]":
         """Return the model, its channels' indices, and an mjData for one simulation."""
@@ -195,7 +195,8 @@ class NominalModel:
                 forces[name] = (data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator)[
                     places["qvel"]
                 ]
-        return Dynamics(dense[np.ix_(places["qvel"], places["qvel"])], forces["h"], forces["g"])
+        of_joints = np.ix_(places["qvel"], places["qvel"])
+        return Dynamics(dense[of_joints], forces["h"], forces["g"])
 
     def coriolis(self, x: Array, v: Array, w: Array, p: Any) -> Array:
         """Return C(x, v) w, (n,), with the C of Christoffel's symbols."""
@@ -299,7 +300,8 @@ def _mujoco(name: str, more: int = 0) -> Callable:
     Compiled code has its name, not its address, so that another process can load the code from the
     disk.
     """
-    binding.add_symbol(name, ctypes.cast(libmujoco.library()[name], ctypes.c_void_p).value)
+    address = ctypes.cast(libmujoco.library()[name], ctypes.c_void_p).value
+    binding.add_symbol(name, address)
     return types.ExternalFunction(name, types.void(*[types.int64] * (2 + more)))
 
 

@@ -70,7 +70,8 @@ def at_start(
     if keyframe is not None:
         mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)
     data.qvel[:] = 0.0
-    for joint, x in starts(model, joints_of(channels), channels, keyframe)[0].items():
+    known = starts(model, joints_of(channels), channels, keyframe)[0]
+    for joint, x in known.items():
         if model.joint(joint).type[0] != FREE:
             data.qpos[model.joint(joint).qposadr[0]] = x
     mujoco.mj_forward(model, data)
@@ -126,7 +127,8 @@ def _hold(
         load = data.qfrc_bias[dof] - data.qfrc_passive[dof]
         made = add_motor(spec, f"hold:{name}", name)
         made.biastype = AFFINE
-        made.biasprm[:3] = kp * data.qpos[joint.qposadr[0]] + load, -kp, -kd
+        hold = kp * data.qpos[joint.qposadr[0]] + load
+        made.biasprm[:3] = hold, -kp, -kd
 
 
 def _lock(

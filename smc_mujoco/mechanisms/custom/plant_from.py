@@ -303,9 +303,11 @@ def _with_drives(
 def _check_names(label: str, model: mujoco.MjModel, keyframe: str | None, tip: str | None) -> None:
     """Raise ScenarioError for a keyframe or a site that the model does not have."""
     if keyframe is not None:
-        mjcf.pick(label, "keyframe", keyframe, [model.key(i).name for i in range(model.nkey)])
+        keyframes = [model.key(i).name for i in range(model.nkey)]
+        mjcf.pick(label, "keyframe", keyframe, keyframes)
     if tip is not None:
-        mjcf.pick(label, "site", tip, [model.site(i).name for i in range(model.nsite)])
+        sites = [model.site(i).name for i in range(model.nsite)]
+        mjcf.pick(label, "site", tip, sites)
 
 
 def _name(label: str) -> str:
@@ -343,7 +345,8 @@ def _places(
 
 def _goals(model: mujoco.MjModel, joints: list[str], keyframe: str | None) -> dict[str, float]:
     """Return hinges and slides with where they end by default, rad or m."""
-    return dict(zip(joints, own.goals(model, joints, keyframe)[0], strict=True))
+    at_goal = own.goals(model, joints, keyframe)[0]
+    return dict(zip(joints, at_goal, strict=True))
 
 
 def without_model(x, v, i, p):
@@ -387,7 +390,8 @@ def missing(model: mujoco.MjModel, joints: list[str], motors: Sequence[Motor]) -
     if np.any(model.actuator_dyntype[idle] == DCMOTOR):
         return f"a dcmotor has a current that is not measured: {WITHOUT_MODEL}"
     # what may couple trees
-    if model.ntendon or not np.all(np.isin(model.actuator_trntype[idle], own.ONE_JOINT)):
+    alone = np.all(np.isin(model.actuator_trntype[idle], own.ONE_JOINT))
+    if model.ntendon or not alone:
         near = range(model.nv)
     else:
         near = np.flatnonzero(np.isin(model.dof_treeid, model.dof_treeid[channel_dofs]))

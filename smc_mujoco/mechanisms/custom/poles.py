@@ -126,9 +126,11 @@ def constraint_rate(plant: Plant) -> float:
     first, second = np.concatenate(solrefs).T
     # a time constant and a damping ratio, or a stiffness and a damping, both negative
     given = first > 0.0
-    stiffness = np.where(given, 1.0 / np.maximum(np.abs(first * second), 1e-12), 0.0)
+    softness = np.maximum(np.abs(first * second), 1e-12)
+    stiffness = np.where(given, 1.0 / softness, 0.0)
     stiffness += np.sqrt(-np.minimum(first, 0.0))
-    decay = np.where(given, 2.0 / np.maximum(np.abs(first), 1e-12), -second)
+    times = np.maximum(np.abs(first), 1e-12)
+    decay = np.where(given, 2.0 / times, -second)
     return float(np.max(np.maximum(stiffness, decay), initial=0.0))
 
 

@@ -122,7 +122,8 @@ def _held(
     inertia = M[dofs, dofs]
     # the PD's gains suit M[i, i]; where the base gives way the joint is lighter, and its modes are
     # faster
-    fastest = STIFF * np.linalg.eigvals(np.linalg.inv(M)[np.ix_(dofs, dofs)] * inertia).real.max()
+    mobility_of_dofs = np.linalg.inv(M)[np.ix_(dofs, dofs)]
+    fastest = STIFF * np.linalg.eigvals(mobility_of_dofs * inertia).real.max()
     model.opt.timestep = min(model.opt.timestep, 0.1 / STIFF, 0.5 / fastest)
     goal = data.qpos[places].copy()
     mujoco.mj_forward(model, data)
@@ -185,7 +186,8 @@ def tips_over(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
     directions = []
     for one in (first, data):
         mujoco.mj_kinematics(model, one)
-        directions.append(model.opt.gravity @ one.xmat[base].reshape(3, 3))
+        pose = one.xmat[base].reshape(3, 3)
+        directions.append(model.opt.gravity @ pose)
     return bool(directions[0] @ directions[1] < TIPPED * model.opt.gravity @ model.opt.gravity)
 
 
@@ -200,7 +202,9 @@ def beside_goal(plant: Plant) -> Floats:
     x0 = plant.origin
     limits = plant.ranges or (("", -math.inf, math.inf),) * plant.driven
     for i, (_, low, high) in enumerate(limits[: plant.driven]):
-        x0 = _clear_start(plant, x0, i, x0[i] - low, high - x0[i])
+        down = x0[i] - low
+        up = high - x0[i]
+        x0 = _clear_start(plant, x0, i, down, up)
     return x0
 
 
@@ -220,7 +224,8 @@ def _clear_start(plant: Plant, x0: Floats, i: int, down: float, up: float) -> Fl
     sides = [min(BESIDE, ROOM * up), -min(BESIDE, ROOM * down)]
     if down > up:
         sides.reverse()
-    ways = np.outer(sides, 0.5 ** np.arange(HALVINGS)).ravel().tolist()
+    halvings = 0.5 ** np.arange(HALVINGS)
+    ways = np.outer(sides, halvings).ravel().tolist()
     ways.sort(key=abs, reverse=True)
     at_goal = overlap(plant, plant.origin).depth
     places: list[Floats] = []
@@ -243,10 +248,12 @@ def needs(plant: Plant) -> Floats:
     with two digits: 2 load + (60/s^2 M + 8/s D) X + 1.5 dry friction.
     """
     at = at_goal(plant)
-    way = np.abs(np.subtract(usual_start(plant), plant.origin))[: plant.driven]
+    apart = np.subtract(usual_start(plant), plant.origin)
+    way = np.abs(apart)[: plant.driven]
     way = np.where(way > MAX_EXCESS, way, BESIDE)
     damping = np.maximum(np.diag(at.D)[at.dofs], 0.0)
-    moving = (STIFFNESS * np.diag(at.M)[at.dofs] + DAMPING * damping) * way
+    inertia = np.diag(at.M)[at.dofs]
+    moving = (STIFFNESS * inertia + DAMPING * damping) * way
     need = 2.0 * np.abs(at.load) + moving + 1.5 * at.dry
     return tuple(float(f"{value:.2g}") for value in need)
 

@@ -137,4 +137,5 @@ class UserFields:
         yield Field("body_mass", slice(None), model.body_mass * scale)
         yield Field("body_inertia", slice(None), model.body_inertia * scale[:, None])
         if self.gravity:
-            yield Field("opt.gravity", slice(None), model.opt.gravity * (p.grav / self.gravity))
+            factor = p.grav / self.gravity
+            yield Field("opt.gravity", slice(None), model.opt.gravity * factor)

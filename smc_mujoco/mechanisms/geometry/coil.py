@@ -19,7 +19,8 @@ def draw(spec, name, start, end, *, radius, turns, wire, material):
     up = np.array([0.0, 0.0, 1.0])
     s = np.linspace(0.0, 1.0, turns * STEPS_PER_TURN + 1)
     turn = 2 * np.pi * turns * s[:, None]
-    outward = np.cos(turn) * up + np.sin(turn) * np.cross(axis, up)
+    sideways = np.cross(axis, up)
+    outward = np.cos(turn) * up + np.sin(turn) * sideways
     around = 2 * np.pi * np.arange(SIDES)[:, None] / SIDES
     centre = first + s[:, None] * (last - first) + radius * outward
     vertices = centre[:, None] + wire * (np.cos(around) * outward[:, None] + np.sin(around) * axis)

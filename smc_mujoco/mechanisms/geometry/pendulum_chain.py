@@ -47,10 +47,12 @@ def compose(single, n, x0):
     pendulum.pos = (0.0, 0.0, 0.0)
     material = strip(source, pendulum)
     for i in range(n):
-        copy = machine.add_frame(pos=(0.0, i * PITCH, HEIGHT)).attach_body(pendulum, f"p{i}/", "")
+        frame = machine.add_frame(pos=(0.0, i * PITCH, HEIGHT))
+        copy = frame.attach_body(pendulum, f"p{i}/", "")
         for geom in copy.geoms:
             geom.material = material[geom.name.removeprefix(f"p{i}/")]
-    spec.add_key(name="home", qpos=[x0[i % len(x0)] for i in range(n)])
+    start = [x0[i % len(x0)] for i in range(n)]
+    spec.add_key(name="home", qpos=start)
     for i in range(n - 1):
         spring = spec.add_tendon(name=f"coupling{i}", stiffness=COUPLING, springlength=(0.0, 0.0))
         spring.wrap_joint(f"p{i}/hinge", -1.0)
@@ -187,7 +189,8 @@ def bobs(spec):
     side = above(spec.geom("p0/bob").pos)
     width = (n - 1) * ROW_PITCH
     for i in range(n):
-        spec.body(f"p{i}/pendulum").frame.pos = (i * ROW_PITCH - width / 2, 0.0, HEIGHT)
+        place = (i * ROW_PITCH - width / 2, 0.0, HEIGHT)
+        spec.body(f"p{i}/pendulum").frame.pos = place
     for geom in list(spec.body("machine").geoms):
         if not geom.name.startswith("p"):
             spec.delete(geom)
@@ -225,7 +228,8 @@ def springs(spec):
 def spring_fields(model, p):
     """Yield the fields that p sets if real springs join the pendulums."""
     couplings = _couplings(model)
-    pitch = model.body("p1/pendulum").pos[0] - model.body("p0/pendulum").pos[0]
+    first = model.body("p0/pendulum").pos[0]
+    pitch = model.body("p1/pendulum").pos[0] - first
     yield from pendulum_fields(model, p)
     yield Field("tendon_stiffness", couplings, p.kc / HOOK_ARM**2)
     yield Field("tendon_lengthspring", couplings, pitch)
