@@ -53,6 +53,7 @@ ROUND_WRAPS = mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER
 # ends of the names of a free body's sensors
 POSE_SENSORS = {"x_sensor": (":x", ":q"), "v_sensor": (":v", ":w")}
 MAX_RECENT = 16  # mechanisms that are kept for later runs, as those of a search for gains; chosen
+MAX_RECENT_BYTES = 512_000_000  # of their models together; chosen
 # m, at a start; chosen: bodies in contact overlap by less, so a deeper start begins with a blow
 MAX_OVERLAP = 1e-3
 OBSTACLE = "the obstacle"
@@ -121,9 +122,11 @@ def mechanism(scenario: Scenario) -> Mechanism:
     if (shared := _mechanisms.get(key)) is None:
         base = compile_model(scenario, USERDATA, scenery=False)
         shared = _mechanisms[key] = Mechanism(base, channels(base))
-        # a user's file is read again, because it may have changed
-        if not scenario.plant.is_user_model:
-            _recent.append(shared)
+        _recent.append(shared)
+        while sum(mujoco.mj_sizeModel(one.model) for one in _recent) > MAX_RECENT_BYTES:
+            _recent.popleft()
+    elif scenario.plant.is_user_model:
+        scenario.plant.build.source.check_unchanged()
     return shared
 
 

@@ -7,11 +7,14 @@ from collections.abc import Mapping, Sequence
 from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.step_halving import UNTRIED
 from smc_mujoco.analysis.tuning.result import Tuned
+from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import capital, counted, joined, number
 from smc_mujoco.control.component import Component, gains_text
 from smc_mujoco.robustness.margins import Margin
+from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.board import MAX_LEAD, MEDIANS, Boards, Lead
 from smc_mujoco.studies.race import FIRST, LOOKS, Race, needed
 from smc_mujoco.studies.table import Table
@@ -108,10 +111,17 @@ class RaceAdvice(Advice):
     settled: Mapping[str, Mapping[str, tuple[int, int]]]
     weighs: Mapping[str, float]  # condition -> its share of J of the first law
     margins: Sequence[Margin]  # of the first law with its gains, without other conditions
+    untried: Sequence[str]  # kinds of margins for which there was no time
+    seeds: int  # from which each law was to run in each condition, if the time allowed it
     worst_run: Scenario  # of the first law in the condition where it fares worst
     tuned: Tuned | None  # the searches for the gains of the first law; None if they were known
     left_out: Mapping[str, str]  # law -> why it could not be tuned
     judged: str  # what J is of, in words
+
+    @cached_property
+    def worst_trace(self) -> Trace:
+        """The trace of `worst_run`, computed when first used."""
+        return run(self.worst_run)
 
     @property
     def answer(self) -> list[str]:
@@ -146,11 +156,14 @@ class RaceAdvice(Advice):
         race, comparison = self.race, self.race.comparison
         assert comparison is not None
         if race.sets < LOOKS[0] and not race.winner:
-            more = (LOOKS[0] - race.sets) * race.seconds / 60.0
+            more = math.ceil((LOOKS[0] - race.sets) * race.seconds / 60.0)
+            short = ""
+            if race.sets < FIRST:
+                short = f", as the time cannot hold even {FIRST}"
             return (
                 f"open; {counted(race.sets, 'set')} of gains of each law were searched in the "
-                f"time, {LOOKS[0]} can name a winner, and the same call goes on with them; it "
-                f"takes about {math.ceil(more)} more minutes"
+                f"time{short}, {LOOKS[0]} can name a winner, and the same call goes on with them; "
+                f"it takes about {counted(more, 'more minute')}"
             )
         text = _verdict(comparison, race.running)
         ranked = _ranked(comparison, race.running)
@@ -214,8 +227,11 @@ class RaceAdvice(Advice):
 
     @property
     def _margins(self) -> str:
+        late = ""
+        if self.untried:
+            late = f"{joined(self.untried)} not tried, as the time was over"
         if not self.margins:
-            return "not tried, as runs start at the goal"
+            return late or "not tried, as runs start at the goal"
         parts = []
         for margin in self.margins:
             unit = "times" if margin.unit == "1" else margin.unit
@@ -223,7 +239,8 @@ class RaceAdvice(Advice):
             if math.isnan(margin.value):
                 return "nothing more: without changes it does not end within 5 % of its start"
             parts.append(f"{margin.kind} {level}")
-        return f"{joined(parts)}, one at a time, within 5 % of the start at the end"
+        text = f"{joined(parts)}, one at a time, within 5 % of the start at the end"
+        return f"{text}; {late}" if late else text
 
     @property
     def tables(self) -> list[Tabular]:
@@ -233,6 +250,18 @@ class RaceAdvice(Advice):
             rows = [list(map(_unmarked, row)) for row in table.rows]
             shown.append(dataclasses.replace(table, rows=rows, notes=()))
         notes = self.leaderboard.remarks
+        runs = next(iter(self.settled[self.law.name].values()))[1]
+        if runs < self.seeds:
+            notes.append(
+                f"{runs} runs of a law in each condition, as the time left was too short for "
+                f"{self.seeds}."
+            )
+        missing = [law for law in self.race.running if law not in self.settled]
+        if missing:
+            notes.append(
+                f"Without {joined(missing)}: these runs are of the laws that may be the best"
+                f"{' and of the next one' if self.race.winner else ''}."
+            )
         notes.append(
             f"{MEDIANS} Nothing here is tested: what is, stands below. {capital(UNTRIED)}."
         )

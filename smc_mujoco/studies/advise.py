@@ -7,16 +7,18 @@ that settle, and the margins are of these gains, too, on runs of their own.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from smc_mujoco.analysis.paired_runs import SETTLES, values
 from smc_mujoco.analysis.ranking import Comparison
+from smc_mujoco.analysis.step_halving import doubled
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective, shares
 from smc_mujoco.analysis.tuning.result import Tuned
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError
+from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component
@@ -25,9 +27,10 @@ from smc_mujoco.robustness.margins import COARSE, Margin, margins_of
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.advice import RELIABLE, RaceAdvice
+from smc_mujoco.studies.answer_time import FEWEST_SEEDS, AnswerTime
 from smc_mujoco.studies.fair_gains import NOT_TUNED, Candidate, Laws, Trial, default_of
 from smc_mujoco.studies.leaderboard import leaderboard
-from smc_mujoco.studies.race import Entrant, Race, compared, race, unseen
+from smc_mujoco.studies.race import Entrant, Race, compared, judgements, race, unseen
 from smc_mujoco.studies.table import Table
 
 SHOWN = 5  # laws in the tables by condition, at most; chosen
@@ -36,6 +39,9 @@ CHOOSING = range(1001, 1003)  # unseen instances that choose one of them
 DECIDING = range(2000, 2008)  # and that compare laws with these; chosen
 KINDS = ("delay", "friction", "mass", "blow")  # of the margins
 KINDS_OF_POSES = ("delay", "disturbance", "mass", "blow")  # of a free body
+TRIED = 15  # runs that a coarse margin takes, on average; chosen
+# judgements of each law after a race: of the sets considered, and of the one chosen
+AFTER = CONSIDERED * len(CHOOSING) + judgements(DECIDING)
 Settled = dict[str, dict[str, tuple[int, int]]]
 
 
@@ -45,22 +51,29 @@ def advise(
     laws: Laws,
     metrics: Sequence[str],
     seeds: int,
-    until: float,
+    clock: AnswerTime,
     relevant: float,
 ) -> RaceAdvice:
-    """Race laws on a plant until a time of `time.monotonic`, s, and advise one of them; `metrics`
-    are those of the tables, from that many seeds.
+    """Race laws on a plant and advise one of them, all as long as the clock lets it; `metrics` are
+    those of the tables, from that many seeds.
     """
     goal = trial.asked_goal(plant)
     entrants, left_out = _entrants(trial, plant, laws)
-    raced = race(trial, plant, entrants, goal, until, relevant)
+    table_work = sum(trial.case(plant, "none", one).work for one in trial.conditions)
+    margins_work = TRIED * len(KINDS) * trial.case(plant, "none", trial.conditions[0]).work
+    clock.unit = _work_of_judgement(plant, goal)
+    count = min(len(entrants), SHOWN)
+    few = min(seeds, FEWEST_SEEDS)
+    clock.after = count * (AFTER * clock.unit + few * table_work) + margins_work
+    raced = race(trial, plant, entrants, goal, clock, relevant)
     shown = raced.first
     if raced.winner:
         shown = raced.running[:1] if len(raced.running) == 1 else [*raced.first, _next(raced)]
     chosen, tuned = _chosen(trial, plant, raced, shown[:SHOWN], goal)
     fixed = _fixed(trial, plant, chosen, goal, relevant)
     candidates = {plant.name: [Candidate(law, (law,)) for law in chosen.values()]}
-    table = trial.run(candidates, seeds, half_steps=False)
+    made = clock.seeds(seeds, len(chosen) * table_work, margins_work)
+    table = trial.run(candidates, made, half_steps=False)
     settled = _settled(table)
     least = {}
     for law in chosen:
@@ -70,6 +83,8 @@ def advise(
     if not boards:
         raise ScenarioError(f"no need has a number in any run on {plant.name}: ask for others")
     first = chosen[order[0]]
+    weighs = shares(plant, first, goal, CHOOSING, trial.threads)
+    margins, untried = _margins(trial, plant, first, clock)
     return RaceAdvice(
         table=table,
         leaderboard=boards,
@@ -78,8 +93,10 @@ def advise(
         race=raced,
         fixed=fixed,
         settled=settled,
-        weighs=shares(plant, first, goal, CHOOSING, trial.threads),
-        margins=_margins(trial, plant, first),
+        weighs=weighs,
+        margins=margins,
+        untried=untried,
+        seeds=seeds,
         worst_run=_worst_run(table, first.name),
         tuned=tuned.get(first.name),
         left_out=left_out,
@@ -133,7 +150,7 @@ def _chosen(
     their searches.
     """
     chosen, tunings = {}, {}
-    for name in names:
+    for name in _counted("choosing gains of law", names, trial):
         one = raced.entrants[name]
         law = one.gains(0)
         if one.count > 1:
@@ -152,6 +169,14 @@ def _chosen(
     return chosen, tunings
 
 
+def _counted(what: str, names: Sequence[str], trial: Trial) -> Iterator[str]:
+    """Yield names, with a bar."""
+    with bar(what, len(names), trial.progress, counted=True) as drawn:
+        for name in names:
+            yield name
+            drawn.advance(1.0)
+
+
 def _fixed(
     trial: Trial,
     plant: Plant,
@@ -166,7 +191,8 @@ def _fixed(
     halves = {}
     one = {}
     fine = {}
-    for name, law in chosen.items():
+    for name in _counted("unseen runs of law", [*chosen], trial):
+        law = chosen[name]
         J[name], halves[name] = unseen(trial, plant, [law] * len(DECIDING), goal, DECIDING)
         one[name] = np.zeros(len(DECIDING))
         fine[name] = J[name] < FAILURE_COST
@@ -198,14 +224,31 @@ def _worst_run(table: Table, law: str) -> Scenario:
     return table.scenario(worst)
 
 
-def _margins(trial: Trial, plant: Plant, law: Component) -> list[Margin]:
+def _margins(
+    trial: Trial, plant: Plant, law: Component, clock: AnswerTime
+) -> tuple[list[Margin], list[str]]:
     """Return what a law tolerates beside no other condition, or beside the first one asked for
-    where that has other commands; none where it starts at its goal.
+    where that has other commands, and the kinds for which there is no time; none of either where
+    it starts at its goal.
     """
     base = trial.case(plant, law, "nominal")
     first = trial.case(plant, law, trial.conditions[0])
     if base.efforts != first.efforts:
         base = first
     if not math.dist(base.resolved.x0, plant.origin):
-        return []
-    return margins_of([base], KINDS_OF_POSES if plant.pose else KINDS, COARSE, trial.threads)
+        return [], []
+    kinds = KINDS_OF_POSES if plant.pose else KINDS
+    count = int(min(len(kinds), clock.work_left / (TRIED * base.work)))
+    if not count:
+        return [], [*kinds]
+    with bar("what the law tolerates", shown=trial.progress) as drawn:
+        found = margins_of([base], kinds[:count], COARSE, trial.threads, drawn.reached)
+    return found, [*kinds[count:]]
+
+
+def _work_of_judgement(plant: Plant, goal: Objective) -> float:
+    """Return the work of the runs that judge one set of gains, at twice their step where they may
+    have it.
+    """
+    cases = goal.holdout(plant, coerce.law("none"), 0)
+    return sum(doubled(case).work for case in cases)

@@ -35,6 +35,7 @@ from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.workers import called, opened
+from smc_mujoco.studies.answer_time import AnswerTime
 from smc_mujoco.studies.fair_gains import Candidate, Trial
 from smc_mujoco.studies.study import REPEATED_SEEDS
 
@@ -100,7 +101,7 @@ class Race(NamedTuple):
     comparison: Comparison | None  # of the others, by J of their sets; None for one law
     sets: int  # of each law that was not dropped
     stopped: bool  # whether the time was over before a winner or the last look
-    seconds: float  # that the last set of each law took together
+    seconds: float  # that a set of each law takes together
 
     @property
     def running(self) -> list[str]:
@@ -129,11 +130,11 @@ def race(
     plant: Plant,
     entrants: Sequence[Entrant],
     goal: Objective,
-    until: float,
+    clock: AnswerTime,
     relevant: float,
 ) -> Race:
-    """Race laws on a plant by J of `goal` until a time of `time.monotonic`, s; inf: until the end.
-    `relevant` is as in `ranking`.
+    """Race laws on a plant by J of `goal`, as long as the clock lets it. `relevant` is as in
+    `ranking`.
 
     The folder of the trial keeps each search. Sets that it has are taken even if the time is over.
     """
@@ -141,13 +142,13 @@ def race(
     everyone = dict(running)
     dropped: dict[str, float] = {}
     comparison = None
-    seconds = 0.0
+    rounds: list[float] = []  # s that a law took in each
     stopped = False
     with bar("set of gains", LOOKS[0] * len(running), trial.progress, counted=True) as shown:
         for k in range(LOOKS[-1]):
             start = time.monotonic()
             pieces = [(one, k, 0) for one in running.values() if one.task]
-            over = k > 0 and start + seconds > until
+            over = k > 0 and start + len(running) * _expected(rounds) > clock.race_ends
             if over and any(_file(trial, *piece).read() is None for piece in pieces):
                 stopped = True
                 break
@@ -155,8 +156,8 @@ def race(
                 one.found.append(made)
                 shown.advance(1.0)
             _again(trial, list(running.values()))
-            _judge(trial, plant, list(running.values()), goal, k + 1)
-            seconds = time.monotonic() - start
+            _judge(trial, plant, list(running.values()), goal, k + 1, clock)
+            rounds.append((time.monotonic() - start) / len(running))
             if k + 1 == FIRST:
                 values = {name: one.values for name, one in running.items()}
                 dropped = hopeless(values)
@@ -170,7 +171,15 @@ def race(
     count = len(next(iter(running.values())).J)
     if count not in LOOKS:
         comparison = judged(running, goal, relevant)
+    seconds = len(running) * _expected(rounds)
     return Race(everyone, dropped, comparison, count, stopped, seconds)
+
+
+def _expected(rounds: Sequence[float]) -> float:
+    """Return how long a further set of a law takes, s: as the longest of those after the first,
+    which compiles, too.
+    """
+    return max(rounds[1:] or rounds)
 
 
 def _expect(shown: Bar, done: int, laws: int) -> None:
@@ -303,7 +312,12 @@ def _again(trial: Trial, running: Sequence[Entrant]) -> None:
 
 
 def _judge(
-    trial: Trial, plant: Plant, running: Sequence[Entrant], goal: Objective, count: int
+    trial: Trial,
+    plant: Plant,
+    running: Sequence[Entrant],
+    goal: Objective,
+    count: int,
+    clock: AnswerTime,
 ) -> None:
     """Compute J of the first sets, on unseen runs, where it is not known."""
     wanted = []
@@ -316,9 +330,18 @@ def _judge(
                 wanted.append((one, k))
                 laws.append(one.gains(k))
                 numbers.append(k)
+    start = time.monotonic()
     values, halves = unseen(trial, plant, laws, goal, numbers)
+    clock.judged(judgements(numbers), time.monotonic() - start)
     for (one, k), value, half in zip(wanted, values.tolist(), halves.tolist(), strict=True):
         one.J[k] = Unseen(value, half)
+
+
+def judgements(numbers: Sequence[int]) -> int:
+    """Return how often as much as one instance `unseen` computes for instances: one in four runs
+    once more, at half the step.
+    """
+    return len(numbers) + 2 * sum(k % REPEATED_SEEDS == 0 for k in numbers)
 
 
 def unseen(

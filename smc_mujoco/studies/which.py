@@ -33,6 +33,7 @@ from smc_mujoco.simulation.grid import Starts, listed, listed_laws
 from smc_mujoco.simulation.workers import Workers
 from smc_mujoco.studies.advice import Advice
 from smc_mujoco.studies.advise import advise
+from smc_mujoco.studies.answer_time import AnswerTime
 from smc_mujoco.studies.compare import DrawSeed
 from smc_mujoco.studies.fair_gains import Laws, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import leaderboard
@@ -44,7 +45,6 @@ DEFAULT_CONDITIONS = ("nominal", "noise", "sine")
 MIN_SETTLED = 0.5  # of the share of runs that settle under the best law; chosen
 SEEDS, RACE_SEEDS = 24, 14  # runs of a law in each condition, of a whole comparison and of a race
 QUICK_MINUTES = 10.0
-RACED = 0.7  # of the minutes: the share in which searches begin; chosen
 
 
 @constrained
@@ -92,11 +92,12 @@ def which(
         that no law of a joint can be judged.
       minutes: how long the whole may take. Then laws race: their gains are searched under the
         conditions asked for and noise, a quarter as long, in turn over the laws until one has the
-        lowest J, at most 12 sets a law. The clock may change how many sets there are, and with
-        them the answer; with the same sets it is the same to the last bit. After a stop, the same
-        call goes on with the sets that the folder has. The `RaceAdvice` that comes back has the
-        `margins` of the first law and its `worst_run`, too. Default: a whole comparison, which no
-        clock stops.
+        lowest J, at most 12 sets a law. The race leaves time for the tables and the margins, which
+        are shorter where there is little. The first set of each law is searched in any case. The
+        clock may change how many sets, runs and margins there are, and with them the answer; with
+        the same ones it is the same to the last bit. After a stop, the same call goes on with the
+        sets that the folder has. The `RaceAdvice` that comes back has the `margins` of the first
+        law and its `worst_run`, too. Default: a whole comparison, which no clock stops.
       starts, relevant, threads, progress, seed, device, executor: as in `compare`.
 
     Returns:
@@ -134,8 +135,8 @@ def which(
     )
     trial.check({machine.name: chosen})
     if minutes:
-        until = began + RACED * 60.0 * minutes
-        return advise(trial, machine, chosen, compared, seeds or RACE_SEEDS, until, relevant)
+        clock = AnswerTime(began + 60.0 * minutes)
+        return advise(trial, machine, chosen, compared, seeds or RACE_SEEDS, clock, relevant)
     count = seeds or SEEDS
     candidates = trial.candidates({machine.name: chosen}, count)
     table = trial.run(candidates, count)

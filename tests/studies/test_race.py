@@ -13,6 +13,7 @@ from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, objectiv
 from smc_mujoco.analysis.tuning.result import SearchResult
 from smc_mujoco.studies import race as module
 from smc_mujoco.studies.advise import in_order
+from smc_mujoco.studies.answer_time import FEWEST_SEEDS, AnswerTime
 from smc_mujoco.studies.fair_gains import Candidate
 
 GOAL = Objective(conditions=("nominal",), duration=1.0)
@@ -58,10 +59,10 @@ def run(monkeypatch):
     monkeypatch.setattr(module, "unseen", unseen)
     trial = types.SimpleNamespace(progress=False, executor=None)
 
-    def raced(leads, seed=0, until=math.inf):
+    def raced(leads, seed=0, clock=None):
         random = np.random.default_rng(seed)
         entrants = [Drawn(name, lead, random) for name, lead in leads.items()]
-        return module.race(trial, None, entrants, GOAL, until, RELEVANT)
+        return module.race(trial, None, entrants, GOAL, clock or AnswerTime(), RELEVANT)
 
     return raced
 
@@ -125,12 +126,36 @@ def test_a_race_goes_on_after_the_first_look_only_if_it_may_be_decided(run):
 def test_the_clock_ends_a_race_between_two_rounds(run, monkeypatch):
     ticks = iter(range(100))
     monkeypatch.setattr(module.time, "monotonic", lambda: float(next(ticks)))
-    raced = run({"a": 0.0, "b": 2.0}, until=9.0)
+    raced = run({"a": 0.0, "b": 2.0}, clock=AnswerTime(19.0))
     assert raced.stopped
     assert 1 < raced.sets < module.LOOKS[0]
     assert {len(one.found) for one in raced.entrants.values()} == {raced.sets}
     assert raced.winner is None
     assert raced.first == raced.running == ["a", "b"]
+
+
+def test_a_race_leaves_the_time_that_the_runs_after_it_take(run, monkeypatch):
+    """By the pace of its own judgements, of which a round has one or three times two sets here."""
+    sets = []
+    for after in (0.0, 60.0, 1e6):
+        ticks = iter(range(100))
+        with monkeypatch.context() as patch:
+            patch.setattr(module.time, "monotonic", lambda ticks=ticks: float(next(ticks)))
+            clock = AnswerTime(31.0, after=after, unit=1.0)
+            sets.append(run({"a": 0.0, "b": 2.0}, clock=clock).sets)
+        assert clock.pace in (0.5, 1 / 6)
+        assert clock.race_ends == 31.0 - clock.pace * after
+    assert sets[0] > sets[1] > sets[2] == 1
+
+
+def test_tables_have_fewer_runs_in_a_short_time_but_some(monkeypatch):
+    monkeypatch.setattr(module.time, "monotonic", lambda: 0.0)
+    clock = AnswerTime(100.0, pace=0.1)
+    assert clock.seeds(14, work=50.0, then=300.0) == 14
+    assert clock.seeds(14, work=70.0, then=300.0) == 10
+    assert clock.seeds(14, work=70.0, then=1000.0) == FEWEST_SEEDS
+    assert clock.seeds(2, work=70.0, then=1000.0) == 2
+    assert AnswerTime(100.0).seeds(14, work=1e9, then=1e9) == 14  # nothing was timed
 
 
 @pytest.mark.slow
@@ -153,7 +178,7 @@ def test_the_same_searches_under_two_names_have_no_winner(run, monkeypatch):
         pairs = zip("ab", randoms, strict=True)
         entrants = [Drawn(name, 0.0, random) for name, random in pairs]
         trial = types.SimpleNamespace(progress=False, executor=None)
-        raced = module.race(trial, None, entrants, GOAL, math.inf, RELEVANT)
+        raced = module.race(trial, None, entrants, GOAL, AnswerTime(), RELEVANT)
         assert raced.winner is None
         assert raced.sets == module.LOOKS[-1]
         assert raced.first == ["a", "b"]

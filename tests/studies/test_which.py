@@ -19,6 +19,7 @@ from smc_mujoco.control.properties import searched
 from smc_mujoco.studies import advice as advice_module
 from smc_mujoco.studies import advise, race
 from smc_mujoco.studies import which as module
+from smc_mujoco.studies.answer_time import FEWEST_SEEDS
 from smc_mujoco.studies.board import Boards
 
 FAST = smc.law("observer_free", lam=6.0, k1=2.0)
@@ -184,8 +185,27 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
 def test_a_race_that_is_asked_for_again_gives_the_same_answer_from_its_folder(raced, monkeypatch):
     asked, advice, plant = raced
     monkeypatch.setattr(search.TuningTask, "search", None)
-    again = smc.which(plant, **asked, minutes=1e-6, duration=1.5)
+    again = smc.which(plant, **asked, quick=True, duration=1.5)
     assert str(again) == str(advice)
+
+
+def test_without_time_there_is_an_answer_of_the_sets_that_there_are_without_margins(
+    raced, monkeypatch
+):
+    asked, advice, plant = raced
+    monkeypatch.setattr(search.TuningTask, "search", None)
+    asked = asked | {"seeds": 9}
+    short = smc.which(plant, **asked, minutes=1e-6, duration=1.5)
+    assert short.law == advice.law
+    assert short.race.sets == advice.race.sets
+    assert not short.margins
+    assert len(short.table) == FEWEST_SEEDS * len(short.laws)
+    text = " ".join(str(short).split())
+    assert "5 runs of a law in each condition, as the time left was too short for 9." in text
+    late = "delay, friction, mass and blow not tried, as the time was over"
+    assert f"Tolerates: {late}" in short.answer
+    some = dataclasses.replace(short, margins=advice.margins[:2], untried=["mass", "blow"])
+    assert some._margins.endswith("; mass and blow not tried, as the time was over")
 
 
 def test_the_clock_may_end_a_race_before_the_first_look(raced, tmp_path):
@@ -195,6 +215,7 @@ def test_the_clock_may_end_a_race_before_the_first_look(raced, tmp_path):
     assert {len(one.values) for one in short.race.entrants.values()} == {1}
     (however,) = (line for line in short.answer if line.startswith("However tuned"))
     assert "open; 1 set of gains of each law" in however
+    assert "as the time cannot hold even 3" in however
     assert "7 can name a winner" in however
 
 
@@ -224,7 +245,7 @@ def test_the_page_has_the_numbers_of_the_code():
         f"{quick_search.BUDGET} evaluations a gain",
         f"after {race.LOOKS[0]} sets the laws are compared",
         f"again after {race.LOOKS[1]}, unless the {race.LOOKS[0]} say that more than {race.WITHIN} ",
-        f"the first {100 * module.RACED:g} % of the minutes",
+        f"from {FEWEST_SEEDS} to {module.RACE_SEEDS} seeds",
         f"each condition from {module.SEEDS} seeds",
     ):
         assert words in page

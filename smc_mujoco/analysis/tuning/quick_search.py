@@ -6,7 +6,7 @@ then; with fewer, J was often several times that of a whole search.
 1. A Latin hypercube of four times the usual size is screened in the first run alone. Its best
    third, at least three sets, is screened in all runs, and the evolution begins at the best.
 2. All evaluations, those of the descent too, have one physics step a control period.
-3. The best three sets are decided as a scenario runs.
+3. The best three sets are decided as a scenario runs, under RK4 at twice its step where that fits.
 """
 
 from typing import NamedTuple
@@ -36,7 +36,7 @@ RULE = (
     "dimension, further above for products of more than two rates, "
     "is screened in the first run alone, and the best of these in all. CMA-ES and "
     "COBYQA go on from there; both may leave the box by a decade. The best three sets are decided "
-    "as a scenario runs"
+    "as a scenario runs, under RK4 at twice its step where that fits"
 )
 
 

@@ -35,8 +35,10 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
+import mujoco
 import numpy as np
 
+from smc_mujoco.analysis import step_halving
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.tuning import quick_search, search_space
 from smc_mujoco.analysis.tuning.evaluator import EQUATION, PYTHON, Evaluator, with_gains
@@ -314,7 +316,7 @@ class TuningTask(NamedTuple):
             self.budget,
             self.outside_theorem,
             list(self.box.items()),
-            self.quick,
+            self.quick and quick_search.RULE,
             draw,
         )
         again = f"-{draw}" if draw else ""
@@ -329,6 +331,8 @@ class TuningTask(NamedTuple):
         which every run fails.
         """
         cases = self.cases(i)
+        if self.quick:
+            cases = list(map(step_halving.doubled, cases))
         by_equation = self._evaluator(cases, by_equation=True)
         random = np.random.default_rng([self.seed, i, draw] if draw else [self.seed, i])
         if self.quick:
@@ -527,7 +531,11 @@ def _only_limits(case: Scenario) -> bool:
     model = with_values(prepare(case).mechanism.model, case)
     plain = not case.friction and not case.contact and case.mechanism == "equation"
     dry = model.neq or model.dof_frictionloss.any() or model.tendon_frictionloss.any()
-    return bool(plain and not dry and all(part.in_callback for part in case.actuator))
+    # a robot may stand on its feet
+    stands = not case.plant.pose and (model.jnt_type == mujoco.mjtJoint.mjJNT_FREE).any()
+    return bool(
+        plain and not dry and not stands and all(part.in_callback for part in case.actuator)
+    )
 
 
 def result_of(task: TuningTask, found: tuple[SearchResult, ...]) -> Tuned:

@@ -1,5 +1,6 @@
 """smc-mujoco compare, which: questions that many runs of many laws answer."""
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,9 +14,12 @@ from smc_mujoco.common.interrupts import delay_signals
 from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
-    from smc_mujoco.studies.advice import Advice
+    from smc_mujoco.studies.advice import Advice, RaceAdvice
     from smc_mujoco.studies.table import Table
 
+FILMED = 0.1  # of the minutes, which are for the figure and the film; chosen
+# pictures a second of the film; the largest is enough to follow a run, the smallest to see it
+MAX_FPS, MIN_FPS = 15.0, 4.0
 
 Seed = Annotated[int, typer.Option(min=0, help="Seed of initial states, noise and phases.")]
 
@@ -47,8 +51,8 @@ Falling = Annotated[
 Minutes = Annotated[
     float | None,
     typer.Option(
-        help="Answer within about so many minutes; --quick is --minutes 10. Laws race under "
-        "the conditions asked for, until one has the lowest J."
+        help="Answer within so many minutes, film included; --quick is --minutes 10. Laws race "
+        "under the conditions asked for, until one has the lowest J."
     ),
 ]
 Film = Annotated[
@@ -91,9 +95,12 @@ def which(
     sensor=Encoder(counts=4096)" --needs accurate
     """
     with delay_signals():
+        from smc_mujoco.studies.which import QUICK_MINUTES
         from smc_mujoco.studies.which import which as advise
 
     terminal = Terminal(json)
+    began = time.monotonic()
+    whole = QUICK_MINUTES if quick and minutes is None else minutes
     advice = advise(
         plant,
         options.conditions(condition) or None,
@@ -112,35 +119,56 @@ def which(
         device=device,
         executor=executor,
         falling=falling,
-        minutes=minutes,
+        minutes=whole and (1.0 - FILMED * film) * whole,
     )
     terminal.print(advice)
-    _save(advice, out, film, terminal)
+    _save(advice, out, terminal)
+    if film and whole:
+        _film(advice, out, began + 60.0 * whole, terminal)
     _finish(advice.table, out, terminal)
 
 
-def _save(advice: "Advice", out: Path, film: bool, terminal: Terminal) -> None:
-    """Write the gains of the first law of a race, and a figure and a film of its worst run."""
+def _save(advice: "Advice", out: Path, terminal: Terminal) -> None:
+    """Write the gains of the first law of a race, and a figure of its worst run."""
     from smc_mujoco.studies.advice import RaceAdvice
 
     if not isinstance(advice, RaceAdvice):
         return
     from smc_mujoco.draw import figure, page
-    from smc_mujoco.simulation.run import run
 
     if advice.tuned:
         file = advice.tuned.save(out / "advised.json")
         terminal.wrote(file)
         terminal.note(f"--law {advice.law.name}  with these gains: --law {file}")
-    trace = run(advice.worst_run)
-    figure.figure([trace], out / "worst_run")
+    figure.figure([advice.worst_trace], out / "worst_run")
     terminal.wrote(*page.files(out / "worst_run"))
-    if not film:
-        return
+
+
+def _film(advice: "RaceAdvice", out: Path, ends: float, terminal: Terminal) -> None:
+    """Film the worst run of the first law of a race until a time of `time.monotonic`, s, with as
+    many pictures a second as can be made by then.
+    """
     from smc_mujoco.draw.film import film as films
 
     try:
-        films.film([trace], out / "worst_run.mp4")
+        begun = time.monotonic()
+        frames = films.Frames([advice.worst_trace], size=films.FULL_SIZE)
+        pictures = iter(frames)
+        next(pictures)
+        first = time.monotonic()
+        next(pictures, None)
+        each = time.monotonic() - first
+        pictures.close()
+        left = ends - time.monotonic() - (first - begun)
+        fps = min(MAX_FPS, films.FPS * left / (each * len(frames)))
+        if fps < MIN_FPS:
+            terminal.note(
+                f"no film: {len(frames) * each * MIN_FPS / films.FPS:.0f} s are too long for the "
+                "time left; the same command with more --minutes makes it",
+                wrap=True,
+            )
+            return
+        films.film([advice.worst_trace], out / "worst_run.mp4", fps=fps)
     except ScenarioError as error:  # the answer stands without it
         terminal.note(f"no film: {error}", wrap=True)
     else:

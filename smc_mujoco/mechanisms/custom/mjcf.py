@@ -83,11 +83,15 @@ class ModelSource:
         The file is parsed once. A change of it is an error.
         """
         spec = _parsed(self)
+        self.check_unchanged()
+        return spec.copy()
+
+    def check_unchanged(self) -> None:
+        """Raise ScenarioError if the file, or one that it names, is another than was read."""
         if self.path and not _unchanged(self):
             raise ScenarioError(
                 f"{self.path}, or a file that it names, has changed: call smc.plant_from again"
             )
-        return spec.copy()
 
     def read(self) -> mujoco.MjSpec:
         """Parse the model; a free joint without a name has its body's."""

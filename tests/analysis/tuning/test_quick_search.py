@@ -55,6 +55,30 @@ def test_its_j_is_that_of_the_runs_of_a_scenario(task):
     assert found.best.objective == min(one.objective for one in found.history)
 
 
+ARM = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/><body pos="0 0 .6">
+<joint name="j" axis="0 1 0" frictionloss=".05"/>
+<geom type="capsule" fromto="0 0 0 .3 0 0" size=".02" mass=".4"/></body></worldbody>
+<actuator><motor joint="j" ctrlrange="-4 4"/></actuator></mujoco>"""
+
+
+def test_the_last_three_have_twice_the_step_of_a_scenario_under_rk4(monkeypatch):
+    arm = smc.plant_from(ARM, ["j"], name="arm")
+    task = search.task_of(arm, smc.law("pid"), GOAL, 16, 0, 1)._replace(quick=True)
+    steps = []
+    evaluate = Evaluator.__call__
+
+    def seen(self, candidates):
+        steps.append([case.resolved.physics_step for case in self.cases])
+        return evaluate(self, candidates)
+
+    monkeypatch.setattr(Evaluator, "__call__", seen)
+    task.search(0, "", lambda count: None)
+    usual = [case.resolved.physics_step for case in task.cases(0)]
+    assert max(usual) < GOAL.control_period
+    assert steps[-1] == [2.0 * step for step in usual]
+    assert {step for cases in steps[:-1] for step in cases} == {GOAL.control_period}
+
+
 def test_another_draw_is_another_search_on_the_same_runs(task, tmp_path):
     first, again = (task.search(1, "", lambda count: None, draw) for draw in (0, 1))
     assert first == task.search(1, "", lambda count: None)

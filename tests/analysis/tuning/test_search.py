@@ -181,6 +181,18 @@ def test_what_needs_a_shorter_step_keeps_its_own():
     assert plain.resolved.integrator == "Euler"
 
 
+STANDING = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/><body pos="0 0 .1">{base}
+<geom type="box" size=".1 .1 .1" mass="2"/><body pos="0 0 .2"><joint name="j" axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 0 0 .2" size=".02" mass=".1"/></body></body></worldbody>
+<actuator><motor joint="j" ctrlrange="-1 1"/></actuator></mujoco>"""
+
+
+def test_coarse_runs_keep_the_floor_on_which_a_base_stands():
+    for base, only in (("", True), ("<freejoint/>", False)):
+        plant = smc.plant_from(STANDING.format(base=base), ["j"], name="standing")
+        assert search._only_limits(smc.Scenario(plant=plant, law="pid")) is only
+
+
 @pytest.mark.filterwarnings("ignore:no set of gains")
 @pytest.mark.parametrize("budget", [1, 4, 32])
 def test_a_search_stops_at_its_budget_and_no_set_of_gains_is_paid_for_twice(budget):

@@ -27,6 +27,7 @@ from smc_mujoco.mechanisms.custom.user_model import UserModel
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import run_key, scenario_json
+from smc_mujoco.simulation.model import mechanism
 
 TORQUE = smc.law("computed_torque", kp=100.0, kd=20.0)
 ARRAYS = ("x", "v", "u", "applied", "s", "d", "force", "reaction")
@@ -487,6 +488,7 @@ def test_includes_and_their_contents_count(tmp_path):
         duration=0.01,
     )
     assert smc.run(scenario).failure is None
+    assert mechanism(scenario) is mechanism(scenario)  # compiled once
     (tmp_path / "parts" / "motors.xml").write_text(f"<mujoco>{ACTUATED}<!-- other --></mujoco>")
     with pytest.raises(smc.ScenarioError, match=r"has changed: call smc.plant_from again"):
         smc.run(scenario)

@@ -1,0 +1,56 @@
+"""The time of an answer: when it must be there, and how long the runs after a race will take.
+
+The runs by which a race judges sets of gains are timed, per unit of `Scenario.work`. What follows
+them, the choice of gains, the tables and the margins, is a known number of runs, so its time is
+known before it begins. A race leaves that much. Where less is left, tables have fewer runs, and
+margins fewer kinds. A time is that of `time.monotonic`, s.
+"""
+
+import dataclasses
+import math
+import time
+
+FEWEST_SEEDS = 5  # of the tables, however short the time is; chosen
+
+
+@dataclasses.dataclass
+class AnswerTime:
+    """When an answer must be there, and how fast runs are.
+
+    ends: a time, inf for no limit.
+    after: the work of the runs that must follow a race, at the least.
+    unit: the work of a judgement of one set of gains.
+    pace: how long a unit of work takes, s, as the last runs of a race took; 0 before them.
+    """
+
+    ends: float = math.inf
+    after: float = 0.0
+    unit: float = 0.0
+    pace: float = 0.0
+
+    def judged(self, sets: float, seconds: float) -> None:
+        """Take note of how long the judgement of that many sets of gains took."""
+        if sets and self.unit:
+            self.pace = seconds / (sets * self.unit)
+
+    @property
+    def race_ends(self) -> float:
+        """When a race must end."""
+        return self.ends - self.pace * self.after
+
+    @property
+    def left(self) -> float:
+        """The time that is left, s."""
+        return self.ends - time.monotonic()
+
+    @property
+    def work_left(self) -> float:
+        """The work that fits in the time that is left; inf before any was timed."""
+        return max(0.0, self.left) / self.pace if self.pace else math.inf
+
+    def seeds(self, wanted: int, work: float, then: float) -> int:
+        """Return from how many seeds the tables are made, of those `wanted`, given the work of one,
+        if the work `then` is to follow.
+        """
+        fit = (self.work_left - then) / work
+        return wanted if fit >= wanted else min(wanted, max(FEWEST_SEEDS, int(fit)))
