@@ -1,0 +1,484 @@
+"""The sentences and tables of docs/where_sliding_mode_loses.md, by the points of
+benchmarks/fronts.py.
+
+    python -m benchmarks.fronts_sentences benchmarks/fronts.json
+    python -m benchmarks.fronts_sentences benchmarks/fronts.json --figure fronts.svg
+
+A lead is the ratio of two errors, medians of many runs, with the interval of that ratio. A sentence
+stands at a price if the whole interval is above 1 and the lead is beyond a factor of 1.5. It is
+contradicted if both say the reverse, and else open. Errors below a ten-thousandth of the start are
+not ranked. If both are below it, nothing is said; if one is, that is said, without a ratio.
+
+Where several searches were run, a lead is told only if each of them found it, and then the smallest
+is told, with an interval that holds those of all. A sentence is struck out if any search
+contradicts it anywhere.
+"""
+
+import argparse
+import json
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from smc_mujoco.analysis.tuning import search_space
+
+SECOND_ORDER = ("hodob",)
+OBSERVERS = ("adrc", "pd_observer", *SECOND_ORDER)
+RIVALS = (*OBSERVERS, "pid")
+SMOOTH = ("boundary_layer",)
+TWISTING = ("super_twisting", "implicit_super_twisting")
+LAWS = (*TWISTING, "classical", *SMOOTH, *RIVALS)
+FLOOR = 1e-4  # of the start: smaller errors are not ranked
+# prices: times the least J of all laws, or the rate of variation in calm over u_max, 1/s
+LEVELS = {
+    "J": (1.25, 1.5, 2.0, 3.0, 5.0),
+    "rate": (30.0, 100.0, 300.0),
+}
+
+
+class Sentence(NamedTuple):
+    """One of the page: at one price, the best of the first laws has less error than the best of the
+    second; if the price is "least", the cheapest set is cheaper.
+    """
+
+    name: str
+    first: tuple[str, ...]
+    second: tuple[str, ...]
+    conditions: tuple[str, ...]
+    price: str = "J"
+    low: float = 0.0  # level
+    high: float = math.inf
+    model: str = "none"
+    within: bool | None = None  # only where super-twisting's theorem admits the load, or does not
+
+
+QUIET = ("middle", "strong", "fast")
+NOISY = tuple(f"{kind}, noise" for kind in QUIET)
+CHEAP = ("calm",)  # of the cheapest set, whatever the load
+SWITCHING = (*TWISTING, "classical")
+SENTENCES = (
+    Sentence("twisting, quiet", TWISTING, RIVALS, QUIET, within=True),
+    Sentence("twisting, noise", TWISTING, RIVALS, NOISY, within=True),
+    Sentence("second order, noise", SECOND_ORDER, TWISTING, NOISY),
+    Sentence("second order, observers", SECOND_ORDER, ("adrc", "pd_observer"), QUIET),
+    Sentence("smooth, quiet", RIVALS, SMOOTH, QUIET),
+    Sentence("smooth, noise", RIVALS, SMOOTH, NOISY),
+    Sentence("smooth, by rate", RIVALS, SMOOTH, (*QUIET, *NOISY), "rate"),
+    Sentence("sign", SMOOTH, ("classical",), (*QUIET, *NOISY)),
+    Sentence("cheap", OBSERVERS, SWITCHING, CHEAP, "least"),
+)
+ERROR = 0.025 / len(SENTENCES)  # beyond each end of an interval
+# factor beyond which a lead counts, of errors and of the least J, see `between`
+SEARCH = {"J": 1.5, "rate": 1.5, "least": 1.1}
+ROWS = ((1e-3, "middle"), (1e-3, "middle, noise"), (5e-3, "middle"), (5e-3, "middle, noise"))
+
+
+def of_figure(point: dict) -> bool:
+    """Return whether the figure has a point."""
+    shown = (point["period"], point["condition"]) in ROWS
+    return shown and point["price"] == "J" and point["draw"] is None
+
+
+def with_interval(values: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
+    """Return the median of values, NaN for a failed run, and its interval: two of the values, one
+    of which the true median is beyond with a probability of ERROR at most. A failed run is beyond
+    all others.
+    """
+    from scipy.stats import binom
+
+    ordered = np.sort(np.nan_to_num(np.asarray(values, float), nan=math.inf))
+    beyond = int(binom.ppf(ERROR / 2, ordered.size, 0.5))  # values on either side of the interval
+    ends = ordered[max(beyond - 1, 0)], ordered[-max(beyond, 1)]
+    middle = ordered[(ordered.size - 1) // 2], ordered[ordered.size // 2]
+    return float(sum(middle) / 2.0), float(ends[0]), float(ends[1])
+
+
+VERDICTS = {
+    "stands": "by a ratio",
+    "below the floor": "the first is below the floor, the second is not",
+    "unopposed": "the second laws have no gains at this price",
+    "open": "",
+    "not ranked": "the floor decides",
+    "contradicted": "",
+}
+
+
+SAYS = {"stands": 1, "below the floor": 1, "unopposed": 1, "contradicted": -1}  # others say 0
+
+
+class Verdict(NamedTuple):
+    """What the points of a search say of a sentence at one price."""
+
+    sentence: str
+    search: int
+    draw: int | None
+    plant: str
+    period: float  # s
+    condition: str
+    level: float
+    laws: tuple[str, str]  # the best of both sides, or "none" at this price
+    errors: tuple[float, float]  # medians, of the start; J of the cheapest
+    lead: float  # ratio of the second's to the first's; NaN if the floor decides
+    low: float
+    high: float
+    verdict: str  # one of VERDICTS
+
+    @property
+    def place(self) -> tuple:
+        """Sentence, draw, plant, period, condition and level: all but what was found."""
+        return self.sentence, self.draw, self.plant, self.period, self.condition, self.level
+
+
+def best(points: Iterable[dict], laws: Sequence[str]) -> dict | None:
+    """Return the point of some laws whose error, or J if it is the cheapest, was the least where it
+    was chosen.
+    """
+    its = [point for point in points if point["law"] in laws]
+    return min(its, key=lambda point: point["chose"], default=None)
+
+
+def value(point: dict | None) -> Sequence[float]:
+    """Return what a point is judged by, with its interval: J of the cheapest, else the error."""
+    if point is None:
+        return math.nan, math.nan, math.nan
+    return point["J"] if point["price"] == "least" else point["error"]
+
+
+def verdict(sentence: Sentence, first: dict | None, second: dict | None) -> tuple:
+    """Return the lead of the first point over the second with its interval, and what it says."""
+    none = math.nan, math.nan, math.nan
+    if first is None or second is None:
+        return *none, "unopposed" if first else "contradicted"
+    ours, theirs = np.array(value(first)), np.array(value(second))
+    beyond = SEARCH[sentence.price]
+    if second["price"] != "least":
+        below = ours[0] <= FLOOR, theirs[0] <= FLOOR
+        if any(below):
+            other = theirs if below[0] else ours
+            if all(below) or other[1] <= beyond * FLOOR:
+                return *none, "not ranked"
+            return *none, "below the floor" if below[0] else "contradicted"
+    with np.errstate(invalid="ignore"):
+        lead, low, high = (theirs / ours[[0, 2, 1]]).tolist()
+    said = "open"
+    if low > 1.0 and lead > beyond:
+        said = "stands"
+    elif high < 1.0 and lead < 1.0 / beyond:
+        said = "contradicted"
+    return lead, low, high, said
+
+
+def two_sides(
+    points: Sequence[dict], sentences: Sequence[Sentence] = SENTENCES
+) -> Iterator[tuple[Sentence, dict | None, dict | None]]:
+    """Yield the best points of both sides at every level that a sentence is about, None where a
+    side has none.
+    """
+    levels: dict[tuple, list[dict]] = {}
+    for point in points:
+        names = "search", "draw", "plant", "period", "model", "condition", "price", "level"
+        levels.setdefault(tuple(point[name] for name in names), []).append(point)
+    known = {point["law"] for point in points}
+    for sentence in sentences:
+        if known.isdisjoint(sentence.first) or known.isdisjoint(sentence.second):
+            continue
+        for (*_, model, condition, price, level), its in levels.items():
+            about = condition in sentence.conditions and price == sentence.price
+            if not (about and model == sentence.model and sentence.low <= level <= sentence.high):
+                continue
+            first, second = best(its, sentence.first), best(its, sentence.second)
+            twisting = best(its, TWISTING)
+            admitted = twisting["within"] if twisting else None
+            if (first or second) and sentence.within in (None, admitted):
+                yield sentence, first, second
+
+
+def judged(points: Sequence[dict], sentences: Sequence[Sentence] = SENTENCES) -> Iterator[Verdict]:
+    """Yield a verdict of each search for every level that a sentence is about."""
+    for sentence, first, second in two_sides(points, sentences):
+        laws = first["law"] if first else "none", second["law"] if second else "none"
+        its = first or second or {}
+        yield Verdict(
+            sentence.name,
+            its["search"],
+            its["draw"],
+            its["plant"],
+            its["period"],
+            its["condition"],
+            its["level"],
+            laws,
+            (float(value(first)[0]), float(value(second)[0])),
+            *verdict(sentence, first, second),
+        )
+
+
+def cells(
+    points: Sequence[dict], sentences: Sequence[Sentence] = SENTENCES
+) -> Iterator[tuple[Verdict, ...]]:
+    """Yield the verdicts of all searches at each level that one of them has. A search that has no
+    gains there, or none that the theorem admits, is open, without laws.
+    """
+    found: dict[tuple, list[Verdict]] = {}
+    searches: dict[int | None, set[int]] = {}
+    for one in judged(points, sentences):
+        found.setdefault(one.place, []).append(one)
+        searches.setdefault(one.draw, set()).add(one.search)
+    none = {"laws": ("none", "none"), "lead": math.nan, "verdict": "open"}
+    for its in found.values():
+        missing = len(searches[its[0].draw]) - len(its)
+        yield (*its, *[its[0]._replace(**none)] * missing)
+
+
+def compared(points: Sequence[dict], sentence: Sentence) -> Iterator[Verdict]:
+    """Yield what all searches say where all have laws on both sides."""
+    for found in cells(points, [sentence]):
+        if not any("none" in one.laws for one in found):
+            yield weakest(found)
+
+
+def weakest(cell: Sequence[Verdict]) -> Verdict:
+    """Return what all searches say: the smallest lead, with an interval that holds those of all. It
+    is open if they do not agree.
+    """
+    ratios = [one for one in cell if not math.isnan(one.lead)]
+    nearest = min(ratios or cell, key=lambda one: abs(np.log(one.lead)))
+    said = nearest.verdict
+    if len({SAYS.get(one.verdict, 0) for one in cell}) > 1 or said == "open":
+        unranked = any(one.verdict == "not ranked" for one in cell)
+        said = "not ranked" if unranked else "open"
+    low = min(one.low for one in ratios or cell)
+    high = max(one.high for one in ratios or cell)
+    return nearest._replace(low=low, high=high, verdict=said)
+
+
+def at_edges(points: Sequence[dict]) -> Iterator[str]:
+    """Yield a sentence for each gain of a law that is at the edge of its box on a plant, of the
+    first such point, with how many there are.
+    """
+    members: dict[tuple[str, str], list[dict]] = {}
+    for point in points:
+        members.setdefault((point["plant"], point["law"]), []).append(point)
+    for (plant, law), its in members.items():
+        for edge in dict.fromkeys(edge for point in its for edge in point["edges"].items()):
+            there = [point for point in its if edge in point["edges"].items()]
+            (words,) = search_space.edges_in_words(there[0]["gains"], dict([edge]))
+            yield f"{law} on {plant}: {words} ({len(there)} of {len(its)} points)"
+
+
+def summary(points: Sequence[dict]) -> Iterator[str]:
+    """Yield how far MuJoCo is from the fast engine, which gains are at the edge of their box, and
+    the verdicts.
+    """
+    apart = np.abs([point["apart"] for point in points if "apart" in point])
+    if len(apart):
+        share = 100.0 * (apart.max(axis=1) < 0.05).mean()
+        most = ", ".join(f"{one:.2g}" for one in apart.max(axis=0))
+        yield (
+            f"MuJoCo: {len(apart)} points, J and error within 5 % in {share:.0f} %, farthest {most}"
+        )
+    yield from at_edges(points)
+    for one in judged(points):
+        ours, theirs = one.errors
+        yield (
+            f"{one.sentence}: search {one.search}, {one.plant}, {1e3 * one.period:g} ms, "
+            f"{one.condition}, {one.level:.3g}: {' over '.join(one.laws)} {ours:.2g}, "
+            f"{theirs:.2g}, {one.lead:.3g} ({one.low:.3g} to {one.high:.3g}), {one.verdict}"
+        )
+
+
+SHOWN = (
+    Sentence("of super-twisting, without noise", TWISTING, RIVALS, QUIET),
+    Sentence("of super-twisting, with sensor noise", TWISTING, RIVALS, NOISY),
+    Sentence("of smooth sliding, without noise", SMOOTH, RIVALS, QUIET),
+    Sentence("of smooth sliding, with sensor noise", SMOOTH, RIVALS, NOISY),
+)
+
+
+def cell(one: Verdict) -> str:
+    """Return what a table of the page says of a verdict."""
+    first, second = one.laws
+    if first == "none" or second == "none":
+        return "no gains" if first == "none" else "no rival"
+    if one.verdict == "not ranked":
+        return "not ranked"
+    if math.isnan(one.lead):
+        ours, theirs = (f"{error:.1e}" if error > FLOOR else "below" for error in one.errors)
+        return f"{ours}; `{second}` {theirs}"
+    lead = f"{one.lead:.2g} ({one.low:.2g} to {one.high:.2g})"
+    return f"{lead if one.verdict == 'open' else f'**{lead}**'} `{second}`"
+
+
+def tables(points: Sequence[dict]) -> Iterator[str]:
+    """Yield the lines of the page's tables: at each price, the best rival's error over a law's."""
+    for shown in SHOWN:
+        levels = " | ".join(f"{level:g}" for level in LEVELS["J"])
+        yield f"| {shown.name}: plant, period, load | {levels} |"
+        yield "|---" * (1 + len(LEVELS["J"])) + "|"
+        rows: dict[tuple, dict[float, str]] = {}
+        for found in cells([point for point in points if point["draw"] is None], [shown]):
+            one = weakest(found)
+            place = one.plant, one.period, one.condition.removesuffix(", noise")
+            rows.setdefault(place, {})[one.level] = cell(one)
+        for plant, period, condition in sorted(rows):
+            its = rows[plant, period, condition]
+            told = " | ".join(its.get(level, "") for level in LEVELS["J"])
+            yield f"| `{plant}`, {1e3 * period:g} ms, {condition} | {told} |"
+
+
+def tallies(points: Sequence[dict]) -> list[dict[str, int]]:
+    """Return verdict -> how often all searches agree on it, and the number of cells in which all
+    have laws on both sides, for each table of the page.
+    """
+    counts = []
+    for shown in SHOWN:
+        had = [one.verdict for one in compared(points, shown)]
+        counts.append({word: had.count(word) for word in VERDICTS} | {"all": len(had)})
+    return counts
+
+
+class Between(NamedTuple):
+    """How far the errors of one law at one price are apart in two searches, above the floor."""
+
+    compared: int
+    median: float  # ratio
+    tenth: float  # that a tenth are beyond
+    apart: float  # share beyond SEARCH
+
+    @property
+    def by_chance(self) -> float:
+        """The share of cells in which both searches would tell two equal laws apart, to the same
+        side.
+        """
+        return self.apart**2 / 2.0
+
+
+def between(points: Sequence[dict]) -> Between:
+    """Return how far two searches are apart."""
+    names = "plant", "period", "model", "law", "level", "condition"
+    errors: dict[tuple, list[float]] = {}
+    for point in points:
+        if point["draw"] is None and point["price"] == "J":
+            place = tuple(point[name] for name in names)
+            errors.setdefault(place, []).append(max(value(point)[0], FLOOR))
+    both = [pair for pair in errors.values() if len(pair) == 2 and max(pair) > FLOOR]
+    ratios = np.array([max(pair) / min(pair) for pair in both])
+    return Between(
+        len(ratios),
+        float(np.median(ratios)),
+        float(np.quantile(ratios, 0.9)),
+        float(np.mean(ratios > SEARCH["J"])),
+    )
+
+
+def contradicted(points: Sequence[dict]) -> set[str]:
+    """Return the names of the sentences that some search contradicts somewhere."""
+    return {one.sentence for one in judged(points) if one.verdict == "contradicted"}
+
+
+def counted(points: Sequence[dict]) -> dict[tuple[str, bool], dict[str, int]]:
+    """Return sentence and whether its cells were drawn -> verdict -> how many of them say so. A
+    cell is contradicted if one search says so, else it says what all do.
+    """
+    counts: dict[tuple[str, bool], dict[str, int]] = {}
+    for found in cells(points):
+        said = weakest(found).verdict
+        if any(one.verdict == "contradicted" for one in found):
+            said = "contradicted"
+        place = found[0].sentence, found[0].draw is not None
+        counts.setdefault(place, dict.fromkeys(VERDICTS, 0))[said] += 1
+    return counts
+
+
+def count_table(points: Sequence[dict]) -> Iterator[str]:
+    """Yield the lines of the table of how often each sentence of the page holds."""
+    yield f"| sentence | plants | {' | '.join(VERDICTS)} |"
+    yield "|---" * (2 + len(VERDICTS)) + "|"
+    for (name, drawn), found in counted(points).items():
+        told = " | ".join(str(count) for count in found.values())
+        yield f"| {name} | {'drawn' if drawn else 'of the page'} | {told} |"
+
+
+def how_often(points: Sequence[dict]) -> dict[str, str]:
+    """Return sentence -> how often the page says that it holds."""
+    struck = contradicted(points)
+    totals: dict[str, dict[str, int]] = {}
+    for (name, _), found in counted(points).items():
+        total = totals.setdefault(name, dict.fromkeys(VERDICTS, 0))
+        for word, count in found.items():
+            total[word] += count
+    words = {}
+    for name, total in totals.items():
+        cases = sum(total.values())
+        words[name] = (
+            f"Never contradicted; it holds by a ratio in {total['stands']} of {cases} cases, by "
+            f"the floor in {total['below the floor']}, unopposed in {total['unopposed']}."
+        )
+        if name in struck:
+            words[name] = f"Contradicted in {total['contradicted']} of {cases} cases."
+    return words
+
+
+def in_words(points: Sequence[dict]) -> tuple[str, str, str]:
+    """Return what README says, what the page says first, and what it says of the two searches, of
+    the points that were not drawn.
+    """
+    own = [point for point in points if point["draw"] is None]
+    counts = tallies(own)
+    quiet, noisy, *smooth = counts
+    leads = [its["stands"] + its["below the floor"] for its in counts]
+    readme = (
+        f"In {noisy['all']} cases with sensor noise, super-twisting leads the best of its rivals "
+        f"`adrc`, `pd_observer`, `hodob` and `pid` in {leads[1]} and trails it in "
+        f"{noisy['contradicted']}. In {quiet['all']} cases without noise it leads in {leads[0]} "
+        f"and trails in {quiet['contradicted']}; in {quiet['not ranked']} the errors are below a "
+        "ten-thousandth of the start, or near it, and are not ranked. Smooth first-order sliding "
+        f"leads the best rival in {sum(leads[2:])} of {sum(its['all'] for its in smooth)} cases, "
+        f"with and without noise, and trails in {sum(its['contradicted'] for its in smooth)}."
+    )
+    admitted = list(compared(own, SENTENCES[1]))
+    verdicts = [one.verdict for one in admitted]
+    loads = [one.condition.removesuffix(", noise") for one in admitted]
+    under = [f"{loads.count(load)} under *{load}*" for load in QUIET]
+    plants = len({one.plant for one in admitted})
+    first = (
+        f"Where its theorem admits the load and the sensor has noise, super-twisting leads the "
+        f"best of its rivals in {verdicts.count('stands') + verdicts.count('below the floor')} of "
+        f"{len(verdicts)} cases and trails it in {verdicts.count('contradicted')}. These are "
+        f"on {plants} plants, {', '.join(under)}."
+    )
+    its = between(points)
+    searches = (
+        f"The two searches found errors {its.median:.2g} times apart in the median of the "
+        f"{its.compared} that both have and that lie above the floor, and {its.tenth:.2g} times "
+        f"or more in a tenth. In {100 * its.apart:.0f} % they are more than "
+        f"{SEARCH['J']:g} times apart. So by chance both would tell two equal laws apart, and to "
+        f"the same side, in {100 * its.by_chance:.0f} % of the cells."
+    )
+    return readme, first, searches
+
+
+def main() -> None:
+    """Print the tables and sentences of the page, and draw its figure."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("files", nargs="+", type=Path, help="of points")
+    parser.add_argument("--figure", type=Path, help="file to draw")
+    asked = parser.parse_args()
+    points = [point for path in asked.files for point in json.loads(path.read_text())]
+    print(*summary(points), *tables(points), *count_table(points), sep="\n")
+    for name, words in how_often(points).items():
+        print(f"{name}: {words}")
+    print(*in_words(points), sep="\n")
+    if asked.figure:
+        from benchmarks.fronts_figure import draw
+
+        known = {point["law"] for point in points}
+        draw(points, asked.figure, [law for law in LAWS if law in known])
+
+
+if __name__ == "__main__":
+    main()
