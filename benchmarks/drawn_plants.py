@@ -1,9 +1,9 @@
-"""Two plants whose numbers were drawn by lot, to check the sentences of
+"""Two plants whose numbers were drawn at random, to check the sentences of
 docs/where_sliding_mode_loses.md on them.
 
-    python benchmarks/fronts.py benchmarks/drawn_plants.py:drawn_pendulum --lot SEED
+    python -m benchmarks.fronts benchmarks/drawn_plants.py:drawn_pendulum --draw SEED --search 11
 
-SEED is that of the lot, the first seven digits of the hash that git gave benchmarks/fronts.py when
+SEED is that of the draw, the first seven digits of the hash that git gave benchmarks/fronts.py when
 its code was fixed (git hash-object). A mass on a spring: M x'' = -k x - b x' + u + d. A pendulum, m
 l^2 x'' = m g l sin x - b x' + u + d, that stands or hangs; one that half of u_max cannot hold is
 drawn again.
@@ -16,7 +16,7 @@ import numpy as np
 
 from smc_mujoco.mechanisms.plant import Field, Plant
 
-SEED, GRAVITY, HELD = 225907474, 9.81, 3.0  # of the lot; m/s^2; N m
+SEED, GRAVITY, HELD = 46543088, 9.81, 3.0  # of the draw; m/s^2; N m
 MODEL = """
 <mujoco>
   <option timestep="0.001" integrator="RK4"/>
@@ -30,17 +30,17 @@ MODEL = """
   <sensor><jointpos name="x" joint="x"/><jointvel name="v" joint="x"/></sensor>
 </mujoco>
 """
-lot = np.random.default_rng(SEED)
+rng = np.random.default_rng(SEED)
 
 
 def even(low: float, high: float) -> float:
     """Return a number between two, to three digits."""
-    return float(f"{lot.uniform(low, high):.3g}")
+    return float(f"{rng.uniform(low, high):.3g}")
 
 
 def even_ratio(low: float, high: float) -> float:
     """Return a number between two, of which equal ratios are equally likely."""
-    return float(f"{math.exp(lot.uniform(math.log(low), math.log(high))):.3g}")
+    return float(f"{math.exp(rng.uniform(math.log(low), math.log(high))):.3g}")
 
 
 def slide(n):
@@ -85,7 +85,7 @@ drawn_slide = plant(
     "drawn_slide", "m", even(0.1, 0.5), numbers, "M", slide, slide_fields, slide_nominal
 )
 while True:
-    stands = bool(lot.integers(2))
+    stands = bool(rng.integers(2))
     numbers = {"m": even_ratio(0.2, 1.5), "h": even_ratio(0.25, 0.9), "b": even(0.0, 0.1)}
     start = even(0.2, 0.8)
     if numbers["m"] * GRAVITY * numbers["h"] <= HELD:

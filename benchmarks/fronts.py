@@ -50,7 +50,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import smc_mujoco as smc
-from benchmarks.fronts_sentences import FLOOR, LAWS, LEVELS, of_figure, summary, two_sides
+from benchmarks.fronts_sentences import FLOOR, LAWS, LEVELS, of_figure, read, summary, two_sides
 from benchmarks.fronts_sentences import with_interval as median
 from smc_mujoco.analysis.engine import scores
 from smc_mujoco.analysis.engine.form import FAILURE, SCORES, SETTING, Form, layout
@@ -504,20 +504,25 @@ def prices_by_mujoco(bench: Bench, gains: np.ndarray) -> np.ndarray:
     return bench.prices(bench.by_mujoco(gains, bench.priced[0]), bench.priced[0])
 
 
-NAMES = "search", "draw", "plant", "period", "model", "law", "price", "level", "condition", "within"
+KEPT = (
+    *("search", "draw", "plant", "period", "model", "law", "price", "level", "condition"),
+    *("within", "edges", "wc", "least", "chose", "rate", "settled", "gains", "J", "error", "apart"),
+)
 
 
-def rounded(point: dict) -> dict:
-    """Return what is kept of a point, with four or five digits."""
-    kept = {name: point[name] for name in (*NAMES, "edges")}
-    for name in ("wc", "least", "chose", "rate", "settled"):
-        kept[name] = float(f"{point[name]:.4g}")
-    for name in ("J", "error"):
-        kept[name] = [float(f"{value:.4g}") for value in point[name]]
-    kept["gains"] = {name: float(f"{value:.5g}") for name, value in point["gains"].items()}
-    if "apart" in point:
-        kept["apart"] = [float(f"{value:.2g}") for value in point["apart"]]
-    return kept
+def rounded(value: Any) -> Any:
+    """Return what is kept of a value of a point: of numbers four digits, of gains five."""
+    if isinstance(value, dict):
+        return {
+            name: its if isinstance(its, str) else _digits(its, 5) for name, its in value.items()
+        }
+    if isinstance(value, list | tuple):
+        return [_digits(one, 4) for one in value]
+    return _digits(value, 4) if isinstance(value, float) else value
+
+
+def _digits(value: float, digits: int) -> float:
+    return float(f"{value:.{digits}g}")
 
 
 HEADS = "search, plant, period, model, law, condition, price, J, error / start, rate / u_max, "
@@ -584,8 +589,9 @@ def workers(processes: int, address: str | None) -> AbstractContextManager[Execu
 
 
 def write(points: Sequence[dict], path: Path) -> None:
-    """Write what is kept of points, a line each."""
-    path.write_text("[\n" + ",\n".join(json.dumps(rounded(one)) for one in points) + "\n]\n")
+    """Write what is kept of points: their names, then a row a point, which `read` reads."""
+    rows = [KEPT, *([rounded(point.get(name)) for name in KEPT] for point in points)]
+    path.write_text("[\n" + ",\n".join(json.dumps(row) for row in rows) + "\n]\n")
 
 
 def main() -> None:
@@ -606,7 +612,7 @@ def main() -> None:
     parser.add_argument("--read", nargs="+", type=Path, default=[], help="points kept earlier")
     parser.add_argument("--keep", type=Path, help="file of the points that the page rests on")
     asked = parser.parse_args()
-    points = [point for path in asked.read for point in json.loads(path.read_text())]
+    points = [point for path in asked.read for point in read(path)]
     with workers(asked.processes, asked.executor) as executor:
         for search_seed in asked.search:
             for plant in asked.plants:

@@ -36,7 +36,7 @@ def draw(points: Sequence[dict], path: Path, laws: Sequence[str]) -> None:
                     look = {"color": line.get_color(), "marker": line.get_marker()}
                     ax.plot(x, y, ms=3, lw=1, **look)
                 ax.axhspan(1e-9, FLOOR, color=style.BAND, lw=0, zorder=0)
-                ax.set(xscale="log", yscale="log", ylim=(1e-5, 1.0))
+                ax.set(xscale="log", yscale="log", ylim=(1e-5, 0.1))
                 ax.set_xticks(TICKS, [f"{tick:g}" for tick in TICKS])
                 ax.minorticks_off()
                 place = {"transform": ax.transAxes, "ha": "right", "color": style.MUTED}

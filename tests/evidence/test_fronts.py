@@ -2,6 +2,7 @@
 takes to turn a sentence of the page.
 """
 
+import functools
 import json
 import math
 import re
@@ -10,53 +11,130 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import fronts
-from benchmarks.fronts import CONDITIONS, FLOOR, LEVELS, SENTENCES, UNSEEN, Job, Sentence, Sets
+from benchmarks import fronts, fronts_by_own_loop, fronts_sentences
+from benchmarks.fronts import CONDITIONS, Job, Sets
+from benchmarks.fronts_sentences import FLOOR, LEVELS, SENTENCES, Sentence
 
 PAGE = Path(fronts.__file__).parents[1] / "docs" / "where_sliding_mode_loses.md"
-POINTS = json.loads(Path(fronts.__file__).with_suffix(".json").read_text())  # of the page
-SECOND = json.loads((Path(fronts.__file__).parent / "second_fronts.json").read_text())
-SPREAD = np.exp(np.linspace(-0.05, 0.05, UNSEEN))
+TEXT = " ".join(PAGE.read_text().split())
+POINTS = fronts_sentences.read(Path(fronts.__file__).with_suffix(".json"))  # of the page
+OWN = json.loads(Path(fronts_by_own_loop.__file__).with_suffix(".json").read_text())
+ONE = Sentence("one", ("super_twisting",), ("pid",), ("middle",), high=3.0)
 
 
 def point(law, error, level=2.0, **fields):
-    """A point of a front, with runs about an error."""
+    """A point of a front, whose error is known within 5 %."""
+    known = math.inf if math.isnan(error) else error
     made = {"plant": "duffing", "model": "none", "law": law, "price": "J", "level": level}
-    made |= {"lot": None, "period": 1e-3}
-    made |= {"condition": "middle", "chose": error, "errors": (error * SPREAD).tolist()}
-    return made | {"within": True} | fields
+    made |= {"search": 11, "draw": None, "period": 1e-3, "condition": "middle", "within": True}
+    return made | {"chose": known, "error": [known, 0.95 * known, 1.05 * known]} | fields
 
 
 @pytest.mark.quick
 @pytest.mark.parametrize(
     ("ours", "theirs", "said"),
     [
-        (0.01, 0.02, "stands"),
-        (0.01, 0.013, "open"),  # another search may find as much
-        (0.02, 0.01, "contradicted"),
+        (0.01, 0.025, "stands"),
+        (0.01, 0.015, "open"),  # another search may find as much
+        (0.025, 0.01, "contradicted"),
         (None, 0.01, "contradicted"),  # nothing at this price
         (0.01, None, "unopposed"),
         (FLOOR / 100, FLOOR / 2, "not ranked"),
-        (FLOOR / 100, FLOOR * 2, "below the floor"),
-        (FLOOR / 100, FLOOR * 1.3, "not ranked"),  # another search may find it below, too
-        (FLOOR * 2, FLOOR / 100, "contradicted"),
+        (FLOOR / 100, FLOOR * 2.5, "below the floor"),
+        (FLOOR / 100, FLOOR * 1.8, "not ranked"),  # another search may find it below, too
+        (FLOOR * 2.5, FLOOR / 100, "contradicted"),
         (math.nan, 0.01, "contradicted"),  # a run that fails is behind all others
     ],
 )
 def test_a_sentence_is_judged_by_the_lead_at_the_prices_that_it_is_about(ours, theirs, said):
-    sentence = Sentence("one", ("super_twisting",), ("pid",), ("middle",), high=3.0)
     points = []
     for law, error in (("super_twisting", ours), ("pid", theirs)):
         for change in ({"level": 4.0}, {"model": "nominal"}, {"price": "rate"}):
             points.append(point(law, 1.0, **({"level": 2.5} | change)))
         if error is not None:
             points.append(point(law, error))
-    (found,) = fronts.judged(points, [sentence])
+    (found,) = fronts_sentences.judged(points, [ONE])
     assert found.verdict == said
     if said in ("stands", "open"):
         assert found.lead == pytest.approx(theirs / ours)
         assert found.low <= found.lead <= found.high
-    assert not list(fronts.judged(points, [sentence._replace(within=False)]))
+    assert not list(fronts_sentences.judged(points, [ONE._replace(within=False)]))
+
+
+@pytest.mark.quick
+def test_a_median_has_an_interval_of_two_values_and_a_failed_run_is_beyond_all():
+    values = np.arange(1.0, 129.0)
+    middle, low, high = fronts_sentences.with_interval(np.random.default_rng(2).permutation(values))
+    assert middle == 64.5
+    assert low + high == 129.0
+    # fewer than `low` of 128 tosses fall on one side
+    tails = [math.comb(128, k) / 2.0**128 for k in range(int(low) + 1)]
+    assert sum(tails[:-1]) <= fronts_sentences.ERROR / 2 < sum(tails)
+    assert fronts_sentences.with_interval([*values[:11], math.nan]) == (6.5, 1.0, math.inf)
+    assert fronts_sentences.with_interval([math.nan] * 7 + [1.0] * 5)[0] == math.inf
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize(
+    ("theirs", "again", "said", "lead"),
+    [
+        (0.025, 0.03, "stands", 2.5),
+        (0.004, 0.003, "contradicted", 0.4),
+        (0.022, 0.004, "open", 2.2),
+        (0.03, 0.012, "open", 1.2),
+        (0.025, None, "open", 2.5),  # the second search has no law at this price
+    ],
+)
+def test_what_two_searches_say_is_the_smallest_lead_that_both_have(theirs, again, said, lead):
+    points = [point("super_twisting", 0.01), point("pid", theirs)]
+    if again is None:
+        points.append(point("pid", 0.01, level=3.0, search=12))
+    else:
+        points += [point("super_twisting", 0.01, search=12), point("pid", again, search=12)]
+    cell, *_ = fronts_sentences.cells(points, [ONE])
+    found = fronts_sentences.weakest(cell)
+    assert found.verdict == said
+    assert found.lead == pytest.approx(lead)
+    assert found.low == pytest.approx(0.95 / 1.05 * min(theirs, again or theirs) / 0.01)
+    assert found.high == pytest.approx(1.05 / 0.95 * max(theirs, again or theirs) / 0.01)
+
+
+@pytest.mark.quick
+def test_a_lead_that_the_other_search_has_below_the_floor_is_not_ranked():
+    points = [point("super_twisting", 0.01), point("pid", 0.02)]
+    points += [point(law, FLOOR / 3, search=12) for law in ("super_twisting", "pid")]
+    (cell,) = fronts_sentences.cells(points, [ONE])
+    assert fronts_sentences.weakest(cell).verdict == "not ranked"
+
+
+@pytest.mark.quick
+def test_a_sentence_is_struck_out_if_one_search_contradicts_it():
+    points = [point("hodob", 0.01), point("boundary_layer", 0.03)]
+    second = [point("hodob", 0.03, search=12), point("boundary_layer", 0.01, search=12)]
+    name = "smooth, quiet"
+    counts = fronts_sentences.counted(points)[name, False]
+    assert (counts["stands"], counts["contradicted"]) == (1, 0)
+    assert name not in fronts_sentences.contradicted(points)
+    assert fronts_sentences.counted(points + second)[name, False]["contradicted"] == 1
+    assert name in fronts_sentences.contradicted(points + second)
+
+
+@pytest.mark.quick
+def test_two_searches_are_compared_where_both_have_a_point_above_the_floor():
+    points = [point("pid", 0.01), point("adrc", FLOOR / 9), point("pid", 0.5, level=3.0)]
+    points += [point("pid", 0.03, search=12), point("adrc", FLOOR / 3, search=12)]
+    found = fronts_sentences.between(points)
+    assert (found.compared, found.apart) == (1, 1.0)
+    assert found.median == pytest.approx(3.0)
+    assert found.by_chance == 0.5  # both searches toss a coin each
+
+
+@pytest.mark.quick
+def test_two_searches_choose_on_other_instances_and_are_judged_on_the_same_unseen_ones():
+    benches = [fronts.Bench(Job("duffing", "pid", 8.2, search=search)) for search in (11, 12)]
+    starts = [[one.resolved.x0 for one in bench.cases] for bench in benches]
+    assert not set(starts[0]) & set(starts[1])
+    assert [len(bench.loaded) for bench in benches] == [1, 1]
 
 
 @pytest.mark.quick
@@ -78,15 +156,15 @@ def test_a_level_buys_the_least_error_among_sets_that_have_settled():
 
 
 @pytest.mark.quick
-def test_a_lot_draws_loads_and_prices_of_its_seed_and_plant():
-    conditions, levels = fronts.by_lot(7, "duffing")
-    assert (conditions, levels) == fronts.by_lot(7, "duffing")
-    assert conditions != fronts.by_lot(8, "duffing")[0]
-    assert conditions != fronts.by_lot(7, "arm.xml:elbow")[0]
-    for given, drawn in zip(CONDITIONS, conditions, strict=True):
-        assert drawn.kind == given.kind
-        assert 0.5 * given.noise <= drawn.noise <= 2.0 * given.noise
-        assert 0.7 * given.ratio <= drawn.ratio <= 1.4 * given.ratio
+def test_loads_and_prices_are_drawn_from_a_seed_and_the_plant():
+    conditions, levels = fronts.drawn(7, "duffing")
+    assert (conditions, levels) == fronts.drawn(7, "duffing")
+    assert conditions != fronts.drawn(8, "duffing")[0]
+    assert conditions != fronts.drawn(7, "arm.xml:elbow")[0]
+    for given, made in zip(CONDITIONS, conditions, strict=True):
+        assert made.kind == given.kind
+        assert 0.5 * given.noise <= made.noise <= 2.0 * given.noise
+        assert 0.7 * given.ratio <= made.ratio <= 1.4 * given.ratio
     for price, its in LEVELS.items():
         assert its[0] <= min(levels[price]) <= max(levels[price]) <= its[-1]
 
@@ -95,7 +173,7 @@ def test_a_lot_draws_loads_and_prices_of_its_seed_and_plant():
 def test_a_gain_at_the_edge_of_its_box_is_named_once_for_a_plant_with_how_often():
     edges = [{"l": "upper"}, {"l": "upper"}, {}]
     points = [point("hodob", 0.1, gains={"l": 632.5}, edges=edge) for edge in edges]
-    (said,) = fronts.at_edges(points)
+    (said,) = fronts_sentences.at_edges(points)
     assert said.startswith("hodob on duffing: l = 632.5 is at the upper end of its box: a larger")
     assert said.endswith("(2 of 3 points)")
 
@@ -111,98 +189,94 @@ def test_the_implicit_laws_assumed_gain_is_searched():
 
 @pytest.mark.quick
 def test_the_page_has_the_tables_of_its_points_and_strikes_out_what_they_contradict():
-    text = PAGE.read_text()
-    for line in (*fronts.tables(POINTS), *fronts.counted(POINTS)):
-        assert line in text.splitlines(), line
-    contradicted = {one.sentence for one in fronts.judged(POINTS) if one.verdict == "contradicted"}
-    for name, verdicts in SECOND["verdicts"].items():
-        if verdicts["contradicted"]:
-            contradicted.add(name)
-    assert {one.sentence for one in fronts.judged(POINTS)} == {one.name for one in SENTENCES}
-    for sentence in SENTENCES:
-        (struck,) = re.findall(rf"^- (~~)?\*{re.escape(sentence.name)}\*", text, re.MULTILINE)
-        assert bool(struck) == (sentence.name in contradicted), sentence.name
-    words = f"**{len(contradicted)} of {len(SENTENCES)} sentences are contradicted**"
-    assert words in " ".join(text.split())
+    lines = PAGE.read_text().splitlines()
+    for line in (*fronts_sentences.tables(POINTS), *fronts_sentences.count_table(POINTS)):
+        assert line in lines, line
+    struck = fronts_sentences.contradicted(POINTS)
+    often = fronts_sentences.how_often(POINTS)
+    assert set(often) == {sentence.name for sentence in SENTENCES}
+    for name, words in often.items():
+        (bullet,) = [line for line in lines if re.match(rf"- (~~)?\*{re.escape(name)}\*", line)]
+        assert bullet.startswith("- ~~") == (name in struck), name
+        assert words in bullet
+    words = f"**{len(struck)} of {len(SENTENCES)} sentences are contradicted**"
+    assert words in TEXT
 
 
 @pytest.mark.quick
-def test_readme_and_the_page_say_first_how_often_super_twisting_leads_and_trails():
-    readme = PAGE.parents[1] / "README.md"
-    for path, words in zip((readme, PAGE), fronts.in_words(POINTS), strict=True):
-        assert words in " ".join(path.read_text().split()), path
+def test_readme_and_the_page_say_how_often_super_twisting_leads_and_what_two_searches_share():
+    readme = " ".join((PAGE.parents[1] / "README.md").read_text().split())
+    assert fronts_sentences.in_readme(POINTS) in readme
+    assert fronts_sentences.first_words(POINTS) in TEXT
+    assert fronts_sentences.of_searches(POINTS) in TEXT
+    assert fronts_sentences.often_at_edges(POINTS) in TEXT
 
 
 @pytest.mark.quick
-def test_readme_and_the_page_say_what_a_second_search_found():
-    _, noisy, *smooth = SECOND["tallies"]
-    leads = [its["stands"] + its["below the floor"] for its in (noisy, *smooth)]
-    cases = sum(its["all"] for its in smooth)
-    behind = sum(its["contradicted"] for its in smooth)
-    quiet = SECOND["verdicts"]["smooth, quiet"]
-    said = {
-        PAGE.parents[1] / "README.md": [
-            f"A second search gives {leads[0]} and {noisy['contradicted']} of {noisy['all']} with "
-            f"noise, and {sum(leads[1:])} and {behind} of {cases}.",
-        ],
-        PAGE: [
-            f"in no case of this search, and in {sum(leads[1:])} of another",
-            f"found errors {SECOND['median']:.2g} times apart in the median of the "
-            f"{SECOND['compared']} that both have and that lie above the floor, and "
-            f"{SECOND['tenth']:.2g} times or more in a tenth",
-            f"leads the best rival in {leads[0]} of {noisy['all']} cases with noise and trails it "
-            f"in {noisy['contradicted']}; smooth sliding leads in {sum(leads[1:])} of {cases} and "
-            f"trails in {behind}",
-            f"Contradicted at {quiet['contradicted']} of {sum(quiet.values())} of the second",
-        ],
-    }
-    for path, sentences in said.items():
-        text = " ".join(path.read_text().split())
-        assert [words for words in sentences if words not in text] == []
-
-
-@pytest.mark.quick
-def test_another_search_is_compared_where_both_have_a_point_above_the_floor():
-    first = [point("pid", 0.01), point("adrc", FLOOR / 9), point("pid", 0.5, level=3.0)]
-    second = [point("pid", 0.02), point("adrc", FLOOR / 3), point("adrc", 0.1, level=3.0)]
-    found = fronts.second(second, first)
-    assert found["compared"] == 1
-    assert found["median"] == pytest.approx(2.0)
+def test_two_equal_laws_are_told_apart_in_few_cells():
+    assert fronts_sentences.between(POINTS).by_chance < 0.05
 
 
 @pytest.mark.quick
 def test_mujoco_has_run_each_point_that_a_sentence_rests_on():
-    sides = [side for _, *both in fronts.compared(POINTS) for side in both if side]
-    apart = [side["apart"] for side in sides if side["lot"] is None]
-    assert apart
-    ranked = [side for side in sides if side["lot"] is None and np.median(side["errors"]) > FLOOR]
-    near = [np.abs(side["apart"]).max() < 0.05 for side in ranked]
+    sides = [side for _, *both in fronts_sentences.two_sides(POINTS) for side in both if side]
+    own = [side for side in sides if side["draw"] is None]
+    assert own
+    near = [np.abs(side["apart"]).max() < 0.05 for side in own if side["error"][0] > FLOOR]
     assert np.mean(near) > 0.95
 
 
+@pytest.mark.quick
+def test_a_loop_of_its_own_gives_the_printed_errors():
+    points = fronts_by_own_loop.above_floor(POINTS)
+    assert fronts_by_own_loop.in_words(points, OWN) in TEXT
+    off = [abs(own / point["error"][0] - 1.0) for own, point in zip(OWN, points, strict=True)]
+    assert np.mean(np.array(off) < 0.05) > 0.95
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("sentence", SENTENCES, ids=[sentence.name for sentence in SENTENCES])
+def test_the_own_loop_gives_its_medians_again():
+    """One point of each law, with other starts, phases and noise than those that are kept."""
+    rng = np.random.default_rng(9)
+    points = fronts_by_own_loop.above_floor(POINTS)
+    for law in fronts_by_own_loop.GAINS:
+        near = [one["law"] == law and "strong" not in one["condition"] for one in points]
+        at = near.index(True)
+        assert fronts_by_own_loop.median(points[at], rng) == pytest.approx(OWN[at], rel=0.05)
+
+
+LEFT = [one for one in SENTENCES if one.name not in fronts_sentences.contradicted(POINTS)]
+
+
+@functools.cache
+def choosing(job):
+    return fronts.Bench(job)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sentence", LEFT, ids=[sentence.name for sentence in LEFT])
 def test_no_change_of_one_gain_of_a_losing_law_turns_a_sentence_that_stands(sentence):
-    """By 3, 10 or 30 either way: it costs more than the price, or its error is larger still."""
+    """By 3, 10 or 30 either way, where the search chose: it costs more than the price, or its error
+    is larger still.
+    """
     kinds = [condition.kind for condition in CONDITIONS]
-    benches = {}
-    for _, first, second in fronts.compared(POINTS, [sentence]):
-        stands = fronts.verdict(sentence, first, second)[-1] == "stands"
-        if not (first and second and stands and first["lot"] is None):
+    own = [point for point in POINTS if point["draw"] is None]
+    for _, first, second in fronts_sentences.two_sides(own, [sentence]):
+        stands = fronts_sentences.verdict(sentence, first, second)[-1] == "stands"
+        if not (first and second and stands):
             continue
-        job = Job(second["plant"], second["law"], second["wc"], period=second["period"])
-        bench = benches.setdefault(job, None) or fronts.Bench(job)
-        benches[job] = bench
-        # on duffing the implicit law's b was left at 1
-        its = [second["gains"].get(name, 1.0) for name in bench.names]
+        place = {name: second[name] for name in ("plant", "law", "wc", "period", "search")}
+        bench = choosing(Job(**place))
+        its = [second["gains"][name] for name in bench.names]
         changed = np.repeat([its], 6 * len(bench.names), axis=0)
         for i, (gain, factor) in enumerate(np.ndindex(len(bench.names), 6)):
             changed[i, gain] *= (1 / 30, 1 / 10, 1 / 3, 3.0, 10.0, 30.0)[factor]
-        sets = bench.judged(changed, 1)
+        sets = bench.judged(changed)
         if sentence.price == "least":
-            assert (np.nan_to_num(sets.J, nan=np.inf) > first["J"][0]).all()
+            assert (np.nan_to_num(sets.J, nan=np.inf) > first["chose"]).all()
             continue
         cost = sets.rates if sentence.price == "rate" else sets.J / second["least"]
-        error = sets.errors[:, kinds.index(second["condition"])]
-        turned = (cost <= first["level"]) & (error < np.median(first["errors"]))
+        at = kinds.index(second["condition"])
+        affordable = (cost <= fronts.MARGIN * first["level"]) & sets.settled[:, at]
+        turned = affordable & (sets.errors[:, at] < first["chose"])
         assert not turned.any(), (first["law"], second["law"], first["level"], changed[turned])
