@@ -5,7 +5,7 @@ beside implicitfast at 0.25 ms.
 
 The truth is RK4 at a sixteenth of the default step (at most 1/256 ms where poles need it). The
 table of docs/accuracy.md is that of benchmarks/integrators.json, which --write writes. The machines
-are written here, with numbers drawn by lot.
+are written here, with numbers drawn at random.
 """
 
 import dataclasses
@@ -37,7 +37,7 @@ Machine = tuple[Plant, dict]
 
 
 def chain(n: int, damping: float = 0.0, armature: float = 0.0) -> str:
-    """The MJCF of a chain of n links with numbers drawn by lot, and more damping and armature."""
+    """The MJCF of a chain of n links with random numbers, and more damping and armature."""
     rng = random.Random(f"chain {n}")
     text = HEAD.format(f"chain{n}")
     at = 1.5

@@ -32,7 +32,7 @@ UNTIED = FLAGS.mjDSBL_CONTACT, FLAGS.mjDSBL_LIMIT, FLAGS.mjDSBL_FRICTIONLOSS
 @functools.lru_cache(maxsize=64)
 def fastest_pole(plant: Plant, parts: tuple[Part, ...] = ()) -> float:
     """Return the largest |pole| of a plant with these parts and with u held, 1/s, in its start and
-    in POSES poses drawn by lot.
+    in POSES poses drawn at random.
 
     Its ties hold, as they take away the modes of light bodies; no other constraint acts.
     """
@@ -64,7 +64,7 @@ def _model(plant: Plant, parts: Iterable[Part]) -> mujoco.MjModel:
 
 
 def _drawn(model: mujoco.MjModel, start: Array, rng: np.random.Generator) -> Array:
-    """Return a pose drawn by lot, near the start and within the joints' ranges."""
+    """Return a pose drawn at random, near the start and within the joints' ranges."""
     qpos = start.copy()
     for i in range(model.njnt):
         if model.jnt_type[i] < mujoco.mjtJoint.mjJNT_SLIDE.value:  # free or ball

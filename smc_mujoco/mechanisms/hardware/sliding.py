@@ -16,8 +16,8 @@ stop or rest, all together, as it does for Coulomb friction. A joint whose speed
 below STICKING_SPEED, is held within the bounds. It is brought back to where it came to rest, so it
 does not creep. A load that passes the bounds for so short a time that the joint does not reach
 STICKING_SPEED therefore leaves no motion. Where joints come to rest has an error of first order in
-the physics step: in 24 double pendulums drawn by lot at most 1.3 % of the range in which friction
-can hold them, at the default step.
+the physics step: in 24 double pendulums drawn at random at most 1.3 % of the range in which
+friction can hold them, at the default step.
 
 Limit: MuJoCo gives the force of friction, limits and contacts at a joint as one sum. What friction
 may have exerted of it is not counted in the load.

@@ -1,4 +1,4 @@
-"""What is said of all gains, and of some: the inequalities at gains drawn by lot, and the printed
+"""What is said of all gains, and of some: the inequalities at gains drawn at random, and the printed
 gains in MuJoCo.
 """
 
