@@ -456,6 +456,11 @@ def _named_plant(text: str, logs: Sequence[Any]) -> Plant:
             joints.append(f"{joint}(measured)")
     if not driven:
         joints = [joint.name for joint in mjcf.source(text).spec().joints if joint.name]
+        if len(joints) > 1 and "x" in logs[0]:
+            raise ScenarioError(
+                f"the log has x of one joint, and {text} has {len(joints)}: say which it is, as "
+                f"{text}:{joints[-1]}, of {joined(joints)}"
+            )
         if len(joints) != 1:
             return as_plant(text)  # its error names the joints
     return as_plant(f"{text}:{'+'.join(joints)}")

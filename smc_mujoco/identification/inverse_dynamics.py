@@ -16,7 +16,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.identification.records import Columns, Record, step_of
-from smc_mujoco.mechanisms.layout import dof_ids, joint_ids
+from smc_mujoco.mechanisms.layout import dof_ids, initial_pose, joint_ids
 from smc_mujoco.mechanisms.plant import Plant
 
 CUBIC_WINDOW, CUBIC_DEGREE = 0.04, 3  # s, and degree, of the cubic about each sample; chosen
@@ -116,6 +116,7 @@ def torques(plant: Plant, data: Record, columns: Columns, cutoff: float = CUTOFF
     filtered = Filter(data, columns, cutoff)
     model = plant.load()
     state = mujoco.MjData(model)
+    state.qpos[:] = initial_pose(model)  # of joints that are held
     joints = joint_ids(model)
     dofs = dof_ids(model)
     x, v, a = filtered.motion(columns.x)

@@ -286,6 +286,13 @@ def test_a_log_without_any_command_is_not_taken_for_a_file_without_joints(run, t
         smc.identify(str(tmp_path / "arm.xml"), positions, ["j1.damping"])
 
 
+def test_a_log_of_one_joint_asks_which_of_several_it_is(run, tmp_path):
+    file = tmp_path / "two.xml"
+    file.write_text(TWO)
+    with pytest.raises(smc.ScenarioError, match="log has x of one joint, and"):
+        smc.identify(str(file), run, ["m"])
+
+
 def test_a_command_in_milliamperes_is_doubted_unless_its_gain_is_asked_for(arm, run):
     """Of a motor of 0.1 N m/A."""
     in_mA = run | {"u": run["u"] * 1e4}
@@ -476,3 +483,16 @@ def test_the_delay_of_a_simulated_log_is_short_by_half_a_step_of_its_integrator(
     # it also counts half of the damping of a step as inertia
     inertia = 0.02 + lead * step * 0.3
     assert found.values["j1.armature"] == pytest.approx(inertia, abs=2e-5)
+
+
+def test_the_start_knows_where_other_joints_are_held():
+    """A forearm that hangs from an upper arm held level: gravity pulls it by another angle."""
+    key = '<keyframe><key name="home" qpos="1.57 0.3"/></keyframe></mujoco>'
+    xml = chain([0.35, 0.3], [1.2, 0.6]).replace("</mujoco>", key)
+    arm = smc.plant_from(xml, ["j2"], keyframe="home", others="held")
+    true = {"j2.damping": 0.2, "j2.armature": 0.01}
+    push = smc.Sine(1.0, 4.0) + smc.Sine(0.5, 11.0)
+    run = smc.Scenario(plant=arm, mismatch=true, law="none", feedforward=push, duration=4.0)
+    found = smc.identify(arm, smc.run(run), list(true), most=1)
+    for name, value in true.items():
+        assert found.before.values[name] == pytest.approx(value, rel=0.15), name
