@@ -67,7 +67,9 @@ def presliding(replays: Replays, slopes: Slopes) -> Presliding:
     """
     none = Presliding("", np.zeros(len(replays.names)))
     rig = replays.rig(slopes.point)
-    if not isinstance(rig, OwnRig) or not rig.plant.rubs or rig.base.actuator:
+    if not isinstance(rig, OwnRig) or not rig.plant.rubs:
+        return none
+    if not all(part.drives for part in rig.base.actuator):  # rotors beside joints
         return none
     J = np.concatenate(slopes.freed(slopes.by_values))
     r = np.concatenate(slopes.freed(slopes.residuals))

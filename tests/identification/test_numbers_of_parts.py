@@ -96,3 +96,48 @@ def test_a_gain_an_offset_and_where_the_encoder_reads_0():
     found = smc.identify(smc.plant_from(damped, ["j1"]), run, list(truth))
     check(found, truth, 0.01)
     assert any("j1.offset and j1.zero cannot be told apart" in note for note in found.notes)
+
+
+def bristled(level, stiffness, damping):
+    """Return a function (v, memory) -> the force of bristles, which moves them by a step."""
+
+    def force(v, memory):
+        (z,) = memory
+        rate = v - stiffness * abs(v) / level * z
+        memory[0] = z + STEP * rate
+        return -stiffness * z - damping * rate
+
+    return force
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("beside", ["a motor", "a Coulomb"])
+def test_friction_that_gives_way_is_in_the_errors_beside_other_parts(beside):
+    """Bristles that bend by 1 mrad under 0.3 N m, and their level without bristles."""
+    truth = {"j1.frictionloss": 0.3, "j1.armature": 0.02}
+    damped = ONE.replace('name="j1"', 'name="j1" damping=".3"')
+    arm = smc.plant_from(damped, ["j1"])
+    inertia = float(arm.load().dof_M0[0]) + truth["j1.armature"]
+    bristles = bristled(0.3, 300.0, 3.0)
+    if beside == "a motor":
+        k, R = 1.0, 1.2
+        machine = smc.Scenario(
+            plant=arm,
+            law="none",
+            actuator=smc.DCMotor(R, 0.0, 0.05, 20.0, 0.0, voltage=60.0, command="voltage"),
+        )
+
+        def torque(u, v, memory):
+            return k * (u - k * v) / R + bristles(v, memory) - 0.3 * v
+
+    else:
+        machine = smc.Scenario(plant=arm, law="none", friction=smc.Coulomb(0.1))
+
+        def torque(u, v, memory):
+            return u + bristles(v, memory) - 0.3 * v - 0.1 * math.tanh(v / 1e-3)
+
+    run = joint_log(inertia, torque, 20.0, 1.5)
+    found = smc.identify(machine, run, list(truth))
+    check(found, truth, 0.02)
+    assert abs(found.values["j1.frictionloss"] - 0.3) > 0.001  # the bristles are missed
+    assert any("presliding" in note for note in found.notes)
