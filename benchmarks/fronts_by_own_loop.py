@@ -222,8 +222,9 @@ def in_words(points: Sequence[dict], medians: Sequence[float]) -> str:
             others.append(off)
     return (
         f"A loop of its own, with nothing of this package in it, gives {near} of {len(medians)} "
-        f"errors above the floor within 5 %, and {inside} within 5 % or the interval in the file. "
-        f"Of the {len(medians) - near} others, {swinging} are under *strong*; the rest are within "
+        f"errors above the floor within 5 %, and {inside} within 5 % or the interval that "
+        f"fronts.json gives. Of the {len(medians) - near} others, {swinging} are under *strong*; "
+        "the rest are within "
         f"{100 * max(others):.0f} %"
     )
 

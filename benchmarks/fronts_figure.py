@@ -7,7 +7,7 @@ from benchmarks.fronts_sentences import FLOOR, ROWS, of_figure, value
 from smc_mujoco.draw import page, style
 
 TICKS = (1.25, 2, 3, 5)
-WIDTH, ROW = 6.4, 1.7  # inches
+WIDTH, ROW = 5.0, 1.5  # inches
 
 
 def draw(points: Sequence[dict], path: Path, laws: Sequence[str]) -> None:
@@ -44,7 +44,7 @@ def draw(points: Sequence[dict], path: Path, laws: Sequence[str]) -> None:
             noise = "sensor noise" if "noise" in condition else "no noise"
             row[0].set_ylabel(f"{1e3 * period:g} ms, {noise}\nrms error / start")
         for ax, plant in zip(panels[0], plants, strict=True):
-            ax.set_title(style.plant_name(plant))
+            ax.set_title(style.plant_name(plant, short=True))
         for ax in panels[-1]:
             ax.set_xlabel("J / least J")
         page.set_head(figure, WIDTH, "The price of rejecting a load", handles)

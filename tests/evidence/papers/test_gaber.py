@@ -110,7 +110,7 @@ def lots(scenario: Scenario, *names: str) -> dict[str, float]:
 
 
 def drawn_by_lot(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
-    """Return x that decays as fast, and u that turns as fast, as the lot says."""
+    """Return x that decays as fast, and u that turns as fast, as was drawn."""
     x0, (fast, large, often) = (
         max(map(abs, scenario.resolved.x0)),
         lots(scenario, "x", "u", "turns").values(),
