@@ -128,7 +128,8 @@ class Range(Constraint):
             raise ScenarioError(
                 f"{what} is {shown(value)}: give the lowest and the highest, as (0.7, 1.3)"
             )
-        low, high = (self._end(what, one) for one in value)
+        low = self._end(what, value[0])
+        high = self._end(what, value[1])
         if low > high:
             raise ScenarioError(f"{what} is from {low:g} to {high:g}: give the lowest first")
         return low, high
@@ -205,7 +206,8 @@ def of_fields(kind: type) -> dict[str, Constraint]:
     if any(isinstance(declared, str) for declared in types.values()):
         with contextlib.suppress(NameError):  # names that only a type checker imports
             hints = typing.get_type_hints(kind, include_extras=True)
-            types = {name: hints[name] for name in types}
+            for name in types:
+                types[name] = hints[name]
     return _declared(types)
 
 

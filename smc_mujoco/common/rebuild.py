@@ -90,7 +90,11 @@ def helpers(function: FunctionType) -> list[FunctionType]:
         found.append(value)
         if isinstance(value, ModuleType):
             found += list(map(vars(value).get, names.attributes))
-    return [value.py_func for value in found if is_jitted(value)]
+    written = []
+    for value in found:
+        if is_jitted(value):
+            written.append(value.py_func)
+    return written
 
 
 def values_in(function: FunctionType) -> list[Any]:

@@ -311,7 +311,10 @@ def _wrapped(text: str, width: int) -> str:
 def _narrow(text: str) -> str:
     """Return a text on narrow lines; a number stays with its unit."""
     lines = re.sub(r"(\d) ", rf"\1{NO_BREAK}", text.replace("–", "–\n")).splitlines()
-    return "\n".join(_wrapped(line, NARROW_WIDTH) for line in lines)
+    narrow = []
+    for line in lines:
+        narrow.append(_wrapped(line, NARROW_WIDTH))
+    return "\n".join(narrow)
 
 
 def _width(text: "Text") -> int:
@@ -330,9 +333,12 @@ def _parts(widths: Sequence[int], width: int, names: int) -> list[list[int]]:
     left = list(range(names))
     parts = [left]
     for i, column_width in enumerate(widths[names:], names):
-        if len(parts[-1]) > names and sum(widths[k] + 1 for k in parts[-1]) + column_width > width:
+        last = parts[-1]
+        taken = sum(widths[k] for k in last) + len(last)
+        if len(last) > names and taken + column_width > width:
+            last = left
             parts.append(left)
-        parts[-1] = [*parts[-1], i]
+        parts[-1] = [*last, i]
     return parts
 
 

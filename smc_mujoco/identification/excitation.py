@@ -27,6 +27,7 @@ from smc_mujoco.common.data import attributes, named_data
 from smc_mujoco.common.errors import ScenarioError, find, items_of, number, shown
 from smc_mujoco.common.files import as_path, replacing
 from smc_mujoco.control.from_text import law as find_law
+from smc_mujoco.identification.least_squares import least_squares
 from smc_mujoco.identification.own_rig import RUN_STEP, OwnRig, own_rig
 from smc_mujoco.identification.paths import DELAY, named_once
 from smc_mujoco.identification.replays import Point, Replays
@@ -288,7 +289,9 @@ def candidate_shapes(joints: int, duration: float, rate: float) -> dict[str, Arr
         k = np.floor(t / HOLD).astype(int)
         levels = np.array([0.0, 0.5, 1.0, 0.5, 0.0, -0.5, -1.0, -0.5])
         s = np.clip((t - k * HOLD) / RAMP, 0.0, 1.0)
-        y = levels[k % 8] + (levels[(k + 1) % 8] - levels[k % 8]) * s * s * (3.0 - 2.0 * s)
+        before = levels[k % 8]
+        after = levels[(k + 1) % 8]
+        y = before + (after - before) * s * s * (3.0 - 2.0 * s)
         return np.array([y * (-1.0) ** i for i in range(joints)])
 
     shapes = {
@@ -427,14 +430,14 @@ def _told(rig: OwnRig, names: list[str], trace: Trace) -> dict[str, Any]:
     check_told_apart(replays, slopes)
     # what is left by the true machine is noise and counts, without errors by steps
     slopes = dataclasses.replace(slopes, residuals=noise)
-    J = np.concatenate(slopes.freed(slopes.by_values))
-    r = np.concatenate(slopes.freed(slopes.residuals))
-    solved = slopes.stepped(-np.linalg.lstsq(J, r, rcond=None)[0])
+    J = slopes.freed_slopes
+    solved = slopes.stepped(-least_squares(J, slopes.freed_residuals))
     errors, correlations, _ = statistics(replays, solved, np.zeros(len(names)))
     singular = np.linalg.svd(J / np.linalg.norm(J, axis=0), compute_uv=False)
     apart = correlations - np.eye(len(names))
     i, j = np.unravel_index(np.argmax(np.abs(apart)), apart.shape)
-    worst = (names[i], names[j] if len(names) > 1 else "", float(apart[i, j]))
+    other = names[j] if len(names) > 1 else ""
+    worst = (names[i], other, float(apart[i, j]))
     condition = float(singular[0] / max(singular[-1], 1e-300))
     for name, error in errors.items():
         if math.isnan(error):
@@ -461,4 +464,6 @@ def _of_run(replays: Replays, rig: OwnRig, trace: Trace) -> tuple[Array, list[Ar
 
 def _rest(v: Array) -> float:
     """Return the share of samples at which every joint is slow, of speeds (K, n)."""
-    return float(np.mean(np.all(np.abs(v) <= SLOW * np.abs(v).max(axis=0), axis=1)))
+    speeds = np.abs(v)
+    slow = speeds <= SLOW * speeds.max(axis=0)
+    return float(np.mean(np.all(slow, axis=1)))

@@ -24,6 +24,7 @@ from smc_mujoco.identification.inverse_dynamics import (
     Filter,
     cubic_samples,
 )
+from smc_mujoco.identification.least_squares import least_squares
 from smc_mujoco.identification.own_rig import OwnRig
 from smc_mujoco.identification.paths import DELAY, MAX_DELAY, slope, steady_force
 from smc_mujoco.identification.records import Columns, Record, stacked, step_of
@@ -161,7 +162,8 @@ def _solved(A: Array, b: Array) -> Array:
     sizes = np.linalg.norm(A, axis=0)
     used = sizes > 1e-9 * max(sizes.max(initial=0.0), 1e-300)
     found = np.zeros(A.shape[1])
-    found[used] = np.linalg.lstsq(A[:, used] / sizes[used], b, rcond=1e-6)[0] / sizes[used]
+    scales = sizes[used]
+    found[used] = least_squares(A[:, used] / scales, b, 1e-6) / scales
     return found
 
 
@@ -225,7 +227,8 @@ def forces(rig: OwnRig, record: Record, delays: Sequence[float]) -> Forces:
     for name in linear(rig):
         if name in rig.plant.parameters and "." not in name:
             step = SHIFT * abs(base[name]) or SHIFT
-            slopes.append(((inertial(base | {name: base[name] + step}) - plain) / step).ravel())
+            shifted = inertial(base | {name: base[name] + step})
+            slopes.append(((shifted - plain) / step).ravel())
         else:
             slopes.append(_column(rig, name, filtered, (x, v, a)).ravel())
     commands = []

@@ -11,6 +11,7 @@ import itertools
 import numpy as np
 
 from smc_mujoco.common.aliases import Array
+from smc_mujoco.identification.least_squares import least_squares
 from smc_mujoco.identification.replays import Point, Replays, Slopes, cost
 from smc_mujoco.identification.standard_errors import jackknife
 
@@ -83,8 +84,8 @@ def by_halving(replays: Replays, slopes: Slopes) -> Array:
     changed = []
     for half, full in zip(residuals, slopes.residuals, strict=True):
         changed.append(half - full)
-    J = np.concatenate(slopes.freed(slopes.by_values))
-    return 2.0 * np.abs(np.linalg.lstsq(J, np.concatenate(slopes.freed(changed)), rcond=None)[0])
+    move = least_squares(slopes.freed_slopes, np.concatenate(slopes.freed(changed)))
+    return 2.0 * np.abs(move)
 
 
 def accurate(replays: Replays, slopes: Slopes) -> tuple[Slopes, Array]:
@@ -174,8 +175,8 @@ def _variants(replays: Replays, slopes: Slopes, values: Array) -> list[Point]:
 
 def _moved(replays: Replays, slopes: Slopes, damping: float) -> Array:
     """Return the quantities after a damped Gauss-Newton step, within their ranges, (p,)."""
-    J = np.concatenate(slopes.freed(slopes.by_values))
-    r = np.concatenate(slopes.freed(slopes.residuals))
+    J = slopes.freed_slopes
+    r = slopes.freed_residuals
     values = slopes.point.values
     low = replays.low
     high = replays.high
@@ -184,7 +185,7 @@ def _moved(replays: Replays, slopes: Slopes, damping: float) -> Array:
     A = J.T @ J
     A[np.diag_indices_from(A)] *= 1.0 + damping
     step = np.zeros(len(values))
-    step[inside] = np.linalg.lstsq(A[np.ix_(inside, inside)], descent[inside], rcond=1e-14)[0]
+    step[inside] = least_squares(A[np.ix_(inside, inside)], descent[inside], 1e-14)
     moved = values + step
     positive = (low >= 0.0) & (values > NEGLIGIBLE_VALUE)
     moved = np.where(positive, np.clip(moved, values / MAX_FACTOR, values * MAX_FACTOR), moved)

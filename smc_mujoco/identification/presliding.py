@@ -19,6 +19,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.data import frozen_data
+from smc_mujoco.identification.least_squares import least_squares
 from smc_mujoco.identification.own_rig import RUN_STEP, OwnRig
 from smc_mujoco.identification.replays import Replays, Slopes
 from smc_mujoco.identification.rig import Values
@@ -71,8 +72,8 @@ def presliding(replays: Replays, slopes: Slopes) -> Presliding:
         return none
     if not all(part.drives for part in rig.base.actuator):  # rotors beside joints
         return none
-    J = np.concatenate(slopes.freed(slopes.by_values))
-    r = np.concatenate(slopes.freed(slopes.residuals))
+    J = slopes.freed_slopes
+    r = slopes.freed_residuals
     best, least = none, float(np.linalg.norm(r))
     reported = REPORTED * least
     trial = copy.copy(replays)
@@ -86,9 +87,9 @@ def presliding(replays: Replays, slopes: Slopes) -> Presliding:
         for after, before in zip(residuals, holding, strict=True):
             changed.append(after - before)
         c = np.concatenate(slopes.freed(changed))
-        share = float(np.linalg.lstsq(np.column_stack([J, c]), -r, rcond=None)[0][-1])
+        *_, share = least_squares(np.column_stack([J, c]), -r).tolist()
         share = min(max(share, 0.0), 1.0)
-        moved = np.linalg.lstsq(J, share * c, rcond=None)[0]
+        moved = least_squares(J, share * c)
         left = float(np.linalg.norm(r + share * c - J @ moved))
         if left < least:
             best, least = Presliding(way if left < reported else "", np.abs(moved)), left

@@ -211,7 +211,8 @@ def checked(record: Data, columns: Columns, period: float | None, rig: str) -> R
             )
     step = _checked_step(t, period, rig)
     if period is None:
-        even = t[0] + step * np.arange(int((t[-1] - t[0]) / step + 1e-6) + 1)
+        last = int((t[-1] - t[0]) / step + 1e-6)
+        even = t[0] + step * np.arange(last + 1)
         for name, values in data.items():
             data[name] = np.interp(even, t, values)
     for name, offset in zip(columns.x, columns.offset, strict=False):

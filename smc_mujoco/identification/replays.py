@@ -28,6 +28,7 @@ from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioWarning
 from smc_mujoco.identification import inverse_dynamics, records
+from smc_mujoco.identification.least_squares import least_squares
 from smc_mujoco.identification.records import Record
 from smc_mujoco.identification.rig import Quantity, RecordPart, Rig
 from smc_mujoco.simulation.run import run
@@ -92,8 +93,18 @@ class Slopes:
         pairs = zip(self.by_states, rows, strict=True)
         freed = []
         for S, row in pairs:
-            freed.append(row - S @ np.linalg.lstsq(S, row, rcond=SINGULAR_RATIO)[0])
+            freed.append(row - S @ least_squares(S, row, SINGULAR_RATIO))
         return freed
+
+    @property
+    def freed_slopes(self) -> Array:
+        """The derivatives by the quantities, `freed`, of all pieces, (all N, p)."""
+        return np.concatenate(self.freed(self.by_values))
+
+    @property
+    def freed_residuals(self) -> Array:
+        """The residuals, `freed`, of all pieces, (all N,)."""
+        return np.concatenate(self.freed(self.residuals))
 
     def moves(self, step: Array) -> Array:
         """Return the moves of each piece's states, (pieces, s), that suit a step of the quantities
@@ -101,7 +112,7 @@ class Slopes:
         """
         moves = []
         for r, J, S in zip(self.residuals, self.by_values, self.by_states, strict=True):
-            moves.append(-np.linalg.lstsq(S, r + J @ step, rcond=SINGULAR_RATIO)[0])
+            moves.append(-least_squares(S, r + J @ step, SINGULAR_RATIO))
         return np.array(moves)
 
     def stepped(self, step: Array) -> "Slopes":
@@ -161,10 +172,17 @@ class Replays:
         self.closed = closed
         self.report = report
         self.whole = whole or closed or not twin.window
-        self.known = known = [twin.quantities[name] for name in names]
-        self.scales = np.array(list(map(_scale, known)))
-        self.low = np.array([quantity.least for quantity in known]) / self.scales
-        self.high = np.array([quantity.most for quantity in known]) / self.scales
+        self.known = []
+        low = []
+        high = []
+        for name in names:
+            quantity = twin.quantities[name]
+            self.known.append(quantity)
+            low.append(quantity.least)
+            high.append(quantity.most)
+        self.scales = np.array(list(map(_scale, self.known)))
+        self.low = np.array(low) / self.scales
+        self.high = np.array(high) / self.scales
         n = len(twin.columns.x)
         self.free = np.arange(2 * n)
         if closed:  # the controller has read the first positions as they were measured

@@ -23,6 +23,7 @@ from smc_mujoco.common.data import attributes
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import as_path, write_json
 from smc_mujoco.identification import number_text, records
+from smc_mujoco.identification.least_squares import least_squares
 from smc_mujoco.mechanisms.hardware.stribeck import Stribeck
 from smc_mujoco.simulation.conditions import Condition, condition
 
@@ -288,7 +289,7 @@ def _solved(terms: tuple[str, ...], v: Array, force: Array, speed: float) -> Arr
     free = list(range(len(terms)))
     while True:
         numbers = np.zeros(len(terms))
-        numbers[free] = np.linalg.lstsq(columns[:, free], force, rcond=None)[0]
+        numbers[free] = least_squares(columns[:, free], force)
         negative = []
         for i in free:
             if terms[i] in NATURAL and numbers[i] < 0.0:
@@ -396,7 +397,7 @@ def _covariance(
     losses = np.zeros(BLOCKS)
     for b, block in enumerate(np.array_split(np.arange(len(v)), BLOCKS)):
         own, left = slopes[block], residual[block]
-        moved[b] = -np.linalg.lstsq(whole - own.T @ own, own.T @ left, rcond=None)[0]
+        moved[b] = -least_squares(whole - own.T @ own, own.T @ left)
         losses[b] = np.mean((left - own @ moved[b]) ** 2)
     moved -= moved.mean(axis=0)
     by_blocks = (BLOCKS - 1) / BLOCKS * moved.T @ moved

@@ -24,6 +24,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.identification import records
+from smc_mujoco.identification.least_squares import least_squares
 from smc_mujoco.identification.replays import Point, Replays, Slopes
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.signals import Noise
@@ -50,15 +51,17 @@ def statistics(
     cause, in their scales, (p,).
     """
     names = replays.names
-    J = np.concatenate(slopes.freed(slopes.by_values))
+    J = slopes.freed_slopes
     covariance = jackknife(slopes)
     deviation = np.sqrt(np.diag(covariance))
     count = independent(slopes)
     with np.errstate(all="ignore"):
         correlations = np.nan_to_num(covariance / np.outer(deviation, deviation))
     deviation = np.maximum(deviation, by_correlation(slopes, J, count))
-    deviation = np.maximum(deviation, between(slopes, list(range(len(slopes.residuals)))))
-    deviation = np.maximum(deviation, between(slopes, [piece.record for piece in replays.pieces]))
+    by_piece = list(range(len(slopes.residuals)))
+    by_record = [piece.record for piece in replays.pieces]
+    deviation = np.maximum(deviation, between(slopes, by_piece))
+    deviation = np.maximum(deviation, between(slopes, by_record))
     if replays.closed:
         deviation = np.maximum(deviation, _fed_back(replays, slopes.point, J))
     deviation = np.hypot(deviation, by_model)
@@ -69,7 +72,7 @@ def statistics(
 def check_told_apart(replays: Replays, slopes: Slopes) -> None:
     """Raise ScenarioError where nothing depends on a quantity, or two cannot be told apart."""
     names = replays.names
-    J = np.concatenate(slopes.freed(slopes.by_values))
+    J = slopes.freed_slopes
     sizes = np.linalg.norm(J, axis=0)
     for name, size in zip(names, sizes, strict=True):
         if size == 0.0:
@@ -103,7 +106,8 @@ def between(slopes: Slopes, groups: Sequence[int]) -> Array:
         every[group] = every[group][0] + A, every[group][1] + g
     if len(every) < 2:
         return np.zeros(p)
-    sizes, vectors = np.linalg.eigh(np.sum([A for A, _ in every.values()], axis=0))
+    whole = np.sum([A for A, _ in every.values()], axis=0)
+    sizes, vectors = np.linalg.eigh(whole)
     whiten = vectors / np.sqrt(np.maximum(sizes, SINGULAR_RATIO**2 * sizes[-1]))
     variance = np.zeros(p)
     for A, g in every.values():
@@ -120,17 +124,23 @@ def jackknife(slopes: Slopes) -> Array:
     """
     pieces = list(zip(slopes.residuals, slopes.by_values, slopes.by_states, strict=True))
     parts = -(-_blocks(slopes) // len(pieces))
-    normal = [_normal(*piece) for piece in pieces]
-    A = sum(piece_A for piece_A, _ in normal)
-    g = sum(piece_g for _, piece_g in normal)
+    p = slopes.by_values[0].shape[1]
+    A = np.zeros((p, p))
+    g = np.zeros(p)
+    normal = []
+    for piece in pieces:
+        piece_A, piece_g = _normal(*piece)
+        A = A + piece_A
+        g = g + piece_g
+        normal.append((piece_A, piece_g))
     moves = []
     for (r, J, S), (piece_A, piece_g) in zip(pieces, normal, strict=True):
         block = np.arange(len(r)) * parts // len(r)
         for b in range(parts):
             rest = block != b
             left_A, left_g = _normal(r[rest], J[rest], S[rest])
-            moves.append(np.linalg.lstsq(A - piece_A + left_A, g - piece_g + left_g, rcond=None)[0])
-    moved = np.array(moves) - np.linalg.lstsq(A, g, rcond=None)[0]
+            moves.append(least_squares(A - piece_A + left_A, g - piece_g + left_g))
+    moved = np.array(moves) - least_squares(A, g)
     return (len(moved) - 1) / len(moved) * moved.T @ moved
 
 
@@ -169,7 +179,7 @@ def _normal(r: Array, J: Array, S: Array) -> tuple[Array, Array]:
     """Return J'J and J'r of a piece, (p, p) and (p,), with J less what states S at its start can
     cause.
     """
-    J = J - S @ np.linalg.lstsq(S, J, rcond=SINGULAR_RATIO)[0]
+    J = J - S @ least_squares(S, J, SINGULAR_RATIO)
     return J.T @ J, J.T @ r
 
 
@@ -201,7 +211,7 @@ def _fed_back(replays: Replays, point: Point, J: Array) -> Array:
     expected, *repeats = rows
     moves = []
     for repeat in repeats:
-        moves.append(np.linalg.lstsq(J, repeat - expected, rcond=None)[0])
+        moves.append(least_squares(J, repeat - expected))
     moved = np.array(moves)
     replays.report(1)
     return np.sqrt(np.mean(moved**2, axis=0))

@@ -206,8 +206,12 @@ def rise_time(trace: Trace) -> float:
         part = next((p for p in parts if e[p.start, i] != 0), None)
         if part is not None:
             done = 1 - e[part, i] / e[part.start, i]
-            low, high = (np.flatnonzero(done >= level) for level in RISE_LEVELS)
-            times.append(float(t[part][high[0]] - t[part][low[0]]) if high.size else np.inf)
+            low, high = RISE_LEVELS
+            if np.any(done >= high):
+                begun = t[part][np.argmax(done >= low)]
+                times.append(float(t[part][np.argmax(done >= high)] - begun))
+            else:
+                times.append(np.inf)
     return max(times)
 
 

@@ -81,7 +81,7 @@ def limit_cycle(t: Array, s: Array) -> Pair:
         s, np.full(window, 1.0 / window), "valid"
     )
     ranges = np.ptp(sliding_window_view(fast, window + 1), axis=1)
-    early, late = (float(np.median(part)) for part in np.array_split(ranges, 2))
+    early, late = map(np.median, np.array_split(ranges, 2))
     largest = max(early, late)
     if largest <= 2.0 * ROUNDING * np.abs(s).max() or abs(late - early) > MAX_CHANGE * largest:
         return NO_CYCLE
@@ -173,8 +173,7 @@ def _refined(rates: Array, peak: int) -> float:
     half = len(rates) // 2
     turns = np.exp(-2j * math.pi * peak / len(rates) * np.arange(2 * half))
     window = _window(half)
-    early, late = ((rates[at : at + half] * turns[at : at + half]) @ window for at in (0, half))
-    turned = float(np.angle(late * np.conj(early))) / (
-        2.0 * math.pi
-    )  # turns in half of the samples
-    return peak + turned * len(rates) / half
+    early = (rates[:half] * turns[:half]) @ window
+    late = (rates[half : 2 * half] * turns[half:]) @ window
+    turn = float(np.angle(late * np.conj(early))) / (2.0 * math.pi)  # in half of the samples
+    return peak + turn * len(rates) / half

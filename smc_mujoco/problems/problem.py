@@ -319,10 +319,10 @@ def cells(version: int) -> list[str]:
     for plant, fields in of["more"].items():
         conditions[plant] = fields["conditions"]
     listed = []
-    for plant, of_plant in conditions.items():
-        listed.extend(f"{plant}/{condition}" for condition in of_plant)
-    for plant in plants:
-        listed.extend(f"{plant}/{condition}" for condition in _attacks(version))
+    attacks = dict.fromkeys(plants, _attacks(version))
+    for plant, of_plant in (*conditions.items(), *attacks.items()):
+        for condition in of_plant:
+            listed.append(f"{plant}/{condition}")
     return listed
 
 

@@ -309,12 +309,20 @@ class Change:
     @property
     def worse(self) -> list[str]:
         """The problems on which the median became larger."""
-        return [cell for cell, ratio in self.ratios.items() if ratio > 1.0 + CHANGE]
+        cells = []
+        for cell, ratio in self.ratios.items():
+            if ratio > 1.0 + CHANGE:
+                cells.append(cell)
+        return cells
 
     @property
     def better(self) -> list[str]:
         """The problems on which the median became smaller."""
-        return [cell for cell, ratio in self.ratios.items() if ratio < 1.0 / (1.0 + CHANGE)]
+        cells = []
+        for cell, ratio in self.ratios.items():
+            if ratio < 1.0 / (1.0 + CHANGE):
+                cells.append(cell)
+        return cells
 
     def __str__(self) -> str:
         line = f"{self.entry}, {TITLES[self.question].lower()}: {len(self.worse)} worse, "

@@ -76,10 +76,11 @@ class Advice(Tables):
         if all(board.too_few for board in boards):
             return f"first so far; {boards[0].too_few}"
         name = self.law.name
-        blocks = sum(len(board.blocks) for board in boards)
+        blocks = 0
         wins = 0
         losses = 0
         for board in boards:
+            blocks += len(board.blocks)
             wins += len(board.wins(name))
             losses += len(board.losses(name))
         text = f"it wins {wins} of {blocks} comparisons, and another law wins {losses}"
@@ -92,7 +93,9 @@ class Advice(Tables):
         """The tables of the `leaderboard`, with the answer below the last."""
         *others, last = self.leaderboard.tables
         notes = [*last.notes, ""]
-        if rare := sorted(self.settles.keys() - {law.name for law in self.laws}):
+        compared = {law.name for law in self.laws}
+        rare = sorted(self.settles.keys() - compared)
+        if rare:
             notes.append(
                 "Not compared, as they settle in fewer than half as many runs as another law: "
                 f"{', '.join(rare)}"
@@ -212,7 +215,9 @@ class RaceAdvice(Advice):
         if rare:
             return f"not reliably: in {joined(rare)}"
         runs = next(iter(found.values()))[1]
-        least = min(done for done, _ in found.values())
+        least = runs
+        for done, _ in found.values():
+            least = min(least, done)
         share = f"all {runs}" if least == runs else f"at least {least} of {runs}"
         return f"in {share} unseen runs in {_each(len(found))}"
 

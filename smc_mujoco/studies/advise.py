@@ -71,24 +71,30 @@ def advise(
         shown = raced.running[:1] if len(raced.running) == 1 else [*raced.first, _next(raced)]
     chosen, tuned = _chosen(trial, plant, raced, shown[:SHOWN], goal)
     fixed = _fixed(trial, plant, chosen, goal, relevant)
-    candidates = {plant.name: [Candidate(law, (law,)) for law in chosen.values()]}
+    candidates = []
+    for law in chosen.values():
+        candidates.append(Candidate(law, (law,)))
     made = clock.seeds(seeds, len(chosen) * table_work, margins_work)
-    table = trial.run(candidates, made, half_steps=False)
+    table = trial.run({plant.name: candidates}, made, half_steps=False)
     settled = _settled(table)
     least = {}
     for law in chosen:
-        least[law] = min(n / of for n, of in settled[law].values())
+        fine = []
+        for n, of in settled[law].values():
+            fine.append(n / of)
+        least[law] = min(fine)
     order = in_order(least, fixed, raced.winner)
     boards = leaderboard(table, metrics, defaults=True, relevant=relevant)
     if not boards:
         raise ScenarioError(f"no need has a number in any run on {plant.name}: ask for others")
-    first = chosen[order[0]]
+    ordered = tuple(chosen[law] for law in order)
+    first = ordered[0]
     weighs = shares(plant, first, goal, CHOOSING, trial.threads)
     margins, untried = _margins(trial, plant, first, clock)
     return RaceAdvice(
         table=table,
         leaderboard=boards,
-        laws=tuple(chosen[law] for law in order),
+        laws=ordered,
         settles=least,
         race=raced,
         fixed=fixed,

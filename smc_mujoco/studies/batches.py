@@ -74,14 +74,15 @@ def compute_elsewhere(
     """Have the workers of an Executor run batches. They send back result columns, not traces."""
     calls = []
     for batch in batches:
-        scenarios = [prepared.scenario for prepared in batch]
+        scenarios = []
         keys = []
-        for s in scenarios:
-            keys.append(run_key.key(s, plants=plants))
+        for prepared in batch:
+            scenarios.append(prepared.scenario)
+            keys.append(run_key.key(prepared.scenario, plants=plants))
         calls.append((scenarios, keys))
     for i, columns in workers.called(executor, scored, calls):
         finish(batches[i], columns)
-        report(sum(prepared.scenario.work for prepared in batches[i]))
+        report(sum(scenario.work for scenario in calls[i][0]))
 
 
 def scored(scenarios: Sequence[Scenario], keys: Sequence[str]) -> list[ResultColumns]:

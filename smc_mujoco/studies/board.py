@@ -208,7 +208,11 @@ class Board(Tables):
 
         With several blocks there may be none.
         """
-        return tuple(entry.law for entry in self.entries if entry.rank.best)
+        best = []
+        for entry in self.entries:
+            if entry.rank.best:
+                best.append(entry.law)
+        return tuple(best)
 
     @property
     def winner(self) -> str | None:
@@ -487,7 +491,9 @@ class Boards(Tables, list[Board]):
             groups.setdefault(board.about, []).append(board)
         if not groups:
             return [Tabular(headings=["no boards: no metric applies"], rows=[])]
-        made = [_table(name, boards) for name, boards in groups.items()]
+        made = []
+        for name, boards in groups.items():
+            made.append(_table(name, boards))
         notes = *made[-1].notes, *self.remarks, key(self, repr(made))
         return [*made[:-1], dataclasses.replace(made[-1], notes=notes)]
 
@@ -545,7 +551,9 @@ def _table(name: str, boards: Sequence[Board]) -> Tabular:
     largest = max(boards, key=lambda board: len(board.blocks))
     if len(largest.blocks) == 1:
         name = f"{largest.group['plant']}, {largest.blocks[0].condition}"
-    samples = "; ".join(dict.fromkeys(block.sample for block in largest.blocks))
+    samples = {}
+    for block in largest.blocks:
+        samples[block.sample] = None
     words = str([*itertools.chain(*cells.values())])
     under = []
     for word, text in UNDER.items():
@@ -556,7 +564,7 @@ def _table(name: str, boards: Sequence[Board]) -> Tabular:
     return Tabular(
         headings=["law", *map(heading, boards)],
         rows=rows,
-        title=f"{name}: {samples}",
+        title=f"{name}: {'; '.join(samples)}",
         notes=_verdicts(boards),
         under=under,
     )

@@ -82,7 +82,9 @@ class Compared(Tables):
         """
         found: dict[str, dict[str, Law]] = {}
         for plant, candidates in self.candidates.items():
-            found[plant] = {candidate.law.name: candidate.law for candidate in candidates}
+            found[plant] = {}
+            for law, *_ in candidates:
+                found[plant][law.name] = law
         return found
 
     @cached_property
@@ -233,8 +235,10 @@ class Compared(Tables):
     @property
     def _metrics(self) -> list[str]:
         """The metrics compared, without J."""
-        compared = dict.fromkeys(board.metric for board in self.leaderboard)
-        compared.pop(paired_runs.OBJECTIVE, None)
+        compared = {}
+        for board in self.leaderboard:
+            if board.metric != paired_runs.OBJECTIVE:
+                compared[board.metric] = None
         return [*compared]
 
     def plot(
@@ -387,7 +391,7 @@ def compare(
     _leave_out_failed(holdout, table)
     sources = {}
     for p in holdout:
-        sources[p] = {c.law.name: (c.law.source,) for c in candidates[p]}
+        sources[p] = {law.name: (law.source,) for law, *_ in candidates[p]}
     boards[:0] = objective_boards(holdout, sources, defaults, relevant)
     return Compared(
         table=table,
@@ -435,7 +439,7 @@ def _worst_cases(
     found: dict[str, dict[str, WorstCase]] = {}
     for plant in trial.plants:
         found[plant.name] = {}
-        for law in (candidate.law for candidate in candidates[plant.name]):
+        for law, *_ in candidates[plant.name]:
             run = case(plant, law, "nominal", duration or DURATION, starts=trial.starts)
             found[plant.name][law.name] = trial.attack(f"{plant.name}-{law.name}", run, within)
     return found
@@ -450,7 +454,7 @@ def _times(
     found: dict[str, dict[str, LawTime]] = {}
     for plant in trial.plants:
         found[plant.name] = {}
-        for law in (candidate.law for candidate in candidates[plant.name]):
+        for law, *_ in candidates[plant.name]:
             if time := law_time(trial.case(plant, law, trial.conditions[0])):
                 found[plant.name][law.name] = time
     return found
@@ -459,10 +463,12 @@ def _times(
 def _usual(plant: Plant) -> list[Any]:
     """Return the laws to compare on a plant if none are given."""
     known = []
+    tuned = []
     for name in gain_sets.COMPARED:
         if suits(catalogue()[name], plant):
             known.append(name)
-    tuned = [name for name in known if gain_sets.in_set(plant, name, "tuned")]
+            if gain_sets.in_set(plant, name, "tuned"):
+                tuned.append(name)
     if known:
         return tuned or known
     left_out = {"none", *gain_sets.ALIASES}  # aliases have the gains of laws that are there already

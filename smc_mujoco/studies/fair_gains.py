@@ -261,7 +261,8 @@ class Trial(NamedTuple):
         """Return how the gains of the other laws are searched: as those of the package, from the
         same starts, if some laws have these.
         """
-        shipped = source.SHIPPED in {one.law.source.kind for one in known if one}
+        kinds = [one.law.source.kind for one in known if one]
+        shipped = source.SHIPPED in kinds
         if self.quick and not shipped:
             return GainRule(self.asked_goal(plant), quick_search.BUDGET, True)
         return GainRule(self._goal(plant, None if shipped else self.starts), self.budget, False)
@@ -442,7 +443,7 @@ class Trial(NamedTuple):
 
         def load(path: Path) -> tuple[np.ndarray, ...]:
             with np.load(path) as parts:
-                return tuple(parts[name] for name in parts.files)
+                return tuple(parts.values())
 
         return cached(
             self.folder / "unseen" / f"{plant.name}-{candidate.law.name}.npz",

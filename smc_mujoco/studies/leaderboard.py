@@ -82,8 +82,10 @@ def leaderboard(
     """
     if isinstance(metrics, str) or not items_of("metrics", metrics):
         raise ScenarioError(f"metrics is {shown(metrics)}: give names, such as ('itae', 'tv_rate')")
+    known = dict(UNITS)
+    del known[OBJECTIVE]
     for name in metrics:
-        find("metric", name, {known: unit for known, unit in UNITS.items() if known != OBJECTIVE})
+        find("metric", name, known)
     paired_runs.check_table(table)
     boards = Boards()
     boards.failures = paired_runs.failures(table)
@@ -133,11 +135,13 @@ def _boards_of(
     Winners are corrected for all of them.
     """
     by_row = paired_runs.by_row(table, metric)
-    scores = [each.group.scores(by_row) for each in ranked]
+    scores = []
     compared = {}
-    for i, of_group in enumerate(scores):
+    for i, each in enumerate(ranked):
+        of_group = each.group.scores(by_row)
+        scores.append(of_group)
         if of_group.blocks:
-            compared[i] = _compared(of_group, ranked[i].ran, metric, relevant)
+            compared[i] = _compared(of_group, each.ran, metric, relevant)
     corrected([*compared.values()])
     family = _family(compared.values())
     boards = {}
@@ -224,7 +228,9 @@ def _board(
 ) -> Board:
     """Return the board of a comparison, whose winners are corrected for `family` blocks."""
     blocks = []
+    of_blocks = []
     for at, k in enumerate(scores.blocks):
+        of_blocks.append(ran[k])
         floor = paired_runs.floor_words(ran[k], metric)
         if floor and len(scores.blocks) > 1:
             floor += f" under {group.blocks[k][1]}"
@@ -233,7 +239,7 @@ def _board(
     return Board(
         group=group.name,
         metric=metric,
-        unit=_unit(metric, [ran[k] for k in scores.blocks]),
+        unit=_unit(metric, of_blocks),
         entries=_entries(comparison, scores.sets, sources),
         blocks=tuple(blocks),
         family=family,
@@ -245,7 +251,12 @@ def _board(
 
 def _unit(metric: str, ran: Sequence[Scenario | None]) -> str:
     """Return the unit of a metric, with that of u where it is the same voltage in all blocks."""
-    efforts = {"" if not one or one.force_command else one.efforts[0] for one in ran}
+    efforts = set()
+    for one in ran:
+        if not one or one.force_command:
+            efforts.add("")
+        else:
+            efforts.add(one.efforts[0])
     effort = efforts.pop()
     if efforts or not effort:
         return UNITS[metric]
@@ -257,10 +268,15 @@ def _compared(
     scores: Scores, ran: Sequence[Scenario | None], metric: str, relevant: float
 ) -> Comparison:
     """Compare the scores of laws in a metric; `ran` has a scenario of each block of the group."""
-    scenarios = [ran[k] for k in scores.blocks]
+    floors = []
+    of_first_order = []
+    for k in scores.blocks:
+        scenario = ran[k]
+        floors.append(paired_runs.floor(scenario, metric))
+        of_first_order.append(scenario is not None and first_order(scenario))
     return Comparison(
         scores.values,
-        [paired_runs.floor(scenario, metric) for scenario in scenarios],
+        floors,
         shares=metric == SETTLES,
         outcomes=scores.outcomes,
         sets=scores.sets,
@@ -268,7 +284,7 @@ def _compared(
         halves=scores.halves,
         trends=scores.trends,
         arrived=scores.arrived,
-        first_order=[scenario is not None and first_order(scenario) for scenario in scenarios],
+        first_order=of_first_order,
     )
 
 

@@ -138,8 +138,8 @@ def race(
 
     The folder of the trial keeps each search. Sets that it has are taken even if the time is over.
     """
-    running = {one.law.name: one for one in entrants}
-    everyone = dict(running)
+    everyone = {one.law.name: one for one in entrants}
+    running = dict(everyone)
     dropped: dict[str, float] = {}
     comparison = None
     rounds: list[float] = []  # s that a law took in each
@@ -193,7 +193,9 @@ def hopeless(J: Mapping[str, Sequence[float]]) -> dict[str, float]:
     is more than FAR. Two laws stay.
     """
     lead = min(map(max, J.values()))
-    shares = {law: min(values) / lead for law, values in J.items()}
+    shares = {}
+    for law, values in J.items():
+        shares[law] = min(values) / lead
     order = sorted(shares, key=lambda law: (shares[law], law))
     return {law: shares[law] for law in order[2:] if shares[law] > FAR}
 
@@ -219,10 +221,10 @@ def judged(running: Mapping[str, Entrant], goal: Objective, relevant: float) -> 
     numbers = {}
     fine = {}
     for name, one in running.items():
-        J = list(filter(None, one.J))
-        values[name] = np.array([unseen.value for unseen in J])
-        halves[name] = np.array([unseen.half for unseen in J])
-        numbers[name] = np.arange(len(J)) % one.count
+        whole, halved = zip(*filter(None, one.J), strict=True)
+        values[name] = np.array(whole)
+        halves[name] = np.array(halved)
+        numbers[name] = np.arange(len(whole)) % one.count
         fine[name] = values[name] < FAILURE_COST
     return compared(values, goal, halves, numbers, fine, relevant, looks=len(LOOKS))
 
@@ -277,11 +279,15 @@ def _searched(
     trial: Trial, pieces: Sequence[tuple[Entrant, int, int]]
 ) -> Iterator[tuple[Entrant, SearchResult]]:
     """Yield the search k of each entrant, of a draw, in order, as the folder keeps it."""
-    files = [_file(trial, *piece) for piece in pieces]
-    found = [file.read() for file in files]
+    files = []
+    found = []
     missing = []
-    for i, file in enumerate(files):
-        if found[i] is None:
+    for i, piece in enumerate(pieces):
+        file = _file(trial, *piece)
+        made = file.read()
+        files.append(file)
+        found.append(made)
+        if made is None:
             missing.append(i)
             writable(file.path)
     if missing and trial.executor is not None:

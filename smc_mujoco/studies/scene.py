@@ -91,7 +91,10 @@ class Outcome:
     def _kept(self, wanted: Callable[[str, Trace], bool]) -> "Outcome":
         kept = {}
         for name, runs in self.traces.items():
-            kept[name] = {label: run for label, run in runs.items() if wanted(label, run)}
+            kept[name] = {}
+            for label, run in runs.items():
+                if wanted(label, run):
+                    kept[name][label] = run
         return Outcome(traces=kept)
 
     def values(self, measure: Measure) -> dict[str, dict[str, float]]:

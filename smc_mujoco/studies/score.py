@@ -83,7 +83,7 @@ def score(
                 )
         rows = []
         for case, (values, failed) in zip(chunk, scored.scored(chunk), strict=True):
-            numbers = [value if failed is None else None for value in values]
+            numbers = values if failed is None else (None,) * len(values)
             about = case.plant.name, case.law.name, case.condition, case.seed
             rows.append(dict(zip(columns, (*about, *numbers, failed), strict=True)))
         tables.append(pa.Table.from_pylist(rows, schema))

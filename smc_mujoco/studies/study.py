@@ -31,7 +31,7 @@ from smc_mujoco.common.files import reading, to_json
 from smc_mujoco.common.progress import counter
 from smc_mujoco.control.gain_sets import COMPARED
 from smc_mujoco.control.law import checked_name
-from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import run_key
 from smc_mujoco.simulation.conditions import DURATION, PLANTS
 from smc_mujoco.simulation.run import cores
@@ -63,7 +63,8 @@ class Store:
     def __init__(self, out: Path):
         self.parts = out / "parts"
         self.results = out / "results.parquet"
-        self.schema = tables.schema({"scores": fingerprint.of(tuple(m.formula for m in metrics()))})
+        formulas = tuple(metric.formula for metric in CATALOGUE.values())
+        self.schema = tables.schema({"scores": fingerprint.of(formulas)})
         self.where: dict[
             str, tuple[Path, int]
         ] = {}  # hash of a finished run -> its part, and its row in it
@@ -98,7 +99,8 @@ class Store:
             / f"{hashlib.sha256(''.join(sorted(hashes)).encode()).hexdigest()[:32]}.parquet"
         )
         tables.write(path, self.schema, [pa.Table.from_pylist(list(rows), schema=self.schema)])
-        self.where.update((name, (path, i)) for i, name in enumerate(hashes))
+        for i, name in enumerate(hashes):
+            self.where[name] = path, i
 
     def rows(self, names: Iterable[str]) -> Iterator[Fields]:
         """Yield the rows of finished runs, part by part."""
@@ -307,11 +309,10 @@ def _repeated(
 
 def _half_step_scores(repeated: Mapping[str, tuple[str, Scenario]], store: Store) -> dict[str, str]:
     """Return hash -> the scores of the repeated run as JSON; {} for one that failed."""
-    names = ["arrived", *(metric.name for metric in metrics())]
     scores = {}
     for row in store.rows({half for half, _ in repeated.values()}):
         values = {}
-        for name in names:
+        for name in ("arrived", *CATALOGUE):
             if row[name] is not None:
                 values[name] = row[name]
         scores[row["hash"]] = to_json(values)

@@ -37,7 +37,7 @@ from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import MAX_RATIO, MAX_UNPACKED, from_json, reading, replacing, to_json
 from smc_mujoco.common.text import counted, number
-from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import scenario_json
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
@@ -76,10 +76,11 @@ def schema(metadata: Mapping[str, str]) -> "pa.Schema":
         "int64": pa.int64(),
         "float64": pa.float64(),
     }
-    columns = RUN_COLUMNS | {m.name: "float64" for m in metrics()} | RESULT_COLUMNS
-    return pa.schema(
-        [(name, kinds[kind]) for name, kind in columns.items()], metadata=dict(metadata)
-    )
+    columns = RUN_COLUMNS | dict.fromkeys(CATALOGUE, "float64") | RESULT_COLUMNS
+    fields = {}
+    for name, kind in columns.items():
+        fields[name] = kinds[kind]
+    return pa.schema(fields, metadata=dict(metadata))
 
 
 def content(rows: "pa.Table") -> bytes:

@@ -144,7 +144,7 @@ def which(
     boards = leaderboard(table.select(law=fit), compared, defaults=defaults, relevant=relevant)
     if not boards:
         raise ScenarioError(f"no need has a number in any run on {machine.name}: ask for others")
-    found = {law.name: law for law, _, _ in candidates[machine.name]}
+    found = {law.name: law for law, *_ in candidates[machine.name]}
     ordered = tuple(found[name] for name in boards.order)
     return Advice(table=table, leaderboard=boards, laws=ordered, settles=settles)
 

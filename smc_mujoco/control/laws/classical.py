@@ -15,7 +15,10 @@ from smc_mujoco.control.units import FORCE, SLOPE, Gain
     finite_time="s",
     accuracy=1,
     admits={"d": lambda g: g.k},
-    gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": SLOPE},
+    gains={
+        "k": Gain(4.0, FORCE, nonnegative=True),
+        "c": SLOPE,
+    },
     short="CL",
     colour="#E69F00",
 )

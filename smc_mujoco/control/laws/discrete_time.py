@@ -22,7 +22,10 @@ from smc_mujoco.control.units import FORCE, SLOPE, Gain
     finite_time="s",
     accuracy=2,
     label="Discrete-time",
-    gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": SLOPE},
+    gains={
+        "k": Gain(4.0, FORCE, nonnegative=True),
+        "c": SLOPE,
+    },
     memory=3,
 )
 def discrete_time(y, gains, memory):

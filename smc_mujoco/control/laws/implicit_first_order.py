@@ -23,7 +23,11 @@ from smc_mujoco.control.units import AHEAD_B, FORCE, SLOPE, Gain
     accuracy=1,
     admits={"d": lambda g: g.k},
     label="Implicit first-order",
-    gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": SLOPE, "b": AHEAD_B},
+    gains={
+        "k": Gain(4.0, FORCE, nonnegative=True),
+        "c": SLOPE,
+        "b": AHEAD_B,
+    },
 )
 def implicit_first_order(y, gains, memory):
     s, v_eq = sliding(y, gains.c)

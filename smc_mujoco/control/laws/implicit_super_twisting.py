@@ -27,7 +27,10 @@ from smc_mujoco.control.units import AHEAD_B, REACHED, SUPER_TWISTING
     finite_time="s",
     accuracy=1,
     label="Implicit super-twisting",
-    gains={**SUPER_TWISTING, "b": AHEAD_B},
+    gains={
+        **SUPER_TWISTING,
+        "b": AHEAD_B,
+    },
     memory=1,
     conditions=REACHED,
 )

@@ -22,7 +22,10 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
     finite_time="e",
     accuracy=3,
     label="Nested third-order",
-    gains={"a": Gain(5.0, FORCE, positive=True), "w": Gain(2.0, RATE, positive=True)},
+    gains={
+        "a": Gain(5.0, FORCE, positive=True),
+        "w": Gain(2.0, RATE, positive=True),
+    },
     memory=1,
     relative_degree=3,
 )

@@ -17,7 +17,10 @@ from smc_mujoco.control.units import FORCE, SPEED_PER_ROOT, Gain
     family="higher-order",
     finite_time="e",
     accuracy=2,
-    gains={"a": Gain(5.0, FORCE, positive=True), "b": Gain(2.0, SPEED_PER_ROOT, positive=True)},
+    gains={
+        "a": Gain(5.0, FORCE, positive=True),
+        "b": Gain(2.0, SPEED_PER_ROOT, positive=True),
+    },
     memory=1,
     relative_degree=2,
     conditions={"a > b^2/2": lambda g: g.a > g.b**2 / 2.0},

@@ -26,7 +26,10 @@ from smc_mujoco.control.units import AHEAD_B, REACHED, SUPER_TWISTING
     finite_time="s",
     accuracy=2,
     label="Proper super-twisting",
-    gains={**SUPER_TWISTING, "b": AHEAD_B},
+    gains={
+        **SUPER_TWISTING,
+        "b": AHEAD_B,
+    },
     memory=1,
     conditions=REACHED,
 )

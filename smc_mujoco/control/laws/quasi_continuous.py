@@ -30,7 +30,10 @@ def brakes(gains):
     finite_time="e",
     accuracy=2,
     label="Quasi-continuous",
-    gains={"a": Gain(6.0, FORCE, positive=True), "b": Gain(1.0, SPEED_PER_ROOT, positive=True)},
+    gains={
+        "a": Gain(6.0, FORCE, positive=True),
+        "b": Gain(1.0, SPEED_PER_ROOT, positive=True),
+    },
     memory=1,
     relative_degree=2,
     conditions={"a (r - b) / (r + b) > r^2/2 for some r > b": brakes},

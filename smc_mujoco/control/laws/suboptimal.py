@@ -19,7 +19,10 @@ from smc_mujoco.control.units import FORCE, Gain
     family="higher-order",
     finite_time="e",
     accuracy=2,
-    gains={"r1": Gain(4.0, FORCE, positive=True), "r2": Gain(1.5, FORCE, positive=True)},
+    gains={
+        "r1": Gain(4.0, FORCE, positive=True),
+        "r2": Gain(1.5, FORCE, positive=True),
+    },
     memory=3,
     relative_degree=2,
     conditions={"r1 > r2": lambda g: g.r1 > g.r2},

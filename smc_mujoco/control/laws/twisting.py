@@ -18,7 +18,10 @@ from smc_mujoco.control.units import FORCE, Gain
     finite_time="e",
     accuracy=2,
     admits={"d": lambda g: min(g.r1 - g.r2, g.r2)},
-    gains={"r1": Gain(3.7, FORCE, positive=True), "r2": Gain(2.3, FORCE, positive=True)},
+    gains={
+        "r1": Gain(3.7, FORCE, positive=True),
+        "r2": Gain(2.3, FORCE, positive=True),
+    },
     memory=1,
     relative_degree=2,
     conditions={"r1 > r2": lambda g: g.r1 > g.r2},

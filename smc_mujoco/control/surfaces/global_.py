@@ -14,7 +14,11 @@ from smc_mujoco.control.units import RATE, Gain
 
 
 @surface_function(
-    gains={"c": Gain(2.5, RATE, positive=True), "q": Gain(1.5, RATE, positive=True)}, memory=3
+    gains={
+        "c": Gain(2.5, RATE, positive=True),
+        "q": Gain(1.5, RATE, positive=True),
+    },
+    memory=3,
 )
 def global_(y, gains, memory):
     linear = y.de + gains.c * y.e

@@ -17,7 +17,11 @@ from smc_mujoco.control.units import RATE, RATE2, Gain
 
 
 @surface_function(
-    gains={"k1": Gain(6.25, RATE2, positive=True), "k2": Gain(5.0, RATE, positive=True)}, memory=1
+    gains={
+        "k1": Gain(6.25, RATE2, positive=True),
+        "k2": Gain(5.0, RATE, positive=True),
+    },
+    memory=1,
 )
 def higher_order(y, gains, memory):
     v_eq = -gains.k2 * y.de - gains.k1 * y.e

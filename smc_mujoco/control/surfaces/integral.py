@@ -14,7 +14,11 @@ from smc_mujoco.control.units import RATE, RATE2, Gain
 
 
 @surface_function(
-    gains={"k1": Gain(2.25, RATE2, positive=True), "k2": Gain(3.0, RATE, positive=True)}, memory=3
+    gains={
+        "k1": Gain(2.25, RATE2, positive=True),
+        "k2": Gain(3.0, RATE, positive=True),
+    },
+    memory=3,
 )
 def integral(y, gains, memory):
     if memory[0] == 0.0:  # the first sample

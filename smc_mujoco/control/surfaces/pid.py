@@ -13,7 +13,11 @@ from smc_mujoco.control.units import RATE, RATE2, Gain
 
 
 @surface_function(
-    gains={"kp": Gain(3.0, RATE, positive=True), "ki": Gain(2.0, RATE2, positive=True)}, memory=1
+    gains={
+        "kp": Gain(3.0, RATE, positive=True),
+        "ki": Gain(2.0, RATE2, positive=True),
+    },
+    memory=1,
 )
 def pid(y, gains, memory):
     s = y.de + gains.kp * y.e + gains.ki * memory[0]
