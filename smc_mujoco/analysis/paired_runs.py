@@ -5,7 +5,7 @@ which every law ran.
 import contextlib
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -356,9 +356,47 @@ def sources(table: RunColumns, rows: Array) -> dict[str, tuple[Source, ...]]:
     return by_law
 
 
+class Least(NamedTuple):
+    """The smallest values that matter in a problem, of what the units of metrics are made of."""
+
+    share: float  # eps
+    period: float  # of control, s
+    duration: float  # s
+    start: float  # X0, rad or m
+    error: float  # rad or m, throughout a run
+    seen: float  # rad or m, at one time of its last part, as the sensor gives it
+    u: float
+
+
+# A metric's unit -> its floor
+FLOORS: dict[str, Callable[[Least], float]] = {
+    "s": lambda q: q.period,
+    "{x}": lambda q: q.seen,
+    "%": lambda q: 100.0 * q.seen / q.start if q.start else 0.0,
+    "{x} s": lambda q: q.error * q.duration,
+    "{x} s^2": lambda q: q.error * q.duration**2 / 2,
+    "({x})^2 s": lambda q: q.error**2 * q.duration,
+    "{u}": lambda q: q.u,
+    "{u}/s": lambda q: q.u,
+    "({u})^2 s": lambda q: q.u**2 * q.duration,
+    "{force}": lambda q: q.u,
+    "1": lambda q: q.share,
+    "1/s": lambda q: 1 / q.duration,
+    "Hz": lambda q: 1 / q.duration,
+}
+
+
+def without_floor(metric: str) -> str:
+    """Return a sentence if no floor is known for a metric because of its unit; else ""."""
+    entry = CATALOGUE.get(metric)
+    if entry is None or entry.unit in FLOORS:
+        return ""
+    return f"no floor is known for a metric in {entry.unit!r}, so any difference counts"
+
+
 def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
     """Return q, the smallest value of a metric that matters in a problem, whatever the law; 0 where
-    it is not known.
+    it is not known, see `without_floor`.
 
     With X0 the largest |x0| of a driven channel, of a free body from its rest, and T the duration
     it is, for
@@ -374,33 +412,29 @@ def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
     if scenario is None or metric == SETTLES:
         return 0.0
     entry = CATALOGUE[metric]
-    T = scenario.duration
+    if entry.unit not in FLOORS:
+        return 0.0
     off = np.abs(np.subtract(scenario.resolved.x0, scenario.plant.origin))
-    start = 0.0  # X0
+    start = 0.0
     counts = 0.0
     for group in channel_groups(scenario):
         if group.driven:
             start = max(start, float(off[list(group.channels)].max()))
             counts = max(counts, resolution(scenario, group))
-    least = eps * start
-    seen = max(least, counts)
-    u = MIN_COMMAND_SHARE * max(filter(math.isfinite, scenario.limits), default=0.0)
-    by_unit = {
-        "s": scenario.control_period,
-        "{x}": seen if entry.late else least,
-        "%": 100.0 * seen / start if start else 0.0,
-        "{x} s": least * T,
-        "{x} s^2": least * T**2 / 2,
-        "({x})^2 s": least**2 * T,
-        "{u}": u,
-        "{u}/s": u,
-        "({u})^2 s": u**2 * T,
-        "{force}": u,
-        "1": eps,
-        "1/s": 1 / T,
-        "Hz": 1 / T,
-    }
-    return by_unit.get(entry.unit, 0.0)
+    error = eps * start
+    seen = max(error, counts)
+    if entry.unit == "{x}" and not entry.late:
+        seen = error
+    least = Least(
+        share=eps,
+        period=scenario.control_period,
+        duration=scenario.duration,
+        start=start,
+        error=error,
+        seen=seen,
+        u=MIN_COMMAND_SHARE * max(filter(math.isfinite, scenario.limits), default=0.0),
+    )
+    return FLOORS[entry.unit](least)
 
 
 def floor_words(scenario: Scenario | None, metric: str) -> str:

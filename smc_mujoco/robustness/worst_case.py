@@ -226,7 +226,8 @@ def worst_case(
         physics steps.
       seed: of the random members and of the search.
       threads, progress: as in `run`. The result does not depend on threads.
-      device: of the fast engine, "cpu", or "cuda" for any number of runs.
+      device: of the fast engine, "cpu", or "cuda" for any number of runs. On "cuda" MuJoCo Warp
+        runs the random members of your own machine, if there are many.
 
     Returns:
       A `WorstCase`: the worst run, its score, and those of random members of the class.
@@ -244,7 +245,7 @@ def worst_case(
     members = Members(scenarios, within)
     work = 2 * budget * scenario.work
     formulas = {metric: entry.formula, "rms_error": CATALOGUE["rms_error"].formula}
-    fast = ScoredRuns(formulas, device, threads, worth_compiling(work), by_group=True)
+    fast = ScoredRuns(formulas, device, threads, worth_compiling(work), by_group=True, worlds=True)
     words = f"worst case of {scenario.law.name} on {scenario.plant.name}"
     with bar(words, work, shown=progress) as drawn:
         drawing = WorstCaseSearch(members, entry, budget, fast, drawn.advance)

@@ -41,6 +41,7 @@ from smc_mujoco.simulation.signals import Relay
 from smc_mujoco.simulation.trace import Trace
 
 BATCH_MEMBERS = 16  # run at once; chosen
+DRAWN_MEMBERS = 1024  # random members that are run at once, after the first BATCH_MEMBERS; chosen
 # in a batch: of the worst member, then of the worst of each other origin; chosen
 CHANGES_PER_PARENT = 7, 4, 3, 2
 MAX_CORNERS = 16
@@ -108,11 +109,13 @@ class WorstCaseSearch:
 
     def draw(self, rng: np.random.Generator) -> None:
         """Run random members only, a whole budget of them."""
-        for left in range(self.budget, 0, -BATCH_MEMBERS):
+        at_once = BATCH_MEMBERS  # which may tell the frequency at which the loop swings
+        while self.runs < self.budget:
             cases = []
-            for _ in range(min(left, BATCH_MEMBERS)):
+            for _ in range(min(self.budget - self.runs, at_once)):
                 cases.append(Case(self.members.random(rng)))
             self.run(cases)
+            at_once = DRAWN_MEMBERS
 
     def search(self, rng: np.random.Generator, known: Sequence[TriedMember]) -> None:
         """Try the strategies, beginning with members that were run before."""

@@ -9,7 +9,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from smc_mujoco.analysis.bootstrap import LEVEL, MIN_INTERVAL_SAMPLES, Interval
-from smc_mujoco.analysis.paired_runs import MIN_COMMAND_SHARE, OBJECTIVE, SETTLES
+from smc_mujoco.analysis.paired_runs import (
+    MIN_COMMAND_SHARE,
+    OBJECTIVE,
+    SETTLES,
+    without_floor,
+)
 from smc_mujoco.analysis.ranking import LEVEL_SHARE, Effect, Rank, needed_to_rank, needed_to_win
 from smc_mujoco.analysis.step_halving import APART, RANGE, UNTRIED
 from smc_mujoco.common.aliases import Names, Numbers, Pair
@@ -267,7 +272,7 @@ class Board(Tables):
     @property
     def result(self) -> str:
         """The winner and its least lead; else where laws win and lose; else why none wins. Then
-        which laws are not ranked.
+        which laws are not ranked, and that no floor is known where it is not.
         """
         if self.winner or any(map(self.wins, self._laws)):
             text = self._won
@@ -275,7 +280,7 @@ class Board(Tables):
             text = f"no winner; {self._why}"
         if self.few and not self.too_few:
             text += f"; {self._not_ranked}"
-        return text
+        return "; ".join(filter(None, (text, without_floor(self.metric))))
 
     @property
     def _laws(self) -> list[str]:

@@ -1,12 +1,15 @@
 """MuJoCo Warp's worlds against MuJoCo: on its processor device, and what it is asked to run."""
 
+import dataclasses
 import importlib.util
 import sys
+import types
 
 import numpy as np
 import pytest
 from analysis.test_engine_worlds import CONDITIONS, PLANTS
 from helpers import mujoco_worlds
+from helpers.machines import PENDULUM
 
 import smc_mujoco as smc
 from smc_mujoco.analysis import engine
@@ -14,6 +17,7 @@ from smc_mujoco.analysis.engine import choice, worlds
 from smc_mujoco.analysis.engine.form import FAILURE, SCORES
 from smc_mujoco.analysis.engine.group import FormGroup
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns
+from smc_mujoco.identification import ensemble
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.simulation import state
 
@@ -115,7 +119,9 @@ def test_a_model_that_mujoco_warp_cannot_run_is_told():
 
 @pytest.fixture
 def on_card(monkeypatch):
-    """Worlds are MuJoCo's, and a few are worth a card."""
+    """Worlds are MuJoCo's, a few are worth a card, and there is a card."""
+    card = types.SimpleNamespace(check_device=lambda: None)
+    monkeypatch.setattr(engine, "gpu", card, raising=False)
     monkeypatch.setattr(choice, "_of_model", lambda scenario: "")
     monkeypatch.setattr(worlds.WorldGroup, "least", 3)
 
@@ -154,6 +160,29 @@ def test_a_map_of_an_own_machine_is_made_in_worlds(on_card, monkeypatch):
     assert found.outcome.tolist() == expected.outcome.tolist()
     assert "MuJoCo repeated 4 states, 0" in found.checked
     assert expected.checked == ""
+
+
+def test_random_members_of_a_worst_case_are_run_in_worlds(on_card):
+    base = smc.Scenario(plant=hinge(), law=smc.law("pid"), duration=0.1)
+    within = smc.Uncertainty(disturbance=0.5, parameters={"m": (0.7, 1.3)})
+    found = smc.worst_case(base, within=within, budget=24, device="cuda")
+    expected = smc.worst_case(base, within=within, budget=24)
+    assert found.value == expected.value
+    assert found.scenario == expected.scenario
+    assert found.median == pytest.approx(expected.median, rel=1e-12)
+    assert "MuJoCo repeated 20 runs: 0 failed" in found.checked
+
+
+def test_parameter_sets_of_an_identified_machine_are_worlds_of_one_model(on_card):
+    def machine(values):
+        return {"plant": hinge(), "mismatch": {"m": values.inertia / 0.1635}}
+
+    rig = dataclasses.replace(PENDULUM, machine=machine)
+    cases = ensemble.runs(rig, ["pid"], seeds=2, duration=0.1, starts=smc.starts(0.3))
+    table = smc.score(cases, metrics=("itae",), device="cuda")
+    expected = smc.score(cases, metrics=("itae",))
+    np.testing.assert_allclose(table.column("itae"), expected.column("itae"), rtol=1e-12)
+    assert "MuJoCo made" not in str(table)
 
 
 def test_the_plant_decides_which_engine_runs_it(on_card):

@@ -11,9 +11,10 @@ import sys
 import typing
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pytest
+import typer
 from helpers import annexes, machines
 from helpers.arguments import reported
 from helpers.words import words
@@ -111,7 +112,7 @@ def parameters(command: Callable) -> dict[str, tuple[inspect.Parameter, Any]]:
     found = {}
     every = inspect.signature(command).parameters
     for one in [one for name, one in every.items() if name != "ctx"]:
-        (info,) = one.annotation.__metadata__
+        info = one.annotation.__metadata__[0]
         given = []
         for word in (info.default, *(info.param_decls or ())):
             if isinstance(word, str):
@@ -125,33 +126,42 @@ def parameters(command: Callable) -> dict[str, tuple[inspect.Parameter, Any]]:
     return found
 
 
-def number_of(one: inspect.Parameter, info: Any) -> str:
-    """Return a number that an option takes and that is not its default; "" if it takes none."""
+def value_of(one: inspect.Parameter, info: Any) -> str:
+    """Return a value that an option takes and that is not its default; "" for a file or a flag.
+
+    A text of a form of its own stands in the option's type, behind what typer is told:
+    Annotated[str, typer.Option(...), "m=2"].
+    """
     kind = one.annotation.__origin__
-    if not {int, float} & {kind, *typing.get_args(kind)}:
-        return ""
-    return str(max(info.min or 0, one.default or 0) + 1)
+    kinds = {kind, *typing.get_args(kind)}
+    if {int, float} & kinds:
+        return str(max(info.min or 0, one.default or 0) + 1)
+    if str in kinds:
+        return next(iter(one.annotation.__metadata__[1:]), "word")
+    return ""
 
 
-def with_numbers(calls: dict[str, list[str]]) -> dict[str, list[str]]:
-    """Return the calls; the longest of each command also has the numbers that none of them has, so
-    that such an option needs no word here.
+def with_values(calls: dict[str, list[str]]) -> dict[str, list[str]]:
+    """Return the calls; the longest of each command also has the numbers and texts that none of
+    them has, so that such an option needs no word here.
     """
     found = dict(calls)
     for name, (_, command) in COMMANDS.items():
         lines = sorted((line for line in calls if line.split()[0] == name), key=len)
-        tried = set(" ".join(lines).split())
+        tried = set()
+        for word in " ".join(lines).split():
+            tried.add(word.partition("=")[0])
         more = []
         for names, (one, info) in parameters(command).items():
-            number = number_of(one, info)
-            if number and names.startswith("-") and not tried & {*names.split("/")}:
-                more += [names, number]
+            value = value_of(one, info)
+            if value and names.startswith("-") and not tried & {*names.split("/")}:
+                more += [names, value]
         if lines and more:
             found[" ".join([lines[-1], *more])] = found.pop(lines[-1])
     return found
 
 
-CALLS = with_numbers(CALLS)
+CALLS = with_values(CALLS)
 
 PRINTED = [  # command lines that are run to their ends
     "list --needs continuous,one-gain --json l.json",
@@ -360,6 +370,21 @@ def test_a_device_without_its_package_is_refused_before_the_work(line, monkeypat
     assert end.value.code == 2
     assert "numba_cuda" in (told := capsys.readouterr().err)
     assert told.endswith("pip install 'smc-mujoco[gpu]'\n")
+
+
+def test_an_option_of_a_number_or_a_text_needs_no_value_here():
+    def command(
+        count: Annotated[int, typer.Option(min=3)] = 0,
+        label: Annotated[str, typer.Option()] = "",
+        masses: Annotated[str | None, typer.Option("--mass"), "m=2"] = None,
+        out: Annotated[Path | None, typer.Option()] = None,
+    ):
+        pass
+
+    found = {}
+    for names, (one, info) in parameters(command).items():
+        found[names] = value_of(one, info)
+    assert found == {"--count": "4", "--label": "word", "--mass": "m=2", "--out": ""}
 
 
 def test_the_calls_above_have_every_option_of_their_commands():

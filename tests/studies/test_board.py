@@ -17,6 +17,7 @@ from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.ranking import Effect
 from smc_mujoco.common.tabular import TEX, plain
 from smc_mujoco.draw import dot_plot
+from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies.board import Board, Boards, Lead, size, spread
 from smc_mujoco.studies.leaderboard import leaderboard
 
@@ -281,6 +282,16 @@ def test_each_group_has_a_table_with_its_units_and_its_sample():
         assert (board.winner is None) == ("no winner;" in board.result)
     assert "no boards" in Boards()._repr_html_()
     assert Boards().to_latex() == ""
+
+
+def test_a_metric_in_a_unit_without_a_floor_says_so(monkeypatch):
+    told = "no floor is known for a metric in 'W', so any difference counts"
+    (board,) = leaderboard(made(), ["itae"])
+    assert told not in board.result
+    entry = dataclasses.replace(CATALOGUE["itae"], unit="W")
+    monkeypatch.setitem(CATALOGUE, "itae", entry)
+    (board,) = leaderboard(made(), ["itae"])
+    assert board.result.endswith(told)
 
 
 def test_latex_has_no_letter_that_an_engine_may_not_know():
