@@ -429,7 +429,7 @@ def _stuck(trace: Trace) -> dict[str, Array]:
     """
     scenario = trace.scenario
     plant = scenario.plant
-    if trace.held is not None or trace.x.shape[1] != plant.n:
+    if trace.held is not None or trace.x.shape[1] != plant.n or not scenario.friction:
         return {}
     bends = {}
     jump = scenario.jump_sample

@@ -77,12 +77,7 @@ def advise(
     made = clock.seeds(seeds, len(chosen) * table_work, margins_work)
     table = trial.run({plant.name: candidates}, made, half_steps=False)
     settled = _settled(table)
-    least = {}
-    for law in chosen:
-        fine = []
-        for n, of in settled[law].values():
-            fine.append(n / of)
-        least[law] = min(fine)
+    least = {law: _least_share(settled[law]) for law in chosen}
     order = in_order(least, fixed, raced.winner)
     boards = leaderboard(table, metrics, defaults=True, relevant=relevant)
     if not boards:
@@ -108,6 +103,14 @@ def advise(
         left_out=left_out,
         judged=f"over {joined([one.name for one in goal.conditions])} on {plant.name}",
     )
+
+
+def _least_share(settled: Mapping[str, tuple[int, int]]) -> float:
+    """Return the least share of a condition's runs that settle, of (settled, all) by condition."""
+    shares = []
+    for count, of in settled.values():
+        shares.append(count / of)
+    return min(shares)
 
 
 def _next(raced: Race) -> str:
