@@ -90,7 +90,8 @@ class Space:
         for constant in members.constants:
             add(constant.name, *constant.bounds, constant.unit, constant)
         if members.forced:
-            add("disturbance", 0.0, within.disturbance, scenario.plant.efforts[0])
+            forces = dict.fromkeys(scenario.plant.efforts[: scenario.plant.driven])
+            add("disturbance", 0.0, within.disturbance, " or ".join(forces))
         if within.position_noise:
             add("noise", 0.0, within.position_noise, unit)
         elif within.velocity_noise:

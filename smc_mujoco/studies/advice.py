@@ -251,11 +251,14 @@ class RaceAdvice(Advice):
     def tables(self) -> list[Tabular]:
         """J of the laws' sets of gains; the needs by condition, of the gains in the answer."""
         shown = [self._objectives]
+        found = self.settled[self.law.name]
+        runs = next(iter(found.values()))[1]
+        plant = self.worst_run.plant.name
+        title = f"{plant} under {joined([*found])}: {counted(runs, 'seed')}"
         for table in self.leaderboard.tables:
             rows = [list(map(_unmarked, row)) for row in table.rows]
-            shown.append(dataclasses.replace(table, rows=rows, notes=()))
+            shown.append(dataclasses.replace(table, rows=rows, notes=(), title=title))
         notes = self.leaderboard.remarks
-        runs = next(iter(self.settled[self.law.name].values()))[1]
         if runs < self.seeds:
             notes.append(
                 f"{runs} runs of a law in each condition, as the time left was too short for "

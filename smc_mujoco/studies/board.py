@@ -454,6 +454,8 @@ class Boards(Tables, list[Board]):
     commands: Sequence[str] = ()
     failures: Sequence[str] = ()
     untouched: Sequence[str] = ()
+    # why metrics have no board, shown if none has
+    absent: Sequence[str] = ()
 
     @property
     def remarks(self) -> list[str]:
@@ -495,7 +497,7 @@ class Boards(Tables, list[Board]):
         for board in self:
             groups.setdefault(board.about, []).append(board)
         if not groups:
-            return [Tabular(headings=["no boards: no metric applies"], rows=[])]
+            return [Tabular(headings=["no boards: no metric applies"], rows=[], notes=self.absent)]
         made = []
         for name, boards in groups.items():
             made.append(_table(name, boards))

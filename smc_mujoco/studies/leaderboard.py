@@ -30,6 +30,7 @@ from smc_mujoco.analysis.step_halving import first_order, repeats_all
 from smc_mujoco.common.aliases import Array, Names
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.control.source import DEFAULT, Source
+from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.board import Block, Board, BoardEntry, Boards, Lead
 
@@ -102,7 +103,19 @@ def leaderboard(
         for made in by_metric.values():
             if i in made:
                 boards.append(made[i])
+    boards.absent = _absent(metrics, ranked)
     return boards
+
+
+def _absent(metrics: Sequence[str], ranked: Sequence["RankedGroup"]) -> list[str]:
+    """Return why metrics have no single value in the runs of groups."""
+    reasons = []
+    for metric in metrics:
+        for one in ranked:
+            scenario = next(filter(None, one.ran), None)
+            if scenario and metric in CATALOGUE:
+                reasons.append(CATALOGUE[metric].refusal(scenario))
+    return list(dict.fromkeys(filter(None, reasons)))
 
 
 class RankedGroup(NamedTuple):

@@ -27,9 +27,10 @@ from smc_mujoco.control.properties import PROPERTIES, suitable
 from smc_mujoco.mechanisms.custom.scales import falls
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.metrics.catalogue import metric_of, metrics
+from smc_mujoco.metrics.catalogue import CATALOGUE, metric_of, metrics
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import Starts, listed, listed_laws
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.workers import Workers
 from smc_mujoco.studies.advice import Advice
 from smc_mujoco.studies.advise import advise
@@ -114,7 +115,7 @@ def which(
     machine = as_plant(plant)
     if not falling and (why := falls(machine)):
         raise ScenarioError(f"{why}; falling=True (--falling) goes on all the same")
-    compared, properties = _asked(machine, needs)
+    asked, properties = _asked(needs)
     chosen = _suited(machine, properties, laws)
     if minutes and machine.is_user_model and laws is None:
         chosen = [law for law in chosen if law.name in gain_sets.COMPARED] or chosen
@@ -134,6 +135,7 @@ def which(
         executor=executor,
     )
     trial.check({machine.name: chosen})
+    compared = _with_values(trial.case(machine, "none", trial.conditions[0]), asked)
     if minutes:
         clock = AnswerTime(began + 60.0 * minutes)
         return advise(trial, machine, chosen, compared, seeds or RACE_SEEDS, clock, relevant)
@@ -149,7 +151,7 @@ def which(
     return Advice(table=table, leaderboard=boards, laws=ordered, settles=settles)
 
 
-def _asked(plant: Plant, needs: str | Sequence[str]) -> tuple[list[str], list[str]]:
+def _asked(needs: str | Sequence[str]) -> tuple[list[str], list[str]]:
     """Return the metrics and the properties among the needs; without metrics, DEFAULT_NEEDS."""
     compared, properties = [], []
     given = needs.split(",") if isinstance(needs, str) else listed("needs", needs)
@@ -160,9 +162,17 @@ def _asked(plant: Plant, needs: str | Sequence[str]) -> tuple[list[str], list[st
             compared.append(NEEDS[name])
         else:
             properties.append(name)
-    for metric in compared:
-        metric_of(plant, metric)
     return compared or [NEEDS[name] for name in DEFAULT_NEEDS], properties
+
+
+def _with_values(run: Scenario, asked: Sequence[str]) -> list[str]:
+    """Return those of the default metrics that have one value in a run. Raise ScenarioError for
+    others that have none, as where motors have different units.
+    """
+    if list(asked) != [NEEDS[name] for name in DEFAULT_NEEDS]:
+        for metric in asked:
+            metric_of(run, metric)
+    return [metric for metric in asked if not CATALOGUE[metric].refusal(run)]
 
 
 def _suited(plant: Plant, properties: Sequence[str], laws: object) -> Laws:

@@ -21,6 +21,7 @@ from helpers import commands
 import smc_mujoco as smc
 from smc_mujoco.cli import console, main, tables
 from smc_mujoco.cli import run_scene as show
+from smc_mujoco.cli.commands import options
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
 from smc_mujoco.metrics.catalogue import metrics, score
@@ -624,3 +625,11 @@ def test_chatter_measures_in_runs_of_the_duration_that_it_is_given(duration, cal
     assert lasted == [duration]
     assert "0.1" in call(*line, 0.099)[2]
     assert lasted == [duration]
+
+
+def test_x0_is_one_number_or_one_for_each_channel():
+    assert options.starts(None) is None
+    assert options.starts("-0.3").x0 == (-0.3,)
+    assert options.starts("0.3,-0.2,1").x0 == (0.3, -0.2, 1.0)
+    with pytest.raises(smc.ScenarioError, match=r"--x0 is '0.3;1': give a number"):
+        options.starts("0.3;1")

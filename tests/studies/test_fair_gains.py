@@ -13,7 +13,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.tuning.objective import Objective
-from smc_mujoco.control.law import catalogue, law_function
+from smc_mujoco.control.law import catalogue, known_laws, law_function
 from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
 from smc_mujoco.simulation.conditions import NAMED, find_condition
 from smc_mujoco.studies import fair_gains
@@ -192,3 +192,15 @@ def test_j_on_unseen_runs_is_kept(tmp_path, monkeypatch):
     again = here.holdout(candidates, 3)["duffing"]
     for old, new in zip(first[:4], again[:4], strict=True):
         np.testing.assert_array_equal(old["observer_free"], new["observer_free"])
+
+
+def test_laws_that_cannot_see_what_nothing_drives_are_named_before_the_runs(tmp_path, capsys):
+    laws = [known_laws()[name] for name in ("pid", "hierarchical")]
+    for plant, told in (("cart_pole", ["pid"]), ("duffing", [])):
+        machine = smc.plant(plant)
+        trial = Trial.of(
+            [machine], "nominal", (), 1.0, tmp_path, starts=None, threads=1, progress=True
+        )
+        trial.check({plant: laws})
+        said = capsys.readouterr().err
+        assert [law.name for law in laws if law.name in said] == told

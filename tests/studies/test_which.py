@@ -177,6 +177,12 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     assert advice.worst_run.condition == "coulomb"
     assert len(advice.table) == 4 * len(advice.laws)
     text = str(advice)
+    assert "mass under coulomb: 4 seeds" in text
+    (left,) = advice.race.entrants.keys() - {*compared}
+    assert "Without" not in text  # of a law that was dropped a line below says so
+    kept = dataclasses.replace(advice, race=advice.race._replace(dropped={}))
+    words = " ".join(str(kept).split())
+    assert f"Without {left}: these runs are of the laws that may be the best." in words
     assert "too few" not in text
     assert "J over coulomb and noise on mass" in text
     assert "*" not in text
@@ -228,6 +234,26 @@ def test_a_law_that_does_not_settle_is_not_advised_without_saying_where(raced):
     lines = dict(line.split(": ", 1) for line in rare.answer)
     assert lines["Use"] == f"{name}, which does not settle reliably in every condition"
     assert lines["Settles"] == "not reliably: in 2 of 4 runs under coulomb"
+
+
+MIXED = """<mujoco model="mixed"><worldbody>
+<body><joint name="a" type="slide" axis="1 0 0"/><geom size=".1" mass="2" contype="0"/></body>
+<body pos="0 1 0"><joint name="b" type="slide" axis="1 0 0"/><geom size=".1" mass="2" contype="0"/>
+</body></worldbody><actuator><motor joint="a" ctrlrange="-9 9"/>
+<position joint="b" kp="50" kv="20" ctrlrange="-1 1"/></actuator></mujoco>"""
+
+
+def test_where_u_has_two_units_a_need_or_a_metric_of_u_says_so(tmp_path):
+    plant = smc.plant_from(MIXED, {"a": {}, "b": {"servo": True}})
+    given = {"laws": [smc.law("pid", kp=20.0, ki=1.0, kd=9.0)], "out": tmp_path, "seeds": 2}
+    given |= {"conditions": "nominal", "duration": 0.3}
+    why = "tv_rate has no one value where u is in N and m, as in mixed: take a metric of the error"
+    with pytest.raises(smc.ScenarioError, match=re.escape(why)):
+        smc.which(plant, needs=["accurate", "calm"], **given)
+    found = smc.which(plant, **given)  # the default needs that have a value
+    assert [board.metric for board in found.leaderboard] == ["settling_time", "ultimate_bound"]
+    compared = smc.compare(plants=[plant], metrics=["tv_rate"], tune=False, **given)
+    assert why in " ".join(str(compared).split())
 
 
 def test_the_page_has_the_numbers_of_the_code():

@@ -196,8 +196,13 @@ Executor = Annotated[
     ),
 ]
 X0 = Annotated[
-    float | None,
-    typer.Option("--x0", help="Initial position, rad or m; default: the plant's."),
+    str | None,
+    typer.Option(
+        "--x0",
+        metavar="FLOAT[,FLOAT...]",
+        help="Initial position, rad or m: one number for all channels, or one for each, such as "
+        "0.3,-0.2; default: the plant's.",
+    ),
 ]
 
 
@@ -334,11 +339,19 @@ def compared_laws(
     return laws(texts)
 
 
-def starts(x0: float | None) -> "Starts | None":
+def starts(x0: str | None) -> "Starts | None":
     """Return the initial states of the option --x0; None for each plant's own."""
     from smc_mujoco.simulation import grid
 
-    return None if x0 is None else grid.starts(x0)
+    if x0 is None:
+        return None
+    try:
+        values = [float(text) for text in x0.split(",")]
+    except ValueError:
+        raise ScenarioError(
+            f"--x0 is {x0!r}: give a number, or one for each channel, such as 0.3,-0.2"
+        ) from None
+    return grid.starts(values[0] if len(values) == 1 else values)
 
 
 def actuator(text: str) -> "tuple[Actuator, ...]":

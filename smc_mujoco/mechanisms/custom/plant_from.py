@@ -20,6 +20,7 @@ import base64
 import dataclasses
 import math
 import os
+import re
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -62,6 +63,8 @@ if TYPE_CHECKING:
 
 WITHOUT_MODEL = "give model='none' and a law that reads no model"
 SET_POINT = f"u is the set-point of a servo, and a nominal u is a force: {WITHOUT_MODEL}"
+EMPTY_NAMES = "scene", "model", "robot"  # of files, which say nothing about the machine
+UNNAMED_MODEL = "mujoco_model"  # MuJoCo's name of a model without one, as `_name` writes it
 # dynamics of an actuator whose state changes even at ctrl = 0
 DCMOTOR = mujoco.mjtDyn.mjDYN_DCMOTOR.value
 
@@ -223,7 +226,7 @@ def _plant(
     seen = own.measured_joints(label, model, pairs, measured)
     joints = [*joints_of(pairs), *seen]
     _check_names(label, model, keyframe, tip)
-    plant_name = _name(source.name) if name is None else name
+    plant_name = _name(source, title) if name is None else name
     units, special = _places(plant_name, model, joints, pairs, keyframe)
     if tip and special.get("base", -1) >= 0:
         raise ScenarioError(f"the base of {label} is measured: leave the tip out")
@@ -310,10 +313,20 @@ def _check_names(label: str, model: mujoco.MjModel, keyframe: str | None, tip: s
         mjcf.pick(label, "site", tip, sites)
 
 
-def _name(label: str) -> str:
-    """Return the name of the plant of a file, which is none of the library's."""
-    file = label.removesuffix(".xml")
-    return label if catalogue().taken(file) else file
+def _name(source: ModelSource, title: str) -> str:
+    """Return the name of the plant of a file, which is none of the library's: the file's, or that
+    of its model or its folder if the file's says nothing.
+    """
+    file = source.name.removesuffix(".xml")
+    if source.path and Path(file).stem.lower() in EMPTY_NAMES:
+        model = re.sub(r"[\W_]+", "_", title.lower().removesuffix("scene")).strip("_")
+        folder = Path(source.path).parent.name
+        file = next(filter(_says_something, (model, folder)), file)
+    return f"{file}.xml" if catalogue().taken(file) else file
+
+
+def _says_something(name: str) -> bool:
+    return name not in ("", UNNAMED_MODEL, *EMPTY_NAMES)
 
 
 def _places(

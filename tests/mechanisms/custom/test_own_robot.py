@@ -228,6 +228,22 @@ def test_a_missing_mesh_and_a_part_are_refused_with_cures_that_work(tmp_path, co
             smc.plant_from(tmp_path / "motor.xml", ["k"])
 
 
+@pytest.mark.parametrize(
+    ("model", "name"),
+    [("Arm X-2 scene", "arm_x_2"), ("scene", "big_arm"), ("", "big_arm"), (None, "big_arm")],
+)
+def test_a_file_whose_name_says_nothing_has_that_of_its_model_or_folder(tmp_path, model, name):
+    attribute = "" if model is None else f' model="{model}"'
+    text = f"""<mujoco{attribute}><worldbody><body><joint name="j"/><geom size=".1"/></body>
+    </worldbody><actuator><motor joint="j" ctrlrange="-1 1"/></actuator></mujoco>"""
+    folder = tmp_path / "big_arm"
+    folder.mkdir()
+    for file in ("scene.xml", "lift.xml"):
+        (folder / file).write_text(text)
+    assert smc.plant_from(folder / "scene.xml", ["j"]).name == name
+    assert smc.plant_from(folder / "lift.xml", ["j"]).name == "lift"
+
+
 def test_a_xacro_is_refused_with_its_command(folder):
     (folder / "arm.urdf.xacro").write_text(ARM)
     with pytest.raises(
