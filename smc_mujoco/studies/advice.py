@@ -11,6 +11,7 @@ from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import capital, counted, joined, number
 from smc_mujoco.control.component import Component, gains_text
+from smc_mujoco.metrics.conventions import leans
 from smc_mujoco.robustness.margins import Margin
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
@@ -19,6 +20,10 @@ from smc_mujoco.studies.board import MAX_LEAD, MEDIANS, Boards, Lead
 from smc_mujoco.studies.race import FIRST, LOOKS, Race, needed
 from smc_mujoco.studies.table import Table
 
+LEANS = (
+    "u stays at its bound in the worst run: it leans on something, or needs more force, so give "
+    "another goal or start, or a larger u_max if the motor gives more"
+)
 RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
 
 
@@ -213,7 +218,8 @@ class RaceAdvice(Advice):
             if done < RELIABLE * of:
                 rare.append(f"{done} of {of} runs under {name}")
         if rare:
-            return f"not reliably: in {joined(rare)}"
+            text = f"not reliably: in {joined(rare)}"
+            return f"{text}; {LEANS}" if leans(self.worst_trace) else text
         runs = next(iter(found.values()))[1]
         least = runs
         for done, _ in found.values():

@@ -234,6 +234,9 @@ def test_a_law_that_does_not_settle_is_not_advised_without_saying_where(raced):
     lines = dict(line.split(": ", 1) for line in rare.answer)
     assert lines["Use"] == f"{name}, which does not settle reliably in every condition"
     assert lines["Settles"] == "not reliably: in 2 of 4 runs under coulomb"
+    pushed = dataclasses.replace(advice.worst_run, disturbance=smc.Constant(20.0))  # u_max is 9
+    weak = dataclasses.replace(rare, worst_run=pushed)
+    assert weak._where.startswith(f"{lines['Settles']}; u stays at its bound in the worst run: ")
 
 
 MIXED = """<mujoco model="mixed"><worldbody>

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 FILMED = 0.1  # of the minutes, which are for the figure and the film; chosen
 # pictures a second of the film; the largest is enough to follow a run, the smallest to see it
 MAX_FPS, MIN_FPS = 15.0, 4.0
+TIMED = 5  # pictures by which a film's time is estimated; chosen
+MADE = 0.8  # of the time that is left, in which they must be made: then they are written; chosen
 
 Seed = Annotated[int, typer.Option(min=0, help="Seed of initial states, noise and phases.")]
 
@@ -156,10 +158,11 @@ def _film(advice: "RaceAdvice", out: Path, ends: float, terminal: Terminal) -> N
         pictures = iter(frames)
         next(pictures)
         first = time.monotonic()
-        next(pictures, None)
-        each = time.monotonic() - first
+        for _ in zip(range(TIMED), pictures, strict=False):
+            pass
+        each = (time.monotonic() - first) / TIMED
         pictures.close()
-        left = ends - time.monotonic() - (first - begun)
+        left = MADE * (ends - time.monotonic()) - (first - begun)
         fps = min(MAX_FPS, films.FPS * left / (each * len(frames)))
         if fps < MIN_FPS:
             terminal.note(

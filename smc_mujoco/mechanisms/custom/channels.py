@@ -63,7 +63,8 @@ class Channel:
         joint needs exactly one actuator: a motor.
       servo: whether u is the command of the file's actuator, which stays as it is. u is the
         set-point of a `<position>`, rad (m) from the joint's default goal, with its kp, kv, gear,
-        forcerange and ctrlrange, and without a nominal model; or the voltage of a `<dcmotor>`, V.
+        timeconst, forcerange and ctrlrange, and without a nominal model; or the voltage of a
+        `<dcmotor>`, V.
       set_point_step: the servo rounds its set-point to multiples of this, rad (m); 0: it does not.
       partner: a joint without an actuator that moves with this one, such as a pole on its cart. It
         is measured and scored as a separate channel, after the driven ones. The law of this channel

@@ -17,6 +17,7 @@ from smc_mujoco.mechanisms.hardware.position_servo import UNBOUNDED, PositionSer
 EQUAL = 1e-9  # relative: numbers of a file that should agree
 AFFINE = mujoco.mjtBias.mjBIAS_AFFINE.value
 FIXED = mujoco.mjtGain.mjGAIN_FIXED.value
+FILTERED = mujoco.mjtDyn.mjDYN_FILTEREXACT.value
 OF_DCMOTOR = mujoco.mjtGain.mjGAIN_DCMOTOR.value
 VOLTAGE = mujoco.mjtCtrlInput.mjINPUT_VOLTAGE.value
 
@@ -28,7 +29,10 @@ def not_kept(model: mujoco.MjModel, i: int) -> str:
     bias, stiffness, _ = model.actuator_biasprm[i, :3].tolist()
     if model.actuator_gaintype[i] != FIXED or model.actuator_biastype[i] != AFFINE or not stiffness:
         return no_motor(model, i) or "is a motor, whose command is a force"
-    if model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
+    if model.actuator_dyntype[i] == FILTERED:
+        if model.actuator_actlimited[i] or model.actuator_actearly[i]:
+            return "is a servo with a timeconst and with actlimited or actearly"
+    elif model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
         kind = mujoco.mjtDyn(model.actuator_dyntype[i]).name
         lag = kind.removeprefix("mjDYN_").lower()
         return f"is a servo with dynamics (dyntype {lag})"
@@ -74,6 +78,7 @@ def kept(model: mujoco.MjModel, i: int, goal: float, step: float) -> Actuator:
     if model.actuator_gaintype[i] == OF_DCMOTOR:
         return _dcmotor(model, i, gear)
     _, stiffness, damping = model.actuator_biasprm[i, :3].tolist()
+    filtered = model.actuator_dyntype[i] == FILTERED
     return PositionServo(
         kp=-gear * gear * stiffness,
         kv=-gear * gear * damping,
@@ -81,6 +86,7 @@ def kept(model: mujoco.MjModel, i: int, goal: float, step: float) -> Actuator:
         ctrlrange=_times(ctrlrange_of(model, i), 1.0 / gear),
         goal=goal,
         step=step,
+        timeconst=float(model.actuator_dynprm[i, 0]) if filtered else 0.0,
     )
 
 

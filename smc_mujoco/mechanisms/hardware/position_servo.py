@@ -8,7 +8,7 @@
 # pyright: reportIncompatibleVariableOverride=false
 # (a constant of the base class is a function or a property here)
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from typing import Annotated, Any
 
 import mujoco
@@ -25,8 +25,9 @@ from smc_mujoco.mechanisms.plant import Field
 
 Span = Annotated[Pair, Range(infinite=True)]
 UNBOUNDED = (-math.inf, math.inf)
-# Where the numbers lie in the compiled model, in actuator_gainprm and in actuator_biasprm
-STIFFNESS, BIAS = 0, slice(0, 3)
+# Where the numbers lie in the compiled model, in actuator_gainprm, actuator_biasprm and
+# actuator_dynprm
+STIFFNESS, BIAS, TIMECONST = 0, slice(0, 3), 0
 
 
 @frozen_data
@@ -38,7 +39,8 @@ class PositionServo(Actuator):
     MuJoCo computes the force kp (goal + u - x) - kv v at each stage of a step, as for the file's
     own `<position>`. The set-point is clipped to `ctrlrange`, the force to `forcerange`. u is 0 at
     the goal, so that one bound on |u| reaches equally far to both sides of it. An `input_delay`
-    delays only the set-point. A law has no nominal model of it.
+    delays only the set-point. Behind a `timeconst` MuJoCo filters the clipped set-point, from the
+    goal at the start. A law has no nominal model of it.
 
     Attributes:
       kp: N m/rad (N/m) at the joint, greater than 0.
@@ -47,6 +49,7 @@ class PositionServo(Actuator):
       ctrlrange: lowest and highest set-point, rad (m) of the joint.
       goal: position at which u is 0, rad (m) of the joint.
       step: the set-point is rounded to multiples of this, rad (m) of the joint; 0: it is not.
+      timeconst: of the first-order filter of the set-point, s; 0: none.
 
     Raises:
       ScenarioError: `forcerange` does not contain 0 between its ends. In a scenario: another drive
@@ -62,6 +65,7 @@ class PositionServo(Actuator):
     ctrlrange: Span = UNBOUNDED
     goal: Offset = 0.0
     step: Natural = 0.0
+    timeconst: Natural = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -71,6 +75,11 @@ class PositionServo(Actuator):
                 f"PositionServo's forcerange is {low:g} to {high:g}, but a servo pushes both "
                 "ways: give a lowest force below 0 and a highest above it"
             )
+
+    @property
+    def delay(self) -> float:
+        """The time constant of its set-point, s."""
+        return self.timeconst
 
     @property
     def meaning(self) -> str:
@@ -120,7 +129,7 @@ class PositionServo(Actuator):
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         for actuator in self.drives_of(spec):
-            actuator.set_to_position(kp=1.0)
+            actuator.set_to_position(kp=1.0, timeconst=1.0 if self.timeconst else 0.0)
             actuator.ctrllimited = True
             actuator.ctrlrange = (-1.0, 1.0)
             actuator.forcelimited = True
@@ -133,6 +142,11 @@ class PositionServo(Actuator):
         yield Field("actuator_biasprm", (ids, BIAS), (self.kp * self.goal, -self.kp, -self.kv))
         yield Field("actuator_ctrlrange", ids, (low - self.goal, high - self.goal))
         yield Field("actuator_forcerange", ids, self.forcerange)
+        if self.timeconst:
+            yield Field("actuator_dynprm", (ids, TIMECONST), self.timeconst)
+
+    def structure(self) -> tuple[Hashable, ...]:
+        return *super().structure(), bool(self.timeconst)
 
     def numbers(self, run: Run) -> list[Sequence[float]]:
         return [(self.goal, self.step)]

@@ -57,13 +57,15 @@ def run(**fields):
 
 @pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
 @pytest.mark.parametrize("late", [0, 2])
-def test_a_servo_moves_as_that_of_the_file_whose_ctrl_is_the_set_point(integrator, late):
+@pytest.mark.parametrize("timeconst", [0.0, 0.05])
+def test_a_servo_moves_as_that_of_the_file_whose_ctrl_is_the_set_point(integrator, late, timeconst):
     step = 0.01
+    xml = ARM.replace('kv="1.5"', f'kv="1.5" timeconst="{timeconst}"')
     channels = {
         "a": smc.Channel(servo=True, x0=0.5),
         "b": smc.Channel(servo=True, x0=-0.3, set_point_step=step),
     }
-    arm = smc.plant_from(ARM, channels, keyframe="home")
+    arm = smc.plant_from(xml, channels, keyframe="home")
     law = on_set_point(kp=0.7, ki=2.0)
     fields = {"reference": smc.Sine(0.6, 5.0), "control_period": 5e-3, "physics_step": 1e-3}
     trace = run(
@@ -75,11 +77,12 @@ def test_a_servo_moves_as_that_of_the_file_whose_ctrl_is_the_set_point(integrato
         **fields,
     )
     assert trace.failure is None
-    model = mujoco.MjModel.from_xml_string(ARM)
+    model = mujoco.MjModel.from_xml_string(xml)
     model.opt.timestep = 1e-3
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
     data = mujoco.MjData(model)
     data.qpos[:] = 0.5, -0.3
+    data.act[:] = -2.0 * 0.2  # the goal
     for k in range(len(trace.t) - 1):
         np.testing.assert_allclose(data.qpos, trace.x[k], rtol=0, atol=1e-12)
         u = trace.u[k - late] if k >= late else np.zeros(2)
@@ -130,7 +133,16 @@ def test_a_bound_and_a_goal_follow_from_the_file():
 FREE = '<position joint="j" kp="17.8"/>'
 REFUSED = {
     "a motor": ('<motor joint="j"/>', {}, ["is a motor", "leave servo out"]),
-    "a lag": ('<position joint="j" kp="9" timeconst=".1"/>', {}, ["dynamics", "filterexact"]),
+    "a lag": (
+        '<general joint="j" dyntype="filter" dynprm=".1" gainprm="9" biastype="affine" biasprm="0 -9"/>',
+        {},
+        ["dynamics (dyntype filter)"],
+    ),
+    "a bounded lag": (
+        '<position joint="j" kp="9" timeconst=".1" actlimited="true" actrange="-1 1"/>',
+        {},
+        ["actlimited"],
+    ),
     "a delay": ('<position joint="j" kp="9" delay=".02" nsample="10"/>', {}, ["delay of 0.02 s"]),
     "another gain": (
         '<general joint="j" gainprm="9" biastype="affine" biasprm="0 -8 0"/>',
