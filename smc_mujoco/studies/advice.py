@@ -113,7 +113,7 @@ class RaceAdvice(Advice):
     """Advice within minutes: laws that raced, those that may be best first, and which to use."""
 
     race: Race
-    # of `laws` with these gains, by J of the same unseen runs; None for one law
+    # of `laws` with these gains, by J of the same unseen runs; None for one law, or without time
     fixed: Comparison | None
     # law -> condition -> the numbers of its runs that settle, and of all
     settled: Mapping[str, Mapping[str, tuple[int, int]]]
@@ -140,6 +140,8 @@ class RaceAdvice(Advice):
             lines.append(f"However tuned: {self._however}")
         if self.fixed:
             lines.append(f"With these gains: {self._with_these}")
+        elif len(self.laws) > 1:
+            lines.append("With these gains: not tried, as the time was over")
         if len(self.weighs) > 1:
             lines.append(f"Its J: {self._weighs}")
         lines += [f"Settles: {self._where}", f"Tolerates: {self._margins}"]

@@ -70,7 +70,9 @@ def advise(
     if raced.winner:
         shown = raced.running[:1] if len(raced.running) == 1 else [*raced.first, _next(raced)]
     chosen, tuned = _chosen(trial, plant, raced, shown[:SHOWN], goal)
-    fixed = _fixed(trial, plant, chosen, goal, relevant)
+    fixed = None
+    if clock.left > 0.0:
+        fixed = _fixed(trial, plant, chosen, goal, relevant)
     candidates = []
     for law in chosen.values():
         candidates.append(Candidate(law, (law,)))
