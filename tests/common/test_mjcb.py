@@ -411,3 +411,14 @@ def test_a_law_that_clears_the_callback_fails_its_run(integrator):
     assert "took its control callback away" in (trace.failure or "")
     assert trace.diverged_at == 0.0  # of its slice
     assert np.isnan(trace.x).all()
+
+
+def test_a_run_reads_no_clock():
+    assert mjcb.no_clock()() == 0.0
+    with mjcb.installed(None):
+        assert mujoco.get_mjcb_time() is mjcb.no_clock()
+    model = mujoco.MjModel.from_xml_string(MODEL)
+    data = mujoco.MjData(model)
+    with mjcb.installed(None):
+        mujoco.mj_step(model, data, 10)
+    assert data.timer.duration.max() == 0.0
