@@ -3,10 +3,12 @@ logs and paths that cannot be used.
 """
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers.machine_logs import chain, chirp, log, sines
+from helpers.public_logs import DRY, double_pendulum, double_pendulum_log
 from typer.testing import CliRunner
 
 import smc_mujoco as smc
@@ -496,3 +498,18 @@ def test_the_start_knows_where_other_joints_are_held():
     found = smc.identify(arm, smc.run(run), list(true), most=1)
     for name, value in true.items():
         assert found.before.values[name] == pytest.approx(value, rel=0.15), name
+
+
+@pytest.mark.slow
+def test_the_dry_friction_of_a_public_double_pendulum_is_between_its_authors_fits():
+    """From two of their logs, in which both motors act. Their fits of one machine differ by five."""
+    folder = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
+    if not folder.is_dir():
+        pytest.skip("the public records are not at hand")
+    arm = smc.plant_from(double_pendulum(), ["shoulder", "elbow"])
+    logs = [double_pendulum_log(folder, name, 4.0) for name in ("03", "13")]
+    found = smc.identify(arm, logs, [f"{joint}.frictionloss" for joint in DRY])
+    for joint, published in DRY.items():
+        name = f"{joint}.frictionloss"
+        assert min(published) < found.values[name] < max(published), found
+        assert found.errors[name] < 0.1 * max(published), found
