@@ -19,6 +19,7 @@ from smc_mujoco.analysis.engine.group import FormGroup
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns
 from smc_mujoco.identification import ensemble
 from smc_mujoco.metrics import catalogue
+from smc_mujoco.robustness.worst_case_search import BATCH_MEMBERS
 from smc_mujoco.simulation import state
 
 with_warp = pytest.mark.skipif(
@@ -162,11 +163,12 @@ def test_a_map_of_an_own_machine_is_made_in_worlds(on_card, monkeypatch):
     assert expected.checked == ""
 
 
-def test_random_members_of_a_worst_case_are_run_in_worlds(on_card):
+def test_random_members_of_a_worst_case_are_run_in_worlds(on_card, monkeypatch):
+    monkeypatch.setattr(worlds.WorldGroup, "least", BATCH_MEMBERS + 1)
     base = smc.Scenario(plant=hinge(), law=smc.law("pid"), duration=0.1)
     within = smc.Uncertainty(disturbance=0.5, parameters={"m": (0.7, 1.3)})
-    found = smc.worst_case(base, within=within, budget=24, device="cuda")
-    expected = smc.worst_case(base, within=within, budget=24)
+    found = smc.worst_case(base, within=within, budget=40, device="cuda")
+    expected = smc.worst_case(base, within=within, budget=40)
     assert found.value == expected.value
     assert found.scenario == expected.scenario
     assert found.median == pytest.approx(expected.median, rel=1e-12)
