@@ -398,6 +398,8 @@ def over_time(
         target(ax, panel)
     rows = zip(traces, colours, means, style.looks(traces), strict=True)
     for trace, colour, mean, look in reversed(list(rows)):
+        if not np.isfinite(mean).any():  # s of a law without a surface
+            continue
         y = QUANTITIES[name](trace)
         look |= {"color": colour, "drawstyle": steps(trace, name)}
         if bands and name not in UNBANDED:

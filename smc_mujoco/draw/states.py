@@ -31,11 +31,14 @@ SIDES = {-1: "left flank", 0: "in play", 1: "right flank", 2: "rattles"}
 
 
 class State(NamedTuple):
-    """The state of a machine in words, with their colour and their opacity, 0 .. 1."""
+    """The state of a machine in words, with their colour and their opacity, 0 .. 1, and whether
+    they have a force.
+    """
 
     words: str
     colour: str
     opacity: float = 1.0
+    force: bool = False
 
 
 def timeline(
@@ -74,12 +77,22 @@ def timeline(
             states.append(end)
         elif hits[k]:
             states.append(hits[k])
+        elif plant.pose and (said := off_place(trace, k)):
+            states.append(said)
         elif words:
             colour = style.INK if sticks.any() else style.MUTED
             states.append(State(", ".join(words), colour))
         else:
             states.append(None)
     return states
+
+
+def off_place(trace: Trace, k: int) -> State | None:
+    """Return how far a free body is off its place at a sample: what pictures of a flight hide."""
+    away = 1e3 * float(np.linalg.norm(trace.x[k, :3] - trace.r[k, :3]))
+    if not away >= 1.0:
+        return None
+    return State(f"{style.short(away)} mm off", style.INK)
 
 
 def ended(trace: Trace, time: float) -> State | None:
@@ -102,14 +115,15 @@ def contacts(trace: Trace, shown: Array) -> list[State | None]:
     for first, stop in edges.reshape(-1, 2).tolist():
         during = np.flatnonzero(on[first:stop]) + first
         words = "contact"
-        if trace.t[during[-1]] - trace.t[during[0]] <= HIT_TIME:
+        brief = bool(trace.t[during[-1]] - trace.t[during[0]] <= HIT_TIME)
+        if brief:
             words = f"hit, {hit_size(trace, touch, during)}"
         last = during[0]
         for k in range(first, stop):
             last = k if on[k] else last
             fade = 1.0 - (shown[k] - shown[last]) / MIN_STATE_TIME
             opacity = min(1.0, max(0.0, float(fade)))
-            said[k] = State(words, style.REACTION, opacity)
+            said[k] = State(words, style.REACTION, opacity, brief)
     return said
 
 

@@ -44,7 +44,7 @@ def staged(trace, size, colour="#0072B2", chosen=None, strip=0.0):
     shown = tracks([trace], [colour])
     whole = mock.patch.object(film, "room_of", lambda size: Room(0.0, 0.0, *size))
     words = mock.patch.object(
-        film, "label_sizes", lambda names, size, room: np.array([[room, strip]])
+        film, "label_sizes", lambda names, size, room: (np.array([[room, strip]]), 1.0)
     )
     with whole, words:
         placed = film.placement(shown, chosen, ["one"], size)

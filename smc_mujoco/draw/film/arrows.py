@@ -67,6 +67,7 @@ COMMAND_OPACITY = 0.45  # of a command's arrow beside that of the drive's force
 CUT = 1.02  # of the longest arrow: a longer one is cut, and has its number
 BREAK = 0.45  # of a cut arrow, where its break mark is
 LETTERS = 36.0  # px of a film of full size, of the number at an arrow, as of all its letters
+SMALL_LETTERS = 27.0  # px, of one that has no room else
 MIN_BAR = 0.1  # of the longest arrow: smaller ranges have no bar
 
 
@@ -354,6 +355,15 @@ def frames(
     return found
 
 
+def without_number(drawn: Drawn) -> Drawn:
+    """Return arrows of which that of the reaction has no number, as a hit's is in words."""
+    kept = []
+    for channel, arrow in drawn.arrows:
+        told = arrow.rgba == rgba(style.REACTION)
+        kept.append((channel, arrow._replace(words="") if told else arrow))
+    return drawn._replace(arrows=kept)
+
+
 def is_network(plant: Plant) -> bool:
     """Return whether a plant is made of many alike, such as pendulums; a robot is not."""
     return plant.network and not plant.direct
@@ -496,10 +506,8 @@ def stamp(
         across = way[::-1] * (-0.9, 0.9) + 0.3 * way
         corners = [across + 0.3 * way, across - 0.3 * way, -across - 0.3 * way, 0.3 * way - across]
         paint(image, line[k] + np.array(corners), WHITE)
-    end, other = line[-1], line[0]
-    if arrow.body:
-        end, other = other, end
-    write(image, arrow.words, end, end - other, arrow.rgba, scale)
+    ends = (line[0], line[-1]) if arrow.body else (line[-1], line[0])
+    write(image, arrow.words, ends, arrow.rgba, scale)
 
 
 def bytes_of(rgba: Sequence[float]) -> tuple[int, ...]:
@@ -508,22 +516,36 @@ def bytes_of(rgba: Sequence[float]) -> tuple[int, ...]:
 
 
 def write(
-    image: Image.Image, words: str, end: Array, way: Array, rgba: Sequence[float], scale: float
+    image: Image.Image,
+    words: str,
+    ends: tuple[Array, Array],
+    rgba: Sequence[float],
+    scale: float,
 ) -> None:
-    """Write a number beyond the end of an arrow, px, in its way, within the picture."""
-    high = LETTERS * scale
-    wide = style.width(words, high, bold=True)
-    x, y = end.tolist()
-    x += 6 * scale if way[0] >= 0.0 else -6 * scale - wide
-    beyond = x
-    x = min(max(x, 2 * scale), image.width - wide - 2 * scale)
-    if x != beyond:
-        y -= high  # over the arrow
-    y = min(max(y, high), image.height - high)
+    """Write a number at an arrow, whose free end and other end are given, px, where there is room
+    in the picture: beyond the free end, before the other or over the arrow; else below it.
+    """
+    free, other = ends
+    gap = 6 * scale
+    side = 1.0 if free[0] >= other[0] else -1.0
+    middle = (free + other) / 2
+    for high in (LETTERS * scale, SMALL_LETTERS * scale):
+        wide = style.width(words, high, bold=True)
+        apart = np.array([0.0, abs(free[1] - other[1]) / 2 + high])
+        reach = np.array([side * (gap + wide / 2), 0.0])
+        low = np.array([wide, high]) / 2 + 2 * scale
+        most = np.array(image.size) - low
+        places = [free + reach, other - reach, middle - apart]
+        inside = [(place >= low).all() and (place <= most).all() for place in places]
+        if any(inside):
+            place = places[inside.index(True)]
+            break
+    else:
+        place = (middle + apart).clip(low, np.maximum(low, most))
     rim = {"stroke_width": round(2 * scale), "stroke_fill": style.PAPER}
-    fill = bytes_of(rgba)
+    at = tuple(place.tolist())
     letters = style.font(high, True)
-    ImageDraw.Draw(image).text((x, y), words, fill, letters, anchor="lm", **rim)
+    ImageDraw.Draw(image).text(at, words, bytes_of(rgba), letters, anchor="mm", **rim)
 
 
 def paint(image: Image.Image, edge: Array, rgba: Sequence[float], rim: int = 0) -> None:

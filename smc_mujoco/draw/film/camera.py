@@ -21,6 +21,8 @@ TILE_GAP = 2  # px between tiles
 MIN_HEIGHT = 0.25  # of a tile's, for a machine whose words have no room; chosen
 MAX_BESIDE = 0.3  # of a row's width, for a label beside its machine; chosen
 Camera = str | Sequence[float]  # a name, or azimuth and elevation in degrees
+# an allowed width -> widths and heights of labels, (n, 2), px, and how well they are read, 0 .. 1
+Sizes = Callable[[float], tuple[Array, float]]
 
 
 class Room(NamedTuple):
@@ -115,28 +117,35 @@ def pixel(size: tuple[int, int]) -> float:
     return float(half / (size[1] / 2))
 
 
+def magnification(view: View, points: Array) -> float:
+    """Return how large a view shows points (m, 3) m, px a metre."""
+    distance = float((view.place - points.mean(axis=0)) @ view.turn[:, 2])
+    return 1.0 / (pixel(view.size) * distance)
+
+
 def layout(
     count: int,
     room: Room,
-    sizes: Callable[[float], Array],
+    sizes: Sizes,
     points: Array,
     turn: Array,
+    may_be_beside: bool = True,
 ) -> tuple[Array, Array, View]:
     """Return the tiles of so many machines in a room of the film and those of their labels, (count,
     4) px each, and the view of points (m, 3) m in each tile.
 
-    They are in as many rows, with labels below or beside them, as make the machines largest.
-    `sizes` returns the widths and heights of the labels, (count, 2) px, for an allowed width, px.
+    They are in as many rows, with labels below or beside them, as make the machines largest that
+    have labels which are read well. `may_be_beside` allows labels beside machines.
     """
     layouts = []
-    for rows, beside in itertools.product(range(1, count + 1), (False, True)):
+    for rows, beside in itertools.product(range(1, count + 1), {False, may_be_beside}):
         columns = -(-count // rows)
         if columns * (rows - 1) >= count:  # a row would be empty
             continue
         pitch = np.array([(room.right - room.left) / columns, (room.bottom - room.top) / rows])
         wide, tall = (pitch - TILE_GAP).astype(int).tolist()
-        most = MAX_BESIDE * wide if beside else wide
-        across, down = sizes(most).max(axis=0).tolist()
+        labels, read = sizes(MAX_BESIDE * wide if beside else wide)
+        across, down = labels.max(axis=0).tolist()
         fits = down <= tall if beside else across <= wide
         if beside:
             fits &= across <= MAX_BESIDE * wide
@@ -148,10 +157,9 @@ def layout(
         head = min(HEAD_ROOM * (room.right - room.left), 0.5 * size[1])
         inside = Room(edge, max(edge, head), size[0] - edge, size[1] - edge)
         place = fit(points, turn, size, inside)
-        away = place - points.mean(axis=0)
-        distance = float(away @ turn[:, 2])
-        rank = (fits, 1.0 / (pixel(size) * distance))
-        layouts.append((rank, columns, pitch, View(size, turn, place)))
+        view = View(size, turn, place)
+        merit = fits, read * magnification(view, points)
+        layouts.append((merit, columns, pitch, view))
     _, columns, pitch, view = max(layouts, key=lambda one: one[0])
     wide, tall = view.size
     left, foot = (pitch - TILE_GAP - view.size).astype(int).tolist()

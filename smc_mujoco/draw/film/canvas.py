@@ -10,9 +10,11 @@ from collections.abc import Callable
 
 import mujoco
 import numpy as np
+from PIL import Image, ImageChops, ImageFilter
 
 from smc_mujoco.common import gl
 from smc_mujoco.common.aliases import Array
+from smc_mujoco.draw import style
 from smc_mujoco.draw.film import camera, world
 
 THICKNESS = 1e-4  # of a shadow, of its shape's height: normals of a flat shape would be undefined
@@ -21,7 +23,11 @@ SHADOW_EMISSION = 20.0  # so large that a shadow is as dark whichever light fall
 SHADE = (0.70, 0.715, 0.74)  # red, green, blue of the floor in shadow, chosen
 MIN_CAST = 1.0  # px, half the least thickness of what casts a shadow
 MIN_BOX_CAST = 3.0  # px, the same of boxes, as scale marks are
+OUTLINE_OPACITY = 0.75  # of the line around where the reference wants a machine; chosen
 GEOM = mujoco.mjtObj.mjOBJ_GEOM
+FLAT = mujoco.mjtRndFlag.mjRND_SEGMENT  # colours without light
+FOG = mujoco.mjtRndFlag.mjRND_FOG
+SKY = mujoco.mjtRndFlag.mjRND_SKYBOX
 
 
 class Canvas:
@@ -35,7 +41,8 @@ class Canvas:
         middle = (eye.xpos - model.stat.center) @ eye.xmat.reshape(3, 3)[:, 2]
         self.casts = casting(model, middle * camera.pixel(size))
         self.renderer = gl.renderer(model, size[1], size[0])
-        self.renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 1
+        self.option = mujoco.MjvOption()
+        self.renderer.scene.flags[FOG] = 1
 
     def close(self) -> None:
         """Close the renderer."""
@@ -47,10 +54,32 @@ class Canvas:
         `add` adds shapes to the scene, such as ghosts.
         """
         shown = self.renderer.scene
-        self.renderer.update_scene(self.data, camera="film")
+        self.renderer.update_scene(self.data, "film", self.option)
         add(shown)
         add_shadows(shown, self.sun, self.casts, self.extent)
         return self.renderer.render()
+
+    def outlined(
+        self, picture: Array, add: Callable[[mujoco.MjvScene], None], width: float
+    ) -> Array:
+        """Return a picture with the outline, of a width in px, of the white shapes that `add` adds
+        to a scene; read-only.
+        """
+        shown = self.renderer.scene
+        shown.ngeom = 0
+        add(shown)
+        if not shown.ngeom:
+            return picture
+        flags = shown.flags.copy()
+        shown.flags[FLAT] = 1
+        shown.flags[FOG] = shown.flags[SKY] = 0
+        seen = Image.fromarray(self.renderer.render()[..., 0])  # white shapes on black
+        shown.flags[:] = flags
+        thick = 2 * max(1, round(width)) + 1
+        edge = ImageChops.subtract(seen.filter(ImageFilter.MaxFilter(thick)), seen)
+        image = Image.fromarray(picture)
+        image.paste(style.rgb(style.INK), (0, 0), edge.point(lambda part: OUTLINE_OPACITY * part))
+        return np.asarray(image)
 
 
 def casting(model: mujoco.MjModel, pixel: float) -> Array:

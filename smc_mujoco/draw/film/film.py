@@ -2,17 +2,17 @@
 clock.
 
 In order: pace.py sets the speed; track.py says what each run does at each frame; camera.py lays out
-the tiles; world.py composes a machine's model, puppet.py poses it, stage.py adds the arrows of
-arrows.py, and canvas.py renders; arm.py draws over arms and what flies; sheet.py is the page with
-the text and the charts, made as figures are; video.py writes. Frames are made and written one by
-one, so that memory does not grow with a film's length.
+the tiles, or race.py carts on one picture; world.py composes a machine's model, puppet.py poses it,
+stage.py adds the arrows of arrows.py, and canvas.py renders; arm.py draws over arms and what flies;
+sheet.py is the page with the text and the charts, made as figures are; video.py writes. Frames are
+made and written one by one, so that memory does not grow with a film's length.
 """
 
 import contextlib
 import dataclasses
 import functools
 import itertools
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, overload
 
@@ -27,7 +27,7 @@ from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.draw import horizon, style
 from smc_mujoco.draw.decimate import end
 from smc_mujoco.draw.figure import DrawnRuns
-from smc_mujoco.draw.film import arrows, camera, pace
+from smc_mujoco.draw.film import arrows, camera, pace, race
 from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.draw.film.pace import FilmClock
 from smc_mujoco.draw.film.puppet import Course, Puppet
@@ -84,7 +84,7 @@ class Frames:
         if self.at is not None:
             last = end(style.same_plant(self.traces))
             time = number("at", self.at, low=0.0, high=last + 1e-9)
-            self.clock = FilmClock(np.array([time]), np.ones(1))
+            self.clock = pace.clock(self.traces, self.fps, self.speed).still(time)
         else:
             self.clock = pace.clock(self.traces, self.fps, self.speed)
         if self.span is not None:
@@ -298,12 +298,16 @@ def pictures(frames: Frames) -> Generator[Array]:
     sheet = Sheet(runs, size, placed.tiles, placed.labels, frames.title, key)
     with contextlib.ExitStack() as opened:
         stages = [opened.enter_context(stage) for stage in staged(tracks, placed, clock.times)]
+        shots = separate_shots
+        if placed.lanes is not None:
+            race.hide_between(stages)
+            shots = race.shots
         overlays = []
         if runs.traces[0].scenario.plant.has_path:
             from smc_mujoco.draw.film import arm
 
             overlays = arm.overlays(stages)
-        yield from drawn(clock, stages, overlays, sheet)
+        yield from drawn(clock, stages, shots, overlays, sheet)
         if close := clock.close:
             start = float(close.times[0])
             closing = []
@@ -318,7 +322,7 @@ def pictures(frames: Frames) -> Generator[Array]:
                 middle = track.x.mean(axis=0)
                 track.x = middle + close.factor * (track.x - middle)
                 stage.track = track
-            yield from drawn(close, stages, overlays, sheet)
+            yield from drawn(close, stages, shots, overlays, sheet)
 
 
 def tracks_at(
@@ -334,22 +338,32 @@ def tracks_at(
     return found
 
 
+def separate_shots(stages: Sequence[Stage], frame: int, time: float) -> list[Array]:
+    """Return the picture of each machine at a frame, whose time is given, s."""
+    return [stage.shot(frame, time) for stage in stages]
+
+
 def drawn(
-    clock: FilmClock, stages: Sequence[Stage], overlays: Sequence["arm.Overlay"], sheet: Sheet
+    clock: FilmClock,
+    stages: Sequence[Stage],
+    shots: Callable[[Sequence[Stage], int, float], list[Array]],
+    overlays: Sequence["arm.Overlay"],
+    sheet: Sheet,
 ) -> Generator[Array]:
     """Yield the pictures at the times of a clock."""
     for frame, time in enumerate(clock.times.tolist()):
-        machines = [stage.shot(frame, time) for stage in stages]
+        machines = shots(stages, frame, time)
         for k, over in enumerate(overlays):
             machines[k] = over.over(machines[k], frame)
         states = [stage.track.states[frame] for stage in stages]
-        moment = Moment(time, float(clock.speeds[frame]), states)
+        moment = Moment(time, float(clock.speeds[frame]), states, len(clock.times) == 1)
         yield sheet.picture(moment, machines)
 
 
 class Placement(NamedTuple):
     """Where the machines of a film stand: the puppets, their tiles and labels, (machines, 4) px,
-    the view of each, the points that it shows, and their courses if the camera follows them.
+    the view of each, the points that it shows, their courses if the camera follows them, and their
+    places if they share one picture, as of `race.places`.
     """
 
     puppets: Sequence[Puppet]
@@ -359,6 +373,7 @@ class Placement(NamedTuple):
     points: Array
     scale: float
     followed: Sequence[Course] = ()
+    lanes: Array | None = None
 
 
 def placement(
@@ -386,9 +401,20 @@ def placement(
             reaches.append(reach)
         points = np.concatenate(reaches)
     sizes = functools.partial(label_sizes, names, size)
-    tiles, labels, view = camera.layout(len(tracks), room_of(size), sizes, points, turn)
+    room = room_of(size)
+    tiles, labels, view = camera.layout(len(tracks), room, sizes, points, turn)
+    lanes = race.places(puppets, turn)
+    if lanes is not None:
+        every = np.concatenate([points + place for place in lanes])
+        shared = race.layout(len(tracks), room, sizes, every, turn)
+        if camera.magnification(shared[2], every) > camera.magnification(view, points):
+            tiles, labels, view = shared
+            points = every
+        else:
+            lanes = None
     scale = size[0] / FULL_SIZE[0]
-    return Placement(puppets, tiles, labels, view, points, scale, courses if followed else ())
+    ways = courses if followed else ()
+    return Placement(puppets, tiles, labels, view, points, scale, ways, lanes)
 
 
 def staged(tracks: Sequence[MachineTrack], placed: Placement, times: Array) -> Iterator[Stage]:
@@ -400,4 +426,5 @@ def staged(tracks: Sequence[MachineTrack], placed: Placement, times: Array) -> I
             raised = np.array([0.0, 0.0, puppet.height])
             path = placed.followed[k].followed(times) + raised
         alone = len(tracks) == 1
-        yield Stage(track, puppet, placed.view, placed.points, placed.scale, alone, path)
+        beside = 0.0 if placed.lanes is None else placed.lanes[k]
+        yield Stage(track, puppet, placed.view, placed.points, placed.scale, alone, path, beside)

@@ -36,7 +36,7 @@ CLOSE_TIME = 4.0  # s of the film for a close-up, at most; chosen, as what follo
 MIN_FACTOR = 10.0  # of its deflections; smaller ones are seen without it
 SEEN_TURN = 0.25  # rad: a turn of a hinge that is seen well
 SEEN_SLIDE = 0.08  # extents of its machine: the same of a slide
-STILL = 1 / 30  # s, of the run in a still
+STILL = 1 / 30  # s of the film, in a still
 LITTLE = 0.2  # of these: a film of less motion shows nothing moving
 MAX_LENGTH = (1.85, 8.0)  # of a film: in durations of the run, or in s if that is more; chosen
 Rate = Annotated[float, Number(low=1.0, high=120.0)]  # frames per second
@@ -58,19 +58,25 @@ class FilmClock(NamedTuple):
     @property
     def edges(self) -> Array:
         """The start of the first frame and the ends of all, (frames + 1,) s of the run."""
-        step = STILL if len(self.times) < 2 else self.times[1] - self.times[0]
+        step = STILL * self.speeds[0] if len(self.times) < 2 else self.times[1] - self.times[0]
         return np.append(self.times[0] - step, self.times)
 
     def played(self, t: Array) -> Array:
-        """Return when the film shows times t of the run, s: before its start and after its end in
-        real time.
+        """Return when the film shows times t of the run, s: before its start and after its end at
+        the speeds that it has there.
         """
         passed = np.diff(self.times) / self.speeds[1:]
         shown = np.append(0.0, np.cumsum(passed))
-        inside = np.interp(t, self.times, shown)
-        before = np.minimum(t - self.times[0], 0.0)
-        after = np.maximum(t - self.times[-1], 0.0)
-        return inside + before + after
+        before = np.minimum(t - self.times[0], 0.0) / self.speeds[0]
+        after = np.maximum(t - self.times[-1], 0.0) / self.speeds[-1]
+        return np.interp(t, self.times, shown) + before + after
+
+    def still(self, time: float) -> "FilmClock":
+        """Return the clock of the picture at a time of the run, s: what a film holds for a while,
+        it shows as the film would.
+        """
+        now = min(int(np.searchsorted(self.times, time - 1e-9)), len(self.times) - 1)
+        return FilmClock(np.array([time]), self.speeds[[now]])
 
     def part(self, start: float, stop: float) -> "FilmClock":
         """Return the frames from `start` to `stop` of the run, s."""

@@ -38,9 +38,9 @@ LOOK = ONE_SIZE | {"axes.titlepad": 3.0}  # points; below the pictures, which hi
 LINE_PITCH = 1.2  # of letters
 EDGE = 0.6  # letters, from the picture's edge to text
 CHARTS_SHARE = 0.355  # of the film's height
-MAX_LINES = 2  # of a label
+MAX_LINES = 3  # of a label
 SAMPLE = 0.5  # letters, height of the line above a label
-LEAST_TITLE = 0.75  # of the size of letters, of a long title
+LEAST_TITLE = 0.75  # of the size of letters, of a long title, and of long labels
 TIME_TICKS = 5  # at most
 SIDES = ("left", "right")  # of the first and the last tick's words, so that they stay on the page
 FUTURE_LINE = 0.4  # opacity of what is still to come
@@ -49,13 +49,14 @@ EVENT_TIME = 1.0  # s of the film for which what has ended is told
 
 
 class Moment(NamedTuple):
-    """What a frame shows beside the machines: the time of the run, s, the speed of playback, and
-    what is said of each machine.
+    """What a frame shows beside the machines: the time of the run, s, the speed of playback, what
+    is said of each machine, and whether it is a single picture, without a speed.
     """
 
     time: float
     speed: float
     states: Sequence[State | None]
+    still: bool = False
 
 
 class Moving(NamedTuple):
@@ -80,20 +81,42 @@ def room_of(size: tuple[int, int]) -> Room:
     return Room(0.0, top, size[0], foot)
 
 
-def label_sizes(names: Sequence[str], size: tuple[int, int], room: float) -> Array:
+class Labels(NamedTuple):
+    """The names of machines, each on some lines, and the height of their letters, px."""
+
+    words: Sequence[str]
+    letters: float
+
+    @classmethod
+    def of(cls, names: Sequence[str], room: float, high: float) -> "Labels":
+        """Return labels for an allowed width, px, with letters `high` px high; with smaller ones
+        where a name would be cropped.
+        """
+        for share in (1.0, LEAST_TITLE):
+            size = share * high
+            words = []
+            for name in style.distinct(names):
+                parts = name.replace("_", "_ ")
+                lines = style.wrapped(parts, room - EDGE * high, size, MAX_LINES)
+                words.append(lines.replace("_ ", "_"))
+            if not any("…" in name for name in words):
+                break
+        return cls(words, size)
+
+
+def label_sizes(names: Sequence[str], size: tuple[int, int], room: float) -> tuple[Array, float]:
     """Return widths and heights of labels, (n, 2) px, for an allowed width, px, which those that do
-    not fit exceed.
+    not fit exceed, and how well they are read: smaller ones less well.
     """
     high = letters(size)
+    labels = Labels.of(names, room, high)
     found = []
-    for name in style.distinct(names):
-        lines = style.wrapped(name, room - high, high, MAX_LINES).split("\n")
-        wide = style.widest(lines, high)
-        if any("…" in line for line in lines):
-            wide = style.width(name, high)
-        high_of_lines = (LINE_PITCH * len(lines) + SAMPLE) * high
-        found.append((wide + high, high_of_lines))
-    return np.array(found)
+    for words, name in zip(labels.words, style.distinct(names), strict=True):
+        lines = [name] if "…" in words else words.split("\n")
+        wide = style.widest(lines, labels.letters)
+        tall = LINE_PITCH * (1 + words.count("\n")) * labels.letters + SAMPLE * high
+        found.append((wide + EDGE * high, tall))
+    return np.array(found), labels.letters / high
 
 
 class Sheet:
@@ -183,22 +206,27 @@ class Sheet:
     def write_labels(self, labels: Array) -> None:
         """Write the machines' names, each below its line in the panels."""
         runs = self.runs
-        names = style.distinct(runs.names)
-        for box, name, colour, look in zip(labels, names, runs.colours, runs.looks, strict=True):
+        high = self.letters
+        wide = float((labels[:, 2] - labels[:, 0]).min())
+        names = Labels.of(runs.names, wide, high)
+        pitch = LINE_PITCH * names.letters
+        share = names.letters / high
+        parts = zip(labels, self.tiles, names.words, runs.colours, runs.looks, strict=True)
+        for box, tile, words, colour, look in parts:
             left, top, right, bottom = box
-            words = style.wrapped(name, right - left - self.letters, self.letters, MAX_LINES)
             middle = (left + right) / 2
-            lines = 1 + words.count("\n")
-            high = (LINE_PITCH * lines + SAMPLE) * self.letters
-            start = top + (0.0 if bottom - top < 1.5 * high else (bottom - top - high) / 2)
-            y = start + 0.5 * SAMPLE * self.letters
-            ends = np.array([left + 0.3 * self.letters, right - 0.3 * self.letters])
-            place = (ends / self.size[0], [1.0 - y / self.size[1]] * 2)
+            tall = pitch * (1 + words.count("\n")) + SAMPLE * high
+            start = top if top >= tile[3] else (top + bottom - tall) / 2  # below it, or beside
+            y = start + 0.5 * SAMPLE * high
+            ends = np.array([left + 0.3 * high, right - 0.3 * high])
+            line = (ends / self.size[0], [1.0 - y / self.size[1]] * 2)
             shown = {**look, "markevery": None}  # without axes, a mark stands at each end
-            sample = Line2D(*place, color=colour, lw=style.points(2.5), **shown)
+            sample = Line2D(*line, color=colour, lw=style.points(2.5), **shown)
             self.page.add_artist(sample)
-            y = start + (SAMPLE + LINE_PITCH * lines - 0.3) * self.letters
-            self.write(middle, y, words, ha="center", va="baseline", linespacing=LINE_PITCH)
+            y = start + tall - 0.3 * names.letters
+            place = {"ha": "center", "va": "baseline", "linespacing": LINE_PITCH}
+            size = share * ONE_SIZE["xtick.labelsize"]
+            self.write(middle, y, words, fontsize=size, **place)
 
     def draw_panels(self) -> tuple[list[Artist], list[Moving], list[flight.Flight]]:
         """Draw the two panels at the foot of the page, and return the artists of their curves, and
@@ -288,7 +316,7 @@ class Sheet:
             one.dot.set_data(*flown[:, -1:])
             drawn += [one.past, one.dot]
         self.clock.set_text(f"{moment.time:.{3 if moment.speed < 0.2 else 2}f} s")
-        self.pace.set_text(pace_words(moment.speed))
+        self.pace.set_text("" if moment.still else pace_words(moment.speed))
         self.below.set_text(self.event_words(moment) or self.key)
         for text, state in zip(self.says, moment.states, strict=True):
             text.set_text(state.words if state else "")

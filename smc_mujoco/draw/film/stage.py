@@ -22,7 +22,8 @@ from smc_mujoco.draw.film.track import MachineTrack
 LAW_SHARE = 0.75  # of the law's colour in a user's model, where several laws are shown; chosen
 DEFAULT_RGBA = np.array([0.5, 0.5, 0.5, 1.0], np.float32)  # MuJoCo's colour of geoms
 GROUPS = 3  # groups of geoms that MuJoCo draws by default
-GHOST_RGBA = np.array([0.12, 0.14, 0.16, 0.22], np.float32)  # ink, translucent
+OUTLINE = 2.6  # px of a film of full size, around where the reference wants the machine; chosen
+WHITE = np.ones(4, np.float32)
 SHAPE_FIELDS = ("geom_pos", "geom_size", "geom_group", "geom_sameframe")
 
 
@@ -30,7 +31,8 @@ class Stage:
     """The compiled scene of one machine and its renderer: a context, which closes the renderer.
 
     `points`, (m, 3) m, are what the machines of a film reach in this view; `alone` is whether the
-    film has no other machine; `followed`, (frames, 3) m, is where the camera goes with the machine.
+    film has no other machine; `followed`, (frames, 3) m, is where the camera goes with the machine;
+    `beside`, (3,) m, is the place of one that shares its picture with others.
     """
 
     def __init__(
@@ -42,6 +44,7 @@ class Stage:
         scale: float = 1.0,
         alone: bool = True,
         followed: Array | None = None,
+        beside: Array | float = 0.0,
     ):
         self.track = track
         self.puppet = puppet
@@ -50,6 +53,7 @@ class Stage:
         self.scale = scale
         self.alone = alone
         self.followed = followed
+        self.beside = beside
         self.is_users = not puppet.scenario.plant.on_stage
         self.model = world.compose(puppet.scenario, puppet.height, self.size)
         if not self.is_users:
@@ -104,8 +108,6 @@ class Stage:
             self.mounts.append(mount._replace(joint=ids[-1], radius=bent))
         moved = moved_bodies(self.model, ids)  # by joints: bodies without one may be fused
         self.links = np.flatnonzero(np.isin(self.model.geom_bodyid, moved) & visible)
-        halves = self.model.geom_aabb[self.links, 3:].min(axis=1)
-        self.thickness = 2.0 * halves.max(initial=0.0)
 
     def look(self, frame: int) -> None:
         """Put the camera where it is at a frame."""
@@ -170,9 +172,13 @@ class Stage:
         self.model.geom_rgba[links, :3] = LAW_SHARE * rgb + own
 
     def shot(self, frame: int, time: float) -> Array:
-        """Return the picture at a frame, whose time is given, s: (height, width, 3) uint8.
+        """Return the picture at a frame, whose time is given, s: (height, width, 3) uint8."""
+        return self.render(self.pose(frame, time))
 
-        A machine that has failed is grey, without a ghost or arrows.
+    def pose(self, frame: int, time: float) -> Sequence[tuple[int, arrows.Arrow]]:
+        """Put the machine where it is at a frame, whose time is given, s, and return its arrows.
+
+        A machine that has failed is grey, without an outline or arrows.
         """
         track = self.track
         failed = track.failed(time)
@@ -180,15 +186,20 @@ class Stage:
         self.arrange(track.x[frame], track.ahead[frame], time, goal)
         self.look(frame)
         self.set_colour(style.FAILED if failed else track.colour)
-        return self.render(() if failed else track.drawn[frame].arrows)
+        world.forward(self.model, self.data)
+        world.forward(self.model, self.goal)
+        return () if failed else track.drawn[frame].arrows
 
     def render(self, drawn: Sequence[tuple[int, arrows.Arrow]] = ()) -> Array:
         """Return the picture, (height, width, 3) uint8, with arrows given as (channel, arrow);
         read-only.
         """
-        world.forward(self.model, self.data)
-        world.forward(self.model, self.goal)
-        picture = self.canvas.draw(self.add_ghosts)
+        picture = self.canvas.draw(lambda shown: None)
+        picture = self.canvas.outlined(picture, self.add_outline, OUTLINE * self.scale)
+        return self.with_arrows(picture, drawn)
+
+    def with_arrows(self, picture: Array, drawn: Sequence[tuple[int, arrows.Arrow]]) -> Array:
+        """Return a picture with arrows, given as (channel, arrow), over it; read-only."""
         if not drawn:
             return picture
         image = Image.fromarray(picture)
@@ -220,7 +231,7 @@ class Stage:
 
     def project(self, points: Array) -> Array:
         """Return where points (m, 3) m are in the picture, (m, 2) px."""
-        return camera.project(points, self.turn, self.place, self.size)
+        return camera.project(points + self.beside, self.turn, self.place, self.size)
 
     def find(self, name: str) -> Array:
         """Return where a site of the machine is, or the centre of mass of a body, (3,) m."""
@@ -228,25 +239,30 @@ class Stage:
             return self.data.site(f"m/{name}").xpos
         return self.data.body(f"m/{name}").xipos
 
-    def add_ghosts(self, shown: mujoco.MjvScene) -> None:
-        """Add a translucent copy of the machine that is aimed, as its reference wants it.
-
-        It is as much larger as it is farther than the machine, whose links so hide it and are not
-        cut into it.
-        """
+    def add_outline(self, shown: mujoco.MjvScene) -> None:
+        """Add white copies of the links, as the reference wants them, if the machine is aimed."""
         model = self.model
         for i in self.links.tolist() if self.aimed else ():
             if shown.ngeom >= shown.maxgeom:
                 return
             shape = shown.geoms[shown.ngeom]
-            size = model.geom_size[i]
-            away = self.goal.geom_xpos[i] - self.place
-            factor = 1.0 + self.thickness / np.linalg.norm(away)
-            place = self.place + factor * away
-            turn = factor * self.goal.geom_xmat[i]
-            mujoco.mjv_initGeom(shape, model.geom_type[i], size, place, turn, GHOST_RGBA)
+            place = self.goal.geom_xpos[i] + self.beside
+            turn = self.goal.geom_xmat[i]
+            mujoco.mjv_initGeom(shape, model.geom_type[i], model.geom_size[i], place, turn, WHITE)
             shape.dataid = 2 * model.geom_dataid[i]
             shape.objtype = mujoco.mjtObj.mjOBJ_UNKNOWN
-            shape.transparent = 1
-            shape.specular = 0.0
             shown.ngeom += 1
+
+    def add_beside(self, shown: mujoco.MjvScene) -> None:
+        """Add the machine to the scene of another, at its place beside it."""
+        first = shown.ngeom
+        every = mujoco.mjtCatBit.mjCAT_ALL
+        look = self.canvas.option, mujoco.MjvPerturb()
+        mujoco.mjv_addGeoms(self.model, self.data, *look, every, shown)
+        for shape in shown.geoms[first : shown.ngeom]:
+            shape.pos[:] += self.beside
+
+    def hide(self, geoms: Array) -> None:
+        """Draw no geoms of these indices, and no skins, such as springs."""
+        self.model.geom_group[geoms] = world.HIDDEN_GROUP
+        self.canvas.option.flags[mujoco.mjtVisFlag.mjVIS_SKIN] = 0

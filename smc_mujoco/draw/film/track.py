@@ -58,6 +58,9 @@ class MachineTrack:
         self.drawn = arrows.frames(trace, edges, self.holds, sizes, colour)
         self.framing = arrows.frames(trace, grid, np.zeros(len(grid)), sizes, colour)
         self.states = states.timeline(trace, times, clock.played)
+        for k, state in enumerate(self.states):
+            if state and state.force:
+                self.drawn[k] = arrows.without_number(self.drawn[k])
         self.x = sampled(trace, trace.x[:, :n], times)
         self.r = sampled(trace, trace.r[:, :n], times)
         self.ahead = leads(trace, times, edges)[:, :n]

@@ -288,17 +288,17 @@ def cut(machines: Sequence[mujoco.MjModel], points: Array, slides: Array, own: b
         if upright:  # only from below
             first = min(least[~long & (most > first)].min(initial=first) - margin, first)
             last = np.inf
-        start = least[long].min()
-        stop = most[long].max()
-        first = max(first, start)
-        last = min(last, stop)
+        start, stop = least[long].min(), most[long].max()
+        first, last = max(first, start), min(last, stop)
         near = RAIL_END * (stop - start)
         for k, geom in enumerate(fixed.tolist()):
             way = np.zeros(3)
             middle = 0.5 * (least[k] + most[k])
             if long[k]:
-                a = max(least[k], first)
-                b = min(most[k], last)
+                a, b = max(least[k], first), min(most[k], last)
+                if a >= b:  # it is beyond
+                    model.geom_group[geom] = HIDDEN_GROUP
+                    continue
                 side = int(turned[k].argmax())
                 way[axis] = 0.5 * (a + b) - middle
                 lengthen(model, geom, side, 0.5 * (b - a - sides[k, axis]))

@@ -40,7 +40,7 @@ def test_labels_stay_below_their_tiles_on_as_many_lines_as_were_measured(wide):
     traces = [machine("duffing"), machine("duffing", "adaptive")]
     names = ["one", "one that has a long name"]
     size = (640, 360)
-    high = float(label_sizes(names, size, wide)[:, 1].max())
+    high = float(label_sizes(names, size, wide)[0][:, 1].max())
     tiles = np.array([[0, 60, wide, 160], [wide + 2, 60, 2 * wide + 2, 160]])
     labels = np.array([[left, 160, right, 160 + high] for left, _, right, _ in tiles])
     runs = DrawnRuns.of(traces, names)

@@ -170,7 +170,7 @@ def test_five_machines_keep_room_above_their_words():
     cube = world.CORNERS
     room = camera.Room(0.0, 54.0, 800.0, 342.0)
     tiles, labels, view = camera.layout(
-        5, room, lambda wide: np.array([[min(wide, 150.0), 33.0]]), cube, turn
+        5, room, lambda wide: (np.array([[min(wide, 150.0), 33.0]]), 1.0), cube, turn
     )
     seen = camera.project(cube, turn, view.place, view.size)
     assert ((seen >= 0.0) & (seen <= view.size)).all()
@@ -181,7 +181,7 @@ def test_five_machines_keep_room_above_their_words():
 
 def test_labels_are_beside_machines_that_are_far_wider_than_high():
     turn = camera.turn(90.0, 0.0)
-    sizes = lambda wide: np.array([[120.0, 33.0]])  # noqa: E731
+    sizes = lambda wide: (np.array([[120.0, 33.0]]), 1.0)  # noqa: E731
     rows = {}
     for name, wide in (("rail", 8.0), ("cube", 1.0)):
         room = camera.Room(0.0, 54.0, 800.0, 342.0)
@@ -196,7 +196,7 @@ def test_a_label_has_all_the_width_that_it_asked_for():
     tall = world.CORNERS * (0.3, 0.3, 1.0)
     room = camera.Room(0.0, 54.0, 800.0, 342.0)
     for wide in np.linspace(80.0, 82.0, 21).tolist():
-        sizes = lambda room, wide=wide: np.array([[wide, 90.3]])  # noqa: E731
+        sizes = lambda room, wide=wide: (np.array([[wide, 90.3]]), 1.0)  # noqa: E731
         _, labels, _ = camera.layout(1, room, sizes, tall, camera.turn(90.0, 0.0))
         left, top, right, bottom = labels[0].tolist()
         assert right - left >= wide

@@ -1,0 +1,113 @@
+"""Carts of several runs on rails side by side, in one picture.
+
+A rail is wide and low. In a tile for each run it would be small, and the distances between the runs
+could not be seen. The first run is at the back, the last in front. What stands behind a rail is
+drawn behind the first only, and what stands before it before the last. Springs are left out: MuJoCo
+draws the skins of one model alone.
+"""
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from smc_mujoco.common.aliases import Array
+from smc_mujoco.draw.film import camera, world
+from smc_mujoco.draw.film.puppet import Puppet
+from smc_mujoco.draw.film.stage import OUTLINE, Stage
+
+PITCH = 0.8  # of the carts' depth with their pointers, from rail to rail; chosen
+
+
+def places(puppets: Sequence[Puppet], turn: Array) -> Array | None:
+    """Return where each machine is, (machines, 3) m from its own place, before a camera of this
+    turn; None where each has a tile.
+    """
+    first = puppets[0]
+    plant = first.scenario.plant
+    carts = plant.on_stage and plant.n == 1 and bool(first.slides.all()) and not plant.pose
+    if len(puppets) < 2 or not carts:
+        return None
+    near = nearness(turn)
+    depth = np.ptp(boxes(first)[moved(first)] @ near)
+    return np.arange(len(puppets))[:, None] * PITCH * depth * near
+
+
+def nearness(turn: Array) -> Array:
+    """Return the direction along the floor to the camera, (3,)."""
+    near = turn[:, 2] * (1.0, 1.0, 0.0)
+    return near / np.linalg.norm(near)
+
+
+def boxes(puppet: Puppet) -> Array:
+    """Return the corners of the boxes of a machine's geoms at the start, (geoms, 8, 3) m."""
+    data = puppet.data[0]
+    data.qpos[:] = puppet.start
+    world.forward(puppet.model, data)
+    return world.boxes(puppet.model, data)
+
+
+def moved(puppet: Puppet) -> Array:
+    """Return which geoms of a machine move, (geoms,)."""
+    return puppet.model.body_weldid[puppet.model.geom_bodyid] > 0
+
+
+def layout(
+    count: int, room: camera.Room, sizes: camera.Sizes, points: Array, turn: Array
+) -> tuple[Array, Array, camera.View]:
+    """Return as `camera.layout` the tiles, which are the parts of one picture, and the labels below
+    it.
+    """
+
+    def of_all(allowed: float) -> tuple[Array, float]:
+        labels, read = sizes(allowed / count)
+        return labels * (count, 1.0), read
+
+    tiles, labels, view = camera.layout(1, room, of_all, points, turn, may_be_beside=False)
+    return across(tiles[0], count), across(labels[0], count), view
+
+
+def across(box: Array, count: int) -> Array:
+    """Return so many parts of a box, side by side, (count, 4) px."""
+    left, top, right, bottom = box
+    ends = np.linspace(left, right, count + 1).round().astype(int)
+    return np.array([(a, top, b, bottom) for a, b in itertools.pairwise(ends)])
+
+
+def hide_between(stages: Sequence[Stage]) -> None:
+    """Hide what of each machine would be between two rails, and the floors of all but the first."""
+    first = stages[0]
+    near = nearness(first.turn)
+    depths = world.boxes(first.model, first.data) @ near
+    carts = depths[first.links]
+    planes = first.model.geom_type == world.PLANE
+    before = (depths.min(axis=1) > carts.max()) & ~planes
+    behind = (depths.max(axis=1) < carts.min()) & ~planes
+    for stage in stages:
+        hidden = np.zeros(len(planes), bool)
+        if stage is not first:
+            hidden |= behind | planes
+        if stage is not stages[-1]:
+            hidden |= before
+        stage.hide(np.flatnonzero(hidden))
+
+
+def shots(stages: Sequence[Stage], frame: int, time: float) -> list[Array]:
+    """Return the parts of the picture at a frame, whose time is given, s, as `layout` has them."""
+    drawn = [stage.pose(frame, time) for stage in stages]
+    first, *others = stages
+
+    def add(shown) -> None:
+        for other in others:
+            other.add_beside(shown)
+
+    def add_outlines(shown) -> None:
+        for stage in stages:
+            stage.add_outline(shown)
+
+    picture = first.canvas.draw(add)
+    picture = first.canvas.outlined(picture, add_outlines, OUTLINE * first.scale)
+    for stage, arrows in zip(stages, drawn, strict=True):
+        picture = stage.with_arrows(picture, arrows)
+    whole = np.array([0, 0, picture.shape[1], picture.shape[0]])
+    return [picture[:, left:right] for left, _, right, _ in across(whole, len(stages)).tolist()]
