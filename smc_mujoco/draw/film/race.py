@@ -94,7 +94,10 @@ def hide_between(stages: Sequence[Stage]) -> None:
 
 def shots(stages: Sequence[Stage], frame: int, time: float) -> list[Array]:
     """Return the parts of the picture at a frame, whose time is given, s, as `layout` has them."""
-    drawn = [stage.pose(frame, time) for stage in stages]
+    drawn = []
+    for stage in stages:
+        drawn.append(stage.pose(frame, time))
+        stage.forward()
     first, *others = stages
 
     def add(shown) -> None:

@@ -186,14 +186,18 @@ class Stage:
         self.arrange(track.x[frame], track.ahead[frame], time, goal)
         self.look(frame)
         self.set_colour(style.FAILED if failed else track.colour)
+        return () if failed else track.drawn[frame].arrows
+
+    def forward(self) -> None:
+        """Compute where everything is in the machine's pose, and where its reference wants it."""
         world.forward(self.model, self.data)
         world.forward(self.model, self.goal)
-        return () if failed else track.drawn[frame].arrows
 
     def render(self, drawn: Sequence[tuple[int, arrows.Arrow]] = ()) -> Array:
         """Return the picture, (height, width, 3) uint8, with arrows given as (channel, arrow);
         read-only.
         """
+        self.forward()
         picture = self.canvas.draw(lambda shown: None)
         picture = self.canvas.outlined(picture, self.add_outline, OUTLINE * self.scale)
         return self.with_arrows(picture, drawn)

@@ -50,7 +50,7 @@ def test_an_outline_stands_where_the_reference_is():
     with stage("van_der_pol") as shown:
         shown.arrange(np.array([1.5]))
         alone = shown.render()
-        shown.arrange(np.array([1.5]), goal=np.array([-1.0]))
+        shown.arrange(np.array([1.5]), goal=np.array([0.1]))
         outline = changed(shown.render(), alone) > 20
         columns = np.flatnonzero(outline.any(axis=0))
         assert outline.sum() > 100

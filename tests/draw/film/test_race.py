@@ -1,0 +1,106 @@
+"""Carts on one picture, labels that are whole, and words of what pictures hide: measured."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from helpers.films import without_charts
+
+import smc_mujoco as smc
+from smc_mujoco.common import gl
+from smc_mujoco.draw import states, style
+from smc_mujoco.draw.film import arrows, film
+from smc_mujoco.draw.film.sheet import label_sizes
+
+SIZE = (800, 450)
+renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+
+
+def placed(traces, names):
+    clock = film.FilmClock(np.array([0.0, 0.1]), np.ones(2))
+    runs = film.DrawnRuns.of(traces, names)
+    tracks = film.tracks_at(clock, runs, arrows.scales(traces))
+    return film.placement(tracks, None, names, SIZE)
+
+
+@renders
+@without_charts
+def test_carts_share_a_picture_in_which_each_is_in_its_colour_and_larger():
+    laws = ("classical", "adaptive")
+    traces = [
+        smc.run(smc.Scenario(plant="duffing", law=smc.law(law), duration=0.3)) for law in laws
+    ]
+    place = placed(traces, list(laws))
+    assert place.lanes is not None
+    assert place.tiles[0, 2] == place.tiles[1, 0]
+    (shown,) = film.Frames(traces, size=SIZE, at=0.2)
+    for colour in style.trace_colours(traces):
+        r, g, b = style.rgb(colour)
+        hue = np.array([r, g, b]) / max(r, g, b)
+        pixels = shown.reshape(-1, 3) / np.maximum(shown.reshape(-1, 3).max(axis=1), 1)[:, None]
+        strong = shown.reshape(-1, 3).max(axis=1) > 60
+        assert (strong & (np.abs(pixels - hue).max(axis=1) < 0.12)).sum() > 300, colour
+
+
+def test_pendulums_have_tiles_of_their_own():
+    traces = []
+    for law in ("classical", "adaptive"):
+        scenario = smc.Scenario(plant="inverted_pendulum", law=smc.law(law), duration=0.2)
+        traces.append(smc.run(scenario))
+    assert placed(traces, ["one", "two"]).lanes is None
+
+
+def test_a_long_name_is_broken_after_underscores_before_it_makes_machines_small():
+    names = ["adaptive_quaternion_sliding", "geometric"]
+    sizes, read = label_sizes(names, SIZE, 140.0)
+    assert (sizes[:, 0] <= 140.0).all()
+    assert read < 1.0
+    assert label_sizes(names, SIZE, 400.0)[1] == 1.0
+
+
+def test_a_still_holds_a_hit_as_long_as_the_film_does():
+    """In a still it was held for .15 s of the run, while the bob was upright."""
+    blow = smc.signals.Impulse(2.0, time=0.1, width=0.01)
+    stops = smc.hardware.Contact("stops", restitution=0.8)
+    run = smc.run(
+        smc.Scenario(
+            plant="inverted_pendulum",
+            law=smc.law("classical"),
+            x0=0.0,
+            contact=stops,
+            disturbance=blow,
+            duration=0.6,
+        )
+    )
+    touch = run.t[states.in_contact(run).any(axis=1)]
+    last = float(touch[touch < touch[0] + 0.1].max())
+    for after, told in ((0.0, True), (0.06, False)):
+        clock = smc.film(run, at=last + after).clock
+        (state,) = states.timeline(run, clock.times, clock.played)
+        assert (state is not None) == told
+        if told:
+            assert state.force
+
+
+def test_a_number_at_an_arrow_hides_nothing_where_there_is_room_beside_it():
+    from PIL import Image
+
+    image = Image.new("RGB", (180, 170), style.PAPER)
+    line = np.linspace((100.0, 25.0), (150.0, 25.0), 40)
+    arrow = arrows.Arrow(0.0, 1.0, arrows.rgba(style.DISTURBANCE), words="180 N·m")
+    arrows.stamp(image, line, 6.0, arrow, 0.625)
+    dark = np.asarray(image).min(axis=2) < 128
+    assert not dark[45:].any()
+    assert dark[:, :95].any()
+    assert dark[20:30, 130:150].any()
+
+
+def test_a_free_body_s_picture_says_how_far_it_is_off_its_place():
+    drone = smc.plant("quadrotor")
+    run = smc.run(smc.Scenario(plant=drone, law="geometric", x0=drone.rest, duration=0.05))
+    assert states.timeline(run, np.array([0.01])) == [None]
+    moved = run.x.copy()
+    moved[:, 0] += 0.123
+    (said,) = states.timeline(dataclasses.replace(run, x=moved), np.array([0.02]))
+    assert said is not None
+    assert said.words == "120 mm off"
