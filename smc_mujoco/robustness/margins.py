@@ -331,7 +331,7 @@ MARGIN_KINDS: dict[str, MarginKind] = {
         levels=tuple(i / 10 for i in range(1, 10)),
         put=_with_missed,
     ),
-    "gain": MarginKind(
+    "loss": MarginKind(
         label="share of gain that an actuator loses",
         unit="1",
         levels=tuple(i / 10 for i in range(1, 10)),
@@ -397,7 +397,7 @@ def margins(
     Args:
       plants, laws: names, or your own plants and laws, one or several.
       kinds: one or several of "delay", "disturbance", "friction", "mass", "noise"; and of "blow",
-        at half time, "jitter" and "missed", of the controller's clock, and "gain", the share of its
+        at half time, "jitter" and "missed", of the controller's clock, and "loss", the share of its
         gain that an actuator has lost from the start on, which are left out by default. All
         actuators lose it, or the one that the condition's fault is on.
       gains: set of gains, one of `gain_sets.SETS`, or "default".

@@ -76,7 +76,7 @@ class Advice(Tables):
         for board in boards:
             for barred in board.barred:
                 if barred != self.law.name:
-                    cure = f"--defaults lets a law win over {barred}'s default gains"
+                    cure = f"--allow-defaults lets a law win over {barred}'s default gains"
                     return f"first so far; {cure}"
         if all(board.too_few for board in boards):
             return f"first so far; {boards[0].too_few}"

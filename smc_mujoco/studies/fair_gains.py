@@ -327,8 +327,8 @@ class Trial(NamedTuple):
             reasons.append(reason)
         if len(laws) > 1:
             raise ScenarioError(
-                f"{reasons[0]}; or give laws with gains, or defaults=True (--defaults) for default "
-                "gains"
+                f"{reasons[0]}; or give laws with gains, "
+                "or defaults=True (--allow-defaults) for default gains"
             )
 
     def asked_goal(self, plant: Plant) -> Objective:

@@ -41,7 +41,7 @@ CALLS = {
     "compare": ["studies.compare.compare"],
     "compare duffing,van_der_pol --law pid,classical --condition noise --seeds 3 --no-tune "
     "--worst --quick --metrics itae "
-    "--gains default --duration 2 --x0 0.4 --relevant 0.05 --defaults --out there --searches 2 "
+    "--gains default --duration 2 --x0 0.4 --relevant 0.05 --allow-defaults --out there --searches 2 "
     "--figure f "
     "--latex t.tex --seed 5 --json c.json --threads 2 --device cuda --executor dask://h:1": [
         "studies.compare.compare"
@@ -53,14 +53,14 @@ CALLS = {
         "identification.ensemble.leaderboard",
     ],
     "compare --rig lifted_pendulum --law pid --seeds 1 --duration 2 --x0 0.4 --out there "
-    "--threads 2 --defaults --relevant 0.05": [
+    "--threads 2 --allow-defaults --relevant 0.05": [
         "identification.ensemble.study",
         "identification.ensemble.leaderboard",
     ],
     "which duffing": ["studies.which.which"],
     "which duffing --needs calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 "
     "--x0 0.4 "
-    "--relevant 0.05 --out there --defaults --seed 5 --json w.json --threads 2 --device cuda "
+    "--relevant 0.05 --out there --allow-defaults --seed 5 --json w.json --threads 2 --device cuda "
     "--executor dask://h:1 --minutes 2 --no-film --falling": ["studies.which.which"],
     "tune duffing pid": ["analysis.tuning.search.tune"],
     "tune duffing pid --device cuda --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
@@ -197,14 +197,15 @@ FLAGS = {
     "--no-tune",
     "--worst",
     "--quick",
-    "--defaults",
+    "--allow-defaults",
 }
 FLAGS |= {"--no-binary"}
 # which function does the work; --needs and --plant of `list`
 SWITCHES = {"--rig", "--needs", "--plant", "--no-film"}
 AFTER = {"--figure", "--latex", "--json", "--out"}  # of what is done after the function
 FOLDERS = {"run", "compare", "which"}  # whose --out is a folder
-ALIASES = {  # option -> arguments that it may change, besides the one of its name
+ALIASES = {
+    "--allow-defaults": "defaults",  # option -> arguments that it may change, besides the one of its name
     "--law": "laws scenario scenarios",
     "--condition": "conditions scenario",
     "--x0": "starts scenarios",

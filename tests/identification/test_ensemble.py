@@ -74,7 +74,7 @@ def test_a_rig_has_laws_and_a_start_of_its_own():
 def test_a_law_is_tuned_on_a_machine_and_compared_there(tmp_path, monkeypatch):
     monkeypatch.setattr(rig, "catalogue", machines.catalogue)
     words = ["compare", "--rig", "lifted_pendulum", "--law", "pid,twisting", "--searches=1"]
-    more = ["--seeds", "1", "--duration", "0.5", "--defaults", "--out", str(tmp_path)]
+    more = ["--seeds", "1", "--duration", "0.5", "--allow-defaults", "--out", str(tmp_path)]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ensemble.tuned, "__defaults__", (None, 1, 1, None, None, None, False))
         done = CliRunner().invoke(app, [*words, *more])

@@ -91,7 +91,7 @@ def test_compare_names_a_winner_over_defaults_with_an_option(tmp_path, capsys):
     options = ["--condition", "nominal", "--seeds", "16", "--duration", "2", "--gains", "default"]
     for extra in (
         [],
-        ["--defaults"],
+        ["--allow-defaults"],
     ):
         with pytest.raises(SystemExit):
             main.main(

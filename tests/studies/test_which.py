@@ -112,7 +112,7 @@ def test_what_cannot_be_decided_is_said(advice, folder):
     board = dataclasses.replace(advice.leaderboard[0], blocks=(barred,))
     untuned = dataclasses.replace(advice, leaderboard=[board])
     assert untuned.answer[3].startswith(
-        "Evidence: first so far; --defaults lets a law win over slow's"
+        "Evidence: first so far; --allow-defaults lets a law win over slow's"
     )
 
 

@@ -119,7 +119,7 @@ Kinds = Annotated[
     str | None,
     typer.Option(
         help="Any of delay, disturbance, friction, mass, noise, blow, jitter, missed and "
-        "gain, separated by commas; default: the first five."
+        "loss, separated by commas; default: the first five."
     ),
 ]
 Quick = Annotated[
@@ -149,7 +149,7 @@ def margins(
     is a multiple of the nominal mass. Noise is the standard deviation of the position sensor, in
     rad or m; if that is 1 mrad, the velocity sensor has 5 mrad/s. A blow at half time has that
     momentum, in N s or N m s. Jitter is a share of the control
-    period. Missed is the share of samples that are missed. Gain is the share of its force that each
+    period. Missed is the share of samples that are missed. Loss is the share of its force that each
     actuator loses. For laws that can be linearised, the column "theory" has the stability limit of
     the linear loop. A law may tolerate more, with a small sustained oscillation.
 

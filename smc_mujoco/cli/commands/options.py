@@ -87,7 +87,8 @@ Condition = Annotated[
     ),
 ]
 Defaults = Annotated[
-    bool, typer.Option("--defaults", help="Name a winner even if a rival has default gains.")
+    bool,
+    typer.Option("--allow-defaults", help="Name a winner even if a rival has default gains."),
 ]
 Disturbance = Annotated[
     float | None,

@@ -2,10 +2,10 @@
 clock.
 
 In order: pace.py sets the speed; track.py says what each run does at each frame; camera.py lays out
-the tiles, or race.py carts on one picture; world.py composes a machine's model, puppet.py poses it,
-stage.py adds the arrows of arrows.py, and canvas.py renders; arm.py draws over arms and what flies;
-sheet.py is the page with the text and the charts, made as figures are; video.py writes. Frames are
-made and written one by one, so that memory does not grow with a film's length.
+the tiles, or shared_picture.py carts on one; world.py composes a machine's model, puppet.py poses
+it, stage.py adds the arrows of arrows.py, and canvas.py renders; arm.py draws over arms and what
+flies; sheet.py is the page with the text and the charts, made as figures are; video.py writes.
+Frames are made and written one by one, so that memory does not grow with a film's length.
 """
 
 import contextlib
@@ -27,7 +27,7 @@ from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.draw import horizon, style
 from smc_mujoco.draw.decimate import end
 from smc_mujoco.draw.figure import DrawnRuns
-from smc_mujoco.draw.film import arrows, camera, pace, race
+from smc_mujoco.draw.film import arrows, camera, pace, shared_picture
 from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.draw.film.pace import FilmClock
 from smc_mujoco.draw.film.puppet import Course, Puppet
@@ -300,8 +300,8 @@ def pictures(frames: Frames) -> Generator[Array]:
         stages = [opened.enter_context(stage) for stage in staged(tracks, placed, clock.times)]
         shots = separate_shots
         if placed.lanes is not None:
-            race.hide_between(stages)
-            shots = race.shots
+            shared_picture.hide_between(stages)
+            shots = shared_picture.shots
         overlays = []
         if runs.traces[0].scenario.plant.has_path:
             from smc_mujoco.draw.film import arm
@@ -363,7 +363,7 @@ def drawn(
 class Placement(NamedTuple):
     """Where the machines of a film stand: the puppets, their tiles and labels, (machines, 4) px,
     the view of each, the points that it shows, their courses if the camera follows them, and their
-    places if they share one picture, as of `race.places`.
+    places if they share one picture, as of `shared_picture.places`.
     """
 
     puppets: Sequence[Puppet]
@@ -403,10 +403,10 @@ def placement(
     sizes = functools.partial(label_sizes, names, size)
     room = room_of(size)
     tiles, labels, view = camera.layout(len(tracks), room, sizes, points, turn)
-    lanes = race.places(puppets, turn)
+    lanes = shared_picture.places(puppets, turn)
     if lanes is not None:
         every = np.concatenate([points + place for place in lanes])
-        shared = race.layout(len(tracks), room, sizes, every, turn)
+        shared = shared_picture.layout(len(tracks), room, sizes, every, turn)
         if camera.magnification(shared[2], every) > camera.magnification(view, points):
             tiles, labels, view = shared
             points = every
