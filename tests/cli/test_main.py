@@ -21,7 +21,7 @@ from helpers import commands
 import smc_mujoco as smc
 from smc_mujoco.cli import console, main, tables
 from smc_mujoco.cli import run_scene as show
-from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.commands import options, studies
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
 from smc_mujoco.metrics.catalogue import metrics, score
@@ -633,3 +633,19 @@ def test_x0_is_one_number_or_one_for_each_channel():
     assert options.starts("0.3,-0.2,1").x0 == (0.3, -0.2, 1.0)
     with pytest.raises(smc.ScenarioError, match=r"--x0 is '0.3;1': give a number"):
         options.starts("0.3;1")
+
+
+@pytest.mark.skipif(gl.missing() is not None, reason="no OpenGL")
+def test_a_film_of_an_answer_has_as_many_pictures_as_its_time_allows(tmp_path):
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    scenario = smc.Scenario(plant="duffing", law=smc.law("pid"), duration=0.5)
+    advice = types.SimpleNamespace(worst_trace=smc.run(scenario))
+    said = []
+    terminal = types.SimpleNamespace(note=lambda text, wrap: said.append(text), wrote=said.append)
+    studies._film(advice, tmp_path, time.monotonic() - 1.0, terminal)
+    assert re.match(r"no film: \d+ s are too long for the time left", said[0])
+    assert not [*tmp_path.iterdir()]
+    studies._film(advice, tmp_path, time.monotonic() + 600.0, terminal)
+    assert said[1] == tmp_path / "worst_run.mp4"
+    made = next(ffmpeg.read_frames(str(said[1])))
+    assert made["fps"] == studies.MAX_FPS
