@@ -134,7 +134,7 @@ def test_bristles_against_mujoco_alone():
         mujoco.mj_step(model, data)
     np.testing.assert_allclose(trace.x[:-1, 0], places, atol=1e-12)
     # it holds up to the jump, and slides soon after it
-    assert smc.score(trace, ["stick_time"])["stick_time"] == pytest.approx(AT, abs=0.05)
+    assert smc.score(trace, ["stick_time"])["stick_time"] == pytest.approx(AT, abs=0.1)
 
 
 def test_a_condition_with_it_is_kept_and_run(tmp_path):
