@@ -97,12 +97,16 @@ def plot(
         by_plant = axes.reshape(len(dots.conditions), -1)
         for plant, high, row in zip(dots.conditions, tall, by_plant, strict=True):
             _draw_plant(row, dots, plant, across == 1)
-            named = title is not None or len(dots.conditions) > 1
-            words = style.plant_name(dots.labels[plant]) if named else ""
-            above = 1.0 + 1.7 * pages.TEXT_SIZE / 72 / (high - WORDS_HEIGHT)  # the note
-            row[0].set_title(words, y=above, parse_math=False)
+            if title is not None or len(dots.conditions) > 1:
+                _name_row(row[0], dots.labels[plant], high)
         pages.set_head(page, width, head, key, shared)
         return pages.write(page, paths)
+
+
+def _name_row(ax: Axes, plant: Plant | str, high: float) -> None:
+    """Write the name of a plant above its row, which is `high` in, clear of the note above it."""
+    above = 1.0 + 1.7 * pages.TEXT_SIZE / 72 / (high - WORDS_HEIGHT)
+    ax.set_title(style.plant_name(plant), y=above, parse_math=False)
 
 
 class Dots(NamedTuple):

@@ -286,7 +286,8 @@ def cut(machines: Sequence[mujoco.MjModel], points: Array, slides: Array, own: b
             continue
         first, last = lows[axis], highs[axis]
         if upright:  # only from below
-            first = min(least[~long & (most > first)].min(initial=first) - margin, first)
+            beyond = least[~long & (most > first)].min(initial=first)
+            first = min(beyond - margin, first)
             last = np.inf
         start, stop = least[long].min(), most[long].max()
         first, last = max(first, start), min(last, stop)
@@ -308,14 +309,19 @@ def cut(machines: Sequence[mujoco.MjModel], points: Array, slides: Array, own: b
                 way[axis] = last - stop
             elif not upright and not first <= middle <= last:
                 model.geom_group[geom] = HIDDEN_GROUP
-            if way.any():
-                model.geom_sameframe[geom] = 0  # else MuJoCo takes it to be where its body is
-            pose = data.xmat[model.geom_bodyid[geom]].reshape(3, 3)
-            model.geom_pos[geom] += way @ pose
+            _move(model, data, geom, way)
         raised = first - start if upright else 0.0
     for other, name in itertools.product(machines[1:], CUT_FIELDS):
         getattr(other, name)[fixed] = getattr(model, name)[fixed]
     return raised
+
+
+def _move(model: mujoco.MjModel, data: mujoco.MjData, geom: int, way: Array) -> None:
+    """Move a geom by `way`, (3,) m in the world."""
+    if way.any():
+        model.geom_sameframe[geom] = 0  # else MuJoCo takes it to be where its body is
+    pose = data.xmat[model.geom_bodyid[geom]].reshape(3, 3)
+    model.geom_pos[geom] += way @ pose
 
 
 def _slender(sides: Array, axis: int) -> Array:

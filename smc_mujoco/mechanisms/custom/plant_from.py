@@ -241,8 +241,7 @@ def _plant(
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields = UserFields(mass, gravity)
-    servo = any(isinstance(motor.kept, PositionServo) for motor in build.motors)
-    why_not = SET_POINT if servo else missing(model, joints, build.motors)
+    why_not = _unmodelled(model, joints, build.motors)
     rubs = default_friction(model)
     return Plant(
         name=plant_name,
@@ -381,6 +380,13 @@ def _kept(
         if motor.kept and bounds[i] is None:
             bounds[i] = own.bound_of_kept(label, model, motor.joint, motor.kept)
     return {"actuator": parts, "u_max": tuple(bounds)}
+
+
+def _unmodelled(model: mujoco.MjModel, joints: list[str], motors: Sequence[Motor]) -> str:
+    """Return why a plant has no nominal model; "" if it has one."""
+    if any(isinstance(motor.kept, PositionServo) for motor in motors):
+        return SET_POINT
+    return missing(model, joints, motors)
 
 
 def missing(model: mujoco.MjModel, joints: list[str], motors: Sequence[Motor]) -> str:
