@@ -78,8 +78,10 @@ def median_of(values: Array, samples: Sequence[int] | None = None) -> Interval:
         counts[:, ~counts.any(axis=0)] = 1
         counted = 2 * np.cumsum(counts, axis=0, dtype=drawn.dtype)
         total = counted[-1] // 2
-        lower[:, k] = ordered[(counted < total).sum(axis=0)]
-        upper[:, k] = ordered[(counted <= total).sum(axis=0)]
+        below = (counted < total).sum(axis=0)
+        lower[:, k] = ordered[below]
+        up_to = (counted <= total).sum(axis=0)
+        upper[:, k] = ordered[up_to]
     # T. C. Hesterberg's expanded percentile, with Student's t of n - 1 degrees of freedom
     quantile = stdtrit(n - 1, (1 + LEVEL) / 2)
     tail = ndtr(-math.sqrt(n / (n - 1)) * quantile)
@@ -95,7 +97,8 @@ def median_of(values: Array, samples: Sequence[int] | None = None) -> Interval:
 def middle(values: Array) -> Array:
     """Return the median over the last axis, without NaN; NaN if all values are NaN."""
     ordered = np.sort(values, axis=-1)
-    n = (~np.isnan(values)).sum(axis=-1, keepdims=True)
+    known = ~np.isnan(values)
+    n = known.sum(axis=-1, keepdims=True)
     lower_place = np.maximum((n - 1) // 2, 0)
     low = np.take_along_axis(ordered, lower_place, axis=-1)
     upper_place = np.maximum(n // 2, 0)

@@ -170,7 +170,8 @@ def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chatte
         assumptions += ("N L is about 1 at many frequencies: do not trust the prediction",)
     elif len(stable) > 1:
         assumptions += ("other starts may end in another cycle",)
-    return _prediction(loop, one, _threshold(loop, one, unstable), assumptions, ranges)
+    threshold = _threshold(loop, one, unstable)
+    return _prediction(loop, one, threshold, assumptions, ranges)
 
 
 def _threshold(loop: Loop, one: Balance, unstable: Sequence[Balance]) -> float:
@@ -210,7 +211,8 @@ def _locked_ranges(loop: Loop, assumptions: Names) -> Chattering:
     stable, _ = cycles(later)
     if not stable:
         return Chattering(assumptions=assumptions)
-    wave = later.wave(*max(stable, key=lambda one: one[1]))
+    fastest = max(stable, key=lambda one: one[1])
+    wave = later.wave(*fastest)
     assumptions += ("no solution, but a cycle locked to the samples is possible",)
     return Chattering(
         amplitude_range=(0.0, AMPLITUDE_FACTOR * wave.s + loop.s_of_one_count),
@@ -299,7 +301,8 @@ def _may_balance(products: Array, sides: Array) -> Array:
     """Return whether N L may be 1 in cells, (K,), from its values at their corners, (K, 4), with a
     margin.
     """
-    sizes = np.log(np.maximum(np.abs(products), SMALLEST))
+    magnitudes = np.maximum(np.abs(products), SMALLEST)
+    sizes = np.log(magnitudes)
     spans = np.ptp(sizes, axis=1)
     margins = CELL_MARGIN * np.maximum(spans, max(sides[1], COARSE_NOISE))
     below = sizes.min(axis=1) <= margins
@@ -312,7 +315,8 @@ def _may_balance(products: Array, sides: Array) -> Array:
     margins = CELL_MARGIN * np.maximum(np.ptp(phases, axis=1), max(sides[0], COARSE_NOISE))
     lowest = phases.min(axis=1) - margins
     highest = phases.max(axis=1) + margins
-    return near & (np.ceil(lowest / math.tau) * math.tau <= highest)
+    next_turn = np.ceil(lowest / math.tau) * math.tau
+    return near & (next_turn <= highest)
 
 
 def _balanced(loop: Loop, low: Array, high: Array) -> Balance | None:
@@ -330,7 +334,8 @@ def _balanced(loop: Loop, low: Array, high: Array) -> Balance | None:
         product = cmath.log(
             loop.gain(amplitude, omega) * loop.response(omega) or math.exp(-MAX_SHIFT)
         )
-        return np.array([product.real, product.imag]) + (inside - z)
+        parts = np.array([product.real, product.imag])
+        return parts + (inside - z)
 
     def solved() -> Iterator[Array]:
         yield root(excess, 0.5 * (low + high), options=ROOT_OPTIONS).x
@@ -374,7 +379,8 @@ def _nearest_cycle(loop: Loop, wave: Wave, shift: float) -> Wave | None:
     sign = math.copysign(1.0, shift)
     beside = []
     for cycle in stable:
-        if sign * math.log(cycle[1] / wave.omega) >= -SAME_CYCLE_TOLERANCE:
+        ratio = math.log(cycle[1] / wave.omega)
+        if sign * ratio >= -SAME_CYCLE_TOLERANCE:
             beside.append(cycle)
     if not beside and shift > 0.0:
         beside = _of_two_samples(later)
@@ -462,12 +468,14 @@ def _with_harmonics(loop: Loop, wave: Wave) -> Wave:
 
     def excess(z: Array) -> list[float]:
         gain = loop.wave(*np.exp(z)).gain
-        product = np.log(gain * loop.response(math.exp(z[1])))
+        response = loop.response(math.exp(z[1]))
+        product = np.log(gain * response)
         return [product.real, product.imag]
 
     start = np.log([wave.amplitude, wave.omega])
     solved = root(excess, start, options=ROOT_OPTIONS)
-    near = solved.success and np.abs(solved.x - start).max() < MAX_SHIFT
+    moved = np.abs(solved.x - start).max()
+    near = solved.success and moved < MAX_SHIFT
     if near:
         return loop.wave(*np.exp(solved.x).tolist())
     return wave
@@ -504,6 +512,7 @@ def _prediction(
             omegas.append(math.inf)
     fastest = max(omegas) * FREQUENCY_FACTOR / math.tau
     nyquist = 0.5 / loop.scenario.control_period
+    lowest = min(omegas) / FREQUENCY_FACTOR / math.tau
     return Chattering(
         amplitude=wave.s,
         amplitude_x=wave.amplitude,
@@ -516,7 +525,7 @@ def _prediction(
             min(sizes) / AMPLITUDE_FACTOR,
             max(sizes) * AMPLITUDE_FACTOR + loop.s_of_one_count,
         ),
-        frequency_range=(min(omegas) / FREQUENCY_FACTOR / math.tau, min(fastest, nyquist)),
+        frequency_range=(lowest, min(fastest, nyquist)),
         coupling=coupling,
         gain=wave.gain,
         response=response,

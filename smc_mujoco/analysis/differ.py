@@ -28,7 +28,8 @@ def relative_range(values: Sequence[float], least: float = 0.0, first_order: boo
         return 0.0 if all(missing) else math.inf
     beyond = []
     for value in values:
-        beyond.append(math.copysign(max(abs(value) - least, 0.0), value))
+        excess = max(abs(value) - least, 0.0)
+        beyond.append(math.copysign(excess, value))
     smallest = max(min(map(abs, values)), least)
     width = max(beyond) - min(beyond)
     # inf - inf is no change

@@ -119,7 +119,8 @@ class Loop:
             self.joints = [channel, free]
         else:
             self.joints = [channel]
-        self.controller = CompiledController(s.velocity, s.surface, s.law.of_channel(channel))
+        law = s.law.of_channel(channel)
+        self.controller = CompiledController(s.velocity, s.surface, law)
         self._linearise_mechanism()
         self.nominal_models = list(map(self._nominal_model, self.joints))
         # all amplitudes of a frequency share an answer and a clock, and the loops of `later` share
@@ -202,7 +203,8 @@ class Loop:
     def response(self, omega: complex) -> complex:
         """Return the amplitude of x at control samples per unit of sampled and held u, rad or m."""
         late = np.exp(-1j * omega * self.delay)
-        return complex(self._answer(omega)[self.rows[self.channel]] * late)
+        of_channel = self._answer(omega)[self.rows[self.channel]]
+        return complex(of_channel * late)
 
     def coupling(self, omega: float) -> float:
         """Return the largest amplitude of another driven channel under this one's u, over that of
@@ -241,7 +243,8 @@ class Loop:
             count = sensor.quantum(s.plant.units[self.channel] == "rad")
         if not count:
             return 0.0
-        x = np.where(np.arange(2 * REST_SAMPLES) < REST_SAMPLES, 0.0, count)
+        first_half = np.arange(2 * REST_SAMPLES) < REST_SAMPLES
+        x = np.where(first_half, 0.0, count)
         _, sliding = self._controlled(s.control_period, [x, np.zeros(len(x))])
         return float(np.abs(sliding).max())
 
@@ -260,9 +263,8 @@ class Loop:
         play, see `Wave`.
         """
         _, u, _ = self._excited([amplitude], omega, max_samples)
-        return self._gain_of(
-            _first(u, self._clock(omega, max_samples, 0.0).against), amplitude, omega
-        )
+        first_harmonic = _first(u, self._clock(omega, max_samples, 0.0).against)
+        return self._gain_of(first_harmonic, amplitude, omega)
 
     def phases(self, amplitude: float, omega: float) -> Pair:
         """Return the lowest and highest phase of a locked cycle's gain relative to `gain`, rad: one
@@ -283,7 +285,9 @@ class Loop:
             at_locked = self._gain_of(_harmonic(u, angles), amplitude, locked)
             shifts.append(float(np.angle(at_locked / mean)))
         scale = omega / locked
-        return scale * min(*shifts, 0.0), scale * max(*shifts, 0.0)
+        earliest = scale * min(*shifts, 0.0)
+        latest = scale * max(*shifts, 0.0)
+        return earliest, latest
 
     def _gain_of(self, first: complex, amplitude: float, omega: float) -> complex:
         two_samples = math.isclose(self.scenario.control_period * omega, math.pi, rel_tol=1e-9)
@@ -342,7 +346,8 @@ class Loop:
         first = _first(u, next(powers))
         rest = []
         for n, power in enumerate(powers, 2):
-            rest.append(self.response(n * omega) * _first(u, power) / 1j)
+            harmonic = self.response(n * omega) * _first(u, power)
+            rest.append(harmonic / 1j)
         # u is shifted in time until the answer to its first harmonic has the phase of e
         shift = 0j
         if first:
@@ -376,7 +381,8 @@ class Loop:
                 e = amplitude * turns
                 at = answer[self.rows[self.channel]]
                 x += (answer[self.rows[joint]] / at * e).real
-                v += (answer[self.nv + self.rows[joint]] / at * e).real
+                answered = answer[self.nv + self.rows[joint]] / at
+                v += (answered * e).real
             motion += [x, v]
         u, s = self._controlled(clock.h, motion)
         limit = self.scenario.limits[self.channel]
@@ -392,8 +398,10 @@ class Loop:
         count = math.ceil(periods * period / h)
         first = int(SETTLING_SHARE * count)
         angles = omega * (h * np.arange(first, count) + h * position)
-        turns = np.exp(1j * omega * h * (np.arange(count) + position))
-        return SampleTimes(h, turns, first, angles, np.exp(-1j * angles))
+        samples = np.arange(count) + position
+        turns = np.exp(1j * omega * h * samples)
+        against = np.exp(-1j * angles)
+        return SampleTimes(h, turns, first, angles, against)
 
 
 class SampleTimes(NamedTuple):

@@ -59,7 +59,9 @@ def law_time(scenario: Scenario) -> LawTime | None:
     # in turn, as loads come and go
     rounds = []
     for _ in range(ROUNDS):
-        rounds.append((_round(timed, seen), _round(reference, seen)))
+        own_round = _round(timed, seen)
+        other_round = _round(reference, seen)
+        rounds.append((own_round, other_round))
     of_timed, of_reference = zip(*rounds, strict=True)
     own = np.min(of_timed, axis=0)
     other = np.min(of_reference, axis=0)
@@ -71,7 +73,8 @@ def _measured(scenario: Scenario) -> Array:
     """Return what the law measures in the last channel at each sample of a run, (samples, fields
     of a Measurement).
     """
-    short = dataclasses.replace(scenario, duration=min(scenario.resolved.duration, LONGEST))
+    duration = min(scenario.resolved.duration, LONGEST)
+    short = dataclasses.replace(scenario, duration=duration)
     seen = []
     with callback.installed():
         batch = ScenarioBatch([prepare(short)], threads=1)
@@ -106,7 +109,8 @@ def _round(timed: Law, seen: Array) -> Array:
         middle = clock()
         _calls(function.address, row, *own, stride, copies)
         spent[k], empty[k] = clock() - middle, middle - start
-    return 1e-9 * np.maximum(spent - np.median(empty), 0.0) / copies
+    alone = np.maximum(spent - np.median(empty), 0.0)
+    return 1e-9 * alone / copies
 
 
 @njit

@@ -193,7 +193,8 @@ def _crossing(at: Linear, stiffness: float, lam: float, k1: float, h: float) -> 
     )
     for root in np.roots(equation):
         if abs(root.imag) <= 1e-9 * abs(root) and 0.0 < (y := float(root.real)) <= 2.0:
-            w = complex(-y, math.sqrt(y * (2.0 - y)))
+            imaginary = math.sqrt(y * (2.0 - y))
+            w = complex(-y, imaginary)
             top = n1 * w + n0
             bottom = w * w - t * w + d
             turned = np.angle(-top / bottom) % math.tau
@@ -210,7 +211,8 @@ def steady_error(plant: Plant, lam: Natural, k1: Natural, d: Finite) -> float:
     """Return |x| at rest of (1) under a constant d on every channel, worst channel, rad or m: |d| /
     (lam k1 + K).
     """
-    loop = linear(plant).stiffness + lam * k1 * np.eye(plant.n)
+    sliding = lam * k1 * np.eye(plant.n)
+    loop = linear(plant).stiffness + sliding
     moved = np.linalg.solve(loop, np.full(plant.n, d))
     return float(np.abs(moved).max())
 

@@ -79,7 +79,8 @@ def values(table: RunColumns, metric: str) -> Array:
     plants = np.asarray(table.column("plant"), str)
     lost = failed(table)
     missing = np.isnan(scores) & ~lost
-    lacking = set(plants[missing]) - set(plants[~missing & ~lost])
+    kept = set(plants[~missing & ~lost])
+    lacking = set(plants[missing]) - kept
     if not CATALOGUE[name].error:
         lost = lost | ~has_arrived(table)
     scores[lost] = np.inf
@@ -131,7 +132,8 @@ def has_arrived(table: RunColumns) -> Array:
 def failed(table: RunColumns) -> Array:
     """Return which rows are runs that failed."""
     lost = np.array([failure is not None for failure in table.column("failure")], bool)
-    return lost | ~np.isnan(np.array(table.column("diverged_at"), float))
+    times = np.array(table.column("diverged_at"), float)
+    return lost | ~np.isnan(times)
 
 
 def failures(table: RunColumns) -> list[str]:
@@ -199,7 +201,8 @@ class RunGroup:
         laws, law = np.unique(columns["law"], return_inverse=True)
         self.laws = tuple(laws.tolist())
         numbers, seed = np.unique(columns["seed"], return_inverse=True)
-        cells = law, [self.blocks.index(key) for key in keys], seed
+        blocks = [self.blocks.index(key) for key in keys]
+        cells = law, blocks, seed
         shape = (3, len(laws), len(self.blocks), len(numbers))
         cubes = np.full(shape, -1)
         for cube, of_run in zip(cubes, (rows, columns["outcome"], columns["sets"]), strict=True):
@@ -314,7 +317,8 @@ def _outcomes(table: RunColumns) -> Array:
     # to 20 binary digits, and below 1e-9 to 0
     share, exponent = np.frexp(np.stack(columns, axis=1))
     with np.errstate(over="ignore", invalid="ignore"):
-        numbers = np.ldexp(np.round(share * 2**20), exponent - 20)
+        rounded = np.round(share * 2**20)
+        numbers = np.ldexp(rounded, exponent - 20)
     numbers[np.abs(numbers) < ROUNDING] = 0.0
     numbers[np.isnan(numbers)] = -np.inf  # which no metric is; NaN would differ from itself
     return np.unique(numbers, axis=0, return_inverse=True)[1].ravel()
@@ -328,7 +332,8 @@ def scenarios(table: RunColumns, group: RunGroup) -> list[Scenario | None]:
     scenarios: list[Scenario | None] = [None] * len(group.blocks)
     for k, rows in enumerate(group.rows.swapaxes(0, 1)):
         with contextlib.suppress(ScenarioError):
-            scenarios[k] = table.scenario(int(rows[rows >= 0].min()))
+            first = int(rows[rows >= 0].min())
+            scenarios[k] = table.scenario(first)
     return scenarios
 
 
@@ -352,7 +357,8 @@ def sources(table: RunColumns, rows: Array) -> dict[str, tuple[Source, ...]]:
     of_laws = set(zip(*columns, strict=True))
     for law, kind, search in sorted(of_laws, key=str):
         about = {"kind": kind, "search": search and json.loads(search)}
-        by_law[law] = (*by_law.get(law, ()), restore(about))
+        known = by_law.get(law, ())
+        by_law[law] = (*known, restore(about))
     return by_law
 
 
@@ -414,12 +420,14 @@ def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
     entry = CATALOGUE[metric]
     if entry.unit not in FLOORS:
         return 0.0
-    off = np.abs(np.subtract(scenario.resolved.x0, scenario.plant.origin))
+    away = np.subtract(scenario.resolved.x0, scenario.plant.origin)
+    off = np.abs(away)
     start = 0.0
     counts = 0.0
     for group in channel_groups(scenario):
         if group.driven:
-            start = max(start, float(off[list(group.channels)].max()))
+            of_group = off[list(group.channels)]
+            start = max(start, float(of_group.max()))
             counts = max(counts, resolution(scenario, group))
     error = eps * start
     seen = max(error, counts)

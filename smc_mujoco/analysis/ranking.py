@@ -250,7 +250,8 @@ class Comparison:
     @property
     def seeds(self) -> np.ndarray:
         """The number of seeds of each block, (blocks,)."""
-        return (~np.isnan(self.cells[0])).sum(axis=1)
+        known = ~np.isnan(self.cells[0])
+        return known.sum(axis=1)
 
     @property
     def samples(self) -> np.ndarray:
@@ -296,7 +297,8 @@ class Comparison:
     def winners(self) -> list[str | None]:
         """The law of each block that is better than every other, if there is one."""
         eligible = self._eligible | ~self.ranked.T[:, None, :]
-        wins = (self.winner_p <= self.winning) & np.all(eligible, axis=2)
+        significant = self.winner_p <= self.winning
+        wins = significant & np.all(eligible, axis=2)
         wins &= ~self.away.any(axis=2).T
         names = np.array([*self.laws, None])
         first = np.where(wins.any(axis=1), wins.argmax(axis=1), -1)
@@ -315,7 +317,8 @@ class Comparison:
         """
         enough = self.ranked & (min_p(self.units) <= self.limit)
         enough &= enough.sum(axis=0) > 1
-        best = enough & ~self.worse & ~self.away.any(axis=2)
+        fails = self.away.any(axis=2)
+        best = enough & ~self.worse & ~fails
         lowest = best & self.below
         best = np.where(lowest.any(axis=0), lowest, best)
         for k, winner in enumerate(self.winners):
@@ -332,7 +335,8 @@ class Comparison:
             within = ~np.any(self.leads**2 > 0.0, axis=3)
         else:
             within = p_values(self.leads - math.log1p(-LEVEL_SHARE)) <= WIN_ERROR
-        level = within & within.swapaxes(1, 2) & (self.samples >= MIN_LEVEL_UNITS)
+        enough = self.samples >= MIN_LEVEL_UNITS
+        level = within & within.swapaxes(1, 2) & enough
         level &= ~(self.below.T[:, :, None] | self.below.T[:, None, :])
         return level | np.eye(len(self.laws), dtype=bool)
 
@@ -351,7 +355,8 @@ class Comparison:
             high = 1.0
             if self.better[block, a, b]:
                 nearest = np.nanmedian(self.low[b, block])
-                high = math.exp(math.log(self.floors[block]) - nearest)
+                floor = math.log(self.floors[block])
+                high = math.exp(floor - nearest)
             value = high
         return Effect(
             value=float(np.clip(value, low, high)),
@@ -370,7 +375,8 @@ class Comparison:
         It makes up for what half the step and trends charge, too.
         """
         at = block, self.laws.index(law), self.laws.index(rival)
-        if self.below[list(at[1:]), block].any():
+        ours_or_theirs = self.below[list(at[1:]), block]
+        if ours_or_theirs.any():
             return math.nan
         lead = least_visible_lead(self.leads[at], self.first, self.relevant)
         difference = _difference(self.plain[at], self.leads[at])
@@ -407,9 +413,12 @@ def bounds(
         return np.fmin(cells, halves), np.fmax(cells, halves)
     whole = _logarithms(cells)
     half = _logarithms(halves)
-    change = np.abs(_difference(_logarithms(halves, floors), _logarithms(cells, floors)))
+    of_halves = _logarithms(halves, floors)
+    of_cells = _logarithms(cells, floors)
+    change = np.abs(_difference(of_halves, of_cells))
     # of a law in a block, for its runs that were not repeated
-    widening = np.minimum(np.nan_to_num(middle(change)), MAX_LOG)[..., None]
+    typical = np.nan_to_num(middle(change))
+    widening = np.minimum(typical, MAX_LOG)[..., None]
     with np.errstate(divide="ignore"):
         rise = np.log(middle(trends))[..., None]
     matters = np.abs(rise) > (relevant or RELEVANT)

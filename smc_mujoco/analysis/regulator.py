@@ -121,7 +121,8 @@ def _sampled(plant: Plant, control_period: float) -> tuple[np.ndarray, np.ndarra
         mujoco.mjd_transitionFD(model, data, 1e-6, True, step, pushed, None, None)
     order = [*dofs, *(model.nv + dofs)]
     step = step[np.ix_(order, order)]
-    pushed = pushed[np.ix_(order, model.actuator_ctrladr[drive_ids(model)])]
+    columns = model.actuator_ctrladr[drive_ids(model)]
+    pushed = pushed[np.ix_(order, columns)]
     A = np.eye(len(order))
     B = np.zeros_like(pushed)
     for _ in range(at.steps):

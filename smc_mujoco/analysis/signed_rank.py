@@ -62,7 +62,8 @@ def interval(differences: ArrayLike, error: float) -> tuple[float, float, float]
 def _finite(differences: ArrayLike) -> np.ndarray:
     """Return the differences that are known, with finite numbers in place of infinite ones."""
     known = np.asarray(differences, float)
-    return np.clip(known[~np.isnan(known)], -MAX_LOG, MAX_LOG)
+    known_ones = known[~np.isnan(known)]
+    return np.clip(known_ones, -MAX_LOG, MAX_LOG)
 
 
 def _ends(samples: np.ndarray, error: float) -> np.ndarray:
@@ -164,7 +165,8 @@ def least_visible_lead(leads: ArrayLike, error: float, relevant: float) -> float
     if n < 2 or min_p(n) > error:
         return 1.0
     centre = interval(known, error)[0]
-    centred = math.sqrt(n / (n - 1)) * (known - centre)
+    scale = math.sqrt(n / (n - 1))
+    centred = scale * (known - centre)
     digest = hashlib.sha256(known.tobytes()).digest()
     seed = int.from_bytes(digest[:8])
     drawn = np.random.default_rng(seed).integers(n, size=(LEAD_RESAMPLES, n))
@@ -173,5 +175,6 @@ def least_visible_lead(leads: ArrayLike, error: float, relevant: float) -> float
         low, high = _ends(centred[indices], error)
         needed.append([-low, high])
     own, mirrored = np.concatenate(needed, axis=1)
-    least = max(0.0, np.quantile(own, OWN_SHARE), np.median(mirrored))
+    own_size = np.quantile(own, OWN_SHARE)
+    least = max(0.0, own_size, np.median(mirrored))
     return 1.0 - (1.0 - relevant) * math.exp(-least)

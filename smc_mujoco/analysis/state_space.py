@@ -67,8 +67,10 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
         block = rates(model, data)
     order = _order(model, dofs)
     n = len(order)
-    a = block[:n, :n][np.ix_(order, order)]
-    b = block[:n, n:][np.ix_(order, driven)]
+    of_states = block[:n, :n]
+    a = of_states[np.ix_(order, order)]
+    of_drives = block[:n, n:]
+    b = of_drives[np.ix_(order, driven)]
     names = channel_names(plant)
     if plant.pose:
         labels = names
@@ -76,7 +78,8 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     else:
         labels = []
         for i in order[: model.nv]:
-            labels.append(model.joint(int(model.dof_jntid[i])).name)
+            joint = int(model.dof_jntid[i])
+            labels.append(model.joint(joint).name)
         drives = names[: plant.driven]
     return StateSpace(
         a,

@@ -41,10 +41,12 @@ def crossover(lags: Sequence[float], one: Sequence[float], other: Sequence[float
     """Return the lag, s, at which two amplitudes are equal, interpolated in logarithms; NaN where
     they do not cross.
     """
-    table = np.log(np.array([lags, one, other], float))
+    columns = np.array([lags, one, other], float)
+    table = np.log(columns)
     at, first, second = table[:, np.isfinite(table).all(axis=0)]
     ratios = first - second
-    for k in np.flatnonzero(ratios[:-1] * ratios[1:] <= 0.0):
+    crossed = ratios[:-1] * ratios[1:] <= 0.0
+    for k in np.flatnonzero(crossed):
         if ratios[k] != ratios[k + 1]:
             share = ratios[k] / (ratios[k] - ratios[k + 1])
             return math.exp(at[k] + share * (at[k + 1] - at[k]))
@@ -91,7 +93,8 @@ def amplitudes(
         page = pages.blank(style.FULL_WIDTH, PAGE_HEIGHT)
         ax = page.subplots()
         ax.set(xscale="log", yscale="log")
-        rows = zip(runs.items(), style.law_colours(laws), gains, strict=True)
+        colours = style.law_colours(laws)
+        rows = zip(runs.items(), colours, gains, strict=True)
         for (label, its), colour, source in rows:
             over_lag = amplitudes_of(its)
             drawn.append(over_lag)
@@ -108,7 +111,8 @@ def amplitudes(
         handles.append(pages.entry("run", **dot))
         label = "run that differs when repeated"
         handles.append(pages.entry(label, style.PAPER, mec=style.MUTED, **dot))
-        plant = next(iter(runs.values()))[0].scenario.plant
+        first = next(iter(runs.values()))[0]
+        plant = first.scenario.plant
         factor, unit = style.prefixed(ax.dataLim.ymax, f"{plant.unit}/s")
         ticks = set()
         for over_lag in drawn:
@@ -151,7 +155,8 @@ def draw_law(ax: Axes, traces: Sequence[Trace], over_lag: OverLag, colour: str) 
         look: Fields = {"color": colour, "mec": style.PAPER}
         if change.marked:
             look = {"color": style.PAPER, "mec": colour}
-        ax.plot(at, size, "o", ms=style.points(7.0), **look)
+        size_of_dot = style.points(7.0)
+        ax.plot(at, size, "o", ms=size_of_dot, **look)
 
 
 def set_axes(ax: Axes, lags: Sequence[float], factor: float, unit: str) -> None:

@@ -58,7 +58,8 @@ def _parting(one: Line, other: Line, limits: Pair, logarithmic: bool) -> float:
     """
     from scipy.ndimage import maximum_filter1d
 
-    t = one[0][one[0] <= other[0][-1] + 1e-9]
+    both = one[0] <= other[0][-1] + 1e-9
+    t = one[0][both]
     of_one = one[1][: len(t)]
     of_other = np.interp(t, *other)
     y = np.stack([of_one, of_other])
@@ -71,13 +72,15 @@ def _parting(one: Line, other: Line, limits: Pair, logarithmic: bool) -> float:
     highest = PEAK_DISTANCE * float(np.abs(y).max())
     if not logarithmic:
         highest = min(max(highest, MIN_PEAK * apart), apart)
-    window = 2 * math.ceil(PEAK_TIME * len(one[0])) + 1
+    half = math.ceil(PEAK_TIME * len(one[0]))
+    window = 2 * half + 1
     held = np.ones(len(t), bool)
     high = maximum_filter1d(y, window, mode="nearest")
     low = maximum_filter1d(-y, window, mode="nearest")
     for pair, room in ((drawn, apart), (high, highest), (low, highest)):
         near = np.abs(pair[0] - pair[1]) <= room
-        share = np.cumsum(near) / np.arange(1, len(t) + 1)
+        counts = np.arange(1, len(t) + 1)
+        share = np.cumsum(near) / counts
         held &= near & (share >= COINCIDENT_SHARE)
     return float(t[held].max(initial=-np.inf))
 

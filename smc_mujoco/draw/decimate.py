@@ -91,7 +91,9 @@ def band(t: Array, y: Array) -> tuple[Array, Array, Array]:
 
     count = len(t) - 1
     if count <= COLUMNS:
-        return t, y.min(axis=1), y.max(axis=1)
+        low = y.min(axis=1)
+        high = y.max(axis=1)
+        return t, low, high
     edges = t[:: 2 * -(-count // (2 * COLUMNS))]
     ends = edges if edges[-1] == t[-1] else np.append(edges, t[-1])
     e = windows(t, y, ends)
@@ -109,7 +111,8 @@ def window(trace: Trace) -> int:
     If a control switches irregularly between +-1, its mean over w samples varies by about 2 / w,
     which makes the line jagged. The window is so wide that this is less than the width of the line.
     """
-    return 4 * round(max(MEAN_SHARE * trace.scenario.samples, MIN_MEAN) / 4)
+    share = MEAN_SHARE * trace.scenario.samples
+    return 4 * round(max(share, MIN_MEAN) / 4)
 
 
 def chattering_parts(y: Array, width: int) -> list[slice]:
@@ -149,7 +152,8 @@ def reversals(y: Array) -> tuple[Array, Array]:
     step = np.diff(y)
     least = MIN_MOVE * np.abs(y).max()
     moving = np.flatnonzero(np.abs(step) > least)
-    turns = np.flatnonzero(np.diff(np.sign(step[moving])))
+    ways = np.sign(step[moving])
+    turns = np.flatnonzero(np.diff(ways))
     return moving[turns], moving[turns + 1]
 
 
@@ -175,11 +179,14 @@ def smooth(y: Array, width: int) -> Array:
     for part in chattering_parts(y, width):
         from scipy.signal import detrend
 
-        half = min(width // 2, (part.stop - part.start + 1) // 2)
-        means = np.pad(triangular_mean(line[part], half), half - 1, "edge")
+        middle = (part.stop - part.start + 1) // 2
+        half = min(width // 2, middle)
+        smoothed = triangular_mean(line[part], half)
+        means = np.pad(smoothed, half - 1, "edge")
         for values, mean in ((line[part], means), (line[part][::-1], means[::-1])):  # from each end
             start = values[: 2 * half - 1]
-            moves = detrend(start).var() < (1.0 - TREND_SHARE) * start.var()
+            rest = detrend(start).var()
+            moves = rest < (1.0 - TREND_SHARE) * start.var()
             if not moves:
                 continue
             for k in range(1, half):

@@ -125,7 +125,8 @@ class Dots(NamedTuple):
     @property
     def lines(self) -> Array:
         """The number of lines of each plant's panels, (plants,)."""
-        blocks = np.array(list(map(len, self.conditions.values())))
+        counts = list(map(len, self.conditions.values()))
+        blocks = np.array(counts)
         return (len(self.looks) + 1) * blocks
 
 
@@ -253,7 +254,8 @@ def _intervals(table: RunColumns, metrics: Sequence[str]) -> dict[Cell, Interval
             for law, of_law in scores.values.items():
                 interval = median_of(of_law, linked(*scores.sets[law]))
                 if metric == SETTLES:
-                    interval = share_interval(float((of_law == 0.0).mean()), interval.n)
+                    share = float((of_law == 0.0).mean())
+                    interval = share_interval(share, interval.n)
                 else:
                     sizes = np.array(interval[:3])
                     sizes[(sizes > 0.0) & (sizes < MIN_SIZE)] = MIN_SIZE
@@ -272,7 +274,8 @@ def _key(
     """Return the entries of the legend, law by law and mark by mark, and where all gains come from
     if that is the same.
     """
-    known = sources(table, np.arange(len(table.column("law"))))
+    rows = np.arange(len(table.column("law")))
+    known = sources(table, rows)
     key: list[Handle] = []
     line: Fields = {"lw": style.points(1.5)}
     gains, shared = pages.gain_sources([known.get(law, ()) for law in looks])
@@ -285,7 +288,8 @@ def _key(
         label += f" (the range, with fewer than {MIN_INTERVAL_SAMPLES} samples)"
     key.append(pages.entry(label, **line))
     if ringed:
-        key.append(pages.entry("winner", style.INK, lw=0.0, **RING))
+        ring = pages.entry("winner", style.INK, lw=0.0, **RING)
+        key.append(ring)
     if any(interval.median == MIN_SIZE for interval in intervals):
         smallest = number(MIN_SIZE / 2)
         key.append(pages.entry(smallest, lw=0.0, marker="<"))
@@ -326,7 +330,8 @@ def _panel(
         ax.set_yticks(range(len(looks)), map(style.law_name, looks), parse_math=False)
     else:
         middles = height * (np.arange(len(conditions)) + 0.5) - 1
-        ax.set_yticks(middles, np.char.replace(conditions, "_", " "), parse_math=False)
+        names = np.char.replace(conditions, "_", " ")
+        ax.set_yticks(middles, names, parse_math=False)
     ax.set_ylim(len(conditions) * height - 1, -1)
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)
@@ -360,7 +365,8 @@ def _label(metric: str, x: str) -> str:
     """Return the label of a panel with the metric's unit where positions are in x, on two lines."""
     if metric == SETTLES:
         return "share of runs\nthat settle"
-    words, bracket, unit = CATALOGUE[metric].heading(x).partition(" (")
+    heading = CATALOGUE[metric].heading(x)
+    words, bracket, unit = heading.partition(" (")
     folded = bracket.replace(" ", "\n")
     shown_unit = unit.replace("^2", "²").replace(" ", "·")
     return words + folded + shown_unit

@@ -192,7 +192,8 @@ def _composed_page(
     space = pages.head_height(width, handles)
     rows = max(*columns.values(), least)
     heights = blocks.heights
-    tall = height or _usual_height(width, space, rows, sum(map(len, heights)))
+    rows_of_all = sum(map(len, heights))
+    tall = height or _usual_height(width, space, rows, rows_of_all)
     page = pages.blank(width, tall, fig)
     free = 72 * (page.bbox.height / page.dpi - space - 0.4)  # points
     cells = _cells(page, list(columns), heights)
@@ -204,7 +205,8 @@ def _composed_page(
         titled = list(zip(panels, words, strict=True))
         _draw_over_time(page, cells[k], titled, runs, k == 0)
     _draw_beside(page, cells[2], blocks.beside, blocks.places, runs)
-    pages.set_head(page, width, style.titled(title, runs.head), handles, gains)
+    head = style.titled(title, runs.head)
+    pages.set_head(page, width, head, handles, gains)
     page.set_label("; ".join(str(one.get_label()) for one in key))
     pages.space_ticks(page)
     return page
@@ -334,7 +336,8 @@ def _height(panel: Panel) -> float:
 
 def _default(traces: Sequence[Trace], width: float) -> list[str]:
     """Return the names of the panels that suit the plant and the page."""
-    several = any(len(group.channels) > 1 for group in style.split(traces))
+    parts = style.split(traces)
+    several = any(len(group.channels) > 1 for group in parts)
     disturbed = any(np.nan_to_num(trace.d).any() for trace in traces)
     names = ["d"] if disturbed else []
     if several and traces[0].scenario.plant.direct:
@@ -375,7 +378,8 @@ def _draw_over_time(
     frames: list[Axes] = []
     axes: list[Axes] = []
     for cell, (panel, words) in zip(cells, overview, strict=True):
-        frame, rows = _rows(page, cell, panel, runs, axes[0] if axes else None)
+        above = axes[0] if axes else None
+        frame, rows = _rows(page, cell, panel, runs, above)
         frame.set_ylabel(words)
         frames.append(frame)
         for ax, part, colours in rows:
@@ -414,7 +418,8 @@ def _draw_alone(ax: Axes, runs: DrawnRuns, name: str, title: str | None) -> None
         drawing.mark(ax, runs.marks, named=title is None)
     if title is not None:
         ax.set_title(style.titled(title, ""))
-    for handle in pages.run_handles(runs.traces, runs.names, runs.colours)[0]:
+    handles = pages.run_handles(runs.traces, runs.names, runs.colours)[0]
+    for handle in handles:
         ax.add_artist(handle)
     dark.suit_page(set(ax.findobj()) - before)
 
@@ -456,7 +461,8 @@ def _rows(
     for row, name in zip(rows, runs.names, strict=True):
         sample = pages.entry(".", row.colours[0])
         key = row.axes.legend(handles=[sample], handlelength=1.0, **look)
-        key.get_texts()[0].set_text(style.cropped(name, room, size))
+        words = style.cropped(name, room, size)
+        key.get_texts()[0].set_text(words)
         key.get_texts()[0].set_parse_math(False)
         key.set_in_layout(False)
     return frame, rows
@@ -548,7 +554,8 @@ def _key(shown: Sequence[Panel]) -> list[Handle]:
         if name == "band":
             handles.append(Patch(color=style.MUTED, alpha=0.3, label=label))
         elif name == "line":
-            handles.append(pages.entry(label, lw=style.points(drawing.LINE)))
+            width = style.points(drawing.LINE)
+            handles.append(pages.entry(label, lw=width))
         else:
             handles.append(pages.entry(label, lw=thin))
     return handles

@@ -45,7 +45,8 @@ def horizon(traces: Sequence[Trace]) -> float:
 
 def until(trace: Trace, time: float) -> Trace:
     """Return the trace up to a time, s, with two samples at least."""
-    count = max(2, int(np.searchsorted(trace.t, time + 1e-9)))
+    place = int(np.searchsorted(trace.t, time + 1e-9))
+    count = max(2, place)
     part = arrays_within(trace, slice(count))
     return dataclasses.replace(trace, **part)
 

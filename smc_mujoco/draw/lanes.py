@@ -114,7 +114,8 @@ def settled(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Artist]:
     look: Fields = {"ms": style.points(6), "mec": style.PAPER, "mew": style.points(0.5)}
     for trace, colour in zip(panel.traces, colours, strict=True):
         error = np.abs(trace.x - trace.r).max(axis=1)
-        time = last_exit(trace.t, error, settling_band(trace.scenario, scale(trace)))
+        band = settling_band(trace.scenario, scale(trace))
+        time = last_exit(trace.t, error, band)
         if trace.diverged_at is None and 0.0 < time < min(trace.t[-1], ax.get_xlim()[1]):
             mean = trace.x.mean(axis=1)
             y = float(np.interp(time, trace.t, mean))
@@ -162,5 +163,6 @@ def crowded(panel: Panel, allowed: int = MAX_BANDS) -> bool:
     wide = 0
     for trace in panel.traces:
         _, least, most = band(trace.t, trace.u)
-        wide += float(np.mean(most - least)) > MIN_WIDE_BAND * (high - low)
+        wide_at_all = float(np.mean(most - least))
+        wide += wide_at_all > MIN_WIDE_BAND * (high - low)
     return wide > allowed

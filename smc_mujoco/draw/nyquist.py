@@ -50,7 +50,8 @@ def nyquist(
     """
     with style.page():
         colours = style.law_colours([scenario.law for scenario in scenarios])
-        gains, shared = pages.gain_sources([[scenario.law.source] for scenario in scenarios])
+        sources = [[scenario.law.source] for scenario in scenarios]
+        gains, shared = pages.gain_sources(sources)
         handles: list[Handle] = []
         for scenario, cycle, colour, source in zip(scenarios, cycles, colours, gains, strict=True):
             words = "no limit cycle predicted, L and 1/N do not cross"
@@ -72,7 +73,8 @@ def nyquist(
                 right.set_subplotspec(grid.get_gridspec()[grid.rowspan.start, :])
             last_periods(right, trace, cycle, channel, colour)
             if change.marked:
-                words = style.wrapped(NOTE, 72 * 0.53 * style.FULL_WIDTH, size, lines=2)
+                room = 72 * 0.53 * style.FULL_WIDTH
+                words = style.wrapped(NOTE, room, size, lines=2)
                 right.set_title(words, loc="left", fontsize=size, fontweight="normal")
         title = f"Chattering: {style.head(scenarios)}"
         pages.set_head(page, style.FULL_WIDTH, title, handles, shared)
@@ -83,13 +85,15 @@ def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour:
     """Draw L over frequency and 1/N over amplitude, and mark where they cross."""
     ax.set(xlabel="real part", ylabel="imaginary part", aspect="equal")
     ax.set(xlim=(-PLANE_EDGE, 0.2 * PLANE_EDGE), ylim=(-0.6 * PLANE_EDGE, 0.6 * PLANE_EDGE))
-    ax.axhline(0.0, color=style.RULE, lw=style.points(0.8))
-    ax.axvline(0.0, color=style.RULE, lw=style.points(0.8))
+    rule = {"color": style.RULE, "lw": style.points(0.8)}
+    ax.axhline(0.0, **rule)
+    ax.axvline(0.0, **rule)
     loop = Loop(scenario, channel)
     omega = math.tau * cycle.frequency
     unit = -cycle.response
     fastest = math.pi / scenario.control_period
-    omegas = np.geomspace(omega / SPAN_FACTOR, min(omega * SPAN_FACTOR, fastest), 400)
+    last = min(omega * SPAN_FACTOR, fastest)
+    omegas = np.geomspace(omega / SPAN_FACTOR, last, 400)
     responses = []
     for w in omegas:
         responses.append(loop.response(w))
@@ -97,7 +101,8 @@ def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour:
     amplitudes = cycle.amplitude_x * np.geomspace(1 / SPAN_FACTOR, SPAN_FACTOR, 60)
     inverses = []
     for a in amplitudes:
-        inverses.append(1.0 / (loop.gain(a, omega) or math.nan))
+        gain = loop.gain(a, omega)
+        inverses.append(1.0 / (gain or math.nan))
     inverse = np.array(inverses) / unit
     wide = style.points(1.6)
     curve = {"color": style.INK, "lw": wide, "label": "L, over frequency"}

@@ -150,7 +150,8 @@ def head_height(width: float, handles: Sequence[Handle]) -> float:
     """Return the height of the title and the legend, in inches."""
     labels, columns = _legend(handles, width)
     lines = np.char.count(labels, "\n") + 1 if labels else np.zeros(0)
-    rows = max(part.sum() for part in np.array_split(lines, columns))
+    parts = np.array_split(lines, columns)
+    rows = max(part.sum() for part in parts)
     return style.points(1.9 * TITLE_SIZE + 1.45 * TEXT_SIZE * rows) / 72
 
 
@@ -173,7 +174,8 @@ def _legend(handles: Sequence[Handle], width: float) -> tuple[list[str], int]:
             labels.append(label)
             widths.append(beside + style.widest(label.split("\n"), size))
         for columns in range(len(widths), 1, -1):
-            if sum(map(max, np.array_split(widths, columns))) < page - 16:
+            parts = np.array_split(widths, columns)
+            if sum(map(max, parts)) < page - 16:
                 return labels, columns
     return labels, 1
 
@@ -227,7 +229,8 @@ def run_handles(
     `gain_sources`.
     """
     handles: list[Handle] = []
-    gains, shared = gain_sources([[trace.scenario.law.source] for trace in traces])
+    sources = [[trace.scenario.law.source] for trace in traces]
+    gains, shared = gain_sources(sources)
     looks = style.looks(traces)
     for trace, name, colour, source, look in zip(traces, names, colours, gains, looks, strict=True):
         words = name + source

@@ -156,7 +156,8 @@ def slides_on_speed(trace: Trace) -> bool:
 
 def without_s(trace: Trace) -> Trace:
     """Return a trace whose s is unknown, so that no panel draws it."""
-    return dataclasses.replace(trace, s=np.full_like(trace.s, np.nan))
+    unknown = np.full_like(trace.s, np.nan)
+    return dataclasses.replace(trace, s=unknown)
 
 
 def is_shared(panel: Panel) -> bool:
@@ -263,7 +264,8 @@ def actuators(traces: Sequence[Trace]) -> list[Panel]:
         runs = []
         for part in parts:
             u = part.u[:, j : j + 1]
-            runs.append(dataclasses.replace(group_trace(part, first), u=u))
+            of_actuator = group_trace(part, first)
+            runs.append(dataclasses.replace(of_actuator, u=u))
         own = dataclasses.replace(group, channels=(j,))
         panels.append(Panel("u", own, runs, j))
     return panels
@@ -347,7 +349,8 @@ def curve(trace: Trace, y: Array, name: str) -> ArrayPair:
 
 def middle(trace: Trace, name: str) -> ArrayPair:
     """Return the line of the mean of a quantity over the channels: times in s, and values."""
-    return curve(trace, QUANTITIES[name](trace).mean(axis=1), name)
+    mean = QUANTITIES[name](trace).mean(axis=1)
+    return curve(trace, mean, name)
 
 
 def smoothed(trace: Trace) -> bool:
@@ -361,7 +364,8 @@ def mean_window(traces: Sequence[Trace]) -> float:
     longest = 0.0
     for trace in filter(smoothed, traces):
         for u in trace.u.T[drawn_channels(trace.u)]:
-            chattering = np.abs(smooth(u, window(trace)) - u).max()
+            ripple = np.abs(smooth(u, window(trace)) - u)
+            chattering = ripple.max()
             if chattering > VISIBLE_CHATTERING * (high - low):
                 longest = max(longest, window(trace) * trace.scenario.control_period)
                 break
@@ -396,7 +400,8 @@ def over_time(
         clip_impacts(ax, panel, colours)
     if name in ("x", "e"):
         target(ax, panel)
-    rows = zip(traces, colours, means, style.looks(traces), strict=True)
+    looks = style.looks(traces)
+    rows = zip(traces, colours, means, looks, strict=True)
     for trace, colour, mean, look in reversed(list(rows)):
         if not np.isfinite(mean).any():  # s of a law without a surface
             continue
@@ -483,7 +488,8 @@ def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
     peak = 0.0
     usual = 0.0
     for trace in panel.traces:
-        sizes = np.abs(trace.reaction[np.isfinite(trace.reaction)])
+        known = np.isfinite(trace.reaction)
+        sizes = np.abs(trace.reaction[known])
         if sizes.size:
             peak = max(peak, float(sizes.max()))
             usual = max(usual, float(np.quantile(sizes, LASTING_QUANTILE)))
@@ -603,7 +609,8 @@ def last_samples(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
     """
     stop = end(panel.traces)
     set_numbers(ax.yaxis, panel)
-    begin = max(0.0, stop - LAST_SAMPLES * panel.traces[0].scenario.control_period)
+    shown = LAST_SAMPLES * panel.traces[0].scenario.control_period
+    begin = max(0.0, stop - shown)
     ends = []
     rows = zip(panel.traces, colours, style.looks(panel.traces), strict=True)
     for trace, colour, look in reversed(list(rows)):
@@ -614,7 +621,8 @@ def last_samples(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
         if u.size:
             ends += [u.min(), u.max()]
     if ends:
-        least = MIN_CLOSE_UP / 2 * max(map(abs, span(panel.traces, "u")))
+        largest = max(map(abs, span(panel.traces, "u")))
+        least = MIN_CLOSE_UP / 2 * largest
         half = max(0.62 * np.ptp(ends), least) or 1.0
         middle = (min(ends) + max(ends)) / 2
         ax.set_ylim(middle - half, middle + half)
@@ -642,7 +650,8 @@ def drawn_channels(y: Array) -> list[int]:
     n = y.shape[1]
     if n <= MAX_DRAWN_CHANNELS:
         return list(range(n))
-    chosen = np.linspace(0, n - 1, MAX_DRAWN_CHANNELS).round().astype(int)
+    spread = np.linspace(0, n - 1, MAX_DRAWN_CHANNELS)
+    chosen = spread.round().astype(int)
     lowest = int(np.nanargmin(y)) % n
     highest = int(np.nanargmax(y)) % n
     return sorted({*chosen.tolist(), lowest, highest})

@@ -88,7 +88,8 @@ def lasting(traces: Sequence[Trace], name: str) -> list[Array]:
         for trace in traces:
             y = QUANTITIES[name](trace)
             share = UNDIVERGED_SHARE if trace.plant_diverged else 1.0
-            values.append(y[: max(1, int(share * len(y)))])
+            count = max(1, int(share * len(y)))
+            values.append(y[:count])
     lasts = []
     for y in values:
         if np.isfinite(y).all():
@@ -133,7 +134,8 @@ def limits(traces: Sequence[Trace], name: str) -> Pair:
         low, high = min(low, 0.0), max(high, 0.0)
     if name in PEAKS:
         high = max(high, MIN_RATIO * MIN_ERROR)
-        return min(max(low, MIN_ERROR), high / MIN_RATIO) / 1.5, high * 1.5
+        least = min(max(low, MIN_ERROR), high / MIN_RATIO)
+        return least / 1.5, high * 1.5
     size = max(abs(low), abs(high))
     air = MARGIN * (high - low)
     if high - low <= MIN_VARIATION * size:

@@ -133,7 +133,8 @@ def hit_size(trace: Trace, touch: Array, during: Array) -> str:
     """
     reactions = np.abs(np.nan_to_num(trace.reaction[during]))
     sizes = reactions.max(axis=0)
-    sizes = np.where(touch[during].any(axis=0), sizes, 0.0)
+    touched = touch[during].any(axis=0)
+    sizes = np.where(touched, sizes, 0.0)
     channel = int(sizes.argmax())
     for group in conventions.groups(trace.scenario):
         if channel in group.channels:
@@ -184,16 +185,19 @@ def flanks(trace: Trace) -> Array:
     towards larger x.
     """
     alone = not (trace.scenario.friction or trace.scenario.contact)
-    return np.sign(np.nan_to_num(trace.holding if alone else trace.force))
+    force = trace.holding if alone else trace.force
+    return np.sign(np.nan_to_num(force))
 
 
 def extended(on: Array, t: Array, hold: float) -> Array:
     """Return the signal (K + 1,), extended by `hold` s each time it is on, without gaps shorter
     than that.
     """
-    last = np.maximum.accumulate(np.where(on, t, -np.inf))
+    times = np.where(on, t, -np.inf)
+    last = np.maximum.accumulate(times)
     on = t - last < hold - 1e-9
-    edges = np.flatnonzero(np.diff(on.astype(int), prepend=0))  # on, off, on, ...
+    changes = np.diff(on.astype(int), prepend=0)
+    edges = np.flatnonzero(changes)  # on, off, on, ...
     for off, again in zip(edges[1::2], edges[2::2], strict=False):
         on[off:again] |= t[again] - t[off] < hold
     return on
@@ -206,12 +210,14 @@ def backlash_side(flank: Array, t: Array, hold: float) -> Array:
     touched = np.flatnonzero(flank)
     crossed = touched[1:][np.diff(flank[touched]) != 0]
     rattles = np.zeros(len(t), bool)
-    rattles[crossed[1:][np.diff(t[crossed]) < hold]] = True
+    soon = np.diff(t[crossed]) < hold
+    rattles[crossed[1:][soon]] = True
     places = np.where(flank != 0, np.arange(len(t)), 0)
     latest = np.maximum.accumulate(places)
     touching = extended(flank != 0, t, hold)
     sides = np.where(touching, flank[latest], 0.0)
-    return np.where(extended(rattles, t, hold), 2, sides).astype(int)
+    shaken = extended(rattles, t, hold)
+    return np.where(shaken, 2, sides).astype(int)
 
 
 def stick_words(sticks: Array, names: Sequence[str] = ()) -> str:

@@ -151,13 +151,15 @@ def runs_of(
         first = runs[0]
         of_laws = []
         for law in wanted:
-            of_laws.append(dataclasses.replace(first, law=law_for(first.plant, law)))
+            own = law_for(first.plant, law)
+            of_laws.append(dataclasses.replace(first, law=own))
         runs = of_laws or list(runs)
     else:
         plant = as_plant(runs)
         runs = []
         for law in wanted or laws_of(plant)[:1]:
-            runs.append(Scenario(plant=plant, law=law_for(plant, law)))
+            own = law_for(plant, law)
+            runs.append(Scenario(plant=plant, law=own))
     if len(runs) > 2:
         raise ScenarioError(
             f"{len(runs)} runs to show: give one or two, which are shown in one picture"
@@ -193,7 +195,8 @@ def show(session: Session, page: Any, panel: Any) -> None:
             pull[:] = data.xfrc_applied[:] = 0.0
         pulled = data.xfrc_applied[:, :3].copy()
         if np.any(pull) and not np.any(pulled):  # the mouse let go
-            body = int(np.argmax(np.abs(pull).sum(axis=1)))
+            sizes = np.abs(pull).sum(axis=1)
+            body = int(np.argmax(sizes))
             session.push(model.body(body).name, pull[body])
         pull = pulled
         time.sleep(max(0.0, now + FRAME_TIME - time.perf_counter()))

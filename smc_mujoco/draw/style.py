@@ -249,7 +249,8 @@ def looks(traces: Sequence[Trace]) -> list[dict[str, Any]]:
     for i, name in enumerate(names):
         look: dict[str, Any] = {"ls": DASHES[i % len(DASHES)]}
         if names.count(name) > 1:
-            mark = MARKS[names[:i].count(name) % len(MARKS)]
+            before = names[:i].count(name)
+            mark = MARKS[before % len(MARKS)]
             look |= {"marker": mark, "ms": points(4.5), "markevery": (0.04 + 0.02 * i, 0.2)}
         found.append(look)
     return found
@@ -262,7 +263,8 @@ def palette() -> dict[str, dict[str, str]]:
 
     The usual laws are first, then baselines. A law without a colour here gets one by its name.
     """
-    return json.loads(Path(__file__).with_name("law_colours.json").read_text(encoding="utf-8"))
+    file = Path(__file__).with_name("law_colours.json")
+    return json.loads(file.read_text(encoding="utf-8"))
 
 
 def spread(count: int) -> list[str]:
@@ -524,7 +526,8 @@ def events(traces: Sequence[Trace], names: Sequence[str]) -> list[Event]:
         if fault := trace.scenario.fault:
             found.add(Event(fault.at, math.inf, fault.words))
         for push in pushes([trace]):
-            size = short(math.hypot(push.x, push.y, push.z))
+            force = math.hypot(push.x, push.y, push.z)
+            size = short(force)
             found.add(Event(push.time, push.time + push.width, f"blow of {size} N"))
         for event in found:
             who_at.setdefault(event, []).append(name)
@@ -569,7 +572,8 @@ def font(size: float, bold: bool = False):
     from PIL import ImageFont
 
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
-    return ImageFont.truetype(Path(matplotlib.get_data_path(), "fonts", "ttf", name), size)
+    folder = matplotlib.get_data_path()
+    return ImageFont.truetype(Path(folder, "fonts", "ttf", name), size)
 
 
 def width(text: str, size: float, bold: bool = False) -> float:
@@ -739,9 +743,11 @@ def ramp(colour: str, count: int, lightest: float = LIGHTEST) -> list[str]:
     for other in (PAPER, "#000000"):
         for share in np.linspace(0.0, 0.95, 96):
             shades.append(mixed(colour, other, share))
-    lightness = np.array([_seen(shade)[0][0] for shade in shades])
+    values = [_seen(shade)[0][0] for shade in shades]
+    lightness = np.array(values)
     wanted = np.linspace(lightest, DARKEST, count)
-    nearest = np.abs(lightness - wanted[:, None]).argmin(axis=1)
+    misses = np.abs(lightness - wanted[:, None])
+    nearest = misses.argmin(axis=1)
     return [shades[i] for i in nearest]
 
 
@@ -757,7 +763,8 @@ def letters_on(colour: str) -> str:
 
 def luminance(colour: str) -> float:
     """Return the relative luminance of WCAG 2.2, 0 for black and 1 for white."""
-    return float(np.array([0.2126, 0.7152, 0.0722]) @ _linear(colour))
+    shares = np.array([0.2126, 0.7152, 0.0722])
+    return float(shares @ _linear(colour))
 
 
 def short(value: float, digits: int = 2) -> str:

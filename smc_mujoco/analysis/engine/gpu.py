@@ -131,10 +131,12 @@ def run_rows(form: Form, rows: Array, tables: Array) -> Array:
     scores = np.full((len(rows), SCORES + len(form.metrics)), np.nan)
     points = cuda.to_device(tables)
     for first in range(0, len(rows), PIECE):
-        part = cuda.to_device(np.ascontiguousarray(rows[first : first + PIECE]))
+        piece = np.ascontiguousarray(rows[first : first + PIECE])
+        part = cuda.to_device(piece)
         found = cuda.device_array((len(part), scores.shape[1]))
         with warnings.catch_warnings():  # few runs leave the device half idle
             warnings.filterwarnings("ignore", message=".*Grid size")
-            made[-(-len(part) // THREADS), THREADS](part, points, found)
+            blocks = -(-len(part) // THREADS)
+            made[blocks, THREADS](part, points, found)
         scores[first : first + PIECE] = found.copy_to_host()
     return scores

@@ -152,7 +152,8 @@ def values_of(runs: WorldRuns) -> dict[str, Array]:
     found: dict[str, list[Array]] = {name: [] for name in sorted(names.union(DERIVED))}
     for values in each:
         for name in names:
-            field_array(model, name)[:] = values.get(name, field_array(base, name))
+            values_of_field = values.get(name, field_array(base, name))
+            field_array(model, name)[:] = values_of_field
         mujoco.mj_setConst(model, data)
         for name, of_each in found.items():
             of_each.append(field_array(model, name).copy())

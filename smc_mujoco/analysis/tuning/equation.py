@@ -48,7 +48,8 @@ class Equations:
         scores = self.group.run(rows, self.threads, self.device).tolist()
         costs = []
         for i, score in enumerate(scores):
-            costs.append(self._costs(self.cases[i % count], *score))
+            case = self.cases[i % count]
+            costs.append(self._costs(case, *score))
         return costs
 
     def _costs(

@@ -151,19 +151,23 @@ class Evaluator:
         """Return tracking and variation of the run of a case, see `Terms`."""
         if failed_at is not None:
             return self.goal.terms_of_failure(failed_at)
-        finite = np.isfinite(log["x"] - log["r"]).all(axis=1)
+        apart = log["x"] - log["r"]
+        finite = np.isfinite(apart).all(axis=1)
         if not finite.all():
-            return self.goal.terms_of_failure(int(np.argmin(finite)) * case.control_period)
+            first_failed = int(np.argmin(finite)) * case.control_period
+            return self.goal.terms_of_failure(first_failed)
         if case.plant.pose:
             return self.goal.terms_of_pose(case, log["x"], log["r"], log["u"])
-        start = sum(np.abs(log["x"][0]).tolist())
+        distances = np.abs(log["x"][0]).tolist()
+        start = sum(distances)
         itae, tv = over_log((ITAE, TV), log, case.plant.driven, case.control_period)
         return self.goal.terms_of_sums(case, itae, start, tv)
 
 
 def with_gains(law: Component, names: Sequence[str], values: Sequence[float]) -> Component:
     """Return the law with other gains, without a warning for violated conditions of its theorem."""
-    gains = dict(law.gains) | dict(zip(names, values, strict=True))
+    changed = dict(zip(names, values, strict=True))
+    gains = dict(law.gains) | changed
     return dataclasses.replace(law, gains=gains)
 
 

@@ -64,7 +64,8 @@ class ObjectiveFunction:
 
     def law(self, gains: Iterable[float]) -> Component:
         """Return the law with a set of gains, to run it, or to compare it with others."""
-        by_name = dict(zip(self.bounds, self._values(gains), strict=True))
+        values = self._values(gains)
+        by_name = dict(zip(self.bounds, values, strict=True))
         return self._task.law(**by_name)
 
     def _values(self, gains: Iterable[float]) -> tuple[float, ...]:

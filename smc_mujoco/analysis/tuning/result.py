@@ -174,7 +174,8 @@ class Tuned(Tables):
     @property
     def spread(self) -> float:
         """By how much the largest J of a search exceeds the least one, as a share of it."""
-        return max(found.best.objective for found in self.searches) / self.objective - 1.0
+        worst = max(found.best.objective for found in self.searches)
+        return worst / self.objective - 1.0
 
     @property
     def verdict(self) -> str:

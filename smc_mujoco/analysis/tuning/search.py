@@ -206,7 +206,8 @@ def tune(
             work = _searched_elsewhere(task, missing, failure, shown, executor)
         for i, made in work:
             found[i] = files[i].keep(made) if files else made
-        tuned = result_of(task, tuple(found[i] for i in range(searches)))
+        in_order = tuple(found[i] for i in range(searches))
+        tuned = result_of(task, in_order)
     _warn_of_result(tuned)
     return tuned.sourced()
 
@@ -344,7 +345,8 @@ class TuningTask(NamedTuple):
                 return self._found(trials, best, failure)
             random = np.random.default_rng([self.seed, i, draw] if draw else [self.seed, i])
         accurate = self._evaluator(cases)
-        trials = self._search(self._trials(_cheap(accurate), accurate, report), random)
+        every = self._trials(_cheap(accurate), accurate, report)
+        trials = self._search(every, random)
         return self._found(trials, trials.best, failure)
 
     def _evaluator(self, cases: Sequence[Scenario], by_equation: bool = False) -> Evaluator:
@@ -396,7 +398,8 @@ class TuningTask(NamedTuple):
         """Return the evaluation of a set of gains by MuJoCo."""
         law = with_gains(self.law, tuple(self.box), gains)
         cases = [dataclasses.replace(case, law=law) for case in cases]
-        return self.goal.evaluation(cases[0], run(cases, self.threads), gains)
+        traces = run(cases, self.threads)
+        return self.goal.evaluation(cases[0], traces, gains)
 
     def _refuse_broken(self, best: Evaluation, failure: str) -> None:
         """Raise BrokenLawError if every run of a whole search fails."""
@@ -428,7 +431,8 @@ def task_of(
             f"the conditions of a tuning have commands in {both}: tune for each drive alone"
         )
     if len({bool(motor.unit) for motor in first.drive_train.motors}) > 1:
-        units = " and ".join(dict.fromkeys(first.efforts[: first.plant.driven]))
+        names = dict.fromkeys(first.efforts[: first.plant.driven])
+        units = " and ".join(names)
         raise ScenarioError(
             f"joints of {first.plant.name} take commands in {units}, but a tuning has one bound on "
             "u: give all of them servos or motors, as smc.Channel(motor=True)"

@@ -138,7 +138,8 @@ def scales(
         torque = min([u_max, *limits[3:6]])
         most = max(np.diag(M)[3:])
         of_turns = _scales(1.0 / most, torque, 1.0)
-        own = _scales(1.0 / M[0, 0], force, SPREAD if reach is None else reach)
+        room = SPREAD if reach is None else reach
+        own = _scales(1.0 / M[0, 0], force, room)
         for name, value in of_turns.items():
             own[name + OF_TURNS] = value
         return own
@@ -210,7 +211,8 @@ def at_bound(gains: Numbers, bounds: Box) -> dict[str, str]:
     """Return gain -> "lower" or "upper" for gains within 2 % of a bound in log space."""
     edges = {}
     for name, (low, high) in bounds.items():
-        place = math.log(gains[name] / low) / math.log(high / low)
+        width = math.log(high / low)
+        place = math.log(gains[name] / low) / width
         if min(place, 1.0 - place) <= BOUND_MARGIN:
             edges[name] = "lower" if place < 0.5 else "upper"
     return edges

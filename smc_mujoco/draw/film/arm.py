@@ -55,7 +55,8 @@ class Overlay:
         self.path = np.maximum(path[some] + above, floor)
         self.wanted = np.maximum(wanted[some] + above, floor)
         if tip.knows_contacts(trace.scenario):
-            self.forces = windows(trace.t, tip.contacts(trace).push, edges).mean
+            push = tip.contacts(trace).push
+            self.forces = windows(trace.t, push, edges).mean
 
     def over(self, picture: Array, frame: int) -> Array:
         """Return the picture of a frame with all this, as the machine stands on the stage."""
@@ -63,7 +64,8 @@ class Overlay:
         image = Image.fromarray(picture)
         self.trail(image, self.wanted, style.INK, WANTED_PATH_WIDTH, WANTED_OPACITY)
         since = -np.inf if self.stage.followed is None else time - TRAIL_TIME
-        until = self.path[(self.times >= since) & (self.times <= time)]
+        lately = (self.times >= since) & (self.times <= time)
+        until = self.path[lately]
         self.trail(image, until, self.stage.track.colour, PATH_WIDTH)
         if self.forces is not None:
             size = float(np.linalg.norm(self.forces[frame]))
@@ -74,7 +76,8 @@ class Overlay:
         for body, peak in arrows.blows(self.trace, start, time):
             size = float(np.linalg.norm(peak))
             place = self.stage.find(body) - BLOW_DISTANCE * peak / size
-            self.arrow(image, place - self.newton * peak, place, size, body)
+            tail = place - self.newton * peak
+            self.arrow(image, tail, place, size, body)
         return np.asarray(image)
 
     def trail(
@@ -90,7 +93,8 @@ class Overlay:
             return
         fine = arrows.SUPERSAMPLING
         sides = np.array(image.size)
-        line = self.stage.project(points).clip(-OUTSIDE, sides + OUTSIDE) * fine
+        pixels = self.stage.project(points)
+        line = pixels.clip(-OUTSIDE, sides + OUTSIDE) * fine
         mask = Image.new("L", tuple((fine * sides).tolist()))
         places = list(map(tuple, line.tolist()))
         thick = round(fine * width * self.scale)
@@ -107,7 +111,8 @@ class Overlay:
         free, fixed = (line[0], line[1]) if hits else (line[1], line[0])
         way = free - fixed
         rim = RIM * self.scale
-        edge = np.where(way > 0.0, np.array(image.size) - rim, rim)
+        far = np.array(image.size) - rim
+        edge = np.where(way > 0.0, far, rim)
         moves = way != 0.0
         shares = np.divide(edge - fixed, way, out=np.ones(2), where=moves)
         share = float(shares.clip(0.0, 1.0).min())

@@ -449,24 +449,17 @@ def path(
         reach = mount.unit
         width = mount.thick
         way = axis
-        out = _beside_rail(mount, way)
+        out = np.array([0.0, 0.0, 1.0])
+        if mount.front is not None:
+            across = np.cross(mount.front, way)
+            if np.linalg.norm(across) >= 0.1:  # else it slides to the camera
+                out = across / np.linalg.norm(across) * (1.0 if across[2] >= 0.0 else -1.0)
         turned = out @ data.geom_xmat[body].reshape(3, 3)
         box = model.geom_aabb[body]
         half = box[3:] @ np.abs(turned)
         start = box[:3] @ turned + half + RAIL_DISTANCE * width
     start += LAYER_DISTANCE * width * arrow.layer
     return place + start * out + reach * along * way, arrow.size * width
-
-
-def _beside_rail(mount: Mount, way: Array) -> Array:
-    """Return the direction from what slides along `way` to its arrow: up, if the camera sees it."""
-    if mount.front is not None:
-        across = np.cross(mount.front, way)
-        size = np.linalg.norm(across)
-        if size >= 0.1:  # else it slides to the camera
-            side = 1.0 if across[2] >= 0.0 else -1.0
-            return across / size * side
-    return np.array([0.0, 0.0, 1.0])
 
 
 def outline(line: Array, width: float, head: bool = True) -> Array:

@@ -23,7 +23,8 @@ def plane(traces: Sequence[Trace]) -> Array:
     """
     goals = np.concatenate([trace.r for trace in traces])
     sides = np.ptp(goals, axis=0)
-    return np.sort(np.argsort(-sides, kind="stable")[:2])
+    widest = np.argsort(-sides, kind="stable")[:2]
+    return np.sort(widest)
 
 
 class Flight(NamedTuple):
@@ -45,7 +46,8 @@ def draw_map(
     across, along = np.array(["x", "y", "z"])[axes]
     ax.set_title(f"{along} over {across} (m)", fontweight="normal")
     goals = [trace.r for trace in panel.traces]
-    seen = np.concatenate([*quantities.lasting(panel.traces, "x"), *goals])
+    flown = quantities.lasting(panel.traces, "x")
+    seen = np.concatenate([*flown, *goals])
     low = seen[:, axes].min(axis=0)
     high = seen[:, axes].max(axis=0)
     sides = np.array(ax.get_window_extent().size)

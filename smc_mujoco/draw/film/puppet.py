@@ -35,7 +35,8 @@ FOLLOW_TIME = 0.25  # s, over which the followed place is a mean; chosen
 
 def moved_bodies(model: mujoco.MjModel, joints: Sequence[int] | Array) -> list[int]:
     """Return the bodies that joints move, in order: their own and all that hang on these."""
-    moved = set(model.jnt_bodyid[np.asarray(joints, int)].tolist())
+    ids = np.asarray(joints, int)
+    moved = set(model.jnt_bodyid[ids].tolist())
     for body in range(1, model.nbody):
         if model.body_parentid[body] in moved:
             moved.add(body)
@@ -69,7 +70,8 @@ class Course(NamedTuple):
         times = np.clip(times, self.times[0], self.times[-1])
         half = np.minimum(times - self.times[0], self.times[-1] - times)
         half = half.clip(0.0, 0.5 * FOLLOW_TIME)[:, None]
-        at = times[:, None] + half * np.linspace(-1.0, 1.0, 9)
+        shares = np.linspace(-1.0, 1.0, 9)
+        at = times[:, None] + half * shares
         means = [np.interp(at, self.times, part).mean(axis=1) for part in self.middle.T]
         return np.stack(means, axis=1)
 
@@ -185,7 +187,8 @@ class Puppet:
         trace = track.trace
         model = self.model
         plane = model.geom_type == world.PLANE
-        links = np.isin(model.geom_bodyid, moved_bodies(model, self.ids)) & ~plane
+        of_moved = np.isin(model.geom_bodyid, moved_bodies(model, self.ids))
+        links = of_moved & ~plane
         if not links.any():
             raise ScenarioError(
                 f"nothing that moves on {trace.scenario.plant.name} has a shape to be filmed: "
@@ -206,7 +209,8 @@ class Puppet:
             if np.isfinite(goal).all():
                 corners = self.corners(track, goal, time)
                 course.goals.append(corners[links].reshape(-1, 3))
-            corners = self.corners(track, trace.x[sample, : self.shown], time)
+            x = trace.x[sample, : self.shown]
+            corners = self.corners(track, x, time)
             course.times.append(time)
             course.places.append(corners[body].reshape(-1, 3))
             course.others.append(corners[loose])
@@ -226,7 +230,8 @@ class Puppet:
             return False
         sizes = []
         for points in course.places:
-            sizes.append(float(np.ptp(points, axis=0).max()))
+            sides = np.ptp(points, axis=0)
+            sizes.append(float(sides.max()))
         own = max(sizes)
         way = float(np.ptp(course.middle, axis=0).max())
         return way > FOLLOWED_TRAVEL * own
@@ -257,7 +262,8 @@ class Puppet:
             line_times.append(time)
             curves.append(curve)
         if followed:
-            places = course.followed(np.array([*course.times, *line_times]))
+            every_time = np.array([*course.times, *line_times])
+            places = course.followed(every_time)
             relative = []
             for part, at in zip([*course.places, *curves], places, strict=True):
                 relative.append(part - at)
@@ -318,7 +324,8 @@ class Puppet:
         if not on_stage:  # it stands on the floor, or hangs close above it
             foot = float(standing[..., 2].min(initial=np.inf))
             height = -min(lowest, foot, float(around[..., 2].min(initial=np.inf)))
-            hangs = foot > low[2] + FLOOR_SHARE * (high[2] - low[2])
+            tall = high[2] - low[2]
+            hangs = foot > low[2] + FLOOR_SHARE * tall
             if lowest < foot and not hangs:  # a floor below the links would not be below its foot
                 height += NO_FLOOR * size
             floors = model.geom_pos[(model.geom_type == world.PLANE) & (model.geom_bodyid == 0), 2]

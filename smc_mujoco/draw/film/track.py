@@ -84,7 +84,8 @@ def leads(trace: Trace, times: Array, edges: Array) -> Array:
         moved = poses(trace, times)
         return moved[:, shafts] - moved[:, joints]
     gap = states.backlash_gap(trace.scenario)
-    return 0.5 * gap * windows(trace.t, states.flanks(trace), edges).mean
+    flanks = windows(trace.t, states.flanks(trace), edges).mean
+    return 0.5 * gap * flanks
 
 
 def sampled(trace: Trace, values: Array, times: Array) -> Array:

@@ -190,7 +190,8 @@ def view(model: mujoco.MjModel) -> tuple[float, float]:
     axes = data.xaxis[hinges]
     if not len(axes):
         return FRONT
-    if (np.abs(axes @ axes[0]) < PARALLEL_COSINE).any():
+    along = np.abs(axes @ axes[0])
+    if (along < PARALLEL_COSINE).any():
         return CORNER
     x, y, z = axes[0]
     if abs(z) > PARALLEL_COSINE:
@@ -236,7 +237,8 @@ def first_channels(scenario: Scenario) -> Scenario:
     plant = scenario.plant
     if plant.n <= MAX_CHANNELS or plant.direct:
         return scenario
-    plant = dataclasses.replace(plant, n=MAX_CHANNELS, x0=plant.x0[:MAX_CHANNELS])
+    first_x0 = plant.x0[:MAX_CHANNELS]
+    plant = dataclasses.replace(plant, n=MAX_CHANNELS, x0=first_x0)
     x0 = scenario.resolved.x0[:MAX_CHANNELS]
     v0 = scenario.resolved.v0[:MAX_CHANNELS]
     return dataclasses.replace(scenario, plant=plant, x0=x0, v0=v0)
@@ -246,7 +248,8 @@ def restyle(model: mujoco.MjModel) -> None:
     """Enlarge the bobs of pendulums, to which the eye should go, and make dials translucent."""
     names = []
     for i in range(model.ngeom):
-        names.append(model.geom(i).name.rpartition("/")[2])
+        name = model.geom(i).name
+        names.append(name.rpartition("/")[2])
     dial = np.isin(names, ("face", "bezel"))
     painted = model.mat_rgba[model.geom_matid[dial]]
     model.geom_rgba[dial] = painted * (1.0, 1.0, 1.0, 0.4)
@@ -302,7 +305,8 @@ def cut(machines: Sequence[mujoco.MjModel], points: Array, slides: Array, own: b
                     continue
                 side = int(turned[k].argmax())
                 way[axis] = 0.5 * (a + b) - middle
-                lengthen(model, geom, side, 0.5 * (b - a - sides[k, axis]))
+                longer = 0.5 * (b - a - sides[k, axis])
+                lengthen(model, geom, side, longer)
             elif home[k] and middle < start + near:
                 way[axis] = first - start
             elif home[k] and middle > stop - near:

@@ -213,7 +213,8 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
             f"{one_line(', '.join(named))}"
         )
     for joint in joints:
-        kind = mujoco.mjtJoint(model.jnt_type[pick(label, "joint", joint, names)])
+        place = pick(label, "joint", joint, names)
+        kind = mujoco.mjtJoint(model.jnt_type[place])
         if kind == FREE and len(channels) == 1 and dict(channels)[joint] == Channel():
             continue
         if kind == FREE:
@@ -252,14 +253,16 @@ def measured_joints(
             f"measured is {shown(given)}: give joints' names, such as ['pole', 'base']"
         )
     names = _joint_names(model)
-    free = [names[i] for i in np.flatnonzero(model.jnt_type == FREE)]
+    places = np.flatnonzero(model.jnt_type == FREE)
+    free = [names[i] for i in places]
     taken = joints_of(channels)
     found = []
     for name in given:
         joint = name
         if name == "base" and name not in names and len(free) == 1:
             joint = free[0]
-        kind = mujoco.mjtJoint(model.jnt_type[pick(label, "joint", joint, names)])
+        place = pick(label, "joint", joint, names)
+        kind = mujoco.mjtJoint(model.jnt_type[place])
         if kind not in UNIT_OF_JOINT and kind != FREE:
             raise ScenarioError(
                 f"measured joint {joint!r} of {label} is a {kind.name[6:].lower()} joint: give one "
@@ -399,7 +402,8 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> Floats:
     reached = []
     for column in sizes.T:
         used = column > 0.0
-        reached.append(float(np.sum(largest[used] * column[used])))
+        force = np.sum(largest[used] * column[used])
+        reached.append(float(force))
     return (reached[0],) * 3 + tuple(reached[1:])
 
 
@@ -407,7 +411,8 @@ def held_pose(label: str, model: mujoco.MjModel, joint: str) -> Literal["all", "
     """Return what of its pose a free body can hold, as a Plant has it; warn if that is less than
     its heading.
     """
-    forces = unit_wrenches(model, model.joint(joint).id, thrusters(model, joint))
+    drives = thrusters(model, joint)
+    forces = unit_wrenches(model, model.joint(joint).id, drives)
     least = 1e-9 * np.abs(forces).max()
     rank = np.linalg.matrix_rank(forces, tol=least)
     if rank < FLIES:
@@ -593,7 +598,8 @@ def _together(model: mujoco.MjModel, actuators: Sequence[int]) -> Pair:
         if not no_motor(model, i):
             ends = _of_actuator(model, i)
         elif model.actuator_forcelimited[i]:
-            ends = sorted(model.actuator_gear[i, 0] * model.actuator_forcerange[i])
+            of_gear = model.actuator_gear[i, 0] * model.actuator_forcerange[i]
+            ends = sorted(of_gear)
         low += float(ends[0])
         high += float(ends[1])
     if low < 0.0 < high:

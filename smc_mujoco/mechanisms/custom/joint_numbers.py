@@ -120,7 +120,8 @@ class JointFields:
         yield from self.inner(model, p)
         for joint, kind in self.numbers:
             at = _place(model, joint, kind)
-            yield Field(KINDS[kind].field, at, vars(p)[f"{joint}.{kind}"])
+            value = vars(p)[f"{joint}.{kind}"]
+            yield Field(KINDS[kind].field, at, value)
             # dry friction that the model does not have yet is as hard as Coulomb's
             if kind == "frictionloss" and tuple(model.dof_solref[at]) == SOFT_SOLREF:
                 yield Field("dof_solref", at, HARD_SOLREF)

@@ -123,7 +123,8 @@ def forcerange_of(model: mujoco.MjModel, i: int) -> Pair:
     if not model.actuator_forcelimited[i]:
         return UNBOUNDED
     low, high = model.actuator_forcerange[i].tolist()
-    return _times((low, high), float(model.actuator_gear[i, 0]))
+    gear = float(model.actuator_gear[i, 0])
+    return _times((low, high), gear)
 
 
 def _times(ends: Pair, factor: float) -> Pair:

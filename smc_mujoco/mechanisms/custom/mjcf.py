@@ -188,7 +188,8 @@ def found(name: str, sha256: str) -> ModelSource:
     """Return the source of a file that a record names without its folder: where this process has
     read it, else in the current folder or in one within it.
     """
-    places = [Path(name), *sorted(Path().glob(f"*/{glob.escape(name)}"))]
+    below = Path().glob(f"*/{glob.escape(name)}")
+    places = [Path(name), *sorted(below)]
     if sha256 in _known:
         places.insert(0, _known[sha256])
     there = list(filter(Path.is_file, places))
@@ -219,7 +220,8 @@ def _of_text(text: str, assets: Mapping[str, Any]) -> ModelSource:
         if name.lower().endswith(XML):
             texts.append(contents[name])
     given = {PurePosixPath(name).name for name in contents}
-    for name in _files(itertools.chain.from_iterable(map(_elements, texts))):
+    elements = itertools.chain.from_iterable(map(_elements, texts))
+    for name in _files(elements):
         if PurePosixPath(name).name not in given:
             cure = f"give assets={{{name!r}: its bytes}}, or the path of the model's file"
             raise ScenarioError(
@@ -434,7 +436,8 @@ def check_model(label: str, model: mujoco.MjModel) -> None:
     """
     arrays = [(name, getattr(model, name)) for name in fields(model)]
     for name in ("gravity", "wind", "density"):
-        arrays.append((f"opt.{name}", np.atleast_1d(getattr(model.opt, name))))
+        numbers = np.atleast_1d(getattr(model.opt, name))
+        arrays.append((f"opt.{name}", numbers))
     for field, values in arrays:
         if values.dtype.kind != "f" or any(part in field for part in UNUSED):
             continue
@@ -449,7 +452,8 @@ def check_model(label: str, model: mujoco.MjModel) -> None:
     for text in model.names.split(b"\0"):
         name = text.decode()
         for kind in RESERVED_KINDS if name.startswith(RESERVED) else ():
-            if mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind}"), name) >= 0:
+            kind_id = getattr(mujoco.mjtObj, f"mjOBJ_{kind}")
+            if mujoco.mj_name2id(model, kind_id, name) >= 0:
                 own = f"names that begin with {', '.join(RESERVED)} are smc_mujoco's own"
                 raise ScenarioError(
                     f"{label} has a {kind.lower()} {name!r}, and {own}: give it another"

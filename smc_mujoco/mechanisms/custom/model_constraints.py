@@ -171,11 +171,13 @@ def _creeping(label: str, model: mujoco.MjModel, data: mujoco.MjData) -> list[st
         return []
     joints = model.dof_solref[model.dof_frictionloss > 0.0]
     tendons = model.tendon_solref_fri[model.tendon_frictionloss > 0.0]
-    of_file = not np.all(np.vstack([joints, tendons]) == HARD_SOLREF)
+    every = np.vstack([joints, tendons])
+    of_file = not np.all(every == HARD_SOLREF)
     # what it holds once the soft constraints have given way
     model.dof_solimp[:, :2] = model.tendon_solimp_fri[:, :2] = HARD_SOLIMP[:2]
     mujoco.mj_forward(model, data)
-    under = np.max(slack * np.abs(data.efc_force[dry]))
+    forces = np.abs(data.efc_force[dry])
+    under = np.max(slack * forces)
     at_start = f"by {under:.2g} rad/s (m/s) under the weight at the start, and "
     cure = 'nothing creeps without contacts (<flag contact="disable"/>)'
     if of_file:

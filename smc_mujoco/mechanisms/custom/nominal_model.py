@@ -140,7 +140,8 @@ class NominalModel:
             unit[0, places["qvel"][j]] = 1.0
             mujoco.mj_solveM(model, data, moved, unit)
             dof = places["qvel"][i]
-            return float(data.qacc_smooth[dof]), float(moved[0, dof])
+            of_u = float(moved[0, dof])
+            return float(data.qacc_smooth[dof]), of_u
 
     @contextlib.contextmanager
     def _placed(self, x: Array, p: Any) -> Iterator[tuple[mujoco.MjModel, Array, mujoco.MjData]]:
@@ -212,7 +213,8 @@ class NominalModel:
         """Return how the position of a site, the tip, depends on the channels, (3, n)."""
         with self._placed(x, p) as (model, places, data):
             rows = np.zeros((3, model.nv))
-            mujoco.mj_jacSite(model, data, rows, None, model.site(tip).id)
+            site = model.site(tip).id
+            mujoco.mj_jacSite(model, data, rows, None, site)
         return rows[:, places["qvel"]]
 
     @staticmethod
@@ -272,7 +274,8 @@ def prepared(
     model = compiled_for_runs(nominal.build(0), 0)
     model.opt.disableflags |= _DISABLED
     model.opt.enableflags &= ~_SLEEP
-    write(model, iter(list(nominal.fields(model, Values(**parameters)))))
+    fields = nominal.fields(model, Values(**parameters))
+    write(model, iter(list(fields)))
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
     mujoco.mj_resetData(model, data)

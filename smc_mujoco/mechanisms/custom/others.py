@@ -139,7 +139,8 @@ def _lock(
     at.qpos[:] = data.qpos
     for joint in map(model.joint, joints):  # so that the poses of their bodies stay the file's
         if joint.type[0] != FREE:
-            at.qpos[joint.qposadr[0]] = model.qpos0[joint.qposadr[0]]
+            place = joint.qposadr[0]
+            at.qpos[place] = model.qpos0[place]
     mujoco.mj_kinematics(model, at)
     bodies = list(spec.bodies)  # in the order of the model; their ids are -1 before compilation
     for i, body in enumerate(bodies):
@@ -200,7 +201,8 @@ def _stretching(model: mujoco.MjModel, tendon: int, above: Array) -> Array:
     wraps = slice(first, first + model.tendon_num[tendon])
     kinds = model.wrap_type[wraps]
     ids = model.wrap_objid[wraps]
-    carried = above[model.site_bodyid[ids[kinds == mujoco.mjtWrap.mjWRAP_SITE]]]
+    sites = ids[kinds == mujoco.mjtWrap.mjWRAP_SITE]
+    carried = above[model.site_bodyid[sites]]
     joints = np.any(carried, axis=0) & ~np.all(carried, axis=0)
     joints[ids[kinds == mujoco.mjtWrap.mjWRAP_JOINT]] = True
     return joints

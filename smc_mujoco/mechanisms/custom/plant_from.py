@@ -294,10 +294,12 @@ def _with_drives(
                 cure = f"give {', '.join(suggested)} to the scenario"
             raise ScenarioError(f"joint {first!r} of {label} is a free joint: {cure}")
         thrusters = tuple(own.thrusters(model, first))
-        return dataclasses.replace(build, thrusters=thrusters), own.reach_of(label, model, first)
+        reach = own.reach_of(label, model, first)
+        return dataclasses.replace(build, thrusters=thrusters), reach
     motors = []
     for joint, channel in build.channels:
-        motors.append(own.motor_of(label, model, joint, channel, goals[joint]))
+        made = own.motor_of(label, model, joint, channel, goals[joint])
+        motors.append(made)
     limits = tuple(motor.limit for motor in motors)
     return dataclasses.replace(build, motors=tuple(motors)), limits
 
@@ -413,7 +415,8 @@ def missing(model: mujoco.MjModel, joints: list[str], motors: Sequence[Motor]) -
     if model.ntendon or not alone:
         near = range(model.nv)
     else:
-        near = np.flatnonzero(np.isin(model.dof_treeid, model.dof_treeid[channel_dofs]))
+        of_channels = model.dof_treeid[channel_dofs]
+        near = np.flatnonzero(np.isin(model.dof_treeid, of_channels))
     loose = [model.joint(model.dof_jntid[dof]) for dof in near if dof not in channel_dofs]
     if not loose:
         return ""

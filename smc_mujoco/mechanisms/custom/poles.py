@@ -45,7 +45,8 @@ def fastest_pole(plant: Plant, parts: tuple[Part, ...] = ()) -> float:
         mujoco.mj_resetData(model, data)
         data.qpos[:] = _drawn(model, start, rng) if k else start
         poles = np.linalg.eigvals(_linear(model, data))
-        found = max(found, float(np.abs(poles).max()))
+        largest = float(np.abs(poles).max())
+        found = max(found, largest)
     return found
 
 
@@ -131,7 +132,8 @@ def constraint_rate(plant: Plant) -> float:
     stiffness += np.sqrt(-np.minimum(first, 0.0))
     times = np.maximum(np.abs(first), 1e-12)
     decay = np.where(given, 2.0 / times, -second)
-    return float(np.max(np.maximum(stiffness, decay), initial=0.0))
+    rates = np.maximum(stiffness, decay)
+    return float(np.max(rates, initial=0.0))
 
 
 @functools.lru_cache(maxsize=64)

@@ -100,7 +100,8 @@ def _free_base(model: mujoco.MjModel) -> int:
     """Return the body that carries the first channel and moves in two ways or more, none of them
     driven; 0 if there is none.
     """
-    base = int(model.body_rootid[model.jnt_bodyid[driven_ids(model)[0]]])
+    joint = model.jnt_bodyid[driven_ids(model)[0]]
+    base = int(model.body_rootid[joint])
     first = model.body_jntadr[base]
     joints = np.arange(first, first + model.body_jntnum[base])
     on_joints = np.isin(model.actuator_trntype, ONE_JOINT)
@@ -133,7 +134,8 @@ def _held(
     total = np.zeros(len(dofs))
     for k in range(steps):
         error = goal - data.qpos[places]
-        push = load + inertia * STIFF * (STIFF * error - 2.0 * data.qvel[dofs])
+        damped = STIFF * error - 2.0 * data.qvel[dofs]
+        push = load + inertia * STIFF * damped
         data.qfrc_applied[dofs] = push
         mujoco.mj_step(model, data)
         if data.warning.number[UNSTABLE] > 1:
@@ -143,7 +145,8 @@ def _held(
     geoms = np.flatnonzero(model.geom_bodyid == base)
     size = model.geom_rbound[geoms].max(initial=0.0) or model.stat.extent
     load = total / (steps - steps // 2)
-    return load, float(np.linalg.norm(data.xpos[base] - first) / size)
+    strayed = np.linalg.norm(data.xpos[base] - first)
+    return load, float(strayed / size)
 
 
 @functools.lru_cache(maxsize=32)
@@ -156,7 +159,8 @@ def rises(plant: Plant, x: Floats) -> bool:
         return False
     M = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, M)
-    load = -_forces(model, data)[dof_ids(model)[: plant.driven]]
+    forces = _forces(model, data)
+    load = -forces[dof_ids(model)[: plant.driven]]
     _, strayed = _held(model, data, base, load, M)
     if strayed > 1.0 or tips_over(model, data):
         return False
@@ -221,7 +225,9 @@ def _clear_start(plant: Plant, x0: Floats, i: int, down: float, up: float) -> Fl
     """Return a start in which joint i is moved, the farthest of those that touch nothing; `down`
     and `up` are the ways to its limits.
     """
-    sides = [min(BESIDE, ROOM * up), -min(BESIDE, ROOM * down)]
+    above = min(BESIDE, ROOM * up)
+    below = min(BESIDE, ROOM * down)
+    sides = [above, -below]
     if down > up:
         sides.reverse()
     halvings = 0.5 ** np.arange(HALVINGS)
@@ -251,7 +257,8 @@ def needs(plant: Plant) -> Floats:
     apart = np.subtract(usual_start(plant), plant.origin)
     way = np.abs(apart)[: plant.driven]
     way = np.where(way > MAX_EXCESS, way, BESIDE)
-    damping = np.maximum(np.diag(at.D)[at.dofs], 0.0)
+    diagonal = np.diag(at.D)[at.dofs]
+    damping = np.maximum(diagonal, 0.0)
     inertia = np.diag(at.M)[at.dofs]
     moving = (STIFFNESS * inertia + DAMPING * damping) * way
     need = 2.0 * np.abs(at.load) + moving + 1.5 * at.dry

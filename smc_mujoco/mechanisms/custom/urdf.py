@@ -116,7 +116,8 @@ def _mended(robot: ET.Element, file: Path) -> Urdf:
     read = Urdf("", {}, [], [])
     stems: dict[str, Path] = {}
     for link in robot.iter("link"):
-        for shape in [*link.findall("visual"), *link.findall("collision")]:
+        shapes = [*link.findall("visual"), *link.findall("collision")]
+        for shape in shapes:
             mesh = shape.find("geometry/mesh")
             if mesh is None:
                 continue

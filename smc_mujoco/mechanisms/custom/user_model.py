@@ -66,7 +66,8 @@ class UserModel:
         """
         spec = self.edited()
         if self.thrusters:
-            own.add_pose(spec, self.channels[0][0], self.thrusters)
+            first_joint = self.channels[0][0]
+            own.add_pose(spec, first_joint, self.thrusters)
         else:
             own.add_motors(spec, self.motors)
             for joint in (*joints_of(self.channels), *self.measured):

@@ -22,7 +22,8 @@ def draw(spec, name, start, end, *, radius, turns, wire, material):
     sideways = np.cross(axis, up)
     outward = np.cos(turn) * up + np.sin(turn) * sideways
     around = 2 * np.pi * np.arange(SIDES)[:, None] / SIDES
-    centre = first + s[:, None] * (last - first) + radius * outward
+    line = first + s[:, None] * (last - first)
+    centre = line + radius * outward
     vertices = centre[:, None] + wire * (np.cos(around) * outward[:, None] + np.sin(around) * axis)
     _skin(spec, name, start, end, material, vertices, s)
 
@@ -31,7 +32,8 @@ def _skin(spec, name, start, end, material, vertices, s):
     """Add a skin of rings of vertices (rings, SIDES, 3) that follow the bodies with weights 1 - s
     and s, (rings,).
     """
-    ring = np.arange(len(s) - 1)[:, None] * SIDES
+    turns = np.arange(len(s) - 1)[:, None]
+    ring = turns * SIDES
     a = ring + np.arange(SIDES)
     b = ring + (np.arange(SIDES) + 1) % SIDES
     faces = np.stack([a, b, a + SIDES, b, b + SIDES, a + SIDES], axis=-1)
