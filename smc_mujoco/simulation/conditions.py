@@ -129,7 +129,9 @@ class Condition:
 
     def __post_init__(self):
         if not callable(self.fields):
-            fields = {name: _frozen(value) for name, value in self.fields.items()}
+            fields = {}
+            for name, value in self.fields.items():
+                fields[name] = _frozen(value)
             object.__setattr__(self, "fields", frozen(fields))
 
     def __reduce__(self):

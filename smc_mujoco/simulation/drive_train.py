@@ -72,7 +72,10 @@ class DriveTrain:
             if motor.meaning:
                 joints.setdefault(motor.meaning.format(x=unit), []).append(repr(joint))
         name = self.plant.name
-        return [f"u of {joined(those)} of {name} is {what}." for what, those in joints.items()]
+        sentences = []
+        for what, those in joints.items():
+            sentences.append(f"u of {joined(those)} of {name} is {what}.")
+        return sentences
 
     @cached_property
     def limits(self) -> tuple[float, ...]:

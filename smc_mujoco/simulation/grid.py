@@ -248,7 +248,10 @@ def _seeds(given: object) -> list[int]:
     """Return seeds: those given, or as many as a number says."""
     if not isinstance(given, Iterable):
         given = range(whole("seeds", given, 1, MAX_ITEMS))
-    return [whole("a seed", seed, 0, GRID_SEEDS - 1) for seed in listed("seeds", given)]
+    checked = []
+    for seed in listed("seeds", given):
+        checked.append(whole("a seed", seed, 0, GRID_SEEDS - 1))
+    return checked
 
 
 def all_combinations(

@@ -91,7 +91,8 @@ def paths_of_parts(scenario: Any, field: str) -> list[str]:
     for part in parts_of(scenario, field):
         joints = [f".{joint}" for joint in getattr(part, "on", ())] or [""]
         for joint in joints:
-            paths += [f"{field}{joint}.{name}" for name in names_of(part)]
+            for name in names_of(part):
+                paths.append(f"{field}{joint}.{name}")
     return paths
 
 
@@ -140,7 +141,9 @@ def changed(scenario: Any, factors: Mapping[str, float]) -> dict[str, Any]:
     Raises:
       ScenarioError: there is no such number, or it leaves its range.
     """
-    known = [path for field in FIELDS for path in paths_of_parts(scenario, field)]
+    known = []
+    for field in FIELDS:
+        known += paths_of_parts(scenario, field)
     of_parts: dict[tuple[str, int], dict[str, Any]] = {}
     for path, factor in factors.items():
         if path.startswith("disturbance."):

@@ -362,7 +362,10 @@ def cartesian_path(
     knots = _knots(path[0].times[0], path[0].times[-1])
     positions = []
     for t in knots:
-        positions.append([Waypoints.value(t, None, axis.data)[0] for axis in path])
+        place = []
+        for axis in path:
+            place.append(Waypoints.value(t, None, axis.data)[0])
+        positions.append(place)
     if x0 is None:
         start = plant.x0
     else:

@@ -393,7 +393,9 @@ EXPORT_FORMATS = tuple(ending.removeprefix(".") for ending in _WRITERS)  # of Tr
 
 def formats(text: str) -> Names:
     """Return the formats of Trace.export in a text such as "csv,mat"."""
-    names = dict.fromkeys(name.strip().lower().removeprefix(".") for name in text.split(","))
+    names = {}
+    for part in text.split(","):
+        names[part.strip().lower().removeprefix(".")] = None
     for name in names:
         find("format to export", name, dict.fromkeys(EXPORT_FORMATS))
     return tuple(names)
@@ -419,7 +421,10 @@ def from_log(scenario: Scenario, log: Array, failed_step: int, failure: str | No
     arrays = {name: np.ascontiguousarray(log[name]) for name in names}
     if scenario.plant.goal and not scenario.plant.measured:
         arrays["r"][:, scenario.plant.driven :] = scenario.plant.goal
-    finite = np.array([np.isfinite(values[:end]).all(axis=1) for values in arrays.values()])
+    known = []
+    for values in arrays.values():
+        known.append(np.isfinite(values[:end]).all(axis=1))
+    finite = np.array(known)
     if not finite.all():
         k = int(np.argmin(finite.all(axis=0)))
         name = names[int(np.argmin(finite[:, k]))]
