@@ -35,7 +35,8 @@ from smc_mujoco.simulation.scenario import Scenario
 
 MIN_FREQUENCY = 0.5  # Hz: slower oscillations do not count as chattering
 # cells of the coarse grid on which cycles are sought: chosen
-GRID_FREQUENCIES, GRID_AMPLITUDES = 59, 35
+GRID_FREQUENCIES = 59
+GRID_AMPLITUDES = 35
 # parts of a coarse cell's sides: a cell of the finest grid is 11 % in amplitude, about 1.5 % in
 # frequency
 CUTS = 8
@@ -257,7 +258,8 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
     start, end = np.log([[math.tau * MIN_FREQUENCY, MIN_AMPLITUDE], [fastest, MAX_AMPLITUDE]])
     count = np.array([GRID_FREQUENCIES, GRID_AMPLITUDES])
     step = (end - start) / (CUTS * count)
-    (slow, low), (dw, dz) = start.tolist(), step.tolist()
+    slow, low = start.tolist()
+    dw, dz = step.tolist()
 
     @functools.cache
     def product(i: int, k: int) -> complex:
@@ -272,7 +274,8 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
         return products.reshape(-1, len(CORNERS))
 
     # each by the indices of its lowest omega and amplitude
-    cells, side = CUTS * np.argwhere(np.ones(count)), CUTS
+    cells = CUTS * np.argwhere(np.ones(count))
+    side = CUTS
     while side > 1:
         cells = cells[_may_balance(at_corners(cells, side), side * step)]
         side //= 2

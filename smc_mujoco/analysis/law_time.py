@@ -28,7 +28,8 @@ from smc_mujoco.simulation.scenario import Scenario
 
 LONGEST = 2.0  # s of a run, with the approach and some rest of most; chosen
 # of a law at once; numbers of their memories, which fit a processor's second cache
-COPIES, MOST_NUMBERS = 256, 32768
+COPIES = 256
+MOST_NUMBERS = 32768
 ROUNDS = 5
 
 
@@ -108,7 +109,8 @@ def _round(timed: Law, seen: Array) -> Array:
         _calls(function.address, row, *own, stride, 0)
         middle = clock()
         _calls(function.address, row, *own, stride, copies)
-        spent[k], empty[k] = clock() - middle, middle - start
+        spent[k] = clock() - middle
+        empty[k] = middle - start
     alone = np.maximum(spent - np.median(empty), 0.0)
     return 1e-9 * alone / copies
 

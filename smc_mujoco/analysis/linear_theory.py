@@ -127,7 +127,8 @@ def sampled_mode(at: Linear, stiffness: float, h: float) -> ArrayPair:
 
     rates = np.array([[0.0, 1.0], [-stiffness / at.inertia, -at.damping / at.inertia]])
     block = np.zeros((4, 4))
-    block[:2, :2], block[:2, 2:] = rates * h, np.eye(2) * h
+    block[:2, :2] = rates * h
+    block[:2, 2:] = np.eye(2) * h
     integral = expm(block)[:2, 2:]  # of exp(rates t) over h
     return rates @ integral, integral[:, 1] / at.inertia
 
@@ -178,7 +179,8 @@ def _crossing(at: Linear, stiffness: float, lam: float, k1: float, h: float) -> 
     adjugate = np.array([[e[1, 1], -e[0, 1]], [-e[1, 0], e[0, 0]]])
     n1, n0 = row @ gamma, -row @ adjugate @ gamma  # adj(w - E) = w - adj(E)
     # of the change of the loop without delay over a sample: Jury's conditions
-    trace, determinant = t - n1, d + n0
+    trace = t - n1
+    determinant = d + n0
     if min(determinant, -trace - determinant, 4.0 + 2.0 * trace + determinant) <= 0.0:
         return 0.0
     if n0 - 2.0 * n1 >= 4.0 + 2.0 * t + d:

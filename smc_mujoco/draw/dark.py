@@ -40,7 +40,8 @@ def suit_page(artists: Iterable[Artist]) -> None:
             edge = turned(artist.get_markeredgecolor())
             artist.set(color=line, markerfacecolor=face, markeredgecolor=edge)
         elif isinstance(artist, Patch):
-            face, edge = turned(artist.get_facecolor()), turned(artist.get_edgecolor())
+            face = turned(artist.get_facecolor())
+            edge = turned(artist.get_edgecolor())
             artist.set(facecolor=face, edgecolor=edge)
         elif isinstance(artist, Collection):
             faces = list(map(turned, artist.get_facecolor()))

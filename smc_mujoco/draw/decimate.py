@@ -210,7 +210,8 @@ def line(t: Array, y: Array, width: int) -> tuple[Array, Array]:
     """Return times and values of a curve for y (K+1,): smoothed where it chatters, in few points
     that keep extremes.
     """
-    y, size = smooth(y, width), -(-len(t) // LINE_PARTS)
+    y = smooth(y, width)
+    size = -(-len(t) // LINE_PARTS)
     starts = np.arange(0, len(t), size)
     missing = len(starts) * size - len(y)
     padded = np.pad(y, (0, missing), "edge").reshape(-1, size)

@@ -37,7 +37,8 @@ Cell = tuple[str, str, str, str]  # metric, plant, condition, law
 MIN_SIZE = 1e-9  # smaller sizes are drawn at it
 RING: Fields = {"marker": "o", "mfc": "none", "mec": style.INK, "clip_on": False}  # around a winner
 # inches on a full page, heights of a law's line, and of the title, numbers and label of a panel
-LINE_HEIGHT, WORDS_HEIGHT = 0.18, 0.9
+LINE_HEIGHT = 0.18
+WORDS_HEIGHT = 0.9
 
 
 def plot(

@@ -484,7 +484,8 @@ def _equal_ranges(frame: Axes, rows: Sequence[lanes.Row]) -> None:
         if trace.diverged_at is None:
             lasting.append(ax.get_ylim())
     low, high = np.array(lasting or ranges).T
-    low, high = low.min(), high.max()
+    low = low.min()
+    high = high.max()
     if rows[0][1].quantity == "u" and low <= -bound and bound <= high:
         ticks = [-bound, bound]
     else:

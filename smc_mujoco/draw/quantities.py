@@ -131,7 +131,8 @@ def limits(traces: Sequence[Trace], name: str) -> Pair:
         low = min(low, r.min(initial=low))
         high = max(high, r.max(initial=high))
     if name == "e":
-        low, high = min(low, 0.0), max(high, 0.0)
+        low = min(low, 0.0)
+        high = max(high, 0.0)
     if name in PEAKS:
         high = max(high, MIN_RATIO * MIN_ERROR)
         least = min(max(low, MIN_ERROR), high / MIN_RATIO)

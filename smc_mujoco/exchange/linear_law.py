@@ -295,7 +295,8 @@ def _realisation(num: Any, den: Any, dt: Any) -> System:
     from scipy.signal import BadCoefficients, tf2ss
 
     if np.ndim(den[0]) == 0:  # one of scipy
-        num, den = [[num]], [[den]]
+        num = [[num]]
+        den = [[den]]
     if len(num) != 1:
         raise ScenarioError(
             f"K has {len(num)} outputs: give one with one output, u, such as K[0, :]"

@@ -107,7 +107,8 @@ def _blown(plant: Plant, goal: Array) -> Array:
     mujoco.mj_comPos(model, data)
     exerted = np.zeros(model.nv)
     for joint in driven_ids(model).tolist():
-        along, about = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+        along = np.zeros((3, model.nv))
+        about = np.zeros((3, model.nv))
         mujoco.mj_jacBodyCom(model, data, along, about, int(model.jnt_bodyid[joint]))
         if plant.direct:
             exerted[model.jnt_dofadr[joint]] += 1.0

@@ -108,15 +108,19 @@ BOUNDS_PER_FRICTION = 60.0  # of u, on each driven joint
 BRISTLE_STIFFNESS = 1e4  # 1/rad (1/m), of bristles over the friction at which a joint breaks away
 # of a user's joint, from the study's pendulum of 0.125 kg m^2: its largest acceleration, rad/s^2,
 # and the share of a rotor; chosen: what a rig's stepper suits, rad/s^2 (m/s^2) and rad (m)
-STUDY_ACCELERATION, ROTOR_SHARE = 48.0, 0.008
-STEPPER_ACCELERATIONS, SHORTEST_WAY_OF_STEPS = (5.0, 500.0), 0.15
+STUDY_ACCELERATION = 48.0
+ROTOR_SHARE = 0.008
+STEPPER_ACCELERATIONS = (5.0, 500.0)
+SHORTEST_WAY_OF_STEPS = 0.15
 SINE = Sine(amplitude=0.2, omega=5.0)
 SENSOR_NOISE = Noise(position=0.01, velocity=0.05)
 STICTION_SPEED = 0.05  # rad/s (m/s), at which friction has fallen, chosen: that of the bristles
 # of an elastic joint, chosen: its rotor's share of the inertia, as of a geared arm; its resonance
 # over the joint's own rate, sqrt(bound/(inertia way)), which is 68 Hz on the study's pendulum, ten
 # times its loop; and the share of critical damping
-ELASTIC_ROTOR, RESONANCE, STRUCTURAL_DAMPING = 0.5, 43.6, 0.01
+ELASTIC_ROTOR = 0.5
+RESONANCE = 43.6
+STRUCTURAL_DAMPING = 0.01
 DIFFERENCED = estimator("filtered_difference", tau=5e-3)
 
 
@@ -323,7 +327,8 @@ def _parsed(node: ast.expr) -> Any:  # noqa: PLR0911  # a table
                     parsed[_parsed(key)] = _parsed(value)
             return parsed
         case ast.BinOp(left=left, op=ast.Add(), right=right):
-            first, second = _parsed(left), _parsed(right)
+            first = _parsed(left)
+            second = _parsed(right)
             if isinstance(first, Signal) and isinstance(second, Signal):
                 return first + second
         case ast.Call():

@@ -23,7 +23,8 @@ BLOW_STEP = 5e-4
 OWN_STEPS = MAX_STEP, BLOW_STEP, REALISTIC_STEP  # s, of a user's model, the first that it bears
 # of a step times the fastest pole: RK4 resolves it below the first, and is unstable above 2.8; the
 # second leaves room for poses in which the pole is faster
-MAX_POLE, MAX_STABLE_POLE = 0.7, 2.0
+MAX_POLE = 0.7
+MAX_STABLE_POLE = 2.0
 MAX_CONSTRAINT_RATE = 0.2  # of a step times the fastest rate of limits, contacts and ties
 MIN_JITTER_STEPS = (
     4  # physics steps in the clock's jitter; chosen: the delay of a sample has five values or more

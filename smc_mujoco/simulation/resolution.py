@@ -32,7 +32,8 @@ def unresolved(trace: Any) -> str:
 
 def _of_scenario(s: Scenario) -> Iterator[str]:
     """Yield a sentence if the default integrator or step is known to be coarse, or RK4 unstable."""
-    step, name = s.resolved.physics_step, s.plant.name
+    step = s.resolved.physics_step
+    name = s.plant.name
     how = f"{name} runs under {s.resolved.integrator} at {1e3 * step:g} ms"
     if not integration.suits_rk4(s):
         if s.integrator is None:

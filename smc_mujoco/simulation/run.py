@@ -479,7 +479,8 @@ class ScenarioBatch:
         """
         records = self.records
         alive = np.flatnonzero(records["failure"] == state.FINE).astype(np.int32)
-        before, self.calls = self.calls, self.calls + calls
+        before = self.calls
+        self.calls += calls
         check_arithmetic()
         try:
             with self.hearing_ctrl_c():
@@ -524,7 +525,8 @@ class ScenarioBatch:
         if code == state.FINE:
             step, failure = self.spoiled(i)
         else:
-            step, failure = int(self.records["failed_step"][i]), self.failure(i, code)
+            step = int(self.records["failed_step"][i])
+            failure = self.failure(i, code)
         return from_log(self.prepared[i].scenario, self.logs[i], step, failure)
 
     def spoiled(self, i: int) -> tuple[int, str | None]:

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 REST_TOLERANCE = 1e-6  # of X, V and u_max: a run that changes less is at rest
 # of the squared distance (e/X)^2 + (v/V)^2, second half over first
-MAX_FINAL_RATIO, MAX_EARLY_RATIO = 1.05, 0.9
+MAX_FINAL_RATIO = 1.05
+MAX_EARLY_RATIO = 0.9
 NEAR_SQUARE = (0.1 * SETTLING_BAND) ** 2  # squared distance
 PARTS = 5  # of the run, in which a run that approaches comes closer
 NAME = "outcome"

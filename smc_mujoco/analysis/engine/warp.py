@@ -35,7 +35,8 @@ warp.config.log_level = warp.LOG_WARNING
 PIECE = 2**18  # worlds at once; chosen
 # Contacts for which a world has room at first, and at most. If some do not fit, all runs are
 # repeated with twice the room; chosen.
-CONTACTS, MOST_CONTACTS = 16, 1024
+CONTACTS = 16
+MOST_CONTACTS = 1024
 ROWS_OF_EQUALITY = 6  # of a weld, which has the most
 # what mj_setConst computes of the fields that a scenario sets, of those that MuJoCo Warp has
 DERIVED = (

@@ -53,7 +53,8 @@ CONDITIONS = tuple(
 DEFAULT_STARTS = Starts()
 SEEDS_PER_SEARCH = 1000  # each condition uses one of them
 # of a tuning: with 12, 12 runs of two laws decide between them, see `ranking`
-SEARCHES, MAX_SEARCHES = 12, 1000
+SEARCHES = 12
+MAX_SEARCHES = 1000
 BUDGET, MAX_BUDGET = 64, 10_000  # evaluations of a search, for each gain
 Searches = Annotated[int, Whole(low=1, high=MAX_SEARCHES)]
 Budget = Annotated[int, Whole(low=1, high=MAX_BUDGET)]

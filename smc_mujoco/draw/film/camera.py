@@ -149,9 +149,11 @@ def layout(
         fits = down <= tall if beside else across <= wide
         if beside:
             fits &= across <= MAX_BESIDE * wide
-            left, foot = math.ceil(min(across, MAX_BESIDE * wide)), 0
+            left = math.ceil(min(across, MAX_BESIDE * wide))
+            foot = 0
         else:
-            left, foot = 0, math.ceil(min(down, (1.0 - MIN_HEIGHT) * tall))
+            left = 0
+            foot = math.ceil(min(down, (1.0 - MIN_HEIGHT) * tall))
         size = (wide - left, tall - foot)
         edge = TILE_EDGE * size[1]
         head = min(HEAD_ROOM * (room.right - room.left), 0.5 * size[1])

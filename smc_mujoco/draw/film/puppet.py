@@ -173,7 +173,8 @@ class Puppet:
     ) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """Return the shape of the machine at a time, s, and its data with the channels at x."""
         now = self.shape(time)
-        model, data = self.shapes[now].model, self.data[now]
+        model = self.shapes[now].model
+        data = self.data[now]
         data.qpos[:] = self.qpos(x, rest=track.rest(time))
         world.forward(model, data)
         return model, data

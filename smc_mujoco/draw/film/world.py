@@ -287,7 +287,8 @@ def cut(machines: Sequence[mujoco.MjModel], points: Array, slides: Array, own: b
         wanted = own if upright else (np.abs(slides[:, axis]) > 0.9).any()
         if not long.any() or not wanted:
             continue
-        first, last = lows[axis], highs[axis]
+        first = lows[axis]
+        last = highs[axis]
         if upright:  # only from below
             beyond = least[~long & (most > first)].min(initial=first)
             first = min(beyond - margin, first)

@@ -68,7 +68,8 @@ def law_to_c(
                 "a scenario has its own joints: leave joints out, or give its law instead"
             )
         compensate = compensation.compensate_of(law)
-        plant, law = law.resolved.plant, law.resolved.law
+        plant = law.resolved.plant
+        law = law.resolved.law
         joints = plant.n if law.joint else None
     law = writable(law)
     joints = number_of_joints(law, joints)

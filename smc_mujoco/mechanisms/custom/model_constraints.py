@@ -34,7 +34,8 @@ def touches(model: mujoco.MjModel) -> bool:
     masks |= model.geom_contype[second] & model.geom_conaffinity[first]
     body = model.body_weldid[model.geom_bodyid]
     parent = model.body_weldid[model.body_parentid[body]]
-    a, b = body[first], body[second]
+    a = body[first]
+    b = body[second]
     # the world is no parent here, as MuJoCo does not count it
     child = (parent[first] == b) & (b > 0)
     parent_of = (parent[second] == a) & (a > 0)

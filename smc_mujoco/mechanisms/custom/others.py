@@ -177,7 +177,8 @@ def ties(model: mujoco.MjModel, joints: Collection[str]) -> tuple[Array, Array]:
     cut = np.zeros(model.neq, bool)
     kinds = mujoco.mjtEq
     for k, kind in enumerate(map(kinds, model.eq_type)):
-        first, second = model.eq_obj1id[k], model.eq_obj2id[k]
+        first = model.eq_obj1id[k]
+        second = model.eq_obj2id[k]
         between = np.zeros(model.njnt, bool)
         if kind == kinds.mjEQ_JOINT:
             between[[*{first, second} - {-1}]] = True
@@ -210,8 +211,10 @@ def _stretching(model: mujoco.MjModel, tendon: int, above: Array) -> Array:
 
 def _place(body: mujoco.MjsBody, parent: int, i: int, at: mujoco.MjData) -> None:
     """Give a body the pose in its parent that it has in `at`."""
-    back, turn = np.zeros(3), np.zeros(4)
-    pos, quat = np.zeros(3), np.zeros(4)
+    back = np.zeros(3)
+    turn = np.zeros(4)
+    pos = np.zeros(3)
+    quat = np.zeros(4)
     mujoco.mju_negPose(back, turn, at.xpos[parent], at.xquat[parent])
     mujoco.mju_mulPose(pos, quat, back, turn, at.xpos[i], at.xquat[i])
     if body.frame is not None:

@@ -71,20 +71,24 @@ def _drawn(model: mujoco.MjModel, start: Array, rng: np.random.Generator) -> Arr
         if model.jnt_type[i] < mujoco.mjtJoint.mjJNT_SLIDE.value:  # free or ball
             continue
         at = model.jnt_qposadr[i]
-        low, high = start[at] - REACH, start[at] + REACH
+        low = start[at] - REACH
+        high = start[at] + REACH
         if model.jnt_limited[i]:
             low, high = model.jnt_range[i]
-            low, high = max(low, start[at] - MAX_REACH), min(high, start[at] + MAX_REACH)
+            low = max(low, start[at] - MAX_REACH)
+            high = min(high, start[at] + MAX_REACH)
         qpos[at] = rng.uniform(low, max(low, high))
     return qpos
 
 
 def _linear(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     """Return the derivative of (v, v', act') by (q, v, act) at a pose at rest, a square matrix."""
-    nv, na = model.nv, model.na
+    nv = model.nv
+    na = model.na
     A = np.zeros((2 * nv + na, 2 * nv + na))
     A[:nv, nv : 2 * nv] = np.eye(nv)
-    qpos, step = data.qpos.copy(), np.zeros(nv)
+    qpos = data.qpos.copy()
+    step = np.zeros(nv)
 
     def rates() -> Array:
         mujoco.mj_forward(model, data)

@@ -263,7 +263,8 @@ def stand_row(spec, n, width):
     for side, x in (("left", -end), ("right", end)):
         post(machine, side, x, sum(BEAM_Y) / 2, HEIGHT + 0.045)
     shown = min(width, 8 * ROW_PITCH)  # as the chain's camera, nine pendulums at most
-    spec.stat.center, spec.stat.extent = (0.0, 0.0, HEIGHT), 1.6 + shown
+    spec.stat.center = (0.0, 0.0, HEIGHT)
+    spec.stat.extent = 1.6 + shown
     distance = 2.2 + 0.9 * shown
     camera = spec.camera("look")
     camera.pos = (-0.245 * distance, -0.953 * distance, HEIGHT - 0.05 + 0.176 * distance)

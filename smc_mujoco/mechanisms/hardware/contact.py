@@ -242,7 +242,8 @@ def add_pair(
     """Add a contact pair with the solref of its normal, its impedance d and its friction."""
     spec.option.disableflags &= ~mujoco.mjtDisableBit.mjDSBL_CONTACT.value
     if sort == RUB:
-        spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, IMPRATIO
+        spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+        spec.option.impratio = IMPRATIO
     spec.add_pair(
         name=f"{sort}{geoms[0]}:{geoms[1]}",
         geomname1=geoms[0],

@@ -24,7 +24,8 @@ from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
 
 # of a step times the fastest pole: of the default step, at which an undamped rotor that swings by
 # 5 rad is within 1e-6 rad of its place after a second; and of any step
-FINE_POLE, MAX_POLE = 0.05, 0.7
+FINE_POLE = 0.05
+MAX_POLE = 0.7
 SHORTEST_STEP = 1e-5  # s, of the default; chosen: a run of 10 s is a million steps
 
 

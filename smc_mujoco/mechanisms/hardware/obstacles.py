@@ -40,7 +40,8 @@ INK = (0.16, 0.17, 0.20, 1.0)
 STEEL = (0.70, 0.72, 0.75, 1.0)
 RED = (0.85, 0.30, 0.20, 1.0)
 # m, chosen: of the slab that shows a wall, and of the ball that shows a stop
-THICKNESS, POST_RADIUS = 0.03, 0.02
+THICKNESS = 0.03
+POST_RADIUS = 0.02
 CLOSE = 1e-7  # m: shapes that are so near touch
 MAX_MARCH = 1000  # steps of its way
 FAR = 10.0  # sizes of the machine, from where a shape approaches it

@@ -27,7 +27,9 @@ Span = Annotated[Pair, Range(infinite=True)]
 UNBOUNDED = (-math.inf, math.inf)
 # Where the numbers lie in the compiled model, in actuator_gainprm, actuator_biasprm and
 # actuator_dynprm
-STIFFNESS, BIAS, TIMECONST = 0, slice(0, 3), 0
+STIFFNESS = 0
+BIAS = slice(0, 3)
+TIMECONST = 0
 
 
 @frozen_data

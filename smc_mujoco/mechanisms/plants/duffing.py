@@ -9,7 +9,8 @@ from smc_mujoco.mechanisms.geometry import cart
 from smc_mujoco.mechanisms.plant import Field, Plant, model_spec
 
 # m, |x| at the end stops and x at the post: chosen, outside x0, and between x0 and 0
-STOP_X, PEG_X = (1.7, 0.5)
+STOP_X = 1.7
+PEG_X = 0.5
 HALF_RAIL = 2.07  # m, half the length of the rail between its posts
 
 

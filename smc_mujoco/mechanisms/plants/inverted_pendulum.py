@@ -21,7 +21,10 @@ FLOOR_ANGLE, FLOOR_RESTITUTION = 2.44, 0.3  # rad (140 degrees), of the bob on t
 STOP_ANGLE, STOP_RESTITUTION = 1.0, 0.4  # rad; restitution of rubber; both chosen
 WALL_ANGLE, WALL_RESTITUTION = 0.7, 0.8  # rad; both chosen
 # rad; m from the hinge; m; chosen
-PEG_ANGLE, PEG_ARM, PEG_RADIUS, PEG_RESTITUTION = (0.2, 0.30, 0.020, 0.4)
+PEG_ANGLE = 0.2
+PEG_ARM = 0.30
+PEG_RADIUS = 0.020
+PEG_RESTITUTION = 0.4
 
 
 def build(n):

@@ -63,7 +63,8 @@ LINK_MASS = math.fsum((4.970684, 0.646926, 3.228604, 3.587895, 1.225946, 1.66655
 STEEL_DENSITY = 7850.0  # kg/m^3
 FLANGE_DISTANCE = 0.107  # m, from joint 7 to the flange
 # m: height of the table, and distance of the wall from the arm's first axis
-TABLE_HEIGHT, WALL_DISTANCE = (0.2, 0.65)
+TABLE_HEIGHT = 0.2
+WALL_DISTANCE = 0.65
 PROBE_FRICTION = 0.2  # coefficient of friction between the probe and table or wall: chosen
 # rad, the maker's
 READY_POSE = (0.0, -math.pi / 4, 0.0, -3 * math.pi / 4, 0.0, math.pi / 2, math.pi / 4)

@@ -11,7 +11,8 @@ from smc_mujoco.mechanisms.plant import Field, Plant, model_spec
 POST_END, CART_END = 2.57, 0.175  # m, |x| of the springs' ends on the posts and on the cart
 SPRINGS = (("left_spring", -1), ("right_spring", 1))
 # m, |x| at end stops and x at the post: chosen, outside the limit cycle, and between x0 and 0
-STOP_X, PEG_X = (2.2, 0.5)
+STOP_X = 2.2
+PEG_X = 0.5
 
 
 def build(n):
