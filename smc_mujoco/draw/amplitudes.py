@@ -43,7 +43,8 @@ def crossover(lags: Sequence[float], one: Sequence[float], other: Sequence[float
     """
     columns = np.array([lags, one, other], float)
     table = np.log(columns)
-    at, first, second = table[:, np.isfinite(table).all(axis=0)]
+    known = np.isfinite(table).all(axis=0)
+    at, first, second = table[:, known]
     ratios = first - second
     crossed = ratios[:-1] * ratios[1:] <= 0.0
     for k in np.flatnonzero(crossed):
@@ -107,10 +108,12 @@ def amplitudes(
             one, other = drawn
             mark_crossover(ax, crossover(one.lags, one.predicted, other.predicted))
         dot = {"marker": "o", "lw": 0.0}
-        handles.append(pages.entry("predicted", lw=style.points(1.5)))
+        sample = pages.entry("predicted", lw=style.points(1.5))
+        handles.append(sample)
         handles.append(pages.entry("run", **dot))
         label = "run that differs when repeated"
-        handles.append(pages.entry(label, style.PAPER, mec=style.MUTED, **dot))
+        doubtful = pages.entry(label, style.PAPER, mec=style.MUTED, **dot)
+        handles.append(doubtful)
         first = next(iter(runs.values()))[0]
         plant = first.scenario.plant
         factor, unit = style.prefixed(ax.dataLim.ymax, f"{plant.unit}/s")
@@ -132,7 +135,8 @@ class OverLag(NamedTuple):
     @property
     def cycles(self) -> bool:
         """Whether any limit cycle is predicted or run."""
-        return bool(np.nan_to_num([*self.predicted, *self.run]).any())
+        numbers = np.nan_to_num([*self.predicted, *self.run])
+        return bool(numbers.any())
 
 
 def amplitudes_of(traces: Sequence[Trace]) -> OverLag:

@@ -73,7 +73,8 @@ def windows(t: Array, y: Array, edges: Array) -> Envelope:
     start = np.clip(places, 0, len(t) - 1)
     y = y[: start[-1] + 1]
     ends = [*start[:-1], start[-1] + 1]
-    count = np.maximum(np.diff(ends), 1)[:, None]
+    counts = np.maximum(np.diff(ends), 1)
+    count = counts[:, None]
     low = np.minimum.reduceat(y, start[:-1])
     mean = np.add.reduceat(y, start[:-1]) / count
     middle = (edges[:-1] + edges[1:]) / 2
@@ -214,7 +215,8 @@ def line(t: Array, y: Array, width: int) -> tuple[Array, Array]:
     size = -(-len(t) // LINE_PARTS)
     starts = np.arange(0, len(t), size)
     missing = len(starts) * size - len(y)
-    padded = np.pad(y, (0, missing), "edge").reshape(-1, size)
+    whole = np.pad(y, (0, missing), "edge")
+    padded = whole.reshape(-1, size)
     lowest = starts + padded.argmin(axis=1)
     highest = starts + padded.argmax(axis=1)
     keep = np.unique([0, *lowest, *highest, len(t) - 1])

@@ -136,7 +136,8 @@ def figure(
     """
     paths = pages.files(path, format)
     if ax is not None:
-        name = find("panel", pages.given_axes(ax, size, fig, panels), PANEL_NAMES)
+        wanted = pages.given_axes(ax, size, fig, panels)
+        name = find("panel", wanted, PANEL_NAMES)
         _draw_alone(ax, DrawnRuns.of(traces, labels), name, title)
         return pages.save(ax.figure, paths)
     width, height = pages.measure(size, fig)
@@ -207,7 +208,8 @@ def _composed_page(
     _draw_beside(page, cells[2], blocks.beside, blocks.places, runs)
     head = style.titled(title, runs.head)
     pages.set_head(page, width, head, handles, gains)
-    page.set_label("; ".join(str(one.get_label()) for one in key))
+    meaning = "; ".join(str(one.get_label()) for one in key)
+    page.set_label(meaning)
     pages.space_ticks(page)
     return page
 
@@ -553,7 +555,8 @@ def _key(shown: Sequence[Panel]) -> list[Handle]:
     for name, words in drawing.meaning(shown).items():
         label = f"{name}: {words}"
         if name == "band":
-            handles.append(Patch(color=style.MUTED, alpha=0.3, label=label))
+            swatch = Patch(color=style.MUTED, alpha=0.3, label=label)
+            handles.append(swatch)
         elif name == "line":
             width = style.points(drawing.LINE)
             handles.append(pages.entry(label, lw=width))

@@ -27,10 +27,12 @@ def horizon(traces: Sequence[Trace]) -> float:
     for group, parts in style.split(traces).items():
         low, high = span(parts, "x")
         for trace in parts:
-            away = np.abs(trace.x - trace.x[-1]).max(axis=1)
+            ways = trace.x - trace.x[-1]
+            away = np.abs(ways).max(axis=1)
             moved = away > REST_BAND * (high - low)
             pushed = (trace.d != 0.0).any(axis=1)
-            led = (trace.r != trace.r[-1]).any(axis=1)
+            steered = trace.r != trace.r[-1]
+            led = steered.any(axis=1)
             acted = pushed | led
             times = trace.t[moved | (acted & group.driven)]
             last = max(last, *times[-1:], trace.diverged_at or 0.0)
@@ -57,6 +59,7 @@ def since(trace: Trace, time: float) -> Trace:
     first = min(place, len(trace.t) - 2)
     part = arrays_within(trace, slice(first, None))
     part["t"] = part["t"] - part["t"][0]
-    calm = {"duration": float(part["t"][-1]), "jump": None, "fault": None}
+    duration = float(part["t"][-1])
+    calm = {"duration": duration, "jump": None, "fault": None}
     scenario = dataclasses.replace(trace.scenario, **calm)
     return dataclasses.replace(trace, scenario=scenario, **part)

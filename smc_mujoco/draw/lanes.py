@@ -52,7 +52,8 @@ def rows(
     for i, (trace, colour) in enumerate(zip(panel.traces, colours, strict=True), 1):
         place = (0.0, 1.0 - i * pitch, wide, ROW_FILLED * pitch)
         ax = frame.inset_axes(place, sharex=share)
-        found.append(Row(ax, panel._replace(traces=[trace]), [colour]))
+        single = panel._replace(traces=[trace])
+        found.append(Row(ax, single, [colour]))
         share = ax
     return found
 
@@ -113,7 +114,8 @@ def settled(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Artist]:
         return marks
     look: Fields = {"ms": style.points(6), "mec": style.PAPER, "mew": style.points(0.5)}
     for trace, colour in zip(panel.traces, colours, strict=True):
-        error = np.abs(trace.x - trace.r).max(axis=1)
+        misses = trace.x - trace.r
+        error = np.abs(misses).max(axis=1)
         band = settling_band(trace.scenario, scale(trace))
         time = last_exit(trace.t, error, band)
         if trace.diverged_at is None and 0.0 < time < min(trace.t[-1], ax.get_xlim()[1]):
@@ -140,7 +142,8 @@ def tell_swing(lane: Axes, trace: Trace, colour: str) -> None:
         words = "fails"
     elif swing > SMOOTH_SHARE * (high - low):
         words = f"±{swing:.2g}"
-        ends = lane.transLimits.transform([(0.0, least), (0.0, most)])[:, 1]
+        places = lane.transLimits.transform([(0.0, least), (0.0, most)])
+        ends = places[:, 1]
         look: Fields = {"color": colour, "lw": style.points(3), "clip_on": False}
         lane.plot([1.012, 1.012], ends, transform=lane.transAxes, **look)
     else:

@@ -172,7 +172,8 @@ def _legend(handles: Sequence[Handle], width: float) -> tuple[list[str], int]:
             words = str(one.get_label())
             label = style.wrapped(words, share * page - beside, size, lines=2)
             labels.append(label)
-            widths.append(beside + style.widest(label.split("\n"), size))
+            widest = style.widest(label.split("\n"), size)
+            widths.append(beside + widest)
         for columns in range(len(widths), 1, -1):
             parts = np.array_split(widths, columns)
             if sum(map(max, parts)) < page - 16:
@@ -236,7 +237,8 @@ def run_handles(
         words = name + source
         if how := style.ending(trace):
             words += f" ({how})"
-        handles.append(entry(words, colour, lw=style.points(2.0), **look))
+        sample = entry(words, colour, lw=style.points(2.0), **look)
+        handles.append(sample)
     return handles, shared
 
 

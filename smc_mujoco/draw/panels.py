@@ -95,10 +95,12 @@ class Panel(NamedTuple):
         """
         if self.quantity in ("tip", "contact", "load"):
             return 1.0, ""
-        unit = style.units(self.group)[QUANTITY_OF_UNIT.get(self.quantity, self.quantity)]
+        name = QUANTITY_OF_UNIT.get(self.quantity, self.quantity)
+        unit = style.units(self.group)[name]
         if self.quantity in PEAKS:
             return 1.0, f" ({unit})"
-        largest = max(map(abs, limits(self.traces, self.quantity)))
+        ends = limits(self.traces, self.quantity)
+        largest = max(map(abs, ends))
         factor, prefixed = style.prefixed(largest, unit)
         if self.quantity != "s" or all(map(slides_on_speed, filter(slides, self.traces))):
             return factor, f" ({prefixed})"
@@ -117,7 +119,8 @@ class Panel(NamedTuple):
             return f"|v − r′|{unit}"
         if name in WHOLE_LABELS:
             return WHOLE_LABELS[name] + unit
-        letter = {"de": "e′"}.get(name, WORDS.get(name, name))
+        word = WORDS.get(name, name)
+        letter = {"de": "e′"}.get(name, word)
         if speed:
             letter = {"x": "v", "e": "v − r′"}.get(name, letter)
         if not group.driven:
@@ -182,9 +185,11 @@ def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
         traces = [trace if slides(trace) else without_s(trace) for trace in traces]
     panels = of_groups(traces, quantity)
     if quantity == "tip":
-        return [panels[0]._replace(traces=traces)] if all(s.plant.tip for s in scenarios) else []
+        tips = all(s.plant.tip for s in scenarios)
+        return [panels[0]._replace(traces=traces)] if tips else []
     if quantity == "contact":
-        return [panels[0]._replace(traces=traces)] if all(map(knows_contacts, scenarios)) else []
+        contacts = all(map(knows_contacts, scenarios))
+        return [panels[0]._replace(traces=traces)] if contacts else []
     if quantity in ("x", "e", "v"):
         return panels
     if quantity == "force" and not any(scenario.actuator for scenario in scenarios):
@@ -230,7 +235,8 @@ def mean_error(panel: Panel) -> float:
     errors = []
     for run in panel.traces:
         sizes = np.abs(run.x - run.r)
-        errors.append(float(np.nansum(sizes)) / len(run.t))
+        total = float(np.nansum(sizes))
+        errors.append(total / len(run.t))
     return max(errors)
 
 
@@ -253,7 +259,8 @@ def actuators(traces: Sequence[Trace]) -> list[Panel]:
     """Return a panel of the force of each actuator of a free body, in their order, of those that
     push at all.
     """
-    group, parts = next(iter(style.split(traces).items()))
+    groups = style.split(traces).items()
+    group, parts = next(iter(groups))
     first = dataclasses.replace(group, channels=(0,))
     pushed = []
     for part in parts:
@@ -281,7 +288,8 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
     plant = traces[0].scenario.plant
     first = over_groups(traces, "tip")
     if first:
-        first += [*over_groups(traces, "contact"), first[0]._replace(quantity="load")]
+        load = first[0]._replace(quantity="load")
+        first += [*over_groups(traces, "contact"), load]
     motions = []
     controls = []
     for each in style.split(traces).items():
@@ -409,11 +417,13 @@ def over_time(
         look |= {"color": colour, "drawstyle": steps(trace, name)}
         if bands and name not in UNBANDED:
             edges = band(trace.t, y)
-            artists.append(ax.fill_between(*edges, color=colour, alpha=0.22, lw=0))
+            filled = ax.fill_between(*edges, color=colour, alpha=0.22, lw=0)
+            artists.append(filled)
         if y.shape[1] > 1:
             artists += channels(ax, trace, y, name, look)
         else:
-            artists += ax.plot(*curve(trace, mean, name), lw=style.points(LINE), **look)
+            points = curve(trace, mean, name)
+            artists += ax.plot(*points, lw=style.points(LINE), **look)
         # a trace that is cut to a close-up may end before its run failed
         end = trace.t[-1] + trace.scenario.control_period
         if trace.diverged_at is not None and end > trace.diverged_at - 1e-9:
@@ -458,7 +468,8 @@ def channels(ax: Axes, trace: Trace, y: Array, name: str, look: Data) -> list[Ar
     artists: list[Artist] = []
     slowest = -1
     if name == "x":
-        misses = np.nansum(np.abs(y - trace.r), axis=0)
+        off = np.abs(y - trace.r)
+        misses = np.nansum(off, axis=0)
         slowest = int(misses.argmax())
     for i in sorted({*drawn_channels(y), slowest} - {-1}):
         width, alpha = (SLOWEST_LINE, 1.0) if i == slowest else (LIGHT_LINE, 0.55)
@@ -536,7 +547,8 @@ def target(ax: Axes, panel: Panel) -> None:
     """Draw each reference (zero for an error) as long as a run has it, and its settling band."""
     bottom, top = ax.get_ylim()
     for trace, times, values in references(panel.traces):
-        t, r = line(times, values if panel.quantity == "x" else 0.0 * values, 2)
+        drawn_values = values if panel.quantity == "x" else 0.0 * values
+        t, r = line(times, drawn_values, 2)
         half = settling_band(trace.scenario, scale(trace))
         if not (r - half < bottom).all() or not (r + half > top).all():  # else it is the background
             ax.fill_between(t, r - half, r + half, color=style.BAND, lw=0, zorder=1)
@@ -612,7 +624,8 @@ def last_samples(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
     shown = LAST_SAMPLES * panel.traces[0].scenario.control_period
     begin = max(0.0, stop - shown)
     ends = []
-    rows = zip(panel.traces, colours, style.looks(panel.traces), strict=True)
+    looks = style.looks(panel.traces)
+    rows = zip(panel.traces, colours, looks, strict=True)
     for trace, colour, look in reversed(list(rows)):
         part = trace.t >= begin - 1e-9
         u = trace.u[part, 0]

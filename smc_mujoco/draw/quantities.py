@@ -66,7 +66,8 @@ def peaks(y: Array, trace: Trace) -> Array:
     from scipy.ndimage import maximum_filter1d
 
     width = window(trace)
-    largest = maximum_filter1d(y, width, mode="nearest", origin=(width - 1) // 2)
+    origin = (width - 1) // 2
+    largest = maximum_filter1d(y, width, mode="nearest", origin=origin)
     largest[:width] = y[:width].max()
     return np.maximum(largest, MIN_ERROR)[:, None]
 

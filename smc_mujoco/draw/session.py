@@ -75,7 +75,8 @@ class Session:
 
     def begin(self, scenarios: Sequence[Scenario], sample: int = 0) -> None:
         """Start these scenarios, and repeat them up to a sample of the control."""
-        if len({(s.control_period, s.samples) for s in scenarios}) > 1:
+        kinds = len({(s.control_period, s.samples) for s in scenarios})
+        if kinds > 1:
             raise ScenarioError(
                 "no view: the runs differ in control_period or duration: give both the same"
             )

@@ -208,11 +208,13 @@ def backlash_side(flank: Array, t: Array, hold: float) -> Array:
     too often to show.
     """
     touched = np.flatnonzero(flank)
-    crossed = touched[1:][np.diff(flank[touched]) != 0]
+    changes = np.diff(flank[touched])
+    crossed = touched[1:][changes != 0]
     rattles = np.zeros(len(t), bool)
     soon = np.diff(t[crossed]) < hold
     rattles[crossed[1:][soon]] = True
-    places = np.where(flank != 0, np.arange(len(t)), 0)
+    samples = np.arange(len(t))
+    places = np.where(flank != 0, samples, 0)
     latest = np.maximum.accumulate(places)
     touching = extended(flank != 0, t, hold)
     sides = np.where(touching, flank[latest], 0.0)

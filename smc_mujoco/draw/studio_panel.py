@@ -77,13 +77,15 @@ class StudioPanel(plugin.ViewerPlugin):
             names = [law, *self.laws]
         changed, chosen = imgui.Combo(f"law {run + 1}", names.index(law), names)
         if changed:
-            self.asked.put(functools.partial(self.session.take_law, names[chosen], run))
+            call = functools.partial(self.session.take_law, names[chosen], run)
+            self.asked.put(call)
         for name, slider in self.session.sliders[run].items():
             changed, value = imgui.SliderFloat(
                 f"{name}##{run}", slider.value, slider.low, slider.high, "%.4g"
             )
             if changed:
-                self.asked.put(functools.partial(self.session.move, run, slider, value))
+                call = functools.partial(self.session.move, run, slider, value)
+                self.asked.put(call)
 
     def curves(self) -> None:
         """Show u, s and e of each run's first channel up to now; of a free body, those along the
@@ -93,7 +95,8 @@ class StudioPanel(plugin.ViewerPlugin):
             implot.SetNextAxesToFit()
             if implot.BeginPlot(name, imgui.Vec2(-1.0, 130.0)):
                 for run, scenario in enumerate(self.session.scenarios):
-                    log = self.session.log(run)[:, 2 if scenario.plant.pose else 0]
+                    column = 2 if scenario.plant.pose else 0
+                    log = self.session.log(run)[:, column]
                     log = log[:: max(1, len(log) // SAMPLES)]
                     if name == "e":
                         values = log["x"] - log["r"]

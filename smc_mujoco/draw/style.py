@@ -293,7 +293,8 @@ def _grid() -> list[str]:
     parts = itertools.product(range(HUES), (0.24, 0.33, 0.42, 0.51, 0.6), (0.45, 0.7, 0.95))
     for hue, lightness, saturation in parts:
         shade = colorsys.hls_to_rgb(hue / HUES, lightness, saturation)
-        colour = "#" + bytes(round(255 * part) for part in shade).hex().upper()
+        numbers = bytes(round(255 * part) for part in shade)
+        colour = "#" + numbers.hex().upper()
         if _seen(colour)[0][0] < LIGHTEST:
             grid.append(colour)
     return grid
@@ -305,7 +306,8 @@ def _seen(colour: str) -> np.ndarray:
     seen = np.clip(SIGHTS @ _linear(colour), 0.0, 1.0)
     t = seen @ XYZ.T / XYZ.sum(axis=1)
     straight = t / (3 * (6 / 29) ** 2) + 4 / 29
-    x, y, z = np.where(t > (6 / 29) ** 3, np.cbrt(t), straight).T
+    bright = t > (6 / 29) ** 3
+    x, y, z = np.where(bright, np.cbrt(t), straight).T
     return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)]).T
 
 
@@ -528,7 +530,8 @@ def events(traces: Sequence[Trace], names: Sequence[str]) -> list[Event]:
         for push in pushes([trace]):
             force = math.hypot(push.x, push.y, push.z)
             size = short(force)
-            found.add(Event(push.time, push.time + push.width, f"blow of {size} N"))
+            end = push.time + push.width
+            found.add(Event(push.time, end, f"blow of {size} N"))
         for event in found:
             who_at.setdefault(event, []).append(name)
     told = []
@@ -608,10 +611,12 @@ def wrapped(text: str, room: float, size: float, lines: int, bold: bool = False)
         count = len(words)
         while count > 1 and width(" ".join(words[:count]), size, bold) > room:
             count -= 1
-        broken.append(cropped(" ".join(words[:count]), room, size, bold))
+        line = " ".join(words[:count])
+        broken.append(cropped(line, room, size, bold))
         words = words[count:]
     if words:
-        broken.append(cropped(" ".join(words), room, size, bold))
+        line = cropped(" ".join(words), room, size, bold)
+        broken.append(line)
     return "\n".join(broken)
 
 
@@ -620,7 +625,8 @@ def folded(label: str, room: float = 120.0) -> str:
     too.
     """
     breakable = label.replace("_", "_ ")
-    return wrapped(breakable, room, points(RC["font.size"]), 4).replace("_ ", "_")
+    letters = points(RC["font.size"])
+    return wrapped(breakable, room, letters, 4).replace("_ ", "_")
 
 
 def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
@@ -647,7 +653,8 @@ def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
         )
     kinds = set()
     for trace in traces:
-        kinds.add(tuple((group.name, group.unit) for group in groups(trace.scenario)))
+        kind = tuple((group.name, group.unit) for group in groups(trace.scenario))
+        kinds.add(kind)
     if len(kinds) > 1:
         raise ScenarioError(
             f"traces of {plants[0]} differ in their kinds of channels: "
@@ -708,7 +715,8 @@ def heading(
     plants: Sequence[Plant | str], conditions: Sequence[str] = (), short: bool = False
 ) -> str:
     """Return plants, and the condition if there is only one, which is not the nominal one."""
-    names = list(dict.fromkeys(plant_name(plant, short) for plant in plants))
+    found = dict.fromkeys(plant_name(plant, short) for plant in plants)
+    names = list(found)
     if len(set(conditions)) == 1 and conditions[0] != "nominal":
         names.append(conditions[0].replace("_", " "))
     return ", ".join(names)
@@ -734,7 +742,8 @@ def rgb(colour: str) -> tuple[int, int, int]:
 def mixed(colour: str, other: str, share: float) -> str:
     """Return a colour mixed with this share of another."""
     pairs = zip(rgb(colour), rgb(other), strict=True)
-    return "#" + bytes(round(a + share * (b - a)) for a, b in pairs).hex().upper()
+    numbers = bytes(round(a + share * (b - a)) for a, b in pairs)
+    return "#" + numbers.hex().upper()
 
 
 def ramp(colour: str, count: int, lightest: float = LIGHTEST) -> list[str]:

@@ -71,7 +71,8 @@ class Overlay:
             size = float(np.linalg.norm(self.forces[frame]))
             if size > 0.5:
                 at = self.stage.find(self.trace.scenario.plant.tip)
-                self.arrow(image, at, at - self.newton * self.forces[frame], size, "")
+                behind = at - self.newton * self.forces[frame]
+                self.arrow(image, at, behind, size, "")
         start = self.edges[frame] - self.stage.track.holds[frame]
         for body, peak in arrows.blows(self.trace, start, time):
             size = float(np.linalg.norm(peak))
@@ -95,7 +96,8 @@ class Overlay:
         sides = np.array(image.size)
         pixels = self.stage.project(points)
         line = pixels.clip(-OUTSIDE, sides + OUTSIDE) * fine
-        mask = Image.new("L", tuple((fine * sides).tolist()))
+        fine_size = (fine * sides).tolist()
+        mask = Image.new("L", tuple(fine_size))
         places = list(map(tuple, line.tolist()))
         thick = round(fine * width * self.scale)
         opaque = round(255 * opacity)
@@ -133,7 +135,8 @@ def overlays(stages: Sequence[Stage]) -> list[Overlay]:
     for stage in stages:
         trace = stage.track.trace
         for blow in style.pushes([trace]):
-            sizes.append(math.hypot(blow.x, blow.y, blow.z))
+            peak = math.hypot(blow.x, blow.y, blow.z)
+            sizes.append(peak)
         if tip.knows_contacts(trace.scenario):
             force = tip.contacts(trace).force
             if force.any():

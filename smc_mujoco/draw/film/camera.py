@@ -169,7 +169,8 @@ def layout(
     tiles = []
     labels = []
     for k in range(count):
-        x, y = (corner + pitch * (k % columns, k // columns)).round().tolist()
+        at = corner + pitch * (k % columns, k // columns)
+        x, y = at.round().tolist()
         tiles.append((x + left, y, x + left + wide, y + tall))
         if left > foot:
             labels.append((x, y, x + left, y + tall))

@@ -38,7 +38,8 @@ class Canvas:
         self.sun = data.light(world.SUN).xdir.copy()
         self.extent = model.stat.extent
         eye = data.cam("film")
-        middle = (eye.xpos - model.stat.center) @ eye.xmat.reshape(3, 3)[:, 2]
+        way = eye.xmat.reshape(3, 3)[:, 2]
+        middle = (eye.xpos - model.stat.center) @ way
         self.casts = casting(model, middle * camera.pixel(size))
         self.renderer = gl.renderer(model, size[1], size[0])
         self.option = mujoco.MjvOption()
@@ -101,7 +102,8 @@ def add_shadows(shown: mujoco.MjvScene, way: Array, casts: Array, extent: float)
     flatten = np.diag([1.0, 1.0, THICKNESS])
     flatten[:2, 2] = -way[:2] / way[2]
     rise = np.array([0.0, 0.0, FLOOR_DISTANCE * extent])
-    rgba = np.array([*np.array(SHADE) / SHADOW_EMISSION, 1.0], np.float32)
+    shade = np.array(SHADE) / SHADOW_EMISSION
+    rgba = np.array([*shade, 1.0], np.float32)
     for shape in list(shown.geoms[: shown.ngeom]):
         if shape.objtype == GEOM:
             cast = casts[shape.objid]

@@ -58,10 +58,12 @@ def draw_map(
     ax.set(xlim=ends[0], ylim=ends[1])
     artists: list[Artist] = []
     flights = []
-    rows = zip(panel.traces, colours, style.looks(panel.traces), strict=True)
+    looks = style.looks(panel.traces)
+    rows = zip(panel.traces, colours, looks, strict=True)
     for trace, colour, look in reversed(list(rows)):
         places = trace.x[:, axes].T
-        artists += ax.plot(*places, color=colour, lw=style.points(panels.LINE), **look)
+        width = style.points(panels.LINE)
+        artists += ax.plot(*places, color=colour, lw=width, **look)
         goal = {"color": style.INK, "lw": style.points(0.8), "ls": panels.DASHES, "zorder": 3}
         ax.plot(*trace.r[:, axes].T, **goal)
         wide = {"color": colour, "lw": style.points(PAST_LINE), "animated": True}

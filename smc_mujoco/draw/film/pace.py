@@ -162,7 +162,8 @@ def visible_sizes(scenario: Scenario) -> Array:
 def rounded(value: float) -> float:
     """Return the largest of 1, 2, 5, 10, ... that is not larger than a value of 1 or more."""
     power = 10.0 ** math.floor(math.log10(value) + 1e-9)
-    return power * max(digit for digit in (1, 2, 5) if digit * power <= value * (1 + 1e-9))
+    largest = max(digit for digit in (1, 2, 5) if digit * power <= value * (1 + 1e-9))
+    return power * largest
 
 
 def speeds(traces: Sequence[Trace], fps: float) -> tuple[Array, Array]:

@@ -234,7 +234,8 @@ class Puppet:
             sides = np.ptp(points, axis=0)
             sizes.append(float(sides.max()))
         own = max(sizes)
-        way = float(np.ptp(course.middle, axis=0).max())
+        span = np.ptp(course.middle, axis=0)
+        way = float(span.max())
         return way > FOLLOWED_TRAVEL * own
 
     def placed(
@@ -252,7 +253,8 @@ class Puppet:
         sides = np.ptp(np.concatenate(course.places), axis=0)
         radius = arrows.BENT_SIZE * float(sides.max(initial=0.0))
         ids = self.ids.tolist()
-        found = arrows.mounts(self.scenario, ids, self.slides.tolist(), self.rail, front)
+        slides = self.slides.tolist()
+        found = arrows.mounts(self.scenario, ids, slides, self.rail, front)
         mounts = []
         for mount in found:
             mounts.append(mount._replace(radius=min(mount.radius, radius)))
@@ -269,7 +271,8 @@ class Puppet:
             for part, at in zip([*course.places, *curves], places, strict=True):
                 relative.append(part - at)
             points = np.concatenate(relative)
-            lowest = float(np.concatenate(course.places)[:, 2].min())
+            every_place = np.concatenate(course.places)
+            lowest = float(every_place[:, 2].min())
             height = max(0.0, -lowest)
         else:
             points = np.concatenate([course.reached, *curves])
@@ -324,7 +327,8 @@ class Puppet:
         height = -raised
         if not on_stage:  # it stands on the floor, or hangs close above it
             foot = float(standing[..., 2].min(initial=np.inf))
-            height = -min(lowest, foot, float(around[..., 2].min(initial=np.inf)))
+            lowest_around = around[..., 2].min(initial=np.inf)
+            height = -min(lowest, foot, float(lowest_around))
             tall = high[2] - low[2]
             hangs = foot > low[2] + FLOOR_SHARE * tall
             if lowest < foot and not hangs:  # a floor below the links would not be below its foot
@@ -346,8 +350,10 @@ class Puppet:
         lines = []
         for drawn in track.framing:
             t = track.trace.t
-            sample = min(int(np.searchsorted(t, drawn.time - 1e-9)), len(t) - 1)
-            at = self.posed(track, track.trace.x[sample, : self.shown], drawn.time)
+            place = np.searchsorted(t, drawn.time - 1e-9)
+            sample = min(int(place), len(t) - 1)
+            x = track.trace.x[sample, : self.shown]
+            at = self.posed(track, x, drawn.time)
             for i, arrow in drawn.arrows:
                 found = arrows.path(*at, mounts[i], arrow)
                 if found and not arrow.body:

@@ -84,8 +84,7 @@ def leads(trace: Trace, times: Array, edges: Array) -> Array:
         moved = poses(trace, times)
         return moved[:, shafts] - moved[:, joints]
     gap = states.backlash_gap(trace.scenario)
-    flanks = windows(trace.t, states.flanks(trace), edges).mean
-    return 0.5 * gap * flanks
+    return 0.5 * gap * windows(trace.t, states.flanks(trace), edges).mean
 
 
 def sampled(trace: Trace, values: Array, times: Array) -> Array:

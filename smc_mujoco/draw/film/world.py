@@ -129,8 +129,10 @@ def set_floor(model: mujoco.MjModel, view: camera.View, points: Array, moved: Ar
     size, turn, place = view
     points = points + moved
     place = place + moved
-    model.stat.center[:] = (points.min(axis=0) + points.max(axis=0)) / 2
-    model.stat.extent = extent = np.ptp(points, axis=0).max()
+    ends = points.min(axis=0) + points.max(axis=0)
+    model.stat.center[:] = ends / 2
+    sides = np.ptp(points, axis=0)
+    model.stat.extent = extent = sides.max()
     decades = 10.0 ** np.arange(-4, 5)
     cells = np.outer(decades, (1.0, 2.0, 5.0)).ravel()  # m
     misfit = np.abs(np.log(FLOOR_CELLS * cells / extent))
@@ -138,7 +140,8 @@ def set_floor(model: mujoco.MjModel, view: camera.View, points: Array, moved: Ar
     model.mat_texrepeat[model.material("floor").id] = 1.0 / cell
     depth = (points - place) @ -turn[:, 2]
     start = float(depth.max())
-    half = turn[:, 1] * camera.pixel(size) * size[1] / 2
+    across = turn[:, 1] * camera.pixel(size)
+    half = across * size[1] / 2
     low = -half - turn[:, 2]
     if low[2] < 0.0:  # where the foot of the picture meets the floor, below what flies
         start = max(start, -place[2] / low[2])
@@ -174,10 +177,12 @@ def view(model: mujoco.MjModel) -> tuple[float, float]:
 
     The view looks down at least a little: along the floor, or from below, there is nothing to see.
     """
-    fixed = (model.cam_bodyid == 0) & (model.cam_mode == mujoco.mjtCamLight.mjCAMLIGHT_FIXED.value)
+    still = model.cam_mode == mujoco.mjtCamLight.mjCAMLIGHT_FIXED.value
+    fixed = (model.cam_bodyid == 0) & still
     for frame in model.cam_mat0[fixed].reshape(-1, 3, 3):
         right, _, back = frame.T
-        azimuth = np.degrees(np.arctan2(right[0], -right[1]))
+        angle = np.arctan2(right[0], -right[1])
+        azimuth = np.degrees(angle)
         climb = np.clip(-back[2], -1.0, 1.0)
         elevation = np.degrees(np.arcsin(climb))
         return float(azimuth), min(float(elevation), LOW_ELEVATION)
@@ -214,7 +219,8 @@ def boxes(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     half = model.geom_aabb[:, 3:].copy()
     rods = model.geom_type == CAPSULE  # their compiled boxes are not those of a run that changes it
     half[rods, 2] = model.geom_size[rods, 0] + model.geom_size[rods, 1]
-    local = model.geom_aabb[:, None, :3] + CORNERS * half[:, None]
+    centres = model.geom_aabb[:, None, :3]
+    local = centres + CORNERS * half[:, None]
     turns = data.geom_xmat.reshape(-1, 3, 3)
     turned = np.einsum("gij,gcj->gci", turns, local)
     return turned + data.geom_xpos[:, None]
@@ -222,7 +228,8 @@ def boxes(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
 
 def still(model: mujoco.MjModel) -> Array:
     """Return which geoms do not move, planes left out, (geoms,)."""
-    return (model.body_weldid[model.geom_bodyid] == 0) & (model.geom_type != PLANE)
+    fixed = model.body_weldid[model.geom_bodyid] == 0
+    return fixed & (model.geom_type != PLANE)
 
 
 def fixed_boxes(model: mujoco.MjModel) -> Array:
@@ -331,7 +338,8 @@ def _move(model: mujoco.MjModel, data: mujoco.MjData, geom: int, way: Array) -> 
 
 def _slender(sides: Array, axis: int) -> Array:
     """Return which boxes, (k, 3) m, are long and narrow along an axis, (k,)."""
-    others = np.delete(sides, axis, axis=1).max(axis=1)
+    remaining = np.delete(sides, axis, axis=1)
+    others = remaining.max(axis=1)
     return sides[:, axis] > SLENDER * others
 
 
