@@ -76,7 +76,8 @@ def median_of(values: Array, samples: Sequence[int] | None = None) -> Interval:
         ordered = block[order]
         # a resample that draws no run of the block takes each of them once
         counts[:, ~counts.any(axis=0)] = 1
-        counted = 2 * np.cumsum(counts, axis=0, dtype=drawn.dtype)
+        summed = np.cumsum(counts, axis=0, dtype=drawn.dtype)
+        counted = 2 * summed
         total = counted[-1] // 2
         below = (counted < total).sum(axis=0)
         lower[:, k] = ordered[below]
@@ -84,7 +85,8 @@ def median_of(values: Array, samples: Sequence[int] | None = None) -> Interval:
         upper[:, k] = ordered[up_to]
     # T. C. Hesterberg's expanded percentile, with Student's t of n - 1 degrees of freedom
     quantile = stdtrit(n - 1, (1 + LEVEL) / 2)
-    tail = ndtr(-math.sqrt(n / (n - 1)) * quantile)
+    ratio = n / (n - 1)
+    tail = ndtr(-math.sqrt(ratio) * quantile)
     # index of the resample at which the interval ends, from either end
     at = max(1, math.floor(tail * (RESAMPLES + 1)))
     lower = np.sort(middle(lower))
@@ -118,7 +120,8 @@ def share_interval(share: float, n: int) -> Interval:
     z = NormalDist().inv_cdf((1 + LEVEL) / 2)
     centre = share + z * z / (2 * n)
     variance = share * (1 - share) / n
-    half = z * math.sqrt(variance + (z / (2 * n)) ** 2)
+    correction = (z / (2 * n)) ** 2
+    half = z * math.sqrt(variance + correction)
     scale = 1 + z * z / n
     low = (centre - half) / scale
     high = (centre + half) / scale

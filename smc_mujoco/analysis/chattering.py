@@ -264,7 +264,8 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
     @functools.cache
     def product(i: int, k: int) -> complex:
         omega = math.exp(slow + i * dw)
-        gain = loop.gain(math.exp(low + k * dz), omega, COARSE_SAMPLES)
+        amplitude = math.exp(low + k * dz)
+        gain = loop.gain(amplitude, omega, COARSE_SAMPLES)
         return gain * loop.response(omega)
 
     def at_corners(cells: Array, side: int) -> Array:
@@ -279,7 +280,8 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
     while side > 1:
         cells = cells[_may_balance(at_corners(cells, side), side * step)]
         side //= 2
-        cells = (cells[:, None] + side * CORNERS).reshape(-1, 2)
+        quarters = cells[:, None] + side * CORNERS
+        cells = quarters.reshape(-1, 2)
     winding = np.zeros(CUTS * count)
     around = at_corners(cells, 1) - 1.0
     ahead = np.roll(around, -1, axis=1)
@@ -313,9 +315,11 @@ def _may_balance(products: Array, sides: Array) -> Array:
     near = below & above
     strongest = np.abs(products).argmax(axis=1)[:, None]
     largest = np.take_along_axis(products, strongest, axis=1)
-    relative = np.where(products == 0.0, 1.0, products * largest.conj())
+    turned = products * largest.conj()
+    relative = np.where(products == 0.0, 1.0, turned)
     phases = np.angle(largest) + np.angle(relative)
-    margins = CELL_MARGIN * np.maximum(np.ptp(phases, axis=1), max(sides[0], COARSE_NOISE))
+    phase_spans = np.ptp(phases, axis=1)
+    margins = CELL_MARGIN * np.maximum(phase_spans, max(sides[0], COARSE_NOISE))
     lowest = phases.min(axis=1) - margins
     highest = phases.max(axis=1) + margins
     next_turn = np.ceil(lowest / math.tau) * math.tau
@@ -345,7 +349,8 @@ def _balanced(loop: Loop, low: Array, high: Array) -> Balance | None:
         yield _bisected(excess, low, high)
 
     for z in solved():
-        within = (z == np.clip(z, least, largest)).all()
+        clipped = np.clip(z, least, largest)
+        within = (z == clipped).all()
         if within and np.abs(excess(z)).max() < BALANCE_TOLERANCE:
             amplitude, omega = np.exp(z).tolist()
             return amplitude, omega
@@ -436,13 +441,15 @@ def _stable(loop: Loop, balances: Sequence[Balance]) -> list[Balance]:
 
 def _decays(loop: Loop, amplitude: float, omega: float) -> bool:
     def product(a: float, w: float) -> complex:
-        return cmath.log(loop.gain(a, w) * loop.response(w) or SMALLEST)
+        gain = loop.gain(a, w)
+        return cmath.log(gain * loop.response(w) or SMALLEST)
 
     up = product(amplitude * (1 + STABILITY_STEP), omega)
     down = product(amplitude * (1 - STABILITY_STEP), omega)
     fast = product(amplitude, omega * (1 + STABILITY_STEP))
     slow = product(amplitude, omega * (1 - STABILITY_STEP))
-    return ((up - down) * (fast - slow).conjugate()).imag < 0.0
+    across = (fast - slow).conjugate()
+    return ((up - down) * across).imag < 0.0
 
 
 def _turns(loop: Loop, balances: Sequence[Balance]) -> Array:
@@ -567,7 +574,8 @@ def rows(
         scenarios, cycles, measured, changes, strict=True
     ):
         row = {"plant": scenario.plant.name, "law": scenario.law.name}
-        row |= {"gains": dict(scenario.law.gains), **vars(cycle)}
+        gains = dict(scenario.law.gains)
+        row |= {"gains": gains, **vars(cycle)}
         row["gain"] = [cycle.gain.real, cycle.gain.imag]
         row["response"] = [cycle.response.real, cycle.response.imag]
         row["uncertainty"] = cycle.uncertainty

@@ -227,7 +227,8 @@ class Loop:
         passed = passed * z ** -round(s.input_delay / self.step)
 
         resolvent = z[:, None, None] * np.eye(len(self.a)) - self.a
-        answers = np.linalg.solve(resolvent, self.b[:, None])[:, :, 0]
+        column = self.b[:, None]
+        answers = np.linalg.solve(resolvent, column)[:, :, 0]
         if (sensor := s.encoder(self.channel)) is not None:
             answers = answers * np.exp(-1j * omega * sensor.delay)
         return passed @ answers
@@ -245,7 +246,8 @@ class Loop:
             return 0.0
         first_half = np.arange(2 * REST_SAMPLES) < REST_SAMPLES
         x = np.where(first_half, 0.0, count)
-        _, sliding = self._controlled(s.control_period, [x, np.zeros(len(x))])
+        zeros = np.zeros(len(x))
+        _, sliding = self._controlled(s.control_period, [x, zeros])
         return float(np.abs(sliding).max())
 
     def _controlled(self, h: float, motion: list[Array]) -> ArrayPair:
@@ -253,7 +255,8 @@ class Loop:
         seconds.
         """
         s = self.scenario.resolved
-        fixed = {DT: h, LIMIT: self.scenario.limits[self.channel], MODEL: s.model != "none"}
+        limit = self.scenario.limits[self.channel]
+        fixed = {DT: h, LIMIT: limit, MODEL: s.model != "none"}
         return self.controller(fixed, motion, self.nominal_models)
 
     def _gain(
@@ -290,7 +293,8 @@ class Loop:
         return earliest, latest
 
     def _gain_of(self, first: complex, amplitude: float, omega: float) -> complex:
-        two_samples = math.isclose(self.scenario.control_period * omega, math.pi, rel_tol=1e-9)
+        half_turn = self.scenario.control_period * omega
+        two_samples = math.isclose(half_turn, math.pi, rel_tol=1e-9)
         # with two samples a period a wave and its image are the same
         images = 2.0 if two_samples else 1.0
         return first / (1j * amplitude * images) * play(amplitude, self.gap)
@@ -339,10 +343,12 @@ class Loop:
         """Return the harmonics of e: the given amplitude, then the mechanism's answer to the other
         harmonics of u.
         """
-        below_nyquist = math.ceil(math.pi / self.scenario.control_period / omega) - 1
+        half = math.pi / self.scenario.control_period
+        below_nyquist = math.ceil(half / omega) - 1
         highest = min(MAX_HARMONICS, below_nyquist)
         one_back = np.exp(-1j * angles)
-        powers = itertools.accumulate(itertools.repeat(one_back, max(highest, 1)), np.multiply)
+        repeated = itertools.repeat(one_back, max(highest, 1))
+        powers = itertools.accumulate(repeated, np.multiply)
         first = _first(u, next(powers))
         rest = []
         for n, power in enumerate(powers, 2):
@@ -397,7 +403,8 @@ class Loop:
         )
         count = math.ceil(periods * period / h)
         first = int(SETTLING_SHARE * count)
-        angles = omega * (h * np.arange(first, count) + h * position)
+        times = h * np.arange(first, count)
+        angles = omega * (times + h * position)
         samples = np.arange(count) + position
         turns = np.exp(1j * omega * h * samples)
         against = np.exp(-1j * angles)

@@ -66,7 +66,8 @@ def law_time(scenario: Scenario) -> LawTime | None:
     of_timed, of_reference = zip(*rounds, strict=True)
     own = np.min(of_timed, axis=0)
     other = np.min(of_reference, axis=0)
-    median, high = np.quantile(own, (0.5, 0.99)).tolist()
+    quantiles = np.quantile(own, (0.5, 0.99))
+    median, high = quantiles.tolist()
     return LawTime(median, high, median / float(np.median(other)))
 
 
@@ -94,7 +95,8 @@ def _measured(scenario: Scenario) -> Array:
 def _round(timed: Law, seen: Array) -> Array:
     """Return the time of a law at each sample, s, (samples,)."""
     function = cfunctions.compile_component(timed)
-    copies = max(1, min(COPIES, MOST_NUMBERS // max(timed.memory, 1)))
+    fitting = MOST_NUMBERS // max(timed.memory, 1)
+    copies = max(1, min(COPIES, fitting))
     gains = np.array([*timed.gains.values(), 0.0])
     memory = np.zeros((copies, timed.memory + 1))
     out = np.zeros(2)

@@ -102,7 +102,8 @@ def linear(plant: Plant) -> Linear:
             "springs"
         )
     symmetric = (stiffness + stiffness.T) / 2.0
-    return Linear(inertia=float(1.0 / g[0]), damping=float(d), stiffness=symmetric)
+    inertia = float(1.0 / g[0])
+    return Linear(inertia=inertia, damping=float(d), stiffness=symmetric)
 
 
 def linear_gains(law: Law) -> Pair | None:
@@ -125,7 +126,8 @@ def sampled_mode(at: Linear, stiffness: float, h: float) -> ArrayPair:
     """
     from scipy.linalg import expm
 
-    rates = np.array([[0.0, 1.0], [-stiffness / at.inertia, -at.damping / at.inertia]])
+    drag = -at.damping / at.inertia
+    rates = np.array([[0.0, 1.0], [-stiffness / at.inertia, drag]])
     block = np.zeros((4, 4))
     block[:2, :2] = rates * h
     block[:2, 2:] = np.eye(2) * h
@@ -215,7 +217,8 @@ def steady_error(plant: Plant, lam: Natural, k1: Natural, d: Finite) -> float:
     """
     sliding = lam * k1 * np.eye(plant.n)
     loop = linear(plant).stiffness + sliding
-    moved = np.linalg.solve(loop, np.full(plant.n, d))
+    push = np.full(plant.n, d)
+    moved = np.linalg.solve(loop, push)
     return float(np.abs(moved).max())
 
 
@@ -237,7 +240,8 @@ def restoring_force(
         ones = np.full(plant.n, 1.0)
         f, g = plant.nominal(ones, v, i, p)
         ratios.append(f / g)
-    if np.ptp(ratios) > EQUALITY_TOLERANCE * (1.0 + abs(ratios[0])):
+    scale = 1.0 + abs(ratios[0])
+    if np.ptp(ratios) > EQUALITY_TOLERANCE * scale:
         raise ScenarioError(
             f"{plant.name} has no linear theory at rest: give a plant with equal joints"
         )
@@ -248,7 +252,8 @@ def restoring_force(
             places = np.full(plant.n, position)
             f, g = plant.nominal(places, v, 0, p)
             at_rest.append(f / g)
-        return np.minimum(rest.force(gains, x), u_max) - np.array(at_rest)
+        forces = rest.force(gains, x)
+        return np.minimum(forces, u_max) - np.array(at_rest)
 
     return force
 

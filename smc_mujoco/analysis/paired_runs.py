@@ -246,10 +246,12 @@ class RunGroup:
         cube[:, ~common] = np.nan
         blocks = np.flatnonzero(common.any(axis=1))
         seeds = np.flatnonzero(common.any(axis=0))
-        kept = np.ix_(np.arange(len(self.laws)), blocks, seeds)
+        every_law = np.arange(len(self.laws))
+        kept = np.ix_(every_law, blocks, seeds)
         parts = []
         for values in (cube, self.outcome, self.sets, *cubes[1:]):
-            parts.append(dict(zip(self.laws, values[kept], strict=True)))
+            by_law = zip(self.laws, values[kept], strict=True)
+            parts.append(dict(by_law))
         return Scores(blocks.tolist(), *parts)
 
 
@@ -257,7 +259,8 @@ def groups(table: RunColumns, by: Sequence[str]) -> list[RunGroup]:
     """Return the groups of a table, one for each plant, or for each plant and condition, in the
     order of its rows.
     """
-    if tuple(items_of("by", by)) not in (GROUPS[:1], GROUPS):
+    wanted = tuple(items_of("by", by))
+    if wanted not in (GROUPS[:1], GROUPS):
         raise ScenarioError(f"by is {shown(by)}: give ('plant',) or ('plant', 'condition')")
     columns = {}
     for name in (*GROUPS, "law"):
@@ -321,7 +324,8 @@ def _outcomes(table: RunColumns) -> Array:
         numbers = np.ldexp(rounded, exponent - 20)
     numbers[np.abs(numbers) < ROUNDING] = 0.0
     numbers[np.isnan(numbers)] = -np.inf  # which no metric is; NaN would differ from itself
-    return np.unique(numbers, axis=0, return_inverse=True)[1].ravel()
+    distinct = np.unique(numbers, axis=0, return_inverse=True)
+    return distinct[1].ravel()
 
 
 def scenarios(table: RunColumns, group: RunGroup) -> list[Scenario | None]:

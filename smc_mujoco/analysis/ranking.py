@@ -177,11 +177,13 @@ class Comparison:
         self.plain = self.leads.copy()
         for k in range(blocks):
             for a in range(count):
-                self.sets[a, k], self.units[a, k] = _counted(gains[a, k, ran[k]])
+                own_gains = gains[a, k, ran[k]]
+                self.sets[a, k], self.units[a, k] = _counted(own_gains)
                 # the law alone, then beside each other
                 for b in range(a + 1):
                     pair = sorted({a, b})
-                    first = first_of_kind(results[pair, k][:, None], ran[[k]])[0]
+                    column = results[pair, k][:, None]
+                    first = first_of_kind(column, ran[[k]])[0]
                     units = linked(*gains[pair, k][:, first])
                     if a == b:
                         self.below[a, k] = self._is_below(a, k, first, units)
@@ -204,7 +206,8 @@ class Comparison:
         floor = self.floors[block]
         if self.shares or floor <= 0.0:
             return False
-        high = _by_unit(self.high[law, block, runs], units, self.cells.shape[2])
+        highest = self.high[law, block, runs]
+        high = _by_unit(highest, units, self.cells.shape[2])
         # of an even number, the median is above q if only half are at most q
         return bool(middle(high) <= math.log(floor))
 
@@ -221,7 +224,8 @@ class Comparison:
         seeds = self.cells.shape[2]
         difference = _difference(self.low[rival, block], self.high[law, block])
         charged = difference[runs]
-        as_run = _difference(plain[rival, block], plain[law, block])[runs]
+        raw = _difference(plain[rival, block], plain[law, block])
+        as_run = raw[runs]
         self.leads[block, law, rival] = _by_unit(charged, units, seeds)
         self.plain[block, law, rival] = _by_unit(as_run, units, seeds)
 
@@ -269,7 +273,8 @@ class Comparison:
         """Whether the units are enough for a law to win, or to be worse than another, beside
         another such law, (laws, blocks).
         """
-        ranked = min_p(self.units) <= max(self.limit, self.first)
+        level = max(self.limit, self.first)
+        ranked = min_p(self.units) <= level
         return ranked & (ranked.sum(axis=0) > 1)
 
     @property
@@ -290,7 +295,8 @@ class Comparison:
         ranked = self.ranked.T
         itself = np.eye(len(self.laws), dtype=bool)
         against = ranked[:, None, :] & ~itself
-        worst = np.where(against, self.p, 0.0).max(axis=2)
+        losses = np.where(against, self.p, 0.0)
+        worst = losses.max(axis=2)
         return np.where(ranked, worst, 1.0)
 
     @property
@@ -301,7 +307,8 @@ class Comparison:
         wins = significant & np.all(eligible, axis=2)
         wins &= ~self.away.any(axis=2).T
         names = np.array([*self.laws, None])
-        first = np.where(wins.any(axis=1), wins.argmax(axis=1), -1)
+        any_win = wins.any(axis=1)
+        first = np.where(any_win, wins.argmax(axis=1), -1)
         return names[first].tolist()
 
     @property
@@ -346,9 +353,11 @@ class Comparison:
         b = self.laws.index(rival)
         leads = self.leads[block, a, b]
         with np.errstate(over="ignore"):
-            low = np.exp(interval(self.leads[block, b, a], WIN_ERROR)[1])
+            lead = self.leads[block, b, a]
+            low = np.exp(interval(lead, WIN_ERROR)[1])
             high = np.exp(-interval(leads, WIN_ERROR)[1])
-            value = np.exp(-interval(self.plain[block, a, b], WIN_ERROR)[0])
+            of_pair = self.plain[block, a, b]
+            value = np.exp(-interval(of_pair, WIN_ERROR)[0])
         below = bool(self.below[a, block] and not self.below[b, block])
         if below:
             low = 0.0
@@ -393,8 +402,10 @@ class Comparison:
         again = ~np.isnan(half)
         if self.shares or not again.any():
             return None
-        pair = float(middle(self.cells[a, block, again])), float(middle(half))
-        changed = differ(pair, float(self.floors[block]), bool(self.first_order[block]))
+        first = middle(self.cells[a, block, again])
+        pair = float(first), float(middle(half))
+        floor = float(self.floors[block])
+        changed = differ(pair, floor, bool(self.first_order[block]))
         return pair if changed else None
 
 
@@ -504,7 +515,8 @@ def first_of_kind(outcomes: np.ndarray, exists: np.ndarray) -> np.ndarray:
     first = np.zeros(exists.shape, bool)
     for k, block in enumerate(exists):
         seeds = np.flatnonzero(block)
-        _, kept = np.unique(outcomes[:, k, seeds], axis=1, return_index=True)
+        outcomes_there = outcomes[:, k, seeds]
+        _, kept = np.unique(outcomes_there, axis=1, return_index=True)
         first[k, seeds[kept]] = True
     return first
 
@@ -551,7 +563,8 @@ def ranks(comparison: Comparison) -> list[Rank]:
     by_block = ranks_by_block(
         lacking, comparison.centres, comparison.floors, comparison.relevant, tied
     )
-    return placed(comparison.laws, by_block, lacking, np.all(comparison.best, axis=1))
+    best = np.all(comparison.best, axis=1)
+    return placed(comparison.laws, by_block, lacking, best)
 
 
 def ranks_by_block(
@@ -568,7 +581,8 @@ def ranks_by_block(
     beats = exceeds(centres[:, None], centres, floors, relevant)
     larger = beats & ~np.asarray(tied)
     behind |= (lacking[:, None] == lacking) & larger
-    return (len(centres) + 1 + behind.sum(axis=1) - behind.sum(axis=0)) / 2
+    ahead = len(centres) + 1 + behind.sum(axis=1)
+    return (ahead - behind.sum(axis=0)) / 2
 
 
 def placed(

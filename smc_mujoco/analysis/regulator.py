@@ -83,7 +83,8 @@ def lqr(
             f"no command keeps {plant.name} at its goal: drive another joint, or give weights "
             "that are not 0"
         ) from None
-    gain = np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A)
+    system = R + B.T @ P @ B
+    gain = np.linalg.solve(system, B.T @ P @ A)
     return state_feedback(gain, "state_feedback")
 
 

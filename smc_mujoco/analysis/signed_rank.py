@@ -55,7 +55,8 @@ def interval(differences: ArrayLike, error: float) -> tuple[float, float, float]
         return math.nan, math.nan, math.nan
     i, j = np.triu_indices(known.size)
     low, high = _ends(known[None], error)
-    centre = float(np.median(known[i] + known[j])) / 2
+    sums = known[i] + known[j]
+    centre = float(np.median(sums)) / 2
     return centre, float(low[0]), float(high[0])
 
 
@@ -69,7 +70,8 @@ def _finite(differences: ArrayLike) -> np.ndarray:
 def _ends(samples: np.ndarray, error: float) -> np.ndarray:
     """Return the ends of the intervals of samples (m, n), as (2, m); infinite if n is too small."""
     i, j = np.triu_indices(samples.shape[1])
-    tails = _tail(samples.shape[1], np.arange(i.size + 1))
+    places = np.arange(i.size + 1)
+    tails = _tail(samples.shape[1], places)
     enough = np.flatnonzero(tails <= error)
     if not enough.size:
         ends = np.array([[-math.inf], [math.inf]])
@@ -129,13 +131,15 @@ def units_needed(leads: ArrayLike, error: float, relevant: float) -> float:
 
     known = _finite(leads)
     i, j = np.triu_indices(known.size, 1)
-    spread = np.median(np.abs(known[i] - known[j]))
+    gaps = known[i] - known[j]
+    spread = np.median(np.abs(gaps))
     deviation = float(spread) / MEDIAN_DISTANCE
     centre = interval(known, error)[0] + math.log1p(-relevant)
     if not centre > 0.0:
         return math.inf
     for n in range(max(2, math.ceil(-math.log2(error))), MAX_UNITS + 1):
-        deviations = float(stdtrit(n - 1, 1.0 - error) + stdtrit(n - 1, POWER))
+        of_error = stdtrit(n - 1, 1.0 - error)
+        deviations = float(of_error + stdtrit(n - 1, POWER))
         if n >= math.pi / 3.0 * (deviations * deviation / centre) ** 2:
             return n
     return math.inf

@@ -109,9 +109,11 @@ def _of(kind: str, names: Sequence[str]) -> list[str]:
 
 def _hold(model: mujoco.MjModel, data: mujoco.MjData, driven: Array, name: str) -> None:
     """Set the commands that hold a mechanism at rest; raise ScenarioError if there are none."""
-    b = rates(model, data)[model.nv : 2 * model.nv, 2 * model.nv + model.na :][:, driven]
+    last = 2 * model.nv + model.na
+    b = rates(model, data)[model.nv : 2 * model.nv, last:][:, driven]
     mujoco.mj_forward(model, data)
-    data.ctrl[driven] -= np.linalg.lstsq(b, data.qacc)[0]
+    solution = np.linalg.lstsq(b, data.qacc)
+    data.ctrl[driven] -= solution[0]
     mujoco.mj_forward(model, data)
     if np.abs(data.qacc).max() > MAX_REST_ACCELERATION:
         x = ", ".join(f"{one:g}" for one in data.qpos)

@@ -164,14 +164,17 @@ def step_halving(
         if not isinstance(trace, Trace):
             raise ScenarioError(f"traces has {shown(trace)}: give what smc.run returns")
         if channel is not None:
-            channel = whole("channel", channel, 0, trace.scenario.plant.n - 1)
+            last_channel = trace.scenario.plant.n - 1
+            channel = whole("channel", channel, 0, last_channel)
     scenarios = list(map(repetitions, traces))
-    again = iter(run(list(itertools.chain(*scenarios)), threads=threads))
+    every = list(itertools.chain(*scenarios))
+    again = iter(run(every, threads=threads))
     changes = []
     for trace, repeated in zip(traces, scenarios, strict=True):
         cycles = []
         for same in (trace, *itertools.islice(again, len(repeated))):
-            cycles.append(largest_cycle(same) if channel is None else channel_cycle(same, channel))
+            cycle = largest_cycle(same) if channel is None else channel_cycle(same, channel)
+            cycles.append(cycle)
         order = first_order(trace.scenario)
         amplitudes, frequencies = zip(*cycles, strict=True)
         changes.append(

@@ -64,8 +64,10 @@ def solve(
                 break
             jacobian(model, data, moves, None, tip)
             J = moves[:, model.jnt_dofadr[ids]]
-            move = J.T @ np.linalg.solve(J @ J.T + (0.01 * size + 1e-14) * np.eye(3), away)
-            move *= min(1.0, MAX_MOVE / float(np.abs(move).max() + 1e-300))
+            damping = (0.01 * size + 1e-14) * np.eye(3)
+            move = J.T @ np.linalg.solve(J @ J.T + damping, away)
+            longest = np.abs(move).max() + 1e-300
+            move *= min(1.0, MAX_MOVE / float(longest))
             x = np.clip(x + move, low, high)
         else:
             there = ", ".join(f"{value:.4g}" for value in point)

@@ -154,7 +154,8 @@ def all_joints(plant: Plant) -> tuple[str, ...]:
         if model.jnt_type[joint] >= mujoco.mjtJoint.mjJNT_SLIDE.value:  # or a hinge
             names.append(model.joint(joint).name)
     first = [name for name in channel_names(plant) if name in names]
-    return tuple(filter(None, dict.fromkeys((*first, *names))))
+    every = dict.fromkeys((*first, *names))
+    return tuple(filter(None, every))
 
 
 @functools.lru_cache(maxsize=32)
@@ -236,7 +237,8 @@ def state_with(
         first = model.jnt_qposadr[pose]
         dof = model.jnt_dofadr[pose]
         place = x[of_pose]
-        qpos[first : first + 7] = [*place[:3], *rotation.quaternion(*place[3:])]
+        turn = rotation.quaternion(*place[3:])
+        qpos[first : first + 7] = [*place[:3], *turn]
         qvel[dof : dof + 6] = v[of_pose]
         joints = joints[..., ~of_pose]
         x = x[~of_pose]
@@ -249,6 +251,7 @@ def state_with(
 def posed(model: mujoco.MjModel, x: Any) -> mujoco.MjData:
     """Return the data of a model with its channels at x, (n,) rad or m, at rest."""
     data = mujoco.MjData(model)
-    data.qpos[:] = state_with(model, moving_joints(model), x, 0.0)[0]
+    state = state_with(model, moving_joints(model), x, 0.0)
+    data.qpos[:] = state[0]
     mujoco.mj_kinematics(model, data)
     return data

@@ -76,7 +76,8 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
     if others.strip() in OTHERS:
         return from_text(rest, folder, **{"others": others.strip()} | values)
     path = model["path"]
-    joints = list(filter(str.strip, BETWEEN_JOINTS.split(model["joints"] or "")))
+    texts = BETWEEN_JOINTS.split(model["joints"] or "")
+    joints = list(filter(str.strip, texts))
     measured = []
     channels = {}
     for joint in joints:

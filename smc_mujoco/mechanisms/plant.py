@@ -319,8 +319,10 @@ class Plant:
 
         `spec`: its own, with additions.
         """
-        model = compiled_for_runs(spec or self.spec(), whole("nuserdata", nuserdata, 0, MAX_ITEMS))
-        write(model, self.fields(model, self.values(factors or {})))
+        numbers = whole("nuserdata", nuserdata, 0, MAX_ITEMS)
+        model = compiled_for_runs(spec or self.spec(), numbers)
+        values = self.values(factors or {})
+        write(model, self.fields(model, values))
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model
 
@@ -465,7 +467,8 @@ def plant(name: str, *, set: Any = None, **parameters: float) -> Plant:
       A Plant.
     """
     base = find("plant", name, catalogue())
-    n = whole(f"n of {name}", parameters.pop("n", base.n), *base.sizes)
+    given = parameters.pop("n", base.n)
+    n = whole(f"n of {name}", given, *base.sizes)
     values = dict(base.parameters)
     values.update(find(f"set of {name}", set, base.sets) if set is not None else {})
     for key, value in parameters.items():

@@ -74,7 +74,8 @@ def run_rows(
     """
     made = compiled(form)
     rows = np.array(rows, order="C")  # a copy, in which `stop` writes
-    scores = np.full((len(rows), SCORES + len(form.metrics)), np.nan)
+    width = SCORES + len(form.metrics)
+    scores = np.full((len(rows), width), np.nan)
     if logs is None:
         logs = np.zeros((len(rows), 0))
 

@@ -216,7 +216,8 @@ def layout(form: Form) -> Layout:
     work = Places()
 
     def of_part(part: ChannelFunction) -> PartAt:
-        width = len(part.names) * (form.n if part.channels else 1)
+        channels = form.n if part.channels else 1
+        width = len(part.names) * channels
         return PartAt(part, row.take(), row.take(width), work.take(part.memory * form.n))
 
     def of_signal(kind: Any) -> SignalAt:

@@ -128,7 +128,8 @@ def compiled_control(form: Form) -> Any:
 def run_rows(form: Form, rows: Array, tables: Array) -> Array:
     """Return the scores of runs, as `cpu.run` does."""
     made = compiled(form)
-    scores = np.full((len(rows), SCORES + len(form.metrics)), np.nan)
+    width = SCORES + len(form.metrics)
+    scores = np.full((len(rows), width), np.nan)
     points = cuda.to_device(tables)
     for first in range(0, len(rows), PIECE):
         piece = np.ascontiguousarray(rows[first : first + PIECE])

@@ -179,7 +179,8 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
         drives.append(ChannelFunction(advanced, part.names, part.memory, every))
     sensors = []
     for part in s.sensors:
-        sensors.append(ChannelFunction(part.read, part.names, part.memory, every))
+        sensor = ChannelFunction(part.read, part.names, part.memory, every)
+        sensors.append(sensor)
     laws = []
     for law in s.law.of_channels(s.plant.driven):
         laws.append(_part(law)._replace(channels=every if law.joint else ()))
@@ -233,7 +234,8 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
 
 def _on_channels(part: Any, function: Any, s: Resolved) -> ChannelFunction:
     """Return a function of a part, on the part's channels."""
-    return ChannelFunction(function, part.names, part.memory, tuple(part.channels(s.plant)))
+    channels = tuple(part.channels(s.plant))
+    return ChannelFunction(function, part.names, part.memory, channels)
 
 
 def _power(base: int, least: int) -> int:
@@ -267,7 +269,8 @@ def _oldest(s: Resolved) -> int:
     """Return how many physics steps the states reach back that its sensors may give."""
     longest = 0.0
     for part in s.sensors:
-        late = part.delay + part.skew * max(part.channels(s.plant))
+        channels = part.channels(s.plant)
+        late = part.delay + part.skew * max(channels)
         longest = max(longest, late + (part.period or 0.0))
     return math.ceil(longest / s.physics_step) + 2
 
@@ -362,7 +365,8 @@ class FormGroup:
         _put(row, self.layout.estimator.numbers, s.velocity.numbers(1))
         if self.layout.surface and s.surface:
             _put(row, self.layout.surface.numbers, s.surface.numbers(1))
-        for at, law in zip(self.layout.laws, s.law.of_channels(s.plant.driven), strict=True):
+        laws = s.law.of_channels(s.plant.driven)
+        for at, law in zip(self.layout.laws, laws, strict=True):
             _put(row, at.numbers, law.numbers(self._columns))
             if at.part.function is None:
                 row[at.address] = compile_component(law).address
@@ -398,7 +402,8 @@ class FormGroup:
         places = self.layout.row.damping, self.layout.row.levels
         for part in s.friction if self.form.frictions else ():
             for first, value in zip(places, part.added_to_model, strict=True):
-                row[np.add(first, part.channels(s.plant))] += value
+                its_channels = part.channels(s.plant)
+                row[np.add(first, its_channels)] += value
 
     @property
     def _columns(self) -> int:
@@ -409,7 +414,8 @@ class FormGroup:
         """Return where a gain of the law is in a row: of every channel."""
         found = []
         for at in self.layout.laws:
-            first = at.numbers + at.part.names.index(name) * self._columns
+            place = at.part.names.index(name)
+            first = at.numbers + place * self._columns
             found += range(first, first + self._columns)
         return found
 

@@ -122,7 +122,8 @@ class ScoredRuns:
         kind, why = chosen(case, tuple(self.formulas), self.device, self.worlds)
         if kind is None:
             return None, why
-        functions = kind.key_of(case), *map(type, case.resolved.disturbance)
+        of_disturbances = map(type, case.resolved.disturbance)
+        functions = kind.key_of(case), *of_disturbances
         if functions not in self.compiles:
             self.compiles[functions] = prepare.why_not(case)
         if why := self.compiles[functions]:

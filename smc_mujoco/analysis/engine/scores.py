@@ -61,7 +61,8 @@ def _fold(name: str) -> Fold | None:
     entry = CATALOGUE.get(name)
     if entry is None or entry.fold is None:
         return None
-    return entry.fold if entry.fold.signal in (*MADE, *HOLDING, *LOGGED) else None
+    sums = entry.fold.signal in (*MADE, *HOLDING, *LOGGED)
+    return entry.fold if sums else None
 
 
 def holds(name: str) -> bool:

@@ -198,7 +198,8 @@ def _put(model: Any, name: str, values: Array) -> None:
         owner = model.opt
     field = name.rpartition(".")[2]
     array = getattr(owner, field)
-    shape = (len(values), *array.numpy().shape[1:])
+    rest = array.numpy().shape[1:]
+    shape = (len(values), *rest)
     shaped = values.reshape(shape)
     setattr(owner, field, warp.array(shaped, dtype=array.dtype))
 

@@ -69,7 +69,8 @@ class WorldRuns(NamedTuple):
         """Return the state of runs and their scores so far, (runs, work_size) and (runs, SCORES +
         metrics).
         """
-        scores = np.full((count, SCORES + len(self.form.metrics)), np.nan)
+        width = SCORES + len(self.form.metrics)
+        scores = np.full((count, width), np.nan)
         scores[:, FAILURE] = UNDER_WAY
         return np.zeros((count, work_size(self.form))), scores
 

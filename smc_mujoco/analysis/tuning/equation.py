@@ -45,7 +45,8 @@ class Equations:
         for k, gains in enumerate(candidates):
             for value, columns in zip(gains, self.columns, strict=True):
                 rows[k * count : (k + 1) * count, columns] = value
-        scores = self.group.run(rows, self.threads, self.device).tolist()
+        scores_of_rows = self.group.run(rows, self.threads, self.device)
+        scores = scores_of_rows.tolist()
         costs = []
         for i, score in enumerate(scores):
             case = self.cases[i % count]

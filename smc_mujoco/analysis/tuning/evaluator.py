@@ -219,7 +219,8 @@ class _RepeatedBatch(ScenarioBatch):
             some = candidates[first : first + self.slots]
             self.again(np.repeat(some, count, axis=0))
             for k in range(len(some) * count):
-                made.append(terms(self.cases[k % count], self.failed_at(k), self.logs[k]))
+                case = self.cases[k % count]
+                made.append(terms(case, self.failed_at(k), self.logs[k]))
         return made
 
     def again(self, gains: Array) -> None:

@@ -59,7 +59,8 @@ def search(
     hypercube(alone, space.box, random, WIDER * usual, space.inside)
     spent = round(alone.count / len(every.cheap.cases))
     count = max(FEWEST, int(KEPT * usual))
-    kept = sorted(alone.decided.values(), key=_objective)[:count]
+    decided = alone.decided.values()
+    kept = sorted(decided, key=_objective)[:count]
     rows = np.log10([one.gains for one in kept]) if kept else space.inside[None]
     costs = every.screen(rows)
     logs = rows[np.argmin(costs)]

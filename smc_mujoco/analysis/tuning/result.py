@@ -53,7 +53,8 @@ def load_found(path: Path) -> SearchResult:
 
 def _found(data: Data) -> SearchResult:
     history = tuple(map(_evaluation, data["history"]))
-    return SearchResult(**dict(data) | {"best": _evaluation(data["best"]), "history": history})
+    best = _evaluation(data["best"])
+    return SearchResult(**dict(data) | {"best": best, "history": history})
 
 
 def _evaluation(row: Sequence[Any]) -> Evaluation:
@@ -213,7 +214,8 @@ class Tuned(Tables):
     def save(self, path: AnyPath) -> Path:
         """Write a .json file that `load_tuned` reads back."""
         path = with_ending(path, ".json")
-        scenario = self.definition.scenarios(self.plant, self.law, self.seed)[0]
+        scenarios = self.definition.scenarios(self.plant, self.law, self.seed)
+        scenario = scenarios[0]
         data = {name: getattr(self, name) for name in SAVED_FIELDS} | {
             "definition": self.definition.describe(),
             "at_bound": self.at_bound,

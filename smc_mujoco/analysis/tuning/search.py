@@ -281,7 +281,8 @@ class TuningTask(NamedTuple):
         template = self.law.template
         if self.outside_theorem or template is None:
             return True
-        tried = {**self.law.gains, **dict(zip(self.box, gains, strict=True))}
+        searched = zip(self.box, gains, strict=True)
+        tried = {**self.law.gains, **dict(searched)}
         return not template.unmet(tried)
 
     @property
@@ -564,7 +565,8 @@ def result_of(task: TuningTask, found: tuple[SearchResult, ...]) -> Tuned:
     cases = task.cases(found.index(tuned.best))
     traces = run(cases, task.threads)
     before = task.goal.evaluation(cases[0], traces).objective
-    law = with_gains(task.law, tuple(task.box), tuned.best.best.gains)
+    gains = tuned.best.best.gains
+    law = with_gains(task.law, tuple(task.box), gains)
     return dataclasses.replace(tuned, law=law, before=before)
 
 

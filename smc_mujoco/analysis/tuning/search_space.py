@@ -103,7 +103,8 @@ def unit_texts(law: Component, names: Sequence[str], scenario: Scenario) -> dict
         gain = _gain(law, name)
         channel = 3 if gain.turns else 0
         unit = gain.unit if isinstance(gain.unit, Unit) else Unit()
-        texts[name] = unit.text(scenario.efforts[channel], scenario.plant.units[channel])
+        unit_of_x = scenario.plant.units[channel]
+        texts[name] = unit.text(scenario.efforts[channel], unit_of_x)
     return texts
 
 
@@ -113,7 +114,8 @@ def _scales_of(gain: Gain, scales: Numbers) -> Numbers:
     """
     sizes = {}
     for name in ("F", "X", "T"):
-        sizes[name] = scales.get(name + OF_TURNS * gain.turns, scales[name])
+        own_name = name + OF_TURNS * gain.turns
+        sizes[name] = scales.get(own_name, scales[name])
     return sizes
 
 
@@ -132,7 +134,8 @@ def scales(
     """
     if plant.pose and plant.by_mujoco:
         start = np.array(plant.x0)
-        M = plant.nominal.dynamics(start, np.zeros(plant.n), plant.values({})).M
+        still = np.zeros(plant.n)
+        M = plant.nominal.dynamics(start, still, plant.values({})).M
         limits = plant.limits
         force = min([u_max, *limits[:3]])
         torque = min([u_max, *limits[3:6]])
@@ -149,7 +152,8 @@ def scales(
         X = reach
     if plant.is_user_model and per_u is not None:
         # a bound far beyond what the joint needs is no scale
-        u_max = min(u_max, at_start.MOST * max(at_start.needs(plant)) / per_u)
+        need = max(at_start.needs(plant))
+        u_max = min(u_max, at_start.MOST * need / per_u)
         g = min(at_start.mobility(plant, u_max * per_u, X))
     else:
         zeros = np.zeros(plant.n)

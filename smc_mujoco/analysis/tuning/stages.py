@@ -63,7 +63,8 @@ class Trials:
 
     def cost(self, logs: Array) -> float:
         """Return the accurate J of a candidate, given as log10 gains (gains,)."""
-        return self._costs([self.gains(logs.tolist())], self.accurate, self.decided)[0]
+        gains = self.gains(logs.tolist())
+        return self._costs([gains], self.accurate, self.decided)[0]
 
     def within(self, logs: Array) -> bool:
         """Return whether log10 gains hold the conditions of the law's theorem."""
@@ -101,7 +102,8 @@ class Trials:
     def _costs(
         self, candidates: list[Gains], evaluate: Evaluator, known: dict[Gains, Evaluation]
     ) -> Array:
-        new = list(dict.fromkeys(gains for gains in candidates if gains not in known))
+        fresh = dict.fromkeys(gains for gains in candidates if gains not in known)
+        new = list(fresh)
         known.update(zip(new, evaluate(new), strict=True))
         self.report(len(new))
         return np.array([known[gains].objective for gains in candidates])

@@ -341,7 +341,8 @@ def ranges(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Range, ...]:
             high = math.inf
         rows.append((joint.name, float(low), float(high)))
     flags = mujoco.mjtDisableBit
-    off = model.opt.disableflags & (flags.mjDSBL_LIMIT.value | flags.mjDSBL_CONSTRAINT.value)
+    both = flags.mjDSBL_LIMIT.value | flags.mjDSBL_CONSTRAINT.value
+    off = model.opt.disableflags & both
     if off or not any(math.isfinite(low) for _, low, _ in rows):
         return ()
     return tuple(rows)
@@ -396,7 +397,8 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> Floats:
     ]
     largest = np.abs(ends).max(axis=1)
     forces = unit_wrenches(model, model.joint(joint).id, drives)
-    together = np.linalg.norm(forces[:, :3], axis=1)
+    pushes = forces[:, :3]
+    together = np.linalg.norm(pushes, axis=1)
     alone = np.abs(forces[:, 3:])
     sizes = np.array([together, *alone.T]).T
     reached = []

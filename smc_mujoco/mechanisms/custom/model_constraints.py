@@ -131,8 +131,10 @@ def _giving(model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
     def tell(what: str, option: str, solref: Array, solimp: Array, load: float | Array) -> None:
         first, second = solref.T
         # a time constant and a damping ratio, or a stiffness and a damping, both negative
-        w = np.where(first > 0.0, 1.0 / np.abs(first * second), np.sqrt(np.abs(first)))
-        z = np.where(first > 0.0, second, -second / (2.0 * w))
+        roots = np.sqrt(np.abs(first))
+        w = np.where(first > 0.0, 1.0 / np.abs(first * second), roots)
+        of_pair = -second / (2.0 * w)
+        z = np.where(first > 0.0, second, of_pair)
         decay = 1.0 + (math.e - 1.0) * z
         blow = np.max(1.0 / (w * decay), initial=0.0)
         loose = 1.0 - solimp[:, 1]

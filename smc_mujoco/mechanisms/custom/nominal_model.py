@@ -189,7 +189,8 @@ class NominalModel:
             dense = np.zeros((model.nv, model.nv))
             forces = {}
             mujoco.mj_fullM(model, data, dense)
-            for name, velocity in (("g", np.zeros(len(x))), ("h", v)):
+            at_rest = np.zeros(len(x))
+            for name, velocity in (("g", at_rest), ("h", v)):
                 data.qvel[places["qvel"]] = velocity
                 mujoco.mj_fwdVelocity(model, data)
                 mujoco.mj_fwdActuation(model, data)
@@ -303,9 +304,11 @@ def _mujoco(name: str, more: int = 0) -> Callable:
     Compiled code has its name, not its address, so that another process can load the code from the
     disk.
     """
-    address = ctypes.cast(libmujoco.library()[name], ctypes.c_void_p).value
+    function = libmujoco.library()[name]
+    address = ctypes.cast(function, ctypes.c_void_p).value
     binding.add_symbol(name, address)
-    return types.ExternalFunction(name, types.void(*[types.int64] * (2 + more)))
+    arguments = [types.int64] * (2 + more)
+    return types.ExternalFunction(name, types.void(*arguments))
 
 
 def passive_alone(model: mujoco.MjModel) -> bool:

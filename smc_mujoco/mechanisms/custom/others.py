@@ -160,7 +160,8 @@ def _lock(
             number = model.joint(joint.name).id
             to_body = at.xmat[i].reshape(3, 3).T
             joint.axis = to_body @ at.xaxis[number]
-            joint.pos = to_body @ (at.xanchor[number] - at.xpos[i])
+            arm = at.xanchor[number] - at.xpos[i]
+            joint.pos = to_body @ arm
     _delete_orphans(spec)
 
 

@@ -272,7 +272,8 @@ def _without_suggestions(pairs: Pairs) -> Pairs:
     """Return channels without what they suggest to a scenario."""
     bare = []
     for joint, channel in pairs:
-        bare.append((joint, dataclasses.replace(channel, **dict.fromkeys(own.SUGGESTED))))
+        bare_fields = dict.fromkeys(own.SUGGESTED)
+        bare.append((joint, dataclasses.replace(channel, **bare_fields)))
     return tuple(bare)
 
 
@@ -347,7 +348,8 @@ def _places(
     check_ranges(plant, checked, map(start.get, named), map(unit_of.get, named))
     goals = _goals(model, alone, keyframe)
     rest = own.places(model, joints, goals, keyframe)[2]
-    fields: Fields = {"x0": x0, "ranges": own.ranges(model, names)}
+    ranges = own.ranges(model, names)
+    fields: Fields = {"x0": x0, "ranges": ranges}
     if any(rest):
         fields |= {"rest": rest, "goal": rest[len(pairs) :]}
     fields["measured"] = len(names) - len(joints_of(pairs))
@@ -411,7 +413,8 @@ def missing(model: mujoco.MjModel, joints: list[str], motors: Sequence[Motor]) -
     if np.any(model.actuator_dyntype[idle] == DCMOTOR):
         return f"a dcmotor has a current that is not measured: {WITHOUT_MODEL}"
     # what may couple trees
-    alone = np.all(np.isin(model.actuator_trntype[idle], own.ONE_JOINT))
+    kinds = np.isin(model.actuator_trntype[idle], own.ONE_JOINT)
+    alone = np.all(kinds)
     if model.ntendon or not alone:
         near = range(model.nv)
     else:

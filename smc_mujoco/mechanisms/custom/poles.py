@@ -38,7 +38,8 @@ def fastest_pole(plant: Plant, parts: tuple[Part, ...] = ()) -> float:
     """
     model = _model(plant, parts)
     data = mujoco.MjData(model)
-    start = state_with(model, moving_joints(model), plant.x0, 0.0)[0]
+    state = state_with(model, moving_joints(model), plant.x0, 0.0)
+    start = state[0]
     rng = np.random.default_rng(SEED)
     found = 0.0
     for k in range(POSES + 1 if model.nv + model.na else 0):

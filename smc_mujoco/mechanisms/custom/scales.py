@@ -123,8 +123,10 @@ def _held(
     inertia = M[dofs, dofs]
     # the PD's gains suit M[i, i]; where the base gives way the joint is lighter, and its modes are
     # faster
-    mobility_of_dofs = np.linalg.inv(M)[np.ix_(dofs, dofs)]
-    fastest = STIFF * np.linalg.eigvals(mobility_of_dofs * inertia).real.max()
+    mobility = np.linalg.inv(M)
+    mobility_of_dofs = mobility[np.ix_(dofs, dofs)]
+    poles = np.linalg.eigvals(mobility_of_dofs * inertia)
+    fastest = STIFF * poles.real.max()
     model.opt.timestep = min(model.opt.timestep, 0.1 / STIFF, 0.5 / fastest)
     goal = data.qpos[places].copy()
     mujoco.mj_forward(model, data)
@@ -192,7 +194,8 @@ def tips_over(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
         mujoco.mj_kinematics(model, one)
         pose = one.xmat[base].reshape(3, 3)
         directions.append(model.opt.gravity @ pose)
-    return bool(directions[0] @ directions[1] < TIPPED * model.opt.gravity @ model.opt.gravity)
+    least = TIPPED * model.opt.gravity @ model.opt.gravity
+    return bool(directions[0] @ directions[1] < least)
 
 
 @functools.lru_cache(maxsize=32)
@@ -261,7 +264,8 @@ def needs(plant: Plant) -> Floats:
     damping = np.maximum(diagonal, 0.0)
     inertia = np.diag(at.M)[at.dofs]
     moving = (STIFFNESS * inertia + DAMPING * damping) * way
-    need = 2.0 * np.abs(at.load) + moving + 1.5 * at.dry
+    load = 2.0 * np.abs(at.load)
+    need = load + moving + 1.5 * at.dry
     return tuple(float(f"{value:.2g}") for value in need)
 
 
@@ -278,7 +282,8 @@ def mobility(plant: Plant, u_max: float, reach: float) -> Floats:
         unit = np.eye(len(at.M))[i]
         for _ in range(ROUNDS):
             T = np.sqrt(reach / (g * u_max))
-            A = at.M + T * at.D + 0.5 * T * T * at.K
+            damped = at.M + T * at.D
+            A = damped + 0.5 * T * T * at.K
             A[i] = at.M[i]
             A[:, i] = at.M[:, i]
             g = abs(np.linalg.solve(A, unit)[i])

@@ -144,7 +144,8 @@ def _found(name: str, meshdir: Path, folder: Path) -> Path | None:
     the URDF, or beside one above.
     """
     _, package, rest = name.rpartition("://")
-    places = [meshdir / rest, meshdir / Path(rest).name, folder / rest]
+    named = meshdir / Path(rest).name
+    places = [meshdir / rest, named, folder / rest]
     rest = rest.lstrip("/")
     for above in (folder, *folder.parents) if package else ():
         places += [above / rest, above / rest.partition("/")[2]]
@@ -161,7 +162,8 @@ def _raised(inertia: ET.Element) -> bool:
     axes = ("xx", "xy", "xz", "yy", "yz", "zz")
     xx, xy, xz, yy, yz, zz = (float(inertia.get(f"i{axis}", 0.0)) for axis in axes)
     small, middle, large = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    lacking = max(large - middle - small, LEAST - small) + (ENOUGH - 1.0) * large
+    missing = max(large - middle - small, LEAST - small)
+    lacking = missing + (ENOUGH - 1.0) * large
     if large <= 0.0:  # MuJoCo says what is wrong
         return False
     if lacking > 0.0:

@@ -136,7 +136,8 @@ class UserFields:
             if not model.body(i).name.startswith((ROTOR, OWN)):
                 scale[i] = p.m / self.mass
         yield Field("body_mass", slice(None), model.body_mass * scale)
-        yield Field("body_inertia", slice(None), model.body_inertia * scale[:, None])
+        scaled = model.body_inertia * scale[:, None]
+        yield Field("body_inertia", slice(None), scaled)
         if self.gravity:
             factor = p.grav / self.gravity
             yield Field("opt.gravity", slice(None), model.opt.gravity * factor)

@@ -43,7 +43,8 @@ def stops(spec: mujoco.MjSpec, x: float) -> None:
         face = x + FACE_X
         for rail, y in RAIL_Y.items():
             name = f"{side}_{rail}"
-            near, far = sorted((sign * face, sign * (face + 0.02)))
+            beyond = sign * (face + 0.02)
+            near, far = sorted((sign * face, beyond))
             box(machine, f"{name}_pad", (near, y - 0.036, 0.300), (far, y + 0.036, 0.384), "ink")
             near, far = sorted((sign * (face + 0.02), sign * (face + 0.10)))
             box(

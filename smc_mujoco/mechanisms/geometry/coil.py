@@ -21,10 +21,12 @@ def draw(spec, name, start, end, *, radius, turns, wire, material):
     turn = 2 * np.pi * turns * s[:, None]
     sideways = np.cross(axis, up)
     outward = np.cos(turn) * up + np.sin(turn) * sideways
-    around = 2 * np.pi * np.arange(SIDES)[:, None] / SIDES
+    steps = np.arange(SIDES)[:, None]
+    around = 2 * np.pi * steps / SIDES
     line = first + s[:, None] * (last - first)
     centre = line + radius * outward
-    vertices = centre[:, None] + wire * (np.cos(around) * outward[:, None] + np.sin(around) * axis)
+    outwards = np.cos(around) * outward[:, None]
+    vertices = centre[:, None] + wire * (outwards + np.sin(around) * axis)
     _skin(spec, name, start, end, material, vertices, s)
 
 

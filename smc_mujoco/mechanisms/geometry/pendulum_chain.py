@@ -162,7 +162,8 @@ def pendulum_fields(model, p):
     yield Field("dof_damping", model.body_dofadr[bodies], p.b)
     yield Field("opt.gravity", 2, -p.grav)
     for i in range(n):
-        yield from geom_fields(model, f"p{i}/rod", (0.0, 0.0, side * p.l / 2), (1, p.l / 2))
+        half = side * p.l / 2
+        yield from geom_fields(model, f"p{i}/rod", (0.0, 0.0, half), (1, p.l / 2))
         yield from geom_fields(model, f"p{i}/bob", (0.0, 0.0, side * p.l))
 
 
@@ -267,5 +268,6 @@ def stand_row(spec, n, width):
     spec.stat.extent = 1.6 + shown
     distance = 2.2 + 0.9 * shown
     camera = spec.camera("look")
-    camera.pos = (-0.245 * distance, -0.953 * distance, HEIGHT - 0.05 + 0.176 * distance)
+    raised = HEIGHT - 0.05 + 0.176 * distance
+    camera.pos = (-0.245 * distance, -0.953 * distance, raised)
     camera.alt.xyaxes = (0.969, -0.248, 0.0, 0.046, 0.181, 0.982)
