@@ -177,13 +177,11 @@ class Comparison:
         self.plain = self.leads.copy()
         for k in range(blocks):
             for a in range(count):
-                own_gains = gains[a, k, ran[k]]
-                self.sets[a, k], self.units[a, k] = _counted(own_gains)
+                self.sets[a, k], self.units[a, k] = _counted(gains[a, k, ran[k]])
                 # the law alone, then beside each other
                 for b in range(a + 1):
                     pair = sorted({a, b})
-                    column = results[pair, k][:, None]
-                    first = first_of_kind(column, ran[[k]])[0]
+                    first = first_of_kind(results[pair, k][:, None], ran[[k]])[0]
                     units = linked(*gains[pair, k][:, first])
                     if a == b:
                         self.below[a, k] = self._is_below(a, k, first, units)

@@ -67,10 +67,8 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
         block = rates(model, data)
     order = _order(model, dofs)
     n = len(order)
-    of_states = block[:n, :n]
-    a = of_states[np.ix_(order, order)]
-    of_drives = block[:n, n:]
-    b = of_drives[np.ix_(order, driven)]
+    a = block[:n, :n][np.ix_(order, order)]
+    b = block[:n, n:][np.ix_(order, driven)]
     names = channel_names(plant)
     if plant.pose:
         labels = names
@@ -78,8 +76,7 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     else:
         labels = []
         for i in order[: model.nv]:
-            joint = int(model.dof_jntid[i])
-            labels.append(model.joint(joint).name)
+            labels.append(model.joint(int(model.dof_jntid[i])).name)
         drives = names[: plant.driven]
     return StateSpace(
         a,

@@ -86,8 +86,7 @@ def plot(
     dots = _dots(table, items_of("metrics", metrics), winners)
     head = style.titled(title, f"Medians: {dots.heading}")
     with style.page(width):
-        intervals = list(dots.intervals.values())
-        key, shared = _key(table, dots.looks, intervals, bool(dots.won))
+        key, shared = _key(table, dots)
         across = 1 if width < pages.NARROW else len(dots.metrics)
         tall = WORDS_HEIGHT + LINE_HEIGHT * dots.lines
         heights = np.repeat(tall, len(dots.metrics) // across)
@@ -266,21 +265,17 @@ def _intervals(table: RunColumns, metrics: Sequence[str]) -> dict[Cell, Interval
     return intervals
 
 
-def _key(
-    table: RunColumns,
-    looks: Mapping[str, Mapping[str, str]],
-    intervals: Sequence[Interval],
-    ringed: bool,
-) -> tuple[list[Handle], str]:
+def _key(table: RunColumns, dots: Dots) -> tuple[list[Handle], str]:
     """Return the entries of the legend, law by law and mark by mark, and where all gains come from
     if that is the same.
     """
     rows = np.arange(len(table.column("law")))
     known = sources(table, rows)
+    intervals = list(dots.intervals.values())
     key: list[Handle] = []
     line: Fields = {"lw": style.points(1.5)}
-    gains, shared = pages.gain_sources([known.get(law, ()) for law in looks])
-    for (law, look), source in zip(looks.items(), gains, strict=True):
+    gains, shared = pages.gain_sources([known.get(law, ()) for law in dots.looks])
+    for (law, look), source in zip(dots.looks.items(), gains, strict=True):
         label = style.law_name(law) + source
         sample = pages.entry(label, look["color"], marker=look["marker"], mec="none", **line)
         key.append(sample)
@@ -288,7 +283,7 @@ def _key(
     if min(interval.n for interval in intervals) < MIN_INTERVAL_SAMPLES:
         label += f" (the range, with fewer than {MIN_INTERVAL_SAMPLES} samples)"
     key.append(pages.entry(label, **line))
-    if ringed:
+    if dots.won:
         ring = pages.entry("winner", style.INK, lw=0.0, **RING)
         key.append(ring)
     if any(interval.median == MIN_SIZE for interval in intervals):

@@ -327,8 +327,7 @@ class Puppet:
         height = -raised
         if not on_stage:  # it stands on the floor, or hangs close above it
             foot = float(standing[..., 2].min(initial=np.inf))
-            lowest_around = around[..., 2].min(initial=np.inf)
-            height = -min(lowest, foot, float(lowest_around))
+            height = -min(lowest, foot, float(around[..., 2].min(initial=np.inf)))
             tall = high[2] - low[2]
             hangs = foot > low[2] + FLOOR_SHARE * tall
             if lowest < foot and not hangs:  # a floor below the links would not be below its foot

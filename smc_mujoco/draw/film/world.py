@@ -313,8 +313,7 @@ def cut(machines: Sequence[mujoco.MjModel], points: Array, slides: Array, own: b
                     continue
                 side = int(turned[k].argmax())
                 way[axis] = 0.5 * (a + b) - middle
-                longer = 0.5 * (b - a - sides[k, axis])
-                lengthen(model, geom, side, longer)
+                lengthen(model, geom, side, 0.5 * (b - a - sides[k, axis]))
             elif home[k] and middle < start + near:
                 way[axis] = first - start
             elif home[k] and middle > stop - near:
