@@ -90,13 +90,13 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     )
 
 
-def _order(model: mujoco.MjModel, dofs: Array) -> list[int]:
+def _order(model: mujoco.MjModel, dofs: Array) -> Array:
     """Return the indices of positions and then of velocities, those of channels first."""
     order = list(dofs)
     for i in range(model.nv):
         if i not in dofs:
             order.append(i)
-    return order + [model.nv + i for i in order]
+    return np.concatenate([order, np.add(order, model.nv)])
 
 
 def _of(kind: str, names: Sequence[str]) -> list[str]:

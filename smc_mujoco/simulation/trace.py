@@ -480,7 +480,7 @@ def load(path: AnyPath) -> Trace:
         ) from None
     with reading(path, *FILE) as file, zipfile.ZipFile(file) as archive:
         found = archive.namelist()
-        names = list(ARRAYS)
+        names: list[str] = list(ARRAYS)
         for name in OPTIONAL:
             if f"{name}.npy" in found:
                 names.append(name)
