@@ -98,7 +98,8 @@ class LinearLaw(WrittenLaw):
             if last > 0 and self.a[last][last - 1]:
                 first -= 1
             for k in range(first, last + 1):
-                solved = [0.0] * (last + 1) + list(self.a[k][last + 1 :])
+                rest = self.a[k][last + 1 :]
+                solved = [0.0] * (last + 1) + list(rest)
                 read = _sum_of_products([(solved, "x"), (self.b[k], "w")])
                 lines.append(f"f{k} = memory[{k}] + h * ({read})")
             lines += _block_lines(self.a, first, last)
@@ -306,7 +307,8 @@ def _realisation(num: Any, den: Any, dt: Any) -> System:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", BadCoefficients)  # leading zeros, which are cut off
             try:
-                forms.append(tf2ss(np.atleast_1d(above), np.atleast_1d(below)))
+                form = tf2ss(np.atleast_1d(above), np.atleast_1d(below))
+                forms.append(form)
             except ValueError:
                 numerator = len(np.trim_zeros(above, "f")) - 1
                 denominator = len(np.trim_zeros(below, "f")) - 1

@@ -108,7 +108,8 @@ class Controller(Policy):
         """Return u and s."""
         answer = self.act.compute(y.t, np.array([y.x, y.v]), np.array([y.r, y.dr, y.ddr]))  # pyright: ignore[reportFunctionMemberAccess]
         u, info = answer if isinstance(answer, tuple) else (answer, {})
-        return float(np.asarray(u, float).item()), float(info.get("s", 0.0))
+        number = np.asarray(u, float).item()
+        return float(number), float(info.get("s", 0.0))
 
 
 @frozen_data
@@ -165,7 +166,8 @@ def _onnx(onnxruntime: ModuleType, path: Path) -> Act:
 
 def _torch(torch: ModuleType, path: Path) -> Act:
     """Return the network in a torch file, in the mode of its export."""
-    return functools.partial(_forward, torch, torch.export.load(str(path)).module())
+    program = torch.export.load(str(path))
+    return functools.partial(_forward, torch, program.module())
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -204,7 +206,8 @@ class Network:
 
 def _unpickled(content: bytes, classes: tuple[type, ...], version: str, predicts: bool) -> Network:
     torch = _library("torch", "network")
-    return Network(torch.load(io.BytesIO(content), weights_only=False), predicts)
+    module = torch.load(io.BytesIO(content), weights_only=False)
+    return Network(module, predicts)
 
 
 @constrained

@@ -103,7 +103,8 @@ def _input(names: Sequence[str] | None, t: float, size: float) -> Array:
     """Return inputs by name, the same in every process."""
     values = []
     for k, name in enumerate(names or ()):
-        values.append(FIXED.get(name, size * np.sin(1.7 * k + 1.0)))
+        wave = np.sin(1.7 * k + 1.0)
+        values.append(FIXED.get(name, size * wave))
         if name == "t":
             values[-1] = t
     return np.array(values)
@@ -221,7 +222,8 @@ def _results(
 def _same(a: Array | None, b: Array | None) -> bool:
     if a is None or b is None:
         return a is b
-    return bool(np.allclose(a, b, rtol=TOLERANCE, atol=1e-12, equal_nan=True))
+    alike = np.allclose(a, b, rtol=TOLERANCE, atol=1e-12, equal_nan=True)
+    return bool(alike)
 
 
 def _words(result: Array | None, count: int) -> str:

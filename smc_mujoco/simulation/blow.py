@@ -64,7 +64,8 @@ def bump(plant: Plant, time: float, rubs: float) -> tuple[Stops, Impulse]:
             "give an obstacle yourself, as bump: contact=Ball('body', mass=0.1)"
         )
     momentum, side, joint, ends = min(found)
-    return Stops({joint: ends}), Impulse(side * momentum, time=time, width=WIDTH)
+    stops = Stops({joint: ends})
+    return stops, Impulse(side * momentum, time=time, width=WIDTH)
 
 
 def _stopped(plant: Plant, rubs: float) -> list[Stopped]:
@@ -73,12 +74,15 @@ def _stopped(plant: Plant, rubs: float) -> list[Stopped]:
     goal = np.array(plant.rest or plant.origin)
     away = np.array(usual_start(plant)) - goal
     if not away[: plant.driven].any():
-        away[: plant.driven] = BESIDE_OTHERS * np.abs(away).max()
+        largest = np.abs(away).max()
+        away[: plant.driven] = BESIDE_OTHERS * largest
     inverse = np.linalg.inv(at.M)[at.dofs]
     gained = inverse @ _blown(plant, goal)  # speed of each joint for a unit of momentum on all
     inverse = inverse[:, at.dofs]
-    bounds = np.array(Scenario.recorded(plant=plant, law="none").drive_train.forces)
-    held = bounds * (1.0 + rubs) + np.abs(at.load) + at.dry
+    without_law = Scenario.recorded(plant=plant, law="none")
+    bounds = np.array(without_law.drive_train.forces)
+    load = np.abs(at.load)
+    held = bounds * (1.0 + rubs) + load + at.dry
     names = channel_names(plant)
     found = []
     for j in range(plant.driven):
@@ -86,15 +90,22 @@ def _stopped(plant: Plant, rubs: float) -> list[Stopped]:
             continue
         dof = at.dofs[j]
         side = -math.copysign(1.0, away[j])
-        near, far = _room(plant, j, abs(away[j]), side)
+        distance = abs(away[j])
+        near, far = _room(plant, j, distance, side)
         # of what moves at once, and of the joint where servos or PDs hold the others
-        mass = max(1.0 / gained[j], at.M[dof, dof])
-        force = np.abs(inverse[j]) @ held / gained[j] + max(at.K[dof, dof], 0.0) * near
-        damping = max(at.D[dof, dof], 0.0) + 0.5 * rubs * bounds[j]
-        momentum = math.sqrt(2.0 * REACH * mass * force * near) + force * WIDTH + damping * near
-        ends = sorted((goal[j] + side * near, goal[j] - side * far))
+        own_mass = at.M[dof, dof]
+        mass = max(1.0 / gained[j], own_mass)
+        stiffness = max(at.K[dof, dof], 0.0) * near
+        force = np.abs(inverse[j]) @ held / gained[j] + stiffness
+        drag = max(at.D[dof, dof], 0.0)
+        damping = drag + 0.5 * rubs * bounds[j]
+        work = 2.0 * REACH * mass * force * near
+        momentum = math.sqrt(work) + force * WIDTH + damping * near
+        near_end = goal[j] + side * near
+        ends = sorted((near_end, goal[j] - side * far))
         ends_of_reach = (float(ends[0]), float(ends[1]))
-        found.append(Stopped(float(momentum), side, names[j], ends_of_reach))
+        stopped = Stopped(float(momentum), side, names[j], ends_of_reach)
+        found.append(stopped)
     return found
 
 
@@ -109,7 +120,8 @@ def _blown(plant: Plant, goal: Array) -> Array:
     for joint in driven_ids(model).tolist():
         along = np.zeros((3, model.nv))
         about = np.zeros((3, model.nv))
-        mujoco.mj_jacBodyCom(model, data, along, about, int(model.jnt_bodyid[joint]))
+        body = int(model.jnt_bodyid[joint])
+        mujoco.mj_jacBodyCom(model, data, along, about, body)
         if plant.direct:
             exerted[model.jnt_dofadr[joint]] += 1.0
         elif model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE:
@@ -124,4 +136,5 @@ def _room(plant: Plant, j: int, away: float, side: float) -> Pair:
     low, high = (-math.inf, math.inf) if not plant.ranges else plant.ranges[j][1:]
     goal = (plant.rest or plant.origin)[j]
     beyond, behind = (high - goal, goal - low) if side > 0.0 else (goal - low, high - goal)
-    return max(min(NEAR * away, SHARE * beyond), LEAST * away), min(FAR * away, behind)
+    nearest = min(NEAR * away, SHARE * beyond)
+    return max(nearest, LEAST * away), min(FAR * away, behind)

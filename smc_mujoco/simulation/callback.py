@@ -195,7 +195,8 @@ def silence():
     def silent(message):
         return
 
-    return compiled(types.void(types.intp), silent, Key("silent", ""))
+    signature = types.void(types.intp)
+    return compiled(signature, silent, Key("silent", ""))
 
 
 @contextlib.contextmanager

@@ -21,7 +21,8 @@ def code_hashes(s: Scenario, plants: Hashes) -> list[str]:
     for part in (*s.law.parts, s.velocity, s.surface):
         if part is not None:
             things.append(part.function)
-    for signal in (*dict.fromkeys(s.references), s.known_signal, *s.disturbance):
+    references = dict.fromkeys(s.references)
+    for signal in (*references, s.known_signal, *s.disturbance):
         if signal is not None:
             things.append(type(signal))
     for part in (*s.friction, *s.compensated, *s.contact, *s.actuator):
@@ -42,7 +43,8 @@ def _plant_codes(plant: Plant) -> list[str]:
         of_user = filter(_of_a_user, (plant.fields, plant.nominal, *builds))
         return list(map(fingerprint.of, of_user))
     functions = plant.build, plant.fields, plant.nominal, builds
-    return [*map(fingerprint.of, functions), digest_of(plant.spec())]
+    digest = digest_of(plant.spec())
+    return [*map(fingerprint.of, functions), digest]
 
 
 def _of_a_user(thing: Any) -> bool:

@@ -79,7 +79,8 @@ def plant(name: str, value: object, s: Any) -> Plant:
 
 def law(value: Law | Template | str) -> Law:
     """Return a law, from itself, its template or its text."""
-    return _component("law", from_text.law(value) if isinstance(value, str) else value)
+    law = from_text.law(value) if isinstance(value, str) else value
+    return _component("law", law)
 
 
 def laws(name: str, value: Laws | None, s: Any) -> Law:
@@ -212,7 +213,8 @@ def state(name: str, value: float | Sequence[float] | None, s: Any) -> Floats | 
         )
     states = []
     for item in values * (n // len(values)):
-        states.append(number(name, item, low=-MAX_STATE, high=MAX_STATE))
+        checked = number(name, item, low=-MAX_STATE, high=MAX_STATE)
+        states.append(checked)
     return tuple(states)
 
 
@@ -290,7 +292,8 @@ def suggested_reference(plant: Plant) -> Signal:
     plant's rest.
     """
     at_rest = [Constant(x) for x in plant.rest[: plant.driven]] or [REST]
-    suggested = plant.suggested.get("reference", (None,) * len(at_rest))
+    none = (None,) * len(at_rest)
+    suggested = plant.suggested.get("reference", none)
     signals = []
     for rest, signal in zip(itertools.cycle(at_rest), suggested, strict=False):
         signals.append(signal or rest)
@@ -314,7 +317,8 @@ def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
     at_goal = [Constant(x) for x in plant.rest] or [REST] * plant.n
     if isinstance(value, Mapping):
         joints = driven_names(plant)
-        value = dict(zip(joints, at_goal, strict=False)) | dict(value)
+        goals = zip(joints, at_goal, strict=False)
+        value = dict(goals) | dict(value)
     elif isinstance(value, Signal) and getattr(value, "about", ""):
         value = [value] * plant.driven  # pyright: ignore[reportAssignmentType] a Sine
     if isinstance(value, PerChannel):
@@ -337,7 +341,8 @@ def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
             raise ScenarioError(f"reference is {shown(item)}: {cure}")
     for i, item in enumerate(items):
         if getattr(item, "about", ""):
-            items[i] = at_goal[i] + dataclasses.replace(item, about="")
+            about_goal = dataclasses.replace(item, about="")
+            items[i] = at_goal[i] + about_goal
     if not others and all(item == items[0] for item in items):
         return items[0]
     return PerChannel(tuple(items))
@@ -393,11 +398,13 @@ def friction(name: str, value: Frictions | None, s: Any) -> tuple[Friction, ...]
     items = _by_joint(name, value, s, Friction, "smc.Coulomb(0.05)", all_joints)
     for part, other in itertools.combinations(items, 2):
         same = type(part) is type(other) and part.on == other.on
-        both = {*part.joint_names(s.plant)} & {*other.joint_names(s.plant)}
+        first_joints = part.joint_names(s.plant)
+        both = {*first_joints} & {*other.joint_names(s.plant)}
         if same or (part.keeps_state and other.keeps_state and both):
             kinds = f"{type(part).__name__} and {type(other).__name__}"
             raise ScenarioError(f"{name} has {kinds} on the same joint: give one of them")
-    return tuple(sorted(items, key=lambda part: (type(part).__name__, part.on)))
+    ordered = sorted(items, key=lambda part: (type(part).__name__, part.on))
+    return tuple(ordered)
 
 
 def feedforward(name: str, value: object, s: Any) -> Signal | Feedforward | None:
@@ -439,7 +446,8 @@ def _by_joint(
             items += several_parts(name, item, s)
     placed = []
     for part in items:
-        placed.append(_placed(name, part, s.plant, joints(s.plant)))
+        one_placed = _placed(name, part, s.plant, joints(s.plant))
+        placed.append(one_placed)
     return placed
 
 

@@ -150,7 +150,8 @@ class Condition:
         Single events happen at half of the duration.
         """
         length = number("duration", duration, above=0.0)
-        fields = dict(self.fields(plant, length) if callable(self.fields) else self.fields)
+        given = self.fields(plant, length) if callable(self.fields) else self.fields
+        fields = dict(given)
         refused = []
         for name in NOT_OF_FREE_BODIES:
             if plant.pose and fields.get(name) and not isinstance(fields[name], Mapping):
@@ -430,7 +431,8 @@ def _joined_fields(
         if field not in first:
             continue
         if field in ADDITIVE_FIELDS:
-            second[field] = *coerce.as_tuple(first[field]), *coerce.as_tuple(second[field])
+            earlier = coerce.as_tuple(first[field])
+            second[field] = *earlier, *coerce.as_tuple(second[field])
         elif _differ(first[field], second[field]):
             names = " and ".join(repr(condition.name) for condition in pair)
             raise ScenarioError(
@@ -489,7 +491,8 @@ def _stepper(plant: Plant, duration: float) -> Data:
 
 def _fault(plant: Plant, duration: float) -> Data:
     """Return the loss of half the force, at 2 s, or at half of a run that is too short for it."""
-    return {"fault": Fault(at=2.0 if duration > 2.0 else duration / 2, gain=0.5)}
+    at = 2.0 if duration > 2.0 else duration / 2
+    return {"fault": Fault(at=at, gain=0.5)}
 
 
 def _sized(signal: Signal, plant: Plant) -> Signal:
@@ -516,7 +519,8 @@ def _each_joint(name: str, make: Callable[[float, Plant], Any]) -> Recipe:
         parts = [make(limit, plant) for limit in limits]
         if plant.pose or len(set(parts)) == 1:
             return {name: parts[0]}
-        return {name: dict(zip(channel_names(plant), parts, strict=False))}
+        by_joint = zip(channel_names(plant), parts, strict=False)
+        return {name: dict(by_joint)}
 
     return fields
 
@@ -575,7 +579,8 @@ def _fitted(usual: Actuator, fit: Callable[[Own], Actuator]) -> Recipe:
         parts = list(map(fit, _own_joints(plant)))
         if len(set(parts)) == 1:
             return {"actuator": parts[0]}
-        return {"actuator": dict(zip(channel_names(plant), parts, strict=False))}
+        by_joint = zip(channel_names(plant), parts, strict=False)
+        return {"actuator": dict(by_joint)}
 
     return fields
 
@@ -598,18 +603,21 @@ def _elastic(plant: Plant, duration: float) -> Data:
     for joint in joints:
         rotor = max(ELASTIC_ROTOR * joint.inertia, MIN_INERTIA)
         moving = rotor * joint.inertia / (rotor + joint.inertia)
-        omega = RESONANCE * math.sqrt(joint.limit / (joint.inertia * way))
+        ratio = joint.limit / (joint.inertia * way)
+        omega = RESONANCE * math.sqrt(ratio)
         damping = 2.0 * STRUCTURAL_DAMPING * omega * moving
         numbers = (moving * omega**2, damping, rotor)
         parts.append(ElasticJoint(*(float(f"{number:.3g}") for number in numbers)))
     if len(set(parts)) == 1:
         return {"actuator": parts[0]}
-    return {"actuator": dict(zip(channel_names(plant), parts, strict=False))}
+    by_joint = zip(channel_names(plant), parts, strict=False)
+    return {"actuator": dict(by_joint)}
 
 
 def _motor_side(plant: Plant, duration: float) -> Data:
     """Return the same, where the controller reads the rotors, without error."""
-    seen = {"sensor": Encoder(counts=math.inf, side="motor"), "velocity": estimator("measured")}
+    encoder = Encoder(counts=math.inf, side="motor")
+    seen = {"sensor": encoder, "velocity": estimator("measured")}
     return {**_elastic(plant, duration), **seen}
 
 

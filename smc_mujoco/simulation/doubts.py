@@ -63,7 +63,8 @@ def _stiff_bristles(s: Any) -> Iterator[str]:
         damping = part.damping
         if damping is None:
             model = loaded(s.plant)
-            damping = part.default_damping(model.dof_M0[part.dofs(model)].min())
+            masses = model.dof_M0[part.dofs(model)]
+            damping = part.default_damping(masses.min())
         if part.stiffness * s.physics_step > MAX_LATENESS * damping:
             yield (
                 f"LuGre's bristles of stiffness {part.stiffness:g} and damping {damping:.3g} "
@@ -103,7 +104,8 @@ def _weak_motors(s: Any) -> Iterator[str]:
                 continue
             with np.errstate(all="ignore"):
                 values = s.plant.values({})
-                f, g = s.plant.nominal(np.array(s.x0), np.zeros(s.plant.n), i, values)
+                zeros = np.zeros(s.plant.n)
+                f, g = s.plant.nominal(np.array(s.x0), zeros, i, values)
             need = abs(f) / abs(g) if g else 0.0
             if motor.stall < need and (need <= s.limits[i] or not s.force_command):
                 yield (

@@ -59,7 +59,8 @@ class DriveTrain:
         """
         efforts = list(self.plant.efforts)
         for i, motor in enumerate(self.motors):
-            efforts[i] = motor.unit.format(x=self.plant.units[i]) or efforts[i]
+            unit_of_x = self.plant.units[i]
+            efforts[i] = motor.unit.format(x=unit_of_x) or efforts[i]
         return tuple(efforts)
 
     @property
@@ -70,7 +71,8 @@ class DriveTrain:
             self.motors, self.plant.units, driven_names(self.plant), strict=False
         ):
             if motor.meaning:
-                joints.setdefault(motor.meaning.format(x=unit), []).append(repr(joint))
+                meaning = motor.meaning.format(x=unit)
+                joints.setdefault(meaning, []).append(repr(joint))
         name = self.plant.name
         sentences = []
         for what, those in joints.items():
@@ -111,7 +113,8 @@ class DriveTrain:
         found = []
         for chain in self.chains:
             even = next((part for part in chain if part.even), None)
-            found.append(Torque() if even is None else even.mujoco_torque(step, True))
+            torque = Torque() if even is None else even.mujoco_torque(step, True)
+            found.append(torque)
         return found
 
     @property
@@ -127,4 +130,5 @@ class DriveTrain:
         """The actuator of each channel, (n,), in the nominal model: its force is gain u - drag
         v.
         """
-        return [motor.nominal for motor in self.motors] + [NominalDrive()] * self.plant.free
+        of_free = [NominalDrive()] * self.plant.free
+        return [motor.nominal for motor in self.motors] + of_free

@@ -18,7 +18,8 @@ def default_bound(s: Any) -> float | tuple[float, ...]:
         return suggested
     bounds = list(suggested) if isinstance(suggested, tuple) else [suggested] * s.plant.driven
     # what the plant suggests is for the servos that it keeps
-    kept = s.plant.suggested.get("actuator", (None,) * s.plant.driven)
+    none = (None,) * s.plant.driven
+    kept = s.plant.suggested.get("actuator", none)
     for i, motor in enumerate(s.drive_train.motors):
         if motor.bound is not None and kept[i] is None:
             bounds[i] = motor.bound

@@ -112,7 +112,8 @@ class Starts:
             return dataclasses.replace(scenario, seed=0)
         z = []
         for i in range(scenario.plant.n):
-            factor = np.random.default_rng([seed, i]).uniform(-1.0, 1.0)
+            generator = np.random.default_rng([seed, i])
+            factor = generator.uniform(-1.0, 1.0)
             if scenario.contact:
                 factor = -abs(factor)
             z.append(factor)
@@ -122,7 +123,8 @@ class Starts:
                 x0.append(x + (self.spread + self.by) * factor)
             else:
                 away = self.by if x >= r else -self.by
-                x0.append(r + (x - r) * (1.0 + self.spread * factor) + away * factor)
+                scattered = (x - r) * (1.0 + self.spread * factor)
+                x0.append(r + scattered + away * factor)
         if "bobs" in kinds(scenario.contact):
             x0.sort()
         if scenario.plant.pose and scenario.plant.is_user_model:
@@ -138,8 +140,10 @@ def _with_drawn_error(scenario: Scenario, seed: int) -> Scenario:
     if not isinstance(given, Feedforward) or given.error == 0.0:
         return scenario
     most = abs(given.error)
-    drawn = np.random.default_rng([seed, ERROR_STREAM]).uniform(-most, most)
-    return dataclasses.replace(scenario, feedforward=dataclasses.replace(given, error=float(drawn)))
+    generator = np.random.default_rng([seed, ERROR_STREAM])
+    drawn = generator.uniform(-most, most)
+    compensation = dataclasses.replace(given, error=float(drawn))
+    return dataclasses.replace(scenario, feedforward=compensation)
 
 
 def _farthest(start: Sequence[float], rest: Sequence[float]) -> float:

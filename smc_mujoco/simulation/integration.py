@@ -67,7 +67,8 @@ def fastest_pole(s: Any) -> float:
 
     mass = least = 1.0
     for factors in (s.mismatch, s.jump.factors if s.jump else {}):
-        mass *= factors.get("mass", 1.0) * factors.get(s.plant.mass, 1.0)
+        own_factor = factors.get(s.plant.mass, 1.0)
+        mass *= factors.get("mass", 1.0) * own_factor
         least = min(least, mass)
     parts = []
     for part in s.actuator:
@@ -76,7 +77,8 @@ def fastest_pole(s: Any) -> float:
     for part in s.friction:
         if part.smooth:
             parts.append(part)
-    return poles.fastest_pole(s.plant, tuple(parts)) / max(least, MIN_MASS)
+    pole = poles.fastest_pole(s.plant, tuple(parts))
+    return pole / max(least, MIN_MASS)
 
 
 def longest_step(s: Any) -> float:
@@ -100,7 +102,8 @@ def longest_step(s: Any) -> float:
         return longest
     for part in s.actuator:
         if part.delay >= MIN_RESOLVED_LAG * s.control_period or part.limited:
-            longest = min(longest, max(0.5 * part.delay, s.control_period / DRIVE_STEPS))
+            slowest = max(0.5 * part.delay, s.control_period / DRIVE_STEPS)
+            longest = min(longest, slowest)
     return longest
 
 
@@ -133,7 +136,8 @@ def default_steps(s: Any) -> int:
     input delay is a whole number of steps.
     """
     # a scenario that needs less is refused later
-    longest = max(min(map(longest_step, s.machines)), s.control_period / MAX_DEFAULT_STEPS)
+    shortest = min(map(longest_step, s.machines))
+    longest = max(shortest, s.control_period / MAX_DEFAULT_STEPS)
     minimum = math.ceil(s.control_period / longest - 1e-9)
     delay = s.input_delay / s.control_period
     if s.actuator or s.exact_friction:

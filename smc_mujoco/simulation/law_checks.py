@@ -160,7 +160,8 @@ def check_inertia(s: Any) -> None:
     if s.law.joint and s.model != "none" and s.plant.by_mujoco:
         x0 = np.array(s.x0)
         v0 = np.array(s.v0)
-        M = s.plant.nominal.dynamics(x0, v0, s.plant.values({})).M
+        values = s.plant.values({})
+        M = s.plant.nominal.dynamics(x0, v0, values).M
         if not np.linalg.cond(M) < MAX_CONDITION_NUMBER:
             raise ScenarioError(
                 f"the mass matrix of {s.plant.name} is singular at x0 {shown(s.x0)}, as where two "

@@ -158,7 +158,8 @@ def channels(model: mujoco.MjModel) -> np.ndarray:
     rows = []
     for drive, joint in zip(drives, joints, strict=True):
         if joint != base:
-            rows.append(tuple(_channel(model, data, drive, joint).values()))
+            channel = _channel(model, data, drive, joint)
+            rows.append(tuple(channel.values()))
         elif joint not in joints[: len(rows)]:
             table = _places(model, base, BASE)
             table["qfrc"] = table["qvel"]
@@ -263,7 +264,8 @@ def _places(model: mujoco.MjModel, joint: int, site: str) -> np.ndarray:
         if name == "v_sensor":
             second = second + turns
         table[name] = np.where(turns < 0, first + at, second)
-    table["qpos"] = model.jnt_qposadr[joint] + np.minimum(at, 3)
+    places = np.minimum(at, 3)
+    table["qpos"] = model.jnt_qposadr[joint] + places
     table["qvel"] = model.jnt_dofadr[joint] + at
     table["turn"] = np.where(turns < 0, -1, turns)
     table["sign"] = np.where(turns < 0, 1, 0)
@@ -287,7 +289,8 @@ def mixer(plant: Plant) -> np.ndarray:
     )
     limited = model.actuator_ctrllimited[drives].astype(bool)[:, None]
     bounds = np.where(limited, model.actuator_ctrlrange[drives], (-np.inf, np.inf))
-    return np.hstack([np.linalg.pinv(forces.T, rcond=1e-9), bounds])
+    inverse = np.linalg.pinv(forces.T, rcond=1e-9)
+    return np.hstack([inverse, bounds])
 
 
 def keeps_torques(rows: np.ndarray) -> bool:
@@ -439,7 +442,8 @@ def check_start(shared: Mechanism, scenario: Scenario) -> None:
     A check of many pendulums takes 40 ms, and most runs of a grid share their starts, so free ones
     are remembered.
     """
-    inputs = scenario.plant, scenario.contact, scenario.resolved.x0, frozen(scenario.factors(0))
+    factors = frozen(scenario.factors(0))
+    inputs = scenario.plant, scenario.contact, scenario.resolved.x0, factors
     if not scenario.contact or inputs in shared.free_starts:
         return
     model = copy.copy(shared.model)
@@ -461,7 +465,8 @@ def check_path(model: mujoco.MjModel, scenario: Scenario) -> None:
     if not inside and scenario.resolved.x0 != scenario.plant.x0 and not moves_around:
         # no scenario is made, because it would refuse a default start beyond a stop
         v0 = scenario.resolved.v0
-        free = state_with(model, moving_joints(model), scenario.plant.x0, v0)[0]
+        state = state_with(model, moving_joints(model), scenario.plant.x0, v0)
+        free = state[0]
         if _overlap(model, data, free):
             free = model.qpos0
         for part in np.linspace(0, 1, PATH_POINTS):

@@ -42,7 +42,8 @@ def _form(scenario: Scenario) -> Hashable:
     """Return what must be equal before and after a jump."""
     acting = []
     for part, kind in scenario.acting:
-        acting.append((type(part), kind, part.memory, tuple(part.channels(scenario.plant))))
+        channels = tuple(part.channels(scenario.plant))
+        acting.append((type(part), kind, part.memory, channels))
     return structure(scenario), tuple(acting)
 
 
@@ -56,7 +57,8 @@ def put(after: Scenario, packed: Any, runs: Iterator[Any]) -> None:
     for part, _ in s.acting:
         numbers = part.numbers(next(runs))
         for place, _ in enumerate(part.channels(s.plant)):
-            _write(packed.numbers, next(rows), numbers[place if len(numbers) > 1 else 0])
+            at = place if len(numbers) > 1 else 0
+            _write(packed.numbers, next(rows), numbers[at])
     for sensor in s.sensors:
         (numbers,) = sensor.numbers(next(runs))
         for i in sensor.channels(s.plant):

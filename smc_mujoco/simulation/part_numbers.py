@@ -45,11 +45,13 @@ class PartNumber(NamedTuple):
             if low > high:
                 (other,) = set(ordered) - {self.name}
                 self._set(made, other, value)
-        return *parts[: self.part], made, *parts[self.part + 1 :]
+        after = parts[self.part + 1 :]
+        return *parts[: self.part], made, *after
 
     def _set(self, made: Any, name: str, value: float) -> None:
         """Set a number of a part, of this joint where each has one."""
-        object.__setattr__(made, name, self.within(getattr(made, name), value))
+        within = self.within(getattr(made, name), value)
+        object.__setattr__(made, name, within)
 
     def within(self, every: Any, value: float) -> Any:
         """Return the part's field `every` with this number: one, or a tuple with one a joint."""
@@ -121,7 +123,8 @@ def part_number(scenario: Any, path: str, known: Sequence[str]) -> PartNumber:
                 f"{field}.{name}, or give each joint its own {type(part).__name__}, as "
                 f"{field}={{{'.'.join(joint)!r}: ...}}"
             )
-        found.append(PartNumber(field, i, name, joints.index(".".join(joint)) if each else -1))
+        place = joints.index(".".join(joint)) if each else -1
+        found.append(PartNumber(field, i, name, place))
     if not found:
         raise unknown(f"number of {plant.name}", path, known)
     if len(found) > 1:
@@ -154,14 +157,17 @@ def changed(scenario: Any, factors: Mapping[str, float]) -> dict[str, Any]:
         place = part_number(scenario, path, known)
         parts = parts_of(scenario, place.field)
         numbers = of_parts.setdefault((place.field, place.part), {})
-        every = numbers.get(place.name, getattr(parts[place.part], place.name))
+        own = getattr(parts[place.part], place.name)
+        every = numbers.get(place.name, own)
         value = place.of(parts)
-        numbers[place.name] = place.within(every, value * factor if value else factor)
+        scaled = value * factor if value else factor
+        numbers[place.name] = place.within(every, scaled)
     fields = {}
     for (field, i), numbers in of_parts.items():
         parts = fields.get(field, parts_of(scenario, field))
         made = dataclasses.replace(parts[i], **numbers)
-        fields[field] = (*parts[:i], made, *parts[i + 1 :])
+        after = parts[i + 1 :]
+        fields[field] = (*parts[:i], made, *after)
     for field, parts in fields.items():
         if not isinstance(getattr(scenario, field), tuple):
             (fields[field],) = parts

@@ -74,15 +74,18 @@ class Prepared:
     def bytes(self) -> int:
         """Memory of its simulation: log, mjData, record, and the history of a delayed sensor."""
         s = self.scenario.resolved
-        users = (s.law, s.velocity, *filter(None, (s.surface,)), *s.disturbance)
+        surfaces = filter(None, (s.surface,))
+        users = (s.law, s.velocity, *surfaces, *s.disturbance)
         memories = sum(user.memory for user in users)
-        numbers = 200 + s.plant.n * (memories + s.input_delay / s.control_period + 20)
+        of_channel = memories + s.input_delay / s.control_period + 20
+        numbers = 200 + s.plant.n * of_channel
         if s.law.joint:
             numbers += joint_law.stored_dtype(s.plant.n).itemsize / 8
         per_channel = (
             state.LOG.itemsize * (s.samples + 1) + CHANNEL_BYTES + READING_BYTES * s.readings
         )
-        return int(per_channel * s.plant.n + 8 * numbers + state.SIMULATION.itemsize + DATA_BYTES)
+        own = per_channel * s.plant.n + 8 * numbers
+        return int(own + state.SIMULATION.itemsize + DATA_BYTES)
 
 
 def prepare(scenario: object) -> Prepared:
@@ -133,7 +136,8 @@ def _refuse_mistakes(s: Resolved, reason: str) -> None:
     if of is not None and (mistake := UNKNOWN_FIELD.search(reason)):
         record = FIELDS.get(mistake[2], ()) or of.gains
         where = "y" if mistake[2] in FIELDS else "gains"
-        hint = str(unknown(where, mistake[1], record)).partition(": ")[2]
+        sentence = unknown(where, mistake[1], record)
+        hint = str(sentence).partition(": ")[2]
         raise BrokenLawError(f"{about} reads {where}.{mistake[1]}, which is not there: {hint}")
 
 
@@ -244,7 +248,8 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
     values |= {"samples": len(log), "disturbance_count": len(s.disturbance)}
     values["part_count"] = len(arrays["parts"])
     values["compensated"] = len(arrays["compensations"])
-    values |= {"channels": state.address(mechanism.channels), "log": state.address(log)}
+    channels = state.address(mechanism.channels)
+    values |= {"channels": channels, "log": state.address(log)}
     return buffer.as_tuple(state.SIMULATION, values), Packed(
         numbers,
         **arrays,
@@ -326,7 +331,8 @@ def _tables(prepared: Prepared, buffer: Functions) -> dict[str, list[dict[str, A
     """
     s = prepared.scenario.resolved
     n = s.plant.n
-    memory = {"memory": buffer.reserve(s.law.memory * s.plant.n), "stride": 8 * s.law.memory}
+    reserved = buffer.reserve(s.law.memory * s.plant.n)
+    memory = {"memory": reserved, "stride": 8 * s.law.memory}
     size = s.plant.driven if s.law.joint else 1  # numbers of a gain
     laws = []
     for law in buffer.laws():
@@ -364,13 +370,15 @@ def _shared_functions(s: Resolved, nominal: Native | None, buffer: Functions) ->
     fields = {}
     for c in filter(None, (s.velocity, s.surface)):
         compiled = buffer.component(c)
-        fields[c.kind] = _function(compiled, c.gains.values(), buffer, c.memory, s.plant.n)
+        gains = c.gains.values()
+        fields[c.kind] = _function(compiled, gains, buffer, c.memory, s.plant.n)
     if nominal is not None:
         fields["dynamics" if s.law.joint else "nominal"] = _function(
             nominal, nominal.values, buffer
         )
     elif not s.plant.by_mujoco:
-        fields["nominal"] = _function(buffer.nominal(s.plant), known_values(s), buffer)
+        function = buffer.nominal(s.plant)
+        fields["nominal"] = _function(function, known_values(s), buffer)
     signals = {"feedforward": s.known_signal}
     signals |= {"position_error": s.noise.position_error, "velocity_error": s.noise.velocity_error}
     for name, signal in signals.items():
@@ -458,7 +466,8 @@ def pause_phase(s: Resolved) -> int:
     others.
     """
     samples = s.clock.pauses(s.control_period, s.physics_step)[1]
-    drawn = philox.random_words(s.seed, 0, philox.PAUSE, 0)[0]
+    words = philox.random_words(s.seed, 0, philox.PAUSE, 0)
+    drawn = words[0]
     return int(drawn * 2.0**-53 * samples)
 
 
@@ -484,7 +493,8 @@ def _native_nominal(s: Resolved) -> Native | None:
     if not s.plant.by_mujoco:
         return None
     if not s.law.joint:
-        known = dict(zip(s.plant.parameters, known_values(s), strict=True))
+        pairs = zip(s.plant.parameters, known_values(s), strict=True)
+        known = dict(pairs)
         return s.plant.nominal.native(known)
     if s.model == "none":
         return None
@@ -542,7 +552,8 @@ def _parts(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
                 "ctrl": ctrl,
                 "row": frictions.get(place, -1),
             }
-            rows.append(row | {"acts": kind == "act", "staged": kind == "stage_force"})
+            flags = row | {"acts": kind == "act", "staged": kind == "stage_force"}
+            rows.append(flags)
     return rows
 
 
@@ -560,7 +571,8 @@ def _compensations(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]
     rows = []
     for part, i, numbers in compensations(prepared.scenario):
         compiled = buffer.part(part, "steady")
-        rows.append({"function": _function(compiled, numbers, buffer, part.memory), "channel": i})
+        function = _function(compiled, numbers, buffer, part.memory)
+        rows.append({"function": function, "channel": i})
     return rows
 
 
@@ -583,7 +595,8 @@ def _drives(s: Resolved) -> list[dict[str, Any]]:
     for i, nominal in enumerate(s.drive_train.nominal):
         row = {"limit": limits[i], "scale": 1.0, "sums_force": i in summed}
         if i < s.plant.driven:
-            row |= {"scale": s.drive_train.scales[i], "torque": s.drive_train.torques[i]._asdict()}
+            torque = s.drive_train.torques[i]._asdict()
+            row |= {"scale": s.drive_train.scales[i], "torque": torque}
             row["accelerates"] = s.drive_train.motors[i].accelerates
         rows.append(row | nominal._asdict())
     return rows
@@ -610,5 +623,6 @@ def _moments(prepared: Prepared, rows: list[dict[str, Any]], buffer: Functions) 
     }
     for part, _ in prepared.scenario.resolved.acting:
         if part.push is not None:
-            fields["push"] = {"function": {"address": buffer.part(part, "push").address}}
+            address = buffer.part(part, "push").address
+            fields["push"] = {"function": {"address": address}}
     return fields

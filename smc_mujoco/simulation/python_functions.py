@@ -119,7 +119,8 @@ class PythonComponent:
         for part in parts:
             self.sizes.append(part.memory)
             self.gains.append(gains_of(part, self.driven))
-            function = plain.setdefault(id(part.function), rebuild(part.function, lambda f: f))
+            rebuilt = rebuild(part.function, lambda f: f)
+            function = plain.setdefault(id(part.function), rebuilt)
             if isinstance(function, jit.Uncompiled):
                 function = function.fresh()
             self.functions.append(function)
@@ -183,7 +184,8 @@ class NominalDynamics:
                 "there is no tip, or the law has no model: give the plant a tip, and the law the "
                 "model"
             )
-        return nominal.jacobian(self.x, Values(**plant.parameters), plant.tip)
+        values = Values(**plant.parameters)
+        return nominal.jacobian(self.x, values, plant.tip)
 
     @property
     def nominal(self) -> Any:
@@ -249,7 +251,8 @@ class PythonFunction:
 
         self.code = call.__code__
         self.call = C_FUNCTION(call)
-        self.address: int = ctypes.cast(self.call, ctypes.c_void_p).value or 0
+        as_pointer = ctypes.cast(self.call, ctypes.c_void_p)
+        self.address: int = as_pointer.value or 0
 
     def message(self, channel: int) -> str:
         """Return what was raised in words, with the channel if the function was called for one."""
@@ -311,7 +314,8 @@ class Memories:
 def of_component(c: Component, s: Resolved) -> PythonFunction:
     """Return a law, a surface or an estimator of a run: for one channel, or for all joints."""
     if c.joint:
-        return of_joint_law(c, s.plant.n, s.plant.driven, functools.partial(NominalDynamics, s))
+        dynamics = functools.partial(NominalDynamics, s)
+        return of_joint_law(c, s.plant.n, s.plant.driven, dynamics)
     return of_channel_component(c)
 
 
@@ -378,10 +382,12 @@ def of_nominal(plant: Plant) -> PythonFunction:
     names = tuple(plant.parameters)
 
     def body(inputs, parameters, _):
-        seen = np.ctypeslib.as_array(inputs, (len(SEEN.names or ()),)).view(SEEN)[0]
+        width = len(SEEN.names or ())
+        seen = np.ctypeslib.as_array(inputs, (width,)).view(SEEN)[0]
         n = int(seen["n"])
         arrays = [np.array(pointer(int(seen[name]))[:n]) for name in ("x", "v", "u")]
-        values = Values(**dict(zip(names, parameters[: len(names)], strict=True)))
+        own = parameters[: len(names)]
+        values = Values(**dict(zip(names, own, strict=True)))
         x, v, u = arrays
         return evaluate_nominal(
             plant,
@@ -415,7 +421,8 @@ def of_part(part: Part, kind: str) -> PythonFunction:
     def body(inputs, parameters, memory):
         y = record(*inputs[: len(record._fields)])
         try:
-            out = function(y, numbers(*parameters[:count]), memories[memory])
+            gains = numbers(*parameters[:count])
+            out = function(y, gains, memories[memory])
         except USER_EXCEPTIONS as error:
             raise failure_of(name, error, channel=0) from error
         if kind in ("force", "steady"):

@@ -48,7 +48,8 @@ def _of_scenario(s: Scenario) -> Iterator[str]:
     pole = integration.fastest_pole(s)
     if step * pole <= integration.MAX_POLE:
         return
-    fine = s.control_period / math.ceil(s.control_period * pole / integration.MAX_POLE)
+    steps = s.control_period * pole / integration.MAX_POLE
+    fine = s.control_period / math.ceil(steps)
     fast = f"its fastest pole, {number(pole)} 1/s (damping, springs or servos on light bodies)"
     if s.resolved.integrator == "RK4" and step * pole > integration.MAX_STABLE_POLE:
         yield f"{how}, which {fast}, may make unstable: give physics_step={fine:.3g} or less"
@@ -86,14 +87,18 @@ def switches(trace: Any) -> bool:
     s = trace.scenario
     orders = [law.template and law.template.order("e", law.gains) for law in s.law.parts]
     smooth = (s.noise != Noise() or bool(s.sensors)) and not any(orders)
-    u = trace.u[_last(trace), : trace.scenario.plant.driven]
+    driven = trace.scenario.plant.driven
+    u = trace.u[_last(trace), :driven]
     if smooth or len(u) < 2:
         return False
-    variation = np.abs(np.diff(u, axis=0)).sum(axis=0)
+    changes = np.diff(u, axis=0)
+    variation = np.abs(changes).sum(axis=0)
     seconds = len(u) * trace.scenario.control_period
-    return bool(np.any(variation > CHATTER * seconds * np.ptp(u, axis=0)))
+    swing = np.ptp(u, axis=0)
+    return bool(np.any(variation > CHATTER * seconds * swing))
 
 
 def _last(trace: Any) -> slice:
     """Return the samples of the last part."""
-    return slice(int((1.0 - LAST) * len(trace.t)), None)
+    start = (1.0 - LAST) * len(trace.t)
+    return slice(int(start), None)

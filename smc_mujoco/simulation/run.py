@@ -271,7 +271,8 @@ def states(trace: Trace, times: Array) -> tuple[Array, Array]:
                 last = qpos[0].copy(), qvel[0].copy()
             state_at[end] = last
     found = [state_at[end] for end in wanted]
-    return np.array([q for q, _ in found]), np.array([v for _, v in found])
+    every_qpos = np.array([q for q, _ in found])
+    return every_qpos, np.array([v for _, v in found])
 
 
 class ScenarioBatch:
@@ -354,7 +355,8 @@ class ScenarioBatch:
         self.step = 0  # physics steps done
         self.stopped = False
         self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-        addresses = state.address(self.records) + np.arange(count) * self.records.itemsize
+        offsets = np.arange(count) * self.records.itemsize
+        addresses = state.address(self.records) + offsets
         self.batch.bind("userdata")[:] = np.column_stack(
             [np.full(count, callback.MAGIC), addresses]
         )
@@ -412,7 +414,8 @@ class ScenarioBatch:
         """
         changed = []
         for i in indices:
-            values = self.base_values | models.field_values(self.base, self.scenarios[i], step)
+            present = models.field_values(self.base, self.scenarios[i], step)
+            values = self.base_values | present
             for name, value in values.items():
                 if name in self.fields:
                     before = self.fields[name][i]
@@ -478,7 +481,8 @@ class ScenarioBatch:
         each.
         """
         records = self.records
-        alive = np.flatnonzero(records["failure"] == state.FINE).astype(np.int32)
+        fine = records["failure"] == state.FINE
+        alive = np.flatnonzero(fine).astype(np.int32)
         before = self.calls
         self.calls += calls
         check_arithmetic()
@@ -527,7 +531,8 @@ class ScenarioBatch:
         else:
             step = int(self.records["failed_step"][i])
             failure = self.failure(i, code)
-        return from_log(self.prepared[i].scenario, self.logs[i], step, failure)
+        scenario = self.prepared[i].scenario
+        return from_log(scenario, self.logs[i], step, failure)
 
     def spoiled(self, i: int) -> tuple[int, str | None]:
         """Return why simulation i counts as failed though it came to its end, or None, and from
@@ -586,16 +591,19 @@ class ScenarioBatch:
         n = s.plant.n
         channel = int(record["seen"]["i"])
         width = int(record["width"])
-        commands = state.view(numbers, int(record["commands"]), (2, width))
+        place = int(record["commands"])
+        commands = state.view(numbers, place, (2, width))
         start = int(record["law"]["memory"])
-        memory = state.view(numbers, start, (n, s.law.memory)).copy()
+        slots = state.view(numbers, start, (n, s.law.memory))
+        memory = slots.copy()
         if s.law.joint:
             law = s.law
             y = int(record["joint"])
         else:
             law = s.law.of_channel(channel)
             memory = memory[channel]
-            y = state.address(self.records[i : i + 1]) + state.AT.y
+            rows = self.records[i : i + 1]
+            y = state.address(rows) + state.AT.y
         if not self.packed[i].python:
             from smc_mujoco.simulation import python_functions
 

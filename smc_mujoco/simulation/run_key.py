@@ -61,7 +61,8 @@ def key(scenario: Scenario, data: Fields | None = None, plants: Hashes | None = 
     if scenario.condition in NAMED:  # the name adds nothing to the fields
         data = data | {"condition": None}
     codes = code_hashes(scenario, {} if plants is None else plants)
-    text = to_json([data, codes, fingerprint.package(*UNRELATED)], sort_keys=True)
+    package = fingerprint.package(*UNRELATED)
+    text = to_json([data, codes, package], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
@@ -71,7 +72,8 @@ def portable_key(scenario: Scenario) -> str:
     """
     # the condition's name adds nothing
     data = description(scenario) | {"versions": None, "condition": None}
-    text = to_json([data, code_hashes(scenario, {})], sort_keys=True)
+    hashes = code_hashes(scenario, {})
+    text = to_json([data, hashes], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

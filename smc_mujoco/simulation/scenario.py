@@ -246,9 +246,11 @@ class Scenario:
             if "convert" in f.metadata:
                 converted.append(f)
             elif f.name in declared:
-                vars(self)[f.name] = declared[f.name](f.name, getattr(self, f.name))
+                given = getattr(self, f.name)
+                vars(self)[f.name] = declared[f.name](f.name, given)
         for f in converted:  # these may depend on the others
-            value = f.metadata["convert"](f.name, getattr(self, f.name), self)
+            given = getattr(self, f.name)
+            value = f.metadata["convert"](f.name, given, self)
             vars(self)[f.name] = value  # the class is frozen
 
     def __eq__(self, other: object) -> bool:
@@ -454,7 +456,8 @@ class Scenario:
         if self.plant.pose:
             model = loaded(self.plant)
             names = [model.actuator(i).name for i in drive_ids(model).tolist()]
-        return find("actuator of Fault", self.fault.on, dict(zip(names, itertools.count())))
+        numbered = zip(names, itertools.count())
+        return find("actuator of Fault", self.fault.on, dict(numbered))
 
     @property
     def jump_step(self) -> int:
@@ -476,7 +479,8 @@ class Scenario:
         after = object.__new__(type(self))
         vars(after).update(self.__getstate__())
         if self.jump is not None:
-            vars(after).update(part_numbers.changed(self, self.jump.of_parts))
+            changed = part_numbers.changed(self, self.jump.of_parts)
+            vars(after).update(changed)
             vars(after)["jump"] = Jump(self.jump.time, self.jump.of_plant)
         return after
 

@@ -91,7 +91,8 @@ def check_signals(s: Any) -> None:
     step.
     """
     for d in s.disturbance:
-        shortest = s.plant.n * s.duration / max(MAX_STEPS, s.work)  # between knots, s
+        budget = s.plant.n * s.duration
+        shortest = budget / max(MAX_STEPS, s.work)  # between knots, s
         if isinstance(d, OrnsteinUhlenbeck | Dryden) and d.dt < shortest:
             raise ScenarioError(
                 f"{type(d).__name__}'s dt {d.dt:g} s makes too many knots: give {shortest:.3g} s "
@@ -125,7 +126,8 @@ def _check_forces(s: Any) -> None:
             )
     for d in s.disturbance:
         if isinstance(d, Push):
-            find(f"body of {s.plant.name} in a Push", d.body, dict.fromkeys(bodies(s.plant)))
+            known = dict.fromkeys(bodies(s.plant))
+            find(f"body of {s.plant.name} in a Push", d.body, known)
     forces = []
     for d in s.disturbance:
         if d.cartesian and not isinstance(d, Push):
@@ -186,7 +188,8 @@ def check_obstacles(s: Any) -> None:
         from smc_mujoco.mechanisms.custom.clearance import DEPTH, overlap
 
         inside = overlap(s.plant, s.x0)
-        if inside.depth > max(DEPTH, overlap(s.plant, s.plant.x0).depth):
+        at_start = overlap(s.plant, s.plant.x0)
+        if inside.depth > max(DEPTH, at_start.depth):
             raise ScenarioError(
                 f"x0 {shown(s.x0)} of {s.plant.name} has {inside}: give another x0, or starts "
                 "with less spread"
@@ -229,8 +232,10 @@ def check_mechanism(s: Any) -> None:
         values = s.plant.values(s.factors(step))  # raises for those that the plant cannot have
         if s.mechanism != "equation":
             model = mechanism_model(s.plant, s.mechanism)
-            list(s.plant.mechanisms[s.mechanism].fields(model, values))  # raises, too
-        for (name, value), kind in itertools.product(s.plant.placed.items(), kinds(s.contact)):
+            mechanism = s.plant.mechanisms[s.mechanism]
+            list(mechanism.fields(model, values))  # raises, too
+        placed = s.plant.placed.items()
+        for (name, value), kind in itertools.product(placed, kinds(s.contact)):
             if (present := getattr(values, name)) != value:
                 raise ScenarioError(
                     f"the obstacles of contact {kind!r} of {s.plant.name} are placed for "
@@ -251,7 +256,8 @@ def _check_parts(s: Any) -> None:
 
 def check_rotors(s: Any, part: Friction) -> None:
     """Check that the joints of a friction on the motor side have rotors beside them."""
-    chains = dict(zip(driven_names(s.plant), s.drive_train.chains, strict=True))
+    pairs = zip(driven_names(s.plant), s.drive_train.chains, strict=True)
+    chains = dict(pairs)
     for joint in part.joint_names(s.plant):
         if all(one.drives for one in chains.get(joint, ())):
             raise ScenarioError(

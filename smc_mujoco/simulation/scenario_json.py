@@ -118,7 +118,8 @@ def restore(data: dict, plant: Plant | None = None) -> Scenario:
             fields[name] = RESTORERS.get(name, _restored)(value)
     fields["law"] = components.law(data["law"], data.get("source"))
     exact = Scenario.recorded(**fields)
-    with_defaults = Scenario.recorded(**fields | dict.fromkeys(data.get("left_out", ())))
+    left_out = data.get("left_out", ())
+    with_defaults = Scenario.recorded(**fields | dict.fromkeys(left_out))
     # other defaults do not change the recorded values
     if with_defaults == exact:
         scenario = with_defaults

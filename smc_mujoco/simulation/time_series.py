@@ -66,7 +66,8 @@ class TimeSeries(Signal):
     def __post_init__(self):
         kind = type(self).__name__
         for name in ("times", "values"):
-            object.__setattr__(self, name, _floats(f"{kind}'s {name}", getattr(self, name)))
+            floats = _floats(f"{kind}'s {name}", getattr(self, name))
+            object.__setattr__(self, name, floats)
         if len(self.times) != len(self.values):
             raise ScenarioError(
                 f"{kind} has {len(self.times)} times and {len(self.values)} values: give as many "
@@ -74,7 +75,8 @@ class TimeSeries(Signal):
             )
         _check(kind, self.times, "item {}".format)
         with np.errstate(all="ignore"):
-            curvature = np.diff(self.values) / np.diff(self.times) ** 2
+            squares = np.diff(self.times) ** 2
+            curvature = np.diff(self.values) / squares
         if not np.isfinite(curvature).all():
             raise ScenarioError(
                 f"{kind} is too steep for a float: give longer steps of time or smaller ones of "
@@ -204,7 +206,8 @@ class Waypoints(TimeSeries):
 
         rest = [(1, 0.0), (2, 0.0)]
         spline = make_interp_spline(self.times, self.values, k=5, bc_type=(rest, rest))
-        data = np.array([self.times, self.values, spline(self.times, 1), spline(self.times, 2)])
+        velocities = spline(self.times, 1)
+        data = np.array([self.times, self.values, velocities, spline(self.times, 2)])
         data[2:, [0, -1]] = 0.0
         return data
 
@@ -314,7 +317,8 @@ def _knots(first: float, last: float) -> Array:
         raise ScenarioError(
             f"times span {last - first:g} s: give a path of {MAX_KNOTS * KNOT_SPACING:g} s at most"
         )
-    count = max(2, int(np.ceil(steps - 1e-9)) + 1)
+    whole = np.ceil(steps - 1e-9)
+    count = max(2, int(whole) + 1)
     return np.linspace(first, last, count)
 
 
@@ -359,12 +363,14 @@ def cartesian_path(
     tip = _tip(site, body)
     array = _places(points)
     path = [Waypoints(times, array[:, i].tolist()) for i in range(3)]
-    knots = _knots(path[0].times[0], path[0].times[-1])
+    end = path[0].times[-1]
+    knots = _knots(path[0].times[0], end)
     positions = []
     for t in knots:
         place = []
         for axis in path:
-            place.append(Waypoints.value(t, None, axis.data)[0])
+            motion = Waypoints.value(t, None, axis.data)
+            place.append(motion[0])
         positions.append(place)
     if x0 is None:
         start = plant.x0

@@ -166,11 +166,13 @@ class Trace:
             rows["failed"] = self.failure
         if self.unresolved:
             rows["not resolved"] = self.unresolved
-        for name, units in (("x", s.plant.units), ("u", s.efforts[: s.plant.driven])):
+        efforts = s.efforts[: s.plant.driven]
+        for name, units in (("x", s.plant.units), ("u", efforts)):
             for unit in dict.fromkeys(units):
                 columns = [i for i, other in enumerate(units) if other == unit]
                 values = getattr(self, name)[:, columns]
-                known = values[np.isfinite(values)].tolist() or [math.nan]
+                finite = values[np.isfinite(values)]
+                known = finite.tolist() or [math.nan]
                 rows[f"{name} ({unit})"] = f"{min(known):.3g} to {max(known):.3g}"
         return html.fields(rows, "Trace")
 
@@ -236,7 +238,8 @@ class Trace:
         for name in ARRAYS[1:]:
             for unit in self._units(name):
                 units.append(unit)
-        return dict(zip(self.columns(), ["s", *units], strict=True))
+        pairs = zip(self.columns(), ["s", *units], strict=True)
+        return dict(pairs)
 
     def _units(self, name: str) -> list[str]:
         """Return the unit of an array for each channel, (n,)."""
@@ -288,7 +291,8 @@ class Trace:
             import pandas  # pyright: ignore[reportMissingImports]
 
         columns = self.columns()
-        frame = pandas.DataFrame(columns, index=pandas.Index(columns.pop("t"), name="t"))
+        index = pandas.Index(columns.pop("t"), name="t")
+        frame = pandas.DataFrame(columns, index=index)
         frame.attrs = {
             "units": self.units(),
             "scenario": to_json(scenario_json.describe(self.scenario)),
@@ -376,7 +380,8 @@ def _write_parquet(trace: Trace, file: Path) -> None:
     about = to_json(scenario_json.describe(trace.scenario))
     fields = []
     for name, unit in trace.units().items():
-        fields.append(pa.field(name, pa.float64(), metadata={"unit": unit}))
+        field = pa.field(name, pa.float64(), metadata={"unit": unit})
+        fields.append(field)
     with file.open("wb") as stream:  # opened here, so that errors are those of other files
         parquet.write_table(
             pa.table(trace.columns(), pa.schema(fields, metadata={"scenario": about})), stream
@@ -423,7 +428,8 @@ def from_log(scenario: Scenario, log: Array, failed_step: int, failure: str | No
         arrays["r"][:, scenario.plant.driven :] = scenario.plant.goal
     known = []
     for values in arrays.values():
-        known.append(np.isfinite(values[:end]).all(axis=1))
+        fits = np.isfinite(values[:end])
+        known.append(fits.all(axis=1))
     finite = np.array(known)
     if not finite.all():
         k = int(np.argmin(finite.all(axis=0)))

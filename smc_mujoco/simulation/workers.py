@@ -122,7 +122,8 @@ def _other_software(what: str) -> str:
 def software() -> dict[str, str]:
     """Return name -> version of what the numbers of a run depend on, besides the user's code."""
     python = ".".join(platform.python_version_tuple()[:2])
-    return {"Python": python, **versions(), "code": fingerprint.package()[:8]}
+    code = fingerprint.package()[:8]
+    return {"Python": python, **versions(), "code": code}
 
 
 @named_data

@@ -138,7 +138,8 @@ def _sentence(source: Path, symbol: str, output: str) -> str:
         return undefined(source, symbol)
     error = ERROR.search(output)
     if error is None:  # from the linker or the command itself
-        lines = list(filter(str.strip, output.splitlines())) or ["it says nothing"]
+        nonempty = filter(str.strip, output.splitlines())
+        lines = list(nonempty) or ["it says nothing"]
         telling = [line for line in lines if re.search(r"ndefined|cannot find|error:", line)]
         said = (telling or lines)[0].strip()
         command = " ".join(compiler())

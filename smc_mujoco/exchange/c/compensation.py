@@ -36,7 +36,8 @@ def compensate_of(scenario: Scenario) -> Compensate | None:
     terms: list[list[tuple]] = [[] for _ in range(s.plant.driven)]
     for part, i, numbers in compensations(scenario):
         p = jit.named(part.names)(*numbers)
-        terms[i].append((part.steady, p, max(part.memory, 1)))
+        memory = max(part.memory, 1)
+        terms[i].append((part.steady, p, memory))
     speed = {"reference": of_reference, "speed": of_joint}[given.on]
     gains = [nominal.gain for nominal in s.drive_train.nominal[: s.plant.driven]]
     if not s.law.joint:
@@ -47,11 +48,13 @@ def compensate_of(scenario: Scenario) -> Compensate | None:
                     "the scenario's Feedforward differs between its channels, but a law of one "
                     "channel is written once for all: give one that is the same for every channel"
                 )
-        return _of_channel(_added(terms[0], speed, given.eps, gains[0]))
+        added = _added(terms[0], speed, given.eps, gains[0])
+        return _of_channel(added)
     compensate: Compensate = add_nothing
     for i, (own, gain) in enumerate(zip(terms, gains, strict=True)):
         if own:
-            compensate = _with_joint(compensate, _added(own, speed, given.eps, gain), i)
+            added = _added(own, speed, given.eps, gain)
+            compensate = _with_joint(compensate, added, i)
     return compensate
 
 
@@ -59,7 +62,8 @@ def function(compensate: Compensate, joints: int) -> dict[str, tuple[Compensate,
     """Return name in smc_law.h -> function, and the kinds of its arguments. `joints`: 0 for one
     channel.
     """
-    return {NAME: (compensate, [Kind("y"), Kind("real", (max(joints, 1),))])}
+    vector = Kind("real", (max(joints, 1),))
+    return {NAME: (compensate, [Kind("y"), vector])}
 
 
 def compensated(law: Callable, compensate: Compensate, joints: int) -> Callable:

@@ -89,7 +89,8 @@ def law_to_c(
 def with_head(law: Component, numbers: str, slots: int, code: str, joints: int) -> str:
     """Return the file of a law that is translated."""
     facts = _facts(law, slots, joints, numbers == "float")
-    lines = [_head(law, numbers, slots, joints, code), *includes(facts + code), ""]
+    head = _head(law, numbers, slots, joints, code)
+    lines = [head, *includes(facts + code), ""]
     if numbers == "float":
         lines.append("#define SMC_REAL float")
     return "\n".join([*lines, facts, code, ""])
@@ -246,7 +247,8 @@ def _facts(law: Component, slots: int, joints: int, single: bool) -> str:
     lines = []
     if joints:
         lines += [f"#define {JOINTS} {joints}", f"#define {SLOTS} {slots}"]
-    lines += [build.HEADER.read_text(encoding="utf-8"), *gain_names(law)]
+    header = build.HEADER.read_text(encoding="utf-8")
+    lines += [header, *gain_names(law)]
     lines.append(f'const char smc_law_gains[] = "{",".join(texts)}";')
     if values:
         defaults = f"const smc_real smc_law_defaults[] = {{{', '.join(values)}}};"
@@ -294,12 +296,14 @@ def _head(law: Component, numbers: str, slots: int, joints: int, code: str) -> s
     if compensation.NAME in code:
         facts["adds"] = "what the scenario's Feedforward with error=0 gives, smc_compensation, to u"
     if joints:
-        facts["reads"] = ", ".join(dict.fromkeys(re.findall(r"->(?!plant)(\w+)", code)))
+        read = re.findall(r"->(?!plant)(\w+)", code)
+        facts["reads"] = ", ".join(dict.fromkeys(read))
     title = f"{law.name}: a control law{many} in C99, written out by smc_mujoco {__version__}."
     lines = [title, "", *doc.splitlines(), ""]
     for name, fact in facts.items():
         lines += textwrap.wrap(
             f"{name:8} {fact}", 112, subsequent_indent=" " * 9, break_on_hyphens=False
         )
-    text = "\n".join(f" * {line}".rstrip() for line in lines)[2:]
+    body = "\n".join(f" * {line}".rstrip() for line in lines)
+    text = body[2:]
     return f"/*{text.replace('*/', '* /').replace('/*', '/ *')}\n */"

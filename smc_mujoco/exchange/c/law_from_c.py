@@ -49,9 +49,11 @@ class CLaw(AtAddress):
         self.path = path
         self.symbol = symbol
         self.code = file.read_bytes()
-        self.digest = hashlib.sha256(symbol.encode() + b"\0" + self.code).hexdigest()
+        content = symbol.encode() + b"\0" + self.code
+        self.digest = hashlib.sha256(content).hexdigest()
         self._function, self.library = shared_library.entry(str(file), symbol)
-        self.address: int = ctypes.cast(self._function, ctypes.c_void_p).value or 0
+        as_pointer = ctypes.cast(self._function, ctypes.c_void_p)
+        self.address: int = as_pointer.value or 0
         self.joints = 0
         if hasattr(self.library, "smc_mujoco_entry"):
             self.joints = ctypes.c_int.in_dll(self.library, "smc_mujoco_joints").value
@@ -81,7 +83,8 @@ class CLaw(AtAddress):
         numbers = shared_library.stored(y[:3], requests, arrays)
         each = np.concatenate([np.empty(0), *(np.broadcast_to(gain, n) for gain in gains)])
         out = self._out(numbers, each.tolist(), memory, 2 * n)
-        return np.array(out[:n]), np.array(out[n:])
+        commands = np.array(out[:n])
+        return commands, np.array(out[n:])
 
     def _out(
         self, y: Sequence[float], gains: Sequence[float], memory: np.ndarray, count: int

@@ -39,7 +39,8 @@ class Library(NamedTuple):
 
 def entry(path: str, symbol: str):
     """Return the law's ctypes function, and its library."""
-    library = ctypes.CDLL(path, mode=getattr(os, "RTLD_NOW", 0) | getattr(os, "RTLD_LOCAL", 0))
+    modes = getattr(os, "RTLD_NOW", 0) | getattr(os, "RTLD_LOCAL", 0)
+    library = ctypes.CDLL(path, mode=modes)
     glued = hasattr(library, "smc_mujoco_entry")
     function = getattr(library, "smc_mujoco_entry" if glued else symbol)
     function.restype = ctypes.c_int64 if glued else ctypes.c_int
@@ -52,7 +53,8 @@ def facts(library) -> dict[str, Any]:
     constants: dict[str, Any] = {"glue": hasattr(library, "smc_mujoco_entry")}
     for name in ("smc_law_gains", "smc_law_shared"):
         if hasattr(library, name):
-            text = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(library, name)))
+            found = ctypes.c_char.in_dll(library, name)
+            text = ctypes.string_at(ctypes.addressof(found))
             constants[name] = text.decode(errors="replace")
     for name in INTS:
         if hasattr(library, name):
@@ -104,7 +106,8 @@ class Requests:
         self.functions = (product, tip)
         addresses = []
         for function in self.functions:
-            addresses.append(float(ctypes.cast(function, ctypes.c_void_p).value or 0))
+            as_pointer = ctypes.cast(function, ctypes.c_void_p)
+            addresses.append(float(as_pointer.value or 0))
         self.table = doubles([*addresses, 0.0, 1.0])
         self.address = ctypes.addressof(self.table)
 
@@ -114,4 +117,5 @@ def stored(head, requests: Requests, arrays) -> list[float]:
     `joint_law.measurement_at`.
     """
     sizes = requests.joints, requests.joints
-    return [*head, float(requests.address), *sizes, *itertools.chain.from_iterable(arrays)]
+    numbers = itertools.chain.from_iterable(arrays)
+    return [*head, float(requests.address), *sizes, *numbers]

@@ -111,7 +111,8 @@ def law_to_fmu(
     if isinstance(law, Scenario):
         law, chosen = law.resolved.law, _of_scenario(law, chosen)
     exported = _exported(law, **chosen)
-    identifier = re.sub(r"\W+", "_", exported.law.name, flags=re.ASCII).strip("_")
+    word = re.sub(r"\W+", "_", exported.law.name, flags=re.ASCII)
+    identifier = word.strip("_")
     if not identifier[:1].isalpha():
         identifier = f"law_{identifier}".rstrip("_")  # of C
     if path is None:

@@ -102,7 +102,8 @@ class FmuLaw(Uncompiled):
         running = _running.by_number[int(memory[0])]
         every, length = steps(self.period, y.dt)
         done, due = running.steps
-        k = math.floor((y.t - running.start) / y.dt + PERIOD_TOLERANCE)
+        passed = y.t - running.start
+        k = math.floor(passed / y.dt + PERIOD_TOLERANCE)
         if k >= due:
             values = [getattr(y, ours) for ours, _ in self.inputs]
             for _ in range(round(every * y.dt / length)):
@@ -116,7 +117,8 @@ class FmuLaw(Uncompiled):
     def fixed(self, gains: Iterable[float]) -> dict[str, float]:
         """Return the FMU's name -> the value of each constant and parameter."""
         values = (max(-MAX_DOUBLE, min(float(gain), MAX_DOUBLE)) for gain in gains)
-        return dict(self.constants) | dict(zip(self.parameters, values, strict=False))
+        given = zip(self.parameters, values, strict=False)
+        return dict(self.constants) | dict(given)
 
     def _begin(self, y: Measurement, gains: Sequence[float], memory: Array) -> int:
         """Start an instance, which ends when the memory of the run is freed. Return its number."""
@@ -270,7 +272,8 @@ def _meanings(
         if ours not in (*INPUT_FIELDS, *OUTPUTS):
             raise unknown("meaning of a variable", ours, (*INPUT_FIELDS, *OUTPUTS))
         side = "output" if ours in OUTPUTS else "input"
-        errors.find(f"{side} of {file}", theirs, dict.fromkeys(names[side], ""))
+        there = dict.fromkeys(names[side], "")
+        errors.find(f"{side} of {file}", theirs, there)
     for theirs in constants:
         errors.find(f"input of {file}", theirs, dict.fromkeys(ins, ""))
     taken = {*chosen.values(), *constants}

@@ -85,16 +85,19 @@ def _add_rotor(
     body = rigid.jnt_bodyid[i]
     parent = rigid.body_parentid[body]
     frame = pose.xmat[parent].reshape(3, 3)
-    anchor = frame.T @ (pose.xanchor[i] - pose.xpos[parent])
+    offset = pose.xanchor[i] - pose.xpos[parent]
+    anchor = frame.T @ offset
     axis = frame.T @ pose.xaxis[i]
     # all inertia is in the joint's armature, so that it weighs nothing
     light = {"mass": 1e-9, "inertia": (1e-13, 1e-13, 1e-13), "explicitinertial": True}
     rotor = joint.parent.parent.add_body(name=ROTOR + joint.name, pos=anchor, **light)
     rotor.add_joint(name=ROTOR + joint.name, type=joint.type, axis=axis)
     if joint.type == mujoco.mjtJoint.mjJNT_HINGE:
-        arm = frame.T @ (pose.xipos[body] - pose.xanchor[i])
+        lever = pose.xipos[body] - pose.xanchor[i]
+        arm = frame.T @ lever
         if np.linalg.norm(arm) < MIN_ARM:  # a wheel: any direction across its axis does
-            arm = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+            thinnest = np.argmin(np.abs(axis))
+            arm = np.cross(axis, np.eye(3)[thinnest])
         away = arm / np.linalg.norm(arm)
         # in front of the hub, towards the camera at -y
         face = axis * math.copysign(0.045, -axis[1])

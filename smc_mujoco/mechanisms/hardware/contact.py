@@ -217,7 +217,8 @@ def solref(
     share = 1.0 / (impedance + (1.0 - impedance) / directions)
     if not depth:
         depth = DEPTH_OF_BOBS if impedance == SOFT_IMPEDANCE else DEPTH
-    return share * depth / (math.sqrt(e) * zeta), zeta / math.sqrt(share)
+    second = zeta / math.sqrt(share)
+    return share * depth / (math.sqrt(e) * zeta), second
 
 
 # helpers for plants: pairs and obstacles

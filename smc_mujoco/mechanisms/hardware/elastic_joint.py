@@ -65,7 +65,8 @@ class ElasticJoint(BesideJoint):
         dofs = dof_ids(model)[[*self.channels(plant)]]
         mobility = 1.0 / self.rotor_inertia + model.dof_invweight0[dofs].max()
         drag = self.damping * mobility + self.rotor_damping / self.rotor_inertia
-        return float(np.abs(np.roots([1.0, drag, self.stiffness * mobility])).max())
+        roots = np.roots([1.0, drag, self.stiffness * mobility])
+        return float(np.abs(roots).max())
 
     def longest_step(self, plant: Plant) -> float:
         return max(FINE_POLE / self.fastest_pole(plant), SHORTEST_STEP)

@@ -96,4 +96,5 @@ class Drive(JointPart, Actuator):
                 f"actuator has the drives {shown(tuple(drives))}, and {type(self).__name__} takes "
                 "the command itself: give it alone, or with what follows a drive"
             )
-        self.check_lengths(s.plant, len(self.channels(s.plant)))
+        channels = self.channels(s.plant)
+        self.check_lengths(s.plant, len(channels))

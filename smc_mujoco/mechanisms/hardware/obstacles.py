@@ -78,7 +78,8 @@ class Stops(Obstacle):
         """Check that the plant has these joints."""
         model = loaded(plant)
         single = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
-        known = _names(map(model.joint, np.flatnonzero(np.isin(model.jnt_type, single))))
+        moving = np.isin(model.jnt_type, single)
+        known = _names(map(model.joint, np.flatnonzero(moving)))
         for joint in self.limits:
             find(f"joint of {plant.name} in Stops", joint, known)
 
@@ -172,7 +173,8 @@ class Wall(OfBody):
 
     def way(self, model: mujoco.MjModel) -> tuple[Array, float]:
         """Return its direction and the gap."""
-        return np.array(self.direction) / np.linalg.norm(self.direction), self.gap
+        size = np.linalg.norm(self.direction)
+        return np.array(self.direction) / size, self.gap
 
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
         """Add a plane, which only pairs see, and the slab that is seen."""
@@ -225,7 +227,8 @@ class Ball(OfBody):
         """Return the way up and the height."""
         if not model.opt.gravity.any():
             raise ScenarioError("a Ball does not fall without gravity: leave it out")
-        return -model.opt.gravity / np.linalg.norm(model.opt.gravity), self.height
+        size = np.linalg.norm(model.opt.gravity)
+        return -model.opt.gravity / size, self.height
 
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
         """Add a ball that nothing holds."""
@@ -245,7 +248,8 @@ def _placed(part: OfBody, plant: Plant) -> Placed:
     away, room = part.way(model)
     body = model.body(part.body).id
     shape = model.geom(name).id
-    place = _meeting(model, posed(model, plant.x0), body, shape, away)
+    at_start = posed(model, plant.x0)
+    place = _meeting(model, at_start, body, shape, away)
     if place is None:
         raise ScenarioError(
             f"{shown(part)} does not meet its body on the way to the centre of mass: give another "
@@ -274,14 +278,17 @@ def _posts(stops: Stops, plant: Plant) -> list[tuple[str, Array]]:
             mujoco.mj_kinematics(model, data)
             way = data.xaxis[of.id]
             if of.type[0] == mujoco.mjtJoint.mjJNT_HINGE:
-                way = np.cross(way, data.xipos[body] - data.xanchor[of.id])
+                anchor = data.xanchor[of.id]
+                way = np.cross(way, data.xipos[body] - anchor)
             size = np.linalg.norm(way)
             if size < CLOSE or not model.body_geomnum[body]:
                 continue  # a wheel
-            met = _meeting(model, data, body, model.geom(name).id, side * way / size)
+            geom = model.geom(name).id
+            met = _meeting(model, data, body, geom, side * way / size)
             if met is not None:
                 frame = data.xmat[before].reshape(3, 3)
-                posts.append((joint, (met - data.xpos[before]) @ frame))
+                away = met - data.xpos[before]
+                posts.append((joint, away @ frame))
     return posts
 
 

@@ -315,5 +315,6 @@ def chains(parts: Sequence[P], joints: Sequence[str]) -> list[tuple[P, ...]]:
     """Return those of the parts that each joint has."""
     found = []
     for joint in joints:
-        found.append(tuple(part for part in parts if not part.on or joint in part.on))
+        of_joint = tuple(part for part in parts if not part.on or joint in part.on)
+        found.append(of_joint)
     return found

@@ -78,7 +78,8 @@ class Arrays(Constants):
         for i, value in enumerate(values):
             if value.kind.of == "memory":
                 self.program.claim(node, self.program.component.memory)
-                values[i] = value._replace(kind=value.kind._replace(of="real"))
+                real = value.kind._replace(of="real")
+                values[i] = value._replace(kind=real)
             elif not value.kind.shape and "(" in value.text:
                 values[i] = self.kept(value)
         return values, shapes.pop()
@@ -108,9 +109,11 @@ class Arrays(Constants):
             places = list(node.slice.elts)
         if not shape or len(places) > len(shape):
             raise refuse(node, "an element")
-        places += [ast.Slice()] * (len(shape) - len(places))
+        missing = len(shape) - len(places)
+        places += [ast.Slice()] * missing
         if owner.items:
-            return owner.items[int(self.index(node, places[0], len(owner.items), False).text)]
+            number = self.index(node, places[0], len(owner.items), False)
+            return owner.items[int(number.text)]
         memory = owner.kind.of == "memory"
         strides = [owner.kind.stride]
         if len(shape) == 2:
@@ -128,7 +131,8 @@ class Arrays(Constants):
                 kept = Value(tokens[len(left)], INT)
                 if part.start:
                     kept = Value(f"{kept.text} + {part.start}", INT, SUM)
-                made = indexed(made, token, kept, Value(str(part.start), INT), step)
+                first = Value(str(part.start), INT)
+                made = indexed(made, token, kept, first, step)
                 left.append(len(part))
                 stride = step
             else:
@@ -201,7 +205,8 @@ class Arrays(Constants):
 def indexed(array: Value, token: str, index: Value, start: Value, stride: str) -> Value:
     """Return an array with an index in place of a token, and the pointer to where it starts."""
     text, *after = re.split(rf"(\[{token}\]|{token})", array.text)
-    for found, rest in zip(after[::2], after[1::2], strict=True):
+    values = after[1::2]
+    for found, rest in zip(after[::2], values, strict=True):
         text += f"[{index.text}]" if found[0] == "[" else index.within(PRODUCT)
         text += rest
     offset = f" + {start.within(PRODUCT)} * {stride}"

@@ -142,7 +142,8 @@ class Program:
         of = {"i": "int", "f": "real"}[data.dtype.kind]
         items = []
         for number in data.tolist():
-            items.append(literal(number, self.single, ast.Constant(number)).text)
+            item = literal(number, self.single, ast.Constant(number))
+            items.append(item.text)
         content = f"[{len(items)}] = {{\n{rows(items)}\n}};"
         if content not in self.constants:
             self.constants[content] = self.unique_name(name)
@@ -210,7 +211,8 @@ class Lines:
                 declared[in_c] = declaration(in_c, kind)
         for variable, kind in self.temporaries.items():
             declared[variable] = declaration(variable, kind)
-        read = words(" ".join(line.partition(" = ")[2] or line for line in self.lines))
+        text = " ".join(line.partition(" = ")[2] or line for line in self.lines)
+        read = words(text)
         top = list(filter(None, declared.values()))
         for variable in declared:
             if variable not in read:

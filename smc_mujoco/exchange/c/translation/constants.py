@@ -57,7 +57,8 @@ class Constants(Lines):
     def resolve(self, node: ast.expr) -> Any:
         """Return the value of a global name, dotted or not; None for a variable."""
         if isinstance(node, ast.Name) and node.id not in self.names:
-            return self.globals.get(node.id, getattr(builtins, node.id, None))
+            builtin = getattr(builtins, node.id, None)
+            return self.globals.get(node.id, builtin)
         if isinstance(node, ast.Attribute):
             module = self.resolve(node.value)
             if isinstance(module, ModuleType):

@@ -184,7 +184,8 @@ class Expressions(Arrays):
         (value,), _ = self.matched(node, [node.operand])
         if not isinstance(node.op, ast.USub):
             raise refuse(node, "the operator")
-        kind = value.kind._replace(of=value.kind.of.replace("bool", "int"))
+        of = value.kind.of.replace("bool", "int")
+        kind = value.kind._replace(of=of)
         return Value(f"-{value.within(ATOM)}", kind, UNARY)
 
     def _binop(self, node: ast.BinOp) -> Value:
@@ -270,7 +271,8 @@ class Expressions(Arrays):
 
     def _call(self, node: ast.Call) -> Value:
         if isinstance(node.func, ast.Attribute) and node.func.attr == "copy" and not node.args:
-            return self.value(node.func.value)._replace(pointer="", sources=frozenset())
+            value = self.value(node.func.value)
+            return value._replace(pointer="", sources=frozenset())
         function = self.callee(node)
         if function is len:
             made = Value(str(self.whole(node)), INT)
@@ -279,10 +281,12 @@ class Expressions(Arrays):
         elif function in REQUESTS:
             made = self.requested(function, node)
         elif hasattr(function, "_fields"):
-            made = gathered([*map(self.number, node.args)], function._fields)
+            items = map(self.number, node.args)
+            made = gathered([*items], function._fields)
         elif function is np.array and isinstance(node.args[0], ast.List | ast.Tuple):
             made = gathered([*map(self.number, node.args[0].elts)])
-            made = self.kept(made._replace(kind=made.kind._replace(fields=None)))
+            kind = made.kind._replace(fields=None)
+            made = self.kept(made._replace(kind=kind))
         elif self.calls_python(node):
             made = self.results_of(node)
         else:
@@ -293,7 +297,8 @@ class Expressions(Arrays):
         """Translate coriolis and jacobian, which the caller of the law provides."""
         name, rows = REQUESTS[function]
         y, *rest = map(self.argument, node.args)
-        array = self.temporary(Kind("real", (*rows, self.program.joints)))
+        kind = Kind("real", (*rows, self.program.joints))
+        array = self.temporary(kind)
         pointers = [value.pointer for value in (*rest, array)]
         self.lines.append(f"{y.text}->{name}({', '.join([f'{y.text}->plant', *pointers])});")
         return array

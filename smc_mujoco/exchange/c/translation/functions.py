@@ -33,7 +33,8 @@ def translate(
     program = Program(component, single, joints)
     program.used_names |= others.keys()
     slots = [joints, component.memory] if joints else [component.memory]
-    kinds = Kind("y"), Kind("gains"), Kind("memory", tuple(slots))
+    memory = Kind("memory", tuple(slots))
+    kinds = Kind("y"), Kind("gains"), memory
     texts = [
         Function(program, PythonSource(component.function), kinds, entry=True).text(program.symbol)
     ]
@@ -102,7 +103,8 @@ class Function(Statements):
         kinds = made.results
         alike = len(kinds) > 1 and {*kinds} == {Kind(kinds[0].of)}
         if alike:
-            array = self.temporary(Kind(kinds[0].of, (len(kinds),), made.fields))
+            own_kind = Kind(kinds[0].of, (len(kinds),), made.fields)
+            array = self.temporary(own_kind)
             arguments.append(array.pointer)
             for i in range(1, len(kinds)):
                 arguments.append(f"{array.pointer} + {i}")
@@ -135,7 +137,8 @@ class Function(Statements):
         if key not in program.known:
             program.known[key] = None
             made = Function(program, source, kinds, constants)
-            program.known[key] = program.name_of(source.tree.name, made), made
+            own_name = program.name_of(source.tree.name, made)
+            program.known[key] = own_name, made
         if (known := program.known[key]) is None:
             raise refuse(None, f"{source.tree.name}, which calls itself,")
         return known

@@ -77,7 +77,8 @@ def parsed(function: Any) -> tuple[FunctionType, ast.FunctionDef]:
         raise refuse(None, f"{name}, which is not a Python function,")
     try:
         with PARSING_LOCK:
-            (tree,) = ast.parse(textwrap.dedent(inspect.getsource(written))).body
+            text = textwrap.dedent(inspect.getsource(written))
+            (tree,) = ast.parse(text).body
     except (OSError, SyntaxError, ValueError):
         raise refuse(None, f"{name}, whose source is not available,") from None
     if not isinstance(tree, ast.FunctionDef):

@@ -41,7 +41,8 @@ class Statements(Expressions):
             ):
                 self.assign(target, value)
             case ast.AugAssign(target=target):
-                whole = self.value(ast.BinOp(target, node.op, node.value))
+                expression = ast.BinOp(target, node.op, node.value)
+                whole = self.value(expression)
                 if whole.kind.shape and isinstance(target, ast.Name):  # changes the array itself
                     target = ast.Subscript(target, ast.Slice())
                 self.store(target, whole)
@@ -76,7 +77,8 @@ class Statements(Expressions):
 
     def loop(self, node: ast.For, variable: str) -> None:
         """Translate for i in range(...)."""
-        if {*inside(node.body)} & {*self.source.assignments[variable]}:
+        assigned = self.source.assignments[variable]
+        if {*inside(node.body)} & {*assigned}:
             raise refuse(node.iter, "a loop that changes its own variable")
         match node.iter:
             case ast.Call(func=ast.Name(id="range"), args=[*bounds]) if 1 <= len(bounds) <= 3:
@@ -152,7 +154,8 @@ class Statements(Expressions):
             elif not self.entry:
                 places.append(Value(f"*out_{i}", kind))
             elif kind.shape:
-                places.append(array_at("out", kind, ("", JOINTS)[i]))
+                joints = ("", JOINTS)[i]
+                places.append(array_at("out", kind, joints))
             else:
                 places.append(Value(f"out[{i}]", kind))
         return places
@@ -193,7 +196,8 @@ class Statements(Expressions):
             place = self.destination(target, value)
         else:
             place = self.changeable(target)
-            if wider(Kind(place.kind.of), Kind(value.kind.of)).of != place.kind.of:
+            of_place = Kind(place.kind.of)
+            if wider(of_place, Kind(value.kind.of)).of != place.kind.of:
                 raise refuse(target, "real numbers for elements of an array of whole numbers")
             if value.kind.shape not in ((), place.kind.shape):
                 raise refuse(target, f"an array of shape {value.kind.shape} for one of another")
@@ -201,7 +205,8 @@ class Statements(Expressions):
             return
         if place.kind.shape:  # elements that it reads must not be those that the loop has changed
             others = joined(value.items or (value,))
-            if self.origins(others.replace(place.text, "")) & self.origins(place.text):
+            rest = others.replace(place.text, "")
+            if self.origins(rest) & self.origins(place.text):
                 value = self.kept(value)
         self.fill(place, value)
 

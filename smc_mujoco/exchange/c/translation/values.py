@@ -110,7 +110,8 @@ def array_at(base: str, kind: Kind, offset: str = "", sources: Iterable[str] = (
 def gathered(items: Sequence[Value], fields: Names = ()) -> Value:
     """Return a tuple of values."""
     of = functools.reduce(widest, [item.kind.of for item in items], "bool")
-    return Value("", Kind(of, (len(items),), fields), items=tuple(items))
+    kind = Kind(of, (len(items),), fields)
+    return Value("", kind, items=tuple(items))
 
 
 def chosen(test: Value, yes: Value, no: Value, shape: tuple[int, ...] | None = None) -> Value:
@@ -118,7 +119,8 @@ def chosen(test: Value, yes: Value, no: Value, shape: tuple[int, ...] | None = N
     if shape is None:
         kind = wider(yes.kind, no.kind)
     else:
-        kind = Kind(widest(yes.kind.of, no.kind.of), shape)
+        of = widest(yes.kind.of, no.kind.of)
+        kind = Kind(of, shape)
     text = f"{test.within(SUM)} ? {yes.within(SUM)} : {no.within(SUM)}"
     return Value(text, kind, LOOSE)
 
