@@ -106,7 +106,8 @@ def amplitudes(
             handles.append(pages.entry(words, colour))
         if len(drawn) == 2:
             one, other = drawn
-            mark_crossover(ax, crossover(one.lags, one.predicted, other.predicted))
+            crossing = crossover(one.lags, one.predicted, other.predicted)
+            mark_crossover(ax, crossing)
         dot = {"marker": "o", "lw": 0.0}
         sample = pages.entry("predicted", lw=style.points(1.5))
         handles.append(sample)
@@ -146,7 +147,8 @@ def amplitudes_of(traces: Sequence[Trace]) -> OverLag:
     swings = []
     for trace in traces:
         lags.append(1e3 * lag(trace.scenario))
-        sizes.append(predict(trace.scenario, ranges=False).amplitude)
+        cycle = predict(trace.scenario, ranges=False)
+        sizes.append(cycle.amplitude)
         swings.append(channel_cycle(trace)[0])
     return OverLag(lags, sizes, swings)
 
@@ -168,7 +170,8 @@ def set_axes(ax: Axes, lags: Sequence[float], factor: float, unit: str) -> None:
     ax.set(xlabel="lag of the actuator (ms)", ylabel=f"amplitude of s ({unit})")
     ax.set_xticks(lags, [f"{tick:.3g}" for tick in lags])
     ax.set_xticks([], minor=True)
-    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    locator = LogLocator(subs=(1.0, 2.0, 5.0))
+    ax.yaxis.set_major_locator(locator)
     ax.yaxis.set_major_formatter(lambda size, _: f"{factor * size:g}")
     ax.yaxis.set_minor_formatter(NullFormatter())
     ax.margins(0.04, 0.06)

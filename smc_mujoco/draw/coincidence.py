@@ -78,7 +78,8 @@ def _parting(one: Line, other: Line, limits: Pair, logarithmic: bool) -> float:
     high = maximum_filter1d(y, window, mode="nearest")
     low = maximum_filter1d(-y, window, mode="nearest")
     for pair, room in ((drawn, apart), (high, highest), (low, highest)):
-        near = np.abs(pair[0] - pair[1]) <= room
+        gap = pair[0] - pair[1]
+        near = np.abs(gap) <= room
         counts = np.arange(1, len(t) + 1)
         share = np.cumsum(near) / counts
         held &= near & (share >= COINCIDENT_SHARE)
@@ -103,7 +104,8 @@ def tell_agreements(ax: Axes, shared: Sequence[Agreement], names: Sequence[str])
         return
     free = 1.0 - (0.6 + 1.2 * lines) * size / height
     axis = ax.yaxis.get_transform()
-    low, high = axis.transform(np.array(ax.get_ylim()))
+    ends = np.array(ax.get_ylim())
+    low, high = axis.transform(ends)
     top = axis.inverted().transform(np.array([low + (high - low) / free]))
     ax.set_ylim(top=float(top[0]))
     place = {"xytext": (-0.5 * size, -0.4 * size), "textcoords": "offset points"}

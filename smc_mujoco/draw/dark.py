@@ -26,7 +26,8 @@ def suit_page(artists: Iterable[Artist]) -> None:
 
     def turned(colour) -> tuple[float, ...]:
         *shade, opacity = to_rgba(colour)
-        return to_rgba(on_dark(to_hex(shade).upper(), neutral), opacity)
+        solid = to_hex(shade).upper()
+        return to_rgba(on_dark(solid, neutral), opacity)
 
     found = list(artists)
     found += [words.get_bbox_patch() for words in found if isinstance(words, Text)]

@@ -76,7 +76,8 @@ def windows(t: Array, y: Array, edges: Array) -> Envelope:
     counts = np.maximum(np.diff(ends), 1)
     count = counts[:, None]
     low = np.minimum.reduceat(y, start[:-1])
-    mean = np.add.reduceat(y, start[:-1]) / count
+    totals = np.add.reduceat(y, start[:-1])
+    mean = totals / count
     middle = (edges[:-1] + edges[1:]) / 2
     high = np.maximum.reduceat(y, start[:-1])
     return Envelope(middle, low, mean, high)
@@ -162,7 +163,8 @@ def close_reversals(first: Array, last: Array, near: int) -> list[Array]:
     """Return the indices of the reversals in each row of `near`-close ones."""
     brief = np.flatnonzero(last - first <= near)
     pauses = first[brief[1:]] - last[brief[:-1]]
-    parts = np.split(brief, np.flatnonzero(pauses > near) + 1)
+    gaps = np.flatnonzero(pauses > near)
+    parts = np.split(brief, gaps + 1)
     return list(filter(len, parts))
 
 

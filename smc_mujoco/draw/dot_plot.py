@@ -252,7 +252,8 @@ def _intervals(table: RunColumns, metrics: Sequence[str]) -> dict[Cell, Interval
         for metric in metrics:
             scores = group.scores(of_metric[metric])
             for law, of_law in scores.values.items():
-                interval = median_of(of_law, linked(*scores.sets[law]))
+                units = linked(*scores.sets[law])
+                interval = median_of(of_law, units)
                 if metric == SETTLES:
                     share = float((of_law == 0.0).mean())
                     interval = share_interval(share, interval.n)
@@ -288,7 +289,8 @@ def _key(table: RunColumns, dots: Dots) -> tuple[list[Handle], str]:
         key.append(ring)
     if any(interval.median == MIN_SIZE for interval in intervals):
         smallest = number(MIN_SIZE / 2)
-        key.append(pages.entry(smallest, lw=0.0, marker="<"))
+        mark = pages.entry(smallest, lw=0.0, marker="<")
+        key.append(mark)
     return key, shared
 
 
@@ -325,7 +327,8 @@ def _panel(
     if len(conditions) == 1:
         ax.set_yticks(range(len(looks)), map(style.law_name, looks), parse_math=False)
     else:
-        middles = height * (np.arange(len(conditions)) + 0.5) - 1
+        places = np.arange(len(conditions))
+        middles = height * (places + 0.5) - 1
         names = np.char.replace(conditions, "_", " ")
         ax.set_yticks(middles, names, parse_math=False)
     ax.set_ylim(len(conditions) * height - 1, -1)
@@ -364,5 +367,6 @@ def _label(metric: str, x: str) -> str:
     heading = CATALOGUE[metric].heading(x)
     words, bracket, unit = heading.partition(" (")
     folded = bracket.replace(" ", "\n")
-    shown_unit = unit.replace("^2", "²").replace(" ", "·")
+    squared = unit.replace("^2", "²")
+    shown_unit = squared.replace(" ", "·")
     return words + folded + shown_unit

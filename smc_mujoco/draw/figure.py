@@ -178,7 +178,8 @@ def _composed_page(
     handles, gains = pages.run_handles(runs.traces, runs.names, runs.colours)
     key = _key([*blocks.left, *blocks.right])
     if blocks.left_out:
-        key.append(pages.entry(blocks.left_out, lw=0))
+        entry = pages.entry(blocks.left_out, lw=0)
+        key.append(entry)
     narrow = width < pages.NARROW
     if not narrow:
         handles += key
@@ -196,7 +197,8 @@ def _composed_page(
     rows_of_all = sum(map(len, heights))
     tall = height or _usual_height(width, space, rows, rows_of_all)
     page = pages.blank(width, tall, fig)
-    free = 72 * (page.bbox.height / page.dpi - space - 0.4)  # points
+    inches = page.bbox.height / page.dpi
+    free = 72 * (inches - space - 0.4)  # points
     cells = _cells(page, list(columns), heights)
     for k, panels in ((0, blocks.left), (1, blocks.right)):
         rows = _height_of(columns, k)
@@ -244,7 +246,8 @@ def _blocks(runs: DrawnRuns, chosen: Sequence[str]) -> Blocks:
     """Return the chosen panels of traces."""
     early = []
     for trace in runs.traces:
-        early.append(horizon.until(trace, runs.span[0]))
+        shortened = horizon.until(trace, runs.span[0])
+        early.append(shortened)
     left: list[Panel] = []
     right: list[Panel] = []
     left_out = ""
@@ -265,7 +268,8 @@ def _blocks(runs: DrawnRuns, chosen: Sequence[str]) -> Blocks:
     beside = []
     for name in chosen:
         if name in SIDE_PANELS:
-            beside += [name] * (len(portraits) if name == "phase" else 1)
+            count = len(portraits) if name == "phase" else 1
+            beside += [name] * count
     return Blocks(left, right, beside, [groups[0], *portraits], left_out)
 
 
@@ -292,7 +296,8 @@ def _usual_height(width: float, space: float, rows: float, panels: int) -> float
     row = style.points(ROW_HEIGHT)
     tall = space + row * rows + 0.5
     if width < pages.NARROW:
-        return min(tall, max(MAX_COLUMN, space + row * panels + 0.5))
+        wanted = space + row * panels + 0.5
+        return min(tall, max(MAX_COLUMN, wanted))
     return max(0.5625 * width, tall)
 
 
@@ -492,7 +497,8 @@ def _equal_ranges(frame: Axes, rows: Sequence[lanes.Row]) -> None:
         ticks = [-bound, bound]
     else:
         places = MaxNLocator(3).tick_values(low, high)
-        seen = places[(places >= low) & (places <= high)]
+        visible = (places >= low) & (places <= high)
+        seen = places[visible]
         ticks = seen[[0, -1]]
     frame.set(ylim=(low, high), yticks=ticks)
     for ax, *_ in rows:
@@ -550,7 +556,8 @@ def _key(shown: Sequence[Panel]) -> list[Handle]:
         if panel.quantity in ("x", "e") and any(aims):
             dashes = {"lw": thin, "ls": drawing.DASHES}
             handles.append(pages.entry("dashes: reference", style.INK, **dashes))
-            handles.append(Patch(color=style.BAND, label="grey: reference ± 2 %"))
+            band = Patch(color=style.BAND, label="grey: reference ± 2 %")
+            handles.append(band)
             break
     for name, words in drawing.meaning(shown).items():
         label = f"{name}: {words}"

@@ -47,7 +47,8 @@ def horizon(traces: Sequence[Trace]) -> float:
 
 def until(trace: Trace, time: float) -> Trace:
     """Return the trace up to a time, s, with two samples at least."""
-    place = int(np.searchsorted(trace.t, time + 1e-9))
+    found = np.searchsorted(trace.t, time + 1e-9)
+    place = int(found)
     count = max(2, place)
     part = arrays_within(trace, slice(count))
     return dataclasses.replace(trace, **part)
@@ -55,7 +56,8 @@ def until(trace: Trace, time: float) -> Trace:
 
 def since(trace: Trace, time: float) -> Trace:
     """Return the trace from a time on, s, as a run of its own, which is not smoothed."""
-    place = int(np.searchsorted(trace.t, time - 1e-9))
+    found = np.searchsorted(trace.t, time - 1e-9)
+    place = int(found)
     first = min(place, len(trace.t) - 2)
     part = arrays_within(trace, slice(first, None))
     part["t"] = part["t"] - part["t"][0]

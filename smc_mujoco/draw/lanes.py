@@ -97,10 +97,12 @@ def in_lanes(panel: Panel) -> bool:
     """
     if panel.quantity != "u" or len(panel.traces) < 2:
         return False
-    least = MIN_WIDE_BAND * np.ptp(limits(panel.traces, "u"))
+    ends = limits(panel.traces, "u")
+    least = MIN_WIDE_BAND * np.ptp(ends)
     switches = []
     for trace in panel.traces:
-        changes = np.abs(np.diff(trace.u, axis=0))
+        steps = np.diff(trace.u, axis=0)
+        changes = np.abs(steps)
         switches.append(np.sum(changes > least))
     return max(switches) > MAX_SWITCHES or crowded(panel, 0)
 

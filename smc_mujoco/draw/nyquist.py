@@ -59,7 +59,8 @@ def nyquist(
                 words = f"{cycle.frequency:.3g} Hz predicted"
             label = f"{style.law_name(scenario.law)}: {words}{source}"
             handles.append(pages.entry(label, colour))
-        whole = pages.head_height(style.FULL_WIDTH, handles) + ROW_HEIGHT * len(scenarios)
+        head = pages.head_height(style.FULL_WIDTH, handles)
+        whole = head + ROW_HEIGHT * len(scenarios)
         page = pages.blank(style.FULL_WIDTH, whole)
         axes = page.subplots(len(scenarios), 2, squeeze=False, width_ratios=[1.0, 2.0])
         size = style.points(9.5)
@@ -70,7 +71,8 @@ def nyquist(
             else:  # nothing crosses: s has the whole row
                 left.remove()
                 grid = right.get_subplotspec()
-                right.set_subplotspec(grid.get_gridspec()[grid.rowspan.start, :])
+                row = grid.get_gridspec()[grid.rowspan.start, :]
+                right.set_subplotspec(row)
             last_periods(right, trace, cycle, channel, colour)
             if change.marked:
                 room = 72 * 0.53 * style.FULL_WIDTH
@@ -98,7 +100,8 @@ def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour:
     for w in omegas:
         responses.append(loop.response(w))
     response = np.array(responses) / unit
-    amplitudes = cycle.amplitude_x * np.geomspace(1 / SPAN_FACTOR, SPAN_FACTOR, 60)
+    factors = np.geomspace(1 / SPAN_FACTOR, SPAN_FACTOR, 60)
+    amplitudes = cycle.amplitude_x * factors
     inverses = []
     for a in amplitudes:
         gain = loop.gain(a, omega)

@@ -342,6 +342,7 @@ def space_ticks(page: Figure | SubFigure) -> None:
         assert isinstance(ax, Axes)
         if isinstance(ax.xaxis.get_major_locator(), MaxNLocator):
             room = 72 * ax.get_window_extent().width / ax.figure.dpi
-            count = int(room / style.width("0" * TICK_LETTERS, size))
+            digit = style.width("0" * TICK_LETTERS, size)
+            count = int(room / digit)
             most = min(max(count, 1), MAX_TICKS)
             ax.xaxis.set_major_locator(MaxNLocator(most, steps=STEPS))

@@ -251,7 +251,8 @@ def by_channel(panel: Panel) -> list[Panel]:
         traces = [group_trace(trace, within) for trace in panel.traces]
         effort = panel.traces[0].scenario.efforts[channel]
         group = dataclasses.replace(panel.group, channels=(channel,), effort=effort)
-        panels.append(Panel(panel.quantity, group, traces, channel))
+        one = Panel(panel.quantity, group, traces, channel)
+        panels.append(one)
     return panels
 
 
@@ -341,7 +342,8 @@ def titles(panels: Sequence[Panel], heights: Sequence[float]) -> list[str]:
     pairs = zip(panels, heights, strict=True)
     folded = []
     for panel, height in pairs:
-        folded.append(style.folded(panel.label, 0.95 * height))
+        title = style.folded(panel.label, 0.95 * height)
+        folded.append(title)
     return folded
 
 
@@ -372,10 +374,12 @@ def mean_window(traces: Sequence[Trace]) -> float:
     longest = 0.0
     for trace in filter(smoothed, traces):
         for u in trace.u.T[drawn_channels(trace.u)]:
-            ripple = np.abs(smooth(u, window(trace)) - u)
+            smooth_u = smooth(u, window(trace))
+            ripple = np.abs(smooth_u - u)
             chattering = ripple.max()
             if chattering > VISIBLE_CHATTERING * (high - low):
-                longest = max(longest, window(trace) * trace.scenario.control_period)
+                seconds = window(trace) * trace.scenario.control_period
+                longest = max(longest, seconds)
                 break
     return longest
 
@@ -403,7 +407,8 @@ def over_time(
     if name in PEAKS:
         set_logarithmic(ax, heights)
     ax.set_ylim(limits(among or traces, name))
-    set_numbers(ax.yaxis, panel._replace(traces=among or traces))
+    own = panel._replace(traces=among or traces)
+    set_numbers(ax.yaxis, own)
     if name == "reaction":
         clip_impacts(ax, panel, colours)
     if name in ("x", "e"):
@@ -434,7 +439,8 @@ def over_time(
         lines = []
         for trace, y in zip(traces, means, strict=True):
             lines.append((trace.t, y))
-        tell_agreements(ax, agreements(lines, heights, name in PEAKS), names)
+        agreed = agreements(lines, heights, name in PEAKS)
+        tell_agreements(ax, agreed, names)
     return artists
 
 
@@ -503,7 +509,8 @@ def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
         sizes = np.abs(trace.reaction[known])
         if sizes.size:
             peak = max(peak, float(sizes.max()))
-            usual = max(usual, float(np.quantile(sizes, LASTING_QUANTILE)))
+            lasting_size = np.quantile(sizes, LASTING_QUANTILE)
+            usual = max(usual, float(lasting_size))
     if not peak > 2.0 * usual > LEAST_LASTING * peak:
         return
     top = 1.16 * usual
@@ -511,7 +518,8 @@ def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
     look = {"ls": "", "ms": style.points(5), "mew": style.points(1.2), "clip_on": False}
     for trace, colour in zip(panel.traces, colours, strict=True):
         for side, mark in ((1, 2), (-1, 3)):  # matplotlib's ticks up and down, outside the axes
-            largest = np.nan_to_num(side * trace.reaction).max(axis=1)
+            reactions = np.nan_to_num(side * trace.reaction)
+            largest = reactions.max(axis=1)
             beyond = (largest > top).astype(int)
             begins = np.diff(beyond, prepend=0) > 0
             starts = trace.t[np.flatnonzero(begins)]
@@ -634,9 +642,11 @@ def last_samples(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
         if u.size:
             ends += [u.min(), u.max()]
     if ends:
-        largest = max(map(abs, span(panel.traces, "u")))
+        range_of_u = span(panel.traces, "u")
+        largest = max(map(abs, range_of_u))
         least = MIN_CLOSE_UP / 2 * largest
-        half = max(0.62 * np.ptp(ends), least) or 1.0
+        half_range = 0.62 * np.ptp(ends)
+        half = max(half_range, least) or 1.0
         middle = (min(ends) + max(ends)) / 2
         ax.set_ylim(middle - half, middle + half)
     else:

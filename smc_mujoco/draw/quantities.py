@@ -127,7 +127,8 @@ def limits(traces: Sequence[Trace], name: str) -> Pair:
     if name == "x":
         references = []
         for trace in traces:
-            references.append(trace.r[np.isfinite(trace.r)])
+            known = np.isfinite(trace.r)
+            references.append(trace.r[known])
         r = np.concatenate(references)
         low = min(low, r.min(initial=low))
         high = max(high, r.max(initial=high))

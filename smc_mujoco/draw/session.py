@@ -104,7 +104,8 @@ class Session:
         self.due += seconds
         count = int(self.due / self.scenarios[0].control_period)
         self.due -= count * self.scenarios[0].control_period
-        self.advance_to(min(self.sample + count, self.samples))
+        last = min(self.sample + count, self.samples)
+        self.advance_to(last)
 
     def advance_to(self, sample: int) -> None:
         """Step all runs to a sample. A run that fails stays where it is, and says why."""
@@ -202,7 +203,8 @@ class Session:
         for i, s in enumerate(self.scenarios):
             runs[f"{s.law.name} {i + 1}"] = describe(s)
         runs = json.loads(json.dumps(runs))
-        if tuple(map(restore, runs.values())) != self.scenarios:
+        restored = map(restore, runs.values())
+        if tuple(restored) != self.scenarios:
             raise ScenarioError(
                 "the session cannot be saved: a scene file cannot name its law or plant"
             )

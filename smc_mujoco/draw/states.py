@@ -66,7 +66,8 @@ def timeline(
     names = () if plant.network and not plant.direct else channel_names(plant)
     states: list[State | None] = []
     for time in times.tolist():
-        k = int(np.searchsorted(trace.t, time + 1e-9)) - 1
+        place = np.searchsorted(trace.t, time + 1e-9)
+        k = int(place) - 1
         sticks = rest[:, k]
         words = []
         if sticks.any():
@@ -107,7 +108,8 @@ def contacts(trace: Trace, shown: Array) -> list[State | None]:
     280 N·m", with the largest force of the hit, which fades; "contact" of one that lasts.
     """
     touch = in_contact(trace)
-    on: Array = np.asarray(touch.any(axis=1))
+    any_touch = touch.any(axis=1)
+    on: Array = np.asarray(any_touch)
     said: list[State | None] = [None] * len(on)
     held = extended(on, shown, MIN_STATE_TIME)
     changes = np.diff(held.astype(int), prepend=0, append=0)
@@ -121,7 +123,8 @@ def contacts(trace: Trace, shown: Array) -> list[State | None]:
         last = during[0]
         for k in range(first, stop):
             last = k if on[k] else last
-            fade = 1.0 - (shown[k] - shown[last]) / MIN_STATE_TIME
+            passed = shown[k] - shown[last]
+            fade = 1.0 - passed / MIN_STATE_TIME
             opacity = min(1.0, max(0.0, float(fade)))
             said[k] = State(words, style.REACTION, opacity, brief)
     return said
@@ -131,7 +134,8 @@ def hit_size(trace: Trace, touch: Array, during: Array) -> str:
     """Return the largest reaction at samples of a hit, of the channels that touch, with its
     unit.
     """
-    reactions = np.abs(np.nan_to_num(trace.reaction[during]))
+    reaction = np.nan_to_num(trace.reaction[during])
+    reactions = np.abs(reaction)
     sizes = reactions.max(axis=0)
     touched = touch[during].any(axis=0)
     sizes = np.where(touched, sizes, 0.0)

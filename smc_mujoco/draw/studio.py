@@ -197,6 +197,8 @@ def show(session: Session, page: Any, panel: Any) -> None:
         if np.any(pull) and not np.any(pulled):  # the mouse let go
             sizes = np.abs(pull).sum(axis=1)
             body = int(np.argmax(sizes))
-            session.push(model.body(body).name, pull[body])
+            name = model.body(body).name
+            session.push(name, pull[body])
         pull = pulled
-        time.sleep(max(0.0, now + FRAME_TIME - time.perf_counter()))
+        rest = now + FRAME_TIME - time.perf_counter()
+        time.sleep(max(0.0, rest))

@@ -97,7 +97,8 @@ class StudioPanel(plugin.ViewerPlugin):
                 for run, scenario in enumerate(self.session.scenarios):
                     column = 2 if scenario.plant.pose else 0
                     log = self.session.log(run)[:, column]
-                    log = log[:: max(1, len(log) // SAMPLES)]
+                    step = max(1, len(log) // SAMPLES)
+                    log = log[::step]
                     if name == "e":
                         values = log["x"] - log["r"]
                     else:

@@ -276,13 +276,15 @@ def _farthest(used: Sequence[str], count: int) -> list[str]:
     """Return so many colours of the grid, each the one whose least `distance` to the used ones and
     to those before it is largest.
     """
-    grid = np.array(list(map(_seen, _grid())))
+    seen = map(_seen, _grid())
+    grid = np.array(list(seen))
     chosen = list(used)
     for _ in range(count):
         beside = np.array(list(map(_seen, chosen)))
         distances = np.linalg.norm(grid[:, None] - beside, axis=-1)
         apart = distances.min(axis=(1, 2))
-        chosen.append(_grid()[int(apart.argmax())])
+        farthest = int(apart.argmax())
+        chosen.append(_grid()[farthest])
     return chosen[len(used) :]
 
 

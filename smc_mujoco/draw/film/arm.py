@@ -109,7 +109,8 @@ class Overlay:
         """Draw the arrow of a force, N, between two points, (3,) m: of a contact, or of a blow that
         `hits` a body. It is cut at the edge of the picture.
         """
-        line = self.stage.project(np.array([tail, tip]))
+        ends = np.array([tail, tip])
+        line = self.stage.project(ends)
         free, fixed = (line[0], line[1]) if hits else (line[1], line[0])
         way = free - fixed
         rim = RIM * self.scale
@@ -117,7 +118,8 @@ class Overlay:
         edge = np.where(way > 0.0, far, rim)
         moves = way != 0.0
         shares = np.divide(edge - fixed, way, out=np.ones(2), where=moves)
-        share = float(shares.clip(0.0, 1.0).min())
+        clipped = shares.clip(0.0, 1.0)
+        share = float(clipped.min())
         free += (share - 1.0) * way  # in the line
         colour = style.DISTURBANCE if hits else style.REACTION
         words = f"{force:.0f} N"
@@ -140,6 +142,7 @@ def overlays(stages: Sequence[Stage]) -> list[Overlay]:
         if tip.knows_contacts(trace.scenario):
             force = tip.contacts(trace).force
             if force.any():
-                sizes.append(float(np.median(force[force > 0.0])))
+                usual = np.median(force[force > 0.0])
+                sizes.append(float(usual))
     newton = FORCE_ARROW / max(sizes, default=1.0)
     return [Overlay(stage, newton) for stage in stages]

@@ -315,8 +315,7 @@ def arrows(
         if abs(mean) > CUT:
             unit = scale.units[name in ("disturbance", "reaction", "force")]
             words = f"{style.short(abs(mean) * longest)} {unit}"
-        mean_arrow = Arrow(0.0, mean, shade, layer, size, words=words)
-        drawn.append(mean_arrow)
+        drawn.append(Arrow(0.0, mean, shade, layer, size, words=words))
         if layer == 0 and scale.control and high - low > MIN_BAR:
             drawn.append(Arrow(low, high, rgba(colour, 0.4), head=False))
     visible = []
@@ -375,8 +374,7 @@ def mean_of(acting: Envelope) -> Envelope:
     parts = []
     for part in acting[1:]:
         mean = part.mean(axis=1, keepdims=True)
-        repeated = np.repeat(mean, part.shape[1], 1)
-        parts.append(repeated)
+        parts.append(np.repeat(mean, part.shape[1], 1))
     return Envelope(acting.t, *parts)
 
 
@@ -468,8 +466,7 @@ def outline(line: Array, width: float, head: bool = True) -> Array:
     """Return the outline, (points, 2) px, of an arrow along a line (m, 2) px whose shaft is `width`
     px wide.
     """
-    moves = np.diff(line, axis=0)
-    steps = np.linalg.norm(moves, axis=1)
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     way = np.append(0.0, steps.cumsum())
     width = min(width, MAX_THICKNESS * way[-1])
     long = min(HEAD_LENGTH * HEAD_WIDTH * width, 0.7 * way[-1]) * head
@@ -553,10 +550,8 @@ def write(
 
 def paint(image: Image.Image, edge: Array, rgba: Sequence[float], rim: int = 0) -> None:
     """Fill an outline, (points, 2) px, with smooth edges, and a rim of paper around it, px."""
-    lowest = edge.min(axis=0)
-    corner = np.floor(lowest).astype(int) - rim
-    highest = np.ceil(edge.max(axis=0))
-    far = highest.astype(int) + 1 + rim
+    corner = np.floor(edge.min(axis=0)).astype(int) - rim
+    far = np.ceil(edge.max(axis=0)).astype(int) + 1 + rim
     place = tuple(corner.tolist())
     size = SUPERSAMPLING * (far - corner)
     mask = Image.new("L", tuple(size.tolist()))

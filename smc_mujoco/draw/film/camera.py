@@ -149,11 +149,9 @@ def layout(
         fits = down <= tall if beside else across <= wide
         if beside:
             fits &= across <= MAX_BESIDE * wide
-            left = math.ceil(min(across, MAX_BESIDE * wide))
-            foot = 0
+            left, foot = math.ceil(min(across, MAX_BESIDE * wide)), 0
         else:
-            left = 0
-            foot = math.ceil(min(down, (1.0 - MIN_HEIGHT) * tall))
+            left, foot = 0, math.ceil(min(down, (1.0 - MIN_HEIGHT) * tall))
         size = (wide - left, tall - foot)
         edge = TILE_EDGE * size[1]
         head = min(HEAD_ROOM * (room.right - room.left), 0.5 * size[1])
@@ -169,8 +167,7 @@ def layout(
     tiles = []
     labels = []
     for k in range(count):
-        at = corner + pitch * (k % columns, k // columns)
-        x, y = at.round().tolist()
+        x, y = (corner + pitch * (k % columns, k // columns)).round().tolist()
         tiles.append((x + left, y, x + left + wide, y + tall))
         if left > foot:
             labels.append((x, y, x + left, y + tall))

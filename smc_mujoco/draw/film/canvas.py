@@ -35,12 +35,14 @@ class Canvas:
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, size: tuple[int, int]):
         self.data = data
-        self.sun = data.light(world.SUN).xdir.copy()
+        light = data.light(world.SUN)
+        self.sun = light.xdir.copy()
         self.extent = model.stat.extent
         eye = data.cam("film")
         way = eye.xmat.reshape(3, 3)[:, 2]
         middle = (eye.xpos - model.stat.center) @ way
-        self.casts = casting(model, middle * camera.pixel(size))
+        thinnest = middle * camera.pixel(size)
+        self.casts = casting(model, thinnest)
         self.renderer = gl.renderer(model, size[1], size[0])
         self.option = mujoco.MjvOption()
         self.renderer.scene.flags[FOG] = 1

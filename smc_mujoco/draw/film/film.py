@@ -258,7 +258,8 @@ def _write_webp(frames: Frames, made: Iterator[Array], part: Path) -> None:
 
 
 def _write_png(frames: Frames, made: Iterator[Array], part: Path) -> None:
-    Image.fromarray(next(made)).save(part, optimize=True)
+    first = Image.fromarray(next(made))
+    first.save(part, optimize=True)
 
 
 WRITERS = {".mp4": _write_mp4, ".webp": _write_webp, ".png": _write_png}
@@ -320,7 +321,8 @@ def pictures(frames: Frames) -> Generator[Array]:
             sheet = Sheet(last, size, placed.tiles, placed.labels, frames.title, said, start)
             for stage, track in zip(stages, tracks_at(close, runs, scales), strict=True):
                 middle = track.x.mean(axis=0)
-                track.x = middle + close.factor * (track.x - middle)
+                larger = close.factor * (track.x - middle)
+                track.x = middle + larger
                 stage.track = track
             yield from drawn(close, stages, shots, overlays, sheet)
 
@@ -331,7 +333,8 @@ def tracks_at(
     """Return what the runs do at the frames of a clock."""
     stop = runs.span[1]
     count = max(1, round(FPS * stop))
-    grid = np.linspace(0.0, stop, 1 + min(MAX_GRID, count))  # also for a still
+    samples = 1 + min(MAX_GRID, count)
+    grid = np.linspace(0.0, stop, samples)  # also for a still
     found = []
     for trace, colour in zip(runs.traces, runs.colours, strict=True):
         found.append(MachineTrack(trace, colour, clock, grid, scales))

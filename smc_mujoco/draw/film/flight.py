@@ -23,7 +23,8 @@ def plane(traces: Sequence[Trace]) -> Array:
     """
     goals = np.concatenate([trace.r for trace in traces])
     sides = np.ptp(goals, axis=0)
-    widest = np.argsort(-sides, kind="stable")[:2]
+    order = np.argsort(-sides, kind="stable")
+    widest = order[:2]
     return np.sort(widest)
 
 
@@ -43,7 +44,8 @@ def draw_map(
     and return the artists of the traces, and what moves.
     """
     axes = plane(panel.traces)
-    across, along = np.array(["x", "y", "z"])[axes]
+    letters = np.array(["x", "y", "z"])
+    across, along = letters[axes]
     ax.set_title(f"{along} over {across} (m)", fontweight="normal")
     goals = [trace.r for trace in panel.traces]
     flown = quantities.lasting(panel.traces, "x")
@@ -69,5 +71,6 @@ def draw_map(
         wide = {"color": colour, "lw": style.points(PAST_LINE), "animated": True}
         (past,) = ax.plot([], [], **wide)
         dot = panels.dot(ax, colour)
-        flights.append(Flight(past, dot, trace.t, places))
+        flight = Flight(past, dot, trace.t, places)
+        flights.append(flight)
     return artists, flights

@@ -80,9 +80,7 @@ class FilmClock(NamedTuple):
 
     def part(self, start: float, stop: float) -> "FilmClock":
         """Return the frames from `start` to `stop` of the run, s."""
-        begun = self.times >= start - 1e-9
-        over = self.times <= stop + 1e-9
-        inside = begun & over
+        inside = (self.times >= start - 1e-9) & (self.times <= stop + 1e-9)
         return FilmClock(self.times[inside], self.speeds[inside])
 
 
@@ -104,8 +102,7 @@ def clock(traces: Trace | Sequence[Trace], fps: Rate, speed: Speed | None = None
         now = wanted[at]
         times.append(min(times[-1] + now / fps, whole))
     frames = np.array(times)
-    places = np.searchsorted(grid, frames + 1e-9, side="right") - 1
-    speeds_there = wanted[places]
+    speeds_there = wanted[np.searchsorted(grid, frames + 1e-9, side="right") - 1]
     return FilmClock(frames, speeds_there, close_up(traces, fps))
 
 
@@ -148,8 +145,7 @@ def close_up(traces: Sequence[Trace], fps: float) -> FilmClock | None:
         return None
     speed = 1.0 / rounded(max(1.0, CLOSE_TIME * frequency / PERIODS))
     times = np.arange(start, stop, speed / fps)
-    speeds = np.full(len(times), speed)
-    return FilmClock(times, speeds, factor=factor)
+    return FilmClock(times, np.full(len(times), speed), factor=factor)
 
 
 def visible_sizes(scenario: Scenario) -> Array:
@@ -162,8 +158,7 @@ def visible_sizes(scenario: Scenario) -> Array:
 def rounded(value: float) -> float:
     """Return the largest of 1, 2, 5, 10, ... that is not larger than a value of 1 or more."""
     power = 10.0 ** math.floor(math.log10(value) + 1e-9)
-    largest = max(digit for digit in (1, 2, 5) if digit * power <= value * (1 + 1e-9))
-    return power * largest
+    return power * max(digit for digit in (1, 2, 5) if digit * power <= value * (1 + 1e-9))
 
 
 def speeds(traces: Sequence[Trace], fps: float) -> tuple[Array, Array]:
@@ -173,8 +168,7 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[Array, Array]:
     from scipy.ndimage import maximum_filter1d
 
     whole = end(traces)
-    count = max(1, round(whole * fps))
-    grid = np.arange(count) / fps
+    grid = np.arange(max(1, round(whole * fps))) / fps
     runs = list(map(finite, traces))
     travel = travel_of(runs, np.append(grid, whole))
     beyond = np.maximum(travel / MAX_TRAVEL, 1.0)
@@ -189,8 +183,9 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[Array, Array]:
         away = grid + 0.5 / fps - push.time - 0.5 * push.width
         pushed |= np.abs(away) <= IMPACT_TIME
     moved = (travel > REST_TRAVEL) | pushed
-    width = 2 * round(REST_MARGIN * fps) + 1
-    moving = np.asarray(maximum_filter1d(moved, width, mode="nearest"), bool)
+    moving = np.asarray(
+        maximum_filter1d(moved, 2 * round(REST_MARGIN * fps) + 1, mode="nearest"), bool
+    )
     longest = max(MAX_LENGTH[0] * whole, MAX_LENGTH[1])
     playback = np.ones(len(grid))
     for saved in range(2 * MAX_HALVINGS + 1):  # first around other motion, then around pushes

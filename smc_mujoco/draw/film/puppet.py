@@ -69,7 +69,8 @@ class Course(NamedTuple):
         """
         times = np.clip(times, self.times[0], self.times[-1])
         half = np.minimum(times - self.times[0], self.times[-1] - times)
-        half = half.clip(0.0, 0.5 * FOLLOW_TIME)[:, None]
+        clipped = half.clip(0.0, 0.5 * FOLLOW_TIME)
+        half = clipped[:, None]
         shares = np.linspace(-1.0, 1.0, 9)
         at = times[:, None] + half * shares
         means = [np.interp(at, self.times, part).mean(axis=1) for part in self.middle.T]
@@ -106,7 +107,8 @@ class Puppet:
             for shape in found:
                 world.restyle(shape.model)
             if plant.unit != "rad" and not plant.pose:
-                widths = np.abs(world.fixed_boxes(model)[..., 0])
+                halves = world.fixed_boxes(model)[..., 0]
+                widths = np.abs(halves)
                 rail = float(2 * widths.max())
         else:
             start = models.initial_state(model, scenario)[0]
@@ -157,7 +159,8 @@ class Puppet:
         on_rail = np.clip(x, -self.rail / 2, self.rail / 2)
         x = np.where(self.slides, on_rail, x)
         if self.scenario.plant.pose or self.scenario.plant.base >= 0:
-            pose = models.state_with(model, self.ids, x, 0.0)[0]
+            state = models.state_with(model, self.ids, x, 0.0)
+            pose = state[0]
         else:
             pose = (self.start if rest is None else rest).copy()
             pose[model.jnt_qposadr[self.ids]] = x
@@ -188,7 +191,8 @@ class Puppet:
         trace = track.trace
         model = self.model
         plane = model.geom_type == world.PLANE
-        of_moved = np.isin(model.geom_bodyid, moved_bodies(model, self.ids))
+        moved = moved_bodies(model, self.ids)
+        of_moved = np.isin(model.geom_bodyid, moved)
         links = of_moved & ~plane
         if not links.any():
             raise ScenarioError(
@@ -201,19 +205,23 @@ class Puppet:
         falling = np.array(falling_parts)
         loose = ~links & ~plane & ~world.still(model) & ~falling
         roots = model.body_rootid[model.geom_bodyid]
-        body = links | (loose & np.isin(roots, roots[links]))
+        beside = np.isin(roots, roots[links])
+        body = links | (loose & beside)
         course = Course([], [], [], [])
         for share in np.linspace(0.0, 1.0, POSES) ** 2:  # most of the motion is early
-            sample = round(share * (len(trace.t) - 1))
+            last = len(trace.t) - 1
+            sample = round(share * last)
             time = float(trace.t[sample])
             goal = trace.r[sample, : self.shown]
             if np.isfinite(goal).all():
                 corners = self.corners(track, goal, time)
-                course.goals.append(corners[links].reshape(-1, 3))
+                goal_corners = corners[links].reshape(-1, 3)
+                course.goals.append(goal_corners)
             x = trace.x[sample, : self.shown]
             corners = self.corners(track, x, time)
             course.times.append(time)
-            course.places.append(corners[body].reshape(-1, 3))
+            body_corners = corners[body].reshape(-1, 3)
+            course.places.append(body_corners)
             course.others.append(corners[loose])
         return course
 
@@ -226,7 +234,8 @@ class Puppet:
             return False
         model = self.model
         body = model.jnt_bodyid[self.ids[0]]
-        turns = model.jnt_type[model.body_jntadr[body]] == world.HINGE
+        kind = model.jnt_type[model.body_jntadr[body]]
+        turns = kind == world.HINGE
         if turns and model.body_weldid[model.body_parentid[body]] == 0:
             return False
         sizes = []
@@ -250,14 +259,17 @@ class Puppet:
         (3,). Of a machine that the camera follows, the machine
         alone counts.
         """
-        sides = np.ptp(np.concatenate(course.places), axis=0)
-        radius = arrows.BENT_SIZE * float(sides.max(initial=0.0))
+        machine_places = np.concatenate(course.places)
+        sides = np.ptp(machine_places, axis=0)
+        widest = sides.max(initial=0.0)
+        radius = arrows.BENT_SIZE * float(widest)
         ids = self.ids.tolist()
         slides = self.slides.tolist()
         found = arrows.mounts(self.scenario, ids, slides, self.rail, front)
         mounts = []
         for mount in found:
-            mounts.append(mount._replace(radius=min(mount.radius, radius)))
+            smaller = min(mount.radius, radius)
+            mounts.append(mount._replace(radius=smaller))
         lines = self.lines(track, mounts)
         line_times = []
         curves = []

@@ -129,13 +129,15 @@ def set_floor(model: mujoco.MjModel, view: camera.View, points: Array, moved: Ar
     size, turn, place = view
     points = points + moved
     place = place + moved
-    ends = points.min(axis=0) + points.max(axis=0)
+    lowest = points.min(axis=0)
+    ends = lowest + points.max(axis=0)
     model.stat.center[:] = ends / 2
     sides = np.ptp(points, axis=0)
     model.stat.extent = extent = sides.max()
     decades = 10.0 ** np.arange(-4, 5)
     cells = np.outer(decades, (1.0, 2.0, 5.0)).ravel()  # m
-    misfit = np.abs(np.log(FLOOR_CELLS * cells / extent))
+    logs = np.log(FLOOR_CELLS * cells / extent)
+    misfit = np.abs(logs)
     cell = cells[misfit.argmin()]
     model.mat_texrepeat[model.material("floor").id] = 1.0 / cell
     depth = (points - place) @ -turn[:, 2]
