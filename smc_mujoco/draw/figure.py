@@ -101,19 +101,17 @@ def figure(
 
     x, u and s are drawn until all comes to rest, |x - r| over the whole run on a logarithmic axis.
     Each run of a network has a row with a line for each channel, and there is the spread max x -
-    min x. Of a robot with several joints there are e and u of those with the largest errors. Joints
-    without an actuator, and channels in another unit, have their own panels. Realistic mechanisms
-    have panels of the actuator's force and of the reaction of friction and contacts, arms of their
-    tip. The end of a failed run and the instant at which a plant changes are marked. Words say
-    which curves agree, and so hide each other. The figure's `get_label()` and its files have what
-    lines and bands mean, for a caption.
+    min x. Of several joints there are e and u of those with the largest errors. Joints without an
+    actuator, and channels in another unit, have their own panels. Realistic mechanisms have panels
+    of the actuator's force and of the reaction of friction and contacts, arms of their tip. The end
+    of a failed run and the instant at which a plant changes are marked. Words say which curves
+    agree, and so hide each other. The figure's `get_label()` and its files say what lines mean.
 
     Args:
       traces: one or several traces.
       path: file to write; default: none. Without an ending, or with .svg or .png, an SVG and a PNG
         are written; with .pdf, a PDF.
-      labels: one label per trace; default: the laws' labels, with the differences between runs of
-        one law.
+      labels: one per trace; default: the laws' labels, with what differs between runs of one law.
       title: default: the plant's label, and the condition if all traces have one.
       panels: names among "x", "error", "spread", "v", "u", "delivered", "reaction", "d", "tip",
         "contact", "s", "channels" (e and u of the channels with the largest errors, three at most),
@@ -131,14 +129,12 @@ def figure(
       The whole figure; of a SubFigure or of axes, the one that they are part of.
 
     Raises:
-      ScenarioError: no traces, traces of several plants, an unknown panel, size or format, or a
-        path that cannot be written.
+      ScenarioError: no traces, several plants, an unknown panel, size or format, or a bad path.
     """
     paths = pages.files(path, format)
     if ax is not None:
         wanted = pages.given_axes(ax, size, fig, panels)
-        name = find("panel", wanted, PANEL_NAMES)
-        _draw_alone(ax, DrawnRuns.of(traces, labels), name, title)
+        _draw_alone(ax, DrawnRuns.of(traces, labels), wanted, title)
         return pages.save(ax.figure, paths)
     width, height = pages.measure(size, fig)
     runs = DrawnRuns.of(traces, labels)
@@ -402,8 +398,9 @@ def _draw_over_time(
     page.align_ylabels(frames)
 
 
-def _draw_alone(ax: Axes, runs: DrawnRuns, name: str, title: str | None) -> None:
+def _draw_alone(ax: Axes, runs: DrawnRuns, wanted: str, title: str | None) -> None:
     """Draw one panel into a caller's axes, which keep their look."""
+    name = find("panel", wanted, PANEL_NAMES)
     before = set(ax.findobj())
     blocks = _blocks(runs, [name])
     if blocks.beside:

@@ -61,8 +61,7 @@ def act(address, sim, data):
 
 @njit(error_model="numpy")
 def _exert(address, sim, data, part):
-    """Evaluate a part on one joint. Its force goes to ctrl, or is added to those of other parts. A
-    brake also sets the joint's dry friction.
+    """Evaluate a part on a joint. Its force goes to ctrl or to a sum; a brake sets friction, too.
 
     Return whether the part raised, or gave what is NaN or too large.
     """

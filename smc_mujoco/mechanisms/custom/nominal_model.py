@@ -461,9 +461,7 @@ def native_jacobian() -> CompiledFunction:
 
 @functools.cache
 def native() -> CompiledFunction:
-    """Return the C function of the nominal model. Its input is a record SEEN, its outputs are f and
-    g of channel i.
-    """
+    """Return the C function of the nominal model: from a record SEEN, f and g of channel i."""
     positions, velocities = map(_mujoco, ("mj_fwdPosition", "mj_fwdVelocity"))
     actuation, accelerations, solve = map(
         _mujoco, ("mj_fwdActuation", "mj_fwdAcceleration", "mj_solveM"), (0, 0, 3)
@@ -492,9 +490,8 @@ def native() -> CompiledFunction:
         moved = pointer(int(at.moved))
         fresh = False
         for j in range(n):
-            if (
-                last_x[j] != x[j] or last_v[j] != v[j]
-            ):  # NaN, the initial value, differs from everything
+            # NaN, the initial value, differs from everything
+            if last_x[j] != x[j] or last_v[j] != v[j]:
                 fresh = True
                 last_x[j] = x[j]
                 last_v[j] = v[j]
