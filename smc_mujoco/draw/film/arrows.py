@@ -402,9 +402,7 @@ def straight(model: mujoco.MjModel, data: mujoco.MjData, body: str | int, force:
 def path(
     model: mujoco.MjModel, data: mujoco.MjData, mount: Mount, arrow: Arrow
 ) -> tuple[Array, float] | None:
-    """Return the line of an arrow, (m, 3) m, and the width of its shaft, m; None where it has no
-    place.
-    """
+    """Return an arrow's line, (m, 3) m, and its shaft's width, m; None where it has no place."""
     axis = data.xaxis[mount.joint]
     anchor = data.xanchor[mount.joint]
     owner = model.jnt_bodyid[mount.joint]
