@@ -252,7 +252,10 @@ def answers(
                 of_metric.append((condition, metric, runs, (again or {}).get(condition, {})))
             columns[f"{metric.name} ({' or '.join(units)})"] = of_metric
     if len(traces) == 1:
-        columns = {"": [(head, *column[1:]) for head, (column,) in columns.items()]}
+        joined = []
+        for head, (column,) in columns.items():
+            joined.append((head, *column[1:]))
+        columns = {"": joined}
     answered = []
     for head, of_metric in columns.items():
         answered.append(_answer(head, of_metric))

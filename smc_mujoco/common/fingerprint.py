@@ -151,7 +151,8 @@ def variables(function: Any) -> dict[str, str]:
         function.__code__.co_freevars, map(_cell_contents, function.__closure__ or ()), strict=True
     )
     hashes = {}
-    for name, value in (*zip(reached[::2], reached[1::2], strict=True), *cells):
+    pairs = zip(reached[::2], reached[1::2], strict=True)
+    for name, value in (*pairs, *cells):
         hashes[name] = now(value)
     return hashes
 

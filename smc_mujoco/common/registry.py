@@ -183,7 +183,9 @@ class Catalogue(Mapping[str, T_co]):
         names = {*self.added, *other.added}
         both = {}
         for name in names:
-            both[name] = (*self.added.get(name, ()), *other.added.get(name, ()))
+            ours = self.added.get(name, ())
+            theirs = other.added.get(name, ())
+            both[name] = (*ours, *theirs)
         # it is only read
         own: Any = ChainMap[str, Any](other.own, self.own)  # pyright: ignore[reportArgumentType]
         return Catalogue(own, both)

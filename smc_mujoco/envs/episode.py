@@ -188,15 +188,21 @@ class Setting:
         """Return the observation at sample k, (..., size): x, v, and the reference if the task has
         one.
         """
-        return np.concatenate((x, v, self.reference(k)) if self.task.moving else (x, v), axis=-1)
+        parts = [x, v]
+        if self.task.moving:
+            parts.append(self.reference(k))
+        return np.concatenate(parts, axis=-1)
 
     def errors(self, x: Array, v: Array, k: Any) -> ArrayPair:
         """Return the errors e and w of the task for x, v (..., n) at sample k, (..., n) each."""
-        return self.task.errors(x - self.rest_x, v, self.reference(k) - self.rest_r, self.selected)
+        moved = x - self.rest_x
+        goal = self.reference(k) - self.rest_r
+        return self.task.errors(moved, v, goal, self.selected)
 
     def diverged(self, x: Array, v: Array) -> Any:
         """Return whether x, v (..., n) are beyond the largest state of a run, or NaN."""
-        return ~(np.maximum(np.abs(x), np.abs(v)).max(axis=-1) < MAX_STATE)
+        largest = np.maximum(np.abs(x), np.abs(v)).max(axis=-1)
+        return ~(largest < MAX_STATE)
 
 
 class Records:

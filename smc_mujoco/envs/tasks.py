@@ -176,7 +176,9 @@ class Synchronise(Task):
 
     def errors(self, x: Array, v: Array, r: Array, selected: Array) -> ArrayPair:
         """Return the distance of the channels from their mean."""
-        return x - np.mean(x, axis=-1, keepdims=True), v - np.mean(v, axis=-1, keepdims=True)
+        mean_x = np.mean(x, axis=-1, keepdims=True)
+        mean_v = np.mean(v, axis=-1, keepdims=True)
+        return x - mean_x, v - mean_v
 
 
 TASKS = {"regulate": Task(), "track": Track(), "swing_up": SwingUp(), "synchronise": Synchronise()}
@@ -209,7 +211,10 @@ def starts(task: Task, plant: Plant) -> ArrayPair:
     """
     lowest, highest = _ranges(plant)
     low, high = task.spread(plant)
-    return np.clip(rest(plant) + low, lowest, highest), np.clip(rest(plant) + high, lowest, highest)
+    middle = rest(plant)
+    lowest_start = np.clip(middle + low, lowest, highest)
+    highest_start = np.clip(middle + high, lowest, highest)
+    return lowest_start, highest_start
 
 
 def rest(plant: Plant) -> Array:

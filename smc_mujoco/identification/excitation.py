@@ -303,7 +303,8 @@ def candidate_shapes(joints: int, duration: float, rate: float) -> dict[str, Arr
     }
     soft = np.minimum(1.0, t / SOFT_START)
     half = len(t) // 2
-    first = stairs()[:, :half] * soft[:half] * soft[:half][::-1]
+    rising = soft[:half]
+    first = stairs()[:, :half] * rising * rising[::-1]
     second = chirp(0.2, 3.0)[:, half:] * soft[: len(t) - half]
     shapes = {name: shape * soft for name, shape in shapes.items()}
     return shapes | {"half staircase, half chirp": np.concatenate([first, second], axis=1)}
@@ -317,10 +318,11 @@ def largest_size(
     """
 
     def fits(size: float) -> bool:
-        speed = float(np.abs(np.gradient(size * shape, step, axis=1)).max())
+        speeds = np.gradient(size * shape, step, axis=1)
         forces = motion_forces(rig, goal[:, None] + size * shape, step)
-        slow = v_max is None or speed <= v_max
-        return slow and bool(np.all(np.abs(forces).max(axis=1) <= OF_FORCE * bounds))
+        largest = np.abs(forces).max(axis=1)
+        slow = v_max is None or float(np.abs(speeds).max()) <= v_max
+        return slow and bool(np.all(largest <= OF_FORCE * bounds))
 
     if fits(1.0):
         return 1.0

@@ -262,11 +262,13 @@ def motion_forces(rig: OwnRig, record: Record, late: float) -> tuple[Array, Arra
 
 def _of_parts(rig: OwnRig, filtered: Filter, v: Array) -> Array:
     """Return the force of the frictions of the scenario at their own numbers, (M, n)."""
-    found = np.zeros((len(filtered.low(v[:, 0])), v.shape[1]))
+    count = len(filtered.low(v[:, 0]))
+    found = np.zeros((count, v.shape[1]))
     for part in rig.base.friction:
         for k, i in enumerate(part.joint_names(rig.plant)):
             at = channel_names(rig.plant).index(i)
-            found[:, at] += filtered.low(steady_force(part, _smooth_speed(v[:, at]), k))
+            speeds = _smooth_speed(v[:, at])
+            found[:, at] += filtered.low(steady_force(part, speeds, k))
     return found
 
 
@@ -279,7 +281,8 @@ def _smooth_speed(v: Array) -> Array:
 def _column(rig: OwnRig, name: str, filtered: Filter, motion: Sequence[Array]) -> Array:
     """Return how the forces of a motion depend on a linear quantity of joints, (M, n)."""
     x, v, a = motion
-    found = np.zeros((len(filtered.low(v[:, 0])), v.shape[1]))
+    count = len(filtered.low(v[:, 0]))
+    found = np.zeros((count, v.shape[1]))
     names = channel_names(rig.plant)
     if name in rig.places:
         place = rig.places[name]
@@ -344,7 +347,8 @@ def force_shares(rig: OwnRig, log: Forces) -> list[float]:
     found = []
     for i in range(commands.shape[1]):
         takes = float(np.sqrt(np.mean(needed[:, i] ** 2)))
-        found.append(float(np.sqrt(np.mean(commands[:, i] ** 2))) / max(takes, 1e-300))
+        size = float(np.sqrt(np.mean(commands[:, i] ** 2)))
+        found.append(size / max(takes, 1e-300))
     return found
 
 

@@ -57,7 +57,8 @@ def _random(replays: Replays, count: int, seed: int) -> list[Point]:
     drawn = []
     for _ in range(CANDIDATES * count):
         factors = 10.0 ** rng.uniform(-START_DECADES, START_DECADES, len(magnitudes))
-        signs = np.where(replays.low < 0.0, rng.choice((-1.0, 1.0), len(magnitudes)), 1.0)
+        either = rng.choice((-1.0, 1.0), len(magnitudes))
+        signs = np.where(replays.low < 0.0, either, 1.0)
         drawn.append(
             Point(np.clip(signs * factors * magnitudes, replays.low, replays.high), start.states)
         )
@@ -181,7 +182,9 @@ def _moved(replays: Replays, slopes: Slopes, damping: float) -> Array:
     low = replays.low
     high = replays.high
     descent = -J.T @ r
-    inside = ~((values <= low) & (descent < 0.0) | (values >= high) & (descent > 0.0))
+    stopped_low = (values <= low) & (descent < 0.0)
+    stopped_high = (values >= high) & (descent > 0.0)
+    inside = ~(stopped_low | stopped_high)
     A = J.T @ J
     A[np.diag_indices_from(A)] *= 1.0 + damping
     step = np.zeros(len(values))

@@ -123,7 +123,9 @@ def torques(plant: Plant, data: Record, columns: Columns, cutoff: float = CUTOFF
     forces = np.empty_like(x)
     at = model.jnt_qposadr[joints]
     for k in range(len(x)):
-        state.qpos[at], state.qvel[dofs], state.qacc[dofs] = x[k], v[k], a[k]
+        state.qpos[at] = x[k]
+        state.qvel[dofs] = v[k]
+        state.qacc[dofs] = a[k]
         mujoco.mj_inverse(model, state)
         forces[k] = state.qfrc_inverse[dofs]
     found = {}

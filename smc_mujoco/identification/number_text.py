@@ -17,7 +17,8 @@ def to_error(value: float, error: float) -> str:
     """
     digits = 4
     if value and error and math.isfinite(error):
-        digits = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2
+        size = math.floor(math.log10(abs(value)))
+        digits = size - math.floor(math.log10(error)) + 2
     return f"{value:#.{min(max(digits, 4), 12)}g}"
 
 

@@ -148,11 +148,18 @@ def steady_force(part: Friction, v: np.ndarray, i: int) -> np.ndarray:
             f"{type(part).__name__} has no force at a steady speed: identify without it, or give "
             "Coulomb, Viscous, LuGre or ServoFriction"
         )
-    numbers = [of_joint(getattr(part, name), i) for name in part.names]
-    p = np.rec.array([tuple(numbers)], dtype=[(name, float) for name in part.names])[0]
+    numbers = []
+    fields = []
+    for name in part.names:
+        numbers.append(of_joint(getattr(part, name), i))
+        fields.append((name, float))
+    p = np.rec.array([tuple(numbers)], dtype=fields)[0]
     memory = np.zeros(part.memory)
     at = JointState(*[0.0] * 7)
-    return np.array([part.steady(at._replace(v=float(speed)), p, memory) for speed in v])
+    forces = []
+    for speed in v:
+        forces.append(part.steady(at._replace(v=float(speed)), p, memory))
+    return np.array(forces)
 
 
 def slope(part: Friction, place: PartNumber, v: np.ndarray, i: int) -> np.ndarray:

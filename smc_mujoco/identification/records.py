@@ -170,11 +170,16 @@ def of_trace(trace: Trace, columns: Columns) -> Record:
     added = np.zeros(len(trace.t))
     if feedforward is not None:
         added[:] = [evaluate(feedforward, t)[0] for t in trace.t]
-    record = {columns.time: trace.t, columns.u: trace.u[:, 0], columns.reference: trace.r[:, 0]}
+    record = {
+        columns.time: trace.t,
+        columns.u: trace.u[:, 0],
+        columns.reference: trace.r[:, 0],
+    }
     record |= positions(trace, columns, noisy=True)
     for name, zero in zip(columns.x, columns.offset, strict=False):
         record[name] = record[name] + zero
-    record |= dict(zip(columns.state, np.column_stack([trace.x, trace.v]).T, strict=False))
+    states = np.column_stack([trace.x, trace.v])
+    record |= dict(zip(columns.state, states.T, strict=False))
     return record | {columns.feedforward: added}
 
 

@@ -127,8 +127,10 @@ class Slopes:
         for r, J, S in zip(self.residuals, self.by_values, self.by_states, strict=True):
             left, sizes, right = np.linalg.svd(S, full_matrices=False)
             kept = sizes > noise
-            moves.append(-right[kept].T @ ((left[:, kept].T @ (r + J @ step)) / sizes[kept]))
-            rows.append(r + J @ step + S @ moves[-1])
+            moved = r + J @ step
+            within = left[:, kept].T @ moved
+            moves.append(-right[kept].T @ (within / sizes[kept]))
+            rows.append(moved + S @ moves[-1])
         point = Point(self.point.values + step, self.point.states + np.array(moves))
         return dataclasses.replace(self, point=point, residuals=rows)
 

@@ -500,7 +500,8 @@ def percentages(predicted: Record, measured: Record) -> dict[str, float]:
     for name, values in predicted.items():
         y = measured[name]
         with np.errstate(all="ignore"):
-            share = float(np.linalg.norm(y - values) / np.linalg.norm(y - y.mean()))
+            spread = np.linalg.norm(y - y.mean())
+            share = float(np.linalg.norm(y - values) / spread)
         if np.isfinite(share):
             percent[name] = 100.0 * (1.0 - share)
         else:

@@ -311,7 +311,9 @@ def _speed(terms: tuple[str, ...], v: Array, force: Array) -> float:
         numbers = _solved(terms, v, force, speed)
         return float(np.sum((force - _columns(terms, v, speed) @ numbers) ** 2))
 
-    low, high = 2.0 * np.abs(v).min(), 0.5 * np.abs(v).max()
+    sizes = np.abs(v)
+    low = 2.0 * sizes.min()
+    high = 0.5 * sizes.max()
     grid = np.linspace(np.log(low), np.log(max(high, 2.0 * low)), SCAN)
     best = int(np.argmin(list(map(loss, grid))))
     around = grid[max(best - 1, 0)], grid[min(best + 1, SCAN - 1)]
@@ -332,9 +334,12 @@ def _fitted(
     first, last = pairs, other
     if last is None:
         cut = round(FITTED * len(v))
-        first, last = (v[:cut], force[:cut]), (v[cut:], force[cut:])
+        first = v[:cut], force[:cut]
+        last = v[cut:], force[cut:]
     used = _speed(terms, *first)
-    rest = last[1] - _columns(terms, last[0], used) @ _solved(terms, *first, used)
+    speeds_left, force_left = last
+    predicted = _columns(terms, speeds_left, used) @ _solved(terms, *first, used)
+    rest = force_left - predicted
     names = []
     speeds = []
     for term in terms:
@@ -401,7 +406,8 @@ def _covariance(
         losses[b] = np.mean((left - own @ moved[b]) ** 2)
     moved -= moved.mean(axis=0)
     by_blocks = (BLOCKS - 1) / BLOCKS * moved.T @ moved
-    white = np.sum(residual**2) / max(len(v) - len(kept), 1) * np.diag(np.linalg.pinv(whole))
+    degrees = max(len(v) - len(kept), 1)
+    white = np.sum(residual**2) / degrees * np.diag(np.linalg.pinv(whole))
     variance = np.diag(by_blocks)
     factors = np.sqrt(np.maximum(white / np.maximum(variance, 1e-300), 1.0))
     covariance = np.zeros((len(free), len(free)))

@@ -167,7 +167,8 @@ def independent(slopes: Slopes) -> float:
     times = []
     for r in slopes.residuals:
         rows = r.reshape(-1, slopes.columns)
-        power = np.abs(np.fft.rfft(rows, 2 * len(rows), axis=0)) ** 2
+        transform = np.fft.rfft(rows, 2 * len(rows), axis=0)
+        power = np.abs(transform) ** 2
         for correlation in np.fft.irfft(power, axis=0)[: len(rows)].T:
             end = int(np.argmax(correlation < 0.0)) or len(correlation)
             later = correlation[1:end].sum() / max(correlation[0], MIN_POWER)

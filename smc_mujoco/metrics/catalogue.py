@@ -352,10 +352,12 @@ def hf_share(trace: Trace) -> float:
     """
     u = trace.u[:-1]
     t = trace.t
-    if u.size == 0 or np.ptp(u, axis=0).max() <= ROUNDING_SHARE * np.abs(u).max():
+    rounding = ROUNDING_SHARE * np.abs(u).max(initial=0.0)
+    if u.size == 0 or np.ptp(u, axis=0).max() <= rounding:
         return 0.0
     k = len(u)
-    power = (np.abs(np.fft.rfft(u, axis=0)) ** 2).sum(axis=1)
+    spectrum = np.abs(np.fft.rfft(u, axis=0))
+    power = (spectrum**2).sum(axis=1)
     power[1 : (k + 1) // 2] *= 2  # f > 0 stands for -f as well, except at half the sampling rate
     frequency = np.arange(power.size) / (t[-1] - t[0])
     return power[frequency > HIGH_FREQUENCY * (1 + ROUNDING_SHARE)].sum() / power[1:].sum()

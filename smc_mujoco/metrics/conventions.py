@@ -372,7 +372,8 @@ def signal(trace: Trace, name: str) -> Array:
         return _held(trace)
     if name == "slips":
         held = _held(trace) > 0.0
-        return np.vstack([np.zeros(held.shape[1]), held[:-1] & ~held[1:]])
+        none = np.zeros(held.shape[1])
+        return np.vstack([none, held[:-1] & ~held[1:]])
     return getattr(trace, name)
 
 
@@ -385,7 +386,8 @@ def _held(trace: Trace) -> Array:
     rest = at_rest(trace)
     held = np.zeros(rest.shape)
     # a sample's reaction is the mean over the control period before it
-    held[1:] = np.diff(trace.t)[:, None] * (rest[:-1] & rest[1:] & (trace.holding[1:] != 0.0))
+    stands = rest[:-1] & rest[1:] & (trace.holding[1:] != 0.0)
+    held[1:] = np.diff(trace.t)[:, None] * stands
     return held
 
 
@@ -397,7 +399,9 @@ def _after_turns(trace: Trace) -> Array:
         moving = np.flatnonzero(channel)
         turns = moving[1:][np.diff(channel[moving]) != 0.0]
         for turn in turns:
-            found[turn + 1 :, i] |= trace.t[turn + 1 :] - trace.t[turn] <= AFTER_TURN * (1 + 1e-9)
+            later = slice(turn + 1, None)
+            passed = trace.t[later] - trace.t[turn]
+            found[later, i] |= passed <= AFTER_TURN * (1 + 1e-9)
     return found
 
 
@@ -420,7 +424,9 @@ def at_rest(trace: Trace) -> Array:
     """Return where each channel of a group's trace is at rest, (K+1, n); see the module's
     conventions.
     """
-    return np.abs(trace.v) <= max(REST_SHARE * float(np.abs(trace.v).max()), REST_SPEED)
+    speeds = np.abs(trace.v)
+    slow = max(REST_SHARE * float(speeds.max()), REST_SPEED)
+    return speeds <= slow
 
 
 def _stuck(trace: Trace) -> dict[str, Array]:
@@ -463,7 +469,8 @@ def leans(trace: Trace) -> bool:
     if len(limits) != u.shape[1]:  # a group of some channels
         limits = limits.max()
     ends = np.sign(u) * (np.abs(u) >= limits)
-    return bool(np.any(np.abs(ends.mean(axis=0)) > LEANS)) or bool(falls(plant))
+    means = np.abs(ends.mean(axis=0))
+    return bool(np.any(means > LEANS)) or bool(falls(plant))
 
 
 def last_part(trace: Trace) -> slice:

@@ -145,7 +145,8 @@ def contacts(trace: Trace) -> Contacts:
     for d in scenario.disturbance:
         if isinstance(d, Push) and scenario.plant.direct:
             pushes.append((model.body(d.body).id, d))
-    contacts = Contacts(np.zeros(len(trace.t)), np.zeros(len(trace.t)), np.zeros((len(trace.t), 3)))
+    count = len(trace.t)
+    contacts = Contacts(np.zeros(count), np.zeros(count), np.zeros((count, 3)))
     data.qpos[:] = initial_pose(model)
     jump = trace.scenario.jump_sample
     whole = None
@@ -160,7 +161,9 @@ def contacts(trace: Trace) -> Contacts:
             models.put_values(model, compiled, scenario, scenario.jump_step)
             mujoco.mj_setConst(model, mujoco.MjData(model))
         if whole is not None:  # a ball, which no channel moves
-            data.qpos[:], data.qvel[:] = whole[0][k], whole[1][k]
+            poses, speeds = whole
+            data.qpos[:] = poses[k]
+            data.qvel[:] = speeds[k]
         data.qpos[positions] = trace.x[k]
         data.qvel[rates] = trace.v[k]
         data.qfrc_applied[rates] = trace.d[k]
@@ -168,7 +171,8 @@ def contacts(trace: Trace) -> Contacts:
         data.xfrc_applied[:] = 0.0
         for body, push in pushes:
             force = np.array([push.x, push.y, push.z])
-            data.xfrc_applied[body, :3] += push.value(trace.t[k], push)[0] * force
+            size = push.value(trace.t[k], push)[0]
+            data.xfrc_applied[body, :3] += size * force
         mujoco.mj_forward(model, data)
         _add_contacts(model, data, contacts, k)
     for values in contacts:
@@ -188,7 +192,8 @@ def _add_contacts(model: mujoco.MjModel, data: mujoco.MjData, contacts: Contacts
         moves = np.array([model.body(j).name.startswith(OWN) for j in bodies])
         moves = (model.body_weldid[bodies] != 0) & ~moves
         first, second = moves.astype(float)
-        contacts.push[k] += (second - first) * wrench[0] * data.contact.frame[i, :3]
+        normal = data.contact.frame[i, :3]
+        contacts.push[k] += (second - first) * wrench[0] * normal
 
 
 @constrained

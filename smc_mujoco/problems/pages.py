@@ -133,6 +133,7 @@ def extremes(found: Results, name: str) -> Mapping[str, list[tuple[str, str, int
     for question in found.boards():
         ranks = found.ranks(question)[names.index(name)]
         for cell, rank in zip(found.on(question), ranks, strict=True):
-            rows.append((question, cell, int(np.ceil(rank)), medians[cell][MEASURE[question]]))
+            median = medians[cell][MEASURE[question]]
+            rows.append((question, cell, int(np.ceil(rank)), median))
     rows.sort(key=lambda row: row[2])
     return {"best": rows[:SHOWN], "worst": rows[::-1][:SHOWN]}

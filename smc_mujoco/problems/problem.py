@@ -81,7 +81,8 @@ class Problem:
     def _values(self) -> Data:
         """The rules' values for the plant and the condition."""
         of = rules(self.version)
-        of_plant = of["more"].get(self.plant, {}) | of.get("special", {}).get(self.plant, {})
+        special = of.get("special", {}).get(self.plant, {})
+        of_plant = of["more"].get(self.plant, {}) | special
         return of | of_plant | (of["worst"] if self._attacked else {})
 
     @property

@@ -104,7 +104,8 @@ class LevelSearch:
         """The number of levels still to try, estimated."""
         if self.high == math.inf:
             return sum(level > self.low for level in self.levels) + EXPECTED_HALVINGS
-        return math.ceil(max(0.0, math.log2((self.high - self.low) / self.resolution(self.low))))
+        halvings = math.log2((self.high - self.low) / self.resolution(self.low))
+        return math.ceil(max(0.0, halvings))
 
 
 def find_boundaries(

@@ -206,7 +206,9 @@ def basin_of(
         )
     x, v = _axis("x", x), _axis("v", v)
     grid = _Grid(base, x, v, threads)
-    states = np.stack([np.tile(x, v.size), np.repeat(v, x.size)], axis=1)
+    every_x = np.tile(x, v.size)
+    every_v = np.repeat(v, x.size)
+    states = np.stack([every_x, every_v], axis=1)
     checked = ""
     kind, _ = chosen(base, (NAME,), device)
     if kind is None or len(states) < kind.least or prepare(base).why_not:
@@ -324,7 +326,9 @@ def _early(samples: int) -> int:
 
 def _reach(x: Array, v: Array, u_max: Any, final: bool) -> Floats:
     """Return X, V, the bound on u, and whether the verdict is final."""
-    return np.abs(x).max() or 1.0, np.abs(v).max() or 1.0, float(np.max(u_max)), float(final)
+    X = np.abs(x).max() or 1.0
+    V = np.abs(v).max() or 1.0
+    return X, V, float(np.max(u_max)), float(final)
 
 
 def load_basin(path: AnyPath) -> Basin:

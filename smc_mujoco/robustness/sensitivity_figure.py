@@ -113,7 +113,8 @@ def _runs(ax: Axes, found: SobolResult, colour: str) -> None:
     order = np.argsort(found.values)  # the worst on top
     shades = np.array(style.ramp(colour, TONES, LIGHTEST))
     tones = np.empty(len(order), object)
-    tones[order] = shades[np.linspace(0.0, TONES - 0.5, len(order)).astype(int)]
+    steps = np.linspace(0.0, TONES - 0.5, len(order)).astype(int)
+    tones[order] = shades[steps]
     tones[found.failed] = style.INK
     for marker, kind in (("o", ~found.failed), ("x", found.failed)):
         picked = order[kind[order]]

@@ -195,8 +195,11 @@ def estimates(f_A: Array, f_B: Array, f_AB: Array) -> ArrayPair:  # scipy's
     a, b, mixed = map(_standardised, (f_A, f_B, f_AB))
     common = (a * b).mean(-1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        alone = ((mixed * b).mean(-1) - common * (mixed * a).mean(-1)) / (1.0 - common**2)
-    whole = ((f_A - f_AB) ** 2).mean(-1) / (2.0 * np.var([f_A, f_B], axis=(0, -1)))
+        slope = (mixed * b).mean(-1) - common * (mixed * a).mean(-1)
+        alone = slope / (1.0 - common**2)
+    gaps = ((f_A - f_AB) ** 2).mean(-1)
+    variance = np.var([f_A, f_B], axis=(0, -1))
+    whole = gaps / (2.0 * variance)
     return np.where(common**2 < 1.0, alone, 0.0).T, whole.T
 
 
@@ -235,9 +238,11 @@ def indices(
             """Return both indices of each axis, (2, k), from some of the points."""
             # twice: scipy fails on one axis of one output, and centres in place
             some = np.stack([parts[:, at]] * 2)
-            outputs = {"f_A": some[:, 0], "f_B": some[:, 1], "f_AB": some[:, 2:].swapaxes(0, 1)}
+            f_AB = some[:, 2:].swapaxes(0, 1)
+            outputs = {"f_A": some[:, 0], "f_B": some[:, 1], "f_AB": f_AB}
             found = sobol_indices(func=outputs, n=points, method=estimates)  # pyright: ignore[reportArgumentType]
-            return possible(*np.reshape([found.first_order, found.total_order], (2, 2, k))[:, 0])
+            both = np.reshape([found.first_order, found.total_order], (2, 2, k))
+            return possible(*both[:, 0])
 
         draws = np.random.default_rng(seed).integers(points, size=(RESAMPLES, points))
         found = []
@@ -245,7 +250,8 @@ def indices(
             if np.ptp(parts[:2, at]):
                 found.append(of(at))
         resampled = np.array(found)
-        ends = np.quantile(resampled, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
+        tails = [(1 - LEVEL) / 2, (1 + LEVEL) / 2]
+        ends = np.quantile(resampled, tails, axis=0)
         whole = np.array([of(np.arange(points)), *ends])  # (3, 2, k)
         first = _intervals(whole[:, 0], points)
         total = _intervals(whole[:, 1], points)
@@ -289,7 +295,8 @@ def regions(space: Space, shares: Array, failed: Array) -> list[Region]:
         for share in CUTS:
             single += [(Cut(i, low=share),), (Cut(i, high=share),)]
         for low, high in itertools.combinations(CUTS, 2):
-            double += [(Cut(i, low, high),), (Cut(i, low, high, outside=True),)]
+            double.append((Cut(i, low, high),))
+            double.append((Cut(i, low, high, outside=True),))
     coarse = single[2::4] + single[3::4]  # every other share
     for one, other in itertools.combinations(coarse, 2):
         if one[0].axis != other[0].axis:
@@ -321,7 +328,9 @@ def _more_fail(failed: Array, within: Array, left: Array) -> bool:
 
     counts = []
     for side in (within, left & ~within):
-        counts.append([int((failed & side).sum()), int((~failed & side).sum())])
+        fail = int((failed & side).sum())
+        succeed = int((~failed & side).sum())
+        counts.append([fail, succeed])
     return float(np.asarray(fisher_exact(counts, "greater"))[1]) < REGION_ERROR
 
 
@@ -337,7 +346,8 @@ def _gain(within: Array, failed: Array, bounds: int) -> float:
     """
     n = len(failed)
     inside = int(within.sum())
-    if min(inside, n - inside) < MIN_REGION_RUNS or failed[within].mean() <= failed[~within].mean():
+    few = min(inside, n - inside) < MIN_REGION_RUNS
+    if few or failed[within].mean() <= failed[~within].mean():
         return 0.0
     parts = [failed[within], failed[~within]]
     return sum(map(_log_likelihood, parts)) - _log_likelihood(failed) - bounds * math.log(n)
@@ -362,13 +372,16 @@ def improvement(space: Space, shares: Array, values: Array, failed: Array) -> Im
     halves = []
     for i, name in enumerate(space.names):
         if name != CHANCE:
-            for cut in (Cut(i, high=0.5), Cut(i, low=0.5), Cut(i, 0.25, 0.75)):
+            halves_of_axis = (Cut(i, high=0.5), Cut(i, low=0.5), Cut(i, 0.25, 0.75))
+            for cut in halves_of_axis:
                 if _within([cut], shares[:half]).any():
                     halves.append(cut)
 
     def rank(cut: Cut) -> Pair:
         inside = _within([cut], shares[:half])
-        return float(failed[:half][inside].mean()), float(np.median(values[:half][inside]))
+        share = float(failed[:half][inside].mean())
+        median = float(np.median(values[:half][inside]))
+        return share, median
 
     if not halves:
         return None

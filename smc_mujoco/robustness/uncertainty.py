@@ -123,7 +123,8 @@ class Uncertainty:
             self.encoder,
         )
         ends = self.delay, self.mass, self.friction, self.friction_scale, self.bound, self.period
-        if not any(bounds) and all(low == high for low, high in (*ends, *ranges.values())):
+        ranged = [*ends, *ranges.values()]
+        if not any(bounds) and all(low == high for low, high in ranged):
             raise ScenarioError(
                 "Uncertainty allows nothing but the scenario itself: give a bound, such as "
                 "disturbance=2.0"
@@ -259,7 +260,8 @@ class Members:
         if count > 1:
             self.ends[0] = [(i + 0.5) / count for i in range(count)]
             middle[0] = 0.0
-        self.bare = Member(middle, np.zeros(0), np.zeros((2, self.times)))
+        no_noise = np.zeros((2, self.times))
+        self.bare = Member(middle, np.zeros(0), no_noise)
         for constant in self.constants:
             constant.check(scenario)
         for share in (0.0, 1.0):
@@ -281,7 +283,8 @@ class Members:
         scenario = self.with_constants(member.shares)
         force = self.within.disturbance * member.force
         if relay:
-            force = np.where(np.arange(len(force)) * self.h < relay.start, force, 0.0)
+            started = np.arange(len(force)) * self.h >= relay.start
+            force = np.where(started, 0.0, force)
         signals = [*scenario.disturbance]
         if force.any():
             signals.append(self.signal(force))
@@ -312,7 +315,8 @@ class Members:
             bends = change != 0.0
         else:
             bends = np.abs(np.diff(change)) > ROUNDING * np.abs(values).max()
-        at = np.unique(np.concatenate([[0], np.flatnonzero(bends) + 1, [len(values) - 1]]))
+        inner = np.flatnonzero(bends) + 1
+        at = np.unique(np.concatenate([[0], inner, [len(values) - 1]]))
         times = (at * self.h).tolist()
         if steps:
             return Held(times, values[at].tolist())
@@ -335,9 +339,8 @@ class Members:
         """Return a member drawn at random: uniform constants, knots and errors."""
         knot = min(KNOT_SPACING, self.samples * self.h / MIN_KNOTS)
         knots = np.arange(math.ceil(self.samples * self.h / knot) + 1) * knot
-        values = np.interp(
-            np.arange(self.samples + 1) * self.h, knots, rng.uniform(-1.0, 1.0, len(knots))
-        )
+        times = np.arange(self.samples + 1) * self.h
+        values = np.interp(times, knots, rng.uniform(-1.0, 1.0, len(knots)))
         return Member(
             rng.uniform(size=len(self.constants)),
             self.limited(values) if self.forced else np.zeros(0),
@@ -373,14 +376,13 @@ class Members:
         its signals.
         """
         m = len(self.constants)
-        rows = np.reshape(z[len(self.constants) : self.size(knots)], (-1, knots))
+        rows = np.reshape(z[m : self.size(knots)], (-1, knots))
         shares = np.clip(member.shares + CONSTANT_DEVIATION * z[:m], 0.0, 1.0)
         at = np.linspace(0.0, 1.0, knots)
 
         def added(row: Array, more: Array) -> Array:
-            return np.clip(
-                row + 2.0 * np.interp(np.linspace(0.0, 1.0, len(row)), at, more), -1.0, 1.0
-            )
+            along = np.linspace(0.0, 1.0, len(row))
+            return np.clip(row + 2.0 * np.interp(along, at, more), -1.0, 1.0)
 
         force = self.limited(added(member.force, rows[0])) if self.forced else member.force
         if self.times:
@@ -398,8 +400,10 @@ def mutated_signal(values: Array, rng: np.random.Generator) -> Array:
     """
     mutated = values.copy()
     last = len(values) - 1
-    length = round(math.exp(rng.uniform(0.0, math.log(max(2.0, MAX_PIECE_SHARE * last)))))
-    switches = np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1])) + 1
+    longest = max(2.0, MAX_PIECE_SHARE * last)
+    length = round(math.exp(rng.uniform(0.0, math.log(longest))))
+    signs = np.sign(values)
+    switches = np.flatnonzero(signs[1:] != signs[:-1]) + 1
     if len(switches) and rng.random() < SHIFT_PROBABILITY:
         at = int(rng.choice(switches))
         piece = slice(at, at + length)

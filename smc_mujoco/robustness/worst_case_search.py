@@ -209,7 +209,8 @@ class WorstCaseSearch:
     def confirm(self) -> None:
         """Have MuJoCo run those of the worst members that it has not run yet."""
         tried = self.tried
-        worst = sorted(range(len(tried)), key=lambda i: tried[i].key, reverse=True)[:CONFIRMED]
+        order = sorted(range(len(tried)), key=lambda i: tried[i].key, reverse=True)
+        worst = order[:CONFIRMED]
         again = []
         for i in worst:
             if not tried[i].by_mujoco:
@@ -319,7 +320,8 @@ class WorstCaseSearch:
         """
         phase = 2.0 * math.pi * loop_frequency(trace) * trace.t
         for pitch in FREQUENCY_RATIOS:
-            yield self._forced("square wave", np.where(np.sin(pitch * phase) >= 0.0, 1.0, -1.0))
+            positive = np.sin(pitch * phase) >= 0.0
+            yield self._forced("square wave", np.where(positive, 1.0, -1.0))
         for shift in (0.0, 0.5 * math.pi):
             yield self._forced("sine", np.sin(phase + shift))
 
@@ -333,9 +335,8 @@ class WorstCaseSearch:
         corners = math.prod(map(len, ends))
         count = min(corners, MAX_CORNERS)
         for i in range(count):
-            places = np.unravel_index(
-                round(i * (corners - 1) / (count - 1)), [*map(len, ends)], order="F"
-            )
+            corner = round(i * (corners - 1) / (count - 1))
+            places = np.unravel_index(corner, list(map(len, ends)), order="F")
             shares = []
             for choices, place in zip(ends, places, strict=True):
                 shares.append(choices[place])
@@ -406,7 +407,9 @@ def relay_signals(trace: Trace) -> dict[str, Array]:
     """
     r = trace.r[:, 0]
     dr = np.diff(r, prepend=r[:1]) / trace.scenario.control_period
-    return {"s": trace.s[:, 0], "rate": trace.v[:, 0] - dr, "error": trace.x[:, 0] - r}
+    rate = trace.v[:, 0] - dr
+    error = trace.x[:, 0] - r
+    return {"s": trace.s[:, 0], "rate": rate, "error": error}
 
 
 def recorded_force(trace: Trace, relay: Relay, before: Array) -> Array:
@@ -429,7 +432,8 @@ def recorded_force(trace: Trace, relay: Relay, before: Array) -> Array:
 
 def loop_frequency(trace: Trace) -> float:
     """Return the frequency at which a loop swings under a relay of e', Hz."""
-    late = np.nan_to_num(trace.x[:, 0] - trace.r[:, 0])[len(trace.t) // 4 :]
+    error = np.nan_to_num(trace.x[:, 0] - trace.r[:, 0])
+    late = error[len(trace.t) // 4 :]
     swings = max(1.0, np.count_nonzero(np.diff(late > late.mean())) / 2.0)
     return min(
         swings / (0.75 * float(trace.t[-1])), MAX_FREQUENCY_SHARE / trace.scenario.control_period
@@ -443,6 +447,7 @@ def measurement_errors(trace: Trace, times: int, hold: int) -> Iterator[tuple[st
     for signs in itertools.product(SIGNS, repeat=2):
         yield "constant error", np.repeat(np.reshape(signs, (2, 1)), times, axis=1)
     for part in relay_signals(trace).values():
-        signs = np.where(np.nan_to_num(part[: times * hold : hold]) > 0.0, 1.0, -1.0)
+        seen = np.nan_to_num(part[: times * hold : hold])
+        signs = np.where(seen > 0.0, 1.0, -1.0)
         for sign in SIGNS:
             yield "error that switches", sign * np.array([signs, signs])

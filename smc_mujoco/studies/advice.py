@@ -281,8 +281,8 @@ class RaceAdvice(Advice):
         notes.append(
             f"{MEDIANS} Nothing here is tested: what is, stands below. {capital(UNTRIED)}."
         )
-        shown[-1] = dataclasses.replace(shown[-1], notes=[*notes, "", *self.answer])
-        return shown
+        last = shown.pop()
+        return [*shown, dataclasses.replace(last, notes=[*notes, "", *self.answer])]
 
     @property
     def _objectives(self) -> Tabular:
@@ -290,7 +290,9 @@ class RaceAdvice(Advice):
         rows = []
         for name in (*self.race.running, *self.race.dropped):
             values = sorted(self.race.entrants[name].values)
-            middle = number((values[(len(values) - 1) // 2] + values[len(values) // 2]) / 2.0)
+            below = values[(len(values) - 1) // 2]
+            above = values[len(values) // 2]
+            middle = number((below + above) / 2.0)
             cell = Cell(middle, f"{number(values[0])}–{number(values[-1])}")
             rows.append([name, cell, f"{len(values)}"])
         return Tabular(

@@ -68,7 +68,7 @@ def advise(
     raced = race(trial, plant, entrants, goal, clock, relevant)
     shown = raced.first
     if raced.winner:
-        shown = raced.running[:1] if len(raced.running) == 1 else [*raced.first, _next(raced)]
+        shown = [*raced.first, _next(raced)] if len(raced.running) > 1 else raced.running
     chosen, tuned = _chosen(trial, plant, raced, shown[:SHOWN], goal)
     fixed = None
     if clock.left > 0.0:
@@ -171,7 +171,8 @@ def _chosen(
             for tried in sets:
                 laws += [tried] * len(CHOOSING)
             J, _ = unseen(trial, plant, laws, goal, [*CHOOSING] * len(sets))
-            law = sets[int(np.log(J).reshape(len(sets), -1).sum(axis=1).argmin())]
+            logarithms = np.log(J).reshape(len(sets), -1)
+            law = sets[int(logarithms.sum(axis=1).argmin())]
         if one.task:
             tuned = search.result_of(one.task, tuple(one.found)).sourced()
             law = law.sourced(source.TUNED, tuned.search)

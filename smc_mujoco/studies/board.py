@@ -595,7 +595,8 @@ def _cell(board: Board, entry: BoardEntry) -> Cell:
         alarms.append(f"{size(before, board.metric)} {step}")
     says = entry.law == board.winner or not entry.vague
     best = entry.rank.best and says and median != "" and not board.barred
-    return Cell(median, "\n".join(filter(None, below)), best, alarm="\n".join(filter(None, alarms)))
+    lines = "\n".join(filter(None, below))
+    return Cell(median, lines, best, alarm="\n".join(filter(None, alarms)))
 
 
 def _few(boards: Sequence[Board]) -> bool:

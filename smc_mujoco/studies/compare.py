@@ -192,7 +192,10 @@ class Compared(Tables):
         )
         laws = dict.fromkeys(itertools.chain.from_iterable(self.gains.values()))
         title = f"{joined([*laws])} on {joined([*self.gains])}"
-        page = html.page(title, [figure, *(table._repr_html_() for table in self.tables)])
+        parts: list[str] = [figure]
+        for table in self.tables:
+            parts.append(table._repr_html_())
+        page = html.page(title, parts)
         with replacing(Path(path)) as file:
             file.write_text(page, encoding="utf-8")
         return Path(path)

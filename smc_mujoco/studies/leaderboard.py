@@ -317,11 +317,15 @@ def _block(
         change = comparison.step_change(at, law)
         if change:
             by_step[law] = change
-    medians = dict(zip(comparison.laws, comparison.centres[:, at].tolist(), strict=True))
-    lacking = dict(zip(comparison.laws, comparison.without_value[:, at].tolist(), strict=True))
+    centres = comparison.centres[:, at].tolist()
+    medians = dict(zip(comparison.laws, centres, strict=True))
+    without = comparison.without_value[:, at].tolist()
+    lacking = dict(zip(comparison.laws, without, strict=True))
     best = comparison.best[:, at]
     units = comparison.units[:, at]
+    away = comparison.away[:, at].any(axis=1)
     few = ~comparison.ranked[:, at]
+    sets_of_few = dict(zip(laws[few].tolist(), units[few].tolist(), strict=True))
     runs = int(comparison.seeds[at])
     winner = comparison.winners[at]
     # by failed runs, then by median
@@ -341,7 +345,7 @@ def _block(
         best=tuple(laws[best].tolist()),
         below=tuple(laws[comparison.below[:, at]].tolist()),
         floor=floor,
-        away=tuple(laws[comparison.away[:, at].any(axis=1)].tolist()),
+        away=tuple(laws[away].tolist()),
         worse=tuple(laws[comparison.worse[:, at]].tolist()),
         ahead=winner,
         lead=_lead(comparison, at, ranked, floor),
@@ -352,7 +356,7 @@ def _block(
         runs=runs,
         samples=int(comparison.samples[at].max()) if len(laws) > 1 else runs,
         sets=min(sets[sets > 1].tolist(), default=1),
-        few=dict(zip(laws[few].tolist(), units[few].tolist(), strict=True)),
+        few=sets_of_few,
         given=bool((sets == 1).any()),
         untuned=untuned,
     )

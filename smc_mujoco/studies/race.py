@@ -233,7 +233,8 @@ def needed(comparison: Comparison) -> float:
     """Return the number of sets with which the law in front would probably win, if further sets
     were like those that there are; inf for any number.
     """
-    middles = np.where(comparison.ranked[:, 0], np.median(comparison.cells[:, 0], axis=1), np.inf)
+    medians = np.median(comparison.cells[:, 0], axis=1)
+    middles = np.where(comparison.ranked[:, 0], medians, np.inf)
     count = int(comparison.ranked[:, 0].sum())
     if count < 2:
         return math.inf

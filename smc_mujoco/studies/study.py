@@ -98,7 +98,8 @@ class Store:
             self.parts
             / f"{hashlib.sha256(''.join(sorted(hashes)).encode()).hexdigest()[:32]}.parquet"
         )
-        tables.write(path, self.schema, [pa.Table.from_pylist(list(rows), schema=self.schema)])
+        table = pa.Table.from_pylist(list(rows), schema=self.schema)
+        tables.write(path, self.schema, [table])
         for i, name in enumerate(hashes):
             self.where[name] = path, i
 

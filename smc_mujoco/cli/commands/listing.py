@@ -114,7 +114,10 @@ def _print_all(terminal: Terminal, kind: str) -> None:
     lists["Conditions, on inverted_pendulum for 10 s"] = conditions
     lists["Metrics"] = [(metric.name, metric.summary) for metric in metrics()]
     for title, rows in lists.items():
-        if found := rows if kind in title.lower() else [row for row in rows if row[0] == kind]:
+        found = rows
+        if kind not in title.lower():
+            found = [row for row in rows if row[0] == kind]
+        if found:
             terminal.print(tables.catalogue(title, found), "")
     terminal.print(
         "smc-mujoco list NAME shows a law or a plant in full; --needs one-gain,continuous lists "

@@ -150,7 +150,8 @@ def _repeat(
             replays.append(shown.replay(record, start, duration))
         repeated = run(replays)
         traces = [twin.measured(record, start, duration), *repeated]
-        since = float(record[twin.columns.time][0]) + (twin.start if start is None else start)
+        begin = twin.start if start is None else start
+        since = float(record[twin.columns.time][0]) + begin
         if since:
             title += f", from {since:.6g} s of the record"
         terminal.wrote(*filmed(traces, film, ["measured", *twins], title, terminal))

@@ -137,8 +137,11 @@ def scaling(
     rounded = np.asarray(~failed & (errors <= floor).any(axis=0))
     with np.errstate(invalid="ignore", divide="ignore"):
         ratios = parts[..., 1:] / parts[..., :-1]
-    falling = np.asarray(~failed & ~rounded & np.any(np.all(ratios < 1.0 / TREND, axis=2), axis=0))
-    growing = np.asarray(~failed & ~rounded & np.any(np.all(ratios > TREND, axis=2), axis=0))
+    resolved = ~failed & ~rounded
+    falls = np.all(ratios < 1.0 / TREND, axis=2)
+    grows = np.all(ratios > TREND, axis=2)
+    falling = np.asarray(resolved & np.any(falls, axis=0))
+    growing = np.asarray(resolved & np.any(grows, axis=0))
     used = ~(failed | rounded | falling | growing)
     h = np.array(periods)[used]
     order, low, high = fit(h, errors[:, used])

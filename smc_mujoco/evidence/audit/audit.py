@@ -157,7 +157,10 @@ def wanted(paper: Paper, only: Iterable[str | int] | None) -> list[ClaimEntry]:
         return list(known.values())
     ids = set()
     for i in items_of("only", only):
-        ids.add(str(i) if isinstance(i, int) else i if isinstance(i, str) else shown(i))
+        if isinstance(i, int | str):
+            ids.add(str(i))
+        else:
+            ids.add(shown(i))
     for id in sorted(ids - set(known)):
         raise unknown("claim", id, known)
     return [entry for entry in known.values() if entry.id in ids]

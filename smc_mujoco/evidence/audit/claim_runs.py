@@ -195,7 +195,8 @@ class ClaimRuns:
         """Return the scenario of the claim's first plant, law and condition, with some of its
         fields changed.
         """
-        return self.scenario(self.plants[0], self.laws[0], self.conditions[0], **changes)
+        plant, law, condition = self.plants[0], self.laws[0], self.conditions[0]
+        return self.scenario(plant, law, condition, **changes)
 
     def grid(self, **changes: Any) -> dict[tuple[str, str, str], Scenario]:
         """Return (plant, law, condition) -> scenario for all that the claim names, with some fields

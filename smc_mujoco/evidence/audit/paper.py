@@ -176,7 +176,9 @@ class Paper:
                 return self.bound(law, {})
             known = law in (*gain_sets.COMPARED, *gain_sets.STUDY_ALIASES)
             return gain_sets.law(self.plant(plant), law, gains if known else "default")
-        values = {**of_set.get("", {}).get(law, {}), **of_set.get(plant, {}).get(law, {})}
+        general = of_set.get("", {}).get(law, {})
+        of_plant = of_set.get(plant, {}).get(law, {})
+        values = {**general, **of_plant}
         made = self.bound(law, values)
         if law in self.laws:
             known = {}
