@@ -16,6 +16,7 @@ from mkdocs.structure.files import File
 ROOT = Path(__file__).parents[2]
 GALLERY = "videos/gallery"
 HERE = "<!-- README's first screen -->"
+START = "[Start](tutorial.md){ .md-button .md-button--primary }"  # above its first picture
 CATALOGUE = "catalogue.md"  # its tables name all plants and laws
 GROUP = "Catalogue"  # where the contents show their pages
 HEADER = "smc_mujoco/exchange/c/smc_law.h"  # to which pages link
@@ -91,6 +92,7 @@ def on_page_markdown(markdown, page, config, files):
         .read_text(encoding="utf-8")
         .partition("\n<!-- end of the first screen -->")
     )
+    first = first.replace("\n![", f"\n{START}\n\n![", 1)
     markdown = known.filled(markdown.replace(HERE, first.replace("](docs/", "](")))
     for place in (f"{GALLERY}/", HEADER):
         markdown = markdown.replace(f"](../{place}", f"]({place}")
