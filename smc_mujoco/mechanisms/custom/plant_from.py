@@ -345,7 +345,7 @@ def _places(
     names, units, x0 = own.places(model, joints, start, keyframe)
     unit_of = dict(zip(names, units, strict=True))
     named = [joint for joint, _, _ in checked]
-    check_ranges(plant, checked, map(start.get, named), map(unit_of.get, named))
+    check_ranges(plant, checked, [start[one] for one in named], [unit_of[one] for one in named])
     goals = _goals(model, alone, keyframe)
     rest = own.places(model, joints, goals, keyframe)[2]
     ranges = own.ranges(model, names)
