@@ -2,7 +2,7 @@
 docs/what_wins_under_friction.md.
 
     python -m benchmarks.friction rail geared ak80 --keep FOLDER --out friction.json
-    python -m benchmarks.friction drawn_rail drawn_geared --lot 1234567 --seeds 1 --out lot.json
+    python -m benchmarks.friction drawn_rail drawn_geared --draw 1234567 --seeds 1 --out drawn.json
 
 `benchmarks.friction_sentences` reads the file.
 
@@ -520,17 +520,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("joints", nargs="+", help="rail, geared, ak80; of a lot drawn_rail, ...")
+    parser.add_argument("joints", nargs="+", help="rail, geared, ak80; or drawn_rail, drawn_geared")
     parser.add_argument("--law", nargs="+", default=LAWS, help="names of laws")
     parser.add_argument("--sets", type=int, default=SETS)
     parser.add_argument("--seeds", type=int, nargs="+", default=SEEDS)
-    parser.add_argument("--lot", type=int, metavar="SEED", help="draw the joints")
+    parser.add_argument("--draw", type=int, metavar="SEED", help="draw the joints by chance")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--keep", type=Path, help="folder of searches that are done")
     parser.add_argument("--out", type=Path, required=True)
     asked = parser.parse_args()
     points = []
-    known = joints(asked.lot)
+    known = joints(asked.draw)
     with ProcessPoolExecutor(asked.processes, mp_context=get_context("spawn")) as executor:
         work = []
         for name in asked.joints:

@@ -2,8 +2,8 @@
 
 `rail` is a mass on a slide. `geared` is a link that its motor holds at 0.8 rad against gravity,
 with 29 % of the bound on u. `ak80` is the AK80-6 pendulum, upright, with the friction that was
-found in its public records, see `smc_mujoco.evidence.rigs`. `drawn` makes a rail and a link of a
-lot.
+found in its public records, see `smc_mujoco.evidence.rigs`. `drawn` makes a rail and a link by
+chance.
 """
 
 import dataclasses
@@ -146,7 +146,7 @@ def machine() -> Joint:
 
 
 def drawn(seed: int) -> dict[str, Joint]:
-    """Return a rail and a link that a lot draws, with levels from half to one and a half times."""
+    """Return a rail and a link drawn by chance, with levels from half to one and a half times."""
     rng = np.random.default_rng(seed)
 
     def between(low: float, high: float) -> float:
@@ -167,10 +167,10 @@ def drawn(seed: int) -> dict[str, Joint]:
     return found
 
 
-def joints(lot: int | None = None) -> dict[str, Joint]:
-    """Return the joints of the page, or those of a lot."""
-    if lot is not None:
-        return drawn(lot)
+def joints(seed: int | None = None) -> dict[str, Joint]:
+    """Return the joints of the page, or those drawn with a seed."""
+    if seed is not None:
+        return drawn(seed)
     return {
         "rail": joint("rail", "slide", RAIL, 6.0, 0.1, LEVELS, others=OTHERS),
         "geared": joint("geared", "hinge", LINK, 6.0, 0.5, LEVELS, others=OTHERS[:2]),

@@ -29,7 +29,10 @@ WITHOUT_INTEGRAL = ("pd", "boundary_layer")
 
 
 VERDICTS = "stands", "open", "contradicted", "not ranked"
-JOINTS_OF = {"friction": "the three above", "friction_lot": "drawn"}  # file -> its name on the page
+JOINTS_OF = {
+    "friction": "the three above",
+    "friction_drawn": "drawn",
+}  # file -> its name on the page
 
 
 class Verdict(NamedTuple):
