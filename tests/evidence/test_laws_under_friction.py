@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from benchmarks import friction, friction_plants
+from benchmarks import friction, friction_by_own_loop, friction_plants
 from benchmarks import friction_sentences as sentences
 from benchmarks.friction import Case, Choice, Sets
 from smc_mujoco.analysis.engine.group import FormGroup
@@ -21,6 +21,7 @@ from smc_mujoco.analysis.engine.scores import summed_up
 FILE = Path(friction.__file__).with_suffix(".json")
 POINTS = json.loads(FILE.read_text())
 PAGE = (FILE.parents[1] / "docs" / "what_wins_under_friction.md").read_text()
+OWN = json.loads(Path(friction_by_own_loop.__file__).with_suffix(".json").read_text())
 DRAWN = sorted(FILE.parent.glob("friction_drawn*.json"))
 JOINTS = friction_plants.joints()
 
@@ -220,3 +221,16 @@ def test_limit_cycles_need_a_second_pass_as_the_page_says():
     cycles = "chattering_amplitude", "chattering_frequency"
     assert not any(map(summed_up, cycles))
     assert all(map(summed_up, ("rest_share", "ripple", "slip_rate", "stick_time")))
+
+
+@pytest.mark.quick
+def test_an_own_loop_has_the_order_that_the_page_says():
+    assert friction_by_own_loop.in_words(POINTS, OWN) in " ".join(PAGE.split())
+
+
+def test_the_own_loop_gives_its_medians_again():
+    """One law on both joints, with other phases and noise."""
+    rng = np.random.default_rng(8)
+    for point, own in zip(friction_by_own_loop.printed(POINTS), OWN, strict=True):
+        if point["law"] == "pid" and own > friction_by_own_loop.FLOOR:
+            assert friction_by_own_loop.median(point, rng) == pytest.approx(own, rel=0.1)
