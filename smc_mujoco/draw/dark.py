@@ -59,6 +59,7 @@ def on_dark(colour: str, neutral: Mapping[str, str]) -> str:
     if colour in neutral.values():
         return colour
     on = style.luminance(neutral[style.PAPER]) + 0.05
+    lighter = colour
     for share in np.linspace(0.0, 1.0, STEPS):
         lighter = style.mixed(colour, neutral[style.INK], float(share))
         if (style.luminance(lighter) + 0.05) / on >= CONTRAST:
