@@ -17,6 +17,7 @@ from benchmarks import friction_sentences as sentences
 from benchmarks.friction import Case, Choice, Sets
 from smc_mujoco.analysis.engine.group import FormGroup
 from smc_mujoco.analysis.engine.scores import summed_up
+from smc_mujoco.analysis.tuning.objective import CONDITIONS, Objective
 
 FILE = Path(friction.__file__).with_suffix(".json")
 POINTS = json.loads(FILE.read_text())
@@ -234,3 +235,18 @@ def test_the_own_loop_gives_its_medians_again():
     for point, own in zip(friction_by_own_loop.printed(POINTS), OWN, strict=True):
         if point["law"] == "pid" and own > friction_by_own_loop.FLOOR:
             assert friction_by_own_loop.median(point, rng) == pytest.approx(own, rel=0.1)
+
+
+def test_stiction_would_raise_J_by_what_the_page_says():
+    assert "stiction" not in [condition.name for condition in CONDITIONS]
+    goals = [Objective(), Objective(conditions=(*CONDITIONS, "stiction"))]
+    more = []
+    for law in ("pid", "pd_observer", "adrc", "super_twisting", "boundary_layer", "hodob"):
+        gains = smc.law(law, plant="duffing").gains
+        costs = []
+        for goal in goals:
+            cost = smc.design.objective("duffing", law, goal, threads=1)
+            costs.append(cost([gains[name] for name in cost.bounds]))
+        more.append(100 * (costs[1] / costs[0] - 1))
+    said = f"of six laws with their shipped gains on duffing {min(more):.0f} to {max(more):.0f} %"
+    assert said in " ".join(PAGE.split())
