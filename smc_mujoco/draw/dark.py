@@ -24,10 +24,10 @@ def suit_page(artists: Iterable[Artist]) -> None:
     if not neutral:
         return
 
-    def turned(colour) -> tuple[float, ...]:
-        *shade, opacity = to_rgba(colour)
-        solid = to_hex(shade).upper()
-        return to_rgba(on_dark(solid, neutral), opacity)
+    def turned(colour) -> tuple[float, float, float, float]:
+        red, green, blue, opacity = to_rgba(colour)
+        name = to_hex((red, green, blue)).upper()
+        return to_rgba(on_dark(name, neutral), opacity)
 
     found = list(artists)
     found += [words.get_bbox_patch() for words in found if isinstance(words, Text)]
