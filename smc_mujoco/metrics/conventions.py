@@ -439,14 +439,13 @@ def _stuck(trace: Trace) -> dict[str, Array]:
         return {}
     bends = {}
     jump = scenario.jump_sample
-    later = scenario.machines[-1].friction  # the same, unless their numbers jump
-    for part, after in zip(scenario.friction, later, strict=True):
+    jumped = scenario.machines[-1].friction  # the same, unless their numbers jump
+    for part, after in zip(scenario.friction, jumped, strict=True):
         for i in part.channels(plant) if part.side == "link" else ():
             motion = trace.v[:, i], trace.holding[:, i]
-            stuck = part.sticks(*motion)
-            if stuck is not None:
-                stuck[jump:] = after.sticks(*motion)[jump:]
-                bends[i] = stuck
+            before, later = part.sticks(*motion), after.sticks(*motion)
+            if before is not None and later is not None:
+                bends[i] = np.concatenate([before[:jump], later[jump:]])
     if not bends:
         return {}
     rest = at_rest(trace) & (trace.holding != 0.0)

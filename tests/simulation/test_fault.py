@@ -157,7 +157,7 @@ def test_the_gain_that_may_be_lost_is_what_holds_the_start(kp, x0):
     found = smc.margins(
         "inverted_pendulum",
         pd(kp=kp),
-        "gain",
+        "loss",
         starts=smc.starts(x0=x0),
     )
     held = 1.0 - weight * np.sin(x0) / 6.0  # u_max is 6 N m
@@ -177,7 +177,7 @@ def test_the_margin_of_gain_is_of_all_actuators_or_of_the_one_that_a_fault_names
     found = []
     for on in (None, "three", "one"):
         loss = smc.condition("loss", fault=smc.Fault(at=0.0, on=on))
-        found += smc.margins(plant, law, "gain", quick=True, threads=1, condition=loss)
+        found += smc.margins(plant, law, "loss", quick=True, threads=1, condition=loss)
     every, heavy, light = [margin.value for margin in found]
     assert every == heavy < 1.0 - 3.0 * 9.81 / 50.0 < light < 1.0 - 9.81 / 50.0
 
