@@ -1,11 +1,12 @@
-"""The reversals of benchmarks/friction.py again, by a loop with nothing of this package in it: the
-joints, dry friction, encoder, rate, delay and compensation are written out here, and the laws are
-those of fronts_by_own_loop.py.
+"""The reversals and the runs to rest of benchmarks/friction.py again, by a loop with nothing of
+this package in it: the joints, dry friction, encoder, rate, delay and compensation are written out
+here, and the laws are those of fronts_by_own_loop.py.
 
     python -m benchmarks.friction_by_own_loop --keep benchmarks/friction_by_own_loop.json
 
-It has the points of `rail` and `geared` through reversals, but those of the observer-free law. Each
-runs a few times, with phases, zeros of the encoder and noise of a generator of its own.
+It has the points of `rail` and `geared` under dry friction, but those of the observer-free law.
+Each runs a dozen times, with starts, phases, zeros of the encoder and noise of a generator of its
+own.
 """
 
 import argparse
@@ -31,9 +32,10 @@ from benchmarks.fronts_by_own_loop import (
     within_bounds,
 )
 
-SEED, RUNS = 7, 5
+SEED, RUNS = 7, 12
 H, PARTS, LATE = 1e-3, 20, 2  # s, of control; steps of physics in it; periods of delay
 SETTLING, NOISE, LONGEST = 3.0, 0.3, 60.0  # s; counts; s, of pid's integral
+REST, WINDOW = 10.0, 5.0  # s, of a run to rest, and of its last part
 JOINTS = {  # mass, viscous friction, moment of gravity, angle; start; counts per unit of x
     "rail": ((1.0, 0.0, 0.0, 0.0), 0.1, 40960.0),
     "geared": ((0.225, 0.02, 2.4525, 0.8), 0.5, 4096.0 / math.tau),
@@ -60,11 +62,11 @@ def pid(g, e, de, first, z):
 
 
 @njit
-def rms(joint, friction, law, g, tau, share, sine, count, zero, noise, window):
+def rms(joint, friction, law, g, tau, share, x0, sine, count, zero, noise, window):
     """Return the rms of the error in the last `window` samples, counts."""
     mass, viscous, moment, angle = joint
     size, omega, phase = sine
-    x, v = size * math.sin(phase), 0.0
+    x, v = x0, 0.0
     samples = len(noise) - 1
     z = np.zeros(4)
     waiting = np.zeros(samples + 1 + LATE)
@@ -104,7 +106,7 @@ def printed(points: Sequence[dict]) -> list[dict]:
     found = []
     for point in points:
         known = point["joint"] in JOINTS and point["law"] in ("pd", *GAINS)
-        if known and point["price"] == "R" and point["errors"]:
+        if known and point["friction"] in LEVELS and point.get("errors"):
             found.append(point)
     return found
 
@@ -114,8 +116,9 @@ def median(point: dict, rng: np.random.Generator) -> float:
     joint, start, counts = JOINTS[point["joint"]]
     scale = math.sqrt(start * joint[0] / BOUND)
     omega = 0.1 / scale
-    window = round(math.tau / omega / H)
-    samples = window + round(SETTLING / H)
+    rests = point["task"] == "rest"
+    window = round((WINDOW if rests else math.tau / omega) / H)
+    samples = round(REST / H) if rests else window + round(SETTLING / H)
     moving, resting = LEVELS[point["friction"]]
     friction = moving * BOUND, resting * BOUND, 0.02 * start / scale
     its = dict(point["gains"])
@@ -125,17 +128,22 @@ def median(point: dict, rng: np.random.Generator) -> float:
     g = np.array([its[name] if name in its else assumed[name] for name in GAINS[law]])
     found = []
     for _ in range(RUNS):
-        sine = start, omega, rng.uniform(0.0, math.tau)
+        phase = rng.uniform(0.0, math.tau)
+        size = 0.0 if rests else start
+        sine = size, omega, phase
+        x0 = size * math.sin(phase)
+        if rests:
+            x0 = start * rng.uniform(0.8, 1.2) * rng.choice([-1, 1])
         zero = rng.uniform(-0.5, 0.5) / counts
         noise = rng.normal(0.0, NOISE / counts, samples + 1)
         about = joint, friction, list(GAINS).index(law), g, tau, point["share"]
-        found.append(rms(*about, sine, 1.0 / counts, zero, noise, window))
+        found.append(rms(*about, x0, sine, 1.0 / counts, zero, noise, window))
     return float(f"{np.median(found):.4g}")
 
 
 def cell(point: dict) -> tuple:
     """Return what a point of a law shares with those of others."""
-    return tuple(point[name] for name in ("joint", "friction", "level", "share"))
+    return tuple(point[name] for name in ("joint", "task", "friction", "level", "share"))
 
 
 def pairs(points: Sequence[dict], medians: Sequence[float]) -> Iterator[tuple]:
@@ -158,9 +166,9 @@ def in_words(points: Sequence[dict], medians: Sequence[float]) -> str:
     above = [one for one, error in zip(off, errors, strict=True) if error > FLOOR]
     near = sum(one < 0.1 for one in above)
     return (
-        f"of {len(above)} errors through reversals that are above one count, it has {near} within "
-        f"10 %, and of {len(same)} pairs of laws in one cell that are more than 30 % apart, "
-        f"{sum(same)} in the same order"
+        f"of {len(above)} errors that are above one count, it has {near} within 10 %, and of "
+        f"{len(same)} pairs of laws in one cell that are more than 30 % apart, {sum(same)} in the "
+        "same order"
     )
 
 
@@ -179,7 +187,7 @@ def main() -> None:
     for point, own in zip(printed(points), medians, strict=True):
         error = float(np.median(point["errors"]))
         if error > FLOOR and abs(own / error - 1.0) >= 0.1:
-            place = [point[name] for name in ("joint", "law", "friction", "level", "share")]
+            place = [point[name] for name in ("joint", "law", "task", "friction", "level", "share")]
             print(*place, f"{error:.3g}, own {own:.3g}")
     print(in_words(points, medians))
     if asked.keep:
