@@ -23,7 +23,7 @@ from smc_mujoco.draw.figure import figure
 
 PAGE = "ieee-page"
 COLUMN = "ieee-column"
-TEN = (
+TEN = (  # each has a sliding variable
     "observer_free",
     "classical",
     "adaptive",
@@ -31,7 +31,7 @@ TEN = (
     "boundary_layer",
     "fixed_time",
     "integral",
-    "pid",
+    "nonsingular_terminal",
 )
 TEN += ("twisting", "terminal")
 
