@@ -254,6 +254,12 @@ def ultimate_bound(trace: Trace) -> float:
     ...
 
 
+@metric("1", error=True)
+def rest_share(trace: Trace) -> float:
+    """Ultimate bound over the scale."""
+    return CATALOGUE["ultimate_bound"].formula(trace) / scale(trace)
+
+
 @folded("{x}", Fold("e", "range", power=0, part="late"))
 def ripple(trace: Trace) -> float:
     """Peak-to-peak e in the last part, worst channel; what is left of a transient counts."""

@@ -40,8 +40,7 @@ from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
-from smc_mujoco.metrics import catalogue
-from smc_mujoco.metrics.conventions import by_group, scale
+from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.robustness.uncertainty import JITTER_SHARES, with_friction, with_jitter
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import DURATION, Condition
@@ -52,6 +51,7 @@ from smc_mujoco.simulation.signals import Constant, Fault, Impulse, Noise
 from smc_mujoco.simulation.trace import Trace, warn_of_broken
 
 TOLERATED_ERROR = 0.05  # of the scale: the audit's threshold for an ultimate bound
+REST_SHARE = CATALOGUE["rest_share"]  # which must be below it
 # 1/s, noise of the velocity over that of the position: that of the study's sensor
 VELOCITY_NOISE_RATIO = 5.0
 MAX_FORCE = 6.0  # N or N m: the study's u_max; no actuator there holds a larger force
@@ -203,16 +203,7 @@ def tolerates(trace: Trace) -> bool:
     """Return whether a run did not fail and ended within 5 % of its scale, in every group of its
     channels.
     """
-    return trace.failure is None and rest_share(trace) <= TOLERATED_ERROR
-
-
-def rest_share(trace: Trace) -> float:
-    """Return the ultimate bound over the scale, of the worst group of channels."""
-    bound = catalogue.CATALOGUE["ultimate_bound"].formula
-    shares = []
-    for part in by_group(trace).values():
-        shares.append(bound(part) / scale(part))
-    return max(shares)
+    return trace.failure is None and REST_SHARE.of(trace) <= TOLERATED_ERROR
 
 
 def _critical_delay(base: Scenario) -> float | None:
@@ -445,7 +436,7 @@ def margins_of(
     """Return the margins of any scenarios, as `margins` does; the resolution is FINE or COARSE."""
     cells = Cells(bases, kinds, resolution, report)
     # a coarse search by MuJoCo takes less time than compiling its law for the fast engine
-    runs = ScoredRuns({"rest_share": rest_share}, device, threads, resolution != COARSE)
+    runs = ScoredRuns({REST_SHARE.name: REST_SHARE.of}, device, threads, resolution != COARSE)
     unchanged = [(i, None) for i in range(0, len(cells.pairs), len(kinds))]
     held = cells.tolerated(unchanged, runs.by_mujoco)
     going = {}

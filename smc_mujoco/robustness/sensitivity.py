@@ -38,7 +38,7 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
 from smc_mujoco.metrics.catalogue import CATALOGUE, metric_of
 from smc_mujoco.metrics.conventions import Metric, by_group
-from smc_mujoco.robustness.margins import TOLERATED_ERROR, rest_share
+from smc_mujoco.robustness.margins import REST_SHARE, TOLERATED_ERROR
 from smc_mujoco.robustness.sobol import (
     CHANCE,
     Cut,
@@ -241,7 +241,7 @@ def sensitivity(
     points = _checked_points(points, space)
     design = designs(points, len(space.names), seed)
     work = len(design) * scenario.work
-    formulas = {metric: lambda trace: _score(trace, metric), "rest_share": rest_share}
+    formulas = {metric: lambda trace: _score(trace, metric), REST_SHARE.name: REST_SHARE.of}
     fast = ScoredRuns(formulas, device, threads, worth_compiling(work), by_group=True, worlds=True)
     words = f"sensitivity of {scenario.law.name} on {scenario.plant.name}"
     with bar(words, work, shown=progress) as drawn:
@@ -294,9 +294,9 @@ def _run(
     held = np.empty(len(design), bool)
     for first in range(0, len(design), AT_ONCE):
         cases = list(map(space.scenario_at, design[first : first + AT_ONCE]))
-        for i, ((score, share), failed) in enumerate(fast.scored(cases, advance), first):
-            scores[i] = math.inf if failed is not None else score
-            held[i] = failed is None and share <= TOLERATED_ERROR
+        for i, (found, failed) in enumerate(fast.scored(cases, advance), first):
+            scores[i] = math.inf if failed is not None else found[0]
+            held[i] = failed is None and found[-1] <= TOLERATED_ERROR
     return scores, held
 
 

@@ -209,6 +209,7 @@ BY_HAND = [
     (m.steady_error, 2.0, {"x": LAST}, "each channel has its own sign"),
     (m.ripple, 4.0, {"x": LAST}, "the channel with the largest range"),
     (m.ultimate_bound, 3.0, {"x": LAST}, "of either sign"),
+    (m.rest_share, 0.25, {"x": [12, 99, 0, 0, 0, 0, 0, 0, 1, -3, 2]}, "of the start"),
     (m.iae, 4 / 2 + 1 + 0.5, UNEVEN, "trapezoids, summed over channels"),
     (m.ise, 10 / 2 + 1 + 0.5, UNEVEN, "trapezoids of squares"),
     (m.itae, 1 / 2 + 1, UNEVEN, "trapezoids of t |e|"),
@@ -597,7 +598,7 @@ def test_trends_are_of_the_metrics_of_the_last_part_alone():
     for metric in m.metrics():
         if metric.late:
             late.add(metric.name)
-    assert late == same - {"reversal_rate", "reversal_error"}
+    assert late == same - {"rest_share", "reversal_rate", "reversal_error"}
     rho = m.trends(run(t, **plain))
     assert rho.keys() == late - {"slip_rate"}  # which is 0
     assert rho["ultimate_bound"] == pytest.approx(math.exp(6.4 - 8.0), rel=0.02)
@@ -729,6 +730,7 @@ def test_a_run_of_one_step_by_hand():
         "peak": 2.0,
         "steady_error": 1.0,
         "ultimate_bound": 1.0,
+        "rest_share": 0.5,
         "ripple": 0.0,
         "rms_error": 1.0,  # of the last sample alone
         "ise": 0.5 * (4 + 1) / 2,

@@ -299,6 +299,13 @@ def test_a_run_fails_where_its_force_is_too_small_and_one_without_a_score_has_th
     assert (worst == found.values.max()).all()
 
 
+def test_the_share_that_says_whether_a_run_ends_at_rest_may_be_the_metric():
+    case = scenario(law=smc.law("boundary_layer"), duration=3.0)
+    found = smc.sensitivity(case, smc.Uncertainty(bound=(0.02, 1.0)), "rest_share", points=16)
+    assert 0 < found.failed.sum() < 16
+    assert (found.failed == (found.values > 0.05)).all()
+
+
 def test_levels_and_chance_are_axes():
     """A level scales the force and the errors that chance draws; equal chances draw the same."""
     found = module.Space(
