@@ -24,15 +24,14 @@ def forces(scenario: Scenario, x: Array) -> Array:
     It is that of the mean speed, which positions give exactly.
     """
     found = np.zeros(x.shape)
-    jump = scenario.jump_sample
-    for machine in scenario.machines:
+    starts = 0, scenario.jump_sample
+    for machine, first in zip(scenario.machines, starts, strict=False):
+        found[1 + first :] = 0.0  # a jump may take damping away
         coefficients = _coefficients(machine)
         if coefficients.any():
-            v = np.diff(x, axis=0) / scenario.control_period
+            v = np.diff(x[first:], axis=0) / scenario.control_period
             constant, linear, square = coefficients
-            force = -(constant + linear * np.abs(v) + square * v * v) * v
-            first = 0 if machine is scenario else jump
-            found[1 + first :] = force[first:]
+            found[1 + first :] = -(constant + linear * np.abs(v) + square * v * v) * v
     return found
 
 

@@ -50,6 +50,14 @@ def test_dry_and_viscous_friction_of_a_sliding_block():
     assert trace.reaction[later, 0] == pytest.approx(-2.5 - 1.0 * speed[0], abs=1e-6)
 
 
+def test_a_jump_that_takes_all_damping_away():
+    given = {"friction": smc.Viscous(2.0), "feedforward": smc.Constant(6.0)}
+    trace = smc.run(block({"friction.b": 0.0}, **given))
+    jump = trace.scenario.jump_sample
+    assert trace.damping[jump, 0] < 0.0
+    assert not trace.damping[jump + 1 :].any()
+
+
 def test_the_resistance_of_a_motor():
     """m v' = k (V - k v) / R, with k = 4 N/A."""
     motor = smc.DCMotor(2.0, 0.0, 0.4, 10.0, 0.0, current=math.inf, command="voltage")
