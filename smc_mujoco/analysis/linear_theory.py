@@ -199,9 +199,9 @@ def _crossing(at: Linear, stiffness: float, lam: float, k1: float, h: float) -> 
         if abs(root.imag) <= 1e-9 * abs(root) and 0.0 < (y := float(root.real)) <= 2.0:
             imaginary = math.sqrt(y * (2.0 - y))
             w = complex(-y, imaginary)
-            top = n1 * w + n0
-            bottom = w * w - t * w + d
-            turned = np.angle(-top / bottom) % math.tau
+            numerator = n1 * w + n0
+            denominator = w * w - t * w + d
+            turned = np.angle(-numerator / denominator) % math.tau
             angle = 2.0 * math.asin(math.sqrt(y / 2.0))
             periods.append(turned / angle)
     return float(h * min(periods))
@@ -217,9 +217,8 @@ def steady_error(plant: Plant, lam: Natural, k1: Natural, d: Finite) -> float:
     """
     sliding = lam * k1 * np.eye(plant.n)
     loop = linear(plant).stiffness + sliding
-    push = np.full(plant.n, d)
-    moved = np.linalg.solve(loop, push)
-    return float(np.abs(moved).max())
+    x = np.linalg.solve(loop, np.full(plant.n, d))
+    return float(np.abs(x).max())
 
 
 def restoring_force(

@@ -351,11 +351,10 @@ class Comparison:
         b = self.laws.index(rival)
         leads = self.leads[block, a, b]
         with np.errstate(over="ignore"):
-            lead = self.leads[block, b, a]
-            low = np.exp(interval(lead, WIN_ERROR)[1])
+            low = np.exp(interval(self.leads[block, b, a], WIN_ERROR)[1])
             high = np.exp(-interval(leads, WIN_ERROR)[1])
-            of_pair = self.plain[block, a, b]
-            value = np.exp(-interval(of_pair, WIN_ERROR)[0])
+            plain = self.plain[block, a, b]
+            value = np.exp(-interval(plain, WIN_ERROR)[0])
         below = bool(self.below[a, block] and not self.below[b, block])
         if below:
             low = 0.0

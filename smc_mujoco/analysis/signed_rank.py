@@ -39,8 +39,8 @@ def p_values(differences: ArrayLike) -> np.ndarray:
         if known.size:
             with np.errstate(invalid="ignore"):  # the sum of opposite infinities is not above 0
                 above = known[:, None] + known > 0.0  # each pair i < j twice
-            total = int(above.sum() + above.trace()) // 2
-            p[at] = _tail(known.size, total)
+            rank_sum = int(above.sum() + above.trace()) // 2
+            p[at] = _tail(known.size, rank_sum)
     return p
 
 
@@ -63,15 +63,14 @@ def interval(differences: ArrayLike, error: float) -> tuple[float, float, float]
 def _finite(differences: ArrayLike) -> np.ndarray:
     """Return the differences that are known, with finite numbers in place of infinite ones."""
     known = np.asarray(differences, float)
-    known_ones = known[~np.isnan(known)]
-    return np.clip(known_ones, -MAX_LOG, MAX_LOG)
+    return np.clip(known[~np.isnan(known)], -MAX_LOG, MAX_LOG)
 
 
 def _ends(samples: np.ndarray, error: float) -> np.ndarray:
     """Return the ends of the intervals of samples (m, n), as (2, m); infinite if n is too small."""
     i, j = np.triu_indices(samples.shape[1])
-    places = np.arange(i.size + 1)
-    tails = _tail(samples.shape[1], places)
+    rank_sums = np.arange(i.size + 1)
+    tails = _tail(samples.shape[1], rank_sums)
     enough = np.flatnonzero(tails <= error)
     if not enough.size:
         ends = np.array([[-math.inf], [math.inf]])

@@ -31,8 +31,7 @@ def horizon(traces: Sequence[Trace]) -> float:
             away = np.abs(ways).max(axis=1)
             moved = away > REST_BAND * (high - low)
             pushed = (trace.d != 0.0).any(axis=1)
-            steered = trace.r != trace.r[-1]
-            led = steered.any(axis=1)
+            led = (trace.r != trace.r[-1]).any(axis=1)
             acted = pushed | led
             times = trace.t[moved | (acted & group.driven)]
             last = max(last, *times[-1:], trace.diverged_at or 0.0)
@@ -47,18 +46,14 @@ def horizon(traces: Sequence[Trace]) -> float:
 
 def until(trace: Trace, time: float) -> Trace:
     """Return the trace up to a time, s, with two samples at least."""
-    found = np.searchsorted(trace.t, time + 1e-9)
-    place = int(found)
-    count = max(2, place)
+    count = max(2, int(np.searchsorted(trace.t, time + 1e-9)))
     part = arrays_within(trace, slice(count))
     return dataclasses.replace(trace, **part)
 
 
 def since(trace: Trace, time: float) -> Trace:
     """Return the trace from a time on, s, as a run of its own, which is not smoothed."""
-    found = np.searchsorted(trace.t, time - 1e-9)
-    place = int(found)
-    first = min(place, len(trace.t) - 2)
+    first = min(int(np.searchsorted(trace.t, time - 1e-9)), len(trace.t) - 2)
     part = arrays_within(trace, slice(first, None))
     part["t"] = part["t"] - part["t"][0]
     duration = float(part["t"][-1])

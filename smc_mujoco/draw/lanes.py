@@ -168,6 +168,6 @@ def crowded(panel: Panel, allowed: int = MAX_BANDS) -> bool:
     wide = 0
     for trace in panel.traces:
         _, least, most = band(trace.t, trace.u)
-        wide_at_all = float(np.mean(most - least))
-        wide += wide_at_all > MIN_WIDE_BAND * (high - low)
+        width = float(np.mean(most - least))
+        wide += width > MIN_WIDE_BAND * (high - low)
     return wide > allowed

@@ -601,9 +601,9 @@ def phase(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
     if any(np.nan_to_num(np.ptp(trace.r, axis=0)).any() for trace in traces):
         names = "e", "de"
     for axis, name in zip((ax.xaxis, ax.yaxis), names, strict=True):
-        words = panel._replace(quantity=name)
-        set_numbers(axis, words)
-        axis.set_label_text(style.folded(words.label))
+        own = panel._replace(quantity=name)
+        set_numbers(axis, own)
+        axis.set_label_text(style.folded(own.label))
     ax.set(xlim=limits(traces, names[0]), ylim=limits(traces, names[1]))
     one = traces[0].x.shape[1] == 1
     width = style.points(LINE if one else LIGHT_LINE)

@@ -42,8 +42,8 @@ class Importer:
             return None
         spec = None
         for finder in list(sys.meta_path):
-            if spec is None and finder is not self:
-                spec = finder.find_spec(name, path, target)
+            if finder is not self and (spec := finder.find_spec(name, path, target)):
+                break
         if spec is not None and spec.loader is not None:
             execute = spec.loader.exec_module
 

@@ -83,8 +83,8 @@ def objective(rig: Rig, starts: Starts | None = None) -> Objective:
     first = Scenario(**fields)
     period = first.control_period
     conditions = []
-    for name, fields in machines.items():
-        conditions.append(Condition(name, fields))
+    for name, machine in machines.items():
+        conditions.append(Condition(name, machine))
     return Objective(
         conditions=tuple(conditions),
         starts=around,

@@ -99,7 +99,7 @@ def between(slopes: Slopes, groups: Sequence[int]) -> Array:
     Survey Methodology 28(2), 2002 (CR2).
     """
     p = slopes.by_values[0].shape[1]
-    every = dict.fromkeys(groups, (np.zeros((p, p)), np.zeros(p)))
+    every = {group: (np.zeros((p, p)), np.zeros(p)) for group in groups}
     pieces = zip(groups, slopes.residuals, slopes.by_values, slopes.by_states, strict=True)
     for group, r, J, S in pieces:
         A, g = _normal(r, J, S)

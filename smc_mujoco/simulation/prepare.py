@@ -466,9 +466,8 @@ def pause_phase(s: Resolved) -> int:
     others.
     """
     samples = s.clock.pauses(s.control_period, s.physics_step)[1]
-    words = philox.random_words(s.seed, 0, philox.PAUSE, 0)
-    drawn = words[0]
-    return int(drawn * 2.0**-53 * samples)
+    bits, _ = philox.random_words(s.seed, 0, philox.PAUSE, 0)
+    return int(bits * 2.0**-53 * samples)
 
 
 def _joint_measurement(
@@ -493,8 +492,7 @@ def _native_nominal(s: Resolved) -> Native | None:
     if not s.plant.by_mujoco:
         return None
     if not s.law.joint:
-        pairs = zip(s.plant.parameters, known_values(s), strict=True)
-        known = dict(pairs)
+        known = dict(zip(s.plant.parameters, known_values(s), strict=True))
         return s.plant.nominal.native(known)
     if s.model == "none":
         return None
@@ -552,8 +550,7 @@ def _parts(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
                 "ctrl": ctrl,
                 "row": frictions.get(place, -1),
             }
-            flags = row | {"acts": kind == "act", "staged": kind == "stage_force"}
-            rows.append(flags)
+            rows.append(row | {"acts": kind == "act", "staged": kind == "stage_force"})
     return rows
 
 

@@ -421,8 +421,8 @@ def of_part(part: Part, kind: str) -> PythonFunction:
     def body(inputs, parameters, memory):
         y = record(*inputs[: len(record._fields)])
         try:
-            gains = numbers(*parameters[:count])
-            out = function(y, gains, memories[memory])
+            p = numbers(*parameters[:count])
+            out = function(y, p, memories[memory])
         except USER_EXCEPTIONS as error:
             raise failure_of(name, error, channel=0) from error
         if kind in ("force", "steady"):

@@ -109,10 +109,7 @@ def advise(
 
 def _least_share(settled: Mapping[str, tuple[int, int]]) -> float:
     """Return the least share of a condition's runs that settle, of (settled, all) by condition."""
-    shares = []
-    for count, of in settled.values():
-        shares.append(count / of)
-    return min(shares)
+    return min(count / of for count, of in settled.values())
 
 
 def _next(raced: Race) -> str:

@@ -111,8 +111,8 @@ def _components(s: Resolved) -> list[Any]:
 
 def first_of(beyond: Mapping[str, bool]) -> str:
     """Return the first of some sentences that holds; "" if none does."""
-    for words, so in beyond.items():
-        if so:
+    for words, applies in beyond.items():
+        if applies:
             return words
     return ""
 
@@ -402,8 +402,7 @@ class FormGroup:
         places = self.layout.row.damping, self.layout.row.levels
         for part in s.friction if self.form.frictions else ():
             for first, value in zip(places, part.added_to_model, strict=True):
-                its_channels = part.channels(s.plant)
-                row[np.add(first, its_channels)] += value
+                row[np.add(first, part.channels(s.plant))] += value
 
     @property
     def _columns(self) -> int:

@@ -356,7 +356,7 @@ def frames(
 
 
 def without_number(drawn: Drawn) -> Drawn:
-    """Return arrows of which that of the reaction has no number, as a hit's is in words."""
+    """Return the arrows without the number of the reaction: the words on a hit have it."""
     kept = []
     for channel, arrow in drawn.arrows:
         told = arrow.rgba == rgba(style.REACTION)

@@ -138,7 +138,8 @@ def layout(
     have labels which are read well. `may_be_beside` allows labels beside machines.
     """
     layouts = []
-    for rows, beside in itertools.product(range(1, count + 1), {False, may_be_beside}):
+    sides = (False, True) if may_be_beside else (False,)
+    for rows, beside in itertools.product(range(1, count + 1), sides):
         columns = -(-count // rows)
         if columns * (rows - 1) >= count:  # a row would be empty
             continue

@@ -100,8 +100,8 @@ def _free_base(model: mujoco.MjModel) -> int:
     """Return the body that carries the first channel and moves in two ways or more, none of them
     driven; 0 if there is none.
     """
-    joint = model.jnt_bodyid[driven_ids(model)[0]]
-    base = int(model.body_rootid[joint])
+    body = model.jnt_bodyid[driven_ids(model)[0]]
+    base = int(model.body_rootid[body])
     first = model.body_jntadr[base]
     joints = np.arange(first, first + model.body_jntnum[base])
     on_joints = np.isin(model.actuator_trntype, ONE_JOINT)
@@ -136,8 +136,8 @@ def _held(
     total = np.zeros(len(dofs))
     for k in range(steps):
         error = goal - data.qpos[places]
-        damped = STIFF * error - 2.0 * data.qvel[dofs]
-        push = load + inertia * STIFF * damped
+        rate = STIFF * error - 2.0 * data.qvel[dofs]
+        push = load + inertia * STIFF * rate
         data.qfrc_applied[dofs] = push
         mujoco.mj_step(model, data)
         if data.warning.number[UNSTABLE] > 1:
@@ -282,8 +282,7 @@ def mobility(plant: Plant, u_max: float, reach: float) -> Floats:
         unit = np.eye(len(at.M))[i]
         for _ in range(ROUNDS):
             T = np.sqrt(reach / (g * u_max))
-            damped = at.M + T * at.D
-            A = damped + 0.5 * T * T * at.K
+            A = at.M + T * at.D + 0.5 * T * T * at.K
             A[i] = at.M[i]
             A[:, i] = at.M[:, i]
             g = abs(np.linalg.solve(A, unit)[i])
