@@ -105,9 +105,7 @@ def nudged(scenario: Scenario) -> Scenario:
     plant's origin. A joint that starts there stays there.
     """
     places = zip(scenario.resolved.x0, scenario.plant.origin, strict=True)
-    x0 = []
-    for x, r in places:
-        x0.append(r + (1.0 + NUDGE) * (x - r))
+    x0 = [r + (1.0 + NUDGE) * (x - r) for x, r in places]
     return dataclasses.replace(scenario, x0=tuple(x0))
 
 

@@ -311,9 +311,7 @@ def _wrapped(text: str, width: int) -> str:
 def _narrow(text: str) -> str:
     """Return a text on narrow lines; a number stays with its unit."""
     lines = re.sub(r"(\d) ", rf"\1{NO_BREAK}", text.replace("–", "–\n")).splitlines()
-    narrow = []
-    for line in lines:
-        narrow.append(_wrapped(line, NARROW_WIDTH))
+    narrow = [_wrapped(line, NARROW_WIDTH) for line in lines]
     return "\n".join(narrow)
 
 

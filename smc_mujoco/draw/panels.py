@@ -263,9 +263,7 @@ def actuators(traces: Sequence[Trace]) -> list[Panel]:
     groups = style.split(traces).items()
     group, parts = next(iter(groups))
     first = dataclasses.replace(group, channels=(0,))
-    pushed = []
-    for part in parts:
-        pushed.append(np.nan_to_num(part.u).any(axis=0))
+    pushed = [np.nan_to_num(part.u).any(axis=0) for part in parts]
     pushing = np.any(pushed, axis=0)
     panels = []
     for j in np.flatnonzero(pushing).tolist():

@@ -382,9 +382,7 @@ def _motions(
         times = (period * np.arange(positions.shape[1])).tolist()
         start = list(plant.rest or (0.0,) * plant.n)
         start[: plant.driven] = positions[:, 0].tolist()
-        references = []
-        for row in positions:
-            references.append(TimeSeries(times, row.tolist()))
+        references = [TimeSeries(times, row.tolist()) for row in positions]
         fields = rig.machine(Values(**rig.values)) | {
             "law": laws,
             "reference": references,

@@ -65,9 +65,7 @@ class Filter:
         """Return columns, their rates and their second derivatives, (N, n) each."""
         found = []
         for order in range(3):
-            columns = []
-            for name in names:
-                columns.append(self.cubic(name, order))
+            columns = [self.cubic(name, order) for name in names]
             found.append(np.column_stack(columns))
         return found
 

@@ -212,9 +212,7 @@ class OwnRig(Rig):
                 fields["sensor"] = tuple(unrounded)
         u = self.command(part)
         times = (part.period * np.arange(len(u))).tolist()
-        references = []
-        for column in u.T:
-            references.append(TimeSeries(times, column.tolist()))
+        references = [TimeSeries(times, column.tolist()) for column in u.T]
         replayed: Fields = {
             "law": as_recorded(),
             "reference": tuple(references),

@@ -277,9 +277,7 @@ def _columns(terms: tuple[str, ...], v: Array, speed: float) -> Array:
         "viscous": lambda: v,
         "offset": lambda: np.ones_like(v),
     }
-    columns = []
-    for term in terms:
-        columns.append(known[term]())
+    columns = [known[term]() for term in terms]
     return np.column_stack(columns)
 
 

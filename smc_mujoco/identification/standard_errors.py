@@ -210,9 +210,7 @@ def _fed_back(replays: Replays, point: Point, J: Array) -> Array:
         predicted = replays.by_piece(rig, traces)
         rows.append(np.concatenate(list(map(replays.relative, replays.pieces, predicted))))
     expected, *repeats = rows
-    moves = []
-    for repeat in repeats:
-        moves.append(least_squares(J, repeat - expected))
+    moves = [least_squares(J, repeat - expected) for repeat in repeats]
     moved = np.array(moves)
     replays.report(1)
     return np.sqrt(np.mean(moved**2, axis=0))

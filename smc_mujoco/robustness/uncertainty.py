@@ -359,9 +359,7 @@ class Members:
                 member, force=self.limited(mutated_signal(member.force, rng))
             )
         if what == 1:
-            noise = []
-            for row in member.noise:
-                noise.append(mutated_signal(row, rng))
+            noise = [mutated_signal(row, rng) for row in member.noise]
             return dataclasses.replace(member, noise=np.array(noise))
         moves = rng.normal(0.0, CONSTANT_DEVIATION, len(self.constants))
         moves = moves * (rng.random(len(self.constants)) < MOVE_PROBABILITY)
@@ -600,9 +598,7 @@ def dry_frictions(plant: Plant) -> list[str]:
 
 def _with_friction_scale(scenario: Scenario, factor: float) -> Scenario:
     """Return the scenario with a factor on its friction, and on the dry friction of its plant."""
-    friction = []
-    for part in scenario.friction:
-        friction.append(part.scaled(factor))
+    friction = [part.scaled(factor) for part in scenario.friction]
     scenario = dataclasses.replace(scenario, friction=tuple(friction))
     for name in dry_frictions(scenario.plant):
         scenario = _with_factor(scenario, factor, name)

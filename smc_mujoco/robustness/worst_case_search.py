@@ -271,9 +271,7 @@ class WorstCaseSearch:
             relays = []
             for share in SWITCH_TIMES:
                 relays.append(Relay(self.members.within.disturbance, rate=1.0, start=share * end))
-            cases = []
-            for relay in relays:
-                cases.append(Case(member, relay, worst.origin))
+            cases = [Case(member, relay, worst.origin) for relay in relays]
             yield cases
 
     def _relayed(self, kind: str, sign: float = 1.0, **weights: float) -> Case:

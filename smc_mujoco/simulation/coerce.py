@@ -364,9 +364,7 @@ def _split(value: Any, plant: Plant) -> tuple[Any, list[Any]]:
         if joint not in names:
             driven[joint] = signal
     goals = zip(names, plant.goal or (0.0,) * plant.free, strict=True)
-    of_measured = []
-    for name, goal in goals:
-        of_measured.append(value.get(name, Constant(goal)))
+    of_measured = [value.get(name, Constant(goal)) for name, goal in goals]
     return driven, of_measured
 
 

@@ -73,9 +73,7 @@ def advise(
     fixed = None
     if clock.left > 0.0:
         fixed = _fixed(trial, plant, chosen, goal, relevant)
-    candidates = []
-    for law in chosen.values():
-        candidates.append(Candidate(law, (law,)))
+    candidates = [Candidate(law, (law,)) for law in chosen.values()]
     made = clock.seeds(seeds, len(chosen) * table_work, margins_work)
     table = trial.run({plant.name: candidates}, made, half_steps=False)
     settled = _settled(table)

@@ -97,10 +97,7 @@ def scored(scenarios: Sequence[Scenario], keys: Sequence[str]) -> list[ResultCol
             raise ScenarioError(
                 f"a worker has other code for {scenario.law}: install the same there as here"
             )
-    columns = []
-    for trace in run_batch(scenarios, 1):
-        columns.append(result_columns(trace))
-    return columns
+    return [result_columns(trace) for trace in run_batch(scenarios, 1)]
 
 
 def compute(

@@ -498,9 +498,7 @@ class Boards(Tables, list[Board]):
             groups.setdefault(board.about, []).append(board)
         if not groups:
             return [Tabular(headings=["no boards: no metric applies"], rows=[], notes=self.absent)]
-        made = []
-        for name, boards in groups.items():
-            made.append(_table(name, boards))
+        made = [_table(name, boards) for name, boards in groups.items()]
         notes = *made[-1].notes, *self.remarks, key(self, repr(made))
         return [*made[:-1], dataclasses.replace(made[-1], notes=notes)]
 

@@ -134,9 +134,7 @@ class Store:
                     raise ScenarioError(
                         f"part {path} was removed or broken while the study ran: start it again"
                     )
-                places_in_part = []
-                for i in indices:
-                    places_in_part.append(self.where[names[i]][1])
+                places_in_part = [self.where[names[i]][1] for i in indices]
                 parts.append(part.take(places_in_part))
             order = np.argsort(np.concatenate(list(places.values())))
             data = pa.concat_tables(parts).take(order).combine_chunks()

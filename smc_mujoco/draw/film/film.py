@@ -311,9 +311,7 @@ def pictures(frames: Frames) -> Generator[Array]:
         yield from drawn(clock, stages, shots, overlays, sheet)
         if close := clock.close:
             start = float(close.times[0])
-            closing = []
-            for trace in runs.traces:
-                closing.append(horizon.since(trace, start))
+            closing = [horizon.since(trace, start) for trace in runs.traces]
             last = runs._replace(traces=closing)
             stop = end(last.traces)
             last = last._replace(span=(stop, stop))
