@@ -125,8 +125,8 @@ def mechanism(scenario: Scenario) -> Mechanism:
         _recent.append(shared)
         while sum(mujoco.mj_sizeModel(one.model) for one in _recent) > MAX_RECENT_BYTES:
             _recent.popleft()
-    elif scenario.plant.is_user_model:
-        scenario.plant.build.source.check_unchanged()
+    elif source := getattr(scenario.plant.build, "source", None):  # of a user's model
+        source.check_unchanged()
     return shared
 
 

@@ -629,8 +629,10 @@ def test_chatter_measures_in_runs_of_the_duration_that_it_is_given(duration, cal
 
 def test_x0_is_one_number_or_one_for_each_channel():
     assert options.starts(None) is None
-    assert options.starts("-0.3").x0 == (-0.3,)
-    assert options.starts("0.3,-0.2,1").x0 == (0.3, -0.2, 1.0)
+    for text, x0 in (("-0.3", (-0.3,)), ("0.3,-0.2,1", (0.3, -0.2, 1.0))):
+        starts = options.starts(text)
+        assert starts is not None
+        assert starts.x0 == x0
     with pytest.raises(smc.ScenarioError, match=r"--x0 is '0.3;1': give a number"):
         options.starts("0.3;1")
 

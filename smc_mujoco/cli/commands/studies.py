@@ -14,7 +14,7 @@ from smc_mujoco.common.interrupts import delay_signals
 from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
-    from smc_mujoco.studies.advice import Advice, RaceAdvice
+    from smc_mujoco.studies.advice import RaceAdvice
     from smc_mujoco.studies.table import Table
 
 FILMED = 0.1  # of the minutes, which are for the figure and the film; chosen
@@ -97,6 +97,7 @@ def which(
     sensor=Encoder(counts=4096)" --needs accurate
     """
     with delay_signals():
+        from smc_mujoco.studies.advice import RaceAdvice
         from smc_mujoco.studies.which import QUICK_MINUTES
         from smc_mujoco.studies.which import which as advise
 
@@ -124,18 +125,15 @@ def which(
         minutes=whole and (1.0 - FILMED * film) * whole,
     )
     terminal.print(advice)
-    _save(advice, out, terminal)
-    if film and whole:
-        _film(advice, out, began + 60.0 * whole, terminal)
+    if isinstance(advice, RaceAdvice):
+        _save(advice, out, terminal)
+        if film and whole:
+            _film(advice, out, began + 60.0 * whole, terminal)
     _finish(advice.table, out, terminal)
 
 
-def _save(advice: "Advice", out: Path, terminal: Terminal) -> None:
+def _save(advice: "RaceAdvice", out: Path, terminal: Terminal) -> None:
     """Write the gains of the first law of a race, and a figure of its worst run."""
-    from smc_mujoco.studies.advice import RaceAdvice
-
-    if not isinstance(advice, RaceAdvice):
-        return
     from smc_mujoco.draw import figure, page
 
     if advice.tuned:
