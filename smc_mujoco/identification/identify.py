@@ -59,8 +59,12 @@ PIECE_STEPS = 12  # of the search for the starts of pieces of a log that was not
 Log = Source | AnyPath  # also a data frame
 Count = Annotated[int, Whole(low=1, high=1000)]
 SLOW = (
-    "the residuals are slow, for example by a force that was not recorded, a softness, or a log "
-    "whose u is late: true errors may be several standard errors"
+    "the residuals are slow, for example by a force that was not recorded, friction that drops "
+    "with speed, a softness, or a log whose u is late: true errors may be many standard errors"
+)
+RELATIVE = (
+    "with a gain free, forces and inertias are relative to the model's mass: if the model is too "
+    "light, gain, damping, friction and armature are too small by the same share"
 )
 LEFT = (
     "a whole log is left in an open loop, as an arm under gravity leaves it however good its "
@@ -137,6 +141,8 @@ class Identified:
             notes.append(POOR)
         elif self.by_pieces and _worst(self.fits) < POOR_FIT:
             notes.append(LEFT)
+        if isinstance(self.rig, OwnRig) and any(name.endswith(".gain") for name in self.values):
+            notes.append(RELATIVE)
         if isinstance(self.rig, OwnRig) and (absent := self.rig.not_in_runs):
             notes.append(
                 f"replays have {', '.join(absent)}, and runs of the machine leave it out: "
@@ -414,7 +420,9 @@ def _read(
         raise ScenarioError("there are no logs: give at least one")
     read = [records.given(log, columns) for log in many]
     if isinstance(machine, str):
-        machine = find_rig(machine) if machine in rigs() else _named_plant(machine, read)
+        machine = (
+            find_rig(machine) if machine in rigs() else _named_plant(machine, read, names or ())
+        )
     if isinstance(machine, Plant | Scenario):
         machine = own_rig(machine, names or [])
     if not isinstance(machine, Rig):
@@ -429,10 +437,11 @@ def _read(
     return twin, data
 
 
-def _named_plant(text: str, logs: Sequence[Any]) -> Plant:
+def _named_plant(text: str, logs: Sequence[Any], names: Sequence[str]) -> Plant:
     """Return a plant by its name. FILE.xml alone has the joints of the first log's columns: those
     with a command u_JOINT are driven, and those with a position x_JOINT alone are measured. Raise
-    ScenarioError for positions without any command.
+    ScenarioError for positions without any command, and for a number to find of a joint of the file
+    that has no column.
     """
     model = MODEL.fullmatch(text)
     if model is None or model["joints"] is not None or not isinstance(logs[0], Mapping):
@@ -454,8 +463,16 @@ def _named_plant(text: str, logs: Sequence[Any]) -> Plant:
     for joint in seen:
         if joint not in driven:
             joints.append(f"{joint}(measured)")
+    of_file = [joint.name for joint in mjcf.source(text).spec().joints if joint.name]
+    for name in names if driven else ():
+        joint = name.rpartition(".")[0]
+        if joint in of_file and joint not in (*driven, *seen):
+            raise ScenarioError(
+                f"{name} is to be found, and the log has no x_{joint} and u_{joint}: its columns "
+                f"are {joined(logs[0])}; say by columns (--columns) which they are"
+            )
     if not driven:
-        joints = [joint.name for joint in mjcf.source(text).spec().joints if joint.name]
+        joints = of_file
         if len(joints) > 1 and "x" in logs[0]:
             raise ScenarioError(
                 f"the log has x of one joint, and {text} has {len(joints)}: say which it is, as "

@@ -156,9 +156,12 @@ class RaceAdvice(Advice):
 
     @property
     def _name(self) -> str:
+        words = [self.law.name]
+        if len(self.laws) > 1 and not self.fixed and not self.race.winner:
+            words.append("the first so far, not tested against the others")
         if self.settles[self.law.name] < RELIABLE:
-            return f"{self.law.name}, which does not settle reliably in every condition"
-        return self.law.name
+            words.append("which does not settle reliably in every condition")
+        return ", ".join(words)
 
     @property
     def _however(self) -> str:

@@ -288,6 +288,14 @@ def test_a_log_without_any_command_is_not_taken_for_a_file_without_joints(run, t
         smc.identify(str(tmp_path / "arm.xml"), positions, ["j1.damping"])
 
 
+def test_a_number_of_a_joint_without_a_column_is_not_guessed(run, tmp_path):
+    file = tmp_path / "two.xml"
+    file.write_text(TWO)
+    log = {"t": run["t"], "x_j2": run["x"], "u_j2": run["u"], "q_j1": run["x"]}
+    with pytest.raises(smc.ScenarioError, match=r"no x_j1 and u_j1: its columns are t, x_j2, u_j2"):
+        smc.identify(str(file), log, ["j1.damping", "j2.damping"])
+
+
 def test_a_log_of_one_joint_asks_which_of_several_it_is(run, tmp_path):
     file = tmp_path / "two.xml"
     file.write_text(TWO)
@@ -302,6 +310,7 @@ def test_a_command_in_milliamperes_is_doubted_unless_its_gain_is_asked_for(arm, 
         smc.identify(arm, in_mA, ["j1.damping"])
     found = smc.identify(arm, in_mA, ["j1.gain", *TRUTH], most=1)
     assert found.values["j1.gain"] == pytest.approx(1e-4, rel=0.05)
+    assert any("relative to the model's mass" in note for note in found.notes)
 
 
 def test_an_unknown_path_lists_what_there_is(arm, run):

@@ -205,6 +205,8 @@ def test_without_time_there_is_an_answer_of_the_sets_that_there_are_without_marg
     assert short.law.name in {law.name for law in advice.laws}
     assert short.race.sets == advice.race.sets
     assert "With these gains: not tried, as the time was over" in short.answer
+    untested = ", the first so far, not tested against the others"
+    assert (untested in short.answer[0]) == (not short.race.winner)
     assert not short.margins
     assert len(short.table) == FEWEST_SEEDS * len(short.laws)
     text = " ".join(str(short).split())

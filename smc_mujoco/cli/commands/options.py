@@ -160,8 +160,9 @@ PlantName = Annotated[
         help="A plant from `smc-mujoco list`, or joints of your own .xml or .urdf: "
         "FILE.xml:joint+joint@keyframe+held. The keyframe is the goal. With +held, servos "
         "hold the other joints; +locked welds them. Brackets after a joint hold its options: "
-        "(motor) adds a motor, (partner=pole) names a passive joint, (u_max=9,x0=0.2) sets the "
-        "bound on u and the start, and (measured) means read but not driven.",
+        "(motor) adds a motor, (servo) commands a position servo as it is, (partner=pole) names a "
+        "passive joint, (u_max=9,x0=0.2) sets the bound on u and the start, and (measured) means "
+        "read but not driven.",
     ),
 ]
 Quick = Annotated[

@@ -53,8 +53,9 @@ Falling = Annotated[
 Minutes = Annotated[
     float | None,
     typer.Option(
-        help="Answer within so many minutes, film included; --quick is --minutes 10. Laws race "
-        "under the conditions asked for, until one has the lowest J."
+        help="Answer within so many minutes, with a film if time is left; --quick is --minutes 10. "
+        "Laws race under the conditions asked for, until one has the lowest J. Each is searched "
+        "once however short the time is."
     ),
 ]
 Film = Annotated[
