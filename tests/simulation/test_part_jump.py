@@ -54,6 +54,7 @@ def test_a_jump_that_takes_all_damping_away():
     given = {"friction": smc.Viscous(2.0), "feedforward": smc.Constant(6.0)}
     trace = smc.run(block({"friction.b": 0.0}, **given))
     jump = trace.scenario.jump_sample
+    assert trace.damping is not None
     assert trace.damping[jump, 0] < 0.0
     assert not trace.damping[jump + 1 :].any()
 
