@@ -28,7 +28,7 @@ def errors_as_sentences() -> Iterator[None]:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
     except KeyboardInterrupt:
-        _fail("stopped. Run the same command again to resume.", 130)
+        _fail("stopped. A command that keeps a folder goes on from it if you run it again.", 130)
     except Exception as error:
         if lines := users_traceback(error):
             print(lines, end="", file=sys.stderr)

@@ -387,7 +387,9 @@ def test_a_wrong_command_line_ends_with_code_2_and_shows_the_usage(words, call):
     assert "Traceback" not in err
 
 
-STOPPED = "smc-mujoco: stopped. Run the same command again to resume.\n"
+STOPPED = (
+    "smc-mujoco: stopped. A command that keeps a folder goes on from it if you run it again.\n"
+)
 OUTCOMES = {  # what a command raises -> its exit code and what it says
     "bad input": (ScenarioError("k is 0: give more"), 2, "smc-mujoco: k is 0: give more\n"),
     "Ctrl-C": (KeyboardInterrupt(), 130, STOPPED),

@@ -1,5 +1,6 @@
 """smc-mujoco compare, which: questions that many runs of many laws answer."""
 
+import itertools
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -157,9 +158,8 @@ def _film(advice: "RaceAdvice", out: Path, ends: float, terminal: Terminal) -> N
         pictures = iter(frames)
         next(pictures)
         first = time.monotonic()
-        for _ in zip(range(TIMED), pictures, strict=False):
-            pass
-        each = (time.monotonic() - first) / TIMED
+        timed = sum(1 for _ in itertools.islice(pictures, TIMED))
+        each = (time.monotonic() - first) / max(1, timed)
         pictures.close()
         left = MADE * (ends - time.monotonic()) - (first - begun)
         fps = min(MAX_FPS, films.FPS * left / (each * len(frames)))
