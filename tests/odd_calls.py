@@ -96,17 +96,17 @@ FILES = ["a.csv", "a.json", "a.npz", "a.py", "a.xml", "a.xml:shoulder", "a.xml:x
 FILES += ["bom.toml", "folder", "trace.npz", "scene.py", "list.json", "a.c", "out.json", "out.csv"]
 BRIEF = "--seeds 1 --duration 0.1 --quick"
 COMPARED = ["duffing --law ?", "? --law pid", "--rig ?", "duffing --law pid --condition ?"]
-WHICH = ["duffing --law ?", "? --law pid", "duffing --law pid --needs ?"]
+WHICH = ["duffing --law ?", "? --law pid", "duffing --law pid --need ?"]
 WHICH += ["duffing --law pid --condition ?"]
 LINES = {  # command -> its shortest right lines, "?" for what is always odd
-    "list": ["", "pid", "--plant duffing", "--needs continuous"],
+    "list": ["", "pid", "--plant duffing", "--need continuous"],
     "run": ["scene.py --no-film --no-repeat", "?"],
     "show": ["trace.npz", "?"],
     "view": ["?", "a.xml:shoulder --port 0 --law ?"],
     "compare": [f"{words} {BRIEF}" for words in COMPARED],
     "which": [f"{words} {BRIEF}" for words in WHICH],
-    "tune": ["duffing ?", "? pid", "duffing pid --condition ?"],
-    "margins": ["duffing --law pid --gains default --kinds ?", "? --law pid", "duffing --law ?"],
+    "tune": ["duffing --law ?", "? --law pid", "duffing --law pid --condition ?"],
+    "margins": ["duffing --law pid --gains default --kind ?", "? --law pid", "duffing --law ?"],
     "worst": ["duffing --law classical --gains default --budget 1 --duration 0.01"],
     "sensitivity": ["duffing --gains default --points 8 --duration 0.01"],
     "chatter": ["duffing --law ?", "duffing --gains default --actuator ?", "? --law pid"],

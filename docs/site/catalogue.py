@@ -304,7 +304,7 @@ def _properties(template: Template) -> str:
         "plants": ", ".join(f"`{plant}`" for plant in template.plants)
         or "all with an actuator at each joint",
         "found by": ", ".join(
-            f"`--needs {need}`" for need, one in PROPERTIES.items() if one.holds(template)
+            f"`--need {need}`" for need, one in PROPERTIES.items() if one.holds(template)
         )
         or "its name",
     }

@@ -30,7 +30,7 @@ from smc_mujoco.identification import rig
 # command line -> the functions that it calls, of which the last does the work; not for audits
 CALLS = {
     "list pid": ["cli.law_pages.print_pages"],
-    "list --needs continuous,two-gains --json l.json": ["cli.law_pages.print_suitable"],
+    "list --need continuous,two-gains --json l.json": ["cli.law_pages.print_suitable"],
     "list --plant duffing": ["cli.law_pages.print_suitable"],
     "list law.c": ["exchange.c.law_from_c.check"],
     "run duffing": ["cli.run_scene.perform"],
@@ -40,7 +40,7 @@ CALLS = {
     "view duffing --law pid --port 8123 --no-browser": ["draw.studio.view"],
     "compare": ["studies.compare.compare"],
     "compare duffing,van_der_pol --law pid,classical --condition noise --seeds 3 --no-tune "
-    "--worst --quick --metrics itae "
+    "--worst --quick --metric itae "
     "--gains default --duration 2 --x0 0.4 --relevant 0.05 --allow-defaults --out there --searches 2 "
     "--figure f "
     "--latex t.tex --seed 5 --json c.json --threads 2 --device cuda --executor dask://h:1": [
@@ -58,34 +58,34 @@ CALLS = {
         "identification.ensemble.leaderboard",
     ],
     "which duffing": ["studies.which.which"],
-    "which duffing --needs calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 "
+    "which duffing --need calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 "
     "--x0 0.4 "
     "--relevant 0.05 --out there --allow-defaults --seed 5 --json w.json --threads 2 --device cuda "
     "--executor dask://h:1 --minutes 2 --no-film --falling": ["studies.which.which"],
-    "tune duffing pid": ["analysis.tuning.search.tune"],
-    "tune duffing pid --device cuda --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
+    "tune duffing --law pid": ["analysis.tuning.search.tune"],
+    "tune duffing --law pid --device cuda --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
     "--condition noise --x0 0.4 --json j.json --threads 2": ["analysis.tuning.search.tune"],
     "margins": ["robustness.margins.margins"],
     "margins --quick": ["robustness.margins.margins"],
-    "margins duffing --law pid --kinds delay,mass --gains default --quick --device cuda --condition noise --x0 "
+    "margins duffing --law pid --kind delay,mass --gains default --quick --device cuda --condition noise --x0 "
     "0.4 "
     "--json m.json --threads 2": ["robustness.margins.margins"],
     "worst duffing": ["robustness.worst_case.worst_case"],
     "worst duffing --law pid --disturbance 2 "
     "--bound slope=3,position_noise=0.01,delay=0:0.01,mass=0.7:1.3,alpha=0.8:1.2 "
-    "--metric peak --gains default --condition noise --duration 2 --budget 9 --seed 3 --out w "
+    "--metric peak --gains default --condition noise --duration 2 --budget 9 --seed 3 --figure w "
     "--json w.json --threads 2 --device cuda": ["robustness.worst_case.worst_case"],
     "worst lifted_pendulum": ["robustness.worst_case.worst_case"],
     "sensitivity duffing": ["robustness.sensitivity.sensitivity"],
     "sensitivity duffing --law pid --disturbance 2 --bound "
     "delay=0:0.01,encoder=256:4096,period=1:4 "
-    "--metric peak --gains default --condition noise --duration 2 --points 8 --seed 3 --out s "
+    "--metric peak --gains default --condition noise --duration 2 --points 8 --seed 3 --figure s "
     "--json s.json --threads 2 --device cuda": ["robustness.sensitivity.sensitivity"],
     "chatter duffing": ["simulation.grid.case"],
     "chatter duffing --law pid --actuator lag:0.01 --condition noise --gains default --duration 2": [
         "simulation.grid.case"
     ],
-    "chatter duffing --law pid --channel 1 --out c --json c.json --threads 2": [
+    "chatter duffing --law pid --channel 1 --figure c --json c.json --threads 2": [
         "analysis.chattering.chattering"
     ],
     "excitation arm.xml --for m,input_delay --u-max 5 --v-max 2 --amplitude 0.3 --duration 4 "
@@ -164,23 +164,23 @@ def with_values(calls: dict[str, list[str]]) -> dict[str, list[str]]:
 CALLS = with_values(CALLS)
 
 PRINTED = [  # command lines that are run to their ends
-    "list --needs continuous,one-gain --json l.json",
+    "list --need continuous,one-gain --json l.json",
     "list classical --json l.json",
     "show one.npz --export csv,mat --json s.json",
-    "margins duffing --law classical,pid --kinds delay --quick --json m.json",
+    "margins duffing --law classical,pid --kind delay --quick --json m.json",
     (
-        "worst duffing --law classical --budget 3 --duration 0.2 --gains default --out w.pdf "
+        "worst duffing --law classical --budget 3 --duration 0.2 --gains default --figure w.pdf "
         "--json w.json"
     ),
     (
         "sensitivity duffing --law classical --bound mass=0.7:1.3 --points 8 --duration 0.2 "
-        "--out s.pdf --json s.json"
+        "--figure s.pdf --json s.json"
     ),
     (
         "chatter duffing --law super_twisting --actuator lag:0.01 --gains default --duration 0.2 "
-        "--out c.pdf --json c.json"
+        "--figure c.pdf --json c.json"
     ),
-    "tune duffing classical --searches 2 --budget 32 --condition nominal --out t.json --json j.json",
+    "tune duffing --law classical --searches 2 --budget 32 --condition nominal --out t.json --json j.json",
     "compare duffing --law classical,pid --gains default --condition nominal --seeds 1 "
     "--duration 0.1 --out c "
     "--figure f.pdf --latex f.tex --json t.json",
@@ -200,8 +200,8 @@ FLAGS = {
     "--allow-defaults",
 }
 FLAGS |= {"--no-binary"}
-# which function does the work; --needs and --plant of `list`
-SWITCHES = {"--rig", "--needs", "--plant", "--no-film"}
+# which function does the work; --need and --plant of `list`
+SWITCHES = {"--rig", "--need", "--plant", "--no-film"}
 AFTER = {"--figure", "--latex", "--json", "--out"}  # of what is done after the function
 FOLDERS = {"run", "compare", "which"}  # whose --out is a folder
 ALIASES = {
@@ -222,9 +222,14 @@ ALIASES = {
     "--out": "folder",
     "--actuator": "changes",
     "--type": "numbers",
+    "--metric": "metrics",
+    "--kind": "kinds",
+    "--need": "needs",
     "--for": "names",
     "--period": "control_period",
 }
+# an option that its command needs -> another value of it
+REQUIRED = {("tune", "--law"): ["--law", "classical"]}
 # not told in whole
 UNTOLD = {
     "study(scenarios)",
@@ -316,7 +321,8 @@ def test_every_option_changes_the_argument_of_its_name_and_no_other_to_its_value
         option = words[start].partition("=")[0]
         if option in SWITCHES:
             continue
-        without = reached(words[:start] + words[stop:], paths)
+        instead = REQUIRED.get((words[0], option), [])
+        without = reached(words[:start] + instead + words[stop:], paths)
         changed = set()
         for name in {*whole, *without}:
             if whole.get(name) != without.get(name):

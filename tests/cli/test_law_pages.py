@@ -57,7 +57,7 @@ def test_the_table_has_the_formula(call):
 
 
 def test_a_filter_shows_the_laws_that_have_all_properties_and_no_others(call):
-    code, out, err = call("list", "--needs", "continuous,finite-time", "--plant", "duffing")
+    code, out, err = call("list", "--need", "continuous,finite-time", "--plant", "duffing")
     assert code == 0
     assert err == ""
     assert max(map(len, out.splitlines())) <= 80

@@ -57,7 +57,7 @@ def test_compare_prints_the_medians_and_the_counts_of_its_table(printed):
     Path("fails.py").write_text(FAILS)
     out = printed(
         "compare duffing --law classical,pid,fails.py --gains default --no-tune --condition nominal"
-        " --seeds 3 --duration 0.3 --out there --metrics itae,rms_error"
+        " --seeds 3 --duration 0.3 --out there --metric itae,rms_error"
     )
     rows = parquet.read_table("there/results.parquet").to_pylist()
     failed = sum(one["failure"] is not None for one in rows)
@@ -75,7 +75,7 @@ def test_compare_prints_the_medians_and_the_counts_of_its_table(printed):
 
 
 def test_margins_are_printed_in_their_unit(printed):
-    out = printed("margins duffing --law pid --kinds delay,mass --quick --json m.json")
+    out = printed("margins duffing --law pid --kind delay,mass --quick --json m.json")
     for one in json.loads(Path("m.json").read_text()):
         block = out[out.index(f"largest {one['kind']}") :]
         words = row(block, "duffing", "pid")
@@ -110,7 +110,9 @@ def test_sensitivity_prints_shares_in_per_cent_and_ranges_in_their_unit(printed)
 
 
 def test_tune_prints_the_gains_of_its_file(printed):
-    out = printed("tune duffing classical --searches 2 --budget 8 --condition nominal --out g.json")
+    out = printed(
+        "tune duffing --law classical --searches 2 --budget 8 --condition nominal --out g.json"
+    )
     gains = json.loads(Path("g.json").read_text())["scenario"]["law"]["gains"]
     for name, value in gains.items():
         assert float(row(out, name)[1]) == value

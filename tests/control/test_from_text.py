@@ -149,8 +149,8 @@ def test_a_tuning_goes_through_every_door(files, tuned, capsys):
             "nominal",
             "--no-tune",
         ),
-        ("margins", "duffing", "--law", "st.json", "--kinds", "delay", "--quick"),
-        ("tune", "duffing", "st.json", "--budget", "1"),
+        ("margins", "duffing", "--law", "st.json", "--kind", "delay", "--quick"),
+        ("tune", "duffing", "--law", "st.json", "--budget", "1"),
     ):
         with pytest.raises(SystemExit) as end:
             cli.main([*words])

@@ -305,7 +305,7 @@ def test_what_cannot_be_is_said_before_anything_is_searched(
 def test_the_command_prints_the_tables_and_the_answer(folder, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     laws = "fast: observer_free(lam=6,k1=2),slow: observer_free(lam=6,k1=5)"
-    options = ["--needs", "fast", "--condition", "nominal", "--duration", "2.5", "--seed", "1"]
+    options = ["--need", "fast", "--condition", "nominal", "--duration", "2.5", "--seed", "1"]
     with pytest.raises(SystemExit) as end:
         main.main(["which", "duffing", "--law", laws, *options, "--out", str(folder)])
     assert not end.value.code

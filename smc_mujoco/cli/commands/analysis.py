@@ -63,7 +63,7 @@ Condition = Annotated[list[str] | None, options.conditions_by_default("the seven
 
 def tune(
     plant: options.PlantName,
-    law: options.LawText,
+    law: options.LawToTune,
     objective: Objective = "balanced",
     searches: Annotated[int, typer.Option(min=1, help="Independent searches.")] = 12,
     budget: Budget = 64,
@@ -84,7 +84,7 @@ def tune(
     of their results shows how much is chance. The same seed gives the same gains. With --out each
     search is kept in the folder FILE-searches, from which a stopped command resumes.
 
-    Example: smc-mujoco tune duffing observer_free --out duffing.json
+    Example: smc-mujoco tune duffing --law observer_free --out duffing.json
     """
     with delay_signals():
         from smc_mujoco.analysis.tuning import search
@@ -118,8 +118,9 @@ def tune(
 Kinds = Annotated[
     str | None,
     typer.Option(
+        "--kind",
         help="Any of delay, disturbance, friction, mass, noise, blow, jitter, missed and "
-        "loss, separated by commas; default: the first five."
+        "loss, separated by commas; default: the first five.",
     ),
 ]
 Quick = Annotated[
@@ -153,7 +154,7 @@ def margins(
     actuator loses. For laws that can be linearised, the column "theory" has the stability limit of
     the linear loop. A law may tolerate more, with a small sustained oscillation.
 
-    Example: smc-mujoco margins duffing --law observer_free,classical --kinds delay
+    Example: smc-mujoco margins duffing --law observer_free,classical --kind delay
     """
     with delay_signals():
         from smc_mujoco.cli import tables
@@ -231,7 +232,7 @@ def worst(
     duration: Duration = 8.0,
     budget: WorstBudget = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search.")] = 0,
-    out: Annotated[Path | None, options.picture("the worst runs")] = None,
+    figure: Annotated[Path | None, options.picture("the worst runs")] = None,
     json: options.Json = None,
     threads: options.Threads = None,
     device: options.Device = "cpu",
@@ -261,7 +262,7 @@ def worst(
 
     terminal = Terminal(json)
     within = _within(disturbance, bound)
-    options.check_files(None, *files(out))
+    options.check_files(None, *files(figure))
     cases = _attacked_cases(plant, law, condition, duration, gains)
     found = []
     for attacked in cases:
@@ -276,9 +277,9 @@ def worst(
     sources = _sources_of([case.nominal for case in results])
     terminal.note(f"{runs} runs, {sources}", "dim", wrap=True)
     terminal.finish([case.about() for case in results])
-    if out:
-        results.figure(out)
-        terminal.wrote(*files(out))
+    if figure:
+        results.figure(figure)
+        terminal.wrote(*files(figure))
 
 
 def sensitivity(
@@ -297,7 +298,7 @@ def sensitivity(
         ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the points.")] = 0,
-    out: Annotated[Path | None, options.picture("the indices and the runs")] = None,
+    figure: Annotated[Path | None, options.picture("the indices and the runs")] = None,
     json: options.Json = None,
     threads: options.Threads = None,
     device: options.Device = "cpu",
@@ -315,7 +316,7 @@ def sensitivity(
     2^15 counts, half to all of u_max, and a control period up to 4 times as long.
 
     Example: smc-mujoco sensitivity duffing --law super_twisting --bound delay=0:0.02,mass=0.7:1.3
-    --out breaks.png
+    --figure breaks.png
     """
     with delay_signals():
         from smc_mujoco.draw.page import files
@@ -325,7 +326,7 @@ def sensitivity(
 
     terminal = Terminal(json)
     over = _within(disturbance, bound)
-    options.check_files(None, *files(out))
+    options.check_files(None, *files(figure))
     chosen = options.law(law)
     scenario = case(as_plant(plant), chosen, condition, duration, gains)
     found = sensitivity(scenario, over, metric, points, seed, threads, True, device)
@@ -333,9 +334,9 @@ def sensitivity(
     runs = f"{found.runs} runs, {len(found.values)} of them independent"
     terminal.note(f"{runs}, gains: {scenario.law.source}", "dim", wrap=True)
     terminal.finish(found.about())
-    if out:
-        found.figure(out)
-        terminal.wrote(*files(out))
+    if figure:
+        found.figure(figure)
+        terminal.wrote(*files(figure))
 
 
 def _within(disturbance: float | None, bounds: str | None) -> "Uncertainty | None":
@@ -409,7 +410,7 @@ def chatter(
     gains: options.Gains = "tuned",
     channel: Annotated[int, typer.Option(min=0, help="The driven channel.")] = 0,
     duration: ChatterDuration = 8.0,
-    out: Annotated[Path | None, options.picture("Nyquist plots and runs")] = None,
+    figure: Annotated[Path | None, options.picture("Nyquist plots and runs")] = None,
     json: options.Json = None,
     threads: options.Threads = None,
 ) -> None:
@@ -423,7 +424,7 @@ def chatter(
     driven channels, "coupling" is how far this channel's command moves another channel, over how
     far it moves its own. If that is large, the prediction fails.
 
-    Example: smc-mujoco chatter duffing --law classical,super_twisting --actuator lag:0.01 --out
+    Example: smc-mujoco chatter duffing --law classical,super_twisting --actuator lag:0.01 --figure
     chatter
     """
     with delay_signals():
@@ -439,7 +440,7 @@ def chatter(
         from smc_mujoco.simulation.run import run
 
     terminal = Terminal(json)
-    pictures = files(out)
+    pictures = files(figure)
     chosen = options.laws(law, gain_sets.LAWS)
     options.check_files(None, *pictures)
     fields = {} if actuator is None else {"actuator": options.actuator(actuator)}
@@ -459,7 +460,7 @@ def chatter(
     if pictures:
         from smc_mujoco.draw.nyquist import nyquist
 
-        nyquist(cases, channel, cycles, traces, changes, out)
+        nyquist(cases, channel, cycles, traces, changes, figure)
         terminal.wrote(*pictures)
 
 

@@ -27,8 +27,9 @@ Name = Annotated[
 Needs = Annotated[
     str | None,
     typer.Option(
+        "--need",
         help="Only laws with these properties, as a,b: no-velocity, no-model, continuous "
-        "(u), finite-time (of the error), one-gain, two-gains (at most)."
+        "(u), finite-time (of the error), one-gain, two-gains (at most).",
     ),
 ]
 Plant = Annotated[
@@ -58,7 +59,7 @@ def list_(
 
     Example: smc-mujoco list super_twisting
 
-    Example: smc-mujoco list --needs continuous,two-gains
+    Example: smc-mujoco list --need continuous,two-gains
 
     Example: smc-mujoco list my_law.c
     """
@@ -120,6 +121,6 @@ def _print_all(terminal: Terminal, kind: str) -> None:
         if found:
             terminal.print(tables.catalogue(title, found), "")
     terminal.print(
-        "smc-mujoco list NAME shows a law or a plant in full; --needs one-gain,continuous lists "
+        "smc-mujoco list NAME shows a law or a plant in full; --need one-gain,continuous lists "
         "the laws that have both"
     )

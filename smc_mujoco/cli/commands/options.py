@@ -123,9 +123,10 @@ Json = Annotated[
     Path | None, typer.Option(metavar="FILE.json", help="Also write the result to a file.")
 ]
 OneLaw = Annotated[str, typer.Option("--law", autocompletion=LAWS, help=f"A law. {GAINS_HELP}")]
-LawText = Annotated[
+LawToTune = Annotated[
     str,
-    typer.Argument(
+    typer.Option(
+        "--law",
         metavar="LAW|FILE",
         autocompletion=LAWS,
         help="As pid or pid(kp=50,ki=50,kd=8), or a file with a law.",

@@ -30,10 +30,11 @@ Seed = Annotated[int, typer.Option(min=0, help="Seed of initial states, noise an
 Needs = Annotated[
     str,
     typer.Option(
+        "--need",
         help="What to compare, separated by commas: fast (settling time), accurate (ultimate "
         "bound), on-track (ITAE), calm (TV rate of u), gentle (largest u), frugal (integral of "
-        "u^2), no-overshoot. Any name of `smc-mujoco list --needs`, such as no-velocity, is a "
-        "property that the law must have."
+        "u^2), no-overshoot. Any name of `smc-mujoco list --need`, such as no-velocity, is a "
+        "property that the law must have.",
     ),
 ]
 AdviceCondition = Annotated[
@@ -93,10 +94,10 @@ def which(
     --quick takes ten minutes for all at most: it also writes the gains, a figure and a film of the
     worst run. --law names the laws to try. A stopped command resumes when you start it again.
 
-    Example: smc-mujoco which duffing --condition noise,coulomb --needs calm,fast
+    Example: smc-mujoco which duffing --condition noise,coulomb --need calm,fast
 
     Example: smc-mujoco which arm.xml:shoulder --x0 0.5 --condition "worn:
-    sensor=Encoder(counts=4096)" --needs accurate
+    sensor=Encoder(counts=4096)" --need accurate
     """
     with delay_signals():
         from smc_mujoco.studies.advice import RaceAdvice
@@ -202,9 +203,10 @@ Duration = Annotated[
 Metrics = Annotated[
     str | None,
     typer.Option(
+        "--metric",
         help="What to compare, separated by commas: scores that `smc-mujoco show` lists, or "
         '"settles", the share of settled runs. Default: settles, settling_time, '
-        "ultimate_bound, itae, tv_rate."
+        "ultimate_bound, itae, tv_rate.",
     ),
 ]
 Latex = Annotated[
