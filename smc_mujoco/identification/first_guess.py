@@ -25,7 +25,7 @@ from smc_mujoco.identification.inverse_dynamics import (
     cubic_samples,
 )
 from smc_mujoco.identification.least_squares import least_squares
-from smc_mujoco.identification.own_rig import OwnRig
+from smc_mujoco.identification.own_rig import OwnRig, moves
 from smc_mujoco.identification.paths import DELAY, MAX_DELAY, slope, steady_force
 from smc_mujoco.identification.records import Columns, Record, stacked, step_of
 from smc_mujoco.mechanisms.custom.joint_numbers import KINDS
@@ -381,10 +381,11 @@ def doubts(rig: OwnRig, data: Sequence[Data]) -> list[str]:
             if rig.plant.units[i] == "rad" and reach > LARGEST_ANGLE:
                 said.append(f"{x} reaches {reach:.3g} rad: if that is in degrees, divide by 57.3")
             gained = f"{driven_names(rig.plant)[i]}.gain" in rig.quantities
-            if shares[i] > TOO_LARGE and not gained:
+            if shares[i] > TOO_LARGE and not gained and moves(record[x]):
                 unit = rig.plant.efforts[i]
                 said.append(
                     f"{u} is {shares[i]:.2g} times the force that the motion takes by inertia and "
-                    f"gravity: if it is not in {unit} but in mA or N mm, give it in {unit}"
+                    f"gravity: if it is not in {unit} but in mA or N mm, give it in {unit}; if dry "
+                    "friction takes the rest, record a larger motion"
                 )
     return list(dict.fromkeys(said))

@@ -29,7 +29,7 @@ from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
-from smc_mujoco.identification import first_guess, gauss_newton, number_text, records
+from smc_mujoco.identification import first_guess, gauss_newton, log_quality, number_text, records
 from smc_mujoco.identification.own_rig import OwnRig, condition_fields, own_rig
 from smc_mujoco.identification.paths import named_once
 from smc_mujoco.identification.presliding import presliding
@@ -109,14 +109,14 @@ class Identified:
     by_pieces: tuple[Numbers, ...] = ()  # fit of the pieces of each log; empty in a closed loop
     scatter: Numbers = dataclasses.field(default_factory=dict)  # of values between logs, if several
     held_out: HeldOutFit | None = None  # of the log that was kept aside
-    units_doubted: tuple[str, ...] = ()  # sentences on columns that may be in another unit
+    doubted: tuple[str, ...] = ()  # sentences on what may be wrong with columns
     gives_way: str = ""  # how dry friction gives way before it slides, and what to do
     data: tuple[Data, ...] = dataclasses.field(default=(), repr=False)  # the logs' columns
 
     @property
     def notes(self) -> list[str]:
         """What the logs cannot determine, and what to doubt."""
-        notes = list(self.units_doubted)
+        notes = list(self.doubted)
         for (i, first), (j, second) in itertools.combinations(enumerate(self.values), 2):
             correlation = self.correlations[i, j]
             if abs(correlation) > MAX_CORRELATION:
@@ -324,7 +324,9 @@ def identify(
     twin, data = _read(machine, logs, listed, columns)
     names = _checked_names(twin, listed)
     fits_before = twin.fits(data)  # also refuses records that are too short
-    doubts = first_guess.doubts(twin, data) if isinstance(twin, OwnRig) else []
+    doubts = []
+    if isinstance(twin, OwnRig):
+        doubts = first_guess.doubts(twin, data) + log_quality.doubts(twin, data)
     expected = _expected_sets(twin, names, most)
     with bar(f"identify {twin.name}", expected, shown=progress) as drawn:
 
@@ -363,7 +365,7 @@ def identify(
         by_pieces=() if replays.whole else tuple(fits_by_pieces(replays, slopes)),
         scatter=scatter,
         held_out=None if held_out is None else check(fitted, held_out, columns),
-        units_doubted=tuple(doubts),
+        doubted=tuple(doubts),
         gives_way=giving.way,
         data=tuple(data),
     )

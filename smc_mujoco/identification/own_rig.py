@@ -38,7 +38,7 @@ from smc_mujoco.simulation.trace import Trace
 
 MAX_PERIOD = 2.5e-3  # s, of a replay's commands; chosen: a mixed command then errs by 3 us^2 u/J
 SLOWEST = 40.0  # Hz: a log of fewer samples a second misses too much of the commands; chosen
-STILL = 3.0  # deviations of the noise: a record that varies by less has no motion; chosen
+STILL = 3.0  # deviations of the noise, or steps of the sensor: less is no motion; chosen
 RUN_STEP = 2.5e-4  # s, longest physics step of runs with a delay, which it divides
 SETTINGS = "control_period", "u_max", "mechanism", "velocity", "model"  # of a scenario, kept
 
@@ -101,11 +101,11 @@ class OwnRig(Rig):
                 f"did between them is not in it: record {SLOWEST:g} or more a second, or find "
                 "friction alone from pairs of speed and torque, by smc.identify_friction"
             )
-        moved = max(float(np.std(data[name])) for name in self.columns.x)
-        if moved <= STILL * records.noise(data, self.columns):
+        if not any(moves(data[name]) for name in self.columns.x):
+            largest = max(float(np.std(data[name])) for name in self.columns.x)
             raise ScenarioError(
                 f"no joint of {self.name} moves in the record: the largest deviation of a position "
-                f"is {moved:.2g}, no more than noise: record a motion"
+                f"is {largest:.2g}, no more than noise or some steps of the sensor: record a motion"
             )
         return data
 
@@ -253,6 +253,11 @@ class OwnRig(Rig):
                 if joint in joints:
                     faulty.add(joint)
         return tuple(zeros + (motors if len(faulty) > 1 else []))
+
+
+def moves(x: Array) -> bool:
+    """Return whether a column of positions varies by more than noise and rounding."""
+    return bool(np.std(x) > STILL * max(records.white_noise(x), records.sensor_step(x)))
 
 
 def own_rig(given: Plant | Scenario, names: Sequence[str]) -> OwnRig:

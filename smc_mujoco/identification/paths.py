@@ -15,7 +15,7 @@ frictionloss - offset and frictionloss + offset.
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from smc_mujoco.identification.rig import Quantity
 from smc_mujoco.mechanisms.custom.joint_numbers import joint_numbers, with_joint_numbers
 from smc_mujoco.mechanisms.hardware.joint_force import of_joint
 from smc_mujoco.mechanisms.hardware.moments import JointState
-from smc_mujoco.mechanisms.hardware.part import Friction
+from smc_mujoco.mechanisms.hardware.part import Friction, Part
 from smc_mujoco.mechanisms.layout import channel_names, driven_names
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.part_numbers import (
@@ -133,7 +133,18 @@ def _of_part(base: Scenario, path: str) -> tuple[PartNumber, Quantity]:
     for number in ranges(of_fields(type(parts[place.part])).get(place.name)):
         least = _open(number.low) if number.above != 0.0 else LEAST_ABOVE_ZERO
         most = math.inf if number.high >= 1e12 else number.high
-    return place, Quantity(float(place.of(parts)), "", "the scenario", least, most)
+    unit = _unit(base.plant, parts[place.part], place)
+    return place, Quantity(float(place.of(parts)), unit, "the scenario", least, most)
+
+
+def _unit(plant: Plant, part: Any, place: PartNumber) -> str:
+    """Return the unit of a part's number, "" for none, by the first of the joints that share it."""
+    if not isinstance(part, Part):
+        return ""  # a signal
+    i = max(part.channels(plant)[max(place.joint, 0)], 0)
+    x = plant.units[i]
+    inertia = "kg m^2" if x == "rad" else "kg"
+    return part.units.get(place.name, "").format(f=plant.efforts[i], x=x, m=inertia)
 
 
 def _open(least: float) -> float:

@@ -32,6 +32,7 @@ MAX_PERIOD = 0.2
 MAX_GAP = 10
 MAX_GAP_CLOSED = 1.5  # periods: the same for a closed loop, of which no sample may be missing
 NORMAL_MEDIAN = 0.6745  # median of |z| for a standard normal z
+ROUNDING = 1e-9  # of the largest value: a smaller difference of two is rounding; chosen
 RESOLUTION = 1e-6  # s, to which the period of an open-loop record is rounded
 
 
@@ -268,15 +269,29 @@ def step_of(t: Array) -> float:
 def noise(data: Record, columns: Columns) -> float:
     """Return the standard deviation of the white noise of the positions, rad or m: the least of all
     columns.
+    """
+    return min(white_noise(data[name]) for name in columns.x)
 
-    It follows from the fourth differences of a column, which are near 0 for a smooth motion, and
-    have the standard deviation sqrt(70) sigma for white noise of sigma. Their median ignores short
+
+def white_noise(values: Array) -> float:
+    """Return the standard deviation of the white noise of a column.
+
+    It follows from the fourth differences, which are near 0 for a smooth motion, and have the
+    standard deviation sqrt(70) sigma for white noise of sigma. Their median ignores short
     transients.
     """
-    medians = []
-    for name in columns.x:
-        medians.append(np.median(np.abs(np.diff(data[name], 4))))
-    return float(min(medians)) / (NORMAL_MEDIAN * math.sqrt(70.0))
+    median = float(np.median(np.abs(np.diff(values, 4))))
+    return median / (NORMAL_MEDIAN * math.sqrt(70.0))
+
+
+def sensor_step(values: Array) -> float:
+    """Return the step of the sensor that gave a column: the least difference of two values that is
+    more than rounding; 0 for a constant one.
+    """
+    gaps = np.diff(np.unique(values))
+    rounding = ROUNDING * float(np.abs(values).max(initial=0.0))
+    steps = gaps[gaps > rounding]
+    return float(steps.min()) if len(steps) else 0.0
 
 
 def _numbers(name: str, values: Any, rig: str) -> Array:

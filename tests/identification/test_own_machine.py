@@ -250,8 +250,19 @@ def test_the_numbers_of_a_part_have_the_ranges_of_its_type(arm):
     assert ranges["friction.vs"] == (0.3, 1e-9)
     assert ranges["actuator.resistance"][1] == 1e-9
     assert ranges["j1.offset"] == (0.0, -np.inf)
+    units = [rig.quantities[name].unit for name in ("friction.j1.kc", "friction.vs")]
+    assert units == ["N m", "rad/s"]
     moved = rig.with_values({"friction.vs": 0.5})
     assert moved.scenario("none").friction[0].vs == 0.5
+
+
+def test_the_units_of_a_slide_s_friction_are_those_of_a_slide():
+    sled = ONE.replace('axis="0 1 0"', 'type="slide" axis="1 0 0"')
+    bristles = smc.hardware.LuGre(0.2, 0.3, 0.1)
+    machine = smc.Scenario(plant=smc.plant_from(sled, ["j1"]), law="none", friction=bristles)
+    names = ["friction.coulomb", "friction.stribeck", "friction.stiffness"]
+    rig = own_rig(machine, names)
+    assert [rig.quantities[name].unit for name in names] == ["N", "m/s", "N/m"]
 
 
 @pytest.mark.parametrize(

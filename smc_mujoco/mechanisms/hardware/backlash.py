@@ -3,8 +3,8 @@ MuJoCo's limits.
 """
 
 import dataclasses
-from collections.abc import Iterator
-from typing import Annotated
+from collections.abc import Iterator, Mapping
+from typing import Annotated, ClassVar
 
 import mujoco
 
@@ -38,6 +38,7 @@ class Backlash(BesideJoint):
     """
 
     smooth = False
+    units: ClassVar[Mapping[str, str]] = {"gap": "{x}"} | BesideJoint.units
 
     gap: Natural
     rotor_inertia: Annotated[float, Number(low=MIN_INERTIA, high=MAX_PARAMETER)] = 1e-3

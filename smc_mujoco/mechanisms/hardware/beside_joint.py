@@ -5,7 +5,8 @@ or a spring. All angles and inertias are those at the joint, behind the gear.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import ClassVar
 
 import mujoco
 import numpy as np
@@ -31,6 +32,7 @@ class BesideJoint(Actuator):
     """
 
     drives = False
+    units: ClassVar[Mapping[str, str]] = {"rotor_inertia": "{m}", "rotor_damping": "{f} s/{x}"}
 
     rotor_inertia: float
     rotor_damping: float

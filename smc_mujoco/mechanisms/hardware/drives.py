@@ -18,7 +18,7 @@ exact for a speed that changes linearly there.
 # (a constant of the base class is a property here)
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import mujoco
@@ -72,6 +72,8 @@ class Lag(Actuator):
     leads: ClassVar[bool] = True
     has_moment: ClassVar[bool] = True
 
+    units: ClassVar[Mapping[str, str]] = {"tau": "s"}
+
     tau: Natural
 
     @property
@@ -93,6 +95,8 @@ class RateLimit(Actuator):
     """
 
     in_callback: ClassVar[bool] = True
+
+    units: ClassVar[Mapping[str, str]] = {"rate": "{f}/s"}
 
     rate: Bound
 
@@ -151,6 +155,20 @@ class DCMotor(Actuator):
       brush, brush_2: rad at the motor, an angle at which each brush bridges two bars; chosen.
       command: what u is: "torque", N m (N) at the joint, or "voltage", V.
     """
+
+    units: ClassVar[Mapping[str, str]] = {
+        "resistance": "ohm",
+        "inductance": "H",
+        "torque_constant": "N m/A",
+        "rotor_inertia": "kg m^2",
+        "cogging": "N m",
+        "voltage": "V",
+        "current": "A",
+        "bridge": "rad",
+        "bridge_2": "rad",
+        "brush": "rad",
+        "brush_2": "rad",
+    }
 
     resistance: Annotated[float, Number(low=MIN_RESISTANCE, high=MAX_PARAMETER)] = 0.299
     inductance: Natural = 0.0823e-3

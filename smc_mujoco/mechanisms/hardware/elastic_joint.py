@@ -9,8 +9,8 @@ Measurement, and Control 109(4), 1987, with a damper beside the spring.
 
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
-from typing import Annotated, Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any, ClassVar
 
 import mujoco
 import numpy as np
@@ -51,6 +51,11 @@ class ElasticJoint(BesideJoint):
         more; that of a DCMotor is added. The default is chosen: 1 % of the pendulums' 0.125.
       rotor_damping: N m s/rad (N s/m) of the rotor's bearings, 0 or more.
     """
+
+    units: ClassVar[Mapping[str, str]] = {
+        "stiffness": "{f}/{x}",
+        "damping": "{f} s/{x}",
+    } | BesideJoint.units
 
     stiffness: Positive
     damping: Natural = 0.0

@@ -13,8 +13,8 @@ measures no velocity: by default the controller differentiates the positions.
 # (a constant of the base class is a function or a property here)
 import dataclasses
 import math
-from collections.abc import Hashable, Sequence
-from typing import Annotated
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Annotated, ClassVar
 
 import mujoco
 import numpy as np
@@ -75,6 +75,7 @@ class Encoder(OnJoints):
                 f"Encoder has period {self.period:g} and skew {self.skew:g} s: give one of them"
             )
 
+    units: ClassVar[Mapping[str, str]] = {"bias": "{x}", "period": "s", "delay": "s", "skew": "s"}
     memory = 2  # the last reading that was not lost
     names = ("bias", "counts", "dropout")
 

@@ -7,7 +7,8 @@ actuator. Under RK4 the callback simulates dry friction on joints that move alon
 # pyright: reportIncompatibleVariableOverride=false
 # (a constant of the base class is a function or a property here)
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import ClassVar
 
 import mujoco
 import numpy as np
@@ -48,6 +49,7 @@ class Viscous(Friction):
 
     smooth = True
     forces = names = ("b",)
+    units: ClassVar[Mapping[str, str]] = {"b": "{f} s/{x}"}
 
     b: Natural
 
@@ -84,6 +86,7 @@ class Coulomb(Friction):
     """
 
     forces = names = ("level",)
+    units: ClassVar[Mapping[str, str]] = {"level": "{f}"}
 
     level: Natural
 
@@ -297,6 +300,13 @@ class LuGre(Friction):
     keeps_state = True
     forces = ordered = "coulomb", "static"
     names = "coulomb", "static", "stribeck"
+    units: ClassVar[Mapping[str, str]] = {
+        "coulomb": "{f}",
+        "static": "{f}",
+        "stribeck": "{x}/s",
+        "stiffness": "{f}/{x}",
+        "damping": "{f} s/{x}",
+    }
 
     coulomb: Positive
     static: Positive

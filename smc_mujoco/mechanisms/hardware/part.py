@@ -8,7 +8,7 @@ simulate, a part does itself by compiled functions, see moments.py.
 
 import dataclasses
 import math
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar
 
 import mujoco
@@ -60,6 +60,8 @@ class Part:
     read: ClassVar[Callable[..., tuple[float, float]] | None] = None
     # names of its numbers, by which these functions read a row of `numbers`
     names: ClassVar[tuple[str, ...]] = ("unused",)
+    # units of its numbers; {f}, {x} and {m} are those of its joint's force, position and inertia
+    units: ClassVar[Mapping[str, str]] = {}
     memory: ClassVar[int] = 0  # numbers that it keeps for each joint
     # name of its number that implicitfast counts as damping, beside a force held over a step
     counted: ClassVar[str] = ""

@@ -18,7 +18,7 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from smc_mujoco.common.errors import find
 from smc_mujoco.common.files import read_json
@@ -63,6 +63,14 @@ class ServoFriction(Sliding):
     """
 
     forces = ("kv", "kc", "kcs", *LOAD_FACTORS)
+    units: ClassVar[Mapping[str, str]] = {
+        "kv": "{f} s/{x}",
+        "kc": "{f}",
+        "kcs": "{f}",
+        "kmq": "1/({f})",
+        "keq": "1/({f})",
+        "vs": "{x}/s",
+    }
 
     kv: NaturalPerJoint = 0.0
     kc: NaturalPerJoint = 0.0

@@ -28,8 +28,8 @@ may have exerted of it is not counted in the load.
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Hashable, Iterator
-from typing import Annotated, Any, NamedTuple
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import mujoco
 import numpy as np
@@ -313,6 +313,7 @@ class Sigmoid(Sliding):
     """
 
     forces = "p1", "hold"
+    units: ClassVar[Mapping[str, str]] = {"p1": "{f}", "p2": "s/{x}", "p3": "{x}/s", "hold": "{f}"}
 
     p1: NaturalPerJoint
     p2: PositivePerJoint

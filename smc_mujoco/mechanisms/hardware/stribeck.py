@@ -2,7 +2,8 @@
 
 import dataclasses
 import math
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -49,6 +50,14 @@ class Stribeck(Sliding):
 
     forces = "coulomb", "static", "viscous", "offset"
     ordered = "coulomb", "static"
+    units: ClassVar[Mapping[str, str]] = {
+        "coulomb": "{f}",
+        "static": "{f}",
+        "stribeck": "{x}/s",
+        "viscous": "{f} s/{x}",
+        "offset": "{f}",
+        "width": "{x}/s",
+    }
 
     coulomb: NaturalPerJoint
     static: NaturalPerJoint | None = None

@@ -1,0 +1,54 @@
+"""What is said of logs whose columns make every number doubtful, before anything is replayed."""
+
+import numpy as np
+import pytest
+from helpers.machine_logs import chain
+
+import smc_mujoco as smc
+from smc_mujoco.identification import log_quality
+from smc_mujoco.identification.own_rig import own_rig
+
+T = np.arange(0.0, 4.0, 2e-3)
+X = 0.4 * np.sin(5.0 * T)
+COUNT = 2.0 * np.pi / 4096
+
+
+@pytest.fixture(scope="module")
+def rig():
+    """An arm of one joint."""
+    return own_rig(smc.plant_from(chain([0.4], [1.0]), ["j1"]), ["j1.damping"])
+
+
+def rounded(x):
+    return COUNT * np.round(x / COUNT)
+
+
+def said(rig, x):
+    return log_quality.doubts(rig, [{"t": T, "x": x, "u": np.sin(5.0 * T)}])
+
+
+def test_a_good_log_leaves_no_doubt_with_noise_or_counts_or_neither(rig):
+    noise = 2e-4 * np.random.default_rng(0).standard_normal(len(T))
+    for x in (X, X + noise, rounded(X + noise)):
+        assert not said(rig, x)
+
+
+def test_spikes_are_counted_and_placed(rig):
+    x = rounded(X)
+    spikes = [200, 900, 901, 1500]  # the two in a row are wide, and no spike
+    x[spikes] += 0.1
+    (sentence,) = said(rig, x)
+    assert sentence.startswith("2 of 2000 samples of x stick out")
+    assert "the first at 0.4 s" in sentence
+
+
+def test_a_motion_of_few_counts_is_told(rig):
+    (sentence,) = said(rig, rounded(10.0 * COUNT * X / 0.4))
+    assert "only 20 times the noise or the step of its sensor" in sentence
+
+
+def test_a_stuck_joint_is_refused_for_its_rest_and_not_for_the_unit_of_its_command(rig):
+    """Its encoder shows two counts, one after the other."""
+    stuck = {"t": T, "x": np.where(T < 2.0, 0.0, COUNT), "u": 50.0 * np.sin(5.0 * T)}
+    with pytest.raises(smc.ScenarioError, match="no joint of chain moves in the record"):
+        smc.identify(rig.plant, stuck, ["j1.damping"])
