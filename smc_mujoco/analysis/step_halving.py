@@ -95,7 +95,7 @@ def doubled(scenario: Scenario) -> Scenario:
     if scenario.resolved.integrator != "RK4" or step > scenario.control_period:
         return scenario
     try:
-        return dataclasses.replace(scenario, physics_step=step)
+        return dataclasses.replace(scenario, physics_step=step).named(scenario.condition)
     except ScenarioError:
         return scenario
 

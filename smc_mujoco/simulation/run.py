@@ -280,14 +280,14 @@ class ScenarioBatch:
 
     Make and run it while the callback is installed.
 
-    Without `constraints`, no limit, contact, dry friction or equality constraint acts.
+    `off` has MuJoCo's disable flags of what does not act, such as contacts.
     """
 
     def __init__(
         self,
         prepared: Sequence[Prepared],
         threads: int,
-        constraints: bool = True,
+        off: int = 0,
         python: bool = False,
     ):
         self.prepared = prepared
@@ -297,7 +297,8 @@ class ScenarioBatch:
         count = len(scenarios)
         self.base = prepared[0].mechanism.model
         self.model = copy.copy(prepared[0].mechanism.model)
-        if not (constraints and self.may_have_constraints()):
+        self.model.opt.disableflags |= off
+        if not self.may_have_constraints():
             self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
         set_fields = models.put_values(self.model, self.base, first, 0)
         self.scratch = mujoco.MjData(self.model)

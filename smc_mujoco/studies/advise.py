@@ -3,7 +3,8 @@
 The race says which law has the lowest J however it is tuned. Of each law that may be the best, the
 three sets of the lowest J run on the same two unseen instances, which choose one. Eight others say
 which law has the lowest J with these gains, as their units are runs. The tables, the share of runs
-that settle, and the margins are of these gains, too, on runs of their own.
+that settle, and the margins are of these gains, too, on runs of their own. Under RK4 all these runs
+have twice the usual physics step, where that fits.
 """
 
 import math
@@ -25,6 +26,7 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.robustness.margins import COARSE, Margin, margins_of
 from smc_mujoco.simulation import coerce
+from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.advice import RELIABLE, RaceAdvice
 from smc_mujoco.studies.answer_time import FEWEST_SEEDS, AnswerTime
@@ -59,8 +61,8 @@ def advise(
     """
     goal = trial.asked_goal(plant)
     entrants, left_out = _entrants(trial, plant, laws)
-    table_work = sum(trial.case(plant, "none", one).work for one in trial.conditions)
-    margins_work = TRIED * len(KINDS) * trial.case(plant, "none", trial.conditions[0]).work
+    table_work = sum(_coarse(trial, plant, "none", one).work for one in trial.conditions)
+    margins_work = TRIED * len(KINDS) * _coarse(trial, plant, "none", trial.conditions[0]).work
     clock.unit = _work_of_judgement(plant, goal)
     count = min(len(entrants), SHOWN)
     few = min(seeds, FEWEST_SEEDS)
@@ -75,7 +77,7 @@ def advise(
         fixed = _fixed(trial, plant, chosen, goal, relevant)
     candidates = [Candidate(law, (law,)) for law in chosen.values()]
     made = clock.seeds(seeds, len(chosen) * table_work, margins_work)
-    table = trial.run({plant.name: candidates}, made, half_steps=False)
+    table = trial.run({plant.name: candidates}, made, coarse=True)
     settled = _settled(table)
     least = {law: _least_share(settled[law]) for law in chosen}
     order = in_order(least, fixed, raced.winner)
@@ -103,6 +105,13 @@ def advise(
         left_out=left_out,
         judged=f"over {joined([one.name for one in goal.conditions])} on {plant.name}",
     )
+
+
+def _coarse(
+    trial: Trial, plant: Plant, law: Component | str, condition: Condition | str
+) -> Scenario:
+    """Return a run as those of the tables and margins: at twice the usual step under RK4."""
+    return doubled(trial.case(plant, law, condition))
 
 
 def _least_share(settled: Mapping[str, tuple[int, int]]) -> float:
@@ -238,8 +247,8 @@ def _margins(
     where that has other commands, and the kinds for which there is no time; none of either where
     it starts at its goal.
     """
-    base = trial.case(plant, law, "nominal")
-    first = trial.case(plant, law, trial.conditions[0])
+    base = _coarse(trial, plant, law, "nominal")
+    first = _coarse(trial, plant, law, trial.conditions[0])
     if base.efforts != first.efforts:
         base = first
     if not math.dist(base.resolved.x0, plant.origin):

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis.ranking import needed_to_win
+from smc_mujoco.analysis.step_halving import doubled
 from smc_mujoco.analysis.tuning import quick_search, result, search, search_space
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Objective, objectives
 from smc_mujoco.common import fingerprint
@@ -410,9 +411,11 @@ class Trial(NamedTuple):
         self,
         candidates: Mapping[str, Sequence[Candidate]],
         seeds: int,
-        half_steps: bool = True,
+        coarse: bool = False,
     ) -> Table:
-        """Run the laws of each plant in each condition from that many seeds."""
+        """Run the laws of each plant in each condition from that many seeds; `coarse` runs have
+        twice the usual step under RK4, where that fits, and are not repeated at half of theirs.
+        """
         runs = all_combinations(
             self.plants,
             lambda plant: candidates[plant.name],
@@ -421,12 +424,14 @@ class Trial(NamedTuple):
             self.duration,
             self.starts,
         )
+        if coarse:
+            runs = list(map(doubled, runs))
         return study(
             runs,
             self.folder,
             threads=self.threads,
             progress=self.progress,
-            half_steps=half_steps,
+            half_steps=not coarse,
             executor=self.executor,
         )
 

@@ -50,7 +50,7 @@ class Evaluator:
       names: the gains that a candidate consists of.
       threads: as in `run`.
       by_equation: whether the plant's equation replaces MuJoCo where it can.
-      constraints: whether limits and contacts act in MuJoCo.
+      off: disable flags of what does not act in MuJoCo, such as contacts.
       slots: how many candidates MuJoCo runs at once.
       device: of the runs by equation, "cpu" or "cuda".
     """
@@ -62,7 +62,7 @@ class Evaluator:
         names: Sequence[str],
         threads: int | None = None,
         by_equation: bool = False,
-        constraints: bool = True,
+        off: int = 0,
         slots: int = 1,
         device: str = "cpu",
     ):
@@ -70,7 +70,7 @@ class Evaluator:
         self.cases = list(cases)
         self.names = tuple(names)
         self.threads = cores(threads)
-        self._options = threads, by_equation, constraints, slots, device
+        self._options = threads, by_equation, off, slots, device
         prepared = []
         for case in self.cases:
             prepared.append(prepare(case))
@@ -95,7 +95,7 @@ class Evaluator:
                     made = equation.Equations(goal, some, self.names, self.threads, device)
                 else:
                     batch = [prepared[i] for i in indices]
-                    made = _RepeatedBatch(batch, names, self.threads, constraints, slots)
+                    made = _RepeatedBatch(batch, names, self.threads, off, slots)
                 self._runs.append((indices, made))
 
     def __call__(self, candidates: Sequence[Floats]) -> list[Evaluation]:
@@ -199,11 +199,11 @@ class _RepeatedBatch(ScenarioBatch):
         cases: Sequence[Prepared],
         names: Sequence[str],
         threads: int,
-        constraints: bool,
+        off: int,
         slots: int,
     ):
         prepared = [*cases] * slots
-        super().__init__(prepared, threads, constraints)
+        super().__init__(prepared, threads, off)
         self.slots = slots
         self.cases = [item.scenario for item in cases]
         self.first_records = self.records.copy()

@@ -5,7 +5,8 @@ then; with fewer, J was often several times that of a whole search.
 
 1. A Latin hypercube of four times the usual size is screened in the first run alone. Its best
    third, at least three sets, is screened in all runs, and the evolution begins at the best.
-2. All evaluations, those of the descent too, have one physics step a control period.
+2. All evaluations, those of the descent too, have one physics step a control period, and leave out
+   what `search` leaves out in its first two stages.
 3. The best three sets are decided as a scenario runs, under RK4 at twice its step where that fits.
 """
 
@@ -32,11 +33,12 @@ DECIDED = 3  # sets that are decided as a scenario runs; chosen
 RULE = (
     "quick CMA-ES and COBYQA, in the logarithm of the gains: each search has its own start, seed, "
     f"noise and initial states, and {BUDGET} evaluations a gain, at one physics step a control "
-    "period. A Latin hypercube of half as many sets, within 1.5 decades about the gains' scale by "
-    "dimension, further above for products of more than two rates, "
-    "is screened in the first run alone, and the best of these in all. CMA-ES and "
-    "COBYQA go on from there; both may leave the box by a decade. The best three sets are decided "
-    "as a scenario runs, under RK4 at twice its step where that fits"
+    "period, and without contacts of a model that touches nothing at its start and goal. A Latin "
+    "hypercube of half as many sets, within 1.5 decades about the gains' scale by dimension, "
+    "further above for products of more than two rates, is screened in the first run alone, and "
+    "the best of these in all. CMA-ES and COBYQA go on from there; both may leave the box by a "
+    "decade. The best three sets are decided as a scenario runs, under RK4 at twice its step where "
+    "that fits"
 )
 
 

@@ -16,7 +16,9 @@ Where a plant is nothing but its equation under RK4, the fast engine takes the p
 thirtieth of the time. J on record is MuJoCo's, from one evaluation of the best gains. If the two J
 differ by more than 1 %, the search is made again in MuJoCo. Elsewhere the first two stages are
 cheap: they use Euler's method in place of RK4, or one step of another integrator a control period,
-and leave out limits and contacts that are the plant's own. Descents run as a scenario does.
+and leave out limits and contacts that are the plant's own. Where other constraints act, they leave
+out contacts of a model on a fixed base that touches nothing at its start and at its goal. Descents
+run as a scenario does.
 
 A set of gains that misses a condition of the law's theorem is drawn again, and the descent is drawn
 back to the nearest set on its way that does not, unless `outside_theorem` lifts the conditions.
@@ -81,6 +83,7 @@ from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.common.version import versions
 from smc_mujoco.control.component import Component, Template, unit_cure
+from smc_mujoco.mechanisms.custom import clearance
 from smc_mujoco.mechanisms.custom.scales import falls
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.conventions import leans
@@ -97,6 +100,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.simulation.workers import Workers, called, opened
 
+OFF = mujoco.mjtDisableBit
 AGREEMENT = 0.01  # of J: the equation's and MuJoCo's differ by less, or MuJoCo searches again
 SLOTS = 8  # candidates that MuJoCo screens at once: as many as CMA-ES asks for with five gains
 RULE = (
@@ -498,11 +502,10 @@ def _cheap(accurate: Evaluator, at_period: bool = False) -> Evaluator:
         for case in accurate.cases:
             coarse = _coarse(case)
             cases.append(_at_period(coarse) if at_period else coarse)
-    constraints = not all(map(_only_limits, accurate.cases))
     goal = accurate.goal
     names = accurate.names
     threads = accurate.threads
-    return Evaluator(goal, cases, names, threads, constraints=constraints, slots=SLOTS)
+    return Evaluator(goal, cases, names, threads, off=_left_out(accurate.cases), slots=SLOTS)
 
 
 def _coarse(case: Scenario) -> Scenario:
@@ -529,6 +532,33 @@ def _at_period(case: Scenario) -> Scenario:
         return case
 
 
+def _left_out(cases: Sequence[Scenario]) -> int:
+    """Return MuJoCo's disable flags of what cheap runs leave out: the plant's own limits and
+    contacts, or only contacts where something else acts.
+    """
+    if all(map(_only_limits, cases)):
+        return OFF.mjDSBL_CONSTRAINT.value
+    if all(map(_touches_nothing, cases)):
+        return OFF.mjDSBL_CONTACT.value
+    return 0
+
+
+def _touches_nothing(case: Scenario) -> bool:
+    """Return whether a user's model on a fixed base touches nothing where it starts and at its
+    goal, and no part adds contacts.
+    """
+    model = prepare(case).mechanism.model
+    if not case.plant.is_user_model or model.npair or _is_free(model):
+        return False
+    places = case.resolved.x0, case.plant.origin
+    return not any(clearance.touches_at(case.plant, x) for x in places)
+
+
+def _is_free(model: mujoco.MjModel) -> bool:
+    """Return whether a model has a body that nothing holds."""
+    return bool(np.any(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE))
+
+
 def _only_limits(case: Scenario) -> bool:
     """Return whether MuJoCo's constraints are only limits and contacts of the plant itself, which
     rarely act.
@@ -537,7 +567,7 @@ def _only_limits(case: Scenario) -> bool:
     plain = not case.friction and not case.contact and case.mechanism == "equation"
     dry = model.neq or model.dof_frictionloss.any() or model.tendon_frictionloss.any()
     # a robot may stand on its feet
-    stands = not case.plant.pose and (model.jnt_type == mujoco.mjtJoint.mjJNT_FREE).any()
+    stands = not case.plant.pose and _is_free(model)
     return bool(
         plain and not dry and not stands and all(part.in_callback for part in case.actuator)
     )

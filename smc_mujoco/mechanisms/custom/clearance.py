@@ -32,10 +32,24 @@ def overlap(plant: Plant, x: Floats) -> Overlap:
     """Return the deepest overlap with the channels at x, (n,) rad or m, and all else at the
     start.
     """
+    model, data = _at(plant, x)
+    return deepest(plant, model, data)
+
+
+@functools.lru_cache(maxsize=64)
+def touches_at(plant: Plant, x: Floats) -> bool:
+    """Return whether anything touches anything with the channels at x, (n,) rad or m, and all else
+    at the start.
+    """
+    return bool(_at(plant, x)[1].ncon)
+
+
+def _at(plant: Plant, x: Floats) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """Return a plant's model, and its state with the channels at x, (n,) rad or m."""
     model = loaded(plant)
     data = posed(model, x)
     mujoco.mj_fwdPosition(model, data)
-    return deepest(plant, model, data)
+    return model, data
 
 
 def raised(plant: Plant, x: Floats) -> Floats:

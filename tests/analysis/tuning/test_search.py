@@ -7,6 +7,7 @@ import json
 import math
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -191,6 +192,30 @@ def test_coarse_runs_keep_the_floor_on_which_a_base_stands():
     for base, only in (("", True), ("<freejoint/>", False)):
         plant = smc.plant_from(STANDING.format(base=base), ["j"], name="standing")
         assert search._only_limits(smc.Scenario(plant=plant, law="pid")) is only
+
+
+REACHING = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/><body pos="0 0 {height}">{base}
+<body><joint name="j" axis="0 1 0" range="-120 120"/>
+<geom type="capsule" fromto="0 0 0 .2 0 0" size=".02" mass=".1"/></body></body></worldbody>
+<actuator><motor joint="j" ctrlrange="-1 1"/></actuator></mujoco>"""
+
+
+@pytest.mark.filterwarnings("ignore:reaching.* gives way")
+def test_coarse_runs_under_friction_leave_out_contacts_of_what_touches_nothing():
+    """At its start, straight up, it touches nothing; at its goal, it does in one case."""
+    flags = mujoco.mjtDisableBit
+    joint = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><freejoint/>'
+    for height, base, off in ((0.5, "", flags.mjDSBL_CONTACT), (0.018, "", 0), (0.5, joint, 0)):
+        text = REACHING.format(height=height, base=base)
+        plant = smc.plant_from(text, {"j": smc.Channel(x0=-1.5)}, name="reaching")
+        plain = smc.Scenario(plant=plant, law="pid")
+        rubs = dataclasses.replace(plain, friction=smc.Coulomb(0.1))
+        assert search._left_out([plain, rubs]) == int(off)
+    assert search._left_out([plain]) == 0
+    assert search._left_out([smc.Scenario(plant="duffing", law="pid")]) == flags.mjDSBL_CONSTRAINT
+    assert (
+        search._left_out([smc.Scenario(plant="duffing", law="pid", friction=smc.Coulomb(0.1))]) == 0
+    )
 
 
 @pytest.mark.filterwarnings("ignore:no set of gains")
