@@ -390,7 +390,7 @@ FLOORS: dict[str, Callable[[Least], float]] = {
     "{u}/s": lambda q: q.u,
     "({u})^2 s": lambda q: q.u**2 * q.duration,
     "{force}": lambda q: q.u,
-    "1": lambda q: q.share,
+    "": lambda q: q.share,
     "1/s": lambda q: 1 / q.duration,
     "Hz": lambda q: 1 / q.duration,
 }

@@ -59,7 +59,7 @@ def print_pages(name: str, console: Console) -> None:
             if isinstance(law, Law) and law.template:
                 pages.append((law.template, ""))
     if not pages:
-        raise unknown("law, surface or velocity estimator", name, known)
+        raise unknown("law, surface, velocity estimator or plant", name, [*known, *plants()])
     for template, package in pages:
         print_page(template, console, package, name)
     return None

@@ -430,10 +430,13 @@ def chattering(
     scenario.
     """
     plant = scenarios[0].plant
-    last = "coupling" if plant.driven > 1 else "third"
-    heads = [f"s ({plant.units[channel]}/s)", "measured", "Hz", "measured", "±", last]
-    numbers = number_columns(heads, no_wrap=True)
-    table = titled(f"chattering of {plant.name}: predicted, and measured in runs", "law", *numbers)
+    last = "coupling" if plant.driven > 1 else "third\nharmonic"
+    heads = [f"s ({plant.units[channel]}/s)\npredicted", "\nmeasured"]
+    heads += ["Hz\npredicted", "\nmeasured", "±", last]
+    numbers = number_columns(heads, no_wrap=True, vertical="bottom")
+    law = Column("law", no_wrap=True, vertical="bottom")
+    about = f"chattering of {plant.name}"
+    table = titled(about, law, *numbers, padding=(0, 1, 0, 0), show_edge=False, pad_edge=False)
     for scenario, cycle, (amplitude, frequency), change in zip(
         scenarios, cycles, measured, changes, strict=True
     ):
@@ -445,6 +448,7 @@ def chattering(
         table.add_row(law, *sizes, *rates, _share(cycle.uncertainty), _share(share))
     if any(change.marked for change in changes):
         table.caption = NOTE
+        table.caption_justify = "left"
     return table
 
 

@@ -35,12 +35,12 @@ KINDS = {
 
 
 def spread_in_words(searches: int, spread: float) -> str:
-    """Return how far J of searches differ: "12 searches, all within 4.1 % of the least J"."""
+    """Return how far J of searches differ: "12 searches, whose J differ by up to 4.1 %"."""
     if searches == 1:
         return "1 search"
     if spread < 1.0:
-        return f"{searches} searches, all within {100.0 * spread:.2g} % of the least J"
-    return f"{searches} searches, all within {1.0 + spread:.2g} times the least J"
+        return f"{searches} searches, whose J differ by up to {100.0 * spread:.2g} %"
+    return f"{searches} searches, whose J differ by up to {1.0 + spread:.2g} times"
 
 
 @named_data

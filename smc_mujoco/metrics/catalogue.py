@@ -254,7 +254,7 @@ def ultimate_bound(trace: Trace) -> float:
     ...
 
 
-@metric("1", error=True)
+@metric("", error=True)
 def rest_share(trace: Trace) -> float:
     """Ultimate bound over the scale."""
     return CATALOGUE["ultimate_bound"].formula(trace) / scale(trace)
@@ -347,7 +347,7 @@ def energy(trace: Trace) -> float:
     ...
 
 
-@metric("1", command=True)
+@metric("", command=True)
 def hf_share(trace: Trace) -> float:
     """Share of the variance of u above 50 Hz, 0 to 1.
 

@@ -174,8 +174,8 @@ class Metric:
     """A metric's entry in the catalogue."""
 
     name: str  # the function's name
-    # "s", "%", ...; {x} stands for the unit of x, {u} for that of u, {force} for that of a force,
-    # see `unit_for`
+    # "s", "%", ...; "" of a share; {x} stands for the unit of x, {u} for that of u, {force} for
+    # that of a force, see `unit_for`
     unit: str
     summary: str  # first line of the docstring
     formula: Callable[[Trace], float]  # Trace of one group's channels -> float, without the checks
@@ -272,7 +272,7 @@ class Metric:
         unit = self.unit
         if x:
             unit = self.unit_for(x)
-        if unit in ("", "1") or "{" in unit:
+        if not unit or "{" in unit:
             return self.label
         return f"{self.label} ({unit})"
 

@@ -109,7 +109,8 @@ def _runs(ax: Axes, found: SobolResult, colour: str) -> None:
             axis.axes.set(**{f"{axis.axis_name}scale": "log"})
     if len(columns) < 2:  # one axis has the score beside it
         columns.append(found.values)
-        ax.set_ylabel(f"{CATALOGUE[found.metric].label} ({found.unit})")
+        unit = found.unit and f" ({found.unit})"
+        ax.set_ylabel(f"{CATALOGUE[found.metric].label}{unit}")
     order = np.argsort(found.values)  # the worst on top
     shades = np.array(style.ramp(colour, TONES, LIGHTEST))
     tones = np.empty(len(order), object)

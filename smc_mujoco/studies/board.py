@@ -206,6 +206,7 @@ class Board(Tables):
     # whether halving the physics step may change its numbers, and no run was repeated with it
     by_step: bool
     x: str = ""  # the unit of positions, "rad" or "m"; "" where it is not known
+    summed: Names = ()  # the conditions whose runs a number sums, as J does
 
     @property
     def best(self) -> Names:
@@ -556,6 +557,8 @@ def _table(name: str, boards: Sequence[Board]) -> Tabular:
     largest = max(boards, key=lambda board: len(board.blocks))
     if len(largest.blocks) == 1:
         name = f"{largest.group['plant']}, {largest.blocks[0].condition}"
+    if largest.summed:
+        name += f" under {joined(largest.summed)}"
     samples = {}
     for block in largest.blocks:
         samples[block.sample] = None

@@ -450,7 +450,8 @@ class Trial(NamedTuple):
                 if self.rule(plant, candidates[plant.name]).quick:
                     goal = self.asked_goal(plant)
                 least = len(goal.conditions) * goal.duration**2 / 2.0
-                runs = Holdout({}, {}, {}, {}, least)
+                names = tuple(condition.name for condition in goal.conditions)
+                runs = Holdout({}, {}, {}, {}, least, names)
                 with contextlib.suppress(ScenarioError):
                     for candidate in candidates[plant.name]:
                         parts = self._holdout(plant, candidate, goal, self.seeds(count))

@@ -47,6 +47,7 @@ class Holdout(NamedTuple):
     halves: Mapping[str, Array]  # at half the physics step, NaN where it was not computed
     sets: Mapping[str, Array]  # the number of the set of gains
     least: float  # s^2, J of an error that is X0 throughout
+    conditions: Names  # whose runs J sums
 
 
 def leaderboard(
@@ -200,6 +201,7 @@ def objective_boards(
                 family=_family(compared.values()),
                 relevant=relevant,
                 by_step=False,
+                summed=holdout[plant].conditions,
             )
         )
     return boards

@@ -260,7 +260,7 @@ class Outcome:
         for runs in self.traces.values():
             for run in runs.values():
                 units.add(CATALOGUE[measure].unit_in(run.scenario))
-        if len(units) > 1 or units == {"1"}:
+        if len(units) > 1 or units == {""}:
             return ""
         return "".join(units)
 

@@ -36,6 +36,7 @@ from smc_mujoco.common.aliases import AnyPath, Fields
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import MAX_RATIO, MAX_UNPACKED, from_json, reading, replacing, to_json
+from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import counted, number
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import scenario_json
@@ -63,6 +64,8 @@ RESULT_COLUMNS |= {"versions": "string", "scenario": "string"}
 PREVIEW = ("plant", "law", "source", "condition", "seed")
 PREVIEW += ("settling_time", "ultimate_bound", "itae", "tv_rate", "failure")
 MAX_ROWS = 8  # of the preview in a notebook
+CASE = ("plant", "law", "condition")  # whose runs `print` sums up in a row
+MAX_CASES = 20  # that `print` shows; chosen
 DIGEST = b"digest"  # key in a file's metadata
 
 
@@ -124,6 +127,19 @@ def _text(value: object) -> object:
     if isinstance(value, float):
         return number(value)
     return value
+
+
+def _median(metric: str, values: np.ndarray) -> Cell:
+    """Return the median of a metric with its range; NaN is a run that has none."""
+    known = values[~np.isnan(values)]
+    missing = len(values) - len(known)
+    alarm = f"{missing} of {len(values)} have none" if missing else ""
+    if not len(known):
+        return Cell("", alarm=alarm)
+    text = CATALOGUE[metric].text
+    # the lower of two in the middle, as one of them may be inf
+    middle = float(np.sort(known)[(len(known) - 1) // 2])
+    return Cell(text(middle), f"{text(float(known.min()))}–{text(float(known.max()))}", alarm=alarm)
 
 
 def read(path: Path, sealed: bool = False) -> "pa.Table":
@@ -197,10 +213,38 @@ class Table:
 
     def __repr__(self) -> str:
         counts = []
-        for name in ("plant", "law", "condition"):
+        for name in CASE:
             counts.append(counted(len(set(self.column(name).tolist())), name))
         checked = (self.data.schema.metadata or {}).get(b"checked", b"").decode()
         return f"Table({len(self)} runs: {', '.join(counts)}{checked and '; '}{checked})"
+
+    def __str__(self) -> str:
+        if not len(self):
+            return repr(self)
+        return f"{self!r}\n{self._summary()}"
+
+    def _summary(self) -> Tabular:
+        """Return the median and the range of each metric, a row for each plant, law and condition:
+        all metrics of a table of scores, and those of the preview of a study's.
+        """
+        values = {}
+        for name in self.data.column_names:
+            if name in CATALOGUE and (name in PREVIEW or "scenario" not in self.data.column_names):
+                values[name] = self.column(name)
+        rows_of: dict[tuple[str, ...], list[int]] = {}
+        for i, case in enumerate(zip(*map(self.column, CASE), strict=True)):
+            rows_of.setdefault(case, []).append(i)
+        shown = list(rows_of)[:MAX_CASES]
+        cells = []
+        for case in shown:
+            row: list[Cell | str] = [name or "" for name in case]
+            for name, column in values.items():
+                row.append(_median(name, column[rows_of[case]]))
+            cells.append(row)
+        notes = ["Medians; below each the least and the largest value."]
+        if rest := len(rows_of) - len(shown):
+            notes.append(f"And {rest} more: Table.select.")
+        return Tabular(headings=[*CASE, *values], rows=cells, notes=notes, left=len(CASE))
 
     def _repr_html_(self) -> str:
         names = []

@@ -102,6 +102,7 @@ def test_sensitivity_prints_shares_in_per_cent_and_ranges_in_their_unit(printed)
         "--duration 0.3 --json s.json"
     )
     found = json.loads(Path("s.json").read_text())
+    assert re.search(r" is [\d.e-]+ m to [\d.e-]+ m; ", out)
     assert row(out, "delay")[:5] == ["delay", "0", "s", "20", "ms"]
     for one in found["axes"]:
         words = row(out, one["name"])

@@ -105,6 +105,8 @@ def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
             boards.append(board)
     assert [board.metric for board in boards] == [*METRICS]
     assert len(found.leaderboard) == len(METRICS) * 4 + 2  # and J on unseen runs on each plant
+    summed = ", unseen runs under nominal, noise, delay_10ms, sine, constant, light and heavy: "
+    assert found.leaderboard[0].tables[0].title.startswith(f"{found.leaderboard[0].about}{summed}")
     frame = found.to_pandas()
     assert len(frame) == len(found.verdicts) * 3
     frame = frame[(frame["metric"] == "itae") & (frame["law"] == "pid")]
@@ -153,7 +155,7 @@ def test_its_page_fits_a_phone_and_turns_dark(found, tmp_path):
 
 def test_a_law_that_fails_in_every_run_arrives_in_none_of_j(found):
     arrived = {"pid": np.ones(1, bool), "gone": np.ones(1, bool)}
-    compare._leave_out_failed({"duffing": Holdout({}, arrived, {}, {}, 1.0)}, found.table)
+    compare._leave_out_failed({"duffing": Holdout({}, arrived, {}, {}, 1.0, ())}, found.table)
     assert arrived == {"pid": True, "gone": False}
 
 

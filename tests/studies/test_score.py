@@ -38,6 +38,10 @@ def test_a_table_has_the_scores_of_every_run_in_order(monkeypatch):
     assert "MuJoCo repeated 3 runs" in repr(table)
     with pytest.raises(smc.ScenarioError, match="scores alone"):
         table.scenario(0)
+    of_pid = [itae(trace) for trace in traces if trace.scenario.law.name == "pid"]
+    least, most = f"{min(of_pid):.3g}", f"{max(of_pid):.3g}"
+    assert f"{least}–{most}" in str(table)
+    assert "1 of 2 have none" in str(table)
 
 
 def test_what_cannot_be_scored_is_refused():

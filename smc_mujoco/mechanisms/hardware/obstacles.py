@@ -197,8 +197,8 @@ class Wall(OfBody):
             return ""
         start = ", ".join(f"{place:g}" for place in plant.x0)
         return (
-            f"body {self.body!r} {-1e3 * away:.3g} mm in its wall, which stands "
-            f"{1e3 * self.gap:.3g} mm from it where the plant's own x0 is, at {start}"
+            f"body {self.body!r} {-1e3 * away:.3g} mm in its wall (the gap of "
+            f"{1e3 * self.gap:.3g} mm is from the plant's own x0, {start})"
         )
 
 

@@ -281,7 +281,9 @@ def test_a_robot_that_stands_a_little_in_its_floor_takes_any_obstacle(deep):
         assert smc.run(run).failure is None
     with pytest.raises(smc.ScenarioError, match=r"x0 \(-0\.6,\) of dog 'rod' is beyond the obst"):
         smc.run(dataclasses.replace(run, contact=ball, x0=-0.6))
-    with pytest.raises(smc.ScenarioError, match=r"mm in its wall, which stands 50 mm .* at 0\.3: "):
+    with pytest.raises(
+        smc.ScenarioError, match=r"mm in its wall \(the gap of 50 mm .* x0, 0\.3\): "
+    ):
         dataclasses.replace(run, x0=0.8)
 
 
