@@ -6,16 +6,30 @@ as_plant("cart.urdf:slider(motor,partner=pole,u_max=20,x0=0.5)")
 as_plant("drone.xml:body@hover")
 as_plant("robot.xml:knee(motor)@home+held")
 as_plant("cart.xml:slide+hinge(measured)")
+
+A text is short, so what it leaves out is chosen and said: the pose is the file's keyframe, and
+other motors hold it.
 """
 
 import dataclasses
 import re
+import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from smc_mujoco.common.errors import ScenarioError, find, shown
-from smc_mujoco.mechanisms.custom.channels import Channel
-from smc_mujoco.mechanisms.custom.others import OTHERS
+from smc_mujoco.common.errors import (
+    ScenarioError,
+    ScenarioWarning,
+    find,
+    one_line,
+    shown,
+    users_stacklevel,
+)
+from smc_mujoco.common.text import counted
+from smc_mujoco.mechanisms.custom import mjcf
+from smc_mujoco.mechanisms.custom.channels import Channel, joints_of
+from smc_mujoco.mechanisms.custom.others import OTHERS, limp, usual_keyframe
 from smc_mujoco.mechanisms.custom.plant_from import plant_from
 from smc_mujoco.mechanisms.plant import Plant, plant
 
@@ -62,7 +76,8 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
     A comma or a plus sign is between the joints: plants are separated by commas on the command
     line. Fields of a `Channel` follow a joint in brackets: lift(motor,u_max=30,x0=0.2); one that is
     only measured is hinge(measured). The law of a channel and its reference are those of the
-    scenario. The keyframe of the start follows after @. What other joints do is last, as +held.
+    scenario. The keyframe of the start follows after @; nothing after it is the pose of the file.
+    What other joints do is last, as +held. For what is left out see `_left_out`.
     """
     if not (model := MODEL.fullmatch(text)):
         if set(text) & set(":./\\"):
@@ -91,8 +106,40 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
     if measured:
         values = {"measured": measured} | values
     if model["keyframe"] is not None:
-        values = {"keyframe": model["keyframe"].strip()} | values
-    return plant_from(folder / path, channels or None, **values)  # an error names the joints
+        values = {"keyframe": model["keyframe"].strip() or None} | values
+    source = mjcf.source(folder / path)
+    if channels:  # without one, an error names the joints
+        named = [(name, channel or Channel()) for name, channel in channels.items()]
+        values = _left_out(source, [*joints_of(tuple(named)), *measured], values) | values
+    return plant_from(source, channels or None, **values)
+
+
+def _left_out(source: mjcf.ModelSource, seen: Sequence[str], given: dict) -> dict[str, str]:
+    """Return values of `plant_from` that a text does not give, and say so: the file's keyframe, the
+    only one or "home"; and motors that hold the joints that are not `seen`.
+    """
+    taken = {}
+    spec = source.spec()
+    if not set(seen) <= {joint.name for joint in spec.joints}:
+        return taken  # an error follows
+    if "keyframe" not in given and (keyframe := usual_keyframe(spec)):
+        taken["keyframe"] = keyframe
+        _say(
+            f"{source.label} starts and ends in its keyframe {keyframe!r}: @{keyframe} after the "
+            "joints says so without this line, and @ alone takes the pose of the file"
+        )
+    if "others" not in given and (idle := limp(spec, seen)):
+        taken["others"] = "held"
+        _say(
+            f"nothing commands {counted(len(idle), 'motor')} of {source.label} "
+            f"({one_line(', '.join(idle))}), so a stiff PD holds each joint in place: +held after "
+            "the joints says so without this line, +locked welds them, +file leaves them free"
+        )
+    return taken
+
+
+def _say(sentence: str) -> None:
+    warnings.warn(sentence, ScenarioWarning, users_stacklevel())
 
 
 def _channel(text: str) -> tuple[str, Any]:

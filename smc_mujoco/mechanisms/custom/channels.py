@@ -48,9 +48,8 @@ NO_DYNAMICS = mujoco.mjtDyn.mjDYN_NONE.value
 FLIES = (
     4  # independent forces and torques that hold a heading: a thrust, and a torque about each axis
 )
+HOLD = "hold:"  # prefix of names of motors that hold other joints, see others.py
 MOTOR_GROUP = 31  # actuator group of motors, which actuatorgroupdisable cannot turn off
-CURE = "give smc.Channel(motor=True), or JOINT(motor) in a text, for one ideal motor instead"
-KEEP = "give smc.Channel(servo=True), or JOINT(servo) in a text, to command it as it is"
 
 
 @named_data
@@ -60,11 +59,12 @@ class Channel:
     Attributes:
       motor: whether to replace the joint's actuators, if it has any, by an ideal motor. It keeps
         their forcerange, a motor's ctrlrange, and the joint's actuatorfrcrange. Without it, the
-        joint needs exactly one actuator: a motor.
-      servo: whether u is the command of the file's actuator, which stays as it is. u is the
-        set-point of a `<position>`, rad (m) from the joint's default goal, with its kp, kv, gear,
-        timeconst, forcerange and ctrlrange, and without a nominal model; or the voltage of a
-        `<dcmotor>`, V.
+        joint needs exactly one actuator, which stays as it is. In a file without actuators, such as
+        a URDF, a joint whose force is bounded gets an ideal motor.
+      servo: what the joint's actuator has to be. True: a `<position>`, whose set-point u is, rad
+        (m) from the joint's default goal, with its kp, kv, gear, timeconst, forcerange and
+        ctrlrange, and without a nominal model; or a `<dcmotor>`, whose voltage u is, V. False: a
+        motor, whose force u is, N m (N). None: one of the three, and a warning if u is no force.
       set_point_step: the servo rounds its set-point to multiples of this, rad (m); 0: it does not.
       partner: a joint without an actuator that moves with this one, such as a pole on its cart. It
         is measured and scored as a separate channel, after the driven ones. The law of this channel
@@ -78,7 +78,7 @@ class Channel:
     """
 
     motor: Boolean = False
-    servo: Boolean = False
+    servo: Boolean | None = None
     set_point_step: Step = 0.0
     partner: str | None = None
     x0: Place | None = None
@@ -94,10 +94,10 @@ class Channel:
                 "a Channel has motor=True and servo=True: give motor to replace the file's servo, "
                 "or servo to command it"
             )
-        if self.set_point_step and not self.servo:
+        if self.set_point_step and (self.motor or self.servo is False):
             raise ScenarioError(
                 f"a Channel has set_point_step={self.set_point_step:g} but no servo: give "
-                "servo=True as well"
+                "servo=True, without motor"
             )
 
 
@@ -127,7 +127,7 @@ def as_text(joint: str, channel: Channel) -> str:
     given = []
     for field in dataclasses.fields(channel):
         value = getattr(channel, field.name)
-        if field.name in SUGGESTED or value == field.default:
+        if field.name in SUGGESTED or value in (None, False, field.default):
             continue
         if value is True:
             given.append(field.name)
@@ -488,46 +488,58 @@ class Motor(NamedTuple):
     kept: Actuator | None = None  # of the file, if a law commands it as it is
 
 
-def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel, goal: float) -> Motor:
-    """Return the motor that drives a joint, whose default goal is given."""
+def motor_of(
+    label: str, model: mujoco.MjModel, joint: str, channel: Channel, goal: float, ideal: str
+) -> Motor:
+    """Return the motor that drives a joint, whose default goal is given. `ideal` is the plant's
+    text with an ideal motor there.
+    """
     joint_id = model.joint(joint).id
     bounds = []
-    part = None
+    stays = False
     if model.jnt_actfrclimited[joint_id]:
         bounds.append(tuple(map(float, model.jnt_actfrcrange[joint_id])))
     actuators = _on_joint(model, joint_id)
     _limit(f"joint {joint!r} of {label} takes", "widen its actuatorfrcrange", *bounds)
     names = ", ".join(model.actuator(i).name or f"number {i}" for i in actuators)
+    cure = f'give "{ideal}", or smc.Channel(motor=True), for one ideal motor instead'
     if channel.motor:
         bounds.append(_together(model, actuators))
     elif not actuators:
-        raise ScenarioError(f"no actuator of {label} drives joint {joint!r} alone: {CURE}")
+        if not bounds or _has_actuators(model):
+            raise ScenarioError(f"no actuator of {label} drives joint {joint!r} alone: {cure}")
     elif len(actuators) > 1:
-        raise ScenarioError(f"joint {joint!r} of {label} has the actuators {names}: {CURE}")
-    elif channel.servo:
-        if why := not_kept(model, actuators[0]):
-            raise ScenarioError(
-                f"actuator {names!r} of joint {joint!r} {why}, but servo=True is for a <position> "
-                f"or a plain <dcmotor>: leave servo out, or {CURE}"
-            )
-        if channel.set_point_step and model.actuator_gaintype[actuators[0]] != FIXED:
-            raise ScenarioError(
-                f"actuator {names!r} of joint {joint!r} is a <dcmotor>, which has no set-point: "
-                "leave set_point_step out"
-            )
+        raise ScenarioError(f"joint {joint!r} of {label} has the actuators {names}: {cure}")
+    elif channel.servo or (channel.servo is None and no_motor(model, actuators[0])):
+        _check_kept(model, actuators[0], joint, channel, cure)
         bounds.append(forcerange_of(model, actuators[0]))
+        stays = True
     elif why := no_motor(model, actuators[0]):
-        cure = CURE if not_kept(model, actuators[0]) else f"{KEEP}, or {CURE}"
         raise ScenarioError(
-            f"actuator {names!r} of joint {joint!r} {why}, but a law commands a force: {cure}"
+            f"actuator {names!r} of joint {joint!r} {why}, but servo=False is for a force: leave "
+            f"servo out, or {cure}"
         )
     else:
         bounds.append(_of_actuator(model, actuators[0]))
     gives = f"actuator {names!r} gives joint {joint!r} of {label}"
-    limit = _limit(gives, CURE, *bounds)
-    if channel.servo:
-        part = kept(model, actuators[0], goal, channel.set_point_step)
+    limit = _limit(gives, cure, *bounds)
+    part = kept(model, actuators[0], goal, channel.set_point_step) if stays else None
+    if channel.set_point_step and not isinstance(part, PositionServo):
+        raise ScenarioError(
+            f"the drive of joint {joint!r} of {label} has no set-point: leave set_point_step out"
+        )
     return Motor(joint, limit, tuple(actuators), part)
+
+
+def _check_kept(model: mujoco.MjModel, i: int, joint: str, channel: Channel, cure: str) -> None:
+    """Raise ScenarioError for an actuator that cannot stay as it is."""
+    if why := not_kept(model, i):
+        name = model.actuator(i).name or f"number {i}"
+        leave = "leave servo out, or " if channel.servo else ""
+        raise ScenarioError(
+            f"actuator {name!r} of joint {joint!r} {why}, and what stays as it is is a <motor>, a "
+            f"<position> or a plain <dcmotor>: {leave}{cure}"
+        )
 
 
 def bound_of_kept(label: str, model: mujoco.MjModel, joint: str, part: Actuator) -> float:
@@ -536,7 +548,7 @@ def bound_of_kept(label: str, model: mujoco.MjModel, joint: str, part: Actuator)
     """
     if part.bound is not None and part.bound < math.inf:
         return part.bound
-    cure = "give smc.Channel(servo=True, u_max=...)"
+    cure = f"give {joint}(u_max=...), or smc.Channel(u_max=...)"
     if not isinstance(part, PositionServo):
         raise ScenarioError(f"the <dcmotor> of joint {joint!r} of {label} has no ctrlrange: {cure}")
     for _, low, high in ranges(model, [joint]):
@@ -554,6 +566,11 @@ def _on_joint(model: mujoco.MjModel, joint_id: int) -> list[int]:
         if model.actuator_trntype[i] in ONE_JOINT and model.actuator_trnid[i, 0] == joint_id:
             found.append(i)
     return found
+
+
+def _has_actuators(model: mujoco.MjModel) -> bool:
+    """Return whether the file has actuators."""
+    return any(not model.actuator(i).name.startswith(HOLD) for i in range(model.nactuator))
 
 
 def _limit(who: str, cure: str, *ranges: Floats) -> float:

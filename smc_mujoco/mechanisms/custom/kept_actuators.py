@@ -18,6 +18,7 @@ EQUAL = 1e-9  # relative: numbers of a file that should agree
 AFFINE = mujoco.mjtBias.mjBIAS_AFFINE.value
 FIXED = mujoco.mjtGain.mjGAIN_FIXED.value
 FILTERED = mujoco.mjtDyn.mjDYN_FILTEREXACT.value
+INTEGRATED = mujoco.mjtDyn.mjDYN_INTEGRATOR.value
 OF_DCMOTOR = mujoco.mjtGain.mjGAIN_DCMOTOR.value
 VOLTAGE = mujoco.mjtCtrlInput.mjINPUT_VOLTAGE.value
 
@@ -29,19 +30,27 @@ def not_kept(model: mujoco.MjModel, i: int) -> str:
     bias, stiffness, _ = model.actuator_biasprm[i, :3].tolist()
     if model.actuator_gaintype[i] != FIXED or model.actuator_biastype[i] != AFFINE or not stiffness:
         return no_motor(model, i) or "is a motor, whose command is a force"
-    if model.actuator_dyntype[i] == FILTERED:
-        if model.actuator_actlimited[i] or model.actuator_actearly[i]:
-            return "is a servo with a timeconst and with actlimited or actearly"
-    elif model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
-        kind = mujoco.mjtDyn(model.actuator_dyntype[i]).name
-        lag = kind.removeprefix("mjDYN_").lower()
-        return f"is a servo with dynamics (dyntype {lag})"
+    if why := _with_dynamics(model, i):
+        return why
     gain = float(model.actuator_gainprm[i, 0])
     if bias or not math.isclose(gain, -stiffness, rel_tol=EQUAL):
         return (
             f"has the gain {gain:g} and the bias {bias:g} {stiffness:g}, so it is not a <position>"
         )
     return _late(model, i) or spoilt(model, i)
+
+
+def _with_dynamics(model: mujoco.MjModel, i: int) -> str:
+    """Return which dynamics a servo has beside a timeconst, or ""."""
+    if model.actuator_dyntype[i] == INTEGRATED:
+        return no_motor(model, i)  # it takes a speed
+    if model.actuator_dyntype[i] == FILTERED:
+        if model.actuator_actlimited[i] or model.actuator_actearly[i]:
+            return "is a servo with a timeconst and with actlimited or actearly"
+    elif model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
+        kind = mujoco.mjtDyn(model.actuator_dyntype[i]).name
+        return f"is a servo with dynamics (dyntype {kind.removeprefix('mjDYN_').lower()})"
+    return ""
 
 
 def _no_plain_dcmotor(model: mujoco.MjModel, i: int) -> str:

@@ -146,12 +146,14 @@ def _built(spec: mujoco.MjSpec) -> mujoco.MjModel:
 
 def source(model: object, assets: Mapping[str, bytes | str] | None = None) -> ModelSource:
     """Coerce the path of a file, a text with its assets, an MjSpec, or a mjcf.RootElement of
-    dm_control to a ModelSource.
+    dm_control to a ModelSource, which stays as it is.
     """
     pymjcf = sys.modules.get("dm_control.mjcf")
     text = isinstance(model, str) and model.lstrip().startswith("<")
     if assets is not None and not text:
         raise ScenarioError(f"assets is {shown(assets)}, and the model is not text: leave them out")
+    if isinstance(model, ModelSource):
+        return model
     if isinstance(model, mujoco.MjSpec):
         return _of_spec(model)
     if pymjcf is not None and isinstance(model, pymjcf.RootElement):

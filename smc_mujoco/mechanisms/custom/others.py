@@ -15,6 +15,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.mechanisms.custom.channels import (
     FREE,
+    HOLD,
     ONE_JOINT,
     UNIT_OF_JOINT,
     Pairs,
@@ -53,6 +54,14 @@ def limp(spec: mujoco.MjSpec, seen: Iterable[str]) -> list[str]:
             if np.any(joint.actfrcrange) and joint.name not in follow:
                 driven[joint.name] = None
     return [joint for joint in driven if joint not in mine | served]
+
+
+def usual_keyframe(spec: mujoco.MjSpec) -> str:
+    """Return the keyframe that a text without one takes: the only one, or "home"; "" if none."""
+    names = [key.name for key in spec.keys]
+    if len(names) == 1:
+        return names[0]
+    return "home" if "home" in names else ""
 
 
 @functools.lru_cache(maxsize=8)
@@ -125,7 +134,7 @@ def _hold(
         kp = inertia[dof, dof] * HELD**2
         kd = 2.0 * inertia[dof, dof] * HELD
         load = data.qfrc_bias[dof] - data.qfrc_passive[dof]
-        made = add_motor(spec, f"hold:{name}", name)
+        made = add_motor(spec, f"{HOLD}{name}", name)
         made.biastype = AFFINE
         hold = kp * data.qpos[joint.qposadr[0]] + load
         made.biasprm[:3] = hold, -kp, -kd

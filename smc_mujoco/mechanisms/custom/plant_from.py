@@ -140,6 +140,7 @@ def plant_from(
     model = mjcf.as_it_is(source)
     read = urdf.read(Path(source.path))
     doubts = [
+        *_assumed_drives(source.label, made, pairs),
         *(read.notes(source.label, spec) if read else ()),
         *softness_warnings(source.label, made),
     ]
@@ -156,6 +157,24 @@ def plant_from(
     for doubt in doubts:
         warnings.warn(doubt, ScenarioWarning, users_stacklevel())
     return made
+
+
+def _assumed_drives(label: str, made: Plant, given: Pairs) -> Iterator[str]:
+    """Yield a sentence on each drive that the file decides, and that is no motor of the file."""
+    parts = made.suggested.get("actuator", (None,) * len(given))
+    meant = zip(given, made.build.channels, parts, made.units, strict=False)
+    for (joint, asked), (_, taken), part, unit in meant:
+        if taken.motor and not asked.motor:
+            yield (
+                f"{label} has no actuators, so joint {joint!r} gets an ideal motor, bounded as the "
+                f"joint is: {joint}(motor), or smc.Channel(motor=True), says so without this line"
+            )
+        if taken.servo and asked.servo is None:
+            yield (
+                f"u of {joint!r} of {label} is {part.meaning.format(x=unit)}, as in the file: "
+                f"{joint}(servo), or smc.Channel(servo=True), says so without this line, and "
+                f"{joint}(motor), or motor=True, puts an ideal motor there, whose u is a force"
+            )
 
 
 def _doubts_of_others(
@@ -298,11 +317,17 @@ def _with_drives(
         reach = own.reach_of(label, model, first)
         return dataclasses.replace(build, thrusters=thrusters), reach
     motors = []
+    channels = []
     for joint, channel in build.channels:
-        made = own.motor_of(label, model, joint, channel, goals[joint])
+        ideal = build.with_motor(joint)
+        made = own.motor_of(label, model, joint, channel, goals[joint], ideal)
         motors.append(made)
+        # what the file decided is stated from now on, also in texts and records
+        motor = channel.motor or not made.replaced
+        stated = dataclasses.replace(channel, motor=motor, servo=made.kept is not None)
+        channels.append((joint, stated))
     limits = tuple(motor.limit for motor in motors)
-    return dataclasses.replace(build, motors=tuple(motors)), limits
+    return dataclasses.replace(build, channels=tuple(channels), motors=tuple(motors)), limits
 
 
 def _check_names(label: str, model: mujoco.MjModel, keyframe: str | None, tip: str | None) -> None:

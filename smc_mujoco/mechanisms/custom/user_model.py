@@ -13,7 +13,7 @@ from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs, joints_of
 from smc_mujoco.mechanisms.custom.mjcf import ModelSource
 from smc_mujoco.mechanisms.custom.model_constraints import harden
-from smc_mujoco.mechanisms.custom.others import edit
+from smc_mujoco.mechanisms.custom.others import edit, limp, usual_keyframe
 from smc_mujoco.mechanisms.layout import OWN, ROTOR, START
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Field
 
@@ -82,6 +82,13 @@ class UserModel:
         spec.option.disableflags &= ~SENSORS
         return spec
 
+    def with_motor(self, joint: str) -> str:
+        """Return its `argument` with an ideal motor on a joint."""
+        channels = dict(self.channels)
+        ideal = {"motor": True, "servo": None, "set_point_step": 0.0}
+        channels[joint] = dataclasses.replace(channels[joint], **ideal)
+        return dataclasses.replace(self, channels=tuple(channels.items())).argument
+
     @property
     def argument(self) -> str:
         """The model as written on the command line, such as arm.xml:shoulder+elbow@home."""
@@ -95,10 +102,13 @@ class UserModel:
         for joint in self.measured:
             parts.append(f"{joint}(measured)")
         text = "+".join(parts)
+        spec = self.source.spec()
         if self.keyframe is not None:
             text += f"@{self.keyframe}"
-        if self.others:
-            text += f"+{self.others}"
+        elif usual_keyframe(spec):  # which a text would take
+            text += "@"
+        if self.others or limp(spec, [*joints_of(self.channels), *self.measured]):
+            text += f"+{self.others or 'file'}"
         return f"{path}:{text}"
 
     def about(self) -> dict:

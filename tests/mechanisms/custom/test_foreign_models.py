@@ -12,6 +12,7 @@ from PIL import Image
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common import gl
+from smc_mujoco.common.errors import ScenarioWarning
 from smc_mujoco.draw.figure import MAX_WORST
 from smc_mujoco.mechanisms.named import as_plant
 
@@ -147,14 +148,15 @@ def test_a_plant_is_named_by_its_file_and_joints(tmp_path, monkeypatch):
     (tmp_path / "arm.xml").write_text(ARM)
     monkeypatch.chdir(tmp_path)
     for text, words in (
-        ("arm.xml: lift, elbow", "motor=True"),  # a menagerie's servos are not motors
-        ("arm.xml:lift+elbow", "motor=True"),
         ("arm.xml", "no joint of arm.xml is chosen"),
         ("no.xml:a", "no model at"),
         ("arm.xml:ift", "mean 'lift'"),
     ):
         with pytest.raises(smc.ScenarioError, match=words):
             as_plant(text)
+    for text in ("arm.xml: lift, elbow", "arm.xml:lift+elbow"):  # a menagerie's servos stay
+        with pytest.warns(ScenarioWarning, match="set-point of its servo"):
+            assert as_plant(text).argument == "arm.xml:lift(servo)+elbow(servo)"
     with pytest.raises(
         smc.ScenarioError, match=r"channels=\['pan', 'lift'\]; it has pan, lift, elbow"
     ):

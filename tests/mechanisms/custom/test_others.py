@@ -202,6 +202,41 @@ def test_text_and_record_make_the_same_plant_again(name, mode, tmp_path, monkeyp
     assert again.argument == made.argument
 
 
+def test_a_text_takes_the_keyframe_and_holds_other_motors_and_says_so(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "m.xml").write_text(ARM)
+    with pytest.warns(ScenarioWarning) as told:
+        made = as_plant("m.xml:b")
+    assert made == smc.plant_from("m.xml", ["b"], keyframe="home", others="held")
+    assert made.argument == "m.xml:b@home+held"
+    said = " ".join(str(one.message) for one in told)
+    assert "@home after the joints" in said
+    assert "nothing commands 2 motors of m.xml (c, roll), so a stiff PD holds" in said
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", ".*without this line")
+        assert as_plant(made.argument) == made
+    # of Python's plant, which takes neither, the text says so
+    with pytest.warns(ScenarioWarning, match="nothing commands"):
+        drawn = smc.plant_from("m.xml", ["b"])
+    assert drawn.argument == "m.xml:b@+file"
+    again = as_plant(drawn.argument)
+    assert (again.x0, again.spec().to_xml()) == (drawn.x0, drawn.spec().to_xml())
+
+
+@pytest.mark.parametrize(
+    ("keys", "taken"),
+    [(["up"], "@up"), (["up", "home"], "@home"), (["up", "down"], ""), ([""], "")],
+)
+def test_a_text_takes_the_only_keyframe_or_home(keys, taken, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    lines = "".join(f'<key name="{key}" qpos=".1 -.6 .2 -1.1"/>' for key in keys)
+    text = re.sub("<keyframe>.*</keyframe>", f"<keyframe>{lines}</keyframe>", ARM)
+    (tmp_path / "m.xml").write_text(text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert as_plant("m.xml:b+held").argument == f"m.xml:b{taken}+held"
+
+
 def test_motors_that_nothing_commands_are_told_with_a_cure_that_works():
     with pytest.warns(ScenarioWarning, match="nothing commands, 'c' and 'roll'") as told:
         plant("arm", None)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.common.errors import ScenarioWarning
 from smc_mujoco.mechanisms.named import as_plant
 
 MODEL = """<mujoco><worldbody><body><joint name="lift" type="slide" axis="0 0 1"/>
@@ -72,6 +73,19 @@ def test_a_urdf_keeps_its_visual_shapes_and_its_motion(folder):
     assert sorted(model.geom_group.tolist()) == [1, 1, 3]
     np.testing.assert_array_equal(model.body_mass, plain.body_mass)
     np.testing.assert_array_equal(model.body_inertia, plain.body_inertia)
+
+
+def test_a_joint_of_a_urdf_with_an_effort_gets_an_ideal_motor(folder):
+    with pytest.warns(ScenarioWarning) as told:
+        plant = as_plant("arm.urdf:j1")
+    said = " ".join(str(one.message) for one in told)
+    assert "no actuators, so joint 'j1' gets an ideal motor" in said
+    assert plant.argument == "arm.urdf:j1(motor)+held"
+    assert plant == as_plant("arm.urdf:j1(motor)+held")
+    assert plant.limits == (40.0,)
+    # nothing says that a motor is there, or how strong it is
+    with pytest.raises(smc.ScenarioError, match=r'give "mine.xml:lift\(motor\)\+tilt"'):
+        as_plant("mine.xml:lift+tilt")
 
 
 def tetrahedron(size):

@@ -685,8 +685,8 @@ def test_a_file_is_hashed_parsed_and_compiled_once_for_a_plant(tmp_path, monkeyp
 
 
 ACTUATORS = {
-    '<dcmotor joint="j" motorconst=".05" resistance="2"/>': "<dcmotor>, whose command is no force",
-    '<position joint="j" kp="9" delay=".01" nsample="12"/>': "<position> .* a delay of 0.01 s",
+    '<dcmotor joint="j" motorconst=".05" resistance="2" lugre="1 1 .1 .2 .1"/>': "<dcmotor>",
+    '<position joint="j" kp="9" delay=".01" nsample="12"/>': "a delay of 0.01 s",
     '<motor joint="j" delay=".01" nsample="12"/>': "is a motor, with a delay of 0.01 s",
     '<intvelocity joint="j" kp="9" actrange="-3 3"/>': "<intvelocity>, .* a speed",
     '<velocity joint="j" kv="5"/>': "<velocity> servo, .* a speed",

@@ -1,6 +1,7 @@
 """Position servos of a user's file that stay as they are: u is their set-point, about the goal."""
 
 import math
+import warnings
 
 import mujoco
 import numpy as np
@@ -12,6 +13,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw import panels
 from smc_mujoco.draw.film import arrows
 from smc_mujoco.hardware import PositionServo, RateLimit
+from smc_mujoco.mechanisms.custom.plant_from import restored
 from smc_mujoco.mechanisms.named import from_text
 from smc_mujoco.metrics.tip import knows_contacts
 from smc_mujoco.robustness.margins import MARGIN_KINDS
@@ -180,8 +182,32 @@ REFUSED = {
     "two things": (POSITION, {"motor": True}, ["motor=True", "servo=True"]),
     "a step without a servo": (POSITION, {"servo": False, "set_point_step": 0.1}, ["0.1", "servo"]),
     "no bound": (FREE, {"range": ""}, ["no ctrlrange", "u_max="]),
-    "as a force": (POSITION, {"servo": False}, ["servo=True", "motor=True"]),
+    "as a force": (POSITION, {"servo": False}, ["servo=False", "leave servo out", "j(motor)"]),
 }
+
+
+@pytest.mark.parametrize(
+    ("drive", "u", "text"),
+    [
+        (POSITION, "the set-point of its servo, in rad from its goal at 0", "j(servo)"),
+        (MOTOR % "", "the voltage of its motor, in V", "j(servo)"),
+        ('<motor joint="j" ctrlrange="-3 3"/>', "", "j"),
+    ],
+)
+def test_an_actuator_is_used_as_it_is_and_u_is_told_where_it_is_no_force(drive, u, text):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        taken = smc.plant_from(HOBBY % drive, ["j"], name="servo")
+    told = [str(one.message) for one in caught if "u of 'j'" in str(one.message)]
+    assert len(told) == bool(u)
+    assert all(u in sentence for sentence in told)
+    # it is the plant of one who says so, also in texts and records
+    said = smc.plant_from(HOBBY % drive, {"j": smc.Channel(servo=bool(u))}, name="servo")
+    assert taken == said
+    assert taken.argument == f"FILE.xml:{text}"
+    record = taken.build.about()
+    assert ("servo" in record["channels"]["j"]) == bool(u)  # as in older records
+    assert restored(record, "servo") == taken
 
 
 @pytest.mark.parametrize("case", REFUSED)
