@@ -308,12 +308,18 @@ def _cell_contents(cell: Any) -> Any:
 
 
 def _class_contents(kind: type) -> list[Any]:
-    """Return the bases of a class, and the functions and values in its definition."""
+    """Return the bases of a class, and the functions and values in its definition. What it has
+    from a base and states again does not count: cloudpickle leaves that out.
+    """
     parts: list[Any] = []
+    stated = dict(vars(kind))
     for base in kind.__bases__:
         if not _versioned(base):
             parts.append(base)
-    for name, value in sorted(vars(kind).items()):
+        for name, value in vars(base).items():
+            if name in stated and stated[name] is value:
+                del stated[name]
+    for name, value in sorted(stated.items()):
         content = _as_written(value.fget if isinstance(value, property) else value)
         written = name == "__call__" or not name.startswith("__")
         if written and isinstance(content, (FunctionType, *VALUES)):

@@ -1,12 +1,27 @@
-"""Python files of the user, run for what they define."""
+"""Python files of the user, run for what they define.
 
+`my_parts.py:stribeck` names what a file defines, on the command line and in texts.
+"""
+
+import functools
+import os
+import re
 import runpy
 import sys
 import traceback
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import reading
+from smc_mujoco.common.text import joined
+
+# FILE.py:NAME, by itself, and within a text of parts, where a path with a space is in quotes
+IN_FILE = re.compile(r"(?P<file>[^:]+\.py):(?P<name>[^\W\d]\w*)")
+WITHIN = re.compile(r"[^\s'\"=,:(){}\[\]+]+\.py:[^\W\d]\w*")
+
+_places: dict[int, tuple[Any, str]] = {}  # id of what a text's file defines -> it, FILE.py:NAME
 
 
 def execute(path: Path) -> dict:
@@ -26,6 +41,59 @@ def execute(path: Path) -> dict:
         else:
             where = str(path)
         raise ScenarioError(f"{where}: {error}") from error
+
+
+def named(text: str, what: str, wanted: Callable[[Any], bool]) -> Any:
+    """Return what FILE.py:NAME names, such as "my_parts.py:stribeck".
+
+    Args:
+      text: matches IN_FILE.
+      what: the kind of thing that is looked for, for errors.
+      wanted: whether something that the file defines is of this kind.
+
+    Raises:
+      ScenarioError: there is no such file, or nothing of this kind has the name in it.
+    """
+    file, _, name = text.rpartition(":")
+    if not os.path.isfile(file):
+        raise ScenarioError(f"no file {file!r}: give the file that defines {name!r}")
+    found = _defined(file, Path(file).read_bytes())
+    if name in found and wanted(found[name]):
+        return found[name]
+    others = []
+    for other, value in found.items():
+        if wanted(value):
+            others.append(other)
+    cure = f"it has {joined(others)}" if others else "it has none"
+    raise ScenarioError(f"{file} has no {what} {name!r}: {cure}")
+
+
+@functools.cache
+def _defined(file: str, content: bytes) -> dict:
+    """Return what a file of this content defines. It is run once, so that what a text names twice
+    is one thing.
+    """
+    del content
+    found = execute(Path(file))
+    for name, value in found.items():
+        if callable(value):
+            _places[id(value)] = value, f"{file}:{name}"
+    return found
+
+
+def place(thing: Any) -> str:
+    """Return FILE.py:NAME of a user's class or function, from this folder; "" if no file has it."""
+    if id(thing) in _places:
+        return _places[id(thing)][1]
+    name = getattr(thing, "__name__", "")
+    module = sys.modules.get(getattr(thing, "__module__", None) or "")
+    file = str(getattr(module, "__file__", None) or "")
+    if not file.endswith(".py") or vars(module).get(name) is not thing:
+        return ""
+    path = Path(file).resolve()
+    if path.is_relative_to(Path.cwd()):
+        path = path.relative_to(Path.cwd())
+    return f"{path}:{name}"
 
 
 def users_traceback(error: BaseException) -> str:

@@ -3,6 +3,7 @@
     smc.law("gains.json")        # what `smc-mujoco tune --out gains.json` wrote
     smc.law("my_law.py", lam=5)  # a law made by @smc.law_function
     smc.law("my_law.py(gains.json)")  # the same, after it was tuned
+    smc.law("my_laws.py:second(k1=2)")  # one of several laws of a file
     smc.law("slow: classical(k=2, c=3)")
 
 Files are Python (.py), tunings (.json), C (.c, .so) and FMUs (.fmu). Gains in brackets may follow a
@@ -23,7 +24,7 @@ from smc_mujoco.common import annexes
 from smc_mujoco.common.aliases import Data
 from smc_mujoco.common.errors import ScenarioError, find, shown, warn_once
 from smc_mujoco.common.files import read_json, reading
-from smc_mujoco.common.scripts import execute
+from smc_mujoco.common.scripts import IN_FILE, execute, named
 from smc_mujoco.control import component_json, gain_sets
 from smc_mujoco.control.component import Component, GainValue, Template
 from smc_mujoco.control.law import Law, known_laws
@@ -34,10 +35,12 @@ from smc_mujoco.mechanisms.plant import catalogue as plants_known
 # pid(kp=50,ki=50,kd=8)
 NAME_AND_GAINS = re.compile(r"(?P<head>[^()]+?)\s*(?:\((?P<gains>.*)\))?", re.DOTALL)
 # slow: pid(kp=50)
-LABELLED = re.compile(r"(?P<label>[^:()]+):\s*(?P<rest>.+(?:\(.*\)|\.\w+)\s*)", re.DOTALL)
+LABELLED = re.compile(
+    r"(?P<label>[^:()]+)(?<!\.py):\s*(?P<rest>.+(?:\(.*\)|\.\w+(?::\w+)?)\s*)", re.DOTALL
+)
 
 # my_law.py(gains.json)
-FILE_AND_TUNING = re.compile(r"(?P<file>[^()]+\.\w+)\s*\((?P<tuning>[^()=]+\.json)\)")
+FILE_AND_TUNING = re.compile(r"(?P<file>[^()]+\.\w+(?::\w+)?)\s*\((?P<tuning>[^()=]+\.json)\)")
 
 UNREADABLE = SyntaxError, ValueError, RecursionError, MemoryError
 
@@ -58,8 +61,8 @@ def law(
     Args:
       text: the name of a law of the library, such as "pid"; a name with gains, such as
         "pid(kp=50,ki=50,kd=8)"; or a file with one law: FILE.json that `smc-mujoco tune` wrote,
-        FILE.py, FILE.c or FILE.fmu, also with its tuning, as "FILE.py(FILE.json)". Or your own law
-        itself.
+        FILE.py, FILE.c or FILE.fmu, also with its tuning, as "FILE.py(FILE.json)"; one of several
+        laws of a file, as "FILE.py:name". Or your own law itself.
       plant: a Plant or the name of one. The gains that are not given are then those that the
         package ships for a law of the library on it, of the search with the least J.
       gains: one number for all channels, or a sequence with one for each driven channel.
@@ -88,7 +91,9 @@ def law(
         names = []
         for one in found:
             names.append(one if isinstance(one, str) else one.name)
-        raise ScenarioError(f"{text} has several laws, {', '.join(names)}: give a file with one")
+        raise ScenarioError(
+            f"{text} has several laws, {', '.join(names)}: give one, as FILE.py:{names[0]}"
+        )
     first = found[0]
     return _with_gains(known_laws()[first]() if isinstance(first, str) else first, gains)
 
@@ -133,6 +138,8 @@ def laws(text: object) -> list[str | Law]:
         return [dataclasses.replace(_with_gains(own, found.gains), source=found.source)]
     else:
         head, gains = _parts("law", text, "pid(kp=50,ki=50,kd=8)")
+    if IN_FILE.fullmatch(head):
+        return [law(named(head, "law", _is_law), **gains)]
     if read := _reader(head):
         return [_with_gains(law, gains) for law in read(head)]
     return [find("law", head, known_laws()).bind(gains, warn=True)]
@@ -182,16 +189,21 @@ def _with_gains(law: Law, gains: Mapping[str, float | Sequence[float]]) -> Law:
     return law.template.bind({**law.gains, **gains}, warn=True)
 
 
+def _is_law(thing: Any) -> bool:
+    """Return whether a thing of a user's file is a law, with gains or to be given them."""
+    return isinstance(thing, Law | Template) and thing.kind == "law"
+
+
 def _of_python(path: str) -> list[Law]:
     """Return the laws of a Python file: of @smc.law_function, with their default gains, and of
     smc.law_from.
     """
     templates = {}
     bound = {}
-    for value in execute(Path(path)).values():
-        if isinstance(value, Template) and value.kind == "law":
+    for value in filter(_is_law, execute(Path(path)).values()):
+        if isinstance(value, Template):
             templates[value.name] = value
-        elif isinstance(value, Law) and value.kind == "law":
+        else:
             bound[value.name] = value
     laws = []
     for name, template in templates.items():

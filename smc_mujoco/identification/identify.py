@@ -30,8 +30,8 @@ from smc_mujoco.common.files import write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.identification import first_guess, gauss_newton, log_quality, number_text, records
-from smc_mujoco.identification.own_rig import OwnRig, condition_fields, own_rig
-from smc_mujoco.identification.paths import named_once
+from smc_mujoco.identification.own_rig import SETTINGS, OwnRig, condition_fields, own_rig
+from smc_mujoco.identification.paths import DELAY, named_once
 from smc_mujoco.identification.presliding import presliding
 from smc_mujoco.identification.records import Record
 from smc_mujoco.identification.replays import Point, Replays, Slopes
@@ -47,7 +47,9 @@ from smc_mujoco.identification.standard_errors import (
 from smc_mujoco.mechanisms.custom import mjcf
 from smc_mujoco.mechanisms.named import MODEL, as_plant
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation.conditions import Condition, condition
+from smc_mujoco.simulation import conditions
+from smc_mujoco.simulation.conditions import DURATION, Condition, find_condition
+from smc_mujoco.simulation.part_numbers import FIELDS
 from smc_mujoco.simulation.scenario import Scenario
 
 POOR_FIT = 80.0  # percent: a fit below may mean that the search ended in a wrong place; chosen
@@ -184,7 +186,7 @@ class Identified:
             raise ScenarioError(
                 f"{self.rig.name} is a rig: take rig.scenario(law), or compare(rig=...)"
             )
-        return condition(name, **condition_fields(self.rig))
+        return conditions.condition(name, **condition_fields(self.rig))
 
     def __repr__(self) -> str:
         values = []
@@ -276,6 +278,7 @@ def identify(
     *,
     held_out: Log | None = None,
     columns: Mapping[str, str] | None = None,
+    condition: Condition | str | None = None,
     corrected: bool = False,
     starts: Count = 1,
     seed: Seed = 0,
@@ -302,6 +305,8 @@ def identify(
         the rig's `free`. No start is needed: it comes from least squares of forces.
       held_out: a log that is not used, to check the numbers on.
       columns: our name of a column -> that of the logs.
+      condition: what your own machine has beside its model: a condition or its text, such as
+        "mine: friction=LuGre(0.3, 0.4, 0.1)", whose numbers `names` may find; as in a Scenario.
       corrected: whether to correct open loops for the errors of the simulation's steps, in several
         times the time. Without it a standard error has what half steps would change.
       starts: number of sets from which the search may start, if the first fits badly: the present
@@ -321,7 +326,7 @@ def identify(
         cannot be told apart.
     """
     listed = None if names is None else named_once(names)
-    twin, data = _read(machine, logs, listed, columns)
+    twin, data = _read(machine, logs, listed, columns, condition)
     names = _checked_names(twin, listed)
     fits_before = twin.fits(data)  # also refuses records that are too short
     doubts = []
@@ -415,6 +420,7 @@ def _read(
     logs: Log | Sequence[Log],
     names: Sequence[str] | None,
     columns: Mapping[str, str] | None,
+    condition: Condition | str | None,
 ) -> tuple[Rig, list[Data]]:
     """Return the rig of a machine, and its logs as columns. An error about a file names it."""
     many: Any = logs if isinstance(logs, (list, tuple)) else [logs]
@@ -425,6 +431,8 @@ def _read(
         machine = (
             find_rig(machine) if machine in rigs() else _named_plant(machine, read, names or ())
         )
+    if condition is not None:
+        machine = _under(machine, find_condition(condition))
     if isinstance(machine, Plant | Scenario):
         machine = own_rig(machine, names or [])
     if not isinstance(machine, Rig):
@@ -437,6 +445,23 @@ def _read(
             _check_log(twin, given, record)
         twin = first_guess.first_guess(twin, data)
     return twin, data
+
+
+def _under(machine: Any, condition: Condition) -> Scenario:
+    """Return the scenario of a plant under a condition, whose every field a replay has."""
+    if not isinstance(machine, Plant):
+        raise ScenarioError(
+            f"condition {condition.name!r} is for a plant: leave it out, and give a scenario its "
+            "parts itself"
+        )
+    fields = condition.on(machine, DURATION)
+    for name in fields:
+        if name not in (*FIELDS, *SETTINGS, DELAY):
+            raise ScenarioError(
+                f"condition {condition.name!r} has {name}, which no replay of a log has: leave it "
+                f"out; it may have {joined(FIELDS)}"
+            )
+    return Scenario.recorded(plant=machine, law="none", **fields)
 
 
 def _named_plant(text: str, logs: Sequence[Any], names: Sequence[str]) -> Plant:

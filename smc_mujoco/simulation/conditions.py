@@ -6,10 +6,10 @@ Scenario.
 
 A condition applies to any plant. Those of the suite are in `NAMED`, under names such as "noise".
 Names joined by "+" apply together. As text, a condition is its name, a colon and its fields,
-written as in Python. Such a text is parsed;
-nothing in it is run:
+written as in Python. Such a text is parsed, and only a file that it names is run:
 
     worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)
+    mine: friction=my_parts.py:stribeck(static=0.3)
 
 The levels of the suite are those of a machine of the study's size. Dry friction is of any size: a
 sixtieth of the machine's bound on the force of each driven joint, 0.1 N m or N in the study. The
@@ -37,6 +37,7 @@ import dataclasses
 import functools
 import inspect
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -49,9 +50,10 @@ from smc_mujoco.common.errors import ScenarioError, find, number, shown, unknown
 from smc_mujoco.common.files import reading
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.registry import subclasses
+from smc_mujoco.common.scripts import IN_FILE, WITHIN, named, place
 from smc_mujoco.common.text import stated
 from smc_mujoco.control import gain_sets
-from smc_mujoco.control.component import Component
+from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.mechanisms.custom.scales import BESIDE, at_goal, usual_start
@@ -98,6 +100,10 @@ CONDITION_FIELDS = [name for name in Scenario.fields() if name not in GRID_FIELD
 # their values add up when conditions are joined
 ADDITIVE_FIELDS = ("disturbance", "friction", "actuator", "contact")
 ABSTRACT = (Part, Friction, Actuator, Obstacle, Signal)  # classes that a text cannot name
+PLAIN = (Noise, Jump, Fault, Clock)  # fields' values that are neither parts nor signals
+WHAT = "part, signal or estimator"  # that a text may name
+# a text in quotes, or FILE.py:NAME without them
+FILES = re.compile(rf"'[^']*'|\"[^\"]*\"|(?P<bare>{WITHIN.pattern})")
 CONSTANTS = {"inf": math.inf, "pi": math.pi}
 
 # The suite's defaults, under which its plants and laws are compared.
@@ -176,10 +182,17 @@ class Condition:
 
     def __str__(self) -> str:
         """Return the text that `parse` reads, or the name alone for a condition of the suite."""
+        return self.text()
+
+    def text(self, files: bool = True) -> str:
+        """Return the text that `parse` reads, or the name alone for a condition of the suite.
+
+        Without `files` it names a user's part alone, without the file that has it.
+        """
         if self.name in NAMED or callable(self.fields):
             return self.name
         try:
-            texts = _assignments(self.fields, _as_text)
+            texts = _assignments(self.fields, functools.partial(_as_text, files=files))
         # the repr of a value that no scenario takes may fail; this text is for the error about it
         except Exception:
             texts = _assignments(self.fields, shown)
@@ -190,7 +203,7 @@ class Condition:
         errors as in `on`.
         """
         fields = self.on(plant, duration)
-        return _assignments(fields, functools.partial(_as_text, defaults=False))
+        return _assignments(fields, functools.partial(_as_text, defaults=False, files=False))
 
 
 def condition(name: str, **fields: Any) -> Condition:
@@ -236,6 +249,9 @@ def find_condition(value: Condition | str) -> Condition:
         return value
     if not isinstance(value, str):
         raise ScenarioError(f"condition is {shown(value)}: give a name, or smc.condition(...)")
+    if in_file := IN_FILE.fullmatch(value):
+        kind = f'condition (of a part: "{in_file["name"]}: friction={value}")'
+        return named(value, kind, lambda thing: isinstance(thing, Condition))
     if ":" in value:
         return parse(value)
     if set("=(") & set(value):
@@ -264,10 +280,7 @@ def applicable(names: Iterable[str], plants: Sequence[Plant], duration: float) -
 
 
 def parse(text: str) -> Condition:
-    """Return the condition that a text describes, such as "worn gear: friction=Coulomb(0.05)".
-
-    No text is run.
-    """
+    """Return the condition that a text describes, such as "worn gear: friction=Coulomb(0.05)"."""
     name, _, fields = text.partition(":")
     try:
         values = read_fields(fields)
@@ -278,9 +291,13 @@ def parse(text: str) -> Condition:
 
 
 def read_fields(text: str) -> dict[str, Any]:
-    """Return the fields in a text such as "friction=Coulomb(0.05), x0=0.3"."""
+    """Return the fields in a text such as "friction=Coulomb(0.05), x0=0.3".
+
+    No text is run, but a file is whose part the text names, as "friction=my_parts.py:stribeck()".
+    """
+    quoted = FILES.sub(_in_quotes, text)
     try:
-        call = ast.parse(f"_({text})", mode="eval").body
+        call = ast.parse(f"_({quoted})", mode="eval").body
     except (ValueError, RecursionError, MemoryError):
         call = None
     if not isinstance(call, ast.Call) or call.args:
@@ -288,6 +305,11 @@ def read_fields(text: str) -> dict[str, Any]:
     if any(word.arg is None for word in call.keywords):
         raise SyntaxError
     return _keywords(call)
+
+
+def _in_quotes(found: re.Match[str]) -> str:
+    """Return FILE.py:NAME in quotes, as Python reads it."""
+    return repr(found["bare"]) if found["bare"] else found[0]
 
 
 def from_file(path: Path) -> list[Condition]:
@@ -313,6 +335,8 @@ def from_file(path: Path) -> list[Condition]:
 def _parsed(node: ast.expr) -> Any:  # noqa: PLR0911  # a table
     """Return the value of a literal, or of a call that makes a part, a signal or an estimator."""
     match node:
+        case ast.Constant(value=str() as text) if IN_FILE.fullmatch(text):
+            return _call(ast.Call(func=node, args=[], keywords=[]))
         case ast.Constant(value=value):
             return value
         case ast.Name(id=name) if name in CONSTANTS:
@@ -342,8 +366,17 @@ def _parsed(node: ast.expr) -> Any:  # noqa: PLR0911  # a table
 
 def _call(node: ast.Call) -> Any:
     """Return the part, signal or estimator that a call makes."""
-    name = ast.unparse(node.func).removeprefix("smc.")
-    kind = find("part, signal or estimator", name, estimators() | _kinds())
+    if isinstance(node.func, ast.Constant):
+        kind = named(str(node.func.value), WHAT, _usable)
+    else:
+        name = ast.unparse(node.func).removeprefix("smc.")
+        kind = find(WHAT, name, estimators() | _kinds())
+    if not callable(kind):
+        if node.args or node.keywords:
+            raise ScenarioError(
+                f"condition has {shown(ast.unparse(node))}, which is {kind}: leave its brackets out"
+            )
+        return kind
     values = map(_parsed, node.args)
     keywords = _keywords(node)
     try:
@@ -352,6 +385,15 @@ def _call(node: ast.Call) -> Any:
         parameters = inspect.signature(kind).parameters if isinstance(kind, type) else kind.defaults
         cure = f"it takes {', '.join(parameters) or 'nothing'}"
         raise ScenarioError(f"condition has {shown(ast.unparse(node))}: {cure}") from None
+
+
+def _usable(thing: Any) -> bool:
+    """Return whether a thing of a user's file is a part, signal or estimator, or a kind of it."""
+    if isinstance(thing, Template):
+        return thing.kind == "estimator"
+    if isinstance(thing, type):
+        return issubclass(thing, (Part, Signal, *PLAIN)) and thing not in ABSTRACT
+    return isinstance(thing, Part | Signal | Noise | Jump | Fault | Clock)
 
 
 def _keywords(node: ast.Call) -> dict[str, Any]:
@@ -370,7 +412,7 @@ def _kinds() -> dict[str, Any]:
 
     If two have one name, the suite's is returned.
     """
-    kinds: list[type] = [Noise, Jump, Fault, Clock]
+    kinds: list[type] = [*PLAIN]
     for kind in (*subclasses(Part), *subclasses(Signal)):
         if kind not in ABSTRACT:
             kinds.append(kind)
@@ -383,16 +425,23 @@ def _assignments(fields: Data, as_text: Callable[[Any], str]) -> str:
     return ", ".join(f"{name}={as_text(value)}" for name, value in fields.items())
 
 
-def _as_text(value: Any, defaults: bool = True) -> str:
-    """Return a value as `parse` reads it, with or without fields that have their default."""
-    as_text = functools.partial(_as_text, defaults=defaults)
+def _as_text(value: Any, defaults: bool = True, files: bool = True) -> str:
+    """Return a value as `parse` reads it, with or without fields that have their default, and with
+    or without the files of a user's parts.
+    """
+    as_text = functools.partial(_as_text, defaults=defaults, files=files)
     if isinstance(value, Component):
-        return f"{value.name}({_assignments(value.gains, repr)})"
+        own = files and value.name not in estimators()
+        word = _word(value.template, own) or value.name
+        return f"{word}({_assignments(value.gains, repr)})"
     if isinstance(value, Part | Signal | Noise | Jump | Fault | Clock):
         fields = stated(value, defaults)
         if getattr(value, "about", ""):
             fields["about"] = "goal"
-        return f"{type(value).__name__}({_assignments(fields, as_text)})"
+        kind = type(value)
+        own = files and not kind.__module__.startswith("smc_mujoco.")
+        word = _word(kind, own) or kind.__name__
+        return f"{word}({_assignments(fields, as_text)})"
     if isinstance(value, tuple):
         return f"({', '.join(map(as_text, value))},)"
     if isinstance(value, Mapping):
@@ -401,6 +450,12 @@ def _as_text(value: Any, defaults: bool = True) -> str:
             items.append(f"{key!r}: {as_text(item)}")
         return f"{{{', '.join(items)}}}"
     return repr(value)
+
+
+def _word(kind: Any, own: bool) -> str:
+    """Return FILE.py:NAME of a kind of part that is the user's own; "" if no file has it."""
+    where = place(kind) if own else ""
+    return where if WITHIN.fullmatch(where) else where and repr(where)
 
 
 def _frozen(value: Any) -> Any:

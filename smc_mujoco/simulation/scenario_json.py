@@ -34,6 +34,7 @@ FOLDERS = (
 # Fields that older records lack -> their defaults, which are not written either
 LATER = {"fault": None, "tracks": "position"}
 LATER_OF_PARTS = ("side",)
+RUN_FILE = "<run_path>"  # the module of what runpy runs
 RESOLVED = tuple(
     Resolved.__annotations__
 )  # fields that are None if left out, with a default that `resolved` has
@@ -147,9 +148,10 @@ def _restored(data: Any) -> Any:
     for kind in (Feedforward, *subclasses(Signal), *subclasses(Part)):
         kinds[(kind.__name__, kind.__module__)] = kind
     if (kind := kinds.get((data["kind"], data["module"]))) is None:
-        raise ScenarioError(
-            f"{data['kind']!r} is unknown here: first import {data['module']}, which defines it"
-        )
+        cure = f"import {data['module']}, which defines it"
+        if data["module"] == RUN_FILE:
+            cure = "run the file that defines it, by runpy.run_path(FILE)"
+        raise ScenarioError(f"{data['kind']!r} is unknown here: first {cure}")
     values = {name: _restored(value) for name, value in data["values"].items()}
     if issubclass(kind, Friction) and "on" not in values:  # of an older version: on all joints
         values["on"] = () if values.pop("driven", False) else (EVERY,)

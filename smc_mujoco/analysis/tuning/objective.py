@@ -131,7 +131,7 @@ class Objective:
         for f in dataclasses.fields(self):
             values[f.name] = getattr(self, f.name)
         return values | {
-            "conditions": list(map(str, self.conditions)),
+            "conditions": [condition.text(files=False) for condition in self.conditions],
             "starts": dataclasses.asdict(self.starts),
         }
 
@@ -245,7 +245,10 @@ class Objective:
 
 
 def restore(data: Data) -> Objective:
-    """Return the objective that `Objective.describe` wrote."""
+    """Return the objective that `Objective.describe` wrote. No file that it names is run."""
+    for text in data["conditions"]:
+        if ".py:" in text:
+            raise ScenarioError(f"condition {shown(text)} names a file, and a record runs none")
     starts = dict(data.get("starts", {}))
     if starts.get("x0") is not None:
         starts["x0"] = tuple(starts["x0"])

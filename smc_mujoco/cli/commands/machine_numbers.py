@@ -52,6 +52,15 @@ FoundFigure = Annotated[
 FoundFile = Annotated[
     Path | None, typer.Option(help="File for --condition of compare, which and tune: FILE.txt.")
 ]
+Beside = Annotated[
+    str | None,
+    typer.Option(
+        "--condition",
+        metavar="NAME|TEXT",
+        help="What the machine has beside its model, with numbers to find, such as "
+        '"mine: friction=LuGre(0.3, 0.4, 0.1)" or "mine: friction=my_parts.py:stribeck()".',
+    ),
+]
 Corrected = Annotated[
     bool, typer.Option("--corrected", help="Correct for the errors of the simulation's steps.")
 ]
@@ -85,6 +94,7 @@ def identify(
     pairs: PairsFile = None,
     held_out: HeldOut = None,
     columns: options.Columns = None,
+    condition: Beside = None,
     figure: FoundFigure = None,
     out: FoundFile = None,
     corrected: Corrected = False,
@@ -98,8 +108,9 @@ def identify(
     and u (N m or N) of the joint, or x_JOINT and u_JOINT of each. No start is needed.
 
     The paths of numbers are JOINT.damping, .frictionloss, .armature, .stiffness, .gain, .offset and
-    .zero, input_delay, m and grav. The table has each number with its standard error. Notes below
-    it say what the logs cannot determine.
+    .zero, input_delay, m and grav, and of a part that --condition gives FIELD.NAME, as
+    friction.coulomb. The table has each number with its standard error. Notes below it say what the
+    logs cannot determine.
 
     Pairs of speed (rad/s or m/s) and torque (N m or N) are of one joint in the order of time. The
     torque is what friction alone needs: measured, less gravity and inertia.
@@ -107,6 +118,9 @@ def identify(
     Example: smc-mujoco identify arm.xml run1.csv run2.csv --for shoulder.damping,input_delay
 
     Example: smc-mujoco identify arm.xml:shoulder run.csv --for m --columns x=angle,u=torque
+
+    Example: smc-mujoco identify arm.xml run.csv --condition "mine: friction=my.py:stribeck()" --for
+    friction.coulomb,friction.speed
 
     Example: smc-mujoco identify emps run.csv
 
@@ -116,9 +130,9 @@ def identify(
     options.check_files(None, figure, out)
     renamed = options.pairs(columns, "columns", "x_elbow=angle,t=time") or None
     if pairs is not None:
-        if machine is not None or names is not None:
+        if machine is not None or names is not None or condition is not None:
             raise ScenarioError(
-                "--pairs has friction alone: leave out the machine, its logs and --for"
+                "--pairs has friction alone: leave out the machine, its logs, --for and --condition"
             )
         _from_pairs(pairs, held_out, renamed, figure, out, terminal)
         return
@@ -135,6 +149,7 @@ def identify(
         options.names(names) or None,
         held_out=held_out,
         columns=renamed,
+        condition=condition,
         corrected=corrected,
         starts=starts,
         seed=seed,

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 COMMA = re.compile(r",(?![^(]*\))")  # a comma outside brackets
 GAINS_HELP = (
-    "Your own gains: pid(kp=50,ki=50,kd=8). Your own file: my_law.py, gains.json of "
-    "`smc-mujoco tune --out`, or my_law.py(gains.json)."
+    "Your own gains: pid(kp=50,ki=50,kd=8). Your own file: my_law.py, my_laws.py:name, gains.json "
+    "of `smc-mujoco tune --out`, or my_law.py(gains.json)."
 )
 
 
@@ -40,8 +40,9 @@ def conditions_by_default(default: str) -> Any:
         metavar="NAME|TEXT|FILE",
         autocompletion=CONDITIONS,
         help="Conditions from `smc-mujoco list`, separated by commas; noise+encoder joins two. "
-        'Your own: "worn gear: friction=Coulomb(0.05)", or a file with one on each line. May be '
-        f"repeated. Default: {default}.",
+        'Your own: "worn gear: friction=Coulomb(0.05)", with a part of your own file "mine: '
+        'friction=my_parts.py:stribeck(static=0.3)", or a file with one on each line. '
+        f"May be repeated. Default: {default}.",
         show_default=False,
     )
 
@@ -361,17 +362,22 @@ def starts(x0: str | None) -> "Starts | None":
 
 def actuator(text: str) -> "tuple[Actuator, ...]":
     """Return a drive or gear from "lag:0.01", or several from "dcmotor+lag:0.01"; numbers are in
-    the fields' order.
+    the fields' order. Your own is "my_parts.py:dead_zone(zone=0.1)".
     """
     from smc_mujoco.common.registry import subclasses
+    from smc_mujoco.common.scripts import WITHIN
     from smc_mujoco.mechanisms.hardware import backlash, drives  # noqa: F401
     from smc_mujoco.mechanisms.hardware.part import Actuator
+    from smc_mujoco.simulation.conditions import read_fields
 
     known: dict[str, type[Actuator]] = {}
     for kind in subclasses(Actuator):
         known[kind.__name__.lower()] = kind
     parts = []
     for part in text.split("+"):
+        if WITHIN.match(part):
+            parts.append(read_fields(f"actuator={part}")["actuator"])
+            continue
         name, _, numbers = part.partition(":")
         kind = find("actuator", name.strip().lower().replace("_", ""), known)
         try:

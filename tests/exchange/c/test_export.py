@@ -483,7 +483,12 @@ def test_the_command_writes_the_one_law_of_a_file(tmp_path, capsys):
     file.write_text(f"{file.read_text()}{one.replace('mine', 'other')}")
     with pytest.raises(SystemExit):
         cli.main(["export", str(file), str(tmp_path / "a.c")])
-    assert f"{file} has several laws, mine, other: give a file with one" in capsys.readouterr().err
+    assert f"{file} has several laws, mine, other: give one, as FILE.py:mine" in (
+        capsys.readouterr().err
+    )
+    with pytest.raises(SystemExit) as end:
+        cli.main(["export", f"{file}:other", str(tmp_path / "other.c")])
+    assert not end.value.code
 
 
 @pytest.mark.slow
