@@ -42,6 +42,7 @@ ROW_HEIGHT = 1.5  # inches on a full page, height of a panel over time
 MAX_COLUMN = 9.0  # inches, of a figure in a journal's column, which is 9.25 high
 MAX_WORST = 3  # channels of a robot that are drawn, those with the largest errors
 LINE_ROW, LINES_ROW = 0.37, 0.45  # relative height of a row with one line, and with several
+END_TIME = "time before the end (ms)"
 SLIDE_PANELS = "x", "u", "settling", "channels"
 
 
@@ -224,7 +225,12 @@ class Blocks(NamedTuple):
     @property
     def heights(self) -> tuple[list[float], list[float], list[float]]:
         """The relative heights of the panels of each block."""
-        beside = [SIDE_PANELS[name] for name in self.beside]
+        beside = []
+        for name in self.beside:
+            high = SIDE_PANELS[name]
+            if name == "end":
+                high = max(high, _height(self.places[0]._replace(quantity="u")))
+            beside.append(high)
         left = list(map(_height, self.left))
         right = list(map(_height, self.right))
         return left, right, beside
@@ -520,7 +526,31 @@ def _draw_beside(
     portraits = iter(places[1:])
     for cell, name in zip(cells, column, strict=True):
         place = next(portraits) if name == "phase" else places[0]
-        _draw_side(page.add_subplot(cell), name, place, runs)
+        controls = place._replace(quantity="u")
+        if name == "end" and lanes.crowded(controls):
+            _draw_ends(page, cell, controls, runs)
+        else:
+            _draw_side(page.add_subplot(cell), name, place, runs)
+
+
+def _draw_ends(page: Figure | SubFigure, cell: SubplotSpec, panel: Panel, runs: DrawnRuns) -> None:
+    """Draw a close-up of the end of u in a cell, each run in its row."""
+    frame = page.add_subplot(cell, frameon=False, xticks=[])
+    rows = lanes.rows(frame, panel, runs.colours)
+    for ax, part, colours in rows:
+        drawing.last_samples(ax, part, colours)
+    _equal_ranges(frame, rows)
+    frame.set_ylabel(_end_words(panel))
+    rows[-1].axes.set_xlabel(END_TIME)
+
+
+def _end_words(panel: Panel) -> str:
+    """Return the label of a close-up of the end of u."""
+    plant = panel.traces[0].scenario.plant
+    letter = "control u"
+    if plant.driven > 1 or plant.direct:
+        letter = f"{channel_names(plant)[0]} u"
+    return style.folded(letter + panel.scale[1])
 
 
 def _draw_side(ax: Axes, name: str, place: Panel, runs: DrawnRuns) -> None:
@@ -528,12 +558,7 @@ def _draw_side(ax: Axes, name: str, place: Panel, runs: DrawnRuns) -> None:
     if name == "end":
         panel = place._replace(quantity="u")
         drawing.last_samples(ax, panel, runs.colours)
-        plant = panel.traces[0].scenario.plant
-        letter = "control u"
-        if plant.driven > 1 or plant.direct:
-            letter = f"{channel_names(plant)[0]} u"
-        words = style.folded(letter + panel.scale[1])
-        ax.set(xlabel="time before the end (ms)", ylabel=words)
+        ax.set(xlabel=END_TIME, ylabel=_end_words(panel))
     elif name == "phase":
         drawing.phase(ax, place, runs.colours)
     else:

@@ -29,6 +29,11 @@ ROW_HEIGHT = 3.4  # inches
 SPAN_FACTOR = 40.0  # from the crossing to the ends of L's frequencies and of N's amplitudes
 PLANE_EDGE = 2.5  # of the complex plane
 SHOWN_PERIODS = 6  # of s
+WIDE = 1.6  # points on a full page, of the curves in the plane
+DASHES = (0, (4, 2))  # of 1/N
+RESPONSE = "L, over frequency"
+INVERSE = "1/N, over amplitude"
+CYCLE = "cycle, with harmonics of e"
 
 
 def nyquist(
@@ -59,6 +64,12 @@ def nyquist(
                 words = f"{cycle.frequency:.3g} Hz predicted"
             label = f"{style.law_name(scenario.law)}: {words}{source}"
             handles.append(pages.entry(label, colour))
+        if any(cycles):
+            wide = style.points(WIDE)
+            handles.append(pages.entry(RESPONSE, style.INK, lw=wide))
+            handles.append(pages.entry(INVERSE, lw=wide, ls=DASHES))
+            dot = {"marker": "o", "lw": 0.0, "ms": style.points(8)}
+            handles.append(pages.entry(CYCLE, **dot))
         head = pages.head_height(style.FULL_WIDTH, handles)
         whole = head + ROW_HEIGHT * len(scenarios)
         page = pages.blank(style.FULL_WIDTH, whole)
@@ -107,15 +118,11 @@ def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour:
         gain = loop.gain(a, omega)
         inverses.append(1.0 / (gain or math.nan))
     inverse = np.array(inverses) / unit
-    wide = style.points(1.6)
-    curve = {"color": style.INK, "lw": wide, "label": "L, over frequency"}
-    ax.plot(response.real, response.imag, **curve)
-    curve = {"color": colour, "lw": wide, "label": "1/N, over amplitude", "ls": (0, (4, 2))}
-    ax.plot(inverse.real, inverse.imag, **curve)
-    mark = {"color": colour, "ms": style.points(8), "mec": style.PAPER}
-    ax.plot([-1.0], [0.0], "o", label="cycle, with harmonics of e", **mark)
-    look = {"fontsize": style.points(8.5), "frameon": True, "framealpha": 0.8}
-    ax.legend(loc="upper right", handlelength=1.6, **look)
+    wide = style.points(WIDE)
+    ax.plot(response.real, response.imag, color=style.INK, lw=wide, label=RESPONSE)
+    ax.plot(inverse.real, inverse.imag, color=colour, lw=wide, ls=DASHES, label=INVERSE)
+    mark = {"color": colour, "ms": style.points(8), "mec": style.PAPER, "label": CYCLE}
+    ax.plot([-1.0], [0.0], "o", **mark)
 
 
 def last_periods(ax: Axes, trace: Trace, cycle: Chattering, channel: int, colour: str) -> None:

@@ -56,7 +56,7 @@ def friction_figure(
             left, middle, right = axes[i]
             left.plot(t, measured[name], color=style.INK, lw=1.6)
             left.plot(t, predicted[name], color=colour, lw=0.9)
-            left.set_title(f"whole log in an open loop, fit {fit[name]:.1f} %")
+            left.set_title(f"log in an open loop, fit {fit[name]:.1f} %")
             left.set_ylabel(f"{name} ({unit})")
             speed = records.rate(measured[name], records.step_of(t))
             middle.axhline(0.0, color=style.RULE, lw=0.8)
@@ -84,7 +84,7 @@ def _friction(
         error = 2.0 * curve_error(rig, covariance, i, v)
         ax.plot(v, curve, color=colour, lw=1.2)
         ax.fill_between(v, curve - error, curve + error, color=colour, alpha=0.25, lw=0.0)
-    effort = rig.plant.efforts[i]
+    effort = rig.plant.efforts[i].replace(" ", "·")
     ax.set_title(f"friction ({effort})")
 
 

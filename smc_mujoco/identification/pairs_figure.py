@@ -48,8 +48,10 @@ def pairs_figure(
         Line2D([], [], color=colour, lw=1.8, label=f"taken: {taken}"),
         Patch(color=colour, alpha=0.25, lw=0.0, label="± 2 standard errors"),
     ]
-    for model, other in rivals.items():
-        handles.append(Line2D([], [], color=other, lw=0.9, ls="--", label=model))
+    looks = {}
+    for place, (model, other) in enumerate(rivals.items(), 1):
+        looks[model] = {"color": other, "lw": 1.2, "ls": style.DASHES[place % len(style.DASHES)]}
+        handles.append(Line2D([], [], label=model, **looks[model]))
     side = np.linspace(1e-3, 1.0, SPEEDS)
     with style.page():
         height = pages.head_height(style.FULL_WIDTH, handles) + HEIGHT
@@ -57,14 +59,14 @@ def pairs_figure(
         ax = page.subplots()
         ax.plot(v, torque, ".", ms=1.5, color=style.INK, alpha=0.3)
         for speeds in (side[::-1] * v.min(), side * v.max()):
-            for model, other in rivals.items():
-                ax.plot(speeds, forces[model](speeds), color=other, lw=0.9, ls="--")
+            for model, look in looks.items():
+                ax.plot(speeds, forces[model](speeds), **look)
             curve = forces[taken](speeds)
             wide = 2.0 * error(speeds)
             ax.plot(speeds, curve, color=colour, lw=1.8)
             ax.fill_between(speeds, curve - wide, curve + wide, color=colour, alpha=0.25, lw=0.0)
         ax.set_xlabel("speed (rad/s or m/s)")
-        ax.set_ylabel("torque (N m or N)")
+        ax.set_ylabel("torque (N·m or N)")
         ax.set_title(title)
         pages.set_head(page, style.FULL_WIDTH, "Friction from speed and torque", handles)
         pages.write(page, paths)

@@ -13,8 +13,8 @@ from matplotlib.patches import Patch
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.source import restore
+from smc_mujoco.draw import dark, style
 from smc_mujoco.draw import page as pages
-from smc_mujoco.draw import style
 from smc_mujoco.robustness.region_of_attraction import CONVERGES, DOES_NOT, Basin
 
 SHADES = 3  # from early to late
@@ -54,7 +54,10 @@ def draw_map(ax: Axes, region: Basin, after: Sequence[float], title: str) -> Non
     maps.
     """
     classes = colour_indices(region, after)
+    neutral = style.neutral_on_dark()
     colours = colours_of(region.law)
+    if neutral:  # those that the key has on a dark page
+        colours = [dark.on_dark(colour.upper(), neutral) for colour in colours]
     shades = {"cmap": ListedColormap(colours), "vmin": -0.5, "vmax": 4.5}
     ax.pcolormesh(region.x, region.v, classes, rasterized=True, **shades)
     for colour, wide in ((style.PAPER, 3.2), (style.INK, 1.4)):

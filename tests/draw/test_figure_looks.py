@@ -168,7 +168,7 @@ def test_controls_whose_bands_would_hide_each_other_have_a_row_each(one):
     (ax,) = figure(bang, panels=["u"]).axes
     assert {tuple(row.get_yticks()) for row in rows(ax)} == {(-6.0, 6.0)}, "the bound"
     page = figure(three, size=COLUMN, panels=["x", "u", "s", "end"])
-    assert [len(rows(ax)) for ax in page.axes] == [1, 3, 1, 1]
+    assert [len(rows(ax)) for ax in page.axes] == [1, 3, 1, 3]
     names = []
     colours = []
     for row in rows(page.axes[1]):

@@ -5,6 +5,7 @@ whole and inside.
 import dataclasses
 import re
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from helpers import arms
@@ -445,6 +446,17 @@ def test_laws_whose_amplitudes_are_equal_at_a_lag_are_marked_there_and_doubtful_
             hollow.append(places(dot)[0, 0])
     assert hollow == pytest.approx([10.0, 10.0])
     assert len(dots) == 6
+
+
+@pytest.mark.parametrize("page", ["default", "dark_background"])
+def test_the_key_of_a_map_has_its_colours(page):
+    with plt.style.context(page):
+        for ax in region_figure.draw(basins()).axes:
+            legend = ax.get_legend()
+            assert legend is not None
+            keys = [to_hex(patch.get_facecolor()) for patch in legend.get_patches()]
+            (mesh,) = ax.collections
+            assert keys == [to_hex(colour) for colour in mesh.get_cmap()(range(5))]
 
 
 def test_shares_of_a_map_are_those_of_its_states_and_add_up():
