@@ -20,8 +20,8 @@ FOLDER = Path(__file__).parent / "gallery"
 
 
 class Clip(NamedTuple):
-    """What a clip shows: the paper's four laws with the study's gains, or `laws` with their
-    published ones.
+    """What a clip shows: laws of the paper, all four unless `shown` names some, with the study's
+    gains, or `laws` with their published ones.
     """
 
     plant: str | Plant
@@ -30,6 +30,7 @@ class Clip(NamedTuple):
     condition: str = "nominal"
     changes: Mapping[str, Any] = {}
     laws: Sequence[str | Law] = ()
+    shown: Sequence[str] = smc.paper.LAWS
 
     def frames(self, **options: Any) -> Frames:
         """Return the pictures of the clip; options as of `smc.film`."""
@@ -38,9 +39,10 @@ class Clip(NamedTuple):
         for law in self.laws:
             runs.append(smc.Scenario(plant=self.plant, law=law, duration=self.seconds, **changes))
         if not self.laws:
-            runs = smc.paper.comparison(
+            compared = smc.paper.comparison(
                 str(self.plant), self.condition, duration=self.seconds, changes=changes
-            ).values()
+            )
+            runs = [compared[law] for law in self.shown]
         return smc.film(smc.run(runs), title=self.title, fps=20.0, **options)
 
 
@@ -89,17 +91,21 @@ STRANGER = {
 }
 CLIPS = {  # name of the clip's file -> what it shows
     "inverted_pendulum": Clip("inverted_pendulum", "Inverted pendulum", 1.5),
-    "van_der_pol": Clip("van_der_pol", "Van der Pol under measurement noise", 2.0, "noise"),
+    "van_der_pol": Clip("van_der_pol", "Van der Pol, sensor noise", 2.0, "noise"),
     "duffing": Clip("duffing", "Duffing", 3.0),
-    "pendulum_network": Clip("pendulum_network", "Five coupled pendulums", 2.0),
+    "pendulum_network": Clip("pendulum_network", "Coupled pendulums", 2.0),
     "hard_stops": Clip(
-        "inverted_pendulum", "A blow, rubber stops, and friction in the joint", 2.2, changes=BLOW
+        "inverted_pendulum",
+        "Blow, rubber stops, friction",
+        2.2,
+        changes=BLOW,
+        shown=("classical", "adaptive", "super_twisting"),
     ),
     "wall_and_ball": Clip(
         smc.plant_from(
             ARM, channels={"shoulder": smc.Channel(x0=-0.3), "elbow": smc.Channel(x0=0.1)}
         ),
-        "A robot of your own, a wall and a ball",
+        "Your robot, a wall, a ball",
         0.8,
         changes=STRANGER,
         laws=(
@@ -109,7 +115,7 @@ CLIPS = {  # name of the clip's file -> what it shows
     ),
     "quadrotor": Clip(
         "quadrotor",
-        "A drone on a figure of eight, in a gust",
+        "A drone in a gust",
         3.2,
         changes=EIGHT,
         laws=("geometric", "quaternion_sliding"),

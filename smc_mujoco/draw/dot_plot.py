@@ -282,7 +282,7 @@ def _key(table: RunColumns, dots: Dots) -> tuple[list[Handle], str]:
         key.append(sample)
     label = "95 % interval"
     if min(interval.n for interval in intervals) < MIN_INTERVAL_SAMPLES:
-        label += f" (the range, with fewer than {MIN_INTERVAL_SAMPLES} samples)"
+        label += f" (range if under {MIN_INTERVAL_SAMPLES} samples)"
     key.append(pages.entry(label, **line))
     if dots.won:
         ring = pages.entry("winner", style.INK, lw=0.0, **RING)

@@ -15,7 +15,7 @@ from smc_mujoco.draw.film.track import MachineTrack
 class Blank:
     """In the place of a film's page: drawing its panels takes half of a picture's time."""
 
-    def __init__(self, runs, size, tiles, labels, title=None, key=(), start=0.0):
+    def __init__(self, runs, size, tiles, labels, title=None, key=(), start=0.0, lines=2):
         self.tiles = tiles
         self.image = np.full((size[1], size[0], 3), 255, np.uint8)
 
@@ -42,7 +42,7 @@ def staged(trace, size, colour="#0072B2", chosen=None, strip=0.0):
     at its foot.
     """
     shown = tracks([trace], [colour])
-    whole = mock.patch.object(film, "room_of", lambda size: Room(0.0, 0.0, *size))
+    whole = mock.patch.object(film, "room_of", lambda size, lines: Room(0.0, 0.0, *size))
     words = mock.patch.object(
         film, "label_sizes", lambda names, size, room: (np.array([[room, strip]]), 1.0)
     )

@@ -31,7 +31,7 @@ from smc_mujoco.draw.film import arrows, camera, pace, shared_picture
 from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.draw.film.pace import FilmClock
 from smc_mujoco.draw.film.puppet import Course, Puppet
-from smc_mujoco.draw.film.sheet import Moment, Sheet, label_sizes, room_of
+from smc_mujoco.draw.film.sheet import Moment, Sheet, head_lines, label_sizes, room_of
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.draw.film.track import MachineTrack
 from smc_mujoco.draw.film.video import encoder, mediapy
@@ -294,9 +294,13 @@ def pictures(frames: Frames) -> Generator[Array]:
     clock = frames.clock
     scales = arrows.scales(runs.traces)
     tracks = tracks_at(clock, runs, scales)
-    placed = placement(tracks, frames.camera, runs.names, size)
-    key = arrows.key(runs.traces, scales)
-    sheet = Sheet(runs, size, placed.tiles, placed.labels, frames.title, key)
+    keys = [arrows.key(runs.traces, scales)]
+    if clock.close:
+        keys.append([f"last periods, deflections × {clock.close.factor:g}"])
+    lines = head_lines(runs, size, frames.title, keys)
+    placed = placement(tracks, frames.camera, runs.names, size, lines)
+    whole = size, placed.tiles, placed.labels, frames.title
+    sheet = Sheet(runs, *whole, keys[0], lines=lines)
     with contextlib.ExitStack() as opened:
         stages = [opened.enter_context(stage) for stage in staged(tracks, placed, clock.times)]
         shots = separate_shots
@@ -315,8 +319,7 @@ def pictures(frames: Frames) -> Generator[Array]:
             last = runs._replace(traces=closing)
             stop = end(last.traces)
             last = last._replace(span=(stop, stop))
-            said = [f"last periods, deflections × {close.factor:g}"]
-            sheet = Sheet(last, size, placed.tiles, placed.labels, frames.title, said, start)
+            sheet = Sheet(last, *whole, keys[-1], start, lines)
             for stage, track in zip(stages, tracks_at(close, runs, scales), strict=True):
                 middle = track.x.mean(axis=0)
                 larger = close.factor * (track.x - middle)
@@ -382,8 +385,11 @@ def placement(
     chosen: Camera | None,
     names: Sequence[str],
     size: tuple[int, int],
+    lines: int = 2,
 ) -> Placement:
-    """Return where machines stand in a film of some size, px, before the chosen camera."""
+    """Return where machines stand in a film of some size, px, before the chosen camera, below so
+    many lines of words.
+    """
     puppets = [Puppet.of(track.trace.scenario) for track in tracks]
     turn = puppets[0].turn(chosen)
     courses = []
@@ -402,7 +408,7 @@ def placement(
             reaches.append(reach)
         points = np.concatenate(reaches)
     sizes = functools.partial(label_sizes, names, size)
-    room = room_of(size)
+    room = room_of(size, lines)
     tiles, labels, view = camera.layout(len(tracks), room, sizes, points, turn)
     lanes = shared_picture.places(puppets, turn)
     if lanes is not None:

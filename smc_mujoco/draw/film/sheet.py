@@ -40,12 +40,17 @@ EDGE = 0.6  # letters, from the picture's edge to text
 CHARTS_SHARE = 0.355  # of the film's height
 MAX_LINES = 3  # of a label
 SAMPLE = 0.5  # letters, height of the line above a label
+INSET, MARKED_INSET = 0.3, 0.9  # letters, of that line without and with marks, from its tile's edge
 LEAST_TITLE = 0.75  # of the size of letters, of a long title, and of long labels
 TIME_TICKS = 5  # at most
 SIDES = ("left", "right")  # of the first and the last tick's words, so that they stay on the page
 FUTURE_LINE = 0.4  # opacity of what is still to come
 FUTURE_BAND = 0.12
-EVENT_TIME = 1.0  # s of the film for which what has ended is told
+EVENT_TIME = 0.6  # s of the film over which words on what has ended fade; chosen
+CLOCK = "00.000 s"  # at its widest
+PACE = "4× faster"
+FIRST_LINE, SECOND_LINE = 0.62, 1.57  # lines, from the top to the middle of their letters
+HEAD_HEIGHTS = {1: 1.25, 2: 2.1}  # number of lines over the machines -> their height, in lines
 
 
 class Moment(NamedTuple):
@@ -74,11 +79,39 @@ def letters(size: tuple[int, int]) -> float:
     return ONE_SIZE["xtick.labelsize"] / 72 * size[0] / WIDTH
 
 
-def room_of(size: tuple[int, int]) -> Room:
-    """Return the room for machines and their labels in a film of this size."""
-    top = 2.1 * LINE_PITCH * letters(size)
+def room_of(size: tuple[int, int], lines: int) -> Room:
+    """Return the room for machines and their labels in a film of this size, below so many lines."""
+    top = HEAD_HEIGHTS[lines] * LINE_PITCH * letters(size)
     foot = (1.0 - CHARTS_SHARE) * size[1]
     return Room(0.0, top, size[0], foot)
+
+
+def key_room(size: tuple[int, int], title: str = "") -> float:
+    """Return the room for the key beside the clock, px; also beside the title if it is given."""
+    high = letters(size)
+    room = size[0] - 2 * EDGE * high
+    room -= style.width(CLOCK, high, bold=True) + style.width(PACE, high) + 2 * high
+    if title:
+        room -= style.width(title, high, bold=True) + high
+    return room
+
+
+def head_lines(
+    runs: DrawnRuns, size: tuple[int, int], title: str | None, keys: Sequence[Sequence[str]]
+) -> int:
+    """Return the number of lines over the machines: one where the title has room beside each of
+    the keys and the clock, and nothing happens to the plants, which is told there, too.
+    """
+    if runs.events:
+        return 2
+    room = key_room(size, one_line(style.titled(title, runs.head)))
+    fits = all(style.width(" · ".join(key), letters(size)) <= room for key in keys)
+    return 1 if fits else 2
+
+
+def one_line(words: str) -> str:
+    """Return words without breaks of lines."""
+    return " ".join(words.split())
 
 
 class Labels(NamedTuple):
@@ -122,8 +155,8 @@ def label_sizes(names: Sequence[str], size: tuple[int, int], room: float) -> tup
 class Sheet:
     """The page of a film of some size, px, from the time `start` of the run, s.
 
-    `key` has the words below the title, before the source of the gains. `tiles` and `labels`,
-    (machines, 4) px, are where the machines and their labels are.
+    `key` has the words below the title, before the source of the gains; beside it, of one of the
+    `lines`. `tiles` and `labels`, (machines, 4) px, are where the machines and their labels are.
     """
 
     def __init__(
@@ -135,6 +168,7 @@ class Sheet:
         title: str | None = None,
         key: Sequence[str] = (),
         start: float = 0.0,
+        lines: int = 2,
     ):
         self.runs = runs
         self.size = size
@@ -146,7 +180,7 @@ class Sheet:
             inches = (WIDTH, WIDTH * size[1] / size[0])
             self.page = Figure(figsize=inches, dpi=size[0] / WIDTH)
             self.canvas = FigureCanvasAgg(self.page)
-            self.write_head(style.titled(title, runs.head), key)
+            self.write_head(one_line(style.titled(title, runs.head)), key, lines)
             self.write_labels(labels)
             rim = withStroke(linewidth=style.points(3), foreground=style.PAPER)
             corners = tiles[:, :2] + 0.3 * self.letters
@@ -176,23 +210,27 @@ class Sheet:
         place = (x / self.size[0], 1.0 - y / self.size[1])
         return self.page.text(*place, words, parse_math=False, animated=not words, **look)
 
-    def write_head(self, title: str, key: Sequence[str]) -> None:
-        """Write the title, and below it the key, with the clock at the right."""
+    def write_head(self, title: str, key: Sequence[str], lines: int) -> None:
+        """Write the title, and below or beside it the key, with the clock at the right."""
         high = self.letters
         left = EDGE * high
         right = self.size[0] - left
-        words = " ".join(title.split())
-        wide = style.width(words, high, bold=True)
+        wide = style.width(title, high, bold=True)
         share = max(LEAST_TITLE, min(1.0, (right - left) / wide))
-        words = style.cropped(words, right - left, share * high, bold=True)
-        lines = np.array([0.62, 1.57]) * LINE_PITCH * high
-        first, second = lines.tolist()
+        words = style.cropped(title, right - left, share * high, bold=True)
+        first = FIRST_LINE * LINE_PITCH * high
         title_size = share * ONE_SIZE["axes.titlesize"]
         self.write(left, first, words, va="center", weight="bold", fontsize=title_size)
-        self.clock = self.write(right, second, ha="right", va="center", weight="bold")
-        right -= style.width("00.000 s", high, bold=True) + high
-        self.pace = self.write(right, second, ha="right", va="center", color=style.MUTED)
-        self.room = right - style.width("4× faster", high) - high - left  # px, for the key
+        if lines == 1:
+            last = first
+            left += wide + high
+            self.room = key_room(self.size, title)
+        else:
+            last = SECOND_LINE * LINE_PITCH * high
+            self.room = key_room(self.size)
+        self.clock = self.write(right, last, ha="right", va="center", weight="bold")
+        right -= style.width(CLOCK, high, bold=True) + high
+        self.pace = self.write(right, last, ha="right", va="center", color=style.MUTED)
         gains = self.runs.gains
         if style.width(gains, high) > self.room:  # in the order of the machines
             sources = [trace.scenario.law.source.words for trace in self.runs.traces]
@@ -201,7 +239,7 @@ class Sheet:
         while len(said) > 1 and style.width(" · ".join(said), high) > self.room:
             said.pop()
         self.key = style.cropped(" · ".join(said), self.room, high)
-        self.below = self.write(left, second, va="center", color=style.MUTED)
+        self.below = self.write(left, last, va="center", color=style.MUTED)
 
     def write_labels(self, labels: Array) -> None:
         """Write the machines' names, each below its line in the panels."""
@@ -218,7 +256,8 @@ class Sheet:
             tall = pitch * (1 + words.count("\n")) + SAMPLE * high
             start = top if top >= tile[3] else (top + bottom - tall) / 2  # below it, or beside
             y = start + 0.5 * SAMPLE * high
-            ends = np.array([left + 0.3 * high, right - 0.3 * high])
+            inset = (MARKED_INSET if "marker" in look else INSET) * high
+            ends = np.array([left + inset, right - inset])
             line = (ends / self.size[0], [1.0 - y / self.size[1]] * 2)
             shown = {**look, "markevery": None}  # without axes, a mark stands at each end
             sample = Line2D(*line, color=colour, lw=style.points(2.5), **shown)
@@ -317,25 +356,31 @@ class Sheet:
             drawn += [one.past, one.dot]
         self.clock.set_text(f"{moment.time:.{3 if moment.speed < 0.2 else 2}f} s")
         self.pace.set_text("" if moment.still else pace_words(moment.speed))
-        self.below.set_text(self.event_words(moment) or self.key)
+        words, opacity = self.event_words(moment)
+        self.below.set(text=words or self.key, alpha=opacity)
         for text, state in zip(self.says, moment.states, strict=True):
             text.set_text(state.words if state else "")
             if state:
                 text.set(color=state.colour, alpha=state.opacity)
         return [*drawn, self.clock, self.pace, self.below, *self.says]
 
-    def event_words(self, moment: Moment) -> str:
-        """Return what has changed the plant last, or hits it now."""
+    def event_words(self, moment: Moment) -> tuple[str, float]:
+        """Return what has changed the plant last, or hits it now, and the opacity of the words:
+        those on what has ended fade.
+        """
         words = ""
+        opacity = 1.0
         for event in self.runs.events:
-            if event.time <= moment.time <= event.stop + EVENT_TIME * moment.speed:
+            passed = max(0.0, moment.time - event.stop) / moment.speed
+            if event.time <= moment.time and passed <= EVENT_TIME:
                 when = f" since {event.time:g} s"
                 if np.isfinite(event.stop):
                     when = f", {event.time:.2f} to {event.stop:.2f} s"
+                opacity = 1.0 - passed / EVENT_TIME
                 words = event.words + when
                 if style.width(words, self.letters) > self.room:  # the machines' names say how
                     words = f"changed{when}"
-        return words
+        return words, opacity
 
 
 def set_moving(row: Row) -> Moving:

@@ -161,7 +161,12 @@ class Stage:
         self.colour = colour
         rgb = np.array(style.rgb(colour)) / 255
         if not self.is_users:
-            self.model.mat("m/accent").rgba[:3] = rgb
+            accent = self.model.mat("m/accent")
+            accent.rgba[:3] = rgb
+            own = (self.model.geom_matid == accent.id) & (self.model.geom_rgba != DEFAULT_RGBA).any(
+                1
+            )
+            self.model.geom_rgba[own, :3] = rgb  # a transparent accent has its own colour
             return
         links = self.links
         if self.alone and colour != style.FAILED:

@@ -31,7 +31,8 @@ KEY = (0.60, 0.58, 0.55)  # more from one side,
 FILL = (0.10, 0.11, 0.14)  # and little from the other
 SUN = "sun"  # the light whose shadows lie on the floor, see canvas.py
 FLOOR_CELLS = 7  # of the floor's grid, in the width of what is seen
-HAZE = (0.66, 0.725, 0.80, 1.0)  # red, green, blue, opacity
+HAZE = (0.76, 0.81, 0.86, 1.0)  # red, green, blue, opacity
+DIAL_OPACITY = 0.25  # of the dial behind a pendulum
 HAZE_AT_TOP = 0.9  # share of the full haze at the top of the picture
 HAZE_HORIZON = 3.0  # largest distance of that haze, in distances of the farthest machine
 MIN_HAZE_DISTANCE = 1.05  # of the farthest point: a nearer floor, seen from above, gets no haze
@@ -261,7 +262,7 @@ def restyle(model: mujoco.MjModel) -> None:
         names.append(name.rpartition("/")[2])
     dial = np.isin(names, ("face", "bezel"))
     painted = model.mat_rgba[model.geom_matid[dial]]
-    model.geom_rgba[dial] = painted * (1.0, 1.0, 1.0, 0.4)
+    model.geom_rgba[dial] = painted * (1.0, 1.0, 1.0, DIAL_OPACITY)
     model.geom_matid[dial] = -1
     for field in (model.geom_size, model.geom_aabb, model.geom_rbound):
         field[np.isin(names, "bob")] *= 1.3

@@ -18,7 +18,7 @@ from smc_mujoco.common import gl, progress
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.figure import DrawnRuns
 from smc_mujoco.draw.film import arrows, film
-from smc_mujoco.draw.film.sheet import Moment, Sheet, label_sizes
+from smc_mujoco.draw.film.sheet import Moment, Sheet, head_lines, label_sizes, room_of
 from smc_mujoco.draw.states import State
 
 SIZE = (640, 300)
@@ -89,11 +89,47 @@ def test_a_blow_is_told_with_its_times_and_then_no_more():
     push = smc.signals.Push("link", x=400.0, time=1.0, width=0.05)
     trace = machine(plant, "none", duration=3.0, disturbance=push)
     page = sheet([trace], ["one"])
-    told = []
-    for time in (0.99, 1.02, 1.06, 1.5):
+    told = {}
+    for time in (0.99, 1.02, 1.08, 1.5):
         picture(page, time, 0.125)
-        told.append(page.below.get_text() == "blow of 400 N, 1.00 to 1.05 s")
-    assert told == [False, True, True, False]
+        if page.below.get_text() == "blow of 400 N, 1.00 to 1.05 s":
+            told[time] = page.below.get_alpha()
+    assert told == pytest.approx({1.02: 1.0, 1.08: 0.6})
+    assert page.below.get_alpha() == 1.0
+
+
+def test_words_over_machines_are_on_one_line_where_they_have_room():
+    size = (800, 450)
+    trace = machine("duffing")
+    key = ["→ u 6 N"]
+    lines = []
+    for one, title, keys in (
+        (trace, "Duffing", [key]),
+        (trace, "Duffing under a title that is long", [key]),
+        (trace, "Duffing", [key, ["last periods, deflections × 1000"] * 2]),
+        (machine("duffing", jump=smc.Jump(0.2, {"mass": 2.0})), "Duffing", [key]),
+    ):
+        lines.append(head_lines(DrawnRuns.of([one], ["one"]), size, title, keys))
+    assert lines == [1, 2, 2, 2]
+    tile, label = np.zeros((1, 4), int), np.array([[0, 200, 800, 240]])
+    page = Sheet(DrawnRuns.of([trace], ["one"]), size, tile, label, "Duffing", key, lines=1)
+    picture(page, 0.5, 0.125)
+    words = [page.page.texts[0], page.below, page.pace, page.clock]
+    assert page.below.get_text().startswith("→ u 6 N")
+    boxes = [text.get_window_extent() for text in words]
+    for before, after in itertools.pairwise(boxes):
+        assert before.x1 < after.x0
+    assert min(box.y0 for box in boxes) > size[1] - room_of(size, 1).top
+
+
+@pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+def test_the_front_rotors_of_a_drone_have_the_colour_of_its_law_and_stay_transparent():
+    with staged(machine("quadrotor", "geometric"), SIZE, colour="#0072B2") as stage:
+        for name, is_own in (("disc1", True), ("disc2", False)):
+            shade = stage.model.geom(f"m/{name}").rgba
+            own = np.array(style.rgb("#0072B2")) / 255
+            assert (np.abs(shade[:3] - own).max() < 0.01) == is_own
+            assert 0.0 < shade[3] < 1.0
 
 
 def test_panels_are_uncovered_up_to_the_clock_with_a_dot_where_each_run_is():

@@ -130,7 +130,7 @@ def test_a_pendulum_s_picture_is_of_the_bob_s_arc(monkeypatch):
         assert stages[1].puppet.height == shown.puppet.height  # their stands are cut alike
         foot = shown.model.geom("m/foot")
         assert shown.data.geom_xpos[foot.id, 2] == pytest.approx(0.014, abs=1e-3)  # on the floor
-        assert shown.model.geom("m/face").rgba[3] == pytest.approx(0.4)
+        assert shown.model.geom("m/face").rgba[3] == pytest.approx(world.DIAL_OPACITY)
         bob = shown.model.geom("m/bob")
         assert bob.size[0] == pytest.approx(1.3 * 0.065)
     rods = []
