@@ -22,7 +22,7 @@ h1 {{ font-size: 1.6em; line-height: 1.2; overflow-wrap: anywhere; }}
 section {{ margin: 32px 0; overflow-x: auto; }}
 caption, td[colspan] div {{ position: sticky; left: 0; max-width: min(70ch, 100vw - 52px); }}
 caption, th:first-child, td:first-child {{ padding-left: 0 !important; }}
-img {{ display: block; max-width: 100%; height: auto; }}
+img {{ display: block; width: 100%; height: auto; }}
 @media (max-width: {PHONE}px) {{ table {{ font-size: 14px; }} }}
 @media (prefers-color-scheme: dark) {{ img {{ filter: invert(0.9) hue-rotate(180deg); }} }}
 """
