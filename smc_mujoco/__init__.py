@@ -30,7 +30,8 @@ What is needed less often is in modules: `smc.signals` (pushes, paths, gusts, se
 `smc.hardware` (more friction, servos), `smc.design` (gains from theory, chattering, regions of
 attraction, what to record), `smc.accuracy` (orders, half steps), `smc.metrics` (of joints and
 tips), `smc.exchange` (laws from and to C and FMUs), `smc.envs` (environments for agents),
-`smc.errors` (warnings) and `smc.paper`.
+`smc.errors` (warnings) and `smc.paper`. In pytest the fixture `step_response` tests a law:
+`help("smc_mujoco.testing")`.
 
 `__init__.pyi` has the modules of the names. A name is loaded when it is first used, so that
 importing the package costs nothing. Types that are only returned are in their modules, such as

@@ -264,12 +264,12 @@ def name(what: str, value: object) -> str:
 told: ContextVar[set[str]] = ContextVar("told")
 
 
-def warn_once(sentence: str) -> None:
+def warn_once(sentence: str, kind: type[Warning] = ScenarioWarning) -> None:
     """Warn of a doubt, if any, that a call of the user's may raise many times."""
     before = told.get(set())
     if sentence and sentence not in before:
         before.add(sentence)
-        warnings.warn(sentence, ScenarioWarning, users_stacklevel())
+        warnings.warn(sentence, kind, users_stacklevel())
 
 
 def users_stacklevel() -> int:

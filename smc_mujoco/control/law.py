@@ -132,6 +132,11 @@ def law_function(
             s = y.de + gains.c * y.e
             return -gains.k * np.sign(s), s
 
+    `y` is the measurement of one joint: y.e is the error, rad or m, y.de its rate, y.x and y.v
+    position and velocity, y.dt the control period; `help(smc_mujoco.control.measurement)` lists the
+    others. A helper function that the law calls needs @numba.njit above its def, or else the law
+    runs in Python, several times slower.
+
     Args:
       gains: name -> default value, or a Gain with unit and range. `smc.tune` needs the units.
       memory: floats of memory per channel. Default: 8.

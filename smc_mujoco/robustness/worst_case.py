@@ -230,7 +230,8 @@ def worst_case(
         runs the random members of your own machine, if there are many.
 
     Returns:
-      A `WorstCase`: the worst run, its score, and those of random members of the class.
+      A `WorstCase`: `value` is the metric of the worst run, `median` that of random members of the
+      class. `smc.run(found.scenario)` makes the worst run again, `found.figure(path)` draws it.
 
     Raises:
       ScenarioError: a class that the plant cannot have, an unknown metric, or one that the plant

@@ -14,7 +14,6 @@ import functools
 import os
 import sys
 import time
-import warnings
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from typing import Annotated, Any, overload
 
@@ -24,7 +23,7 @@ import numpy as np
 from smc_mujoco.common import arithmetic
 from smc_mujoco.common.attended import attended
 from smc_mujoco.common.constraints import Flag, Whole, constrained
-from smc_mujoco.common.errors import ScenarioError, has_items, shown, users_stacklevel, warn_once
+from smc_mujoco.common.errors import ScenarioError, has_items, shown, warn_once
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import counted
 from smc_mujoco.mechanisms.plant import field_array
@@ -169,8 +168,8 @@ def stream(
     for batch in _batches(enumerate(map(prepare, one_or_several(scenarios))), threads):
         indices, items = zip(*batch, strict=True)
         if items[0].why_not:
-            words = f"{items[0].why_not}; it is called in Python"
-            warnings.warn(words, PlainLoopWarning, users_stacklevel())
+            words = f"{items[0].why_not}; it runs in Python, several times slower"
+            warn_once(words, PlainLoopWarning)
         with callback.installed(), memory_for(items):
             traces = ScenarioBatch(items, threads).run(report)
         if len(batch) >= MIN_TRIM_RUNS:

@@ -253,8 +253,8 @@ class Trial(NamedTuple):
         for plant in self.plants:
             known[plant.name] = self.known(plant, laws[plant.name])
         if self.progress:
-            for plant in self.plants:
-                self._say_if_few(known[plant.name], seeds)
+            few = {self._if_few(of_plant, seeds) for of_plant in known.values()}
+            print(*filter(None, few), sep="\n", end="\n" * any(few), file=sys.stderr)
         made: dict[str, list[Candidate]] = {}
         for plant in self.plants:
             made[plant.name] = []
@@ -290,22 +290,24 @@ class Trial(NamedTuple):
             return GainRule(self.asked_goal(plant), quick_search.BUDGET, True)
         return GainRule(self._goal(plant, None if shipped else self.starts), self.budget, False)
 
-    def _say_if_few(self, known: Sequence[Candidate | None], seeds: int) -> None:
-        """Say before minutes of tuning that so few sets of gains or runs can name no winner."""
+    def _if_few(self, known: Sequence[Candidate | None], seeds: int) -> str:
+        """Return a sentence, to be said before minutes of tuning, if so few sets of gains or runs
+        can name no winner; else "".
+        """
         samples = []
         for candidate in known:
             sets = self.searches if self.tune else 1
             if candidate:
                 sets = len(candidate.sets)
             samples.append(min(sets, seeds) if sets > 1 else seeds)
-        blocks = len(self.plants) * len(self.conditions)
-        least = needed_to_win(blocks)
-        if len(samples) > 1 and sorted(samples)[-2] < least:
-            print(
-                f"{max(samples)} sets of gains or runs cannot rank {len(samples)} laws in "
-                f"{counted(blocks, 'condition')}; {least} can",
-                file=sys.stderr,
-            )
+        least = needed_to_win(len(self.plants) * len(self.conditions))
+        if len(samples) < 2 or sorted(samples)[-2] >= least:
+            return ""
+        where = counted(len(self.conditions), "condition")
+        if len(self.plants) > 1:
+            where += f" on each of {len(self.plants)} plants"
+        few = f"{max(samples)} sets of gains or runs"
+        return f"{few} cannot rank {len(samples)} laws in {where}; {least} can"
 
     def _check_tunable(
         self,
