@@ -37,7 +37,7 @@ ANSWERS = {  # what newcomers type -> where one of the first three hits leads
     "super-twisting": "laws/super_twisting.html",
 }
 QUESTIONS = tomllib.loads((ROOT / "tests" / "search_questions.toml").read_text(encoding="utf-8"))
-LEAST_ANSWERED = 26  # of the 30 questions, by one of the first three hits
+LEAST_ANSWERED = 52  # of the 60 questions, by one of the first three hits
 HITS = ".md-search-result__item:nth-child(-n+3) a"
 NUMBER = r"\d+(?:\.\d+)?"
 
