@@ -229,7 +229,9 @@ class Blocks(NamedTuple):
         for name in self.beside:
             high = SIDE_PANELS[name]
             if name == "end":
-                high = max(high, _height(self.places[0]._replace(quantity="u")))
+                controls = self.places[0]._replace(quantity="u")
+                if lanes.in_lanes(controls):
+                    high = max(high, LINE_ROW * len(controls.traces))
             beside.append(high)
         left = list(map(_height, self.left))
         right = list(map(_height, self.right))
@@ -527,7 +529,7 @@ def _draw_beside(
     for cell, name in zip(cells, column, strict=True):
         place = next(portraits) if name == "phase" else places[0]
         controls = place._replace(quantity="u")
-        if name == "end" and lanes.crowded(controls):
+        if name == "end" and lanes.in_lanes(controls):
             _draw_ends(page, cell, controls, runs)
         else:
             _draw_side(page.add_subplot(cell), name, place, runs)

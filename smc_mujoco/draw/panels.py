@@ -407,8 +407,7 @@ def over_time(
     ax.set_ylim(limits(among or traces, name))
     own = panel._replace(traces=among or traces)
     set_numbers(ax.yaxis, own)
-    if name == "reaction":
-        clip_impacts(ax, panel, colours)
+    clipped = name == "reaction" and clip_impacts(ax, panel, colours)
     if name in ("x", "e"):
         target(ax, panel)
     looks = style.looks(traces)
@@ -433,7 +432,8 @@ def over_time(
             last = np.clip(mean[-1], *ax.get_ylim())
             ending: Fields = {"color": colour, "clip_on": False, "zorder": 5, **cross()}
             artists += ax.plot(trace.t[-1], last, "X", **ending)
-    if names and (name in SINGLE or len(panel.group.channels) == 1):
+    alone = name in SINGLE or len(panel.group.channels) == 1
+    if names and alone and not clipped:  # words have no room above impacts
         lines = []
         for trace, y in zip(traces, means, strict=True):
             lines.append((trace.t, y))
@@ -495,8 +495,9 @@ def cross() -> Fields:
     return {"ms": style.points(9), "mec": "white", "mew": style.points(1)}
 
 
-def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
-    """Fit the vertical range to lasting reactions, such as friction, where there are any.
+def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str]) -> bool:
+    """Fit the vertical range to lasting reactions, such as friction, where there are any, and
+    return whether impacts leave it.
 
     Mark short impacts outside it by arrows, the largest of each run with its size.
     """
@@ -510,7 +511,7 @@ def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
             lasting_size = np.quantile(sizes, LASTING_QUANTILE)
             usual = max(usual, float(lasting_size))
     if not peak > 2.0 * usual > LEAST_LASTING * peak:
-        return
+        return False
     top = 1.16 * usual
     ax.set_ylim(-top, top)
     look = {"ls": "", "ms": style.points(5), "mew": style.points(1.2), "clip_on": False}
@@ -524,6 +525,7 @@ def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
             heights = np.full(len(starts), side * top)
             ax.plot(starts, heights, color=colour, marker=mark, in_layout=False, **look)
     note(ax, f"|reaction| up to {style.short(peak, 3)} {style.units(panel.group)['force']}")
+    return True
 
 
 def note(ax: Axes, words: str) -> None:

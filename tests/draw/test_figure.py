@@ -123,6 +123,11 @@ def test_short_impacts_are_marked_beyond_the_range_of_lasting_reactions_and_told
         ]
         assert ax.get_title(loc="right") == title
         assert marks == (sides if title else [])
+    alike = [dataclasses.replace(one, reaction=20.0 + spikes) for one in pair]
+    (ax,) = draw_figure.figure(alike, panels=["reaction"]).axes
+    assert ax.get_ylim() == pytest.approx((-23.2, 23.2)), "words would lie over what is cut"
+    (ax,) = draw_figure.figure(calm, panels=["reaction"]).axes
+    assert [text.get_text() for text in ax.texts] == ["both agree"]
 
 
 def test_windows_have_the_range_and_mean_of_what_is_held_in_them():
