@@ -471,7 +471,8 @@ def actuator(name: str, value: Actuators | None, s: Any) -> tuple[Actuator, ...]
     if value is None and "actuator" not in s.plant.suggested:
         return ()
     driven = driven_names(s.plant)
-    items = _by_joint(name, value, s, Actuator, "smc.Lag(0.01)", driven_names)
+    given = [part for part in as_tuple(value) if not getattr(part, "kept", False)]
+    items = _by_joint(name, given, s, Actuator, "smc.Lag(0.01)", driven_names)
     kept = _kept(items, s.plant)
     if kept:
         before = []
@@ -512,16 +513,21 @@ def _too_many(name: str, drives: Sequence[Actuator], kept: Sequence[Actuator]) -
     )
 
 
-def _kept(items: Sequence[Actuator], plant: Plant) -> list[Actuator]:
+def _kept(items: list[Actuator], plant: Plant) -> list[Actuator]:
     """Return the actuators of its file that a plant keeps, for joints to which `items` give none of
-    their kind.
+    their kind. An item that is one of them, as of a record, is taken out.
     """
     found = []
     kept = plant.suggested.get("actuator", ())
     for joint, part in zip(driven_names(plant), kept, strict=False):
-        if part is not None and not _given(items, part, joint):
-            on = () if plant.driven == 1 else (joint,)
-            found.append(dataclasses.replace(part, on=on))
+        if part is None:
+            continue
+        own = dataclasses.replace(part, on=() if plant.driven == 1 else (joint,))
+        vars(own)["kept"] = True  # the class is frozen
+        if own in items:
+            items.remove(own)
+        if not _given(items, part, joint):
+            found.append(own)
     return found
 
 

@@ -259,6 +259,8 @@ class Actuator(OnJoints):
 
     drives: ClassVar[bool] = True  # whether it turns u into force; else it stands after a drive
     leads: ClassVar[bool] = False  # whether another drive may follow
+    # whether it is that of the plant's file, which a scenario with another plant leaves behind
+    kept: ClassVar[bool] = False
     in_callback: ClassVar[bool] = False  # whether the callback simulates all of it
 
     scale: ClassVar[float] = 1.0  # control of the model's actuator per unit of u

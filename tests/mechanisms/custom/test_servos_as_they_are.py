@@ -1,5 +1,6 @@
 """Position servos of a user's file that stay as they are: u is their set-point, about the goal."""
 
+import dataclasses
 import math
 import warnings
 
@@ -17,6 +18,7 @@ from smc_mujoco.mechanisms.custom.plant_from import restored
 from smc_mujoco.mechanisms.named import from_text
 from smc_mujoco.metrics.tip import knows_contacts
 from smc_mujoco.robustness.margins import MARGIN_KINDS
+from smc_mujoco.simulation import scenario_json
 from smc_mujoco.simulation.conditions import applicable
 
 ARM = """<mujoco model="arm"><compiler angle="radian"/><worldbody>
@@ -246,6 +248,23 @@ def test_a_trace_of_a_servo_is_read_back(tmp_path):
     assert back.scenario == trace.scenario
     assert [type(part) for part in back.scenario.actuator] == [PositionServo, smc.Backlash]
     np.testing.assert_array_equal(run_again(back.scenario).x, trace.x)
+
+
+@pytest.mark.parametrize("recorded", [False, True])
+def test_another_plant_has_its_own_servo(recorded):
+    first = smc.Scenario(plant=servo(HOBBY % POSITION), law="pid", actuator=smc.Backlash(0.01))
+    if recorded:
+        first = scenario_json.restore(scenario_json.describe(first))
+    weak = servo(HOBBY % POSITION.replace("17.8", "9"))
+    second = dataclasses.replace(first, plant=weak)
+    assert [part.kp for part in second.actuator[:1]] == [9.0]
+    assert second.actuator[1:] == (smc.Backlash(0.01),)
+    ideal = smc.plant_from(HOBBY % POSITION, {"j": smc.Channel(motor=True)})
+    assert dataclasses.replace(first, plant=ideal).actuator == (smc.Backlash(0.01),)
+    # one of the user's own stays
+    stiff = dataclasses.replace(first.actuator[0], kp=40.0)
+    own = dataclasses.replace(first, actuator=(stiff, smc.Backlash(0.01)))
+    assert dataclasses.replace(own, plant=weak).actuator == own.actuator
 
 
 def test_a_text_keeps_a_servo_and_its_steps(tmp_path):
