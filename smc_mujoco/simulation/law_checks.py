@@ -4,15 +4,19 @@ Here `s` is a scenario with its defaults, whose module imports this one.
 """
 
 import dataclasses
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.control.component import gain_text
+from smc_mujoco.common.text import joined
+from smc_mujoco.control.component import Component, Template, gain_text
 from smc_mujoco.control.law import Law, joint_catalogue, suits
+from smc_mujoco.control.properties import reads
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.control.written import StateFeedback
+from smc_mujoco.mechanisms.plant import Plant
 
 # Fields that no scenario of a free body sets, with their words
 NOT_OF_FREE_BODIES = {
@@ -23,6 +27,7 @@ NOT_OF_FREE_BODIES = {
     "clock": "clock with late or missed samples",
     "velocity": "estimated velocity",
 }
+PARTNER = {"q", "dq", "fq", "gq"}  # fields of a measurement: those of the joint beside
 MAX_CONDITION_NUMBER = 1e12  # of a mass matrix; chosen: its inverse has 4 digits
 
 
@@ -168,3 +173,24 @@ def check_inertia(s: Any) -> None:
                 "joints move the same bodies in the same way: drive one of them, or give another "
                 "x0"
             )
+
+
+def blind(plant: Plant, laws: Iterable[Component | Template]) -> str:
+    """Return a sentence on the laws of one joint that do not read the joint that nothing drives
+    beside theirs, or "".
+    """
+    if plant.pose or not plant.free:
+        return ""
+    found = []
+    for law in laws:
+        template = law if isinstance(law, Template) else law.template
+        if template is None or template.joint or template.name == "none":
+            continue
+        if not reads(template) & PARTNER:
+            found.append(law.name)
+    if not found:
+        return ""
+    return (
+        f"{joined(dict.fromkeys(found))} of {plant.name} cannot see what nothing drives there, "
+        "which may fall or swing on: a law that reads y.q, or one of many joints, can"
+    )

@@ -30,6 +30,7 @@ from smc_mujoco.mechanisms.plant import field_array
 from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.controller import MAX_STATE
+from smc_mujoco.simulation.law_checks import blind
 from smc_mujoco.simulation.prepare import Prepared, pack, prepare, put_after_jump
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import PLANT_DIVERGED as PLANT_DIVERGED_SHORT
@@ -118,6 +119,8 @@ def run(
     """
     shown_bar = Flag()("progress", progress)
     prepared = list(map(prepare, one_or_several(scenarios)))
+    for item in prepared:
+        warn_once(blind(item.scenario.plant, item.scenario.law.parts))
     work = sum(item.scenario.work for item in prepared)
     with bar(counted(len(prepared), "run"), work, shown=shown_bar) as progress_bar:
         traces = dict(stream(prepared, threads, progress_bar.advance))

@@ -36,7 +36,6 @@ from smc_mujoco.common.text import counted, joined
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue, known_laws
-from smc_mujoco.control.properties import reads
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.robustness.uncertainty import Uncertainty
@@ -45,6 +44,7 @@ from smc_mujoco.simulation import coerce, run_key
 from smc_mujoco.simulation.conditions import NAMED, Condition, applicable, find_condition
 from smc_mujoco.simulation.grid import Starts, all_combinations, check_moving, check_names, listed
 from smc_mujoco.simulation.grid import case as run_of_grid
+from smc_mujoco.simulation.law_checks import blind
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.workers import Workers
 from smc_mujoco.studies.leaderboard import Holdout
@@ -53,7 +53,6 @@ from smc_mujoco.studies.table import Table
 
 NOISE = "noise"  # a quick search adds it where no condition that was asked for has any
 SEARCHED = 2 / 3  # of the duration of a run: that of the runs of a quick search; chosen
-PARTNER = {"q", "dq", "fq", "gq"}  # fields of a measurement: those of the joint beside
 NOT_TUNED = "not tuned: "  # at the start of a remark
 Laws = Sequence[Component | Template]  # those without given gains are templates
 
@@ -123,20 +122,6 @@ def _without_search(
             sets.append(gain_sets.law(plant, law.name, gains, seed))
         return Candidate(gain_sets.law(plant, law.name, gains), tuple(sets))
     return None
-
-
-def _blind(plant: Plant, laws: Laws) -> list[str]:
-    """Return the laws of one joint that do not read the joint that nothing drives beside theirs."""
-    if plant.pose or not plant.free:
-        return []
-    found = []
-    for law in laws:
-        template = law if isinstance(law, Template) else law.template
-        if template is None or template.joint or template.name == "none":
-            continue
-        if not reads(template) & PARTNER:
-            found.append(law.name)
-    return found
 
 
 def default_of(law: Component | Template, remark: str = "") -> Candidate:
@@ -231,12 +216,8 @@ class Trial(NamedTuple):
         for plant in self.plants:
             for condition in self.conditions:
                 check_moving([self.case(plant, "none", condition)])
-            if self.progress and (blind := _blind(plant, laws[plant.name])):
-                print(
-                    f"{joined(blind)} of {plant.name} cannot see what nothing drives there, which "
-                    "may fall or swing on: a law that reads y.q, or one of many joints, can",
-                    file=sys.stderr,
-                )
+            if self.progress and (sentence := blind(plant, laws[plant.name])):
+                print(sentence, file=sys.stderr)
 
     def candidates(self, laws: Mapping[str, Laws], seeds: int) -> dict[str, list[Candidate]]:
         """Return plant -> its laws with gains for that many runs in each condition: given, shipped,

@@ -169,3 +169,12 @@ def test_bristles_too_stiff_for_the_step_are_told_and_those_of_the_step_told_are
         smc.Scenario(**fields)
     (step,) = map(float, re.findall(r"physics_step of ([0-9.e-]+) or", str(caught[0].message)))
     smc.Scenario(**fields, physics_step=1e-3 / math.ceil(1e-3 / step))
+
+
+def test_a_law_that_cannot_see_the_pole_is_named_when_it_runs():
+    fields = {"plant": "cart_pole", "duration": 0.01}
+    with pytest.warns(
+        smc.errors.ScenarioWarning, match=r"pid of cart_pole cannot see .* reads y\.q"
+    ):
+        smc.run(smc.Scenario(law="pid", **fields))
+    smc.run([smc.Scenario(law=law, **fields) for law in ("hierarchical", "none")])
