@@ -48,6 +48,7 @@ NO_DYNAMICS = mujoco.mjtDyn.mjDYN_NONE.value
 FLIES = (
     4  # independent forces and torques that hold a heading: a thrust, and a torque about each axis
 )
+MAX_JOINTS = 600  # characters of the joints to choose from: chosen
 HOLD = "hold:"  # prefix of names of motors that hold other joints, see others.py
 MOTOR_GROUP = 31  # actuator group of motors, which actuatorgroupdisable cannot turn off
 
@@ -197,21 +198,27 @@ def _joint_names(model: mujoco.MjModel) -> list[str]:
     return [model.joint(i).name for i in range(model.njnt)]
 
 
-def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
+def _unnamed(label: str, file: str, model: mujoco.MjModel, named: list[str]) -> ScenarioError:
+    """Return the error for a user who names no joint, with those that can be named."""
+    driven = [name for name in named if _on_joint(model, model.joint(name).id)]
+    first = (driven or named)[0]
+    of_file = f"{file}:{first} or " if file else ""
+    those = "its actuators drive" if driven else "it has"
+    return ScenarioError(
+        f"no joint of {label} is chosen: give one or more, as {of_file}channels={[first]}; {those} "
+        f"{one_line(', '.join(driven or named), MAX_JOINTS)}"
+    )
+
+
+def check(label: str, file: str, model: mujoco.MjModel, channels: Pairs) -> None:
     """Raise ScenarioError for joints that do not exist or cannot be channels, and for flags that
-    forbid control.
+    forbid control. `file` is the model's as a user here writes it, "" for a text.
     """
     joints = joints_of(channels)
     names = _joint_names(model)
     named = list(filter(None, names))
     if joints == [""] and named:
-        of_file = f"{label}:{'+'.join(named[:2])} or "
-        if label.startswith("the text of"):
-            of_file = ""
-        raise ScenarioError(
-            f"no joint of {label} is chosen: give some, as {of_file}channels={named[:2]}; it has "
-            f"{one_line(', '.join(named))}"
-        )
+        raise _unnamed(label, file, model, named)
     for joint in joints:
         place = pick(label, "joint", joint, names)
         kind = mujoco.mjtJoint(model.jnt_type[place])

@@ -63,6 +63,11 @@ class ModelSource:
     assets: tuple[tuple[str, bytes], ...] = ()  # name and content of each file that the text names
 
     @property
+    def file(self) -> str:
+        """The file as a user writes it in the current folder; "" for a text."""
+        return self.path and os.path.relpath(self.path)
+
+    @property
     def label(self) -> str:
         """The file's name; for a text, words with the name that the model gives itself."""
         if self.path:

@@ -241,7 +241,7 @@ def _plant(
     mjcf.check_model(label, model)
     scenarios = own.suggested(pairs)
     pairs = _without_suggestions(pairs)
-    own.check(label, model, pairs)
+    own.check(label, source.file, model, pairs)
     seen = own.measured_joints(label, model, pairs, measured)
     joints = [*joints_of(pairs), *seen]
     _check_names(label, model, keyframe, tip)

@@ -2,7 +2,6 @@
 
 import base64
 import dataclasses
-import os
 
 import mujoco
 import numpy as np
@@ -92,10 +91,6 @@ class UserModel:
     @property
     def argument(self) -> str:
         """The model as written on the command line, such as arm.xml:shoulder+elbow@home."""
-        if self.source.path:
-            path = os.path.relpath(self.source.path)
-        else:
-            path = "FILE.xml"
         parts = []
         for joint, channel in self.channels:
             parts.append(own.as_text(joint, channel))
@@ -109,7 +104,7 @@ class UserModel:
             text += "@"
         if self.others or limp(spec, [*joints_of(self.channels), *self.measured]):
             text += f"+{self.others or 'file'}"
-        return f"{path}:{text}"
+        return f"{self.source.file or 'FILE.xml'}:{text}"
 
     def about(self) -> dict:
         """Return the arguments with which `restored` makes this plant again, as plain data."""

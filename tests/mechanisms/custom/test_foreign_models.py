@@ -158,6 +158,7 @@ def test_a_plant_is_named_by_its_file_and_joints(tmp_path, monkeypatch):
         with pytest.warns(ScenarioWarning, match="set-point of its servo"):
             assert as_plant(text).argument == "arm.xml:lift(servo)+elbow(servo)"
     with pytest.raises(
-        smc.ScenarioError, match=r"channels=\['pan', 'lift'\]; it has pan, lift, elbow"
+        smc.ScenarioError,
+        match=r"arm.xml:pan or channels=\['pan'\]; its actuators drive pan, lift, elbow",
     ):
         smc.plant_from("arm.xml")
