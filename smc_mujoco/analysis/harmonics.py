@@ -144,8 +144,10 @@ class Loop:
         for part in s.actuator:
             if isinstance(part, DCMotor):
                 motors.append(dataclasses.replace(part, inductance=0.0))
+            if isinstance(part, PositionServo):  # `transition` puts its filter before it
+                motors.append(dataclasses.replace(part, timeconst=0.0))
         for part in s.actuator:
-            if isinstance(part, ElasticJoint | PositionServo):
+            if isinstance(part, ElasticJoint):
                 motors.append(part)
         gears = [part for part in s.actuator if isinstance(part, Backlash)]
         friction = s.friction

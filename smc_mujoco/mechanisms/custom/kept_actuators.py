@@ -25,6 +25,8 @@ VOLTAGE = mujoco.mjtCtrlInput.mjINPUT_VOLTAGE.value
 
 def not_kept(model: mujoco.MjModel, i: int) -> str:
     """Return why an actuator cannot stay as it is; "" if it can."""
+    if delay := float(model.actuator_delay[i]):
+        return f"has a delay of {delay:g} s, which input_delay has instead"
     if model.actuator_gaintype[i] == OF_DCMOTOR:
         return _no_plain_dcmotor(model, i)
     bias, stiffness, _ = model.actuator_biasprm[i, :3].tolist()
@@ -37,7 +39,7 @@ def not_kept(model: mujoco.MjModel, i: int) -> str:
         return (
             f"has the gain {gain:g} and the bias {bias:g} {stiffness:g}, so it is not a <position>"
         )
-    return _late(model, i) or spoilt(model, i)
+    return spoilt(model, i)
 
 
 def _with_dynamics(model: mujoco.MjModel, i: int) -> str:
@@ -73,12 +75,7 @@ def _no_plain_dcmotor(model: mujoco.MjModel, i: int) -> str:
     ):
         if not math.isclose(-low, high, rel_tol=EQUAL):
             return f"is a <dcmotor> whose {what} {low:g} to {high:g} is not symmetric"
-    return _late(model, i) or spoilt(model, i)
-
-
-def _late(model: mujoco.MjModel, i: int) -> str:
-    delay = float(model.actuator_delay[i])
-    return f"has a delay of {delay:g} s, which belongs in input_delay instead" if delay else ""
+    return spoilt(model, i)
 
 
 def kept(model: mujoco.MjModel, i: int, goal: float, step: float) -> Actuator:

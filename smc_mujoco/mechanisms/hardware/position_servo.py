@@ -19,6 +19,7 @@ from smc_mujoco.common.constraints import Range
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import floats, record_at
+from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.hardware.moments import Run, channel_at, state_at
 from smc_mujoco.mechanisms.hardware.part import Actuator, Natural, NominalDrive, Offset, Positive
 from smc_mujoco.mechanisms.plant import Field
@@ -42,7 +43,7 @@ class PositionServo(Actuator):
     own `<position>`. The set-point is clipped to `ctrlrange`, the force to `forcerange`. u is 0 at
     the goal, so that one bound on |u| reaches equally far to both sides of it. An `input_delay`
     delays only the set-point. Behind a `timeconst` MuJoCo filters the clipped set-point, from the
-    goal at the start. A law has no nominal model of it.
+    goal at the start. A `Lag` may stand before it. A law has no nominal model of it.
 
     Attributes:
       kp: N m/rad (N/m) at the joint, greater than 0.
@@ -112,11 +113,17 @@ class PositionServo(Actuator):
         return force if self.stall is None else min(force, self.stall)
 
     def suits(self, s: Any, chain: Sequence[Actuator]) -> None:
-        if len(drives := [part for part in chain if part.drives]) > 1:
-            other = next(part for part in drives if part is not self)
+        drives = [part for part in chain if part.drives]
+        before = [type(part).__name__ for part in drives if part is not self]
+        if before == ["Lag"] and self.step:
             raise ScenarioError(
-                f"a PositionServo is a drive of its own, and so is {type(other).__name__}: leave "
-                "that out, or give smc.Channel(motor=True) for an ideal motor instead"
+                f"a PositionServo rounds its set-point to steps of {self.step:g}, and not behind a "
+                "Lag: leave one of them out"
+            )
+        if before not in ([], ["Lag"]):
+            raise ScenarioError(
+                f"a PositionServo is a drive of its own, and so is {joined(before)}: leave that "
+                "out, or give smc.Channel(motor=True) for an ideal motor instead"
             )
         if s.fault is not None and not s.fault.stuck:
             raise ScenarioError(

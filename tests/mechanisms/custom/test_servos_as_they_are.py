@@ -228,7 +228,8 @@ def test_what_servo_true_does_not_take_is_said(case):
 BESIDE = {
     "nominal": ({"model": "nominal"}, "give model='none'"),
     "of_model": ({"law": "mpc"}, "give model=.none."),
-    "lag": ({"actuator": smc.Lag(0.01)}, "so is Lag: leave that out"),
+    "two": ({"actuator": (smc.Lag(0.01), RateLimit(9.0))}, "keeps the PositionServo"),
+    "rate": ({"actuator": RateLimit(9.0)}, "RateLimit, and the joint keeps the PositionServo"),
     "motor": ({"actuator": smc.DCMotor()}, "DCMotor, and the joint keeps the PositionServo"),
     "fault": ({"fault": smc.Fault(at=1.0, gain=0.5)}, "stuck=True"),
 }
@@ -361,6 +362,38 @@ def test_predicted_chattering_has_the_servo_s_spring(law, late):
     assert predicted.frequency == pytest.approx(1e3 * np.diff(turns).mean() ** -1, rel=0.02)
 
 
+def test_a_lag_before_a_servo_filters_its_set_point():
+    tau, fine = 0.05, 1e-5
+    fields = {"reference": smc.Sine(0.6, 5.0), "x0": 0.5, "duration": 1.0, "control_period": 5e-3}
+    lag = {"actuator": smc.Lag(tau), "physics_step": 1e-3}
+    trace = run(plant=servo(BARE), law=on_set_point(kp=0.7, ki=2.0), **fields, **lag)
+    model = mujoco.MjModel.from_xml_string(BARE)
+    model.opt.timestep = fine
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.5
+    aim = 0.0
+    for k in range(len(trace.t) - 1):
+        assert abs(data.qpos[0] - trace.x[k, 0]) < 5e-5
+        for _ in range(500):  # the lag's output in the middle of a step, and at its end
+            data.ctrl[:] = trace.u[k] + (aim - trace.u[k]) * math.exp(-0.5 * fine / tau)
+            aim = trace.u[k, 0] + (aim - trace.u[k, 0]) * math.exp(-fine / tau)
+            mujoco.mj_step(model, data)
+    with pytest.raises(ScenarioError, match=r"steps of 0\.1, and not behind a Lag"):
+        smc.Scenario(plant=servo(BARE, set_point_step=0.1), law="pid", actuator=smc.Lag(tau))
+
+
+def test_predicted_chattering_has_the_filter_of_a_servo_once():
+    fields = {"law": smc.law("classical", k=0.2, c=8.0), "x0": 0.1, "input_delay": 0.01}
+    filtered = servo(STRONG.replace('kv=".1"', 'kv=".1" timeconst=".01"'))
+    own = smc.Scenario(plant=filtered, **fields, duration=6.0)
+    lagged = smc.Scenario(plant=servo(STRONG), actuator=smc.Lag(0.01), **fields)
+    predicted = smc.design.chattering(own)
+    assert smc.design.chattering(lagged).frequency == pytest.approx(predicted.frequency)
+    trace = run_again(own)
+    turns = np.flatnonzero(np.diff(np.sign(trace.x[trace.t > 4.0, 0])) > 0)
+    assert predicted.frequency == pytest.approx(1e3 / np.diff(turns).mean(), rel=0.03)
+
+
 def test_chattering_is_not_predicted_for_a_goal_or_steps_of_a_set_point():
     stepped = smc.Scenario(plant=servo(BARE, set_point_step=0.01), law="classical")
     with pytest.raises(ScenarioError, match=r"goal 0 and step 0.01: measure it in a run"):
@@ -413,7 +446,7 @@ def test_the_fast_engine_says_what_of_a_servo_it_cannot():
 
 def test_a_comparison_leaves_out_the_conditions_with_another_drive():
     left = applicable(["nominal", "dc_motor", "lag_20ms", "fault", "backlash"], [servo(BARE)], 1.0)
-    assert left == ["nominal", "backlash"]
+    assert left == ["nominal", "lag_20ms", "backlash"]
 
 
 def test_a_voltage_beside_a_set_point_is_never_pooled_with_it():
