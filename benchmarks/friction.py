@@ -17,12 +17,18 @@ without friction; and R, the rate of variation of u at rest without friction, of
 A set of gains is admitted if its J is at most ADMITTED times the least of all laws.
 
 Each law gets the same number of sets: two thirds drawn over the box of a search and a decade
-beyond it, the others bred from their fronts. One instance chooses, twelve others judge, with other
+beyond it, the others bred from their fronts. One instance chooses, 48 others judge, with other
 starts, phases, zeros of the encoder and noise. Both seeds are whole searches. A feedforward knows
-the friction, or has 30 % less or more of it, and a set is chosen for each of these.
+the friction, or has 30 % less or more of it, on the reference or at the measured speed, and a set
+is chosen for each of these. At the measured speed it moves u at rest, so R is then that of a run
+with the friction and its compensation.
 
-The fast engine searches. MuJoCo runs each point that the page prints, and what no search has seen:
-friction that grows with the load, LuGre, a play with friction on either side, a contact.
+Sets that are chosen without them run again with what friction_dither.py has: a PD beside a square
+wave, and super-twisting with a slope in place of its sign.
+
+The fast engine searches, and runs what no search has seen, friction that grows with the load and
+LuGre. MuJoCo runs each point that the page prints, and by itself a play with friction on either
+side, and a contact.
 """
 
 import argparse
@@ -38,6 +44,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import smc_mujoco as smc
+from benchmarks.friction_dither import AMPLITUDES, DITHER, SLOPES, Square, sloped
 from benchmarks.friction_plants import Joint, joints
 from smc_mujoco.analysis.engine.form import FAILURE, SCORES, SETTING
 from smc_mujoco.analysis.engine.group import FormGroup
@@ -68,25 +75,28 @@ TAUS = (1e-3, 3e-2)  # s, of the filtered difference
 CAP = 1.5  # s^2: a set that costs more does not run under friction
 DRAWN = 2 / 3  # of the sets; the others are bred
 ADMITTED, MARGIN = 4.0, 0.97  # of the least J; of a level of R
-RATES = (10.0, 30.0)  # levels of R, 1/s
-UNSEEN, BY_MUJOCO = 12, 2  # instances
+RATES = (10.0, 30.0, 100.0)  # levels of R, 1/s
+UNSEEN, BY_MUJOCO = 48, 2  # instances
 PERIOD, DELAY, NOISE = 1e-3, 2e-3, 0.3  # s; s; counts
 REST, WINDOW, CALM, LONG, LATE = 10.0, 5.0, 4.0, 40.0, 10.0  # s
 AFTER_BLOW = 2.0  # s, the last of a run with a blow at 5 s
 SPEED, SETTLING = 0.1, 3.0  # of a sine: its peak over the start and the time scale; s
 STILL = 4.0  # counts: a joint that moves by more in the last 10 of 40 s still moves
+PARTED = (0.0, RATES[0])  # levels whose sets run beside a square wave or with a slope; 0: least J
 HUNTERS, HUNTING_RATE = 16, 30.0  # sets of a law that run for 40 s; their largest R
 SUMS = ("itae", "tv", "rms_error", "tv_rate", "ripple", "stick_time", "reversal_error")
 ITAE, TV, RMS, RATE, RIPPLE, STICK, TURNED = range(len(SUMS))
 SHARES = (0.0, 1.0, 0.7, 1.3)  # of the true friction that is fed forward
+ON = ("reference", "speed")  # what is fed forward on
 
 
 class Case(NamedTuple):
-    """A friction, a task, and the share of the friction that is fed forward."""
+    """A friction, a task, the share of the friction that is fed forward, and at which speed."""
 
     friction: str
     task: str = "rest"
     share: float = 0.0
+    on: str = ON[0]
 
 
 PRICED = (  # runs without friction: J's, then that of the rate in calm
@@ -105,8 +115,9 @@ def cases_of(one: Joint) -> list[Case]:
     """
     found = []
     for name, (moving, resting) in one.levels.items():
-        shares = SHARES if moving == resting else SHARES[:1]
-        found += [Case(name), *(Case(name, "sine", share) for share in shares)]
+        found += [Case(name), Case(name, "sine")]
+        for on in ON if moving == resting else ():
+            found += [Case(name, "sine", share, on) for share in SHARES[1:]]
     return found
 
 
@@ -139,7 +150,9 @@ def scenario(one: Joint, law: Component, case: Case, instance: int, **changes: A
         "u_max": one.bound,
         "x0": start,
         "friction": friction,
-        "feedforward": smc.Feedforward(friction, eps=one.slow / 4, error=case.share - 1.0),
+        "feedforward": smc.Feedforward(
+            friction, on=case.on, eps=one.slow / 4, error=case.share - 1.0
+        ),
         "reference": smc.Sine(size, omega, phase),
         "duration": length,
         "control_period": PERIOD,
@@ -179,69 +192,92 @@ def priced(one: Joint, law: Component, number: int, instance: int) -> smc.Scenar
     return scenario(one, law, Case("none"), instance, **changes)
 
 
+def calm(one: Joint, law: Component, case: Case, instance: int, **changes: Any) -> smc.Scenario:
+    """Return a run at rest under the friction of a case, with its compensation."""
+    its = {"x0": 0.0, "length": CALM} | changes
+    return scenario(one, law, case._replace(task="rest"), instance, **its)
+
+
 class Sets(NamedTuple):
     """Gains of a law, the last of which is tau, and what they reach where they are chosen."""
 
     gains: np.ndarray  # (sets, gains)
     J: np.ndarray  # (sets,), NaN beyond CAP
-    rates: np.ndarray  # (sets,), R
+    rates: np.ndarray  # (sets, cases), R
     errors: np.ndarray  # (sets, cases), counts
 
 
-class Bench:
-    """The runs of a law on a joint, as rows of the fast engine, for some instances."""
+CALM_WINDOW = round((CALM - 1.0) / PERIOD)  # samples
 
-    def __init__(self, one: Joint, name: str, instances: Sequence[int]):
+
+def grouped(runs: Sequence[smc.Scenario], windows: Sequence[int]) -> FormGroup:
+    """Return runs of one form, whose errors are taken over their last samples."""
+    group = FormGroup(runs, SUMS)
+    group.rows[:, SETTING.early] = group.rows[:, SETTING.samples] + 1 - windows
+    group.rows[:, SETTING.late] = group.rows[:, SETTING.samples] - windows
+    return group
+
+
+def sums_of(group: FormGroup, rows: np.ndarray) -> np.ndarray:
+    """Return the sums of rows, (rows, sums); NaN after a failure."""
+    scores = group.run(rows, threads=1)
+    return np.where(scores[:, [FAILURE]] == state.FINE, scores[:, SCORES:], np.nan)
+
+
+class Bench:
+    """The runs that choose among sets of gains of a law on a joint, as rows of the fast engine."""
+
+    def __init__(self, one: Joint, name: str):
         self.one = one
         self.law = law_of(name, one)
         scales = search_space.scales(one.plant, one.bound, one.start, 1.0)
         self.box = search_space.box(self.law, scales)
         self.cases = cases_of(one)
-        runs = []
-        ends = []  # first sample of the window, before the end
-        for instance in instances:
-            for number in range(len(PRICED)):
-                runs.append(priced(one, self.law, number, instance))
-                ends.append(round((CALM - 1.0) / PERIOD))
-            for case in self.cases:
-                runs.append(scenario(one, self.law, case, instance))
-                ends.append(window_of(one, case))
-        self.group = FormGroup(runs, SUMS)
-        self.starts = [abs(run.resolved.x0[0]) for run in runs]
-        self.size = len(PRICED) + len(self.cases)
-        rows = self.group.rows
-        rows[:, SETTING.early] = rows[:, SETTING.samples] + 1 - ends
-        rows[:, SETTING.late] = rows[:, SETTING.samples] - ends
+        runs = [priced(one, self.law, number, 0) for number in range(len(PRICED))]
+        self.priced = grouped(runs, np.full(len(runs), CALM_WINDOW))
+        self.starts = [abs(run.resolved.x0[0]) for run in runs[:-1]]
+        self.at = {on: [k for k, case in enumerate(self.cases) if case.on == on] for on in ON}
+        self.loaded = {}
+        for on, places in self.at.items():
+            cases = [self.cases[k] for k in places]
+            runs = [scenario(one, self.law, case, 0) for case in cases]
+            self.loaded[on] = grouped(runs, np.array([window_of(one, case) for case in cases]))
+        cases = [self.cases[k] for k in self.at["speed"]]
+        runs = [calm(one, self.law, case, 0) for case in cases]
+        self.calm = grouped(runs, np.full(len(runs), CALM_WINDOW))
 
-    def sums(self, gains: np.ndarray, runs: Sequence[int]) -> np.ndarray:
-        """Return the sums of gains in some runs, (sets, runs, sums); NaN after a failure."""
-        rows = np.tile(self.group.rows[runs], (len(gains), 1))
+    def sums(self, group: FormGroup, gains: np.ndarray) -> np.ndarray:
+        """Return the sums of gains in the runs of a group, (sets, runs, sums)."""
+        runs = len(group.rows)
+        rows = np.tile(group.rows, (len(gains), 1))
         for name, values in zip(self.box, gains.T, strict=False):
-            rows[:, self.group.gain_columns(name)] = np.repeat(values, len(runs))[:, None]
-        rows[:, self.group.layout.estimator.numbers] = np.repeat(gains[:, -1], len(runs))
-        scores = self.group.run(rows, threads=1)
-        found = np.where(scores[:, [FAILURE]] == state.FINE, scores[:, SCORES:], np.nan)
-        return found.reshape(len(gains), len(runs), len(SUMS))
+            rows[:, group.gain_columns(name)] = np.repeat(values, runs)[:, None]
+        rows[:, group.layout.estimator.numbers] = np.repeat(gains[:, -1], runs)
+        return sums_of(group, rows).reshape(len(gains), runs, len(SUMS))
 
     def prices(self, gains: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return J and R of gains on the first instance."""
-        sums = self.sums(gains, range(len(PRICED)))
+        """Return J and R of gains."""
+        sums = self.sums(self.priced, gains)
         J = np.zeros(len(gains))
-        for i, start in enumerate(self.starts[: len(PRICED) - 1]):
+        for i, start in enumerate(self.starts):
             J += sums[:, i, ITAE] / start + PERIOD * sums[:, i, TV] / (self.one.bound * 5.0)
         return J, sums[:, -1, RATE] / self.one.bound
 
     def judged(self, gains: np.ndarray) -> Sets:
-        """Return what gains reach on the first instance; only what is within CAP and the largest
-        level of R runs under friction.
+        """Return what gains reach; only what is within CAP and the largest level of R runs under
+        friction.
         """
-        J, rates = self.prices(gains)
+        J, plain = self.prices(gains)
         J[~(J < CAP)] = np.nan
         errors = np.full((len(gains), len(self.cases)), np.nan)
-        fine = np.flatnonzero(np.isfinite(J) & (rates <= RATES[-1]))
+        rates = np.tile(plain[:, None], (1, len(self.cases)))
+        fine = np.flatnonzero(np.isfinite(J) & (plain <= RATES[-1]))
         if fine.size:
-            sums = self.sums(gains[fine], range(len(PRICED), self.size))
-            errors[fine] = sums[:, :, RMS] / self.one.count
+            for on, places in self.at.items():
+                sums = self.sums(self.loaded[on], gains[fine])
+                errors[np.ix_(fine, places)] = sums[:, :, RMS] / self.one.count
+            sums = self.sums(self.calm, gains[fine])
+            rates[np.ix_(fine, self.at["speed"])] = sums[:, :, RATE] / self.one.bound
         return Sets(gains, J, rates, errors)
 
 
@@ -255,9 +291,9 @@ def on_front(sets: Sets) -> np.ndarray:
     the least J.
     """
     found = {int(np.nanargmin(sets.J))} if np.isfinite(sets.J).any() else set()
-    for error in sets.errors.T:
+    for error, rates in zip(sets.errors.T, sets.rates.T, strict=True):
         least = math.inf
-        for i in np.argsort(sets.rates):
+        for i in np.argsort(rates):
             if error[i] < 0.95 * least:
                 found.add(int(i))
                 least = error[i]
@@ -278,7 +314,7 @@ def searched(one: Joint, name: str, count: int, seed: int, folder: Path | None) 
 
 def search(one: Joint, name: str, count: int, seed: int) -> Sets:
     """Draw and breed sets of gains of a law, and judge them on the instance that chooses."""
-    bench = Bench(one, name, [0])
+    bench = Bench(one, name)
     rng = np.random.default_rng([seed, zlib.crc32(name.encode())])
     low, high = np.log([*bench.box.values(), TAUS]).T
     low[:-1] -= WIDER * math.log(10.0)
@@ -312,9 +348,9 @@ def choices(cases: Sequence[Case]) -> Iterator[Choice]:
         if case.task == "rest":
             yield Choice("J", 0.0, k)
             continue
-        for level in RATES:
-            if case.share == 0.0 or level == RATES[0]:
-                yield Choice("R", level, k)
+        levels = RATES[:2] if case.on == "speed" else RATES[:1]
+        for level in levels if case.share else RATES:
+            yield Choice("R", level, k)
 
 
 def chosen(sets: Sets, choice: Choice, least: float) -> int:
@@ -322,7 +358,8 @@ def chosen(sets: Sets, choice: Choice, least: float) -> int:
     if choice.price == "J":
         costs = sets.J
     else:
-        admitted = (sets.J / least <= ADMITTED) & (sets.rates <= MARGIN * choice.level)
+        rates = sets.rates[:, choice.case]
+        admitted = (sets.J / least <= ADMITTED) & (rates <= MARGIN * choice.level)
         costs = np.where(admitted, sets.errors[:, choice.case], np.nan)
     return -1 if np.isnan(costs).all() else int(np.nanargmin(costs))
 
@@ -347,10 +384,11 @@ class Told(NamedTuple):
         """Return the gains by name."""
         return dict(zip((*self.names, "tau"), gains.tolist(), strict=True))
 
-    def runs(self, gains: np.ndarray, case: Case) -> dict[str, Any]:
+    def runs(self, gains: np.ndarray, case: Case, **changes: Any) -> dict[str, Any]:
         """Return what unseen instances of a case give, by the engine and by MuJoCo."""
         window = window_of(self.one, case)
-        runs = [self.scenario(gains, case, 1 + instance) for instance in range(UNSEEN)]
+        numbers = range(1, 1 + UNSEEN)
+        runs = [self.scenario(gains, case, number, **changes) for number in numbers]
         sums = self.by_engine(runs, window)
         found: dict[str, Any] = {"errors": (sums[:, RMS] / self.one.count).tolist()}
         for key, column in (("ripple", RIPPLE), ("turned", TURNED)):
@@ -362,11 +400,8 @@ class Told(NamedTuple):
 
     def by_engine(self, runs: Sequence[smc.Scenario], window: int) -> np.ndarray:
         """Return the sums of runs of one form over their last samples, (runs, sums)."""
-        group = FormGroup(runs, SUMS)
-        group.rows[:, SETTING.early] = group.rows[:, SETTING.samples] + 1 - window
-        group.rows[:, SETTING.late] = group.rows[:, SETTING.samples] - window
-        scores = group.run(group.rows, threads=1)
-        return np.where(scores[:, [FAILURE]] == state.FINE, scores[:, SCORES:], np.nan)
+        group = grouped(runs, np.full(len(runs), window))
+        return sums_of(group, group.rows)
 
     def by_mujoco(self, runs: Sequence[smc.Scenario], window: int) -> list[float]:
         """Return the rms of the error over the last samples of MuJoCo's runs, counts."""
@@ -397,24 +432,63 @@ def told(one: Joint, name: str, found: Sequence[Sets], least: float) -> list[dic
             point["chose"] = [
                 its.errors[j, choice.case] if j >= 0 else math.inf for its, j in alone
             ]
-            point |= {"J": sets.J[i] / least, "R": sets.rates[i], "gains": it.named(sets.gains[i])}
+            point |= {"J": sets.J[i] / least, "gains": it.named(sets.gains[i])}
+            point["R"] = sets.rates[i, choice.case]
             point |= it.runs(sets.gains[i], case) | {"edge": edges(sets.gains[i], box)}
         points.append(point)
     points += hunting(it, sets, least)
     if np.isfinite(sets.J).any():
         points += beyond(it, sets, least)
+    for choice in choices(cases):
+        i = chosen(sets, choice, least)
+        case = cases[choice.case]
+        if i >= 0 and case.share == 0.0 and choice.level in PARTED:
+            points += parted(it, case, choice.level, sets.gains[i])
     return points
 
 
+def parted(it: Told, case: Case, level: float, gains: np.ndarray) -> Iterator[dict]:
+    """Yield what a set of gains, which a level of R bought, does beside a square wave if it is a
+    PD's, and with a slope in place of the sign if it is super-twisting's; with R of its own.
+    """
+    one = it.one
+    variants: list[tuple[str, float, Told, dict[str, Any]]] = []
+    moving, resting = one.levels[case.friction]
+    if it.name == "pd" and moving == resting:
+        for share in AMPLITUDES:
+            wave = Square(share * moving * one.bound, DITHER)
+            variants.append(("dither", share, it, {"feedforward": wave}))
+    if it.name == "super_twisting":
+        for width in SLOPES:
+            law = sloped(it.law, width * one.start / one.scale)
+            variants.append(("slope", width, it._replace(law=law), {}))
+    for price, size, its, changes in variants:
+        point: dict[str, Any] = {"joint": one.plant.name, "law": it.name, "price": price}
+        point |= {"level": level, "size": size} | case._asdict()
+        still = {"x0": 0.0, "length": CALM} | changes
+        numbers = range(1, 1 + UNSEEN)
+        runs = [its.scenario(gains, Case("none"), number, **still) for number in numbers]
+        rates = its.by_engine(runs, CALM_WINDOW)[:, RATE] / one.bound
+        point |= {"R": float(np.median(rates)), "gains": it.named(gains)}
+        yield point | its.runs(gains, case, **changes)
+
+
 def beyond(it: Told, sets: Sets, least: float) -> Iterator[dict]:
-    """Yield what MuJoCo says of the set of the least J at rest under what no search has seen."""
+    """Yield what the set of the least J does at rest under what no search has seen."""
     one = it.one
     i = int(np.nanargmin(sets.J))
     for name in one.others:
+        point = {"joint": one.plant.name, "law": it.name, "price": "J", "level": 0.0}
+        point |= {"friction": name, "task": "rest", "share": 0.0, "J": sets.J[i] / least}
+        point |= {"R": sets.rates[i, 0]}
         changes: dict[str, Any] = {}
-        case = Case(name if name in ("load", "lugre") else "coulomb10")
-        if name == "lugre":
-            changes = {"physics_step": PERIOD / 4}
+        if name in ("load", "lugre"):
+            if name == "lugre":
+                changes["physics_step"] = PERIOD / 4
+            point |= {"gains": it.named(sets.gains[i])}
+            yield point | it.runs(sets.gains[i], Case(name), **changes)
+            continue
+        case = Case("coulomb10")
         if name.startswith("play"):
             changes = play(one, name.removeprefix("play, "))
         if name == "contact":
@@ -424,10 +498,7 @@ def beyond(it: Told, sets: Sets, least: float) -> Iterator[dict]:
         for instance in range(BY_MUJOCO):
             runs.append(it.scenario(sets.gains[i], case, 1 + instance, **changes))
         window = round((AFTER_BLOW if name == "contact" else WINDOW) / PERIOD)
-        found = it.by_mujoco(runs, window)
-        point = {"joint": one.plant.name, "law": it.name, "price": "J", "level": 0.0}
-        point |= {"friction": name, "task": "rest", "share": 0.0, "J": sets.J[i] / least}
-        yield point | {"R": sets.rates[i], "errors": found}  # by MuJoCo alone
+        yield point | {"errors": it.by_mujoco(runs, window)}
 
 
 def play(one: Joint, side: str) -> dict[str, Any]:
@@ -453,7 +524,7 @@ def edges(gains: np.ndarray, box: Mapping[str, tuple[float, float]]) -> list[str
 
 def hunting(it: Told, sets: Sets, least: float) -> Iterator[dict]:
     """Yield for each friction which share of a law's admitted sets still moves after 40 s."""
-    admitted = np.flatnonzero((sets.J / least <= ADMITTED) & (sets.rates <= HUNTING_RATE))
+    admitted = np.flatnonzero((sets.J / least <= ADMITTED) & (sets.rates[:, 0] <= HUNTING_RATE))
     picked = np.random.default_rng(5).permutation(admitted)[:HUNTERS]
     for friction in it.one.levels:
         point: dict[str, Any] = {"joint": it.one.plant.name, "law": it.name, "price": "hunting"}

@@ -37,9 +37,9 @@ def of_reversals(ax, points: Sequence[dict], joint: str, colours: dict[str, str]
             point = found(points, **its, level=level, share=float(share))
             if point and point["errors"]:
                 errors[level, float(share)] = np.median(point["errors"])
-        plain = [errors[level, 0.0] for level in RATES if (level, 0.0) in errors]
+        plain = [errors[level, 0.0] for level in RATES[:2] if (level, 0.0) in errors]
         ax.plot(plain, [place] * len(plain), color=colour, lw=1.2)
-        for level, fill in zip(RATES, ("white", colour), strict=True):
+        for level, fill in zip(RATES[:2], ("white", colour), strict=True):
             if (level, 0.0) in errors:
                 ax.plot(errors[level, 0.0], place, "o", ms=5, mec=colour, mfc=fill)
         wrong = [errors[RATES[0], share] for share in (0.7, 1.3) if (RATES[0], share) in errors]

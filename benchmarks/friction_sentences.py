@@ -5,7 +5,7 @@ benchmarks/friction.py, and its figure.
 
 A lead counts if it is larger than another search may change it, SEARCH. A sentence is contradicted
 if the other side leads by as much, and else it is open. Below one count of the encoder nothing is
-ranked.
+ranked. A median whose interval spans more than SEARCH is no number, and its interval is printed.
 """
 
 import argparse
@@ -17,8 +17,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.friction import BY_MUJOCO, LAWS, OBSERVERS, RATES
+from benchmarks.friction import AMPLITUDES, BY_MUJOCO, LAWS, OBSERVERS, RATES, SLOPES
 from benchmarks.friction_figure import draw
+from benchmarks.fronts_sentences import with_interval
 
 FLOOR = 1.0  # count
 SEARCH = 1.5  # factor by which another search may move an error, chosen
@@ -26,12 +27,14 @@ HUNTS, STANDS_STILL = 0.4, 0.1  # shares of admitted sets
 DRY = ("coulomb10", "coulomb30", "stribeck", "identified")
 LEVEL = ("coulomb10", "coulomb30", "identified")  # whose feedforward has errors
 WITHOUT_INTEGRAL = ("pd", "boundary_layer")
-
+JUDGED = RATES[:2]  # levels of R that the sentences are about
+SLOPED, SLOPE = 1.1, 0.01  # factor within which a slope leaves an error as it is; its width
 
 VERDICTS = "stands", "open", "contradicted", "not ranked"
 JOINTS_OF = {
     "friction": "the three above",
     "friction_drawn": "drawn",
+    "friction_drawn_first": "drawn first",
 }  # file -> its name on the page
 
 
@@ -50,6 +53,21 @@ def error(point: dict | None) -> float:
     if point is None or point["errors"] is None:
         return math.inf
     return float(np.median(np.nan_to_num(point["errors"], nan=math.inf)))
+
+
+def interval(point: dict) -> tuple[float, float]:
+    """Return the ends of the interval of a point's median error, counts."""
+    values = [math.nan if one is None else one for one in point["errors"]]
+    return with_interval(values)[1:]
+
+
+def is_settled(point: dict) -> bool:
+    """Return whether the runs give a point's error as a number, or as one below a count. What
+    MuJoCo alone ran, on two instances, has no interval.
+    """
+    low, high = interval(point)
+    few = len(point["errors"]) == BY_MUJOCO
+    return few or low == high or high <= SEARCH * max(low, FLOOR)
 
 
 def leads(ours: float, theirs: float, factor: float = 1.0) -> str:
@@ -75,7 +93,8 @@ class Points:
 
     @staticmethod
     def _key(joint, law, price, friction, level=0.0, task="rest", share=0.0, **others):
-        return joint, law, price, level, friction, task, share
+        more = others.get("on", "reference"), others.get("size", 0.0)
+        return joint, law, price, level, friction, task, share, *more
 
     def find(self, joint: str, law: str, friction: str, price: str = "J", **about: Any):
         """Return a point; without more, that of the set of the least J at rest."""
@@ -129,20 +148,18 @@ def hunts(points: Points, joint: str) -> Iterator[tuple]:
         yield friction, two, one, verdict
 
 
-def compare(first: Any, second: Any, factor: float = 1.0, levels: Sequence[float] = RATES) -> Any:
+def compare(first: Any, second: Any, factor: float = 1.0, levels: Sequence[float] = JUDGED) -> Any:
     """Return the function of a sentence that the best of some laws has less error through reversals
-    than the best of others: (laws, shares of the feedforward; the worst of these counts).
+    than the best of others: (laws, what is fed forward; the worst of these counts).
     """
 
     def said(points: Points, joint: str) -> Iterator[tuple]:
         for friction in points.frictions(joint, LEVEL):
             for level in levels:
+                about = {"price": "R", "level": level, "task": "sine"}
                 sides = []
-                for laws, shares in (first, second):
-                    errors = []
-                    for share in shares:
-                        about = {"price": "R", "level": level, "task": "sine", "share": share}
-                        errors.append(points.best(joint, laws, friction, **about))
+                for laws, feeds in (first, second):
+                    errors = [points.best(joint, laws, friction, **about, **one) for one in feeds]
                     sides.append(max(errors))
                 ours, theirs = sides
                 yield f"{friction}, R {level:g}", ours, theirs, leads(ours, theirs, factor)
@@ -150,7 +167,42 @@ def compare(first: Any, second: Any, factor: float = 1.0, levels: Sequence[float
     return said
 
 
-PLAIN, RIGHT, WRONG = (0.0,), (1.0,), (0.7, 1.3)
+def dithers(points: Points, joint: str) -> Iterator[tuple]:
+    """Of three square waves only that of 1.5 times the friction brings a PD within a count at rest,
+    with gains of the least J.
+    """
+    for friction in points.frictions(joint, LEVEL):
+        alone = points.best(joint, ("pd",), friction)
+        about = {"price": "dither", "size": AMPLITUDES[-1]}
+        found = points.best(joint, ("pd",), friction, **about)
+        smaller = points.best(joint, ("pd",), friction, **about | {"size": AMPLITUDES[-2]})
+        verdict = "open"
+        if alone <= FLOOR or found == math.inf:
+            verdict = "not ranked"
+        elif smaller <= FLOOR or found > SEARCH * FLOOR:
+            verdict = "contradicted"
+        elif found <= FLOOR:
+            verdict = "stands"
+        yield friction, found, FLOOR, verdict
+
+
+def slopes(points: Points, joint: str) -> Iterator[tuple]:
+    """A slope of a hundredth in place of super-twisting's sign does not worsen its reversals."""
+    for friction in points.frictions(joint, LEVEL):
+        about = {"level": RATES[0], "task": "sine"}
+        sign = points.best(joint, TWISTING, friction, price="R", **about)
+        found = points.best(joint, TWISTING, friction, price="slope", size=SLOPE, **about)
+        verdict = "stands" if found <= SLOPED * max(sign, FLOOR) else "open"
+        if sign == math.inf:
+            verdict = "not ranked"
+        elif found > SEARCH * max(sign, FLOOR):
+            verdict = "contradicted"
+        yield friction, found, sign, verdict
+
+
+PLAIN, RIGHT = ({"share": 0.0},), ({"share": 1.0},)
+WRONG = {"share": 0.7}, {"share": 1.3}
+AT_SPEED = ({"share": 1.0, "on": "speed"},)
 TWISTING = ("super_twisting",)
 SENTENCES = {
     "rest": rests,
@@ -159,14 +211,26 @@ SENTENCES = {
     "smooth": compare((OBSERVERS, PLAIN), (("boundary_layer",), PLAIN), 3.0),
     "right": compare((("pd",), RIGHT), (TWISTING, PLAIN), levels=RATES[:1]),
     "wrong": compare((OBSERVERS, PLAIN), (("pd",), WRONG), levels=RATES[:1]),
+    "speed": compare((("pd",), RIGHT), (("pd",), AT_SPEED), levels=RATES[:1]),
+    "dither": dithers,
+    "slope": slopes,
 }
 
 
+# sentence -> field of points that the first draw does not have, and its value
+NEEDS = {"speed": ("on", "speed"), "dither": ("price", "dither"), "slope": ("price", "slope")}
+
+
 def judged(points: Sequence[dict]) -> list[Verdict]:
-    """Return a verdict for each condition of each sentence, on each joint."""
+    """Return a verdict for each condition of each sentence, on each joint; a file may be older
+    than a sentence.
+    """
     by_key = Points(points)
     found = []
     for name, says in SENTENCES.items():
+        field, value = NEEDS.get(name, (None, None))
+        if field and all(point.get(field) != value for point in points):
+            continue
         for joint in by_key.joints:
             for about, ours, theirs, verdict in says(by_key, joint):
                 found.append(Verdict(name, joint, about, (ours, theirs), verdict))
@@ -196,9 +260,15 @@ def agreement(points: Sequence[dict]) -> np.ndarray:
 
 
 def cell(point: dict | None) -> str:
-    """Return a point's error as the page prints it, counts; "–" where no set is had."""
+    """Return a point's error as the page prints it, counts, or its interval where the runs do not
+    settle it; "–" where no set is had.
+    """
     found = error(point)
-    return "–" if found == math.inf else two_digits(found)
+    if point is None or found == math.inf:
+        return "–"
+    if not is_settled(point):
+        return " to ".join(map(two_digits, interval(point)))
+    return two_digits(found)
 
 
 def two_digits(value: float) -> str:
@@ -249,6 +319,42 @@ def compensated_rows(points: Sequence[dict], joint: str, frictions: Sequence[str
         yield f"| `{law}` | {' | '.join(cells)} |"
 
 
+def at_speed_rows(points: Sequence[dict], joint: str, frictions: Sequence[str]) -> Iterator[str]:
+    """Yield the rows of the table of compensation at the measured speed: for each friction at the
+    two lower levels of R, right, 70 % and 130 %.
+    """
+    by_key = Points(points)
+    for law in LAWS:
+        cells = []
+        for friction in frictions:
+            for level in JUDGED:
+                errors = []
+                for share in (1.0, 0.7, 1.3):
+                    about = {"price": "R", "level": level, "task": "sine", "share": share}
+                    point = by_key.find(joint, law, friction, on="speed", **about)
+                    errors.append(cell(point))
+                cells.append("; ".join(errors))
+        yield f"| `{law}` | {' | '.join(cells)} |"
+
+
+def parted_rows(points: Sequence[dict], joint: str, frictions: Sequence[str]) -> Iterator[str]:
+    """Yield the rows of the table of a PD beside a square wave and of super-twisting with a slope:
+    for each friction the error at rest and through reversals, and R at rest.
+    """
+    by_key = Points(points)
+    for law, price, sizes in (("pd", "dither", AMPLITUDES), ("super_twisting", "slope", SLOPES)):
+        for size in (0.0, *sizes):
+            cells = []
+            for friction in frictions:
+                for level, task in ((0.0, "rest"), (RATES[0], "sine")):
+                    plain = "J" if task == "rest" else "R"
+                    about = {"level": level, "task": task, "size": size}
+                    point = by_key.find(joint, law, friction, price if size else plain, **about)
+                    rate = f" (R {two_digits(point['R'])})" if point and point["errors"] else ""
+                    cells.append(cell(point) + rate)
+            yield f"| `{law}`, {price} {size:g} | {' | '.join(cells)} |"
+
+
 def page_rows(points: Sequence[dict]) -> Iterator[str]:
     """Yield the rows of all tables of errors, joint by joint."""
     for joint in Points(points).joints:
@@ -256,7 +362,10 @@ def page_rows(points: Sequence[dict]) -> Iterator[str]:
         others = Points(points).frictions(joint, ("load", "lugre"))
         yield from rest_rows(points, joint, (*dry, *others))
         yield from reversal_rows(points, joint, dry)
-        yield from compensated_rows(points, joint, Points(points).frictions(joint, LEVEL))
+        level = Points(points).frictions(joint, LEVEL)
+        yield from compensated_rows(points, joint, level)
+        yield from at_speed_rows(points, joint, level)
+        yield from parted_rows(points, joint, level)
         sides = Points(points).frictions(joint, ("play, link", "play, motor", "contact"))
         if sides:
             yield from rest_rows(points, joint, sides)
