@@ -32,7 +32,8 @@ def _doubtful_units(s: Any) -> Iterator[str]:
             yield f"{what} is {seconds:g} s: if it is {seconds:g} ms, give {seconds / 1e3:g}"
     for name, factor in s.mismatch.items():
         low, high = LARGE_FACTORS
-        if low <= factor <= high and name not in s.plant.added:
+        # a number of a joint or a part, as elbow.damping, may be far from its nominal value
+        if low <= factor <= high and name not in s.plant.added and "." not in name:
             fact = f"the true {name} of {s.plant.name} is {factor:g} times the nominal one"
             yield f"{fact}: if it is {factor:g} % more, give {1.0 + factor / 100.0:g}"
 
