@@ -507,13 +507,13 @@ def _behind(drive: Actuator, block: Array, model: mujoco.MjModel) -> Array:
     ids = drive_ids(model)
     outputs = len(block) - model.nu + ids
     speeds = model.nv + model.jnt_dofadr[model.actuator_trnid[ids, 0]]
-    made = np.pad(block, (0, model.nu))
+    behind = np.pad(block, (0, model.nu))
     if isinstance(drive, DCMotor):
-        made[:, speeds] += drive.constant * made[:, outputs]
-        made[outputs, speeds] = -drive.constant / drive.delay
-    made[outputs, outputs] = -1.0 / drive.delay
-    made[outputs, len(block) + ids] = 1.0 / drive.delay
-    return made
+        behind[:, speeds] += drive.constant * behind[:, outputs]
+        behind[outputs, speeds] = -drive.constant / drive.delay
+    behind[outputs, outputs] = -1.0 / drive.delay
+    behind[outputs, len(block) + ids] = 1.0 / drive.delay
+    return behind
 
 
 def play(amplitude: float, gap: float) -> complex:

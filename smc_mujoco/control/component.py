@@ -164,17 +164,17 @@ class Component:
                 f"{self.name} cannot be the outer law of computed torque: "
                 "give one law of one channel, for all plants"
             )
-        made = outer.on_computed_torque()
+        converted = outer.on_computed_torque()
         gains = {}
         for name, value in self.gains.items():
-            if name in made.gains:
+            if name in converted.gains:
                 gains[name] = value
             elif value != outer.gains[name].default:
                 raise ScenarioError(
                     f"{self.name}'s {name} is {gain_text(value)}, and on computed torque each "
                     "joint is e'' = v: leave it out"
                 )
-        return made.bind(gains).sourced(self.source.kind, self.source.search)
+        return converted.bind(gains).sourced(self.source.kind, self.source.search)
 
     def of_channel(self, i: int) -> "Component":
         """Return the component of channel i, with one number for each gain."""
@@ -197,10 +197,10 @@ class Component:
 
     def numbers(self, count: int) -> list[float]:
         """Return each gain's values in so many channels, gain by gain."""
-        found = []
+        values = []
         for value in self.gains.values():
-            found += [gain_at(value, i) for i in range(count)]
-        return found
+            values += [gain_at(value, i) for i in range(count)]
+        return values
 
     def __call__(self, /, **gains: GainValue) -> "Component":
         """Return it with some gains changed, as `smc.law(law, **gains)` does."""

@@ -32,13 +32,13 @@ def law(data: Data, source: Data | None) -> Component:
     given.
     """
     if "each" in data:
-        made = by_channel([law(item, source) for item in data["each"]])
+        component = by_channel([law(item, source) for item in data["each"]])
     else:
-        made = restore(data, "law", known_laws() | _laws_of_annex(data["module"]))
+        component = restore(data, "law", known_laws() | _laws_of_annex(data["module"]))
     if source is None:
-        return made.sourced(sources.YOURS)
-    restored = dataclasses.replace(sources.restore(source), gains=made.gains)
-    return dataclasses.replace(made, source=restored)
+        return component.sourced(sources.YOURS)
+    restored = dataclasses.replace(sources.restore(source), gains=component.gains)
+    return dataclasses.replace(component, source=restored)
 
 
 def restore(data: Data, kind: str, known: Catalogue[Template]) -> Component:

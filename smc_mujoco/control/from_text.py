@@ -86,15 +86,15 @@ def law(
         return _with_gains(text(), gains)
     if isinstance(text, Law) and text.kind == "law":
         return _with_gains(text, gains)
-    found = laws(text)
-    if len(found) > 1:
+    of_text = laws(text)
+    if len(of_text) > 1:
         names = []
-        for one in found:
-            names.append(one if isinstance(one, str) else one.name)
+        for item in of_text:
+            names.append(item if isinstance(item, str) else item.name)
         raise ScenarioError(
             f"{text} has several laws, {', '.join(names)}: give one, as FILE.py:{names[0]}"
         )
-    first = found[0]
+    first = of_text[0]
     return _with_gains(known_laws()[first]() if isinstance(first, str) else first, gains)
 
 
@@ -105,11 +105,11 @@ def _shipped(text: object, plant: Plant, gains: Mapping[str, float | Sequence[fl
             f"law {shown(text)} is none of the library by its name: leave plant={plant.name!r} out"
         )
     head, given = _parts("law", text, "pid(kp=50,ki=50,kd=8)")
-    made = gain_sets.law(plant, head)
+    shipped = gain_sets.law(plant, head)
     warn_once(gain_sets.of_other_parameters(plant))
     if not (given or gains):
-        return made
-    return known_laws()[head].bind({**made.gains, **given, **gains}, warn=True)
+        return shipped
+    return known_laws()[head].bind({**shipped.gains, **given, **gains}, warn=True)
 
 
 def laws(text: object) -> list[str | Law]:
@@ -125,17 +125,17 @@ def laws(text: object) -> list[str | Law]:
     elif labelled := LABELLED.fullmatch(text):
         return [law(labelled["rest"]).named(labelled["label"].strip())]
     elif tuned := FILE_AND_TUNING.fullmatch(text):
-        found = _tuned(tuned["tuning"])
+        of_file = _tuned(tuned["tuning"])
         own = law(tuned["file"])
         module = getattr(own.function, "__module__", "")
         # a law that has another name by `named` is still of its module
-        if own.name != found.name and module != _described(tuned["tuning"])["law"].get("module"):
+        if own.name != of_file.name and module != _described(tuned["tuning"])["law"].get("module"):
             raise ScenarioError(
-                f"{tuned['tuning']} has gains of law {found.name!r}, and {tuned['file']} has law "
+                f"{tuned['tuning']} has gains of law {of_file.name!r}, and {tuned['file']} has law "
                 f"{own.name!r}: give the file of the same law"
             )
-        component_json.check_gains(found.name, found.gains, own.gains)
-        return [dataclasses.replace(_with_gains(own, found.gains), source=found.source)]
+        component_json.check_gains(of_file.name, of_file.gains, own.gains)
+        return [dataclasses.replace(_with_gains(own, of_file.gains), source=of_file.source)]
     else:
         head, gains = _parts("law", text, "pid(kp=50,ki=50,kd=8)")
     if IN_FILE.fullmatch(head):
@@ -210,9 +210,9 @@ def _of_python(path: str) -> list[Law]:
         if template is not known_laws().get(name):
             laws.append(template())
     # a law that is a template with gains is not one more
-    made = {template.function for template in (*templates.values(), *known_laws().values())}
+    functions = {template.function for template in (*templates.values(), *known_laws().values())}
     for law in bound.values():
-        if made.isdisjoint(part.function for part in law.parts):
+        if functions.isdisjoint(part.function for part in law.parts):
             laws.append(law)
     if not laws:
         raise ScenarioError(
@@ -235,11 +235,11 @@ def _tuned(path: str) -> Law:
     """Return the law of a tuning, with its search as the source of the gains."""
     scenario = _described(path)
     with _reading(path):
-        found = component_json.law(scenario["law"], scenario["source"])
+        tuned = component_json.law(scenario["law"], scenario["source"])
         of_library = scenario["plant"]["module"].startswith("smc_mujoco.mechanisms.plants.")
     if of_library:
         find(f"plant of {path}", scenario["plant"]["name"], plants_known())
-    return found
+    return tuned
 
 
 def _described(path: str) -> Data:

@@ -262,11 +262,11 @@ def _stored(plant: str, name: str, gains: str) -> TunedGains | None:
 def _package_gains(gains: str) -> dict[tuple[str, str], TunedGains]:
     """Return the gains of a set in this package, by plant and law."""
     data = read_json(file_of(gains))
-    found = {}
+    gains_of = {}
     for plant, laws in data["plants"].items():
         for name, record in laws.items():
-            found[plant, name] = _from_record(record, record.get("rule", data["rule"]))
-    return found
+            gains_of[plant, name] = _from_record(record, record.get("rule", data["rule"]))
+    return gains_of
 
 
 def _from_record(record: Data, rule: str) -> TunedGains:

@@ -126,11 +126,11 @@ def in_words(sources: Mapping[str, Iterable[Source]]) -> str:
     `sources` maps a law to the sources of its gains; laws without gains are left out.
     """
     words = {}
-    for law, its in sources.items():
+    for law, of_law in sources.items():
         if len(sources) == 1:
-            words[law] = ", ".join(dict.fromkeys(map(str, its)))
+            words[law] = ", ".join(dict.fromkeys(map(str, of_law)))
         else:
-            words[law] = kinds(its)
+            words[law] = kinds(of_law)
     return by_words(words)
 
 

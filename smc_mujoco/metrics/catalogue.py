@@ -59,10 +59,10 @@ def metric_of(machine: Plant | Scenario, name: object) -> Metric:
     """Return the metric of a name. Raise ScenarioError if there is none, or if it has no single
     value for the plant, or for the scenario.
     """
-    found = find("metric", name, CATALOGUE)
-    if why := found.refusal(machine):
+    chosen = find("metric", name, CATALOGUE)
+    if why := chosen.refusal(machine):
         raise ScenarioError(why)
-    return found
+    return chosen
 
 
 class UnknownMetric(ScenarioError, KeyError):
@@ -90,11 +90,11 @@ def score(trace: Trace) -> dict[str, float]:
     """
     refuse(trace)
     traces = conventions.by_group(trace)
-    found = MetricValues()
+    values = MetricValues()
     for m in metrics():
         if not m.refusal(trace.scenario):
-            found[m.name] = m.worst(traces)
-    return found
+            values[m.name] = m.worst(traces)
+    return values
 
 
 def scores(trace: Trace) -> dict[str, dict[str, float]]:
@@ -111,19 +111,19 @@ def scores(trace: Trace) -> dict[str, dict[str, float]]:
       Group -> metric -> value.
     """
     refuse(trace)
-    found = {}
+    by_group = {}
     for group, part in conventions.by_group(trace).items():
-        found[group.name] = group_scores(group, part)
-    return found
+        by_group[group.name] = group_scores(group, part)
+    return by_group
 
 
 def group_scores(group: conventions.ChannelGroup, part: Trace) -> dict[str, float]:
     """Return name -> value of the metrics that apply to a group, from the trace of its channels."""
-    found = {}
+    values = {}
     for m in metrics():
         if m.applies_to(group):
-            found[m.name] = float(m.formula(part))
-    return found
+            values[m.name] = float(m.formula(part))
+    return values
 
 
 def arrived(trace: Trace) -> bool:
@@ -161,14 +161,14 @@ def trends(trace: Trace) -> dict[str, float]:
         begun[name] = array[:count]
     earlier = conventions.by_group(dataclasses.replace(trace, **begun))
     whole = conventions.by_group(trace)
-    found = {}
+    ratios = {}
     for m in metrics():
         if m.late and not m.refusal(trace.scenario):
             now = m.worst(whole)
             before = m.worst(earlier)
             if now > 0.0 and before > 0.0:
-                found[m.name] = now / before
-    return found
+                ratios[m.name] = now / before
+    return ratios
 
 
 def _band(trace: Trace) -> float:

@@ -116,19 +116,19 @@ def groups(machine: Plant | Scenario) -> tuple[ChannelGroup, ...]:
     for i, unit in enumerate(plant.units):
         members.setdefault((i < plant.driven, unit), []).append(i)
     kinds = [driven for driven, _ in members]
-    found = []
+    channel_groups = []
     for (driven, unit), channels in members.items():
         name = "driven" if driven else "free"
         if kinds.count(driven) > 1:
             name += f" {unit}"
         efforts = {machine.efforts[i] for i in channels}
         effort = efforts.pop() if len(efforts) == 1 else ""
-        found.append(
+        channel_groups.append(
             ChannelGroup(
                 name=name, unit=unit + rate, effort=effort, driven=driven, channels=tuple(channels)
             )
         )
-    return tuple(found)
+    return tuple(channel_groups)
 
 
 def reference_rates(trace: Trace) -> Array:
@@ -394,15 +394,15 @@ def _held(trace: Trace) -> Array:
 def _after_turns(trace: Trace) -> Array:
     """Return whether a sample is after a turn of the reference, (K + 1, n)."""
     directions = np.sign(np.diff(trace.r, axis=0))
-    found = np.zeros(trace.r.shape, bool)
+    after = np.zeros(trace.r.shape, bool)
     for i, channel in enumerate(directions.T):
         moving = np.flatnonzero(channel)
         turns = moving[1:][np.diff(channel[moving]) != 0.0]
         for turn in turns:
             later = slice(turn + 1, None)
             passed = trace.t[later] - trace.t[turn]
-            found[later, i] |= passed <= AFTER_TURN * (1 + 1e-9)
-    return found
+            after[later, i] |= passed <= AFTER_TURN * (1 + 1e-9)
+    return after
 
 
 def by_group(trace: Trace) -> dict[ChannelGroup, Trace]:

@@ -263,8 +263,8 @@ def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
             joint = dataclasses.replace(group, channels=(i,), effort=effort)
             part = group_trace(trace, joint)
             power = np.abs(trace.force[:, i] * trace.v[:, i])
-            found = group_scores(joint, part)
-            found["peak_power"] = float(power.max())
-            found["work"] = float(np.trapezoid(power, trace.t))
-            values[names[i]] = found
+            of_joint = group_scores(joint, part)
+            of_joint["peak_power"] = float(power.max())
+            of_joint["work"] = float(np.trapezoid(power, trace.t))
+            values[names[i]] = of_joint
     return {name: values[name] for name in names}

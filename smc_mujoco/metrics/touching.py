@@ -29,12 +29,12 @@ class Shape(NamedTuple):
 def shapes(scenario: Scenario) -> list[Shape]:
     """Return the mechanism at the start of a run, and after its jump."""
     compiled = models.compile_model(scenario)
-    found = [Shape(0.0, models.with_values(compiled, scenario, 0))]
+    shapes_of_run = [Shape(0.0, models.with_values(compiled, scenario, 0))]
     if scenario.jump:
         step = scenario.jump_step
         model = models.with_values(compiled, scenario, step)
-        found.append(Shape(step * scenario.resolved.physics_step, model))
-    return found
+        shapes_of_run.append(Shape(step * scenario.resolved.physics_step, model))
+    return shapes_of_run
 
 
 @once_per_trace

@@ -78,7 +78,7 @@ def enter(
     earlier = None if against is None else load(against)
     target = entering.enter(folder, suite, seed, results, instances, verify)
     found = load(target.parent)
-    (name,) = [name for name, one in found.entries.items() if one.folder == target]
+    (name,) = [name for name, entry in found.entries.items() if entry.folder == target]
     for place in _places(found, name):
         terminal.print(place)
     about = found.entries[name].about

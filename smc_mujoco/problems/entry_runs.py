@@ -91,10 +91,10 @@ class EntryRuns:
     def columns(self, name: str) -> Mapping[str, np.ndarray]:
         """Return the columns of a problem's runs, (instances,) each, in order of the instances."""
         data: pa.Table = self.file.read_row_group(self.groups[name]).sort_by("instance")
-        found = {}
+        arrays = {}
         for column in ("instance", *COLUMNS):
-            found[column] = data[column].to_numpy()
-        return found
+            arrays[column] = data[column].to_numpy()
+        return arrays
 
     def medians(self) -> dict[str, dict[str, float]]:
         """Return problem -> measure -> median over its instances.

@@ -47,19 +47,26 @@ def build(results: Path, out: Path) -> tuple[Path, list[str]]:
         else:
             why = "enter a law first, with smc-mujoco enter FOLDER"
         raise ScenarioError(f"no results in {str(results)!r}: {why}")
-    made = _environment()
+    environment = _environment()
     left_out = []
     for error in refused:
         left_out.append(str(error).replace(f"{results}{os.sep}", ""))
-    for found in suites:
-        folder = suite.folder(found.suite, found.seed)
-        page = {"found": found, "folder": folder}
-        _write(out / f"{folder}.html", made, "suite.jinja", page, title=found.title, up="")
-        for name in found.entries:
+    for suite_results in suites:
+        folder = suite.folder(suite_results.suite, suite_results.seed)
+        page = {"found": suite_results, "folder": folder}
+        _write(
+            out / f"{folder}.html",
+            environment,
+            "suite.jinja",
+            page,
+            title=suite_results.title,
+            up="",
+        )
+        for name in suite_results.entries:
             file = out / folder / f"{slug(name)}.html"
-            _write(file, made, "entry.jinja", page, name=name, title=name, up="../")
+            _write(file, environment, "entry.jinja", page, name=name, title=name, up="../")
     index = {"suites": suites, "left_out": left_out}
-    _write(out / "index.html", made, "index.jinja", index, title="Results", up="")
+    _write(out / "index.html", environment, "index.jinja", index, title="Results", up="")
     return out / "index.html", left_out
 
 
@@ -111,7 +118,7 @@ def scale(board: QuestionBoard, rank: float) -> float:
 
 def curves(found: Results, question: str, names: Sequence[str]) -> dict[str, str]:
     """Return entry -> the points of its curve of targets, for an SVG polyline."""
-    made = {}
+    paths = {}
     for name in names:
         t, share = found.curve(name, question)
         x = CURVE.width * t / t[-1]
@@ -119,8 +126,8 @@ def curves(found: Results, question: str, names: Sequence[str]) -> dict[str, str
         points = []
         for a, b in zip(x, y, strict=True):
             points.append(f"{a:.1f},{b:.1f}")
-        made[name] = " ".join(points)
-    return made
+        paths[name] = " ".join(points)
+    return paths
 
 
 def extremes(found: Results, name: str) -> Mapping[str, list[tuple[str, str, int, float]]]:

@@ -162,13 +162,13 @@ class Problem:
             find("kind of instances", instances, {"visible": None})
             instances = range(self.visible)
         base = self._base(law)
-        made = []
+        cases = []
         for index in items_of("instances", instances):
             scenario = self._place(base, self.instance(index, seed))
             if self._attacked:
                 scenario = self._worst(scenario)
-            made.append(scenario)
-        return tuple(made)
+            cases.append(scenario)
+        return tuple(cases)
 
     def _base(self, law: str | Law | Template) -> Scenario:
         """Return the scenario before anything is drawn."""

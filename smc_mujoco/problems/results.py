@@ -366,16 +366,16 @@ def results(source: AnyPath = "smc-30@1", seed: int = 0) -> Results:
     path = as_path(source)
     if str(source) in suite.suites():
         path = Path("results") / suite.folder(str(source), seed)
-    found, refused = sound(_unpacked(path) if path.suffix == ".zip" else path)
+    loaded, refused = sound(_unpacked(path) if path.suffix == ".zip" else path)
     if refused:
         raise refused[0]
-    if len(found) != 1:
-        several = " and ".join(one.title for one in found) or "none"
+    if len(loaded) != 1:
+        several = " and ".join(each.title for each in loaded) or "none"
         raise ScenarioError(
             f"{shown(str(path))} has results on {several}: give a folder of one suite and seed, "
             "which smc-mujoco enter FOLDER writes"
         )
-    return found[0]
+    return loaded[0]
 
 
 def sound(folder: Path) -> tuple[list[Results], list[ScenarioError]]:
@@ -388,17 +388,17 @@ def sound(folder: Path) -> tuple[list[Results], list[ScenarioError]]:
     entries: dict[tuple[str, int], dict[str, EntryResult]] = {}
     for place in sorted(places):
         try:
-            one = EntryResult(place)
+            entry = EntryResult(place)
         except ScenarioError as error:
             refused.append(error)
             continue
-        others = entries.setdefault((one.about["suite"], one.about["seed"]), {})
-        if slug(one.name) in map(slug, others):
+        others = entries.setdefault((entry.about["suite"], entry.about["seed"]), {})
+        if slug(entry.name) in map(slug, others):
             refused.append(
-                ScenarioError(f"{place} is another result of {shown(one.name)}: remove it")
+                ScenarioError(f"{place} is another result of {shown(entry.name)}: remove it")
             )
         else:
-            others[one.name] = one
+            others[entry.name] = entry
     return [Results(*key, of_key) for key, of_key in sorted(entries.items())], refused
 
 

@@ -279,20 +279,20 @@ class _Grid:
         cases = []
         for x, v in states.tolist():
             cases.append(dataclasses.replace(shortened, x0=x, v0=v))
-        found = [UNDECIDED] * len(cases)
+        verdicts = [UNDECIDED] * len(cases)
         for i, trace in stream(cases, self.threads):
             if trace.broken:
                 self.broken.setdefault(self.base.law.name, trace.broken)
-            found[i] = verdict_of(trace, self.x, self.v, final) or UNDECIDED
-        return found
+            verdicts[i] = verdict_of(trace, self.x, self.v, final) or UNDECIDED
+        return verdicts
 
     def by_engine(self, kind: type[FormGroup], device: str) -> Callable:
         """Return the same by a kind of group, on a device."""
 
         def run(shortened: Scenario, states: Array, final: bool) -> Array:
-            made = kind([shortened], (NAME,))
-            rows = np.repeat(made.rows, len(states), axis=0)
-            at = made.layout.row
+            group = kind([shortened], (NAME,))
+            rows = np.repeat(group.rows, len(states), axis=0)
+            at = group.layout.row
             n = self.base.plant.n
             rows[:, at.x0 : at.x0 + n] = states[:, :1]
             rows[:, at.v0 : at.v0 + n] = states[:, 1:]
@@ -300,7 +300,7 @@ class _Grid:
             rows[:, at.reach : at.reach + 4] = _reach(self.x, self.v, u_max, final)
             if not final:
                 rows[:, SETTING.late] = _early(shortened.samples)
-            outcome = made.run(rows, self.threads, device)[:, SCORES]
+            outcome = group.run(rows, self.threads, device)[:, SCORES]
             return np.where(np.isnan(outcome), DOES_NOT, outcome)
 
         return run

@@ -240,16 +240,16 @@ def indices(
             some = np.stack([parts[:, at]] * 2)
             f_AB = some[:, 2:].swapaxes(0, 1)
             outputs = {"f_A": some[:, 0], "f_B": some[:, 1], "f_AB": f_AB}
-            found = sobol_indices(func=outputs, n=points, method=estimates)  # pyright: ignore[reportArgumentType]
-            both = np.reshape([found.first_order, found.total_order], (2, 2, k))
+            result = sobol_indices(func=outputs, n=points, method=estimates)  # pyright: ignore[reportArgumentType]
+            both = np.reshape([result.first_order, result.total_order], (2, 2, k))
             return possible(*both[:, 0])
 
         draws = np.random.default_rng(seed).integers(points, size=(RESAMPLES, points))
-        found = []
+        samples = []
         for at in draws:
             if np.ptp(parts[:2, at]):
-                found.append(of(at))
-        resampled = np.array(found)
+                samples.append(of(at))
+        resampled = np.array(samples)
         tails = [(1 - LEVEL) / 2, (1 + LEVEL) / 2]
         ends = np.quantile(resampled, tails, axis=0)
         whole = np.array([of(np.arange(points)), *ends])  # (3, 2, k)
@@ -286,7 +286,7 @@ def regions(space: Space, shares: Array, failed: Array) -> list[Region]:
     or beyond which it lies.
     """
     half = len(failed) // 2
-    found = []
+    accepted = []
     left = np.ones(len(failed), bool)  # not in a region yet
     axes = [i for i, name in enumerate(space.names) if name != CHANCE]
     single: list[tuple[Cut, ...]] = []
@@ -298,11 +298,11 @@ def regions(space: Space, shares: Array, failed: Array) -> list[Region]:
             double.append((Cut(i, low, high),))
             double.append((Cut(i, low, high, outside=True),))
     coarse = single[2::4] + single[3::4]  # every other share
-    for one, other in itertools.combinations(coarse, 2):
-        if one[0].axis != other[0].axis:
-            double.append(one + other)
+    for first, second in itertools.combinations(coarse, 2):
+        if first[0].axis != second[0].axis:
+            double.append(first + second)
     prices = dict.fromkeys(single, 1) | dict.fromkeys(double, 2)
-    while len(found) < MAX_REGIONS and failed[:half].any():
+    while len(accepted) < MAX_REGIONS and failed[:half].any():
         chooses = left[:half]
         gains = {}
         for cuts, price in prices.items():
@@ -316,8 +316,8 @@ def regions(space: Space, shares: Array, failed: Array) -> list[Region]:
         left &= ~_within(cuts, shares)
         rest = left.copy()
         rest[:half] = False
-        found.append(Region(cuts, _rate(failed[tested]), _rate(failed[rest])))
-    return found
+        accepted.append(Region(cuts, _rate(failed[tested]), _rate(failed[rest])))
+    return accepted
 
 
 def _more_fail(failed: Array, within: Array, left: Array) -> bool:

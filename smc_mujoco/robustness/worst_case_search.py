@@ -119,8 +119,8 @@ class WorstCaseSearch:
 
     def search(self, rng: np.random.Generator, known: Sequence[TriedMember]) -> None:
         """Try the strategies, beginning with members that were run before."""
-        for i, one in enumerate(known):
-            self.tried.append(one._replace(origin=-1 - i))
+        for i, member in enumerate(known):
+            self.tried.append(member._replace(origin=-1 - i))
         batches = (
             self._simple(),
             self._corners(),
@@ -171,7 +171,7 @@ class WorstCaseSearch:
             if origin < 0:
                 origin = first + i
             tried[i] = TriedMember(member, self._key(trace), origin)
-        done = [one for one in tried if one]
+        done = [entry for entry in tried if entry]
         self.tried += done
         if replays:
             return done + self.run(replays)
@@ -181,16 +181,16 @@ class WorstCaseSearch:
         """Return index -> key of the cases that the fast engine runs: those whose trace is not
         needed.
         """
-        found = {}
+        keys = {}
         for i, case in enumerate(cases):
             needed = case.relay or self.metric.command or not (self.members.forced or self.swing)
             if not needed and self.fast.covers(scenarios[i]):
-                found[i] = FAILED_KEY
-        scores = self.fast.scored([scenarios[i] for i in found], self.report)
-        for i, (values, failed) in zip(found, scores, strict=True):
+                keys[i] = FAILED_KEY
+        scores = self.fast.scored([scenarios[i] for i in keys], self.report)
+        for i, (values, failed) in zip(keys, scores, strict=True):
             if failed is None:
-                found[i] = self._value(values[0]), values[-1]
-        return found
+                keys[i] = self._value(values[0]), values[-1]
+        return keys
 
     def _key(self, trace: Trace) -> Pair:
         if trace.failure is not None:

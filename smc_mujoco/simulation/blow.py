@@ -57,13 +57,13 @@ def bump(plant: Plant, time: float, rubs: float) -> tuple[Stops, Impulse]:
     Raises:
       ScenarioError: no joint of the plant can be stopped.
     """
-    found = [] if plant.pose else _stopped(plant, rubs)
-    if not found:
+    stopped = [] if plant.pose else _stopped(plant, rubs)
+    if not stopped:
         raise ScenarioError(
             f"condition 'contact' finds no driven joint of {plant.name} that stops could hold: "
             "give an obstacle yourself, as bump: contact=Ball('body', mass=0.1)"
         )
-    momentum, side, joint, ends = min(found)
+    momentum, side, joint, ends = min(stopped)
     stops = Stops({joint: ends})
     return stops, Impulse(side * momentum, time=time, width=WIDTH)
 
@@ -84,7 +84,7 @@ def _stopped(plant: Plant, rubs: float) -> list[Stopped]:
     load = np.abs(at.load)
     held = bounds * (1.0 + rubs) + load + at.dry
     names = channel_names(plant)
-    found = []
+    candidates = []
     for j in range(plant.driven):
         if not away[j] or not gained[j] > 0.0:
             continue
@@ -105,8 +105,8 @@ def _stopped(plant: Plant, rubs: float) -> list[Stopped]:
         ends = sorted((near_end, goal[j] - side * far))
         ends_of_reach = (float(ends[0]), float(ends[1]))
         stopped = Stopped(float(momentum), side, names[j], ends_of_reach)
-        found.append(stopped)
-    return found
+        candidates.append(stopped)
+    return candidates
 
 
 def _blown(plant: Plant, goal: Array) -> Array:

@@ -62,7 +62,7 @@ def plant(name: str, value: object, s: Any) -> Plant:
     """Return a plant, from itself or its name. Numbers of its joints that the scenario changes are
     among its parameters.
     """
-    made = as_plant(value)
+    machine = as_plant(value)
     given = vars(s)
     mismatch = given.get("mismatch")
     jump = given.get("jump")
@@ -70,11 +70,11 @@ def plant(name: str, value: object, s: Any) -> Plant:
     if isinstance(mismatch, Mapping):
         changed += dotted(mismatch)
     if isinstance(jump, Jump):
-        numbers = joint_numbers(made)
+        numbers = joint_numbers(machine)
         for path in dotted(jump.of_plant):
             if path in numbers:
                 changed.append(path)
-    return with_joint_numbers(made, changed)
+    return with_joint_numbers(machine, changed)
 
 
 def law(value: Law | Template | str) -> Law:
@@ -101,13 +101,13 @@ def _of_plant(value: Any, s: Any) -> Law:
     """Return a law. One given by its name has the gains that are shipped for the plant, if there
     are some and the scenario has the model, the surface and the goal for which they were tuned.
     """
-    made = law(value)
-    model = "nominal" if made.requires_model else "none"
+    chosen = law(value)
+    model = "nominal" if chosen.requires_model else "none"
     as_tuned = s.model in (None, model) and s.surface is None and s.tracks == "position"
-    if value == made.name and as_tuned and gain_sets.in_set(s.plant, made.name, "tuned"):
-        made = gain_sets.law(s.plant, made.name)
-        warn_once(gain_sets.said(s.plant, made))
-    return made
+    if value == chosen.name and as_tuned and gain_sets.in_set(s.plant, chosen.name, "tuned"):
+        chosen = gain_sets.law(s.plant, chosen.name)
+        warn_once(gain_sets.said(s.plant, chosen))
+    return chosen
 
 
 def surface(name: str, value: object, s: Any) -> Any:
@@ -136,13 +136,13 @@ def _component(kind: str, value: object) -> Component:
         return value
     field = "velocity" if kind == "estimator" else kind
     if callable(value):
-        made = ""
+        alternative = ""
         home = "design." if kind == "surface" else ""
         if kind == "law":
-            made = ", or smc.law_from(function) for a policy of an observation"
+            alternative = ", or smc.law_from(function) for a policy of an observation"
         raise ScenarioError(
             f"{field} is a bare {type(value).__name__}: "
-            f"give smc.{home}{kind}_function(function){made}"
+            f"give smc.{home}{kind}_function(function){alternative}"
         )
     raise ScenarioError(
         f"{field} is {shown(value)}: give smc.{kind}(...), your own {kind}, or a name"
@@ -517,7 +517,7 @@ def _kept(items: list[Actuator], plant: Plant) -> list[Actuator]:
     """Return the actuators of its file that a plant keeps, for joints to which `items` give none of
     their kind. An item that is one of them, as of a record, is taken out.
     """
-    found = []
+    parts = []
     kept = plant.suggested.get("actuator", ())
     for joint, part in zip(driven_names(plant), kept, strict=False):
         if part is None:

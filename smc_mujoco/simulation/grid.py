@@ -371,8 +371,8 @@ def check_names(
         if isinstance(law, str):
             of_laws.append((law, law, law))
         else:
-            made = coerce.law(law)
-            of_laws.append((made.name, made, made))
+            bound = coerce.law(law)
+            of_laws.append((bound.name, bound, bound))
     of_conditions = [(condition.name, condition, str(condition)) for condition in conditions]
     # each thing with its name and what distinguishes it from others
     for what, cure, things in (
@@ -408,10 +408,10 @@ def listed_laws(laws: object) -> list[str | Law | Template]:
 
     Names of the library's laws stay names; other texts become laws.
     """
-    found = []
+    components = []
     for value in listed("laws", laws):
-        found += from_text.laws(value) if isinstance(value, str) else [value]
-    return found
+        components += from_text.laws(value) if isinstance(value, str) else [value]
+    return components
 
 
 def listed(what: str, values: object) -> list:

@@ -79,12 +79,12 @@ def parts_of(scenario: Any, field: str) -> tuple[Any, ...]:
 def names_of(part: Any) -> list[str]:
     """Return the names of a part's numbers: of those declared as such, and of floats."""
     declared = of_fields(type(part))
-    found = []
+    names = []
     for field in dataclasses.fields(part):
         is_number = any(ranges(declared.get(field.name)))
         if is_number or isinstance(getattr(part, field.name), float):
-            found.append(field.name)
-    return found
+            names.append(field.name)
+    return names
 
 
 def paths_of_parts(scenario: Any, field: str) -> list[str]:
@@ -107,7 +107,7 @@ def part_number(scenario: Any, path: str, known: Sequence[str]) -> PartNumber:
     """
     field, *joint, name = path.split(".")
     plant = scenario.plant
-    found = []
+    matches = []
     for i, part in enumerate(parts_of(scenario, field)):
         if not dataclasses.is_dataclass(part) or name not in names_of(part):
             continue
@@ -124,17 +124,17 @@ def part_number(scenario: Any, path: str, known: Sequence[str]) -> PartNumber:
                 f"{field}={{{'.'.join(joint)!r}: ...}}"
             )
         place = joints.index(".".join(joint)) if each else -1
-        found.append(PartNumber(field, i, name, place))
-    if not found:
+        matches.append(PartNumber(field, i, name, place))
+    if not matches:
         raise unknown(f"number of {plant.name}", path, known)
-    if len(found) > 1:
+    if len(matches) > 1:
         raise ScenarioError(
-            f"{path} is a number of {len(found)} parts: name the joint, as {field}.JOINT.{name}"
+            f"{path} is a number of {len(matches)} parts: name the joint, as {field}.JOINT.{name}"
         )
-    value = found[0].of(parts_of(scenario, field))
+    value = matches[0].of(parts_of(scenario, field))
     if not isinstance(value, int | float) or not math.isfinite(value):
         raise ScenarioError(f"{path} is {shown(value)}: give it a number in the scenario")
-    return found[0]
+    return matches[0]
 
 
 def changed(scenario: Any, factors: Mapping[str, float]) -> dict[str, Any]:
@@ -165,9 +165,9 @@ def changed(scenario: Any, factors: Mapping[str, float]) -> dict[str, Any]:
     fields = {}
     for (field, i), numbers in of_parts.items():
         parts = fields.get(field, parts_of(scenario, field))
-        made = dataclasses.replace(parts[i], **numbers)
+        replaced = dataclasses.replace(parts[i], **numbers)
         after = parts[i + 1 :]
-        fields[field] = (*parts[:i], made, *after)
+        fields[field] = (*parts[:i], replaced, *after)
     for field, parts in fields.items():
         if not isinstance(getattr(scenario, field), tuple):
             (fields[field],) = parts

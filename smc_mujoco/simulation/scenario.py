@@ -297,12 +297,12 @@ class Scenario:
     def given(self) -> dict[str, Any]:
         """The fields that differ from their defaults, without plant and law."""
         absent = (None, (), {}, Noise(), Clock())  # of fields that were left out
-        found = {}
+        fields = {}
         for f in dataclasses.fields(self):
             value = getattr(self, f.name)
             if f.name not in ("plant", "law") and value != f.default and value not in absent:
-                found[f.name] = value
-        return found
+                fields[f.name] = value
+        return fields
 
     @classmethod
     def fields(cls) -> tuple[str, ...]:

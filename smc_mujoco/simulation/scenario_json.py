@@ -164,8 +164,8 @@ def _restore_plant(data: dict) -> Plant:
     module = plant.pop("module")
     if mjcf := plant.pop("mjcf", None):
         del plant["n"]
-        made = with_joint_numbers(restored(mjcf, name), dotted(plant))
-        return dataclasses.replace(made, parameters=plant)
+        restored_plant = with_joint_numbers(restored(mjcf, name), dotted(plant))
+        return dataclasses.replace(restored_plant, parameters=plant)
     if module != find_plant(name).build.__module__:
         raise ScenarioError(
             f"plant {name!r} is not one of the library's: import {module}, which defines it, to "

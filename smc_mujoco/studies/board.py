@@ -499,9 +499,9 @@ class Boards(Tables, list[Board]):
             groups.setdefault(board.about, []).append(board)
         if not groups:
             return [Tabular(headings=["no boards: no metric applies"], rows=[], notes=self.absent)]
-        made = [_table(name, boards) for name, boards in groups.items()]
-        notes = *made[-1].notes, *self.remarks, key(self, repr(made))
-        return [*made[:-1], dataclasses.replace(made[-1], notes=notes)]
+        tabulars = [_table(name, boards) for name, boards in groups.items()]
+        notes = *tabulars[-1].notes, *self.remarks, key(self, repr(tabulars))
+        return [*tabulars[:-1], dataclasses.replace(tabulars[-1], notes=notes)]
 
 
 def _are(things: Sequence[str]) -> str:

@@ -80,12 +80,12 @@ class Compared(Tables):
         """Plant -> law -> the law with its best gains; `gains["duffing"]["classical"].source` says
         their source.
         """
-        found: dict[str, dict[str, Law]] = {}
+        by_plant: dict[str, dict[str, Law]] = {}
         for plant, candidates in self.candidates.items():
-            found[plant] = {}
+            by_plant[plant] = {}
             for law, *_ in candidates:
-                found[plant][law.name] = law
-        return found
+                by_plant[plant][law.name] = law
+        return by_plant
 
     @cached_property
     def traces(self) -> list[Trace]:
@@ -383,9 +383,9 @@ def compare(
     trial.check(chosen)
     candidates = trial.candidates(chosen, seeds)
     table = trial.run(candidates, seeds)
-    found = {}
+    worst_cases = {}
     if worst:
-        found = _worst_cases(trial, candidates, within, duration)
+        worst_cases = _worst_cases(trial, candidates, within, duration)
     by = paired_runs.GROUPS
     if len(machines) * len(trial.conditions) > MAX_BLOCKS:
         by = ("plant",)
@@ -400,7 +400,7 @@ def compare(
         table=table,
         candidates=candidates,
         leaderboard=boards,
-        worst=found,
+        worst=worst_cases,
         times=_times(trial, candidates),
     )
 
@@ -439,13 +439,13 @@ def _worst_cases(
     duration: float | None,
 ) -> dict[str, dict[str, WorstCase]]:
     """Return `Compared.worst`: the worst case of each law with its best gains on each plant."""
-    found: dict[str, dict[str, WorstCase]] = {}
+    by_plant: dict[str, dict[str, WorstCase]] = {}
     for plant in trial.plants:
-        found[plant.name] = {}
+        by_plant[plant.name] = {}
         for law, *_ in candidates[plant.name]:
             run = case(plant, law, "nominal", duration or DURATION, starts=trial.starts)
-            found[plant.name][law.name] = trial.attack(f"{plant.name}-{law.name}", run, within)
-    return found
+            by_plant[plant.name][law.name] = trial.attack(f"{plant.name}-{law.name}", run, within)
+    return by_plant
 
 
 def _times(
@@ -454,13 +454,13 @@ def _times(
     """Return `Compared.times`, of the laws with their best gains, without those that do not
     compile.
     """
-    found: dict[str, dict[str, LawTime]] = {}
+    by_plant: dict[str, dict[str, LawTime]] = {}
     for plant in trial.plants:
-        found[plant.name] = {}
+        by_plant[plant.name] = {}
         for law, *_ in candidates[plant.name]:
             if time := law_time(trial.case(plant, law, trial.conditions[0])):
-                found[plant.name][law.name] = time
-    return found
+                by_plant[plant.name][law.name] = time
+    return by_plant
 
 
 def _usual(plant: Plant) -> list[Any]:

@@ -126,8 +126,8 @@ def _without_search(
 
 def default_of(law: Component | Template, remark: str = "") -> Candidate:
     """Return a law with its default gains."""
-    made = coerce.law(law)
-    return Candidate(made, (made,), remark)
+    bound = coerce.law(law)
+    return Candidate(bound, (bound,), remark)
 
 
 class GainRule(NamedTuple):
@@ -180,8 +180,8 @@ class Trial(NamedTuple):
         given = conditions
         if given is None:
             given = applicable(known, plants, duration)
-        found = list(map(find_condition, listed("conditions", given)))
-        return cls(plants=plants, conditions=found, duration=duration, folder=Path(out), **fields)
+        parsed = list(map(find_condition, listed("conditions", given)))
+        return cls(plants=plants, conditions=parsed, duration=duration, folder=Path(out), **fields)
 
     @property
     def searches(self) -> int:
@@ -205,14 +205,14 @@ class Trial(NamedTuple):
         nothing moves.
         """
         for of_plant in laws.values():
-            made = list(map(coerce.law, of_plant))
-            check_names(self.plants, made, self.conditions)
-            for named in (self.plants, made, self.conditions):
+            components = list(map(coerce.law, of_plant))
+            check_names(self.plants, components, self.conditions)
+            for named in (self.plants, components, self.conditions):
                 names = set()
-                for one in named:
-                    if one.name in names:
-                        raise ScenarioError(f"{one.name!r} is there twice: give it once")
-                    names.add(one.name)
+                for thing in named:
+                    if thing.name in names:
+                        raise ScenarioError(f"{thing.name!r} is there twice: give it once")
+                    names.add(thing.name)
         for plant in self.plants:
             for condition in self.conditions:
                 check_moving([self.case(plant, "none", condition)])
@@ -236,16 +236,16 @@ class Trial(NamedTuple):
         if self.progress:
             few = {self._if_few(of_plant, seeds) for of_plant in known.values()}
             print(*filter(None, few), sep="\n", end="\n" * any(few), file=sys.stderr)
-        made: dict[str, list[Candidate]] = {}
+        by_plant: dict[str, list[Candidate]] = {}
         for plant in self.plants:
-            made[plant.name] = []
+            by_plant[plant.name] = []
             rule = self.rule(plant, known[plant.name])
-            for law, found in zip(laws[plant.name], known[plant.name], strict=True):
-                candidate = found or default_of(law)
-                if found is None and self.tune:
+            for law, known_candidate in zip(laws[plant.name], known[plant.name], strict=True):
+                candidate = known_candidate or default_of(law)
+                if known_candidate is None and self.tune:
                     candidate = self.search_gains(plant, law, rule)
-                made[plant.name].append(candidate)
-        return made
+                by_plant[plant.name].append(candidate)
+        return by_plant
 
     def known(self, plant: Plant, laws: Laws) -> list[Candidate | None]:
         """Return the laws whose gains on a plant are known, None for each of the others.
@@ -265,7 +265,7 @@ class Trial(NamedTuple):
         """Return how the gains of the other laws are searched: as those of the package, from the
         same starts, if some laws have these.
         """
-        kinds = [one.law.source.kind for one in known if one]
+        kinds = [candidate.law.source.kind for candidate in known if candidate]
         shipped = source.SHIPPED in kinds
         if self.quick and not shipped:
             return GainRule(self.asked_goal(plant), quick_search.BUDGET, True)
@@ -320,7 +320,7 @@ class Trial(NamedTuple):
         in shorter runs. Events are at half of these, too.
         """
         conditions = list(self.conditions)
-        noisy = any("noise" in one.on(plant, self.duration) for one in conditions)
+        noisy = any("noise" in condition.on(plant, self.duration) for condition in conditions)
         if not noisy and applicable([NOISE], [plant], self.duration):
             conditions.append(NAMED[NOISE])
         usual = Objective()
@@ -424,7 +424,7 @@ class Trial(NamedTuple):
         """Return plant -> J of its laws on `count` instances; a plant on which J is not defined is
         left out.
         """
-        found = {}
+        by_plant = {}
         words = "J on unseen runs"
         laws = sum(map(len, candidates.values()))
         with bar(words, laws, self.progress, counted=True) as shown:
@@ -441,8 +441,8 @@ class Trial(NamedTuple):
                         for of_law, values in zip(runs[:4], parts, strict=True):
                             of_law[candidate.law.name] = values  # pyright: ignore[reportIndexIssue] made as dicts
                         shown.advance(1.0)
-                    found[plant.name] = runs
-        return found
+                    by_plant[plant.name] = runs
+        return by_plant
 
     def _holdout(
         self, plant: Plant, candidate: Candidate, goal: Objective, instances: range

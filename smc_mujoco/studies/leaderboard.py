@@ -101,9 +101,9 @@ def leaderboard(
     for metric in dict.fromkeys(metrics):
         by_metric[metric] = _boards_of(table, metric, ranked, defaults, relevant)
     for i in range(len(ranked)):
-        for made in by_metric.values():
-            if i in made:
-                boards.append(made[i])
+        for boards_of_metric in by_metric.values():
+            if i in boards_of_metric:
+                boards.append(boards_of_metric[i])
     boards.absent = _absent(metrics, ranked)
     return boards
 
@@ -112,8 +112,8 @@ def _absent(metrics: Sequence[str], ranked: Sequence["RankedGroup"]) -> list[str
     """Return why metrics have no single value in the runs of groups."""
     reasons = []
     for metric in metrics:
-        for one in ranked:
-            scenario = next(filter(None, one.ran), None)
+        for group in ranked:
+            scenario = next(filter(None, group.ran), None)
             if scenario and metric in CATALOGUE:
                 reasons.append(CATALOGUE[metric].refusal(scenario))
     return list(dict.fromkeys(filter(None, reasons)))
@@ -210,9 +210,9 @@ def objective_boards(
 def _family(comparisons: Iterable[Comparison]) -> int:
     """Return the number of blocks for which winners are corrected."""
     count = 0
-    for one in comparisons:
-        if len(one.laws) > 1:
-            count += len(one.floors)
+    for comparison in comparisons:
+        if len(comparison.laws) > 1:
+            count += len(comparison.floors)
     return count or 1
 
 
@@ -267,11 +267,11 @@ def _board(
 def _unit(metric: str, ran: Sequence[Scenario | None]) -> str:
     """Return the unit of a metric, with that of u where it is the same voltage in all blocks."""
     efforts = set()
-    for one in ran:
-        if not one or one.force_command:
+    for scenario in ran:
+        if not scenario or scenario.force_command:
             efforts.add("")
         else:
-            efforts.add(one.efforts[0])
+            efforts.add(scenario.efforts[0])
     effort = efforts.pop()
     if efforts or not effort:
         return UNITS[metric]

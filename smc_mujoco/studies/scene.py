@@ -103,15 +103,15 @@ class Outcome:
             value = lookup("metric", measure, CATALOGUE).of
         else:
             value = measure
-        found: dict[str, dict[str, float]] = {}
+        by_condition: dict[str, dict[str, float]] = {}
         for name, runs in self.traces.items():
-            found[name] = {}
+            by_condition[name] = {}
             for label, run in runs.items():
                 if run.failure is not None:
-                    found[name][label] = math.nan
+                    by_condition[name][label] = math.nan
                 else:
-                    found[name][label] = float(value(run))
-        return found
+                    by_condition[name][label] = float(value(run))
+        return by_condition
 
     def size(self, measure: Measure, unit: str = "") -> str:
         """Return a run's value, or the range over several: "0.323 s", "1.12 to 1.13 s, 1 failed",
@@ -338,7 +338,7 @@ class Scene:
     def __post_init__(self):
         errors.name("title", self.title)
         _check_runs("a scene", "conditions", self.conditions)
-        made: dict[str, str] = {}
+        label_of: dict[str, str] = {}
         for condition, runs in self.conditions.items():
             _check_runs(f"condition {condition!r}", "labels", runs)
             plants = set()
@@ -347,8 +347,10 @@ class Scene:
                     raise ScenarioError(f"run {label!r} is {shown(scenario)}: give a Scenario")
                 plants.add(scenario.plant.name)
                 file = f"{slug(condition)}-{slug(label)}"
-                if made.setdefault(file, label) != label:
-                    raise ScenarioError(f"{made[file]} and {label} have one file name: rename one")
+                if label_of.setdefault(file, label) != label:
+                    raise ScenarioError(
+                        f"{label_of[file]} and {label} have one file name: rename one"
+                    )
             if len(plants) > 1:
                 raise ScenarioError(
                     f"condition {condition!r} has the plants {', '.join(sorted(plants))}, which "

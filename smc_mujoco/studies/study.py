@@ -315,11 +315,11 @@ def _half_step_scores(repeated: Mapping[str, tuple[str, Scenario]], store: Store
             if row[name] is not None:
                 values[name] = row[name]
         scores[row["hash"]] = to_json(values)
-    found = {}
+    halved = {}
     for name, (half, _) in repeated.items():
         if half in scores:
-            found[name] = scores[half]
-    return found
+            halved[name] = scores[half]
+    return halved
 
 
 def _checked(scenarios: Any) -> Iterator[Scenario]:

@@ -181,11 +181,11 @@ class ClaimRuns:
         of the named plant.
         """
         paper = self.paper
-        its = self.fields
+        own_fields = self.fields
         machine = paper.plant(plant)
-        duration = {"duration": DURATION, **paper.fields, **its, **changes}["duration"]
+        duration = {"duration": DURATION, **paper.fields, **own_fields, **changes}["duration"]
         fields: Fields = {"plant": machine, **paper.fields}
-        fields |= {**paper.condition(condition).on(machine, duration), **its}
+        fields |= {**paper.condition(condition).on(machine, duration), **own_fields}
         if "law" not in changes:
             fields["law"] = self.law(plant, law_name)
         scenario = Scenario(**fields | changes)
@@ -243,10 +243,10 @@ class ClaimRuns:
         self, name: str, plant: str, laws: Iterable[str], condition: str = "nominal"
     ) -> dict[str, float]:
         """Return law -> a metric of its run on a plant."""
-        found = {}
+        by_law = {}
         for law in laws:
-            found[law] = self.score(plant, law, condition)[name]
-        return found
+            by_law[law] = self.score(plant, law, condition)[name]
+        return by_law
 
     def traces(self, scenarios: Iterable[Scenario]) -> list[Trace]:
         """Return the traces of scenarios, in order; they are not kept."""
@@ -279,10 +279,10 @@ class ClaimRuns:
         self, scenarios: Mapping[Name, Scenario], measure: Callable[[Trace], Value]
     ) -> dict[Name, Value]:
         """Return name -> what is measured on the trace of a named scenario."""
-        found = {}
+        by_name = {}
         for name, trace in self.traced(scenarios).items():
-            found[name] = measure(trace)
-        return found
+            by_name[name] = measure(trace)
+        return by_name
 
     def results(self) -> Iterator[RunResult]:
         """Yield every run of the audit whose scores were used, and every run of the table."""

@@ -179,21 +179,21 @@ class Paper:
         general = of_set.get("", {}).get(law, {})
         of_plant = of_set.get(plant, {}).get(law, {})
         values = {**general, **of_plant}
-        made = self.bound(law, values)
+        bound_law = self.bound(law, values)
         if law in self.laws:
             known = {}
         else:
             known = find("law", law, laws_known()).gains
         lacking = []
-        for gain, one in known.items():
-            if not one.held and gain not in values:
-                lacking.append(f"{gain} = {one.default:g}")
+        for gain, declared in known.items():
+            if not declared.held and gain not in values:
+                lacking.append(f"{gain} = {declared.default:g}")
         if lacking:
             raise ScenarioError(
                 f"the gains {gains!r} of {law} lack some, whose defaults are not the paper's: "
                 f"write in [gains.{gains}] what the paper has for {', '.join(lacking)}"
             )
-        return made
+        return bound_law
 
     def bound(self, law: str, gains: Numbers) -> Component:
         """Return a law with these gains, and its defaults for the rest."""
@@ -203,10 +203,10 @@ class Paper:
             base, defaults = base.template or base, base.gains
         values = {**defaults, **gains}
         if isinstance(base, Template):
-            made = base.bind(values)
+            component = base.bind(values)
         else:
-            made = dataclasses.replace(base, gains=values)
-        return made.sourced(STUDY) if gains else made
+            component = dataclasses.replace(base, gains=values)
+        return component.sourced(STUDY) if gains else component
 
 
 def shipped() -> dict[str, Path]:

@@ -438,14 +438,14 @@ def verdict(evidence: Evidence, quantifier: str = NAMED, over: str = "", limit: 
 def sentences(evidence: Evidence, quantifier: str = NAMED) -> dict[str, bool]:
     """Return sentence -> whether it holds: all its checks do, or one of an existential claim."""
     checks: dict[str, list[bool]] = {}
-    for one in evidence:
-        if isinstance(one, Check):
-            checks.setdefault(one.sentence, []).append(one.holds)
+    for item in evidence:
+        if isinstance(item, Check):
+            checks.setdefault(item.sentence, []).append(item.holds)
     rule = any if quantifier == EXISTENTIAL else all
-    found = {}
+    holding = {}
     for sentence, holds in checks.items():
-        found[sentence] = rule(holds)
-    return found
+        holding[sentence] = rule(holds)
+    return holding
 
 
 def combined(

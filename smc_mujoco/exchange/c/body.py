@@ -36,9 +36,9 @@ def functions(plant: Plant | None) -> dict[str, tuple[Callable[..., Any], list[K
 
     Without a plant there are no actuators.
     """
-    found = {"smc_pose": (pose, [Kind("real", (7,)), VECTOR]), "smc_errors": (errors, [VECTOR] * 6)}
+    known = {"smc_pose": (pose, [Kind("real", (7,)), VECTOR]), "smc_errors": (errors, [VECTOR] * 6)}
     if plant is None:
-        return found
+        return known
     table = mixer(plant)
     rows = table.ravel()
     count = len(table)
@@ -50,4 +50,4 @@ def functions(plant: Plant | None) -> dict[str, tuple[Callable[..., Any], list[K
             command[i] = min(max(u[i], -y.limit[i]), y.limit[i])
         mix(y.x, command, rows, count, keeping, controls)
 
-    return {**found, "smc_actuators": (actuators, [Kind("y"), VECTOR, Kind("real", (count,))])}
+    return {**known, "smc_actuators": (actuators, [Kind("y"), VECTOR, Kind("real", (count,))])}

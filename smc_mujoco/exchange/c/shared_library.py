@@ -53,8 +53,8 @@ def facts(library) -> dict[str, Any]:
     constants: dict[str, Any] = {"glue": hasattr(library, "smc_mujoco_entry")}
     for name in ("smc_law_gains", "smc_law_shared"):
         if hasattr(library, name):
-            found = ctypes.c_char.in_dll(library, name)
-            text = ctypes.string_at(ctypes.addressof(found))
+            field = ctypes.c_char.in_dll(library, name)
+            text = ctypes.string_at(ctypes.addressof(field))
             constants[name] = text.decode(errors="replace")
     for name in INTS:
         if hasattr(library, name):

@@ -124,10 +124,10 @@ class FmuLaw(Uncompiled):
         """Start an instance, which ends when the memory of the run is freed. Return its number."""
         place = next(_numbers)
         names = [theirs for _, theirs in self.inputs]
-        made = Slave(
+        slave = Slave(
             str(extracted(self.path, self.digest)), names, self.outputs, self.fixed(gains), y.t
         )
-        _running.by_number[place] = Running(self, made, y.t, [0.0, 0.0], [0, 0])
+        _running.by_number[place] = Running(self, slave, y.t, [0.0, 0.0], [0, 0])
         owner: Any = memory if memory.base is None else memory.base
         weakref.finalize(owner, _end, place)
         return place
@@ -320,13 +320,13 @@ def _by_name(
     for name in theirs:
         if name not in taken:
             words[name.rsplit(".", 1)[-1].casefold()] = name
-    found = {}
+    matches = {}
     for name in ours:
         if name in chosen:
-            found[name] = chosen[name]
+            matches[name] = chosen[name]
         elif name in words:
-            found[name] = words[name]
-    return found
+            matches[name] = words[name]
+    return matches
 
 
 def _gains(variables: Iterable[Any]) -> dict[str, tuple[str, Gain]]:
