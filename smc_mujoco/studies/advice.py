@@ -253,9 +253,9 @@ class RaceAdvice(Advice):
             unit = "times" if margin.unit == "1" else margin.unit
             level = f"{margin.text} {unit}".strip()
             if math.isnan(margin.value):
-                return "nothing more: without changes it does not end within 5 % of its start"
+                return "nothing more: without changes the error does not end below 5 % of its start"
             parts.append(f"{margin.kind} {level}")
-        text = f"{joined(parts)}, one at a time, within 5 % of the start at the end"
+        text = f"{joined(parts)}, one at a time; the error then still ends below 5 % of its start"
         return f"{text}; {late}" if late else text
 
     @property
