@@ -527,8 +527,8 @@ def _kept(items: list[Actuator], plant: Plant) -> list[Actuator]:
         if own in items:
             items.remove(own)
         if not _given(items, part, joint):
-            found.append(own)
-    return found
+            parts.append(own)
+    return parts
 
 
 def _given(items: Sequence[Actuator], part: Actuator, joint: str) -> bool:
