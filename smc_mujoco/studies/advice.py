@@ -174,9 +174,9 @@ class RaceAdvice(Advice):
             if race.sets < FIRST:
                 short = f", as the time cannot hold even {FIRST}"
             return (
-                f"open; {counted(race.sets, 'set')} of gains of each law were searched in the "
-                f"time{short}, {LOOKS[0]} can name a winner, and the same call goes on with them; "
-                f"it takes about {counted(more, 'more minute')}"
+                f"open; the time was enough for {counted(race.sets, 'set')} of gains of each "
+                f"law{short}, and {LOOKS[0]} can name a winner; the same call goes on from there, "
+                f"and takes about {counted(more, 'more minute')}"
             )
         text = _verdict(comparison, race.running)
         ranked = _ranked(comparison, race.running)
@@ -278,11 +278,11 @@ class RaceAdvice(Advice):
         missing = [law for law in self.race.running if law not in self.settled]
         if missing:
             notes.append(
-                f"Without {joined(missing)}: these runs are of the laws that may be the best"
+                f"{joined(missing)} left out: these runs are of the laws that may be the best"
                 f"{' and of the next one' if self.race.winner else ''}."
             )
         notes.append(
-            f"{MEDIANS} Nothing here is tested: what is, stands below. {capital(UNTRIED)}."
+            f"{MEDIANS} Nothing in this table is tested; the tests stand below. {capital(UNTRIED)}."
         )
         last = shown.pop()
         return [*shown, dataclasses.replace(last, notes=[*notes, "", *self.answer])]

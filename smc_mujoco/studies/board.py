@@ -48,8 +48,8 @@ MARKS = {
     "TV rate": "TV rate is the total variation of u per second, in the last fifth of a run.",
     "strong=True": "A star or bold type marks the laws of which one is the best, with "
     f"{100 * LEVEL:g} % confidence in each column and condition: no other is better, all their "
-    "runs have arrived, and their samples are enough. Unless a law wins, none marks a median whose "
-    "interval spans more than a factor of 4.",
+    "runs have arrived, and their samples are enough. Unless a law wins, a median whose interval "
+    "spans more than a factor of 4 is not marked.",
     "": "A run has arrived if, in its last fifth, the error stays within 10 % of its initial value "
     "or within 5 times the sensor's resolution.",
     "below ": "Values below the floor count as equal. For an error, the floor is 1e-4 of its "
@@ -626,8 +626,9 @@ def key(boards: Sequence[Board], tables: str) -> str:
     parts.append(
         "A winner is better than every other law in a paired test. In each metric by itself, the "
         f"probability of any wrong winner is at most {100 * (1 - LEVEL):g} %, over all conditions "
-        "of the table; with six metrics, any of six may be wrong. A verdict gives the winner's "
-        f"least lead over its rivals: the ratio in paired runs with a {100 * LEVEL:g} % interval. "
+        "of the table; over several metrics together it may be as large as their sum. A verdict "
+        "gives the winner's least lead over its rivals: the ratio in paired runs with a "
+        f"{100 * LEVEL:g} % interval. "
         "It differs from the ratio of the medians. A law is ahead if it is better by more than "
         f"{100 * boards[0].relevant:g} % of the larger value."
     )

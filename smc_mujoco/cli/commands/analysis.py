@@ -148,11 +148,11 @@ def margins(
 
     The delay of the command is in s; a constant disturbance and dry friction are in N or N m. Mass
     is a multiple of the nominal mass. Noise is the standard deviation of the position sensor, in
-    rad or m; if that is 1 mrad, the velocity sensor has 5 mrad/s. A blow at half time has that
-    momentum, in N s or N m s. Jitter is a share of the control
-    period. Missed is the share of samples that are missed. Loss is the share of its force that each
-    actuator loses. For laws that can be linearised, the column "theory" has the stability limit of
-    the linear loop. A law may tolerate more, with a small sustained oscillation.
+    rad or m; if that is 1 mrad, the velocity sensor has 5 mrad/s. A blow comes at half time; its
+    momentum is in N s or N m s. Jitter is a share of the control period. Missed is the share of
+    samples that are missed. Loss is the share of its force that each actuator loses. For laws that
+    can be linearised, the column "theory" has the stability limit of the linear loop. A law may
+    tolerate more, with a small sustained oscillation.
 
     Example: smc-mujoco margins duffing --law observer_free,classical --kind delay
     """

@@ -198,7 +198,7 @@ Executor = Annotated[
     str | None,
     typer.Option(
         metavar="dask://HOST:PORT",
-        help="Scheduler of dask whose workers make searches and runs; default: threads here.",
+        help="A dask scheduler, whose workers do the searches and runs; default: threads here.",
     ),
 ]
 X0 = Annotated[

@@ -49,13 +49,16 @@ AdviceSeeds = Annotated[
 AdviceDuration = Annotated[
     float | None, typer.Option(help="Duration of a run, s; default 5, or 3 with --minutes.")
 ]
+AdviceQuick = Annotated[
+    bool, typer.Option("--quick", help="Answer within ten minutes, as --minutes 10 does.")
+]
 Falling = Annotated[
-    bool, typer.Option("--falling", help="Go on where the base of your model falls.")
+    bool, typer.Option("--falling", help="Do not stop where the base of your model falls.")
 ]
 Minutes = Annotated[
     float | None,
     typer.Option(
-        help="Answer within so many minutes, with a film if time is left; --quick is --minutes 10. "
+        help="Answer within so many minutes, with a film if time is left. "
         "Laws race under the conditions asked for, until one has the lowest J. Each is searched "
         "once however short the time is."
     ),
@@ -70,7 +73,7 @@ def which(
     needs: Needs = "fast,accurate,calm",
     condition: AdviceCondition = None,
     law: options.Laws = None,
-    quick: options.Quick = False,
+    quick: AdviceQuick = False,
     seeds: AdviceSeeds = None,
     duration: AdviceDuration = None,
     x0: options.X0 = None,
