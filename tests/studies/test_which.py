@@ -223,7 +223,7 @@ def test_the_clock_may_end_a_race_before_the_first_look(raced, tmp_path):
     assert short.race.stopped
     assert {len(one.values) for one in short.race.entrants.values()} == {1}
     (however,) = (line for line in short.answer if line.startswith("However tuned"))
-    assert "open; 1 set of gains of each law" in however
+    assert "open; the time was enough for 1 set of gains of each law" in however
     assert "as the time cannot hold even 3" in however
     assert "7 can name a winner" in however
 
