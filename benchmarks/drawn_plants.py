@@ -16,7 +16,7 @@ import numpy as np
 
 from smc_mujoco.mechanisms.plant import Field, Plant
 
-SEED, GRAVITY, HELD = 46543088, 9.81, 3.0  # of the draw; m/s^2; N m
+SEED, GRAVITY, HELD = 221691748, 9.81, 3.0  # of the draw; m/s^2; N m
 MODEL = """
 <mujoco>
   <option timestep="0.001" integrator="RK4"/>

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.fronts_sentences import FLOOR, ROWS, of_figure, value
+from benchmarks.fronts_sentences import FLOOR, ROWS, is_settled, of_figure, value
 from smc_mujoco.draw import page, style
 
 TICKS = (1.25, 2, 3, 5)
@@ -29,7 +29,7 @@ def draw(points: Sequence[dict], path: Path, laws: Sequence[str]) -> None:
                     wanted["law"] = law
                     least: dict[float, float] = {}  # of both searches
                     for one in points:
-                        if wanted.items() <= one.items():
+                        if wanted.items() <= one.items() and is_settled(value(one)):
                             error = value(one)[0]
                             least[one["level"]] = min(error, least.get(one["level"], error))
                     x, y = sorted(least), [least[level] for level in sorted(least)]

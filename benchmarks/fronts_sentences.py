@@ -7,7 +7,9 @@ benchmarks/fronts.py.
 A lead is the ratio of two errors, medians of many runs, with the interval of that ratio. A sentence
 stands at a price if the whole interval is above 1 and the lead is beyond a factor of 2. It is
 contradicted if both say the reverse, and else open. Errors below a ten-thousandth of the start are
-not ranked. If both are below it, nothing is said; if one is, that is said, without a ratio.
+not ranked. If both are below it, nothing is said; if one is, that is said, without a ratio. An
+error whose interval is not within 3 % of it is no number: it is not settled, and no lead is counted
+from it.
 
 Where several searches were run, a lead is told only if each of them found it, and then the smallest
 is told, with an interval that holds those of all. A sentence is struck out if any search
@@ -32,6 +34,9 @@ SMOOTH = ("boundary_layer",)
 TWISTING = ("super_twisting", "implicit_super_twisting")
 LAWS = (*TWISTING, "classical", *SMOOTH, *RIVALS)
 FLOOR = 1e-4  # of the start: smaller errors are not ranked
+# largest share of a median that its interval may reach to either side, so that as many runs of
+# another loop give the median within 5 %
+NARROW = 0.03
 # prices: times the least J of all laws, or the rate of variation in calm over u_max, 1/s
 LEVELS = {
     "J": (1.25, 1.5, 2.0, 3.0, 5.0),
@@ -103,12 +108,23 @@ def with_interval(values: Sequence[float] | np.ndarray) -> tuple[float, float, f
     return float(sum(middle) / 2.0), float(ends[0]), float(ends[1])
 
 
+def is_settled(error: Sequence[float]) -> bool:
+    """Return whether the runs settle a median with its interval: it is narrow, or below the floor
+    as a whole.
+    """
+    middle, low, high = error
+    if high <= FLOOR:
+        return True
+    return (1.0 - NARROW) * middle <= low and high <= (1.0 + NARROW) * middle < math.inf
+
+
 VERDICTS = {
     "stands": "by a ratio",
     "below the floor": "the first is below the floor, the second is not",
     "unopposed": "the second laws have no gains at this price",
     "open": "",
     "not ranked": "the floor decides",
+    "not settled": "the runs do not give an error as a number",
     "contradicted": "",
 }
 
@@ -128,7 +144,7 @@ class Verdict(NamedTuple):
     level: float
     laws: tuple[str, str]  # the best of both sides, or "none" at this price
     errors: tuple[float, float]  # medians, of the start; J of the cheapest
-    lead: float  # ratio of the second's to the first's; NaN if the floor decides
+    lead: float  # ratio of the second's to the first's; NaN if the floor decides, or unsettled
     low: float
     high: float
     verdict: str  # one of VERDICTS
@@ -161,15 +177,17 @@ def verdict(sentence: Sentence, first: dict | None, second: dict | None) -> tupl
         return *none, "unopposed" if first else "contradicted"
     ours, theirs = np.array(value(first)), np.array(value(second))
     beyond = SEARCH[sentence.price]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        lead, low, high = (theirs / ours[[0, 2, 1]]).tolist()
     if second["price"] != "least":
+        if not (is_settled(value(first)) and is_settled(value(second))):
+            return math.nan, low, high, "not settled"
         below = ours[0] <= FLOOR, theirs[0] <= FLOOR
         if any(below):
             other = theirs if below[0] else ours
             if all(below) or other[1] <= beyond * FLOOR:
                 return *none, "not ranked"
             return *none, "below the floor" if below[0] else "contradicted"
-    with np.errstate(invalid="ignore"):
-        lead, low, high = (theirs / ours[[0, 2, 1]]).tolist()
     said = "open"
     if low > 1.0 and lead > beyond:
         said = "stands"
@@ -248,7 +266,7 @@ def compared(points: Sequence[dict], sentence: Sentence) -> Iterator[Verdict]:
 
 def weakest(cell: Sequence[Verdict]) -> Verdict:
     """Return what all searches say: the smallest lead, with an interval that holds those of all. It
-    is open if they do not agree.
+    is open if they do not agree, and not settled if one is not.
     """
     ratios = [one for one in cell if not math.isnan(one.lead)]
     nearest = min(ratios or cell, key=lambda one: abs(np.log(one.lead)))
@@ -256,8 +274,12 @@ def weakest(cell: Sequence[Verdict]) -> Verdict:
     if len({SAYS.get(one.verdict, 0) for one in cell}) > 1 or said == "open":
         unranked = any(one.verdict == "not ranked" for one in cell)
         said = "not ranked" if unranked else "open"
-    low = min(one.low for one in ratios or cell)
-    high = max(one.high for one in ratios or cell)
+    for one in cell:
+        if one.verdict == "not settled":
+            nearest, said = one, one.verdict
+    known = [one for one in cell if not math.isnan(one.low)]
+    low = min((one.low for one in known), default=math.nan)
+    high = max((one.high for one in known), default=math.nan)
     return nearest._replace(low=low, high=high, verdict=said)
 
 
@@ -333,6 +355,8 @@ def cell(one: Verdict) -> str:
         return "no gains" if first == "none" else "no rival"
     if one.verdict == "not ranked":
         return "not ranked"
+    if one.verdict == "not settled":
+        return f"not settled: {plain(one.low)} to {plain(one.high)}"
     if math.isnan(one.lead):
         ours, theirs = (f"{error:.1e}" if error > FLOOR else "below" for error in one.errors)
         return f"{ours}; `{second}` {theirs}"
@@ -370,7 +394,9 @@ def tallies(points: Sequence[dict]) -> list[dict[str, int]]:
 
 
 class Between(NamedTuple):
-    """How far the errors of one law at one price are apart in two searches, above the floor."""
+    """How far the errors of one law at one price are apart in two searches, where both are settled
+    and one is above the floor.
+    """
 
     compared: int
     median: float  # ratio
@@ -392,7 +418,8 @@ def between(points: Sequence[dict]) -> Between:
     for point in points:
         if point["draw"] is None and point["price"] == "J":
             place = tuple(point[name] for name in names)
-            errors.setdefault(place, []).append(max(value(point)[0], FLOOR))
+            if is_settled(value(point)):
+                errors.setdefault(place, []).append(max(value(point)[0], FLOOR))
     both = [pair for pair in errors.values() if len(pair) == 2 and max(pair) > FLOOR]
     ratios = np.array([max(pair) / min(pair) for pair in both])
     return Between(
@@ -471,7 +498,9 @@ def in_readme(points: Sequence[dict]) -> str:
         f"`adrc`, `pd_observer`, `hodob` and `pid` in {leads(noisy)} and trails it in "
         f"{noisy['contradicted']}. In {quiet['all']} cases without noise it leads in "
         f"{leads(quiet)} and trails in {quiet['contradicted']}; in {quiet['not ranked']} the "
-        "errors are below a ten-thousandth of the start, or near it, and are not ranked. Smooth "
+        "errors are below a ten-thousandth of the start, or near it, and are not ranked. In "
+        f"{noisy['not settled'] + quiet['not settled']} of all these cases the runs do not settle "
+        "an error, and no lead is counted. Smooth "
         f"first-order sliding leads the best rival in {sum(map(leads, smooth))} of "
         f"{sum(its['all'] for its in smooth)} cases, with and without noise, and trails in "
         f"{sum(its['contradicted'] for its in smooth)}."
@@ -490,32 +519,50 @@ def first_words(points: Sequence[dict]) -> str:
     for search in sorted({point["search"] for point in own}):
         alone.append(leads(tallies([point for point in own if point["search"] == search])[1]))
     noisy = tallies(own)[1]
+    smooth = tallies(own)[2:]
+    drawn = tallies([point for point in points if point["draw"] is not None])[2:]
     return (
         "Where its theorem admits the load and the sensor has noise, super-twisting leads the "
         f"best of its rivals in {ahead} of {len(admitted)} cases and trails it in "
         f"{verdicts.count('contradicted')}; these are {', '.join(under)}. With noise, theorem or "
         f"not, it leads in {leads(noisy)} of {noisy['all']} and trails in "
         f"{noisy['contradicted']}. Alone, the first search gives it {alone[0]} such leads, and the "
-        f"second {alone[1]}."
+        f"second {alone[1]}. A smooth first-order law leads the best rival in "
+        f"{sum(map(leads, smooth))} of {sum(its['all'] for its in smooth)} cases of the page, and "
+        f"in {sum(map(leads, drawn))} of {sum(its['all'] for its in drawn)} that were drawn, each "
+        "with one search."
     )
 
 
 def of_searches(points: Sequence[dict]) -> str:
     """Return what the page says of its two searches."""
     its = between(points)
-    strong = []
-    for point in points:
-        if point["draw"] is None and point["condition"].startswith("strong"):
-            error, low, high = point["error"]
-            if error > FLOOR:
-                strong.append(high > 2.0 * low)
     return (
         f"The two searches found errors {its.median:.2g} times apart in the median of the "
         f"{its.compared} that both have and that lie above the floor, and {its.tenth:.2g} times "
         f"or more in a tenth. In {100 * its.apart:.0f} % they are more than "
         f"{SEARCH['J']:g} times apart. So by chance both tell two equal laws apart, and to the "
-        f"same side, in {100 * its.by_chance:.0f} % of the cells. Under *strong*, the interval of "
-        f"{sum(strong)} of {len(strong)} errors spans more than a factor of two"
+        f"same side, in {100 * its.by_chance:.0f} % of the cells."
+    )
+
+
+def of_runs(points: Sequence[dict]) -> str:
+    """Return what the page says of errors that are no numbers, and of those that came out larger
+    than where they were chosen.
+    """
+    own = []
+    for point in points:
+        if point["draw"] is None and point["price"] != "least":
+            own.append(point)
+    unsettled = [point for point in own if not is_settled(point["error"])]
+    strong = [point for point in unsettled if point["condition"].startswith("strong")]
+    runs = max(point["runs"] for point in points)
+    above = [point for point in own if point["error"][0] > FLOOR]
+    worse = sum(point["error"][0] > 2.0 * point["chose"] for point in above)
+    return (
+        f"Of {len(own)} errors {len(unsettled)} are not settled by {runs:,} runs, {len(strong)} of "
+        f"them under *strong*. Of the {len(above)} above the floor, {worse} are more than twice "
+        "what they were where they were chosen."
     )
 
 
@@ -545,6 +592,7 @@ def main() -> None:
         in_readme(points),
         first_words(points),
         of_searches(points),
+        of_runs(points),
         often_at_edges(points),
         sep="\n",
     )
