@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.text import joined
+from smc_mujoco.control.law import catalogue
+from smc_mujoco.control.source import DEFAULT
 from smc_mujoco.mechanisms.hardware.friction import LuGre
 from smc_mujoco.mechanisms.layout import channel_names, loaded
 from smc_mujoco.simulation.signals import Constant
@@ -126,6 +128,22 @@ def of_values(s: Any) -> Iterator[str]:
     yield from _unreachable_goals(s)
     yield from _degrees(s)
     yield from _weak_motors(s)
+
+
+def of_default_gains(s: Any) -> str:
+    """Return a sentence on default gains of the library's, which are for a force, before an
+    actuator of a file that takes another command, or "".
+    """
+    if not any(part.kept for part in s.actuator):
+        return ""
+    known = catalogue()
+    for law in s.law.parts:
+        if law.name in known and law.gains and law.source.kind == DEFAULT:
+            return (
+                f"{s.drive_train.words[0].removesuffix('.')}, and the default gains of {law.name} "
+                f"are for a force: tune them, as smc.tune(plant, {law.name!r}) does"
+            )
+    return ""
 
 
 def of_assumed_bound(s: Any) -> str:

@@ -27,7 +27,7 @@ from smc_mujoco.common.errors import ScenarioError, has_items, shown, warn_once
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import counted
 from smc_mujoco.mechanisms.plant import field_array
-from smc_mujoco.simulation import callback, state
+from smc_mujoco.simulation import callback, doubts, state
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.law_checks import blind
@@ -121,6 +121,7 @@ def run(
     prepared = list(map(prepare, one_or_several(scenarios)))
     for item in prepared:
         warn_once(blind(item.scenario.plant, item.scenario.law.parts))
+        warn_once(doubts.of_default_gains(item.scenario))
     work = sum(item.scenario.work for item in prepared)
     with bar(counted(len(prepared), "run"), work, shown=shown_bar) as progress_bar:
         traces = dict(stream(prepared, threads, progress_bar.advance))
@@ -129,8 +130,8 @@ def run(
         if " raised " in trace.broken or " instead of " in trace.broken:
             broken.setdefault(trace.scenario.law.name, trace.broken)
     warn_of_broken(broken)
-    for doubt in dict.fromkeys(trace.unresolved for trace in traces.values()):
-        warn_once(doubt)
+    for unresolved in dict.fromkeys(trace.unresolved for trace in traces.values()):
+        warn_once(unresolved)
     if isinstance(scenarios, Scenario):
         return traces[0]
     return [traces[i] for i in range(len(prepared))]

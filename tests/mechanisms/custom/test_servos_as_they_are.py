@@ -10,7 +10,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine.group import why_not
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
 from smc_mujoco.draw import panels
 from smc_mujoco.draw.film import arrows
 from smc_mujoco.hardware import PositionServo, RateLimit
@@ -21,6 +21,8 @@ from smc_mujoco.robustness.margins import MARGIN_KINDS
 from smc_mujoco.simulation import scenario_json
 from smc_mujoco.simulation.conditions import applicable
 
+# many runs here are of default gains; their own test asks for it
+pytestmark = pytest.mark.filterwarnings("ignore:.*the default gains of pid are for a force")
 ARM = """<mujoco model="arm"><compiler angle="radian"/><worldbody>
   <body><joint name="a" axis="0 1 0" damping=".1" armature=".02"/>
     <geom type="capsule" fromto="0 0 0 .3 0 0" size=".02" mass=".6" contype="0" conaffinity="0"/>
@@ -40,6 +42,7 @@ HOBBY = """<mujoco model="hobby"><compiler angle="radian"/><worldbody><body>
 POSITION = '<position joint="j" kp="17.8" kv=".1" forcerange="-2.94 2.94" ctrlrange="-1.9 1.9"/>'
 MOTOR = """<dcmotor joint="j" motorconst=".05" resistance="2" gear="9" ctrlrange="-12 12"
   saturation=".22" cogging=".002 12 0"%s/>"""
+MINE = '<motor joint="j" ctrlrange="-3 3"/>'
 LOAD, RUBS, KP = 0.3 * 9.81 * 0.1, 0.052, 17.8
 
 
@@ -193,7 +196,7 @@ REFUSED = {
     [
         (POSITION, "the set-point of its servo, in rad from its goal at 0", "j(servo)"),
         (MOTOR % "", "the voltage of its motor, in V", "j(servo)"),
-        ('<motor joint="j" ctrlrange="-3 3"/>', "", "j"),
+        (MINE, "", "j"),
     ],
 )
 def test_an_actuator_is_used_as_it_is_and_u_is_told_where_it_is_no_force(drive, u, text):
@@ -418,6 +421,18 @@ def test_gains_tables_figures_and_files_have_the_unit_of_the_set_point(tmp_path)
     printed = str(smc.leaderboard(table, ["tv_rate"])).replace("\n", " ")
     assert said in printed
     assert "Default gains are for a force: tune them for this u first." in printed
+
+
+def test_default_gains_before_a_servo_are_told_when_they_run():
+    fields = {"plant": servo(HOBBY % POSITION, name="hobby"), "x0": 0.3, "duration": 0.01}
+    words = "u of 'j' of hobby is the set-point .*, and the default gains of pid are for a force"
+    with pytest.warns(ScenarioWarning, match=words):
+        run(law="pid", **fields)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", ".*default gains")
+        run(law=smc.law("pid", kp=0.5, ki=0.0, kd=0.0), **fields)
+        run(law=on_set_point(), **fields)
+        run(law="pid", **fields | {"plant": smc.plant_from(HOBBY % MINE, ["j"])})
 
 
 def test_sizes_of_conditions_and_blows_follow_from_the_servo_s_force():
