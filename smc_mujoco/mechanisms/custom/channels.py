@@ -514,7 +514,10 @@ def motor_of(
         bounds.append(_together(model, actuators))
     elif not actuators:
         if not bounds or _has_actuators(model):
-            raise ScenarioError(f"no actuator of {label} drives joint {joint!r} alone: {cure}")
+            raise ScenarioError(
+                f"no actuator of {label} drives joint {joint!r} alone: {cure}; without a u_max its "
+                "bound is what the joint's load and travel need"
+            )
     elif len(actuators) > 1:
         raise ScenarioError(f"joint {joint!r} of {label} has the actuators {names}: {cure}")
     elif channel.servo or (channel.servo is None and no_motor(model, actuators[0])):
@@ -555,14 +558,16 @@ def bound_of_kept(label: str, model: mujoco.MjModel, joint: str, part: Actuator)
     """
     if part.bound is not None and part.bound < math.inf:
         return part.bound
-    cure = f"give {joint}(u_max=...), or smc.Channel(u_max=...)"
+    cure = f"give {joint}(u_max=3), or smc.Channel(u_max=3), with your bound"
     if not isinstance(part, PositionServo):
-        raise ScenarioError(f"the <dcmotor> of joint {joint!r} of {label} has no ctrlrange: {cure}")
+        raise ScenarioError(
+            f"the <dcmotor> of joint {joint!r} of {label} has no ctrlrange: {cure} in V"
+        )
     for _, low, high in ranges(model, [joint]):
         return max(high - part.goal, part.goal - low)
     raise ScenarioError(
         f"the servo of joint {joint!r} of {label} has no ctrlrange, and the joint has no range: "
-        f"{cure}, the largest distance of the set-point from the goal"
+        f"{cure} on the distance of the set-point from the goal"
     )
 
 
