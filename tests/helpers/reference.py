@@ -172,6 +172,8 @@ class Loop:
         self.level = [0.0] * n  # of MuJoCo's dry friction, in the step before
         # of dry friction, see `apply_exact_friction`: None while a formula gives it at every stage
         self.rubbing: list[tuple | None] = [None] * n
+        # speed, F and slope of a user's function, see `while_sliding`
+        self.line = [(0.0, 0.0, 0.0)] * n
         self.stuck = [False] * n
         self.held = np.zeros(n)
         self.motors = []
@@ -452,6 +454,10 @@ class Loop:
         for body, push in zip(bodies, pushes, strict=True):
             data.xfrc_applied[body, :3] += evaluate(push, t)[0] * np.array([push.x, push.y, push.z])
 
+    def seldom(self, i: int) -> bool:
+        """Return whether joint i has a user's function, which is called seldom."""
+        return isinstance(self.formulas[i], OwnFriction)
+
     def evaluate(self, i: int, v: float, motor: float, load: float) -> Sequence[float]:
         """Return the friction by a formula of joint i and its bounds at rest, 0 without one."""
         if (formula := self.formulas[i]) is None:
@@ -529,13 +535,28 @@ class Loop:
                 self.rubbing[i] = self.begin_friction(data, i, smooth, drive, load)
             moments = self.rubbing[i]
             if moments is None:
-                force = -self.evaluate(i, v, drive, load)[0]
+                force = -self.while_sliding(i, v, drive, load, stage)
             else:
                 mean, rise, smooth, holding, low, high = moments
                 force = min(max(mean - holding * (others + drive - smooth), low), high)
                 force += (-rise, 0.0, 0.0, rise)[stage]
             data.qfrc_applied[dof] = force + (d[i] if self.scenario.plant.direct else 0.0)
             self.forces[1, i] += force / (6.0, 3.0, 3.0, 6.0)[stage]
+
+    def while_sliding(self, i: int, v: float, drive: float, load: float, stage: int) -> float:
+        """Return the force of friction on a sliding joint at a stage. A user's function is called at
+        the first two; the last two are on the line through them.
+        """
+        if stage > 1 and self.seldom(i):
+            v0, f0, slope = self.line[i]
+            return f0 + slope * (v - v0)
+        f = self.evaluate(i, v, drive, load)[0]
+        if stage == 0:
+            self.line[i] = v, f, 0.0
+        elif self.seldom(i):
+            v0, f0, _ = self.line[i]
+            self.line[i] = v0, f0, (f - f0) / (v - v0) if v != v0 else 0.0
+        return f
 
     def begin_friction(
         self, data: mujoco.MjData, i: int, smooth: float, drive: float, load: float
@@ -557,8 +578,8 @@ class Loop:
             def force(v: float) -> Sequence[float]:
                 return self.evaluate(i, v, drive, load)
 
-            f, low, high = force(v)
             slow = abs(v) < STICKING_SPEED and (self.stuck[i] or abs(v) <= abs(self.speed[i]))
+            f, low, high = force(0.0 if slow and self.seldom(i) else v)
             self.speed[i] = v
             stops = abs(v) <= -math.copysign(h * mobility, v) * (smooth - f)
             if low >= high or not (slow or stops or v == 0.0):
@@ -566,9 +587,14 @@ class Loop:
                 return None
             if slow:
                 sliding = -high if v > 0.0 else -low
+            elif self.seldom(i):
+                sliding = -f
             else:
                 sliding = -force(0.5 * v)[0]
-            starting = -force(math.copysign(STICKING_SPEED, smooth))[0]
+            if self.seldom(i) and low <= smooth <= high:
+                starting = -high if math.copysign(1.0, smooth) > 0.0 else -low
+            else:
+                starting = -force(math.copysign(STICKING_SPEED, smooth))[0]
             if smooth * (smooth + starting) <= 0.0:
                 low, high = min(low, smooth), max(high, smooth)
         mean, rise, held = dry_step(v, smooth, sliding, starting, low, high, mobility, h)

@@ -37,7 +37,12 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.jit import named
 from smc_mujoco.mechanisms.hardware.joint_force import JointForce
 from smc_mujoco.mechanisms.hardware.moments import JointState
-from smc_mujoco.mechanisms.hardware.sliding import SLIDES, STICKING_SPEED, Formula, Sliding
+from smc_mujoco.mechanisms.hardware.sliding import (
+    SLIDES,
+    STICKING_SPEED,
+    Formula,
+    Sliding,
+)
 from smc_mujoco.mechanisms.plant import Plant
 
 OWN = SLIDES + 1  # where the memory of the function begins; a copy for further calls follows it
@@ -94,22 +99,24 @@ def _by_function(function: Callable, size: int) -> Formula:
     function = njit(function)
 
     @njit
-    def found(y, v, p, memory, once):
-        own = memory[OWN : OWN + size]
-        if size > 0 and not once:
-            own = memory[OWN + size : OWN + 2 * size]
-            own[:] = memory[OWN : OWN + size]
+    def found(y, v, p, memory):
+        own = memory[OWN + size : OWN + 2 * size]
+        own[:] = memory[OWN : OWN + size]
         return function(at_speed(y, v), p, own)
 
     @njit
-    def force(y, v, p, memory, once):
-        return _force(found(y, v, p, memory, once), v)
+    def first(y, v, p, memory):
+        return function(at_speed(y, v), p, memory[OWN : OWN + size])
 
     @njit
-    def bounded(y, v, p, memory, once):
-        return _with_bounds(found(y, v, p, memory, once), v, found(y, 0.0, p, memory, False))
+    def bounds(at_v, y, v, p, memory):
+        return _bounds(at_v, at_v if v == 0.0 else found(y, 0.0, p, memory))
 
-    return Formula(force, bounded, function.py_func.__module__)
+    @njit
+    def at(y, v, p, memory):
+        return _force(found(y, v, p, memory), v)
+
+    return Formula(first, _force, bounds, at, True, function.py_func.__module__)
 
 
 @register_jitable
@@ -133,11 +140,11 @@ def _force(found, v):
     return found[0] if isinstance(found, tuple) else resisting(found, v)
 
 
-def _with_bounds(found, v, resting):
-    """Return F, low and high of what a user's function returned at the speed v, and at rest."""
+def _bounds(found, resting):
+    """Return low and high of what a user's function returned at a speed, and at rest."""
     if isinstance(found, tuple):
-        return found
-    return resisting(found, v), -resting, resting
+        return found[1], found[2]
+    return -resting, resting
 
 
 @overload(_force)
@@ -147,11 +154,11 @@ def _force_of(found, v):
     return resisting
 
 
-@overload(_with_bounds)
-def _bounds_of(found, v, resting):
+@overload(_bounds)
+def _bounds_of(found, resting):
     if isinstance(found, types.BaseTuple):
-        return lambda found, v, resting: found
-    return lambda found, v, resting: (resisting(found, v), -resting, resting)
+        return lambda found, resting: (found[1], found[2])
+    return lambda found, resting: (-resting, resting)
 
 
 def returns_bounds(function: Callable, numbers: Mapping[str, float], memory: int) -> bool:

@@ -38,9 +38,12 @@ from numba.extending import register_jitable
 
 from smc_mujoco.common.constraints import Each, Number
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.jit import inlined
 from smc_mujoco.mechanisms.hardware.friction import (
+    FRICTION,
     HIGH,
     RISE,
+    SMOOTH,
     Coulomb,
     at_stage,
     begin_step,
@@ -58,9 +61,11 @@ NaturalPerJoint = Annotated[PerJoint, Each(one=Number(low=0.0, high=MAX_PARAMETE
 PositivePerJoint = Annotated[PerJoint, Each(one=Number(above=0.0, high=MAX_PARAMETER))]
 
 # What a joint keeps: its speed at the step before, whether it is stuck and where; at stages of RK4
-# the same speed, whether it was held, and whether it slides.
+# the same speed, whether it was held, and whether it slides. A step that slides keeps F and its
+# slope in place of what friction.py keeps.
 SPEED, STUCK, STUCK_AT = range(3)
 STAGE_SPEED, WAS_HELD, SLIDES = range(HIGH + 1, HIGH + 4)
+SLOPE = SMOOTH  # of F in the speed, in a step that slides
 TINY = 1e-14  # N m (N): a level above 0, so that MuJoCo has a constraint
 
 
@@ -168,13 +173,13 @@ def _dry_joints(model: mujoco.MjModel) -> list[int]:
 
 
 class Formula(NamedTuple):
-    """A friction as compiled code calls it, at the speed v of a joint whose state is y.
+    """A friction as compiled code calls it, on a joint whose state is y."""
 
-    `once` is whether this is the call of the step that may move the memory of its author.
-    """
-
-    force: Callable  # (y, v, p, memory, once) -> F
-    bounded: Callable  # (y, v, p, memory, once) -> F, low and high
+    first: Callable  # (y, v, p, memory) -> what it is at the speed v; moves its author's memory
+    force: Callable  # (found, v) -> F, of what `first` has found
+    bounds: Callable  # (found, y, v, p, memory) -> low and high, of what `first` has found
+    at: Callable  # (y, v, p, memory) -> F at another speed
+    seldom: bool  # whether it is called as seldom as it can be, and not at every stage of RK4
     module: str  # of the author
 
 
@@ -184,14 +189,22 @@ def _by_value(value: Callable) -> Formula:
     value = njit(value)
 
     @njit
-    def force(y, v, p, memory, once):
-        return value(v, y.motor, y.load, p)[0]
-
-    @njit
-    def bounded(y, v, p, memory, once):
+    def first(y, v, p, memory):
         return value(v, y.motor, y.load, p)
 
-    return Formula(force, bounded, value.py_func.__module__)
+    @njit
+    def force(found, v):
+        return found[0]
+
+    @njit
+    def bounds(found, y, v, p, memory):
+        return found[1], found[2]
+
+    @njit
+    def at(y, v, p, memory):
+        return value(v, y.motor, y.load, p)[0]
+
+    return Formula(first, force, bounds, at, False, value.py_func.__module__)
 
 
 def _authored(formula: Formula, function: Callable) -> Callable:
@@ -203,10 +216,10 @@ def _authored(formula: Formula, function: Callable) -> Callable:
 @functools.cache
 def _steady(formula: Formula) -> Callable:
     """Return the force that resists a joint at a steady speed, without a load."""
-    force = formula.force
+    at = formula.at
 
     def steady(y, p, memory):
-        return force(unloaded(y), y.v, p, memory, False)
+        return at(unloaded(y), y.v, p, memory)
 
     return _authored(formula, steady)
 
@@ -222,10 +235,12 @@ def _brake(formula: Formula) -> Callable:
     """Return the force on a joint that slides by a formula, the level of its dry friction, and
     how far it is from where it came to rest.
     """
-    bounded = formula.bounded
+    first, force, bounds, *_ = formula
 
     def brake(y, p, memory):
-        f, low, high = bounded(y, y.v, p, memory, True)
+        found = first(y, y.v, p, memory)
+        f = force(found, y.v)
+        low, high = bounds(found, y, y.v, p, memory)
         slow = abs(y.v) < STICKING_SPEED or y.v * memory[SPEED] < 0.0
         memory[SPEED] = y.v
         if not low < high:  # nothing holds it
@@ -246,47 +261,97 @@ def _brake(formula: Formula) -> Callable:
 def _at_stages(formula: Formula) -> Callable:
     """Return the force at a stage of RK4 on a joint that slides by a formula, or stops or rests in
     the step.
+
+    A formula that is called seldom is so at speed 0 alone where the joint is slow, and while the
+    joint stops, F is that of the step's start.
     """
-    force, bounded, _ = formula
+    first, force, bounds, at, seldom, _ = formula
+    starts = _starting(formula)
+    later = _while_sliding(formula)
 
     def stage_force(y, p, memory):
         held = 0.0
         if y.stage == 0.0:
             smooth = y.others + y.mean
-            f = force(y, y.v, p, memory, True)
-            if not math.isfinite(f):  # which ends the run
-                return -f, 0.0
             before = memory[STAGE_SPEED]
             slow = abs(y.v) < STICKING_SPEED and (
                 memory[WAS_HELD] != 0.0 or abs(y.v) <= abs(before)
             )
+            speed = 0.0 if seldom and slow else y.v
+            found = first(y, speed, p, memory)
+            f = force(found, y.v)
+            if not math.isfinite(f):  # which ends the run
+                return -f, 0.0
             memory[STAGE_SPEED] = y.v
             stops = abs(y.v) <= -math.copysign(y.h * y.mobility, y.v) * (smooth - f)
             low = high = 0.0
             if slow or stops or y.v == 0.0:
-                _, low, high = bounded(y, y.v, p, memory, False)
+                low, high = bounds(found, y, speed, p, memory)
             if not low < high:
+                if speed != y.v:
+                    f = at(y, y.v, p, memory)
                 memory[SLIDES], memory[WAS_HELD], memory[RISE] = 1.0, 0.0, 0.0
+                memory[FRICTION] = f
                 return -f, 0.0
             if slow:
                 sliding = -high if y.v > 0.0 else -low
+            elif seldom:
+                sliding = -f
             else:
-                sliding = -force(y, 0.5 * y.v, p, memory, False)
-            start = math.copysign(STICKING_SPEED, smooth)
-            if smooth > high or smooth < low:  # an offset may leave 0 out of the bounds
-                start = math.copysign(STICKING_SPEED, smooth - high)
-            starting = -force(y, start, p, memory, False)
+                sliding = -at(y, 0.5 * y.v, p, memory)
+            start, starting = starts(y, p, memory, smooth, low, high)
             # friction that holds less than it exerts in motion would start no joint
             if start * (smooth + starting) <= 0.0:
                 low = min(low, smooth)
                 high = max(high, smooth)
             held = begin_step(y, memory, sliding, starting, low, high)
             memory[SLIDES], memory[WAS_HELD] = 0.0, held
-        if memory[SLIDES] != 0.0:
-            return with_rise(y, memory, -force(y, y.v, p, memory, False)), held
-        return at_stage(y, memory), held
+        if memory[SLIDES] == 0.0:
+            return at_stage(y, memory), held
+        return later(y, p, memory), held
 
     return _authored(formula, stage_force)
+
+
+def _starting(formula: Formula) -> Callable:
+    """Return a function (y, p, memory, smooth, low, high) -> the speed at which a joint starts from
+    rest, and the force on it then.
+    """
+    at = formula.at
+    seldom = formula.seldom
+
+    @inlined
+    def starts(y, p, memory, smooth, low, high):
+        start = math.copysign(STICKING_SPEED, smooth)
+        if smooth > high or smooth < low:  # an offset may leave 0 out of the bounds
+            start = math.copysign(STICKING_SPEED, smooth - high)
+        elif seldom:  # it does not start
+            return start, -high if start > 0.0 else -low
+        return start, -at(y, start, p, memory)
+
+    return starts
+
+
+def _while_sliding(formula: Formula) -> Callable:
+    """Return a function (y, p, memory) -> the force at a stage of RK4 after the first.
+
+    Of a formula that is called seldom, F at the last two stages is on the line through F at the
+    first two.
+    """
+    at = formula.at
+    seldom = formula.seldom
+
+    @inlined
+    def later(y, p, memory):
+        change = y.v - memory[STAGE_SPEED]
+        if seldom and y.stage > 1.0:
+            return -memory[FRICTION] - memory[SLOPE] * change
+        f = at(y, y.v, p, memory)
+        if seldom:
+            memory[SLOPE] = (f - memory[FRICTION]) / change if change != 0.0 else 0.0
+        return with_rise(y, memory, -f)
+
+    return later
 
 
 @dataclasses.dataclass(frozen=True)
