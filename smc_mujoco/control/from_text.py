@@ -139,7 +139,7 @@ def laws(text: object) -> list[str | Law]:
     else:
         head, gains = _parts("law", text, "pid(kp=50,ki=50,kd=8)")
     if IN_FILE.fullmatch(head):
-        return [law(named(head, "law", _is_law), **gains)]
+        return [_with_gains(law(named(head, "law", _is_law)), gains)]
     if read := _reader(head):
         return [_with_gains(law, gains) for law in read(head)]
     return [find("law", head, known_laws()).bind(gains, warn=True)]
