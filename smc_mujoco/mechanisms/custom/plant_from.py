@@ -24,7 +24,7 @@ import re
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import mujoco
 import numpy as np
@@ -162,7 +162,8 @@ def plant_from(
 def _assumed_drives(label: str, made: Plant, given: Pairs) -> Iterator[str]:
     """Yield a sentence on each drive that the file decides, and that is no motor of the file."""
     parts = made.suggested.get("actuator", (None,) * len(given))
-    meant = zip(given, made.build.channels, parts, made.units, strict=False)
+    build: Any = made.build
+    meant = zip(given, build.channels, parts, made.units, strict=False)
     for (joint, asked), (_, taken), part, unit in meant:
         if taken.motor and not asked.motor:
             yield (
