@@ -210,7 +210,7 @@ class Sets(NamedTuple):
 CALM_WINDOW = round((CALM - 1.0) / PERIOD)  # samples
 
 
-def grouped(runs: Sequence[smc.Scenario], windows: Sequence[int]) -> FormGroup:
+def grouped(runs: Sequence[smc.Scenario], windows: np.ndarray) -> FormGroup:
     """Return runs of one form, whose errors are taken over their last samples."""
     group = FormGroup(runs, SUMS)
     group.rows[:, SETTING.early] = group.rows[:, SETTING.samples] + 1 - windows
@@ -275,9 +275,9 @@ class Bench:
         if fine.size:
             for on, places in self.at.items():
                 sums = self.sums(self.loaded[on], gains[fine])
-                errors[np.ix_(fine, places)] = sums[:, :, RMS] / self.one.count
+                errors[fine[:, None], places] = sums[:, :, RMS] / self.one.count
             sums = self.sums(self.calm, gains[fine])
-            rates[np.ix_(fine, self.at["speed"])] = sums[:, :, RATE] / self.one.bound
+            rates[fine[:, None], self.at["speed"]] = sums[:, :, RATE] / self.one.bound
         return Sets(gains, J, rates, errors)
 
 

@@ -480,7 +480,7 @@ def how_often(points: Sequence[dict]) -> dict[str, str]:
             continue
         its = against[name]
         strong = sum("strong" in place[4] for place in its)
-        share = "only" if strong == len(its) else f"{strong} of them"
+        share = "only" if strong == len(its) else f"{strong or 'none'} of them"
         words[name] = f"Contradicted in {len(its)} of {cases} cases, {share} under *strong*."
     return words
 
@@ -519,6 +519,12 @@ def first_words(points: Sequence[dict]) -> str:
     for search in sorted({point["search"] for point in own}):
         alone.append(leads(tallies([point for point in own if point["search"] == search])[1]))
     noisy = tallies(own)[1]
+    places = []
+    for one in compared(own, SHOWN[1]):
+        if one.verdict in ("stands", "below the floor"):
+            load = one.condition.removesuffix(", noise")
+            period = f"{1e3 * one.period:g} ms"
+            places.append(f"`{one.plant}` at {period}, *{load}*, {one.level:g} times the least J")
     smooth = tallies(own)[2:]
     drawn = tallies([point for point in points if point["draw"] is not None])[2:]
     return (
@@ -526,11 +532,11 @@ def first_words(points: Sequence[dict]) -> str:
         f"best of its rivals in {ahead} of {len(admitted)} cases and trails it in "
         f"{verdicts.count('contradicted')}; these are {', '.join(under)}. With noise, theorem or "
         f"not, it leads in {leads(noisy)} of {noisy['all']} and trails in "
-        f"{noisy['contradicted']}. Alone, the first search gives it {alone[0]} such leads, and the "
-        f"second {alone[1]}. A smooth first-order law leads the best rival in "
-        f"{sum(map(leads, smooth))} of {sum(its['all'] for its in smooth)} cases of the page, and "
-        f"in {sum(map(leads, drawn))} of {sum(its['all'] for its in drawn)} that were drawn, each "
-        "with one search."
+        f"{noisy['contradicted']}. Its leads: {' and '.join(places) or 'none'}. Alone, the two "
+        f"searches have {alone[0]} and {alone[1]}. A smooth first-order law leads the best rival "
+        f"in {sum(map(leads, smooth))} of {sum(its['all'] for its in smooth)} cases of the page, "
+        f"and in {sum(map(leads, drawn))} of {sum(its['all'] for its in drawn)} that were drawn, "
+        "each with one search."
     )
 
 
