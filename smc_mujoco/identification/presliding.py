@@ -11,7 +11,7 @@ at first order, is part of their errors.
 import copy
 import dataclasses
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -32,6 +32,7 @@ from smc_mujoco.mechanisms.plant import Values as Parameters
 BENDS = 2e-4, 1e-3, 4e-3  # rad (m), by which a joint gives way before it slides; chosen
 SLIDES_AT = 1.0  # rad/s (m/s): of bristles without a Stribeck drop, where it changes nothing
 DAMPING = 0.6  # of bristles, relative to the root of stiffness and inertia; chosen
+FOUND = "coulomb", "stiffness", "damping"  # of bristles
 REPORTED = 0.9  # of the residuals' norm: presliding is reported if it lowers it below this; chosen
 
 
@@ -118,12 +119,29 @@ def _ways(rig: OwnRig) -> dict[str, OwnRig]:
                 damping = DAMPING * math.sqrt(k * inertia)
                 bristles.append(LuGre(level, level, SLIDES_AT, k, damping, on=(joint,)))
         base = dataclasses.replace(rig.base, friction=(*rig.base.friction, *bristles))
-        way = (
-            f"as bristles that bend by {1e3 * bend:g} mrad (mm): find the coulomb of a LuGre with "
-            "such bristles in place of frictionloss"
-        )
+        way = f"as bristles that bend by {1e3 * bend:g} mrad (mm): {_with_bristles(rig, bristles)}"
         found[way] = dataclasses.replace(rig, base=base, plant=_yielding(rig.plant, True))
     return found
+
+
+def _with_bristles(rig: OwnRig, bristles: Sequence[LuGre]) -> str:
+    """Return what to do, in the words of the command, where dry friction bends as bristles do."""
+    parts = []
+    paths = []
+    for one in bristles:
+        (joint,) = one.on
+        texts = []
+        for value in (one.coulomb, one.static, one.stribeck, one.stiffness, one.damping):
+            texts.append(f"{value:.3g}")
+        parts.append(f"'{joint}': LuGre({', '.join(texts)})")
+        for name in FOUND:
+            paths.append(f"friction.{joint}.{name}")
+    cure = f"find --for {','.join(paths)} in place of frictionloss, with --condition "
+    cure += f'"bristles: friction={{{", ".join(parts)}}}"'
+    model = rig.base.plant.load()
+    if np.any(model.dof_frictionloss[dof_ids(model)] > 0.0):
+        cure += ", and without frictionloss in the file"
+    return cure
 
 
 def _yielding(plant: Plant, bends: bool) -> Plant:

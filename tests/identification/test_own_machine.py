@@ -3,6 +3,7 @@ logs and paths that cannot be used.
 """
 
 import dataclasses
+import re
 from pathlib import Path
 
 import numpy as np
@@ -89,6 +90,13 @@ def test_friction_that_gives_way_before_it_slides_is_told_and_in_the_errors():
         assert max(shares) > 0.01
         (note,) = [note for note in found.notes if "gives way" in note]
         assert way in note
+    # what the note says to do can be done, and its numbers are near the bristles'
+    (paths,) = re.findall(r"--for (\S+)", note)
+    (text,) = re.findall(r'--condition "(.+?)"', note)
+    wanted = ["j1.armature", *paths.split(",")]
+    cured = smc.identify(arm, bending, wanted, condition=f"{text}, input_delay=0.004")
+    assert cured.values["friction.j1.coulomb"] == pytest.approx(0.4, rel=0.01)
+    assert cured.values["j1.armature"] == pytest.approx(TRUTH["j1.armature"], rel=0.02)
 
 
 def test_a_log_that_an_open_loop_leaves_is_told_apart_from_a_poor_fit(found):
