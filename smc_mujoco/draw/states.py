@@ -93,6 +93,8 @@ def off_place(trace: Trace, k: int) -> State | None:
     away = 1e3 * float(np.linalg.norm(trace.x[k, :3] - trace.r[k, :3]))
     if not away >= 1.0:
         return None
+    if away >= 1e3:  # fewer letters, in a narrow tile
+        return State(f"{style.short(1e-3 * away)} m off", style.INK)
     return State(f"{style.short(away)} mm off", style.INK)
 
 

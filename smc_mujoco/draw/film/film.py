@@ -253,7 +253,7 @@ def _write_webp(frames: Frames, made: Iterator[Array], part: Path) -> None:
     images = list(map(Image.fromarray, made))
     ends = [round(1000 / frames.fps)] * (count - 1) + [LAST_FRAME_TIME]
     images[0].save(
-        part, save_all=True, append_images=images[1:], duration=ends, loop=0, quality=60, method=4
+        part, save_all=True, append_images=images[1:], duration=ends, loop=0, quality=75, method=4
     )
 
 

@@ -236,7 +236,8 @@ class Sheet:
             sources = [trace.scenario.law.source.words for trace in self.runs.traces]
             gains = f"gains: {', '.join(sources)}"
         said = [*key, gains]
-        while len(said) > 1 and style.width(" · ".join(said), high) > self.room:
+        least = lines - 1  # beside the title there may be no words
+        while len(said) > least and style.width(" · ".join(said), high) > self.room:
             said.pop()
         self.key = style.cropped(" · ".join(said), self.room, high)
         self.below = self.write(left, last, va="center", color=style.MUTED)

@@ -103,3 +103,7 @@ def test_a_free_body_s_picture_says_how_far_it_is_off_its_place():
     (said,) = states.timeline(dataclasses.replace(run, x=moved), np.array([0.02]))
     assert said is not None
     assert said.words == "120 mm off"
+    far = run.x + 10.0 * (moved - run.x)
+    (said,) = states.timeline(dataclasses.replace(run, x=far), np.array([0.02]))
+    assert said is not None
+    assert said.words == "1.2 m off"

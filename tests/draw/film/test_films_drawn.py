@@ -120,6 +120,8 @@ def test_words_over_machines_are_on_one_line_where_they_have_room():
     for before, after in itertools.pairwise(boxes):
         assert before.x1 < after.x0
     assert min(box.y0 for box in boxes) > size[1] - room_of(size, 1).top
+    full = Sheet(DrawnRuns.of([trace], ["one"]), size, tile, label, "Duffing " * 4, lines=1)
+    assert full.key == "", "whole words or none"
 
 
 @pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
