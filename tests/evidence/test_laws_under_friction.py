@@ -117,7 +117,10 @@ def test_mujoco_runs_each_point_that_is_printed_and_agrees():
         if "chose" in point:
             assert len(point["mujoco"]) == friction.BY_MUJOCO
     ratios = sentences.agreement(POINTS)
-    assert np.mean(np.abs(np.log(ratios)) < math.log(1.1)) > 0.9
+    near = np.sum(np.abs(np.log(ratios)) < math.log(1.1))
+    said = f"of {len(ratios)} above one count, {near} are within 10 % of the fast engine"
+    assert said in " ".join(PAGE.split())
+    assert near > 0.9 * len(ratios)
 
 
 def struck(text):
