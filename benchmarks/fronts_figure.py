@@ -3,11 +3,13 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from matplotlib.patches import Patch
+
 from benchmarks.fronts_sentences import FLOOR, ROWS, is_settled, of_figure, value
 from smc_mujoco.draw import page, style
 
 TICKS = (1.25, 2, 3, 5)
-WIDTH, ROW = 5.0, 1.5  # inches
+WIDTH, ROW = 3.9, 1.3  # inches: letters are read on a phone
 
 
 def draw(points: Sequence[dict], path: Path, laws: Sequence[str]) -> None:
@@ -19,7 +21,8 @@ def draw(points: Sequence[dict], path: Path, laws: Sequence[str]) -> None:
         for law, colour, mark in zip(laws, style.law_colours(laws), style.MARKS, strict=False):
             look = {"marker": mark, "lw": 1.2, "ms": 4}
             handles.append(page.entry(style.law_name(law), colour, **look))
-        height = page.head_height(WIDTH, handles) + ROW * len(ROWS) + 0.2
+        key = [*handles, Patch(color=style.BAND, label="not ranked")]
+        height = page.head_height(WIDTH, key) + ROW * len(ROWS) + 0.2
         figure = page.blank(WIDTH, height, None)
         panels = figure.subplots(len(ROWS), len(plants), squeeze=False, sharey=True, sharex=True)
         for row, (period, condition) in zip(panels, ROWS, strict=True):
@@ -39,13 +42,12 @@ def draw(points: Sequence[dict], path: Path, laws: Sequence[str]) -> None:
                 ax.set(xscale="log", yscale="log", ylim=(1e-5, 0.1))
                 ax.set_xticks(TICKS, [f"{tick:g}" for tick in TICKS])
                 ax.minorticks_off()
-                place = {"transform": ax.transAxes, "ha": "right", "color": style.MUTED}
-                ax.text(0.98, 0.03, "not ranked", fontsize=style.points(9.0), **place)
             noise = "sensor noise" if "noise" in condition else "no noise"
             row[0].set_ylabel(f"{1e3 * period:g} ms, {noise}\nrms error / start")
         for ax, plant in zip(panels[0], plants, strict=True):
-            ax.set_title(style.plant_name(plant, short=True))
+            name = style.plant_name(plant, short=True)
+            ax.set_title("\n".join(name.rsplit(" ", 1)))
         for ax in panels[-1]:
             ax.set_xlabel("J / least J")
-        page.set_head(figure, WIDTH, "The price of rejecting a load", handles)
+        page.set_head(figure, WIDTH, "The price of rejecting a load", key)
         page.write(figure, page.files(path))
