@@ -301,7 +301,8 @@ def candidate_shapes(joints: int, duration: float, rate: float) -> dict[str, Arr
         "chirp from 0.2 to 3 Hz": chirp(0.2, 3.0),
         "staircase": stairs(),
     }
-    soft = np.minimum(1.0, t / SOFT_START)
+    share = np.minimum(1.0, t / SOFT_START)
+    soft = share * share * (3.0 - 2.0 * share)  # a corner would take the largest force of all
     half = len(t) // 2
     rising = soft[:half]
     first = stairs()[:, :half] * rising * rising[::-1]

@@ -384,7 +384,7 @@ def test_a_chirp_is_recommended_and_a_staircase_is_last_because_it_rests(arm, tm
     guess = {name: TRUTH[name] for name in names}
     fields = {"u_max": 5.0, "v_max": 4.0, "duration": 6.0, "rate": 250.0}
     advice = smc.design.excitation(arm, names, guess=guess, **fields)
-    assert advice.motions[0].name == "chirp from 0.2 to 3 Hz"
+    assert "chirp" in advice.motions[0].name
     last = advice.motions[-1]
     assert last.name == "staircase"
     assert last.rest > 0.4
