@@ -71,22 +71,26 @@ def better(replays: Replays, *points: Point) -> Point:
     return points[replays.costs(points).sum(axis=1).argmin()]
 
 
-def by_halving(replays: Replays, slopes: Slopes) -> Array:
-    """Return about how far shorter steps would move the solution, (p,): twice what half steps do,
-    as errors by steps are of first order.
+def by_steps(replays: Replays, slopes: Slopes) -> list[Array]:
+    """Return about how far shorter steps would change the residuals of each piece, (N,): twice what
+    half steps do, as errors by steps are of first order.
     """
     point = slopes.point
-    if not replays.free.size:
-        return np.zeros(len(replays.names))  # records of simulated runs have the same steps
+    if not replays.free.size:  # records of simulated runs have the same steps
+        return [np.zeros(len(r)) for r in slopes.residuals]
     plain = replays.rig(point).repeated(replays._part(0))
     steps, replays.steps = replays.steps, {"physics_step": plain.resolved.physics_step / 2.0}
     (residuals,) = replays.residuals([point])
     replays.steps = steps
     changed = []
     for half, full in zip(residuals, slopes.residuals, strict=True):
-        changed.append(half - full)
-    move = least_squares(slopes.freed_slopes, np.concatenate(slopes.freed(changed)))
-    return 2.0 * np.abs(move)
+        changed.append(2.0 * (half - full))
+    return changed
+
+
+def moves(slopes: Slopes, changes: list[Array]) -> Array:
+    """Return how far changes of the residuals of each piece, (N,), move the solution, (p,)."""
+    return np.abs(least_squares(slopes.freed_slopes, np.concatenate(slopes.freed(changes))))
 
 
 def accurate(replays: Replays, slopes: Slopes) -> tuple[Slopes, Array]:

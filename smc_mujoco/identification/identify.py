@@ -30,6 +30,8 @@ from smc_mujoco.common.files import write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.identification import first_guess, gauss_newton, log_quality, number_text, records
+from smc_mujoco.identification.lack_of_fit import Lack, LackOfFit, lack_of_fit
+from smc_mujoco.identification.lacking_forces import lacking_forces
 from smc_mujoco.identification.own_rig import SETTINGS, OwnRig, condition_fields, own_rig
 from smc_mujoco.identification.paths import DELAY, named_once
 from smc_mujoco.identification.presliding import presliding
@@ -68,6 +70,7 @@ RELATIVE = (
     "with a gain free, forces and inertias are relative to the model's mass: if the model is too "
     "light, gain, damping, friction and armature are too small by the same share"
 )
+STEPS = "the steps of the replays show in the residuals: identify with corrected=True (--corrected)"
 LEFT = (
     "a whole log is left in an open loop, as an arm under gravity leaves it however good its "
     "numbers are: judge by the pieces of 1 s"
@@ -112,7 +115,7 @@ class Identified:
     scatter: Numbers = dataclasses.field(default_factory=dict)  # of values between logs, if several
     held_out: HeldOutFit | None = None  # of the log that was kept aside
     doubted: tuple[str, ...] = ()  # sentences on what may be wrong with columns
-    gives_way: str = ""  # how dry friction gives way before it slides, and what to do
+    lacks: tuple[str, ...] = ()  # what the model lacks, and what to do
     data: tuple[Data, ...] = dataclasses.field(default=(), repr=False)  # the logs' columns
 
     @property
@@ -131,11 +134,8 @@ class Identified:
                 notes.append(f"{name} is at the end of its range")
             elif self.errors[name] > abs(value):
                 notes.append(f"{name} may as well be 0")
-        if self.gives_way:
-            notes.append(
-                "presliding: in the logs dry friction gives way before it slides, "
-                f"{self.gives_way}; the errors include what that may change"
-            )
+        for lack in self.lacks:
+            notes.append(f"{lack}; the errors include what that may change")
         worst = _worst(self.by_pieces or self.fits)
         if self.independent < BLOCKS[0] and worst < PERFECT_FIT and self.rig.controller is None:
             notes.append(SLOW)
@@ -342,10 +342,9 @@ def identify(
         replays, slopes, by_steps = _solved(
             twin, names, data, doubts, starts, seed, most, corrected, report
         )
-        giving = presliding(replays, slopes)
-        errors, correlations, independent = statistics(
-            replays, slopes, np.hypot(by_steps, giving.moved)
-        )
+        lacking, by_steps = _lacking(replays, slopes, corrected, by_steps)
+        by_model = np.hypot(by_steps, lacking.moved(len(names)))
+        errors, correlations, independent = statistics(replays, slopes, by_model)
     values = replays.values(slopes.point)
     fitted = twin.with_values(values, "identified from records")
     states = _starting_states(fitted, data, replays, slopes.point)
@@ -371,7 +370,7 @@ def identify(
         scatter=scatter,
         held_out=None if held_out is None else check(fitted, held_out, columns),
         doubted=tuple(doubts),
-        gives_way=giving.way,
+        lacks=lacking.told(np.array(list(errors.values())) / replays.scales),
         data=tuple(data),
     )
 
@@ -554,7 +553,7 @@ def _solved(
     reached = gauss_newton.search(pieces, starts, seed, most)
     if twin.controller is None:
         if not corrected:
-            return pieces, reached, gauss_newton.by_halving(pieces, reached)
+            return pieces, reached, np.zeros(len(names))
         slopes, moved = gauss_newton.accurate(pieces, reached)
         return pieces, gauss_newton.not_worse(pieces, slopes), moved
     closed = Replays(twin, names, data, True, report)
@@ -564,6 +563,23 @@ def _solved(
     slopes = gauss_newton.refine(closed, gauss_newton.better(closed, *points), most)
     closed.evaluations += pieces.evaluations
     return closed, slopes, np.zeros(len(names))
+
+
+def _lacking(
+    replays: Replays, slopes: Slopes, corrected: bool, moved: Array
+) -> tuple[LackOfFit, Array]:
+    """Return what the model lacks, and how far steps move the solution, (p,): as corrected replays
+    have `moved` it, or by half steps.
+    """
+    lacks = []
+    if not corrected and not replays.closed:
+        changes = gauss_newton.by_steps(replays, slopes)
+        moved = gauss_newton.moves(slopes, changes)
+        lacks.append(Lack(STEPS, changes))
+    if not isinstance(replays.twin, OwnRig):
+        return lack_of_fit(slopes, []), moved
+    lacks += lacking_forces(replays, slopes) + presliding(replays, slopes)
+    return lack_of_fit(slopes, lacks), moved
 
 
 def _starting_states(

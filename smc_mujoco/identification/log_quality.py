@@ -1,5 +1,5 @@
-"""What in the columns of a log makes any number found from it doubtful: samples that stick out, and
-a motion of few steps of its sensor.
+"""What in the columns of a log makes any number found from it doubtful: samples that stick out, a
+motion of few steps of its sensor, and a rate at which commands may be missing.
 """
 
 from collections.abc import Sequence
@@ -9,21 +9,38 @@ import numpy as np
 from smc_mujoco.common.aliases import Array, Data
 from smc_mujoco.identification import records
 from smc_mujoco.identification.own_rig import OwnRig, moves
+from smc_mujoco.identification.paths import DELAY
 from smc_mujoco.identification.records import Record
 
 SPIKE = 10.0  # times the noise or the sensor's step: a sample that sticks out by more; chosen
 LARGE_SPIKE = 0.02  # of the motion's deviation; a smaller spike hardly moves a number; chosen
 FEW_STEPS = 100.0  # of the sensor, or deviations of its noise: span of a small motion; chosen
 
+LONG_PERIOD = 0.0051  # s: loops of machines are seldom slower; chosen
+SAME_PERIOD = 0.02  # of a period, by which a loop's own may differ from the log's; chosen
+
 
 def doubts(rig: OwnRig, data: Sequence[Data]) -> list[str]:
-    """Return sentences on columns whose samples stick out, or that span few steps of a sensor."""
+    """Return sentences on what is doubtful in logs."""
     said = []
     for record in map(rig.checked, data):
+        said += _slow(rig, records.step_of(record[rig.columns.time]))
         for name, unit in zip(rig.columns.x, rig.plant.units, strict=True):
             said += _spikes(record, name, rig.columns.time, unit)
             said += _small(record[name], name, unit)
     return list(dict.fromkeys(said))
+
+
+def _slow(rig: OwnRig, period: float) -> list[str]:
+    """Return a sentence on a log that may lack commands of a faster loop."""
+    known = abs(period - rig.base.control_period) < SAME_PERIOD * period
+    if period <= LONG_PERIOD or known or DELAY not in rig.quantities:
+        return []
+    return [
+        f"the log has {1.0 / period:.4g} samples a second: if its loop is faster, the commands "
+        f"between them are missing, and {DELAY} may be {500.0 * period:.3g} ms off; record every "
+        f"command, or say that it is not by a Scenario with control_period={period:g}"
+    ]
 
 
 def _spikes(record: Record, name: str, time: str, unit: str) -> list[str]:

@@ -1,25 +1,21 @@
-"""Presliding: whether dry friction gives way in the logs before it slides, and how far that moves
-the numbers found.
+"""Presliding: dry friction that gives way before it slides, as one of the things that a model may
+lack.
 
 Dry friction of replays holds a joint until it breaks away. That of a real joint bends first, and
 MuJoCo's default creeps, so inertia, friction and delay would absorb that. At the solution the logs
-are replayed with friction that gives way in each of these ways. Least squares, with the numbers
-free, finds the share of that change which the residuals show. How far that share moves the numbers,
-at first order, is part of their errors.
+are replayed with friction that gives way in each of these ways.
 """
 
 import copy
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.data import frozen_data
-from smc_mujoco.identification.least_squares import least_squares
+from smc_mujoco.identification.lack_of_fit import Lack
 from smc_mujoco.identification.own_rig import RUN_STEP, OwnRig
 from smc_mujoco.identification.replays import Replays, Slopes
 from smc_mujoco.identification.rig import Values
@@ -33,14 +29,6 @@ BENDS = 2e-4, 1e-3, 4e-3  # rad (m), by which a joint gives way before it slides
 SLIDES_AT = 1.0  # rad/s (m/s): of bristles without a Stribeck drop, where it changes nothing
 DAMPING = 0.6  # of bristles, relative to the root of stiffness and inertia; chosen
 FOUND = "coulomb", "stiffness", "damping"  # of bristles
-REPORTED = 0.9  # of the residuals' norm: presliding is reported if it lowers it below this; chosen
-
-
-class Presliding(NamedTuple):
-    """How dry friction gives way in the logs."""
-
-    way: str  # how it gives way, and what to do; "" if it does not
-    moved: Array  # how far the numbers would move, in their scales, (p,)
 
 
 @frozen_data
@@ -63,38 +51,27 @@ class PreslidingFields:
         model.opt.noslip_iterations = 0  # a number, which no Field can write
 
 
-def presliding(replays: Replays, slopes: Slopes) -> Presliding:
-    """Return how dry friction gives way in the logs: in the way that explains most of the
-    residuals.
-    """
-    none = Presliding("", np.zeros(len(replays.names)))
+def presliding(replays: Replays, slopes: Slopes) -> list[Lack]:
+    """Return the ways in which dry friction may give way in the logs, as what the model lacks."""
     rig = replays.rig(slopes.point)
     if not isinstance(rig, OwnRig) or not rig.plant.rubs:
-        return none
+        return []
     if not all(part.drives for part in rig.base.actuator):  # rotors beside joints
-        return none
-    J = slopes.freed_slopes
-    r = slopes.freed_residuals
-    best, least = none, float(np.linalg.norm(r))
-    reported = REPORTED * least
+        return []
     trial = copy.copy(replays)
     control = rig.repeated(replays.pieces[0].part).control_period  # pyright: ignore[reportArgumentType]
     trial.steps = {"physics_step": control / math.ceil(control / RUN_STEP - 1e-9)}
     (holding,) = trial.residuals([slopes.point])
+    found = []
     for way, yielding in _ways(rig).items():
         trial.twin = yielding
         (residuals,) = trial.residuals([slopes.point])
-        changed = []
+        changes = []
         for after, before in zip(residuals, holding, strict=True):
-            changed.append(after - before)
-        c = np.concatenate(slopes.freed(changed))
-        *_, share = least_squares(np.column_stack([J, c]), -r).tolist()
-        share = min(max(share, 0.0), 1.0)
-        moved = least_squares(J, share * c)
-        left = float(np.linalg.norm(r + share * c - J @ moved))
-        if left < least:
-            best, least = Presliding(way if left < reported else "", np.abs(moved)), left
-    return best
+            changes.append(after - before)
+        text = f"presliding: in the logs dry friction gives way before it slides, {way}"
+        found.append(Lack(text, changes, gives_way=True))
+    return found
 
 
 def _ways(rig: OwnRig) -> dict[str, OwnRig]:

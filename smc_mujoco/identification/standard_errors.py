@@ -47,7 +47,7 @@ def statistics(
     """Return the standard error of each quantity, their correlations (p, p), and `independent`, at
     the solution.
 
-    `by_model`: errors of the quantities that the simulation's steps and friction that gives way
+    `by_model`: errors of the quantities that the simulation's steps and what the model lacks
     cause, in their scales, (p,).
     """
     names = replays.names

@@ -52,3 +52,11 @@ def test_a_stuck_joint_is_refused_for_its_rest_and_not_for_the_unit_of_its_comma
     stuck = {"t": T, "x": np.where(T < 2.0, 0.0, COUNT), "u": 50.0 * np.sin(5.0 * T)}
     with pytest.raises(smc.ScenarioError, match="no joint of chain moves in the record"):
         smc.identify(rig.plant, stuck, ["j1.damping"])
+
+
+def test_a_log_that_may_lack_commands_is_told_unless_its_loop_is_known_to_be_as_slow(rig):
+    slow = {"t": T[::5], "x": X[::5], "u": np.sin(5.0 * T[::5])}
+    (sentence,) = log_quality.doubts(own_rig(rig.plant, ["input_delay"]), [slow])
+    assert "input_delay may be 5 ms off" in sentence
+    known = smc.Scenario(plant=rig.plant, law="none", control_period=0.01)
+    assert not log_quality.doubts(own_rig(known, ["input_delay"]), [slow])

@@ -1,0 +1,169 @@
+"""Lack of fit: what a model lacks, by what the residuals show, and how far that moves the numbers.
+
+Numbers absorb what a model lacks, and the scatter of residuals does not show how much of it. So
+each thing that it may lack, see lacking_forces.py and presliding.py, is tried at the solution, at
+first order: its change of the residuals is the slope of a further number. One after the other, the
+thing that explains most of what is left is taken, if it stands out of the scatter between blocks of
+time (a score test). How far each moves the numbers is part of their errors.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from smc_mujoco.common.aliases import Array
+from smc_mujoco.common.data import frozen_data
+from smc_mujoco.identification.least_squares import least_squares
+from smc_mujoco.identification.replays import Point, Slopes
+
+SIGNIFICANT = 6.0  # deviations between blocks, beyond which a lack stands out; chosen
+BLOCKS = 8  # of a piece; chosen
+OWN_SHARE = 0.04  # of a lack's change, which no number and no earlier lack can cause; chosen
+MOST = 6  # lacks that are taken; chosen
+# of the squared residuals, and of a number's error: a lack of more is told; chosen
+EXPLAINED, MOVED = 0.1, 0.7
+
+
+@frozen_data
+class Lack:
+    """Something that a model may lack."""
+
+    text: str  # what it is, and what to do
+    changes: list[Array]  # of the residuals of each piece by it, (N,)
+    # whether it only adds to what there is, and counts even where the residuals hardly show it
+    gives_way: bool = False
+
+
+class Share(NamedTuple):
+    """What a lack explains beside the numbers and earlier lacks."""
+
+    explained: float = 0.0  # of the squared residuals that are left
+    deviations: float = 0.0  # of the scatter between blocks
+
+
+class Taken(NamedTuple):
+    """A lack that is taken."""
+
+    lack: Lack
+    explained: float  # as of Share
+    deviations: float
+    move: Array  # how far it moves the numbers, in their scales, (p,)
+
+    def matters(self, errors: Array) -> bool:
+        """Return whether it explains much, or moves a number by most of its error, (p,)."""
+        if self.deviations <= SIGNIFICANT:
+            return False
+        return self.explained > EXPLAINED or bool(np.any(np.abs(self.move) > MOVED * errors))
+
+
+class LackOfFit(NamedTuple):
+    """What the residuals show of what a model lacks."""
+
+    taken: list[Taken]
+    slopes: Slopes  # at the least squares with the lacks as further numbers, which come last
+
+    def moved(self, p: int) -> Array:
+        """Return how far the lacks move the p numbers, in their scales, (p,)."""
+        squares = np.zeros(p)
+        for taken in self.taken:
+            squares = squares + taken.move**2
+        return np.sqrt(squares)
+
+    def told(self, errors: Array) -> tuple[str, ...]:
+        """Return what is lacking, in words, where it matters beside errors in scales, (p,)."""
+        texts = []
+        for taken in self.taken:
+            if taken.matters(errors):
+                texts.append(taken.lack.text)
+        return tuple(dict.fromkeys(texts))
+
+
+def lack_of_fit(slopes: Slopes, lacks: Sequence[Lack]) -> LackOfFit:
+    """Return what the model lacks of several things."""
+    p = slopes.by_values[0].shape[1]
+    taken: list[Taken] = []
+    fitted = slopes
+    rest = list(lacks)
+    while rest and len(taken) < MOST:
+        shares = _shares(fitted, rest)
+        k = _strongest(shares, rest)
+        if k < 0:
+            break
+        lack = rest.pop(k)
+        wider, move = _with(fitted, lack, p)
+        taken.append(Taken(lack, *shares[k], move))
+        if shares[k].deviations <= SIGNIFICANT:
+            break
+        fitted = wider
+    return LackOfFit(taken, fitted)
+
+
+def _strongest(shares: Sequence[Share], lacks: Sequence[Lack]) -> int:
+    """Return the index of the lack that explains most of those that stand out. If none does, of
+    those that give way. -1 if there is none.
+    """
+    best = -1
+    for floor in (SIGNIFICANT, 0.0):
+        for k, (share, lack) in enumerate(zip(shares, lacks, strict=True)):
+            counts = share.deviations > floor and (floor or lack.gives_way)
+            if counts and (best < 0 or share.explained > shares[best].explained):
+                best = k
+        if best >= 0:
+            break
+    return best
+
+
+def _shares(slopes: Slopes, lacks: Sequence[Lack]) -> list[Share]:
+    """Return what each lack alone explains beside the numbers of the slopes."""
+    J = slopes.freed_slopes
+    basis, _ = np.linalg.qr(J / np.maximum(np.linalg.norm(J, axis=0), 1e-300))
+    r = slopes.freed_residuals
+    left = r - basis @ (basis.T @ r)
+    starts = _starts(slopes)
+    found = []
+    for lack in lacks:
+        change = np.concatenate(slopes.freed(lack.changes))
+        own = change - basis @ (basis.T @ change)
+        power = float(own @ own)
+        if power <= OWN_SHARE**2 * float(change @ change):
+            found.append(Share())
+            continue
+        size = -float(own @ left) / power
+        if lack.gives_way and size <= 0.0:
+            found.append(Share())
+            continue
+        pulls = np.add.reduceat(own * (left + size * own), starts)
+        scatter = float(np.linalg.norm(pulls))
+        explained = size**2 * power / max(float(left @ left), 1e-300)
+        found.append(Share(explained, abs(size) * power / max(scatter, 1e-300)))
+    return found
+
+
+def _starts(slopes: Slopes) -> Array:
+    """Return the first row of each block of time in all pieces."""
+    starts = []
+    first = 0
+    for r in slopes.residuals:
+        starts.append(first + np.arange(BLOCKS) * len(r) // BLOCKS)
+        first += len(r)
+    return np.concatenate(starts)
+
+
+def _with(slopes: Slopes, lack: Lack, p: int) -> tuple[Slopes, Array]:
+    """Return the slopes at the least squares with a lack as a further number, and how far it moves
+    the first p numbers, (p,).
+    """
+    r = slopes.freed_residuals
+    before = least_squares(slopes.freed_slopes, -r)
+    columns = []
+    for J, change in zip(slopes.by_values, lack.changes, strict=True):
+        columns.append(np.column_stack([J, change]))
+    point = Point(np.append(slopes.point.values, 0.0), slopes.point.states)
+    wider = dataclasses.replace(slopes, point=point, by_values=columns)
+    step = least_squares(wider.freed_slopes, -r)
+    move = step[:p] - before[:p]
+    if lack.gives_way:  # at most as it does
+        move = move / max(abs(step[-1]), 1.0)
+    return wider.stepped(step), move

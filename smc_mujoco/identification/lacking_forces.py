@@ -1,0 +1,204 @@
+"""Forces that a model may lack, and what each would change in the residuals of its replays.
+
+A force of each shape is added to the recorded command of each motor: near rest, with the direction,
+the speed, the position and the time, and of what the model may have left out. The shapes follow
+from the motion that the replay of the log predicts, which has no noise. The replays of all logs
+with all shapes are one batch.
+"""
+
+import copy
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from smc_mujoco.common.aliases import Array
+from smc_mujoco.identification.lack_of_fit import Lack
+from smc_mujoco.identification.own_rig import LogPart, OwnRig
+from smc_mujoco.identification.paths import DELAY
+from smc_mujoco.identification.replays import Piece, Point, Replays, Slopes
+from smc_mujoco.mechanisms.layout import driven_names
+
+SIZE = 0.01  # of the command's deviation: a force so small acts linearly; chosen
+NEAR_REST = 0.1, 0.3  # of the speed's rms: widths of a drop of friction with speed; chosen
+WAVES = 4  # half waves of a force over the range of positions; chosen
+SLOW_WAVES = 2  # of a friction over that range, and of a force over the time of a log; chosen
+AVERAGED = 0.02  # s, over which a command is averaged: what is left is fast; chosen
+RESTING = 1e-6  # of the speed's rms: below it a joint rests
+REST = "near rest, as friction that drops with speed: find it with a Stribeck in a scenario"
+DIRECTION = "of viscous friction that differs between the directions"
+SPEED = "that grows faster than the speed, as a drag"
+PLACE = "that depends on its position, as of another mass or centre of mass, a spring or cogging"
+RUBS = "of friction that depends on its position"
+TIME = "that changes in the course of the log"
+WARMTH = "of friction that changes in the course of the log, as it warms up"
+COMMAND = (
+    "as the fast part of its command: what was applied between samples differs from the log, so "
+    "record every command of the loop"
+)
+LEFT_OUT = {
+    "armature": "in proportion to its acceleration",
+    "damping": "in proportion to its speed",
+    "frictionloss": "of dry friction",
+    "offset": "that is constant, or differs between the directions",
+}
+
+
+class Motion(NamedTuple):
+    """How a joint moves in a piece of a log when the command of each sample acts: N samples, each
+    relative to what is said.
+    """
+
+    place: Array  # from 0 to 1, over the range of all logs
+    speed: Array  # over its rms in all logs
+    acceleration: Array  # over its rms in all logs
+    time: Array  # from 0 to 1, over the log
+    command: Array  # of its motor
+
+    @property
+    def direction(self) -> Array:
+        """The direction of the motion, -1 or 1: at rest, that of the next motion."""
+        moving = np.abs(self.speed) > RESTING
+        following = np.where(moving, np.arange(len(moving)), len(moving) - 1)
+        following = np.minimum.accumulate(following[::-1])[::-1]
+        return np.sign(self.speed)[following]
+
+
+def shapes(motion: Motion) -> Iterator[tuple[str, Array]]:
+    """Yield what a model may lack, in words, and its force in a motion, (N,)."""
+    direction = motion.direction
+    speed = motion.speed
+    for width in NEAR_REST:
+        yield REST, direction * np.exp(-((speed / width) ** 2))
+    yield DIRECTION, np.abs(speed)
+    yield SPEED, speed * np.abs(speed)
+    for k in range(1, WAVES + 1):
+        yield PLACE, np.cos(k * math.pi * motion.place)
+    for k in range(1, SLOW_WAVES + 1):
+        yield RUBS, direction * np.cos(k * math.pi * motion.place)
+        yield TIME, np.cos(k * math.pi * motion.time)
+        yield WARMTH, direction * np.cos(k * math.pi * motion.time)
+    yield COMMAND, motion.command
+
+
+def left_out(motion: Motion, joint: str, names: Sequence[str]) -> Iterator[tuple[str, Array]]:
+    """Yield what a model may lack, and its force, of the joint's numbers that are not found."""
+    forces = {
+        "armature": motion.acceleration,
+        "damping": motion.speed,
+        "frictionloss": motion.direction,
+        "offset": np.ones(len(motion.speed)),
+    }
+    for kind, force in forces.items():
+        if f"{joint}.{kind}" not in names:
+            yield f"{LEFT_OUT[kind]}: find {joint}.{kind}", force
+
+
+def lacking_forces(replays: Replays, slopes: Slopes) -> list[Lack]:
+    """Return what forces of many shapes would change in the residuals, for each motor."""
+    rig = replays.rig(slopes.point)
+    if not isinstance(rig, OwnRig):
+        return []
+    texts = []
+    pieces = list(replays.pieces)
+    for i, joint in enumerate(driven_names(rig.plant)):
+        every = []
+        for motion in _motions(replays, slopes.point, i):
+            every.append([*shapes(motion), *left_out(motion, joint, replays.names)])
+        for of_pieces in zip(*every, strict=True):
+            words = of_pieces[0][0]
+            texts.append(f"lack of fit: the model lacks a force on {joint} {words}")
+            pieces += _pushed(replays.pieces, [force for _, force in of_pieces], i)
+    trial = copy.copy(replays)
+    trial.pieces = pieces
+    trial.corrections = None
+    states = np.tile(slopes.point.states, (len(texts) + 1, 1))
+    (rows,) = trial.residuals([Point(slopes.point.values, states)])
+    count = len(replays.pieces)
+    found = []
+    for k, text in enumerate(texts, 1):
+        changes = []
+        for after, before in zip(rows[k * count : (k + 1) * count], rows[:count], strict=True):
+            changes.append(after - before)
+        found.append(Lack(text, changes))
+    return found
+
+
+def _motions(replays: Replays, point: Point, i: int) -> list[Motion]:
+    """Return the motion of joint i in each piece, as it is predicted."""
+    rig = replays.rig(point)
+    assert isinstance(rig, OwnRig)
+    late = rig.values.get(DELAY, rig.base.input_delay)
+    (predicted,) = replays.predicted([point])
+    x, v, a = [], [], []
+    for piece, columns in zip(replays.pieces, predicted, strict=True):
+        period = _period(piece)
+        place = columns[rig.columns.x[i]]
+        speed = np.gradient(place, period)
+        t = period * np.arange(len(place))
+        acts = t + late + 0.5 * period  # a command is held over a sample
+        x.append(np.interp(acts, t, place))
+        v.append(np.interp(acts, t, speed))
+        a.append(np.interp(acts, t, np.gradient(speed, period)))
+    least = np.concatenate(x).min()
+    reach = np.ptp(np.concatenate(x)) or 1.0
+    fast = _rms(np.concatenate(v))
+    strong = _rms(np.concatenate(a))
+    records = [piece.record for piece in replays.pieces]
+    motions = []
+    for k, piece in enumerate(replays.pieces):
+        share = np.arange(len(x[k])) / len(x[k])
+        before = k - records.index(piece.record)
+        motions.append(
+            Motion(
+                place=(x[k] - least) / reach,
+                speed=v[k] / fast,
+                acceleration=a[k] / strong,
+                time=(before + share) / records.count(piece.record),
+                command=_fast_part(piece, i),
+            )
+        )
+    return motions
+
+
+def _period(piece: Piece) -> float:
+    """Return the time between samples of a piece, s."""
+    assert isinstance(piece.part, LogPart)
+    return piece.part.period * piece.part.stride
+
+
+def _rms(values: Array) -> float:
+    """Return the root mean square; 1 if it is 0."""
+    return float(np.sqrt(np.mean(values**2))) or 1.0
+
+
+def _fast_part(piece: Piece, i: int) -> Array:
+    """Return the command of motor i less its average over some samples, (N,)."""
+    from scipy.ndimage import uniform_filter1d
+
+    part = piece.part
+    assert isinstance(part, LogPart)
+    command = part.u[part.before :: part.stride, i]
+    size = 2 * max(1, round(AVERAGED / 2.0 / _period(piece))) + 1
+    return command - uniform_filter1d(command, size, mode="nearest")
+
+
+def _pushed(pieces: Sequence[Piece], forces: Sequence[Array], i: int) -> list[Piece]:
+    """Return the pieces with forces added to the commands of motor i, SIZE of its deviation."""
+    commands = []
+    for piece in pieces:
+        assert isinstance(piece.part, LogPart)
+        commands.append(piece.part.u[:, i])
+    size = SIZE * (float(np.std(np.concatenate(commands))) or 1.0) / _rms(np.concatenate(forces))
+    pushed = []
+    for piece, force in zip(pieces, forces, strict=True):
+        part = piece.part
+        assert isinstance(part, LogPart)
+        u = part.u.copy()
+        held = np.repeat(size * force, part.stride)
+        u[: part.before, i] += held[0]
+        u[part.before :, i] += held[: len(u) - part.before]
+        pushed.append(dataclasses.replace(piece, part=dataclasses.replace(part, u=u)))
+    return pushed
