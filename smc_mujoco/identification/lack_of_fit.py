@@ -36,7 +36,7 @@ class Lack:
     gives_way: bool = False
 
 
-class Share(NamedTuple):
+class Explained(NamedTuple):
     """What a lack explains beside the numbers and earlier lacks."""
 
     explained: float = 0.0  # of the squared residuals that are left
@@ -47,7 +47,7 @@ class Taken(NamedTuple):
     """A lack that is taken."""
 
     lack: Lack
-    explained: float  # as of Share
+    explained: float  # as of Explained
     deviations: float
     move: Array  # how far it moves the numbers, in their scales, (p,)
 
@@ -100,7 +100,7 @@ def lack_of_fit(slopes: Slopes, lacks: Sequence[Lack]) -> LackOfFit:
     return LackOfFit(taken, fitted)
 
 
-def _strongest(shares: Sequence[Share], lacks: Sequence[Lack]) -> int:
+def _strongest(shares: Sequence[Explained], lacks: Sequence[Lack]) -> int:
     """Return the index of the lack that explains most of those that stand out. If none does, of
     those that give way. -1 if there is none.
     """
@@ -115,7 +115,7 @@ def _strongest(shares: Sequence[Share], lacks: Sequence[Lack]) -> int:
     return best
 
 
-def _shares(slopes: Slopes, lacks: Sequence[Lack]) -> list[Share]:
+def _shares(slopes: Slopes, lacks: Sequence[Lack]) -> list[Explained]:
     """Return what each lack alone explains beside the numbers of the slopes."""
     J = slopes.freed_slopes
     basis, _ = np.linalg.qr(J / np.maximum(np.linalg.norm(J, axis=0), 1e-300))
@@ -128,16 +128,16 @@ def _shares(slopes: Slopes, lacks: Sequence[Lack]) -> list[Share]:
         own = change - basis @ (basis.T @ change)
         power = float(own @ own)
         if power <= OWN_SHARE**2 * float(change @ change):
-            found.append(Share())
+            found.append(Explained())
             continue
         size = -float(own @ left) / power
         if lack.gives_way and size <= 0.0:
-            found.append(Share())
+            found.append(Explained())
             continue
         pulls = np.add.reduceat(own * (left + size * own), starts)
         scatter = float(np.linalg.norm(pulls))
         explained = size**2 * power / max(float(left @ left), 1e-300)
-        found.append(Share(explained, abs(size) * power / max(scatter, 1e-300)))
+        found.append(Explained(explained, abs(size) * power / max(scatter, 1e-300)))
     return found
 
 

@@ -46,7 +46,7 @@ LEFT_OUT = {
 }
 
 
-class Motion(NamedTuple):
+class JointMotion(NamedTuple):
     """How a joint moves in a piece of a log when the command of each sample acts: N samples, each
     relative to what is said.
     """
@@ -66,7 +66,7 @@ class Motion(NamedTuple):
         return np.sign(self.speed)[following]
 
 
-def shapes(motion: Motion) -> Iterator[tuple[str, Array]]:
+def shapes(motion: JointMotion) -> Iterator[tuple[str, Array]]:
     """Yield what a model may lack, in words, and its force in a motion, (N,)."""
     direction = motion.direction
     speed = motion.speed
@@ -83,7 +83,7 @@ def shapes(motion: Motion) -> Iterator[tuple[str, Array]]:
     yield COMMAND, motion.command
 
 
-def left_out(motion: Motion, joint: str, names: Sequence[str]) -> Iterator[tuple[str, Array]]:
+def left_out(motion: JointMotion, joint: str, names: Sequence[str]) -> Iterator[tuple[str, Array]]:
     """Yield what a model may lack, and its force, of the joint's numbers that are not found."""
     forces = {
         "armature": motion.acceleration,
@@ -126,7 +126,7 @@ def lacking_forces(replays: Replays, slopes: Slopes) -> list[Lack]:
     return found
 
 
-def _motions(replays: Replays, point: Point, i: int) -> list[Motion]:
+def _motions(replays: Replays, point: Point, i: int) -> list[JointMotion]:
     """Return the motion of joint i in each piece, as it is predicted."""
     rig = replays.rig(point)
     assert isinstance(rig, OwnRig)
@@ -152,7 +152,7 @@ def _motions(replays: Replays, point: Point, i: int) -> list[Motion]:
         share = np.arange(len(x[k])) / len(x[k])
         before = k - records.index(piece.record)
         motions.append(
-            Motion(
+            JointMotion(
                 place=(x[k] - least) / reach,
                 speed=v[k] / fast,
                 acceleration=a[k] / strong,
