@@ -117,8 +117,6 @@ def identify(
 
     Example: smc-mujoco identify arm.xml run1.csv run2.csv --for shoulder.damping,input_delay
 
-    Example: smc-mujoco identify arm.xml:shoulder run.csv --for m --columns x=angle,u=torque
-
     Example: smc-mujoco identify arm.xml run.csv --condition "mine: friction=my.py:stribeck()" --for
     friction.coulomb,friction.speed
 
@@ -130,16 +128,11 @@ def identify(
     options.check_files(None, figure, out)
     renamed = options.pairs(columns, "columns", "x_elbow=angle,t=time") or None
     if pairs is not None:
-        if machine is not None or names is not None or condition is not None:
-            raise ScenarioError(
-                "--pairs has friction alone: leave out the machine, its logs, --for and --condition"
-            )
+        _alone("--pairs", machine, files, names, condition)
         _from_pairs(pairs, held_out, renamed, figure, out, terminal)
         return
     if machine is None or not files:
-        raise ScenarioError(
-            "identify needs a machine and its logs, as arm.xml run.csv, or --pairs FILE"
-        )
+        raise ScenarioError("identify needs a machine and its logs, or --pairs FILE")
     with delay_signals():
         from smc_mujoco.identification import identify as identification
 
@@ -156,6 +149,14 @@ def identify(
         progress=True,
     )
     _tell(found, list(map(str, files)), figure, out, terminal)
+
+
+def _alone(option: str, *others: Any) -> None:
+    """Raise ScenarioError if what belongs to a machine was given beside pairs."""
+    if any(others):
+        raise ScenarioError(
+            f"{option} has friction alone: leave out the machine, its logs, --for and --condition"
+        )
 
 
 def _tell(

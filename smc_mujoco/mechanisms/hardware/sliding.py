@@ -273,10 +273,8 @@ def _at_stages(formula: Formula) -> Callable:
         held = 0.0
         if y.stage == 0.0:
             smooth = y.others + y.mean
-            before = memory[STAGE_SPEED]
-            slow = abs(y.v) < STICKING_SPEED and (
-                memory[WAS_HELD] != 0.0 or abs(y.v) <= abs(before)
-            )
+            slower = memory[WAS_HELD] != 0.0 or abs(y.v) <= abs(memory[STAGE_SPEED])
+            slow = slower and abs(y.v) < STICKING_SPEED
             speed = 0.0 if seldom and slow else y.v
             found = first(y, speed, p, memory)
             f = force(found, y.v)
