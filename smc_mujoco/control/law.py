@@ -133,9 +133,8 @@ def law_function(
             return -gains.k * np.sign(s), s
 
     `y` is the measurement of one joint: y.e is the error, rad or m, y.de its rate, y.x and y.v
-    position and velocity, y.dt the control period; `help(smc_mujoco.control.measurement)` lists the
-    others. A helper function that the law calls needs @numba.njit above its def, or else the law
-    runs in Python, several times slower.
+    position and velocity, y.dt the control period; `help(smc_mujoco.control.measurement)` has more.
+    A helper that the law calls needs @numba.njit above its def, or the law runs in slow Python.
 
     Args:
       gains: name -> default value, or a Gain with unit and range. `smc.tune` needs the units.
@@ -148,14 +147,12 @@ def law_function(
         that tests it. A warning quotes the words, tuning stays within, and results of other gains
         are marked "outside its theorem".
       advice: the same for conditions that only warn.
-      plants: names of the plants that the law is for, or "a free body" for all that are one.
-        Default: all.
+      plants: names of the plants that the law is for, or "a free body". Default: all plants.
       requires_model: whether the law needs the nominal model. A scenario then gives it by default.
       label: name in figures and tables. Default: the function's name.
       short: name in two or three letters. Default: initials.
       colour: "#RRGGBB". Default: a colour of a palette, always the same.
-      rest: the law's linear part, a `smc_mujoco.control.component.Rest`. Default: the law is not
-        linear.
+      rest: the linear part of a law that has one, a `smc_mujoco.control.component.Rest`.
       family: one word, such as "terminal", by which lists group the laws.
       continuous: whether u is a continuous function of the measurement at s = 0 (at e = 0 for laws
         of e), however short the control period. Default: no.
@@ -176,9 +173,9 @@ def law_function(
     The function must be pure: state belongs in memory, parameters in gains. A compiled function
     keeps the values that its globals and closure had at compilation, and its random numbers would
     come from a shared generator. Each new function object is compiled once and occupies about 2.5
-    MB until the process ends, because numba never frees code. So change the value of a gain instead
-    of defining a function per value. A compiled law that never returns keeps a core busy until
-    Python ends, also after Ctrl-C. Endless recursion in a compiled law crashes the process.
+    MB until the process ends, so change a gain instead of defining a function per value. A compiled
+    law that never returns keeps a core busy until Python ends, also after Ctrl-C, and one with
+    endless recursion crashes the process.
 
     Returns:
       A decorator. The decorated function, called with gains as in `my_law(lam=5.0)`, returns the
