@@ -12,7 +12,7 @@ from benchmarks.friction_plants import joints
 JOINTS = ("rail", "geared")
 FRICTION = "coulomb30"  # of the reversals
 RESTS = ("pid", "hodob", "pd_observer", "super_twisting", "boundary_layer")
-LASTS = 20.0  # s
+SHOWN, LASTS = 2.0, 20.0  # s of a run to rest
 WIDTH, HEIGHT = 6.4, 6.2  # inches
 
 
@@ -52,7 +52,7 @@ def of_reversals(ax, points: Sequence[dict], joint: str, colours: dict[str, str]
 def of_rest(ax, points: Sequence[dict], joint: str, colours: dict[str, str]) -> None:
     """Draw runs of MuJoCo to rest under Stribeck friction, with the gains of the least J."""
     one = joints()[joint]
-    for law in RESTS:
+    for law in reversed(RESTS):  # what chatters lies below
         point = found(points, joint=joint, law=law, price="J", friction="stribeck")
         if not point or not point["errors"]:
             continue
@@ -60,7 +60,8 @@ def of_rest(ax, points: Sequence[dict], joint: str, colours: dict[str, str]) -> 
         told = Told(one, law, law_of(law, one), names)
         gains = list(point["gains"].values())
         trace = smc.run(told.scenario(gains, Case("stribeck"), 1, length=LASTS))
-        ax.plot(trace.t, trace.e[:, 0] / one.count, color=colours[law], lw=1.0)
+        late = trace.t >= SHOWN
+        ax.plot(trace.t[late], trace.e[late, 0] / one.count, color=colours[law], lw=1.0)
 
 
 def draw(points: Sequence[dict], path: Path) -> None:
@@ -78,14 +79,14 @@ def draw(points: Sequence[dict], path: Path) -> None:
             top, below = panels[0][column], panels[1][column]
             of_reversals(top, points, joint, by_law)
             top.axvspan(1e-3, 1.0, color=style.BAND, lw=0, zorder=0)
-            top.set(xscale="log", xlim=(0.3, 300.0), xlabel="rms error, counts")
+            top.set(xscale="log", xlim=(0.3, 300.0), xlabel="rms error (counts)")
             top.set_yticks(range(len(LAWS)), [name_of(law) for law in LAWS] if column == 0 else [])
             top.set_ylim(len(LAWS) - 0.4, -0.6)
             top.set_title(f"{joint}\nreversals, Coulomb 30 %")
             of_rest(below, points, joint, by_law)
-            below.set(xlim=(2.0, LASTS), ylim=(-60.0, 60.0), xlabel="t, s")
+            below.set(xlim=(SHOWN, LASTS), xlabel="time (s)")
             below.set_title("to rest, Stribeck, gains by J", weight="normal")
-        panels[1][0].set_ylabel("error, counts")
+        panels[1][0].set_ylabel("error (counts)")
         page.set_head(figure, WIDTH, "Laws under friction", handles)
         page.write(figure, page.files(path))
 
