@@ -120,8 +120,6 @@ def identify(
     Example: smc-mujoco identify arm.xml run.csv --condition "mine: friction=my.py:stribeck()" --for
     friction.coulomb,friction.speed
 
-    Example: smc-mujoco identify emps run.csv
-
     Example: smc-mujoco identify --pairs slow.csv --columns speed=dq4,torque=tau4 --figure friction
     """
     terminal = Terminal(json)
