@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from smc_mujoco.studies.advice import RaceAdvice
     from smc_mujoco.studies.table import Table
 
-FILMED = 0.1  # of the minutes, which are for the figure and the film; chosen
+FILMED = 0.5  # minutes that are for the figure and the film, and
+FILMED_SHARE = 0.2  # the largest share that they take of the minutes; chosen
 # pictures a second of the film; the largest is enough to follow a run, the smallest to see it
 MAX_FPS, MIN_FPS = 15.0, 4.0
 TIMED = 5  # pictures by which a film's time is estimated; chosen
@@ -128,7 +129,7 @@ def which(
         device=device,
         executor=executor,
         falling=falling,
-        minutes=whole and (1.0 - FILMED * film) * whole,
+        minutes=whole and whole - film * min(FILMED, FILMED_SHARE * whole),
     )
     terminal.print(advice)
     if isinstance(advice, RaceAdvice):
