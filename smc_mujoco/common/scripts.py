@@ -44,7 +44,8 @@ def execute(path: Path) -> dict:
 
 
 def named(text: str, what: str, wanted: Callable[[Any], bool]) -> Any:
-    """Return what FILE.py:NAME names, such as "my_parts.py:stribeck".
+    """Return what FILE.py:NAME names, such as "my_parts.py:stribeck". The file is run, unless it is
+    imported already.
 
     Args:
       text: matches IN_FILE.
@@ -57,7 +58,7 @@ def named(text: str, what: str, wanted: Callable[[Any], bool]) -> Any:
     file, _, name = text.rpartition(":")
     if not os.path.isfile(file):
         raise ScenarioError(f"no file {file!r}: give the file that defines {name!r}")
-    found = _defined(file, Path(file).read_bytes())
+    found = _imported(file) or _defined(file, Path(file).read_bytes())
     if name in found and wanted(found[name]):
         return found[name]
     others = []
@@ -66,6 +67,16 @@ def named(text: str, what: str, wanted: Callable[[Any], bool]) -> Any:
             others.append(other)
     cure = f"it has {joined(others)}" if others else "it has none"
     raise ScenarioError(f"{file} has no {what} {name!r}: {cure}")
+
+
+def _imported(file: str) -> dict:
+    """Return what a module of this file defines; empty if none was imported."""
+    for module in list(sys.modules.values()):
+        its = getattr(module, "__file__", None) or ""
+        alike = os.path.basename(its) == os.path.basename(file) and os.path.isfile(its)
+        if alike and os.path.samefile(its, file):
+            return vars(module)
+    return {}
 
 
 @functools.cache

@@ -169,7 +169,8 @@ def excitation(
 ) -> Excitation:
     """Recommend a motion to record, from which numbers of a machine can be told apart.
 
-        print(smc.design.excitation("arm.xml:elbow", ["elbow.damping"], u_max=5.0, duration=2.0))
+        arm = "arm.xml:elbow+held"
+        print(smc.design.excitation(arm, ["elbow.damping"], u_max=5.0, duration=2.0))
 
     Args:
       machine, names: as of `smc.identify`.
