@@ -261,7 +261,7 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
         0,
         [
             "identify('emps', [Path(a.csv), Path(b.csv), Path(c.csv)], ['mass', 'offset'], "
-            "held_out=Path(d.csv), columns={x: 'position'}, corrected=True, starts=2, seed=3",
+            "held_out=Path(d.csv), columns={x: 'position'}, condition=None, corrected=True, starts=2, seed=3",
             *AXIS,
             "c.csv falls at 8.4 s (falls at 8.4 s)",
             "the fit is poor",
@@ -272,7 +272,7 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
         0,
         [
             "identify('duffing', [Path(a.csv), Path(b.csv)], None, held_out=None, columns=None, "
-            "corrected=False, starts=1",
+            "condition=None, corrected=False, starts=1",
             "{twin: {x: 99.04, u: 81.0}}, {x: 'm', u: 'V'}, Path(fit))",
             *AXIS,
             "the fit is poor",
