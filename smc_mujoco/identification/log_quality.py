@@ -52,7 +52,7 @@ def _spikes(record: Record, name: str, time: str, unit: str) -> list[str]:
     if not out.any():
         return []
     first = int(np.argmax(out))
-    at = record[time][first + 1]
+    at = record[time][first + 2]
     return [
         f"{int(out.sum())} of {len(x)} samples of {name} stick out from both their neighbours by "
         f"more than {least:.2g} {unit}, the first at {at:.4g} s: interpolate over them"
@@ -60,13 +60,18 @@ def _spikes(record: Record, name: str, time: str, unit: str) -> list[str]:
 
 
 def _sticking_out(x: Array) -> Array:
-    """Return how far each inner sample lies beyond both its neighbours, (K - 2,); 0 if it lies
-    between them.
+    """Return how far each of K samples but two at both ends sticks out, (K - 4,): beyond both its
+    neighbours, and off the cubic through two samples on each side.
+
+    The cubic follows a turn of a fast motion, which lies beyond its neighbours, too.
     """
-    before = x[1:-1] - x[:-2]
-    after = x[1:-1] - x[2:]
-    least = np.minimum(np.abs(before), np.abs(after))
-    return np.where(before * after > 0.0, least, 0.0)
+    inner = x[2:-2]
+    before = inner - x[1:-3]
+    after = inner - x[3:-1]
+    beyond = np.minimum(np.abs(before), np.abs(after))
+    beyond[before * after <= 0.0] = 0.0
+    cubic = (4.0 * (x[1:-3] + x[3:-1]) - x[:-4] - x[4:]) / 6.0
+    return np.minimum(beyond, np.abs(inner - cubic))
 
 
 def _small(x: Array, name: str, unit: str) -> list[str]:

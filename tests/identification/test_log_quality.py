@@ -42,6 +42,14 @@ def test_spikes_are_counted_and_placed(rig):
     assert "the first at 0.4 s" in sentence
 
 
+@pytest.mark.parametrize("rate", [40.0, 60.0, 100.0])
+def test_the_turns_of_a_fast_chirp_are_no_spikes(rig, rate):
+    t = np.arange(0.0, 20.0, 1.0 / rate)
+    chirp = 0.4 * np.sin(2.0 * np.pi * (0.2 * t + 0.5 * (2.8 / 20.0) * t**2))  # 0.2 to 3 Hz
+    for x in (chirp, rounded(chirp)):
+        assert not log_quality.doubts(rig, [{"t": t, "x": x, "u": np.sin(5.0 * t)}])
+
+
 def test_a_motion_of_few_counts_is_told(rig):
     (sentence,) = said(rig, rounded(10.0 * COUNT * X / 0.4))
     assert "only 20 times the noise or the step of its sensor" in sentence
