@@ -234,8 +234,9 @@ class Trial(NamedTuple):
         for plant in self.plants:
             known[plant.name] = self.known(plant, laws[plant.name])
         if self.progress:
-            few = {self._if_few(of_plant, seeds) for of_plant in known.values()}
-            print(*filter(None, few), sep="\n", end="\n" * any(few), file=sys.stderr)
+            few = dict.fromkeys(self._if_few(of_plant, seeds) for of_plant in known.values())
+            for sentence in filter(None, few):
+                print(sentence, file=sys.stderr)
         by_plant: dict[str, list[Candidate]] = {}
         for plant in self.plants:
             by_plant[plant.name] = []

@@ -105,6 +105,12 @@ def test_what_a_file_lacks_is_one_sentence(text, words, parts, refused):
 
 
 @pytest.mark.quick
+@pytest.mark.parametrize("rest", ["(zone=", "(zone=0.3), u_max=2"])
+def test_a_drive_of_a_file_that_cannot_be_read_is_one_sentence(rest, parts, refused):
+    refused(lambda: options.actuator(f"my_parts.py:dead_zone{rest}"), "cannot be read", "gap=0.1")
+
+
+@pytest.mark.quick
 def test_a_part_is_itself_until_its_file_changes_and_then_a_run_has_another_key(parts):
     def key() -> str:
         mine = find_condition("mine: friction=my_parts.py:stribeck(static=0.3)")

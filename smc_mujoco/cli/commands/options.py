@@ -374,9 +374,17 @@ def actuator(text: str) -> "tuple[Actuator, ...]":
     for kind in subclasses(Actuator):
         known[kind.__name__.lower()] = kind
     parts = []
-    for part in text.split("+"):
+    for part in map(str.strip, text.split("+")):
         if WITHIN.match(part):
-            parts.append(read_fields(f"actuator={part}")["actuator"])
+            try:
+                fields = read_fields(f"actuator={part}")
+            except SyntaxError:
+                fields = {}
+            if list(fields) != ["actuator"]:
+                raise ScenarioError(
+                    f"actuator {shown(part)} cannot be read: write it as my_parts.py:name(gap=0.1)"
+                )
+            parts.append(fields["actuator"])
             continue
         name, _, numbers = part.partition(":")
         kind = find("actuator", name.strip().lower().replace("_", ""), known)

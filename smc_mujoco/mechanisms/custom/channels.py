@@ -545,10 +545,14 @@ def _check_kept(model: mujoco.MjModel, i: int, joint: str, channel: Channel, cur
     """Raise ScenarioError for an actuator that cannot stay as it is."""
     if why := not_kept(model, i):
         name = model.actuator(i).name or f"number {i}"
-        leave = "leave servo out, or " if channel.servo else ""
+        if not no_motor(model, i):
+            raise ScenarioError(
+                f"actuator {name!r} of joint {joint!r} {why}, but servo=True is for a <position> "
+                "or a <dcmotor>: leave servo out"
+            )
         raise ScenarioError(
-            f"actuator {name!r} of joint {joint!r} {why}, and what stays as it is is a <motor>, a "
-            f"<position> or a plain <dcmotor>: {leave}{cure}"
+            f"actuator {name!r} of joint {joint!r} {why}, and only a <motor>, a <position> or a "
+            f"plain <dcmotor> can be used as it is: {cure}"
         )
 
 

@@ -139,7 +139,7 @@ def test_a_bound_and_a_goal_follow_from_the_file():
 
 FREE = '<position joint="j" kp="17.8"/>'
 REFUSED = {
-    "a motor": ('<motor joint="j"/>', {}, ["is a motor", "leave servo out"]),
+    "a motor": ('<motor joint="j"/>', {}, ["is a motor", "servo=True is for", "leave servo out"]),
     "a lag": (
         '<general joint="j" dyntype="filter" dynprm=".1" gainprm="9" biastype="affine" biasprm="0 -9"/>',
         {},
