@@ -58,11 +58,11 @@ def named(text: str, what: str, wanted: Callable[[Any], bool]) -> Any:
     file, _, name = text.rpartition(":")
     if not os.path.isfile(file):
         raise ScenarioError(f"no file {file!r}: give the file that defines {name!r}")
-    found = _imported(file) or _defined(file, Path(file).read_bytes())
-    if name in found and wanted(found[name]):
-        return found[name]
+    defined = _imported(file) or _defined(file, Path(file).read_bytes())
+    if name in defined and wanted(defined[name]):
+        return defined[name]
     others = []
-    for other, value in found.items():
+    for other, value in defined.items():
         if wanted(value):
             others.append(other)
     cure = f"it has {joined(others)}" if others else "it has none"
@@ -72,9 +72,9 @@ def named(text: str, what: str, wanted: Callable[[Any], bool]) -> Any:
 def _imported(file: str) -> dict:
     """Return what a module of this file defines; empty if none was imported."""
     for module in list(sys.modules.values()):
-        its = getattr(module, "__file__", None) or ""
-        alike = os.path.basename(its) == os.path.basename(file) and os.path.isfile(its)
-        if alike and os.path.samefile(its, file):
+        path = getattr(module, "__file__", None) or ""
+        alike = os.path.basename(path) == os.path.basename(file) and os.path.isfile(path)
+        if alike and os.path.samefile(path, file):
             return vars(module)
     return {}
 
@@ -85,11 +85,11 @@ def _defined(file: str, content: bytes) -> dict:
     is one thing.
     """
     del content
-    found = execute(Path(file))
-    for name, value in found.items():
+    defined = execute(Path(file))
+    for name, value in defined.items():
         if callable(value):
             _places[id(value)] = value, f"{file}:{name}"
-    return found
+    return defined
 
 
 def place(thing: Any) -> str:

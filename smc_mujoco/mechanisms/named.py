@@ -8,7 +8,7 @@ as_plant("robot.xml:knee(motor)@home+held")
 as_plant("cart.xml:slide+hinge(measured)")
 
 A text is short, so what it leaves out is chosen and said: the pose is the file's keyframe, and
-other motors hold it.
+joints with other motors are held there.
 """
 
 import dataclasses

@@ -130,15 +130,16 @@ def _text(value: object) -> object:
 
 
 def _median(metric: str, values: np.ndarray) -> Cell:
-    """Return the median of a metric with its range; NaN is a run that has none."""
+    """Return the median of a metric with its range, of values (N,) that are NaN where a run has
+    none.
+    """
     known = values[~np.isnan(values)]
     missing = len(values) - len(known)
     alarm = f"{missing} of {len(values)} have none" if missing else ""
     if not len(known):
         return Cell("", alarm=alarm)
     text = CATALOGUE[metric].text
-    # the lower of two in the middle, as one of them may be inf
-    middle = float(np.sort(known)[(len(known) - 1) // 2])
+    middle = float(np.median(known))
     return Cell(text(middle), f"{text(float(known.min()))}–{text(float(known.max()))}", alarm=alarm)
 
 

@@ -44,6 +44,14 @@ def test_a_table_has_the_scores_of_every_run_in_order(monkeypatch):
     assert "1 of 2 have none" in str(table)
 
 
+def test_the_median_of_two_runs_is_their_mean():
+    law = at_defaults("pid")
+    runs = [smc.Scenario(plant="duffing", law=law, x0=x0, duration=0.5) for x0 in (0.1, 0.3)]
+    table = smc.score(runs, metrics=("itae",))
+    mean = sum(table.column("itae")) / 2.0
+    assert f" {mean:.3g}\n" in str(table)
+
+
 def test_what_cannot_be_scored_is_refused():
     with pytest.raises(smc.ScenarioError, match="give one Trace, or scenarios"):
         smc.score([1.0])

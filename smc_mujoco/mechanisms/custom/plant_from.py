@@ -118,9 +118,10 @@ def plant_from(
         range.
 
     Warns:
-      ScenarioWarning: what is changed in a URDF; constraints that give way, or dry friction that
-        creeps; a joint drawn outside its range; motors that nothing commands, without `others`;
-        equality constraints that are left out.
+      ScenarioWarning: what u is where the file's actuator takes no force, and an ideal motor in a
+        file without actuators; what is changed in a URDF; constraints that give way, or dry
+        friction that creeps; a joint drawn outside its range; motors that nothing commands, without
+        `others`; equality constraints that are left out.
 
     A scenario may have model="nominal" if every joint that moves with the channels is a channel or
     a partner, and no equality constraint acts; `plant.unmodelled` says why not. Films show the
