@@ -11,6 +11,9 @@ are independent of each other. It is still too small then, and a note says so.
 What a model lacks makes pieces and records disagree by more than that. So a standard error is also
 at least the scatter between pieces, and between records, if there are several.
 
+Correlations are those of least squares, which the motion decides. One pattern in the residuals
+would correlate all errors of a jackknife, also of quantities that the motion tells apart well.
+
 A closed loop feeds the noise of its measurement back. If one short transient decides a quantity,
 the other blocks do not show the effect of that noise. So closed loops are also simulated with their
 own noise and rounding, and a standard error is at least the deviation that these cause.
@@ -52,11 +55,12 @@ def statistics(
     """
     names = replays.names
     J = slopes.freed_slopes
-    covariance = jackknife(slopes)
-    deviation = np.sqrt(np.diag(covariance))
-    count = independent(slopes)
+    covariance = np.linalg.pinv(J.T @ J)
+    sizes = np.sqrt(np.diag(covariance))
     with np.errstate(all="ignore"):
-        correlations = np.nan_to_num(covariance / np.outer(deviation, deviation))
+        correlations = np.nan_to_num(covariance / np.outer(sizes, sizes))
+    count = independent(slopes)
+    deviation = np.sqrt(np.diag(jackknife(slopes)))
     deviation = np.maximum(deviation, by_correlation(slopes, J, count))
     by_piece = list(range(len(slopes.residuals)))
     by_record = [piece.record for piece in replays.pieces]
