@@ -366,6 +366,7 @@ def _parsed(node: ast.expr) -> Any:  # noqa: PLR0911  # a table
 
 def _call(node: ast.Call) -> Any:
     """Return the part, signal or estimator that a call makes."""
+    kind: Any
     if isinstance(node.func, ast.Constant):
         kind = named(str(node.func.value), WHAT, _usable)
     else:

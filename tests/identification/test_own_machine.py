@@ -56,6 +56,23 @@ def test_one_joint_s_friction_armature_and_delay_are_found_without_a_start(found
 
 
 @pytest.mark.slow
+def test_numbers_that_a_motion_tells_apart_are_no_pair_however_few_residuals_remain(tmp_path):
+    """Of a log of this package, what remains is one pattern, that of the replays' steps."""
+    bounded = ONE.replace('joint="j1"/>', 'joint="j1" ctrlrange="-10 10"/>')
+    arm = smc.plant_from(bounded, ["j1"])
+    true = dict(TRUTH)
+    timing = {"input_delay": true.pop("input_delay"), "control_period": 0.002}
+    machine = {"plant": arm, "mismatch": true, **timing}
+    measured = {"sensor": smc.Encoder(counts=4096), "noise": smc.Noise(2e-4)}
+    motion = smc.Sine(0.5, 2.5) + smc.Sine(0.25, 9.0)
+    law = smc.law("pid", kp=20.0, ki=0.0, kd=1.5)
+    case = smc.Scenario(**machine, **measured, law=law, reference=motion, duration=3.0)
+    smc.run(case).export(tmp_path / "run.csv")
+    told = smc.identify(arm, tmp_path / "run.csv", list(TRUTH))
+    assert not [note for note in told.notes if "told apart" in note]
+
+
+@pytest.mark.slow
 def test_friction_that_gives_way_before_it_slides_is_told_and_in_the_errors():
     """A user's log of MuJoCo alone, whose default dry friction creeps: an armature 6 % off had an
     error of 1 %. Bristles of a LuGre, as of a real joint, do the same.

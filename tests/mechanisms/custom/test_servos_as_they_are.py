@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import warnings
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -210,7 +211,8 @@ def test_an_actuator_is_used_as_it_is_and_u_is_told_where_it_is_no_force(drive, 
     said = smc.plant_from(HOBBY % drive, {"j": smc.Channel(servo=bool(u))}, name="servo")
     assert taken == said
     assert taken.argument == f"FILE.xml:{text}"
-    record = taken.build.about()
+    build: Any = taken.build
+    record = build.about()
     assert ("servo" in record["channels"]["j"]) == bool(u)  # as in older records
     assert restored(record, "servo") == taken
 
