@@ -265,6 +265,110 @@ def test_a_law_or_a_machine_of_another_kind_runs_as_in_mujoco(kind):
     check(plant, law, {"plain": fields, "noise": fields | noisy}, duration=2.0)
 
 
+def solved(plant, **numbers):
+    """The plant, where MuJoCo's search for the forces of constraints goes on to the end: by itself it
+    stops early, 1e-7 rad/s or less from them.
+    """
+    plant = smc.plant(plant, **numbers)
+
+    def build(n):
+        spec = plant.build(n)
+        spec.option.tolerance = 0.0
+        return spec
+
+    return dataclasses.replace(plant, build=build)
+
+
+PLAY = smc.Backlash(0.01, rotor_inertia=0.02, rotor_damping=0.01)
+SHAKEN = {"noise": smc.Noise(1e-4, 5e-4), "disturbance": SINE, "input_delay": 2e-3}
+GEARS = {  # plant, and what else the scenario has
+    "joint": (
+        solved("inverted_pendulum"),
+        {"actuator": PLAY, "friction": (smc.Coulomb(0.3), smc.Viscous(0.1))},
+    ),
+    "rotor": (
+        solved("duffing"),
+        {
+            "actuator": (smc.Lag(0.01), smc.Backlash(0.002, 0.4)),
+            "friction": (smc.Coulomb(0.4, side="motor"), smc.Viscous(0.1, side="motor")),
+            "sensor": smc.Encoder(math.inf, side="motor", delay=2e-3),
+            "jump": smc.Jump(1.0, {"mass": 2.0}),
+        },
+    ),
+    "bristles": (
+        solved("duffing"),
+        {"actuator": PLAY, "friction": smc.hardware.LuGre(0.2, 0.3, 0.05, side="motor")},
+    ),
+    "row": (
+        solved("pendulum_network", n=3),
+        {
+            "actuator": {"p1/hinge": PLAY, "p2/hinge": smc.Backlash(0.0)},
+            "friction": {"p0/hinge": smc.Coulomb(0.1), "p1/hinge": dahl(level=0.1)},
+            "v0": (0.1, 0.2, 0.3),
+        },
+    ),
+    "known": (
+        solved("duffing"),
+        {"actuator": PLAY, "friction": smc.Coulomb(0.3), "model": "true", "disturbance": SINE},
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", GEARS)
+def test_a_play_is_that_of_mujoco(kind):
+    plant, fields = GEARS[kind]
+    shaken = {} if fields.get("model") == "true" else {"noise": fields | SHAKEN}
+    check(plant, "boundary_layer", {"plain": fields} | shaken, duration=1.5)
+
+
+def drawn_play(draw):
+    """A plant with a play, and with friction of any kind on any side of it."""
+    plant = solved(draw.choice(["duffing", "inverted_pendulum", "van_der_pol"]))
+    gap = 10.0 ** draw.uniform(-3.5, -1.0)
+    play = smc.Backlash(gap, 10.0 ** draw.uniform(-3.0, 0.0), draw.choice([0.0, 0.05]))
+    level = 10.0 ** draw.uniform(-2.0, 0.0)
+    frictions = [smc.Coulomb(level), smc.hardware.LuGre(level, 1.5 * level, 0.05)]
+    sides = draw.sample(["link", "motor"], 2)
+    for k, side in enumerate(sides):
+        frictions[k] = dataclasses.replace(frictions[k], side=side)
+    frictions = draw.sample(frictions, draw.choice([0, 1, 2]))
+    if frictions:
+        frictions.append(smc.Viscous(0.1, side=frictions[-1].side))
+    drive = draw.choice([(), (smc.Lag(0.01),), (RateLimit(200.0),)])
+    sensor = smc.Encoder(draw.choice([math.inf, 4096]), side=draw.choice(["link", "motor"]))
+    fields = {"actuator": (*drive, play), "friction": tuple(frictions) or None, "sensor": sensor}
+    return plant, fields | draw.choice([{}, SHAKEN])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+def test_a_play_that_is_drawn_is_that_of_mujoco(seed):
+    draw = random.Random(seed)
+    plant, fields = drawn_play(draw)
+    law = draw.choice(["boundary_layer", "pid", "super_twisting", "adrc"])
+    check(plant, law, {"drawn": fields}, duration=1.5)
+
+
+@pytest.mark.parametrize(
+    ("plant", "fields"),
+    [
+        ("duffing", {"actuator": PLAY, "friction": Sigmoid(0.4, 50.0)}),
+        ("duffing", {"actuator": (smc.DCMotor(), PLAY)}),
+        ("duffing", {"actuator": PLAY, "contact": "stops"}),
+        ("cart_pole", {"actuator": PLAY}),
+        (
+            "inverted_pendulum_network",
+            {"actuator": {"p0/hinge": PLAY, "p1/hinge": ElasticJoint(3e3)}},
+        ),
+    ],
+    ids=str,
+)
+def test_what_is_beside_a_play_may_be_for_mujoco_alone(plant, fields):
+    case = smc.Scenario(plant=plant, law="none", **fields)
+    assert group.why_not(case)
+    assert group.why_not(dataclasses.replace(case, contact="none", friction=None), ("stick_time",))
+
+
 GENERAL = [law for law in laws() if not laws()[law].plants]
 
 

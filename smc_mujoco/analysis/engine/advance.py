@@ -1,12 +1,10 @@
-"""A physics step of the loop: the plant's equation with its drives and its friction, under RK4, or
-under the implicitfast of frictions whose force is held over a step.
-"""
+"""A physics step of the loop: the plant's equation with its drives and its friction, under RK4."""
 
 # pyright: reportCallIssue=false
 from typing import Any
 
 from smc_mujoco.analysis.engine.calls import Compiler, acting, array_in, reader
-from smc_mujoco.analysis.engine.form import SETTING, STATES, ChannelFunction, Form, Spring, layout
+from smc_mujoco.analysis.engine.form import SETTING, STATES, ChannelFunction, Form, layout
 from smc_mujoco.common.jit import always, inlined, record_in
 from smc_mujoco.mechanisms.hardware.drives import KEPT
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, JointState
@@ -27,7 +25,7 @@ def advancing(form: Form, between: Any, compile_user: Compiler) -> Any:
     bend = _bending(form)
     friction = _rubbing(form, compile_user)
     nominal = compile_user(form.nominal.function)
-    values = _valuing(form)
+    values = valuing(form)
     work_at = layout(form).work
 
     @inlined
@@ -74,7 +72,7 @@ def advancing(form: Form, between: Any, compile_user: Compiler) -> Any:
     return advance
 
 
-def _valuing(form: Form) -> Any:
+def valuing(form: Form) -> Any:
     """Return a function (row, step) -> the plant's values in a physics step, by their names."""
     jump = form.jump
     values = reader(form.nominal.names)
@@ -133,21 +131,21 @@ def _bending(form: Form) -> Any:
     """Return a function (view): accelerate the rotors, and put what their springs pass on in the
     place of the drives' force.
     """
-    if not form.elastic:
+    if not form.rotors:
         return always(None)
-    elastic = form.elastic
-    rotors = len(elastic)
+    joints = form.rotors
+    rotors = len(joints)
     first = form.n
-    width = len(Spring._fields)
-    spring_at = reader(Spring._fields)
+    width = len(form.beside_names)
+    spring_at = reader(form.beside_names)
     row_at, work_at = layout(form)[:2]
 
     @inlined
     def bend(view):
         row, _, work = view
         for k in range(rotors):
-            spring = spring_at(row, row_at.springs + width * k)
-            joint = elastic[k]
+            spring = spring_at(row, row_at.beside + width * k)
+            joint = joints[k]
             rotor = first + k
             speed = work[work_at.v + rotor]
             force = spring.stiffness * (work[work_at.x + rotor] - work[work_at.x + joint])
@@ -165,7 +163,7 @@ def _rubbing(form: Form, compile_user: Compiler) -> Any:
     """
     total = always(0.0)
     for at in reversed(layout(form).frictions):
-        total = _and_friction(at.part, total, _holding(form, acting(at, compile_user)))
+        total = and_friction(at.part, total, _holding(form, acting(at, compile_user)))
     row_at, work_at = layout(form)[:2]
 
     @inlined
@@ -211,7 +209,7 @@ def _holding(form: Form, of_stage: Any) -> Any:
     return force
 
 
-def _and_friction(part: ChannelFunction, others: Any, force: Any) -> Any:
+def and_friction(part: ChannelFunction, others: Any, force: Any) -> Any:
     """Return a function (view, y, i) -> the force of a friction on channel i, and of the others."""
     channels = part.channels
 
@@ -223,82 +221,3 @@ def _and_friction(part: ChannelFunction, others: Any, force: Any) -> Any:
         return found
 
     return total
-
-
-def advancing_implicitly(form: Form, compile_user: Compiler) -> Any:
-    """Return a function (view, k, within, step): a physics step h of MuJoCo's implicitfast, for
-    frictions whose force F is held over it. Of joint i, which moves alone:
-
-        (1 - h df_i/dv_i + h g_i b_i) a_i = f_i(x, v) + g_i (u_i + d_i + F_i)
-        v_i += h a_i,   x_i += h v_i
-
-    with b_i the damping of bristles. f is linear in v, so its slope is a difference from rest. A
-    damper between two joints acts by the speeds of the step's start in the other joint's equation:
-    MuJoCo keeps no derivative where the inertia matrix has no entry.
-    """
-    n = form.n
-    values = _valuing(form)
-    nominal = compile_user(form.nominal.function)
-    rub = _rubbing_held(form, compile_user)
-    row_at, work_at = layout(form)[:2]
-
-    @inlined
-    def advance(view, k, within, step):
-        row, _, work = view
-        h = row[SETTING.step]
-        xs = array_in(work, work_at.x, n)
-        vs = array_in(work, work_at.v, n)
-        unit = array_in(work, work_at.unit, n)
-        p = values(row, step)
-        for i in range(n):
-            f, g = nominal(xs, vs, i, p)
-            at_rest = nominal(xs, array_in(work, work_at.rest, n), i, p)[0]
-            unit[i] = 1.0
-            slope = nominal(xs, unit, i, p)[0] - at_rest
-            unit[i] = 0.0
-            damping = row[row_at.damping + i]
-            work[work_at.a + i] = f + g * (rub(view, i, step, at_rest / g) - damping * vs[i])
-            counted = damping + row[row_at.counted + i]
-            work[work_at.a + i] /= 1.0 + h * counted * g - h * slope
-        for i in range(n):
-            vs[i] += h * work[work_at.a + i]
-            xs[i] += h * vs[i]
-
-    return advance
-
-
-def _rubbing_held(form: Form, compile_user: Compiler) -> Any:
-    """Return a function (view, i, step, load) -> the force of the drive, the disturbances and the
-    frictions on channel i, with the plant's `load` on it at rest.
-    """
-    total = always(0.0)
-    for at in reversed(layout(form).frictions):
-        total = _and_friction(at.part, total, acting(at, compile_user))
-    work_at = layout(form).work
-
-    @inlined
-    def rub(view, i, step, load):
-        work = view.work
-        h = view.row[SETTING.step]
-        state = state_in(work, work_at.states + STATES * i)
-        pushed = work[work_at.d + i]
-        y = JointState(
-            t=step * h,
-            h=h,
-            x=work[work_at.x + i],
-            v=work[work_at.v + i],
-            u=state.delayed,
-            motor=state.middle,
-            load=load + pushed,
-            stage=0.0,
-            others=0.0,
-            mean=0.0,
-            level=0.0,
-            mobility=0.0,
-        )
-        force = total(view, y, i)
-        state.reaction += force
-        state.middle = state.delayed  # what the drive's force was, in the next step
-        return force + state.delayed + pushed
-
-    return rub

@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 from smc_mujoco.common.aliases import Names
 from smc_mujoco.control.joint_law import stored_dtype
 from smc_mujoco.control.measurement import Measurement
+from smc_mujoco.mechanisms.hardware.backlash import Backlash
+from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE
 from smc_mujoco.simulation.state import LOG
 
@@ -73,9 +75,10 @@ class Form(NamedTuple):
     surface: ChannelFunction | None
     sensor: ChannelFunction | None
     drive: ChannelFunction | None  # between command and force
-    elastic: tuple[int, ...]  # channels whose drive turns a rotor behind a spring
+    rotors: tuple[int, ...]  # channels whose drive turns a rotor beside the joint
     motor_side: tuple[int, ...]  # those of them whose sensor reads the rotor
-    frictions: tuple[ChannelFunction, ...]
+    frictions: tuple[ChannelFunction, ...]  # on joints
+    rotor_frictions: tuple[ChannelFunction, ...]  # on rotors, by the channels of their joints
     compensated: tuple[ChannelFunction, ...]  # frictions
     on_reference: bool  # whether they are compensated at the speed of the reference
     references: tuple[type, ...]  # kinds of signals, of all channels, or one for each
@@ -89,7 +92,7 @@ class Form(NamedTuple):
     clock: bool
     fails: bool
     drops: bool  # whether a sensor loses readings
-    implicit: bool  # whether a step is implicitfast's, not RK4's
+    implicit: bool  # whether a step is implicitfast's, with plays; else RK4's, with springs
     slots: int  # commands that are under way
     past: int  # physics steps whose states a sensor may read; 0 if it reads the present one
     metrics: Names
@@ -97,16 +100,17 @@ class Form(NamedTuple):
     @property
     def bodies(self) -> int:
         """How many positions it integrates: of all channels, then of their rotors."""
-        return self.n + len(self.elastic)
+        return self.n + len(self.rotors)
 
+    @property
+    def rubs(self) -> bool:
+        """Whether the loop has forces of friction."""
+        return bool(self.frictions) or self.implicit
 
-class Spring(NamedTuple):
-    """What is between a rotor and its joint, and the rotor, see `ElasticJoint`."""
-
-    stiffness: Any
-    damping: Any
-    rotor_inertia: Any
-    rotor_damping: Any
+    @property
+    def beside_names(self) -> Names:
+        """Names of the numbers of what is between a rotor and its joint."""
+        return Backlash.names if self.implicit else ElasticJoint.names
 
 
 class PartAt(NamedTuple):
@@ -137,10 +141,10 @@ class RowPlaces(NamedTuple):
     known: int  # values of the plant, as the law knows them; as many as it has names
     before: int  # and as they are until a jump
     after: int
-    damping: int  # this and `levels` only with frictions
+    damping: int  # on bodies; this and `levels` only with frictions or in an implicit step
     levels: int  # of dry friction
-    counted: int  # damping of bristles, as an implicit step counts it; only in such a step
-    springs: int  # a Spring of each rotor
+    counted: int  # damping of bristles on each body, as an implicit step counts it; only in one
+    beside: int  # what is between each rotor and its joint, by `beside_names`
     hinges: int  # whether a joint is one; only with a sensor
     periods: int  # s between readings, and until one arrives; only with a past
     delays: int
@@ -160,7 +164,8 @@ class WorkPlaces(NamedTuple):
     sum_v: int
     sum_a: int
     rest: int  # velocities of 0
-    unit: int  # and of 1 in one joint; only in an implicit step
+    unit: int  # and of 1 in one joint; only in an implicit step, as the next
+    dry: int  # force of MuJoCo's dry friction, of joint and rotor together, in the step before
     motor: int  # force of a drive at a stage
     d: int  # the disturbances' force
     seen_x: int
@@ -188,6 +193,7 @@ class Layout(NamedTuple):
     sensor: PartAt | None
     drive: PartAt | None
     frictions: tuple[PartAt, ...]
+    rotor_frictions: tuple[PartAt, ...]
     compensated: tuple[PartAt, ...]
     references: tuple[SignalAt, ...]
     disturbances: tuple[SignalAt, ...]
@@ -233,6 +239,7 @@ def layout(form: Form) -> Layout:
         sensor=form.sensor and of_part(form.sensor),
         drive=form.drive and of_part(form.drive),
         frictions=tuple(map(of_part, form.frictions)),
+        rotor_frictions=tuple(map(of_part, form.rotor_frictions)),
         compensated=tuple(map(of_part, form.compensated)),
         references=tuple(map(of_signal, form.references)),
         disturbances=tuple(map(of_signal, form.disturbances)),
@@ -256,10 +263,10 @@ def _row_places(form: Form, row: Places) -> RowPlaces:
         known=row.take(values),
         before=row.take(values),
         after=row.take(values),
-        damping=row.take(n if form.frictions else 0),
-        levels=row.take(n if form.frictions else 0),
-        counted=row.take(n if form.implicit else 0),
-        springs=row.take(len(Spring._fields) * len(form.elastic)),
+        damping=row.take(form.bodies if form.rubs else 0),
+        levels=row.take(form.bodies if form.rubs else 0),
+        counted=row.take(form.bodies if form.implicit else 0),
+        beside=row.take(len(form.beside_names) * len(form.rotors)),
         hinges=row.take(n if form.sensor else 0),
         periods=row.take(n if form.past else 0),
         delays=row.take(n if form.past else 0),
@@ -282,6 +289,7 @@ def _work_places(form: Form, work: Places) -> WorkPlaces:
         sum_a=work.take(form.bodies),
         rest=work.take(n),
         unit=work.take(n if form.implicit else 0),
+        dry=work.take(n if form.implicit else 0),
         motor=work.take(n),
         d=work.take(n),
         seen_x=work.take(n),

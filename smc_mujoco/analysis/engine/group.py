@@ -19,7 +19,6 @@ from smc_mujoco.analysis.engine.form import (
     PartAt,
     Settings,
     SignalAt,
-    Spring,
     layout,
 )
 from smc_mujoco.analysis.engine.scores import RESTING, holds, summed_up
@@ -27,6 +26,8 @@ from smc_mujoco.common import fingerprint, indices
 from smc_mujoco.common.aliases import Fields
 from smc_mujoco.common.jit import AtAddress, Uncompiled
 from smc_mujoco.control.component import Component
+from smc_mujoco.mechanisms.hardware.backlash import Backlash
+from smc_mujoco.mechanisms.hardware.beside_joint import BesideJoint
 from smc_mujoco.mechanisms.hardware.drives import advanced
 from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
 from smc_mujoco.mechanisms.layout import moves_alone
@@ -59,18 +60,22 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
         f"{plant.name} is more than one equation a joint": bool(
             plant.by_mujoco or plant.unmodelled or plant.direct or plant.measured
         ),
-        "it has MuJoCo's friction, contacts or another mechanism": not (
-            s.plain_equation or (s.exact_friction and not plant.free) or rubs_by_force(s)
+        "it has friction by a formula beside a play or a force that is held over a step": (
+            not s.exact_friction and _has_brakes(s) and _needs_implicit(s)
         ),
-        "it has an actuator other than lags, rate limits and elastic joints": not all(
-            isinstance(part, ElasticJoint) or lags(part) for part in s.actuator
+        "it has MuJoCo's friction, contacts, another mechanism, or a play on joints that do not "
+        "move alone": not (
+            s.plain_equation or (s.exact_friction and not plant.free) or steps_implicitly(s)
+        ),
+        "it has an actuator other than lags, rate limits, and springs or plays before joints": (
+            not all(isinstance(part, _beside(s)) or lags(part) for part in s.actuator)
         ),
         f"its integrator is {s.integrator}": s.integrator
-        != ("implicitfast" if rubs_by_force(s) else "RK4"),
+        != ("implicitfast" if steps_implicitly(s) else "RK4"),
     }
     for name in filter(holds, metrics):
-        told = f"{name} needs the force of bristles or of your own friction, as a trace has it"
-        beyond[told] = rubs_by_force(s)
+        told = f"{name} needs the force of friction or of a play on the joint, as a trace has it"
+        beyond[told] = steps_implicitly(s)
     return first_of(beyond) or why_not_sampled(s, metrics, device)
 
 
@@ -144,16 +149,29 @@ def _indexes_within(user: tuple[Any, int]) -> bool:
     return indices.within(*user)
 
 
-def rubs_by_force(s: Resolved) -> bool:
-    """Return whether its friction is functions whose force is held over a step, and dampers, of
-    joints that move alone.
+def steps_implicitly(s: Resolved) -> bool:
+    """Return whether the loop has a step of implicitfast for it: for plays and for frictions whose
+    force is held over a step, of joints that move alone. Dampers and MuJoCo's own dry friction may
+    be beside them.
     """
-    if s.contact or s.mechanism != "equation" or s.actuator or s.exact_friction:
+    if s.contact or s.mechanism != "equation" or s.exact_friction or s.plant.rubs:
         return False
-    held = [part for part in s.friction if not part.smooth]
-    if not held or s.plant.rubs:
-        return False
-    return all(part.held is not None for part in held) and moves_alone(s.plant)
+    return _needs_implicit(s) and not _has_brakes(s) and moves_alone(s.plant)
+
+
+def _needs_implicit(s: Resolved) -> bool:
+    """Return whether it has plays, or frictions whose force is held over a step."""
+    return bool(_held(s)) or any(isinstance(part, Backlash) for part in s.actuator)
+
+
+def _has_brakes(s: Resolved) -> bool:
+    """Return whether it has frictions by a formula."""
+    return any(part.brake is not None for part in s.friction)
+
+
+def _beside(s: Resolved) -> type[BesideJoint]:
+    """Return what the loop may have between a rotor and its joint."""
+    return Backlash if steps_implicitly(s) else ElasticJoint
 
 
 def key(scenario: Scenario) -> Hashable:
@@ -161,14 +179,13 @@ def key(scenario: Scenario) -> Hashable:
     return form_of(scenario.resolved)._replace(**VARYING, disturbances=())
 
 
-def _springs(s: Resolved) -> dict[int, Spring]:
-    """Return the spring behind the rotor of each channel that has one."""
-    found = {}
+def _rotors(s: Resolved) -> tuple[int, ...]:
+    """Return the channels whose drive turns a rotor."""
+    found = []
     for i, chain in enumerate(s.drive_train.chains):
-        for part in chain:
-            if isinstance(part, ElasticJoint):
-                found[i] = Spring(*(getattr(part, name) for name in Spring._fields))
-    return found
+        if any(isinstance(part, BesideJoint) for part in chain):
+            found.append(i)
+    return tuple(found)
 
 
 def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
@@ -185,12 +202,14 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
     for law in s.law.of_channels(s.plant.driven):
         laws.append(_part(law)._replace(channels=every if law.joint else ()))
     frictions = [_on_channels(part, part.stage_force, s) for part in s.exact_parts]
+    on_rotors = []
     for part in _held(s):
-        frictions.append(_on_channels(part, part.force, s))
+        on_side = on_rotors if part.side == "motor" else frictions
+        on_side.append(_on_channels(part, part.force, s))
     compensated = []
     for part in s.compensated:
         compensated.append(_on_channels(part, part.steady, s))
-    elastic = tuple(_springs(s))
+    rotors = _rotors(s)
     motor_side = set()
     for part in s.sensors:
         if part.side == "motor":
@@ -209,9 +228,10 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
         surface=s.surface and _part(s.surface),
         sensor=sensors[0] if sensors else None,
         drive=drives[0] if drives else None,
-        elastic=elastic,
-        motor_side=tuple(i for i in elastic if i in motor_side),
+        rotors=rotors,
+        motor_side=tuple(i for i in rotors if i in motor_side),
         frictions=tuple(frictions),
+        rotor_frictions=tuple(on_rotors),
         compensated=tuple(compensated),
         on_reference=bool(compensation(s).get("on_reference")),
         references=tuple(map(type, references(s))),
@@ -225,7 +245,7 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
         clock=clock,
         fails=s.fault is not None,
         drops=any(part.dropout for part in s.sensors),
-        implicit=rubs_by_force(s),
+        implicit=steps_implicitly(s),
         slots=slots,
         past=past,
         metrics=tuple(metrics),
@@ -260,9 +280,9 @@ def _drives(s: Resolved) -> list[Any]:
 
 def _held(s: Resolved) -> list[Any]:
     """Return the frictions whose force is held over a step."""
-    if not rubs_by_force(s):
+    if s.exact_friction:
         return []
-    return [part.held for part in s.friction if not part.smooth]
+    return [part.held for part in s.friction if part.held is not None]
 
 
 def _oldest(s: Resolved) -> int:
@@ -377,8 +397,12 @@ class FormGroup:
             parts.append((self.layout.drive, part))
         for part in s.sensors:
             parts.append((self.layout.sensor, part))
-        if self.form.frictions:  # else MuJoCo has them
-            parts += zip(self.layout.frictions, (*s.exact_parts, *_held(s)), strict=True)
+        if self.form.rubs:  # else MuJoCo has them
+            held = _held(s)
+            on_joints = [part for part in held if part.side == "link"]
+            on_rotors = [part for part in held if part.side == "motor"]
+            parts += zip(self.layout.frictions, (*s.exact_parts, *on_joints), strict=True)
+            parts += zip(self.layout.rotor_frictions, on_rotors, strict=True)
         parts += zip(self.layout.compensated, s.compensated, strict=True)
         for at, part in parts:
             assert at is not None  # one loop's scenarios have the same parts
@@ -389,7 +413,7 @@ class FormGroup:
             table[channels] = part.numbers(run_of(s, part))
             if part.counted:
                 damping = table[channels, part.names.index(part.counted)]
-                row[np.add(self.layout.row.counted, channels)] += damping
+                row[np.add(self.layout.row.counted, self._bodies(part, s))] += damping
         for part in s.sensors if self.form.past else ():
             for i in part.channels(s.plant):
                 row[self.layout.row.periods + i] = part.period or 0.0
@@ -397,12 +421,28 @@ class FormGroup:
         if s.compensated:
             numbers = compensation(s)
             _put(row, self.layout.row.compensation, (numbers["share"], numbers["eps"]))
-        for k, spring in enumerate(_springs(s).values()):
-            _put(row, self.layout.row.springs + len(spring) * k, spring)
+        self._fill_rotors(row, s)
         places = self.layout.row.damping, self.layout.row.levels
-        for part in s.friction if self.form.frictions else ():
+        for part in s.friction if self.form.rubs else ():
             for first, value in zip(places, part.added_to_model, strict=True):
-                row[np.add(first, part.channels(s.plant))] += value
+                row[np.add(first, self._bodies(part, s))] += value
+
+    def _bodies(self, part: Any, s: Resolved) -> list[int]:
+        """Return which bodies a friction acts on: its joints, or their rotors."""
+        channels = [*part.channels(s.plant)]
+        if part.side == "link":
+            return channels
+        return [self.form.n + self.form.rotors.index(i) for i in channels]
+
+    def _fill_rotors(self, row: np.ndarray, s: Resolved) -> None:
+        width = len(self.form.beside_names)
+        for part in s.actuator:
+            if not isinstance(part, BesideJoint):
+                continue
+            numbers = part.numbers(run_of(s, part))
+            for i, values in zip(part.channels(s.plant), numbers, strict=True):
+                k = self.form.rotors.index(i)
+                _put(row, self.layout.row.beside + width * k, values)
 
     @property
     def _columns(self) -> int:

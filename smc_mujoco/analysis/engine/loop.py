@@ -8,7 +8,7 @@ a run reads its numbers from its row, and keeps its state in `work`, see `form.l
 import math
 from typing import Any, NamedTuple
 
-from smc_mujoco.analysis.engine.advance import advancing, advancing_implicitly
+from smc_mujoco.analysis.engine.advance import advancing
 from smc_mujoco.analysis.engine.calls import (
     Compiler,
     acting,
@@ -35,6 +35,7 @@ from smc_mujoco.analysis.engine.form import (
     layout,
     measured_places,
 )
+from smc_mujoco.analysis.engine.implicit_step import advancing_implicitly
 from smc_mujoco.analysis.engine.scores import COLUMN, log_in, tallying
 from smc_mujoco.common.aliases import Fields
 from smc_mujoco.common.jit import always, beyond, inlined, place, record_in
@@ -75,8 +76,8 @@ def simulation(form: Form, compile_user: Compiler, noise: Any) -> Any:
     else:
         advance = advancing(form, between, compile_user)
     remember = remembering(form)
-    elastic = form.elastic
-    rotors = len(elastic)
+    joints = form.rotors
+    rotors = len(joints)
     record = recording(form)
     n = form.n
     row_at, work_at = layout(form)[:2]
@@ -92,8 +93,8 @@ def simulation(form: Form, compile_user: Compiler, noise: Any) -> Any:
             work[work_at.v + i] = row[row_at.v0 + i]
         if rotors:
             for k in range(rotors):
-                work[work_at.x + n + k] = row[row_at.x0 + elastic[k]]
-                work[work_at.v + n + k] = row[row_at.v0 + elastic[k]]
+                work[work_at.x + n + k] = row[row_at.x0 + joints[k]]
+                work[work_at.v + n + k] = row[row_at.v0 + joints[k]]
         scores[FAILURE] = UNDER_WAY
         return int(row[SETTING.samples])
 
@@ -134,7 +135,7 @@ def moments(form: Form, compile_user: Compiler, noise: Any) -> Moments:
         clock=form.clock,
         delayed=form.delay,
         fails=form.fails,
-        sums=bool(form.frictions),
+        sums=form.rubs,
     )
     if form.joint:
         return found._replace(ask=_asking_all(form, compile_user))
@@ -200,7 +201,7 @@ def _siding(form: Form) -> Any:
         return inlined(lambda i: i)
     bodies = list(range(form.n))
     for i in form.motor_side:
-        bodies[i] = form.n + form.elastic.index(i)
+        bodies[i] = form.n + form.rotors.index(i)
     read = tuple(bodies)
     return inlined(lambda i: read[i])
 

@@ -92,4 +92,4 @@ class WorldGroup(FormGroup):
         form = form_of(s, metrics)
         if s.plant.by_mujoco or s.plant.unmodelled:
             form = form._replace(nominal=ChannelFunction(no_model, form.nominal.names))
-        return form._replace(frictions=(), implicit=False)
+        return form._replace(frictions=(), rotor_frictions=(), implicit=False)

@@ -3,14 +3,17 @@ MuJoCo's limits.
 """
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, ClassVar
 
 import mujoco
 
 from smc_mujoco.common.constraints import Number
 from smc_mujoco.mechanisms.hardware.beside_joint import MIN_INERTIA, BesideJoint
+from smc_mujoco.mechanisms.hardware.moments import Run
 from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF, Natural
+from smc_mujoco.mechanisms.layout import ROTOR
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
 
 # Time constant, s, and damping ratio of the stops: with a ratio of 1 a flank rebounds at up to 25 %
@@ -39,6 +42,9 @@ class Backlash(BesideJoint):
 
     smooth = False
     units: ClassVar[Mapping[str, str]] = {"gap": "{x}"} | BesideJoint.units
+    # of the little mass that the compiler needs: whether it turns, and its weight's force at 0 and
+    # after a quarter of a turn
+    names = "gap", "rotor_inertia", "rotor_damping", "turns", "weight", "weight_across"
 
     gap: Natural
     rotor_inertia: Annotated[float, Number(low=MIN_INERTIA, high=MAX_PARAMETER)] = 1e-3
@@ -46,6 +52,23 @@ class Backlash(BesideJoint):
 
     def longest_step(self, plant: Plant) -> float:
         return PLAY_STEP
+
+    def numbers(self, run: Run) -> list[Sequence[float]]:
+        model = run.model
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        at_0 = -data.qfrc_bias
+        data.qpos[:] = math.pi / 2
+        mujoco.mj_forward(model, data)
+        across = -data.qfrc_bias
+        rows = []
+        for dof in run.dofs:
+            joint = model.joint(ROTOR + model.joint(int(model.dof_jntid[dof])).name)
+            rotor = joint.dofadr[0]
+            turns = float(joint.type[0] == mujoco.mjtJoint.mjJNT_HINGE)
+            of_rotor = self.gap, model.dof_M0[rotor], self.rotor_damping
+            rows.append((*of_rotor, turns, at_0[rotor], across[rotor]))
+        return rows
 
     def couple(self, tendon: mujoco.MjsTendon) -> None:
         """Limit it to the play."""

@@ -18,6 +18,7 @@ import numpy as np
 from smc_mujoco.common.constraints import Number
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.beside_joint import MIN_INERTIA, BesideJoint
+from smc_mujoco.mechanisms.hardware.moments import Run
 from smc_mujoco.mechanisms.hardware.part import Actuator, Natural, Positive
 from smc_mujoco.mechanisms.layout import dof_ids, loaded
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
@@ -56,6 +57,7 @@ class ElasticJoint(BesideJoint):
         "stiffness": "{f}/{x}",
         "damping": "{f} s/{x}",
     } | BesideJoint.units
+    names = "stiffness", "damping", "rotor_inertia", "rotor_damping"
 
     stiffness: Positive
     damping: Natural = 0.0
@@ -88,6 +90,9 @@ class ElasticJoint(BesideJoint):
                 f"physics_step={s.control_period:g}/{steps} or less, a heavier rotor, or leave it "
                 "out, as so stiff a joint is nearly rigid"
             )
+
+    def numbers(self, run: Run) -> list[Sequence[float]]:
+        return [[getattr(self, name) for name in self.names]] * run.n
 
     def couple(self, tendon: mujoco.MjsTendon) -> None:
         """Make a spring of it, unbent where rotor and joint are at the same angle."""

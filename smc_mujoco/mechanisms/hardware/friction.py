@@ -27,7 +27,7 @@ from smc_mujoco.mechanisms.hardware.part import (
     Part,
     Positive,
 )
-from smc_mujoco.mechanisms.layout import PASSIVE
+from smc_mujoco.mechanisms.layout import PASSIVE, ROTOR
 from smc_mujoco.mechanisms.plant import Field, Plant
 
 # Where a dcmotor's bristles lie in the compiled model.
@@ -237,14 +237,21 @@ class Bristles(Part):
 
     friction: "LuGre"
 
+    @property
+    def side(self) -> str:
+        """The side of a play that it acts on."""
+        return self.friction.side
+
     def channels(self, plant: Plant) -> Sequence[int]:
         return self.friction.channels(plant)
 
     def numbers(self, run: Run) -> list[Sequence[float]]:
         model = run.model
         rows = []
+        shaft = ROTOR if self.side == "motor" else ""
         for dof in run.dofs:
-            bristles = model.actuator(PASSIVE + model.joint(int(model.dof_jntid[dof])).name).id
+            joint = shaft + model.joint(int(model.dof_jntid[dof])).name
+            bristles = model.actuator(PASSIVE + joint).id
             levels = model.actuator_biasprm[bristles, LEVELS]
             rows.append([*levels, *model.actuator_dynprm[bristles, [STIFFNESS, DAMPING]]])
         return rows
@@ -323,8 +330,8 @@ class LuGre(Friction):
             )
 
     @property
-    def held(self) -> Part | None:
-        return Bristles(self) if self.side == "link" else None
+    def held(self) -> Part:
+        return Bristles(self)
 
     @staticmethod
     def steady(y, p, memory):
