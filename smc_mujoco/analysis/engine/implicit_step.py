@@ -32,12 +32,34 @@ def advancing_implicitly(form: Form, compile_user: Compiler) -> Any:
     """
     n = form.n
     bodies = form.bodies
+    values = valuing(form)
+    accelerate = _accelerating(form, compile_user)
+    work_at = layout(form).work
+
+    @inlined
+    def advance(view, k, within, step):
+        row, _, work = view
+        h = row[SETTING.step]
+        p = values(row, step)
+        for i in range(n):
+            accelerate(view, i, step, p)
+        for i in range(bodies):
+            work[work_at.v + i] += h * work[work_at.a + i]
+            work[work_at.x + i] += h * work[work_at.v + i]
+
+    return advance
+
+
+def _accelerating(form: Form, compile_user: Compiler) -> Any:
+    """Return a function (view, i, step, p): accelerate joint i, and the rotor beside it, of a plant
+    with the values p.
+    """
+    n = form.n
     driven = form.driven
     behind = []  # which rotor is beside a channel's joint; -1 without one
     for i in range(n):
         behind.append(form.rotors.index(i) if i in form.rotors else -1)
     rotor_of = tuple(behind)
-    values = valuing(form)
     nominal = compile_user(form.nominal.function)
     drive = driving(form)
     rub = _rubbing(form, layout(form).frictions, compile_user)
@@ -45,46 +67,39 @@ def advancing_implicitly(form: Form, compile_user: Compiler) -> Any:
     row_at, work_at = layout(form)[:2]
 
     @inlined
-    def advance(view, k, within, step):
+    def accelerate(view, i, step, p):
         row, _, work = view
         h = row[SETTING.step]
         xs = array_in(work, work_at.x, n)
         vs = array_in(work, work_at.v, n)
         unit = array_in(work, work_at.unit, n)
-        p = values(row, step)
-        for i in range(n):
-            f, g = nominal(xs, vs, i, p)
-            at_rest = nominal(xs, array_in(work, work_at.rest, n), i, p)[0]
-            unit[i] = 1.0
-            slope = nominal(xs, unit, i, p)[0] - at_rest
-            unit[i] = 0.0
-            pushed = work[work_at.d + i]
-            state = state_in(work, work_at.states + STATES * i)
-            t = step * h
-            load = at_rest / g + pushed + work[work_at.dry + i]
-            y = _state_of(t, h, xs[i], vs[i], state.delayed, state.middle, load)
-            rubbed = rub(view, y, i)
-            state.reaction += rubbed
-            motor = drive(view, i, 0) if i < driven else 0.0
-            force = rubbed + pushed if rotor_of[i] >= 0 else rubbed + motor + pushed
-            damping = row[row_at.damping + i]
-            a = f + g * (force - damping * vs[i])
-            joint = Body(vs[i], a, g, row[row_at.levels + i])
-            work[work_at.dry + i] = 0.0
-            flank = 0.0
-            if rotor_of[i] >= 0:
-                flank = -turn(view, y, i, rotor_of[i], joint, motor)
-            dry = dry_friction(joint, flank, h)
-            work[work_at.dry + i] += dry
-            state.reaction += flank + dry
-            a += g * (flank + dry)
-            counted = damping + row[row_at.counted + i]
-            work[work_at.a + i] = a / (1.0 + h * counted * g - h * slope)
-        for i in range(bodies):
-            work[work_at.v + i] += h * work[work_at.a + i]
-            work[work_at.x + i] += h * work[work_at.v + i]
+        f, g = nominal(xs, vs, i, p)
+        at_rest = nominal(xs, array_in(work, work_at.rest, n), i, p)[0]
+        unit[i] = 1.0
+        slope = nominal(xs, unit, i, p)[0] - at_rest
+        unit[i] = 0.0
+        pushed = work[work_at.d + i]
+        state = state_in(work, work_at.states + STATES * i)
+        load = at_rest / g + pushed + work[work_at.dry + i]
+        y = _state_of(step * h, h, xs[i], vs[i], state.delayed, state.middle, load)
+        rubbed = rub(view, y, i)
+        motor = drive(view, i, 0) if i < driven else 0.0
+        force = rubbed + pushed if rotor_of[i] >= 0 else rubbed + motor + pushed
+        damping = row[row_at.damping + i]
+        a = f + g * (force - damping * vs[i])
+        joint = Body(vs[i], a, g, row[row_at.levels + i])
+        work[work_at.dry + i] = 0.0
+        flank = 0.0
+        if rotor_of[i] >= 0:
+            flank = -turn(view, y, i, rotor_of[i], joint, motor)
+        dry = dry_friction(joint, flank, h)
+        work[work_at.dry + i] += dry
+        state.reaction += rubbed + flank + dry
+        a += g * (flank + dry)
+        counted = damping + row[row_at.counted + i]
+        work[work_at.a + i] = a / (1.0 + h * counted * g - h * slope)
 
-    return advance
+    return accelerate
 
 
 @inlined
