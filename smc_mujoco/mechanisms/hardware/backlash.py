@@ -41,7 +41,7 @@ class Backlash(BesideJoint):
     """
 
     smooth = False
-    units: ClassVar[Mapping[str, str]] = {"gap": "{x}"} | BesideJoint.units
+    units: ClassVar[Mapping[str, str]] = {"gap": "{x}", **BesideJoint.units}
     # of the little mass that the compiler needs: whether it turns, and its weight's force at 0 and
     # after a quarter of a turn
     names = "gap", "rotor_inertia", "rotor_damping", "turns", "weight", "weight_across"

@@ -56,7 +56,8 @@ class ElasticJoint(BesideJoint):
     units: ClassVar[Mapping[str, str]] = {
         "stiffness": "{f}/{x}",
         "damping": "{f} s/{x}",
-    } | BesideJoint.units
+        **BesideJoint.units,
+    }
     names = "stiffness", "damping", "rotor_inertia", "rotor_damping"
 
     stiffness: Positive
