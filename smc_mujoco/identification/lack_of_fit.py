@@ -122,23 +122,23 @@ def _shares(slopes: Slopes, lacks: Sequence[Lack]) -> list[Explained]:
     r = slopes.freed_residuals
     left = r - basis @ (basis.T @ r)
     starts = _starts(slopes)
-    found = []
+    shares = []
     for lack in lacks:
         change = np.concatenate(slopes.freed(lack.changes))
         own = change - basis @ (basis.T @ change)
         power = float(own @ own)
         if power <= OWN_SHARE**2 * float(change @ change):
-            found.append(Explained())
+            shares.append(Explained())
             continue
         size = -float(own @ left) / power
         if lack.gives_way and size <= 0.0:
-            found.append(Explained())
+            shares.append(Explained())
             continue
         pulls = np.add.reduceat(own * (left + size * own), starts)
         scatter = float(np.linalg.norm(pulls))
         explained = size**2 * power / max(float(left @ left), 1e-300)
-        found.append(Explained(explained, abs(size) * power / max(scatter, 1e-300)))
-    return found
+        shares.append(Explained(explained, abs(size) * power / max(scatter, 1e-300)))
+    return shares
 
 
 def _starts(slopes: Slopes) -> Array:

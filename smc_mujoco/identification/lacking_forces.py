@@ -117,13 +117,13 @@ def lacking_forces(replays: Replays, slopes: Slopes) -> list[Lack]:
     states = np.tile(slopes.point.states, (len(texts) + 1, 1))
     (rows,) = trial.residuals([Point(slopes.point.values, states)])
     count = len(replays.pieces)
-    found = []
+    lacks = []
     for k, text in enumerate(texts, 1):
         changes = []
         for after, before in zip(rows[k * count : (k + 1) * count], rows[:count], strict=True):
             changes.append(after - before)
-        found.append(Lack(text, changes))
-    return found
+        lacks.append(Lack(text, changes))
+    return lacks
 
 
 def _motions(replays: Replays, point: Point, i: int) -> list[JointMotion]:

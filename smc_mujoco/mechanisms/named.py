@@ -48,25 +48,25 @@ def as_plant(value: object) -> Plant:
         raise ScenarioError(
             "plant is the text of a model: give smc.plant_from(text, channels=['joint'])"
         )
-    made = from_text(value) if isinstance(value, str) else value
-    if not isinstance(made, Plant):
+    machine = from_text(value) if isinstance(value, str) else value
+    if not isinstance(machine, Plant):
         raise ScenarioError(
-            f"plant is {shown(made)}: give a name that smc.plants() lists, smc.plant(...), "
+            f"plant is {shown(machine)}: give a name that smc.plants() lists, smc.plant(...), "
             "or FILE.xml:joint,joint"
         )
-    return made
+    return machine
 
 
 def jointed(value: object, analysis: str) -> Plant:
     """Return a plant as `as_plant` does. Refuse a free body, whose channels are no joints, to an
     analysis of joints.
     """
-    made = as_plant(value)
-    if made.pose:
+    machine = as_plant(value)
+    if machine.pose:
         raise ScenarioError(
-            f"{made.name} is a free body, and {analysis} is for joints: give another plant"
+            f"{machine.name} is a free body, and {analysis} is for joints: give another plant"
         )
-    return made
+    return machine
 
 
 def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:

@@ -157,20 +157,20 @@ def channel(joint: object, value: object) -> Channel:
         known = {field.name: None for field in dataclasses.fields(Channel)}
         for key in value:
             find("field of a Channel", key, known)
-    made = value
+    coerced = value
     if value is None:
-        made = Channel()
+        coerced = Channel()
     elif isinstance(value, Mapping):
-        made = Channel(**value)
-    if not isinstance(made, Channel):
+        coerced = Channel(**value)
+    if not isinstance(coerced, Channel):
         raise ScenarioError(
             f"channel {shown(joint)} is {shown(value)}: give smc.Channel(...) or None"
         )
-    if made.partner is None and made.partner_x0 is not None:
+    if coerced.partner is None and coerced.partner_x0 is not None:
         raise ScenarioError(
             f"channel {joint!r} has a partner_x0 and no partner: give smc.Channel(partner=...) too"
         )
-    return made
+    return coerced
 
 
 def suggested(channels: Pairs) -> dict[str, tuple]:
@@ -263,7 +263,7 @@ def measured_joints(
     places = np.flatnonzero(model.jnt_type == FREE)
     free = [names[i] for i in places]
     taken = joints_of(channels)
-    found = []
+    joints = []
     for name in given:
         joint = name
         if name == "base" and name not in names and len(free) == 1:
@@ -275,18 +275,18 @@ def measured_joints(
                 f"measured joint {joint!r} of {label} is a {kind.name[6:].lower()} joint: give one "
                 "that is a hinge, a slide or a free joint"
             )
-        bases = set(found).intersection(free)
-        if joint in (*taken, *found) or (kind == FREE and bases):
+        bases = set(joints).intersection(free)
+        if joint in (*taken, *joints) or (kind == FREE and bases):
             raise ScenarioError(
                 f"measured joint {joint!r} of {label} is measured already, or a second base: "
                 "name each joint once, and one base"
             )
-        found.append(joint)
-    if found and is_free(model, taken[0]):
+        joints.append(joint)
+    if joints and is_free(model, taken[0]):
         raise ScenarioError(
             f"joint {taken[0]!r} of {label} is a free joint, the only channel: leave measured out"
         )
-    return tuple(found)
+    return tuple(joints)
 
 
 def starts(
@@ -577,11 +577,11 @@ def bound_of_kept(label: str, model: mujoco.MjModel, joint: str, part: Actuator)
 
 def _on_joint(model: mujoco.MjModel, joint_id: int) -> list[int]:
     """Return the actuators that act on this joint alone."""
-    found = []
+    acting = []
     for i in range(model.nactuator):
         if model.actuator_trntype[i] in ONE_JOINT and model.actuator_trnid[i, 0] == joint_id:
-            found.append(i)
-    return found
+            acting.append(i)
+    return acting
 
 
 def _has_actuators(model: mujoco.MjModel) -> bool:
