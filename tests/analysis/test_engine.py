@@ -420,3 +420,11 @@ def test_a_new_row_is_in_the_score_of_a_trace_and_in_the_engine(monkeypatch):
     assert not group.why_not(case, ("late_speed",))
     found = group.FormGroup([case], ("late_speed",)).scored("cpu", 1)[0][0]
     assert found == pytest.approx([expected], rel=AGREES)
+
+
+def test_a_spring_beside_bristles_is_refused_for_what_it_is():
+    spring = ElasticJoint(500.0, 0.2)
+    bristles = smc.hardware.LuGre(0.1, 0.15, 0.05)
+    fields = {"plant": "duffing", "law": "none", "duration": 1.0, "actuator": spring}
+    assert "elastic joint beside" in group.why_not(smc.Scenario(**fields, friction=bristles))
+    assert not group.why_not(smc.Scenario(**fields))

@@ -67,6 +67,9 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
         "move alone": not (
             s.plain_equation or (s.exact_friction and not plant.free) or steps_implicitly(s)
         ),
+        "it has an elastic joint beside a play, LuGre or another force that is held over a step": (
+            steps_implicitly(s) and any(isinstance(part, ElasticJoint) for part in s.actuator)
+        ),
         "it has an actuator other than lags, rate limits, and springs or plays before joints": (
             not all(isinstance(part, _beside(s)) or lags(part) for part in s.actuator)
         ),
