@@ -103,7 +103,7 @@ class Identified:
     before: Rig  # with the values before
     values: Numbers  # quantity -> value found
     errors: Numbers  # quantity -> its standard error
-    correlations: Array  # of the errors, (p, p), in the order of `values`
+    correlations: Array  # by least squares, (p, p), in the order of `values`
     fits: tuple[Numbers, ...]  # of each log
     fits_before: tuple[Numbers, ...]
     predictions: tuple[

@@ -118,7 +118,8 @@ class RaceAdvice(Advice):
     # law -> condition -> the numbers of its runs that settle, and of all
     settled: Mapping[str, Mapping[str, tuple[int, int]]]
     weighs: Mapping[str, float]  # condition -> its share of J of the first law
-    margins: Sequence[Margin]  # of the first law with its gains, without other conditions
+    margins: Sequence[Margin]  # of the first law with its gains
+    beside: str  # name of the condition beside which they are; "nominal" for none
     untried: Sequence[str]  # kinds of margins for which there was no time
     seeds: int  # from which each law was to run in each condition, if the time allowed it
     worst_run: Scenario  # of the first law in the condition where it fares worst
@@ -255,19 +256,20 @@ class RaceAdvice(Advice):
             if math.isnan(margin.value):
                 return "nothing more: without changes the error does not end below 5 % of its start"
             parts.append(f"{margin.kind} {level}")
-        text = f"{joined(parts)}, one at a time; the error then still ends below 5 % of its start"
+        where = "without these conditions" if self.beside == "nominal" else f"under {self.beside}"
+        text = f"{joined(parts)}, one at a time and {where}: in {self.worst_run.duration:g} s "
+        text += "the error still ends below 5 % of its start"
         return f"{text}; {late}" if late else text
 
     @property
     def tables(self) -> list[Tabular]:
         """J of the laws' sets of gains; the needs by condition, of the gains in the answer."""
         shown = [self._objectives]
-        found = self.settled[self.law.name]
-        runs = next(iter(found.values()))[1]
-        plant = self.worst_run.plant.name
-        title = f"{plant} under {joined([*found])}: {counted(runs, 'seed')}"
-        for table in self.leaderboard.tables:
+        runs = next(iter(self.settled[self.law.name].values()))[1]
+        groups = dict.fromkeys(" under ".join(board.group.values()) for board in self.leaderboard)
+        for about, table in zip(groups, self.leaderboard.tables, strict=True):
             rows = [list(map(_unmarked, row)) for row in table.rows]
+            title = f"{about}: {counted(runs, 'seed')}"
             shown.append(dataclasses.replace(table, rows=rows, notes=(), title=title))
         notes = self.leaderboard.remarks
         if runs < self.seeds:
@@ -282,7 +284,8 @@ class RaceAdvice(Advice):
                 f"{' and of the next one' if self.race.winner else ''}."
             )
         notes.append(
-            f"{MEDIANS} Nothing in this table is tested; the tests stand below. {capital(UNTRIED)}."
+            f"{MEDIANS} Nothing in these tables is tested; the tests stand below. "
+            f"{capital(UNTRIED)}."
         )
         last = shown.pop()
         return [*shown, dataclasses.replace(last, notes=[*notes, "", *self.answer])]

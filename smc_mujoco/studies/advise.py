@@ -81,13 +81,15 @@ def advise(
     settled = _settled(table)
     least = {law: _least_share(settled[law]) for law in chosen}
     order = in_order(least, fixed, raced.winner)
-    boards = leaderboard(table, metrics, defaults=True, relevant=relevant)
+    by = "plant", "condition"
+    boards = leaderboard(table, metrics, by, defaults=True, relevant=relevant)
     if not boards:
         raise ScenarioError(f"no need has a number in any run on {plant.name}: ask for others")
     ordered = tuple(chosen[law] for law in order)
     first = ordered[0]
     weighs = shares(plant, first, goal, CHOOSING, trial.threads)
-    margins, untried = _margins(trial, plant, first, clock)
+    base = _base_of_margins(trial, plant, first)
+    margins, untried = _margins(trial, base, clock)
     return RaceAdvice(
         table=table,
         leaderboard=boards,
@@ -98,6 +100,7 @@ def advise(
         settled=settled,
         weighs=weighs,
         margins=margins,
+        beside=base.condition,
         untried=untried,
         seeds=seeds,
         worst_run=_worst_run(table, first.name),
@@ -240,17 +243,20 @@ def _worst_run(table: Table, law: str) -> Scenario:
     return table.scenario(worst)
 
 
-def _margins(
-    trial: Trial, plant: Plant, law: Component, clock: AnswerTime
-) -> tuple[list[Margin], list[str]]:
-    """Return what a law tolerates beside no other condition, or beside the first one asked for
-    where that has other commands, and the kinds for which there is no time; none of either where
-    it starts at its goal.
+def _base_of_margins(trial: Trial, plant: Plant, law: Component) -> Scenario:
+    """Return the run beside which margins are found: under the condition asked for, if it is the
+    only one or has other commands, else without conditions.
     """
-    base = _coarse(trial, plant, law, "nominal")
+    plain = _coarse(trial, plant, law, "nominal")
     first = _coarse(trial, plant, law, trial.conditions[0])
-    if base.efforts != first.efforts:
-        base = first
+    return first if len(trial.conditions) == 1 or plain.efforts != first.efforts else plain
+
+
+def _margins(trial: Trial, base: Scenario, clock: AnswerTime) -> tuple[list[Margin], list[str]]:
+    """Return what the law of a run tolerates beside it, and the kinds for which there is no time;
+    none of either where it starts at its goal.
+    """
+    plant = base.plant
     if not math.dist(base.resolved.x0, plant.origin):
         return [], []
     kinds = KINDS_OF_POSES if plant.pose else KINDS
