@@ -317,7 +317,8 @@ def of_runs(rig: OwnRig, values: Values) -> Fields:
 
 def condition_fields(rig: OwnRig) -> Fields:
     """Return the fields of a condition under which the user's own machine has a rig's values: those
-    of the model as a mismatch, which a law does not know.
+    of the model as a mismatch, which a law does not know. What the machine's file has is left out,
+    so the condition suits the machine with ideal motors and with fewer joints, too.
     """
     fields = of_runs(rig, Values(**rig.values))
     before = rig.plant.parameters
@@ -327,8 +328,9 @@ def condition_fields(rig: OwnRig) -> Fields:
         if change != (0.0 if name in rig.plant.added else 1.0):
             mismatch[name] = change
     kept = (*FIELDS, "fault", DELAY, "physics_step")
+    bare = Scenario.recorded(plant=rig.plant, law="none")  # has the drives of the plant's file
     found = {}
     for name in kept:
-        if name in fields:
+        if name in fields and fields[name] != getattr(bare, name):
             found[name] = fields[name]
     return found | ({"mismatch": mismatch} if mismatch else {})

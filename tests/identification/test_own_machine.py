@@ -17,7 +17,7 @@ from smc_mujoco.analysis.engine import group
 from smc_mujoco.cli.main import app
 from smc_mujoco.identification.first_guess import first_guess
 from smc_mujoco.identification.friction_figure import curve_error, friction
-from smc_mujoco.identification.own_rig import own_rig
+from smc_mujoco.identification.own_rig import condition_fields, own_rig
 from smc_mujoco.mechanisms.hardware.servos import ServoFriction
 from smc_mujoco.simulation.conditions import from_file
 
@@ -558,3 +558,15 @@ def test_the_dry_friction_of_a_public_double_pendulum_is_between_its_authors_fit
         name = f"{joint}.frictionloss"
         assert min(published) < found.values[name] < max(published), found
         assert found.errors[name] < 0.1 * max(published), found
+
+
+def test_a_condition_that_was_found_has_no_servo_of_the_file_so_it_suits_ideal_motors():
+    servo = '<position joint="j2" kp="40" kv="2" ctrlrange="-2 2"/>'
+    joints = {"j1": smc.Channel(), "j2": smc.Channel(servo=True)}
+    mixed = smc.plant_from(TWO.replace('<motor joint="j2"/>', servo), joints)
+    numbers = {"j1.damping": 0.3, "input_delay": 0.004}
+    rig = own_rig(mixed, list(numbers)).with_values(numbers, "by hand")
+    fields = condition_fields(rig)
+    assert fields.keys() == {"mismatch", "input_delay", "physics_step"}
+    alone = smc.plant_from(TWO, ["j1"], others="held")
+    assert smc.condition("found", **fields).on(alone, 1.0)["mismatch"] == {"j1.damping": 0.3}
