@@ -208,7 +208,7 @@ class RaceAdvice(Advice):
         resolved = "no lead"
         if seen < MAX_LEAD:
             resolved = f"a lead of {100.0 * seen:.2g} %"
-        text = f"{race.sets} sets resolve {resolved}"
+        text = f"{race.looked} sets resolve {resolved}"
         if math.isinf(sets):
             return f"{text}, and the laws are too close for more sets to tell them apart"
         if race.stopped and sets <= LOOKS[-1]:

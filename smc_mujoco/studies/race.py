@@ -100,6 +100,7 @@ class Race(NamedTuple):
     dropped: Mapping[str, float]
     comparison: Comparison | None  # of the others, by J of their sets; None for one law
     sets: int  # of each law that was not dropped
+    looked: int  # at how many of them the comparison looks: a third look would have no error left
     stopped: bool  # whether the time was over before a winner or the last look
     seconds: float  # that a set of each law takes together
 
@@ -141,7 +142,7 @@ def race(
     everyone = {one.law.name: one for one in entrants}
     running = dict(everyone)
     dropped: dict[str, float] = {}
-    comparison = None
+    comparison, looked = None, 0
     rounds: list[float] = []  # s that a law took in each
     stopped = False
     with bar("set of gains", LOOKS[0] * len(running), trial.progress, counted=True) as shown:
@@ -165,14 +166,14 @@ def race(
                     del running[name]
             _expect(shown, k + 1, len(running))
             if k + 1 in LOOKS:
-                comparison = judged(running, goal, relevant)
+                comparison, looked = judged(running, goal, relevant), k + 1
                 if comparison is None or comparison.winners[0] or needed(comparison) > WITHIN:
                     break
     count = len(next(iter(running.values())).J)
-    if count not in LOOKS:
-        comparison = judged(running, goal, relevant)
+    if count < LOOKS[0]:
+        comparison, looked = judged(running, goal, relevant), count
     seconds = len(running) * _expected(rounds)
-    return Race(everyone, dropped, comparison, count, stopped, seconds)
+    return Race(everyone, dropped, comparison, count, looked, stopped, seconds)
 
 
 def _expected(rounds: Sequence[float]) -> float:

@@ -134,6 +134,22 @@ def test_the_clock_ends_a_race_between_two_rounds(run, monkeypatch):
     assert raced.first == raced.running == ["a", "b"]
 
 
+def test_a_race_that_stops_between_its_looks_keeps_what_the_first_look_said(run, monkeypatch):
+    ticks = iter(range(1000))
+    monkeypatch.setattr(module.time, "monotonic", lambda: float(next(ticks)))
+    whole = run({"a": 0.0, "b": 0.6}, 3)
+    assert (whole.sets, whole.looked) == (12, 12)
+    ends = []
+    for end in range(20, 60, 4):
+        ticks = iter(range(1000))
+        raced = run({"a": 0.0, "b": 0.6}, 3, AnswerTime(float(end)))
+        if raced.sets not in module.LOOKS:
+            ends.append(raced.sets > 7)
+            assert raced.looked == min(raced.sets, 7)
+            assert int(raced.comparison.seeds[0]) == raced.looked
+    assert True in ends
+
+
 def test_a_race_leaves_the_time_that_the_runs_after_it_take(run, monkeypatch):
     """By the pace of its own judgements, of which a round has one or three times two sets here."""
     sets = []
