@@ -383,7 +383,9 @@ def _call(node: ast.Call) -> Any:
     try:
         return kind(*values, **keywords)
     except TypeError:
-        parameters = inspect.signature(kind).parameters if isinstance(kind, type) else kind.defaults
+        parameters = getattr(kind, "defaults", ())
+        if isinstance(kind, type):
+            parameters = inspect.signature(kind).parameters
         cure = f"it takes {', '.join(parameters) or 'nothing'}"
         raise ScenarioError(f"condition has {shown(ast.unparse(node))}: {cure}") from None
 

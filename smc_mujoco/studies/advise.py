@@ -35,6 +35,7 @@ from smc_mujoco.studies.leaderboard import leaderboard
 from smc_mujoco.studies.race import Entrant, Race, compared, judgements, race, unseen
 from smc_mujoco.studies.table import Table
 
+BY = "plant", "condition"  # what the runs of a table have in common
 SHOWN = 5  # laws in the tables by condition, at most; chosen
 CONSIDERED = 3  # sets of gains of a law, those of the lowest J; chosen
 CHOOSING = range(1001, 1003)  # unseen instances that choose one of them
@@ -81,8 +82,7 @@ def advise(
     settled = _settled(table)
     least = {law: _least_share(settled[law]) for law in chosen}
     order = in_order(least, fixed, raced.winner)
-    by = "plant", "condition"
-    boards = leaderboard(table, metrics, by, defaults=True, relevant=relevant)
+    boards = leaderboard(table, metrics, BY, defaults=True, relevant=relevant)
     if not boards:
         raise ScenarioError(f"no need has a number in any run on {plant.name}: ask for others")
     ordered = tuple(chosen[law] for law in order)
@@ -100,7 +100,7 @@ def advise(
         settled=settled,
         weighs=weighs,
         margins=margins,
-        beside=base.condition,
+        beside=str(base.condition),
         untried=untried,
         seeds=seeds,
         worst_run=_worst_run(table, first.name),
