@@ -81,8 +81,8 @@ def _imported(file: str) -> dict:
 
 @functools.cache
 def _defined(file: str, content: bytes) -> dict:
-    """Return what a file of this content defines. It is run once, so that what a text names twice
-    is one thing.
+    """Return what a file of this content defines. The file is run once, so two texts that name the
+    same part get the same object.
     """
     del content
     defined = execute(Path(file))
