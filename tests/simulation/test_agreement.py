@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import random
+import time
 import warnings
 
 import numpy as np
@@ -36,6 +37,23 @@ def test_a_law_whose_compiled_form_differs_is_called_in_python_and_told(law):
         assert trace.u[0, 0] == expected(0, y)[0]
     except python_functions.Failure:
         assert "raised ZeroDivisionError" in str(trace.failure)
+
+
+def test_garbage_that_is_collected_meanwhile_hides_no_difference(monkeypatch):
+    """A round of 3 ms beside one that is quick is no slow function."""
+    results, rounds = agreement._results, []
+
+    def interrupted(*arguments):
+        rounds.append(arguments)
+        begin = time.thread_time()
+        while len(rounds) == 1 and time.thread_time() < begin + 3 * agreement.SLOW:
+            pass
+        return results(*arguments)
+
+    monkeypatch.setattr(agreement, "_results", interrupted)
+    own = made(lambda y, gains, memory: (2**71 * 1e-21, 0.0))
+    with pytest.warns(PlainLoopWarning, match="compiled and .* in Python"):
+        smc.run(scenario(own, duration=0.01))
 
 
 @pytest.mark.parametrize(
