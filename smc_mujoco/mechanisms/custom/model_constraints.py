@@ -16,6 +16,7 @@ from smc_mujoco.mechanisms.plant import Plant
 SOFT_SOLREF = (0.02, 1.0)  # MuJoCo's default of solreffriction
 SOFT_SOLIMP = (0.9, 0.95, 0.001, 0.5, 2.0)  # of solimpfriction
 MAX_GIVE = 2e-3  # rad (m) for a blow of 1 rad/s (m/s): a warning tells of more; chosen
+MIN_GIVE = 5e-5  # rad (m) under the weight, of which a warning is silent; chosen
 MAX_CREEP = 1e-6  # rad/s (m/s) of dry friction: a warning tells of more; chosen
 TEST_STEP = 2.5e-4  # s, at which softness is measured: that of runs with constraints
 # MuJoCo's noslip pass, which keeps stuck joints from creeping: the most iterations, and tolerance
@@ -111,8 +112,8 @@ def softness_warnings(label: str, made: Plant) -> list[str]:
     sentences = []
     if parts := _giving(model, data):
         sentences.append(
-            f"{label} gives way {', '.join(parts)}: the first if hit at 1 rad/s or 1 m/s, the "
-            "second under its weight; a smaller first number of the option makes it harder"
+            f"{label} gives way if it is hit at 1 rad/s or 1 m/s: {', '.join(parts)}; a smaller "
+            "first number of the option in brackets makes it harder"
         )
     if not (made.smooth or model.opt.noslip_iterations):  # which hold dry friction exactly
         sentences += _creeping(label, model, data)
@@ -128,7 +129,7 @@ def _giving(model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
     """
     parts = []
 
-    def tell(what: str, option: str, solref: Array, solimp: Array, load: float | Array) -> None:
+    def tell(where: str, solref: Array, solimp: Array, load: float | Array) -> None:
         first, second = solref.T
         # a time constant and a damping ratio, or a stiffness and a damping, both negative
         roots = np.sqrt(np.abs(first))
@@ -140,8 +141,8 @@ def _giving(model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
         loose = 1.0 - solimp[:, 1]
         rest = np.max(loose * load / w**2, initial=0.0)
         if blow > MAX_GIVE:
-            size = f"{1e3 * blow:.2g} and {1e3 * rest:.1g} mrad or mm"
-            parts.append(f"at its {what} by {size} ({option})")
+            weight = f", and {1e3 * rest:.1g} under its weight" if rest > MIN_GIVE else ""
+            parts.append(f"by {1e3 * blow:.2g} {where}{weight}")
 
     off = model.opt.disableflags
     gravity = float(np.linalg.norm(model.opt.gravity))
@@ -149,15 +150,15 @@ def _giving(model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
     if not off & FLAGS.mjDSBL_LIMIT.value:
         pushed = np.abs(data.qacc_smooth[model.jnt_dofadr[limited]])
         limits = model.jnt_solref[limited], model.jnt_solimp[limited]
-        tell("joint limits", "solreflimit", *limits, pushed)
+        tell("mrad or mm at joint limits (solreflimit)", *limits, pushed)
     if touches(model):
         touching = (model.geom_contype > 0) | (model.geom_conaffinity > 0)
         geoms = model.geom_solref[touching], model.geom_solimp[touching]
-        tell("contacts", "solref", *geoms, gravity)
+        tell("mm at contacts (solref)", *geoms, gravity)
     if not off & FLAGS.mjDSBL_EQUALITY.value:
         held = model.eq_active0 > 0
         ties = model.eq_solref[held], model.eq_solimp[held]
-        tell("equality constraints", "solref", *ties, gravity)
+        tell("mrad or mm at equality constraints (solref)", *ties, gravity)
     return parts
 
 

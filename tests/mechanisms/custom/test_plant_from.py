@@ -713,7 +713,7 @@ def test_a_warning_says_how_far_an_equality_gives_way(solref):
       <equality><joint joint1="j" solref="{solref}"/></equality></mujoco>"""
     with pytest.warns(smc.errors.ScenarioWarning, match="equality constraints") as caught:
         plant = smc.plant_from(text, {"j": {"motor": True}})
-    (told,) = map(float, re.findall(r"by ([0-9.]+) and", str(caught[0].message)))
+    (told,) = map(float, re.findall(r"by ([0-9.]+) m", str(caught[0].message)))
     trace = smc.run(smc.Scenario(plant=plant, law="none", v0=1.0, duration=0.5))
     assert 1e-3 * told == pytest.approx(trace.x.max(), rel=0.15)
 
@@ -727,7 +727,7 @@ def test_a_warning_says_how_far_a_limit_gives_way_before_the_run(solref, speed):
       <compiler angle="radian"/><actuator><motor joint="j"/></actuator></mujoco>"""
     with pytest.warns(smc.errors.ScenarioWarning, match="solreflimit") as caught:
         plant = smc.plant_from(text, ["j"])
-    (reported,) = map(float, re.findall(r"by ([0-9.]+) and", str(caught[0].message)))
+    (reported,) = map(float, re.findall(r"by ([0-9.]+) m", str(caught[0].message)))
     trace = smc.run(smc.Scenario(plant=plant, law="none", x0=39.9, v0=speed, duration=0.5))
     assert 1e-3 * reported * speed == pytest.approx(trace.x.max() - 40.0, rel=0.1)
     hard = text.replace(solref, ".004 1")
