@@ -24,6 +24,13 @@ def number(value: float, digits: int = 3) -> str:
     return f"{mantissa}e{int(exponent)}"
 
 
+def span(low: str, high: str) -> str:
+    """Return "1.1–1.3", the range of a median; "" where both ends are the same text, such as
+    "never", and the median says it.
+    """
+    return "" if low == high else f"{low}–{high}"
+
+
 def joined(parts: Iterable[str]) -> str:
     """Return "a, b and c"; "" for no parts."""
     *others, last = list(parts) or [""]

@@ -28,7 +28,7 @@ class Shape(NamedTuple):
 
 def shapes(scenario: Scenario) -> list[Shape]:
     """Return the mechanism at the start of a run, and after its jump."""
-    compiled = models.compile_model(scenario)
+    compiled = models.mechanism(scenario).model
     shapes_of_run = [Shape(0.0, models.with_values(compiled, scenario, 0))]
     if scenario.jump:
         step = scenario.jump_step

@@ -48,6 +48,8 @@ SENSORS = {
     "x_sensor": mujoco.mjtSensor.mjSENS_JOINTPOS,
     "v_sensor": mujoco.mjtSensor.mjSENS_JOINTVEL,
 }
+# with which MuJoCo refuses to leave out a geom that has mass
+OF_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE.value
 # of a tendon around a geom
 ROUND_WRAPS = mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER
 # ends of the names of a free body's sensors
@@ -354,10 +356,14 @@ def compile_model(scenario: Scenario, nuserdata: int = 0, scenery: bool = True) 
     """Return the base model of a scenario's structure: compiled, without the scenario's values.
 
     It is not for pictures. Its procedural textures have a few pixels, because MuJoCo paints them at
-    each compilation, in three quarters of its time. Users' models always keep their scenery: a
-    fixed part may be a floor.
+    each compilation, in three quarters of its time. Without `scenery` it has no geoms that touch
+    nothing, and a user's robot without the meshes of these takes 0.02 MB in place of 30. Users'
+    models keep all their bodies: a fixed one may be a floor. They keep all their geoms if these
+    define all inertias.
     """
     edited = spec(scenario)
+    if not scenery and edited.compiler.inertiafromgeom != OF_GEOMS:
+        edited.compiler.discardvisual = True
     if not (scenery or scenario.plant.direct):
         without_scenery(edited, pushed(scenario))
     for texture in edited.textures:

@@ -147,6 +147,7 @@ def race(
     stopped = False
     with bar("set of gains", LOOKS[0] * len(running), trial.progress, counted=True) as shown:
         for k in range(LOOKS[-1]):
+            _expect(shown, k, len(running))
             start = time.monotonic()
             pieces = [(one, k, 0) for one in running.values() if one.task]
             over = k > 0 and start + len(running) * _expected(rounds) > clock.race_ends
@@ -164,7 +165,6 @@ def race(
                 dropped = hopeless(values)
                 for name in dropped:
                     del running[name]
-            _expect(shown, k + 1, len(running))
             if k + 1 in LOOKS:
                 comparison, looked = judged(running, goal, relevant), k + 1
                 if comparison is None or comparison.winners[0] or needed(comparison) > WITHIN:
@@ -184,8 +184,10 @@ def _expected(rounds: Sequence[float]) -> float:
 
 
 def _expect(shown: Bar, done: int, laws: int) -> None:
-    """Set the work done and the whole work of the bar, in sets of gains of laws that go on."""
-    last = next(look for look in LOOKS if look >= done)
+    """Set the work done and the whole work of the bar before a round, in sets of gains of laws that
+    go on.
+    """
+    last = next(look for look in LOOKS if look > done)
     shown.reached(done * laws, last * laws)
 
 

@@ -37,7 +37,7 @@ from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import MAX_RATIO, MAX_UNPACKED, from_json, reading, replacing, to_json
 from smc_mujoco.common.tabular import Cell, Tabular
-from smc_mujoco.common.text import counted, number
+from smc_mujoco.common.text import counted, number, span
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import scenario_json
 from smc_mujoco.simulation.run import run
@@ -140,7 +140,8 @@ def _median(metric: str, values: np.ndarray) -> Cell:
         return Cell("", alarm=alarm)
     text = CATALOGUE[metric].text
     middle = float(np.median(known))
-    return Cell(text(middle), f"{text(float(known.min()))}–{text(float(known.max()))}", alarm=alarm)
+    ends = span(text(float(known.min())), text(float(known.max())))
+    return Cell(text(middle), ends, alarm=alarm)
 
 
 def read(path: Path, sealed: bool = False) -> "pa.Table":

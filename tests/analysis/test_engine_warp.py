@@ -146,7 +146,7 @@ def test_own_machines_are_scored_in_worlds_and_the_rest_by_mujoco(on_card):
         assert failed is None
         assert values == [pytest.approx(catalogue.itae(trace), rel=1e-12)]
     told = runs.checked()
-    assert "MuJoCo repeated 3 runs: 0 failed" in told
+    assert "MuJoCo repeated 3 runs of another engine: 0 failed" in told
     assert "MuJoCo made 1 runs: its parameters jump" in told
     assert "MuJoCo made 2 runs: they are fewer than 3 of one model" in told
 
@@ -172,7 +172,7 @@ def test_random_members_of_a_worst_case_are_run_in_worlds(on_card, monkeypatch):
     assert found.value == expected.value
     assert found.scenario == expected.scenario
     assert found.median == pytest.approx(expected.median, rel=1e-12)
-    assert "MuJoCo repeated 20 runs: 0 failed" in found.checked
+    assert "MuJoCo repeated 20 runs of another engine: 0 failed" in found.checked
 
 
 def test_parameter_sets_of_an_identified_machine_are_worlds_of_one_model(on_card):

@@ -453,5 +453,5 @@ def test_with_many_runs_the_fast_engine_makes_them_and_mujoco_repeats_some(monke
     found = smc.sensitivity(case, within, points=8)
     assert found.values == pytest.approx(expected.values, rel=1e-9)
     assert (found.failed == expected.failed).all()
-    assert "MuJoCo repeated 20 runs: 0 failed" in str(found)
+    assert "MuJoCo repeated 20 runs of another engine: 0 failed" in str(found)
     assert not expected.checked

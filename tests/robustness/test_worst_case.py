@@ -391,5 +391,5 @@ def test_with_many_runs_the_fast_engine_searches_and_the_worst_is_mujoco_s(monke
     assert found.value == pytest.approx(expected.value, rel=1e-3)
     assert found.median == pytest.approx(expected.median, rel=1e-3)
     for text in (found, found.tables[0].notes):
-        assert "MuJoCo repeated 20 runs: 0 failed" in str(text)
+        assert "MuJoCo repeated 20 runs of another engine: 0 failed" in str(text)
     assert not expected.checked

@@ -154,15 +154,34 @@ def test_a_body_that_is_pushed_stays_in_a_run():
     assert [trace.failure for trace in smc.run([without, pushed])] == [None, None]
 
 
-def test_the_scenery_of_a_users_model_stays():
-    plant = smc.plant_from(
-        "<mujoco><worldbody><light/><geom name='base' size='0.1' contype='0' conaffinity='0'/>"
-        "<body><joint name='turn'/><geom size='0.1' pos='0 0 1'/></body></worldbody></mujoco>",
-        channels={"turn": smc.Channel(motor=True)},
-    )
-    made = compile_model(smc.Scenario(plant=plant, law=smc.law("classical")), scenery=False)
-    assert made.ngeom == 2
-    assert made.nlight == 1
+MESHES = """<mujoco><asset><mesh name="paint" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/>
+<mesh name="shell" vertex="0 0 0 .1 0 0 0 .1 0 0 0 .1"/></asset><worldbody><light/>
+<geom name="base" size=".1" contype="0" conaffinity="0"/><geom type="plane" size="1 1 .1"/>
+<body pos="0 0 .3"><joint name="turn" axis="0 1 0"/><geom type="mesh" mesh="shell" pos=".2 0 0"/>
+<geom type="mesh" mesh="paint" mass="2" contype="0" conaffinity="0"/></body></worldbody></mujoco>"""
+
+
+def test_runs_of_a_users_model_have_no_meshes_that_touch_nothing_and_the_same_bits(monkeypatch):
+    """It falls on the floor, with the inertia of what is left out; nothing is where a file has all
+    inertias from geoms.
+    """
+    of_geoms = MESHES.replace("<asset>", '<compiler inertiafromgeom="true"/><asset>')
+    kept = smc.plant_from(of_geoms, {"turn": smc.Channel(motor=True)}, name="kept")
+    scenario = smc.Scenario(plant=kept, law=smc.law("none"))
+    assert compile_model(scenario, scenery=False).ngeom == 4
+    plant = smc.plant_from(MESHES, {"turn": smc.Channel(motor=True)}, name="painted")
+    scenario = smc.Scenario(plant=plant, law=smc.law("none"), x0=0.1, duration=0.4)
+    whole = compile_model(scenario)
+    bare = compile_model(scenario, scenery=False)
+    assert (whole.ngeom, whole.nmesh) == (4, 2)
+    assert (bare.ngeom, bare.nmesh, bare.nlight) == (2, 1, 1)
+    short = smc.run(scenario)
+    monkeypatch.setattr(model, "_mechanisms", weakref.WeakValueDictionary())
+    compiled = model.compile_model
+    monkeypatch.setattr(model, "compile_model", lambda made, size, scenery: compiled(made, size))
+    assert model.mechanism(scenario).model.nmesh == 2
+    for name, array in smc.run(scenario).arrays().items():
+        np.testing.assert_array_equal(array, short.arrays()[name])
 
 
 def test_runs_one_after_another_share_a_model_that_none_of_them_changes(monkeypatch):

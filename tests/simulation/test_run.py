@@ -357,6 +357,30 @@ print(peak() - before)
 """
 
 
+LARGE = """
+import numpy as np, smc_mujoco as smc
+def resident():
+    return int(open("/proc/self/statm").read().split()[1]) * 4096
+smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))
+np.ones(2**19)
+small = []
+before = resident()
+for _ in range(2):
+    large = []
+    for _ in range(20):
+        large.append(np.ones(2**19))
+        small.append(bytearray(20_000))
+    del large
+print(resident() - before)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="glibc")
+def test_large_blocks_go_back_to_the_system_though_small_ones_lie_between_them(tmp_path):
+    done = python("-c", LARGE, folder=tmp_path)
+    assert int(done.stdout) < 20 * 2**22 / 4
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="resource")
 def test_a_stream_holds_one_batch_and_diverging_runs_print_nothing_and_leave_no_file(tmp_path):
     done = python("-c", MANY + WILD, folder=tmp_path)

@@ -1,5 +1,6 @@
 """A race: equal numbers of sets, laws that are dropped, searches made again, two looks, a clock."""
 
+import contextlib
 import math
 import types
 
@@ -11,6 +12,7 @@ from smc_mujoco.analysis import step_halving
 from smc_mujoco.analysis.ranking import RELEVANT, Comparison
 from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, objectives
 from smc_mujoco.analysis.tuning.result import SearchResult
+from smc_mujoco.common.progress import Bar
 from smc_mujoco.studies import race as module
 from smc_mujoco.studies.advise import in_order
 from smc_mujoco.studies.answer_time import FEWEST_SEEDS, AnswerTime
@@ -148,6 +150,25 @@ def test_a_race_that_stops_between_its_looks_keeps_what_the_first_look_said(run,
             assert raced.looked == min(raced.sets, 7)
             assert int(raced.comparison.seeds[0]) == raced.looked
     assert True in ends
+
+
+def test_the_bar_never_shows_more_sets_than_are_to_be_made(run, monkeypatch):
+    """Beyond the first look, and after a law was dropped."""
+    shares = []
+
+    class Recorded(Bar):
+        def reached(self, done, whole):
+            super().reached(done, whole)
+            shares.append((done, whole))
+
+    monkeypatch.setattr(
+        module, "bar", lambda *given, **named: contextlib.nullcontext(Recorded(whole=given[1]))
+    )
+    monkeypatch.setattr(module, "WITHIN", math.inf)
+    raced = run({"a": 0.0, "b": 0.0, "c": 99.0})
+    assert (raced.sets, [*raced.dropped]) == (12, ["c"])
+    assert all(done <= whole for done, whole in shares)
+    assert shares[-1] == (24, 24)
 
 
 def test_a_race_leaves_the_time_that_the_runs_after_it_take(run, monkeypatch):

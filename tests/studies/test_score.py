@@ -6,6 +6,7 @@ import pytest
 from helpers.runs import at_defaults
 
 import smc_mujoco as smc
+from smc_mujoco.common.text import number
 from smc_mujoco.metrics.catalogue import itae, settling_time
 from smc_mujoco.studies import score as module
 
@@ -35,21 +36,28 @@ def test_a_table_has_the_scores_of_every_run_in_order(monkeypatch):
             continue
         assert row["itae"] == pytest.approx(itae(trace), rel=1e-9)
         assert row["settling_time"] == settling_time(trace)
-    assert "MuJoCo repeated 3 runs" in repr(table)
+    assert "MuJoCo repeated 3 runs of another engine: 0 failed in one of the two only" in repr(
+        table
+    )
     with pytest.raises(smc.ScenarioError, match="scores alone"):
         table.scenario(0)
-    of_pid = [itae(trace) for trace in traces if trace.scenario.law.name == "pid"]
-    least, most = f"{min(of_pid):.3g}", f"{max(of_pid):.3g}"
-    assert f"{least}–{most}" in str(table)
     assert "1 of 2 have none" in str(table)
+
+
+def test_times_of_runs_that_all_never_settle_have_no_range():
+    runs = [smc.Scenario(plant="duffing", law="none", x0=x0, duration=0.5) for x0 in (0.1, 0.3)]
+    text = str(smc.score(runs, metrics=("settling_time",)))
+    assert " never\n" in text
+    assert "–" not in text
 
 
 def test_the_median_of_two_runs_is_their_mean():
     law = at_defaults("pid")
     runs = [smc.Scenario(plant="duffing", law=law, x0=x0, duration=0.5) for x0 in (0.1, 0.3)]
     table = smc.score(runs, metrics=("itae",))
-    mean = sum(table.column("itae")) / 2.0
-    assert f" {mean:.3g}\n" in str(table)
+    values = table.column("itae")
+    assert f" {sum(values) / 2.0:.3g}\n" in str(table)
+    assert f"{number(min(values))}–{number(max(values))}" in str(table)
 
 
 def test_what_cannot_be_scored_is_refused():

@@ -12,6 +12,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from smc_mujoco.analysis.engine import CHECKED
+from smc_mujoco.common.text import joined
 from smc_mujoco.metrics.conventions import groups
 from smc_mujoco.simulation import prepare
 from smc_mujoco.simulation.run import stream
@@ -179,9 +180,9 @@ class ScoredRuns:
                         apart[name] = max(apart[name], abs(value - other))
         parts = []
         for name, value in apart.items():
-            parts.append(f"{name} {value:.1g}")
+            parts.append(f"{value:.1g} in {name}")
         apart_by = (
-            f"MuJoCo repeated {len(self.drawn)} runs: {failed} failed in one engine alone, the "
-            f"others are apart by at most {', '.join(parts)}"
+            f"MuJoCo repeated {len(self.drawn)} runs of another engine: {failed} failed in one of "
+            f"the two only, and scores of the others differ by at most {joined(parts)}"
         )
         return "; ".join([apart_by, *refused])
