@@ -101,9 +101,17 @@ def largest_cycle(trace: Trace) -> Pair:
     """Return amplitude and frequency of the channel with the largest limit cycle; NaN, NaN where
     none has one.
     """
+    part = last_part(trace)
+    return largest_of(trace.t[part], trace.s[part])
+
+
+def largest_of(t: Array, s: Array) -> Pair:
+    """Return amplitude and frequency of the largest limit cycle in samples of s, (K, channels);
+    NaN, NaN where none has one.
+    """
     cycles = []
-    for i in range(trace.s.shape[1]):
-        cycle = channel_cycle(trace, i)
+    for of_channel in s.T:
+        cycle = limit_cycle(t, of_channel)
         if not math.isnan(cycle[0]):
             cycles.append(cycle)
     return max(cycles, default=NO_CYCLE)

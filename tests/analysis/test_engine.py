@@ -428,3 +428,36 @@ def test_a_spring_beside_bristles_is_refused_for_what_it_is():
     fields = {"plant": "duffing", "law": "none", "duration": 1.0, "actuator": spring}
     assert "elastic joint beside" in group.why_not(smc.Scenario(**fields, friction=bristles))
     assert not group.why_not(smc.Scenario(**fields))
+
+
+def test_the_limit_cycle_of_a_run_is_that_of_its_trace(monkeypatch):
+    """Of channels that chatter and of those that do not, of runs of several lengths, and of so few
+    logs at once that they come in parts.
+    """
+    names = "itae", "chattering_frequency", "chattering_amplitude"
+    monkeypatch.setattr(group, "LOG_NUMBERS", 1)
+    law = smc.law("super_twisting")(k1=20.0, k2=200.0)
+    late = {"plant": "pendulum_network", "law": law, "input_delay": 4e-3}
+    cases = [
+        smc.Scenario(duration=2.0, disturbance=SINE, **late),
+        smc.Scenario(duration=3.0, **late),
+        smc.Scenario(duration=1.0, **late | {"law": smc.law("pid"), "input_delay": 0.0}),
+        smc.Scenario(duration=1.0, **late, disturbance=smc.Step(1e200, 0.99)),
+    ]
+    alone = []
+    for case in cases:
+        trace = smc.run(case)
+        assert not group.why_not(case, names)
+        ((found, failed),) = group.FormGroup([case], names).scored("cpu", 1)
+        assert (failed is None) == (trace.diverged_at is None)
+        if failed is None:
+            values = catalogue.score(trace)
+            expected = [values[name] for name in names]
+            assert found == pytest.approx(expected, rel=1e-6, nan_ok=True)
+        else:
+            assert np.isnan(found).all()
+        alone.append((found, failed))
+    assert not np.isnan(alone[0][0] + alone[1][0]).any()  # they chatter
+    monkeypatch.undo()
+    assert group.FormGroup(cases[:2], names).scored("cpu", 2) == alone[:2]
+    assert "only the processor writes" in group.why_not(cases[0], names, "cuda")

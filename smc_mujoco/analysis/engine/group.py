@@ -12,6 +12,7 @@ from smc_mujoco.analysis.engine import noise
 from smc_mujoco.analysis.engine.form import (
     FAILED_STEP,
     FAILURE,
+    LOGGED,
     SCORES,
     SETTING,
     ChannelFunction,
@@ -21,7 +22,7 @@ from smc_mujoco.analysis.engine.form import (
     SignalAt,
     layout,
 )
-from smc_mujoco.analysis.engine.scores import RESTING, holds, summed_up
+from smc_mujoco.analysis.engine.scores import CYCLE, RESTING, cycles, holds, summed_up
 from smc_mujoco.common import fingerprint, indices
 from smc_mujoco.common.aliases import Fields
 from smc_mujoco.common.jit import AtAddress, Uncompiled
@@ -40,6 +41,7 @@ from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import Constant, Push, Signal
 from smc_mujoco.simulation.state import FINE
 
+LOG_NUMBERS = 8_000_000  # of the logs that are kept at once, 64 MB
 # fields in which forms of one key may differ, at their least
 VARYING: Fields = {
     "noise": False,
@@ -97,7 +99,9 @@ def why_not_sampled(s: Resolved, metrics: Sequence[str], device: str) -> str:
     }
     moving = not all(isinstance(signal, Constant) for signal in s.references)
     for name in metrics:
-        beyond[f"it does not sum up {name}"] = not summed_up(name)
+        of_log = name in CYCLE
+        beyond[f"{name} needs a log, which only the processor writes"] = of_log and device == "cuda"
+        beyond[f"it does not sum up {name}"] = not (of_log or summed_up(name))
         only = f"the engine sums up {name} only for a reference at rest"
         beyond[only] = name in RESTING and moving
     return first_of(beyond)
@@ -353,13 +357,46 @@ class FormGroup:
 
     def scored(self, device: str, threads: int | None) -> list[tuple[list[float], float | None]]:
         """Return the metrics of every scenario, and the time of its failure, s, or None."""
+        logs = not set(CYCLE).isdisjoint(self.form.metrics)
+        runs = self._logged(threads) if logs else self.run(self.rows, threads, device)
         found = []
-        for s, scores in zip(self.scenarios, self.run(self.rows, threads, device), strict=True):
+        for s, scores in zip(self.scenarios, runs, strict=True):
             time = None
             if scores[FAILURE] != FINE:
                 time = float(scores[FAILED_STEP] * s.physics_step)
             found.append((scores[SCORES:].tolist(), time))
         return found
+
+    def _logged(self, threads: int | None) -> np.ndarray:
+        """Return the scores of all runs, of which some at a time write a log for the metrics that
+        need one.
+        """
+        from smc_mujoco.analysis.engine import cpu
+
+        rows = self.rows.copy()
+        rows[:, SETTING.logging] = 1.0
+        shape = int(rows[:, SETTING.samples].max()) + 1, self.form.n, len(LOGGED)
+        size = max(1, LOG_NUMBERS // math.prod(shape))
+        parts = []
+        for first in range(0, len(rows), size):
+            some = rows[first : first + size]
+            logs = np.zeros((len(some), *shape))
+            scores = cpu.run_rows(self.form, some, self.tables, cores(threads), logs)
+            for run, row, log in zip(scores, some, logs, strict=True):
+                if run[FAILURE] == FINE:
+                    self._put_cycle(run, row, log)
+            parts.append(scores)
+        return np.concatenate(parts)
+
+    def _put_cycle(self, scores: np.ndarray, row: np.ndarray, log: np.ndarray) -> None:
+        """Write the numbers of a run's limit cycle into its scores."""
+        samples = int(row[SETTING.samples]) + 1
+        found = cycles(
+            log[:samples, : self.form.driven], int(row[SETTING.late]), row[SETTING.period]
+        )
+        for name, value in zip(CYCLE, found, strict=True):
+            if name in self.form.metrics:
+                scores[SCORES + self.form.metrics.index(name)] = value
 
     def _fill(self, row: np.ndarray, s: Resolved) -> None:
         row[: len(SETTING)] = _settings(s)

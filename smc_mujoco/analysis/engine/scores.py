@@ -3,6 +3,8 @@
 Those of the catalogue that are folds are made here of their rows; a few more are written out. A
 metric is two compiled functions: one takes a sample into its numbers in `work`, the other makes the
 score of them at the end. Those with a unit of x or u are of the channels that have an actuator.
+
+The limit cycle of s has a spectrum, which needs a log of its run: see `cycles`.
 """
 
 import functools
@@ -22,10 +24,12 @@ from smc_mujoco.analysis.engine.form import (
     layout,
     metric_places,
 )
+from smc_mujoco.common.aliases import Array, Pair
 from smc_mujoco.common.jit import always, inlined, record_in
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.metrics.conventions import AFTER_TURN, SETTLING_BAND
 from smc_mujoco.metrics.fold import Fold, first_sample
+from smc_mujoco.metrics.limit_cycle import largest_of
 from smc_mujoco.simulation.cfunctions import cached
 from smc_mujoco.simulation.state import LOG
 
@@ -34,6 +38,7 @@ COLUMN = {name: i for i, name in enumerate(LOG.names or ())}  # places in a samp
 RESTING = ("settling_time", "rest_share")  # of a reference that does not move
 MADE = "e", "turned"  # signals that are made of columns
 HOLDING = "held", "slips"  # those of friction that is exact, see `Scenario.exact_friction`
+CYCLE = "chattering_amplitude", "chattering_frequency"  # of a log, which only the processor writes
 
 
 class Samples(NamedTuple):
@@ -82,9 +87,19 @@ def tallying(form: Form) -> Any:
             n = form.n if CATALOGUE[name].shared else form.driven
             samples = Samples(n, work_at.now, work_at.before)
             metrics.append(folding(fold, samples, at))
+        elif name in CYCLE:
+            metrics.append((always(None), always(math.nan)))
         else:
             metrics.append(WRITTEN_OUT[name](form, at))
     return _together(metrics)
+
+
+def cycles(log: Array, late: int, period: float) -> Pair:
+    """Return amplitude and frequency of the largest limit cycle of s from sample `late` on, as
+    metrics have it. The log is (K + 1, channels, LOGGED), of the channels that have an actuator.
+    """
+    s = log[late:, :, LOGGED.index("s")]
+    return largest_of(period * np.arange(len(s)), s)
 
 
 def _together(metrics: Sequence[tuple[Any, Any]]) -> Any:
