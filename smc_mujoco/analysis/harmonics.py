@@ -101,6 +101,11 @@ class Loop:
                     f"chattering is not predicted behind {type(part).__name__}, whose force is a "
                     "function of your own: measure it in a run"
                 )
+            if isinstance(part, PositionServo) and part.by_pid:
+                raise ScenarioError(
+                    "chattering is not predicted for a PositionServo with ki or slewmax: measure "
+                    "it in a run"
+                )
             if isinstance(part, PositionServo) and (part.goal or part.step):
                 raise ScenarioError(
                     "chattering is predicted about x = 0 and without steps of a set-point, but a "
@@ -168,6 +173,7 @@ class Loop:
         with installed(None):
             model = models.with_values(models.compile_model(ideal), ideal)
             model.opt.disableflags |= NONLINEAR_FLAGS
+            model.actuator_delay[:] = 0.0  # `_solve` has it
             for gear in gears:
                 driven = dof_ids(model)[gear.channels(s.plant)]
                 model.dof_armature[driven] += gear.rotor_inertia
@@ -180,7 +186,7 @@ class Loop:
                 model, dataclasses.replace(ideal, x0=0.0, v0=0.0)
             )
             self.a, b = transition(model, data, chain)
-            of_channel = b[:, drive_ids(model)[self.channel]]
+            of_channel = b[:, model.actuator_ctrladr[drive_ids(model)[self.channel]]]
             self.b = of_channel * s.drive_train.scales[self.channel]
             self.rows = dof_ids(model)
             shafts = model.jnt_dofadr[moving_joints(model)[1]]
@@ -226,7 +232,10 @@ class Loop:
         turns = math.tau * np.arange(count) / count
         z = np.exp(1j * (omega * self.step + turns))
         passed = sum(z**-i for i in range(count)) / count  # by the hold
-        passed = passed * z ** -round(s.input_delay / self.step)
+        late = s.input_delay
+        for part in s.drive_train.chains[self.channel]:
+            late += part.lateness
+        passed = passed * z ** -round(late / self.step)
 
         resolvent = z[:, None, None] * np.eye(len(self.a)) - self.a
         column = self.b[:, None]
@@ -505,14 +514,15 @@ def _behind(drive: Actuator, block: Array, model: mujoco.MjModel) -> Array:
     A motor's model has no inductance: the voltage V - gear k v becomes the state R i.
     """
     ids = drive_ids(model)
-    outputs = len(block) - model.nu + ids
+    commands = model.actuator_ctrladr[ids]
+    outputs = len(block) - model.nu + commands
     speeds = model.nv + model.jnt_dofadr[model.actuator_trnid[ids, 0]]
     behind = np.pad(block, (0, model.nu))
     if isinstance(drive, DCMotor):
         behind[:, speeds] += drive.constant * behind[:, outputs]
         behind[outputs, speeds] = -drive.constant / drive.delay
     behind[outputs, outputs] = -1.0 / drive.delay
-    behind[outputs, len(block) + ids] = 1.0 / drive.delay
+    behind[outputs, len(block) + commands] = 1.0 / drive.delay
     return behind
 
 

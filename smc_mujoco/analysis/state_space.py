@@ -59,16 +59,17 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     with installed(None):
         model = models.with_values(models.compile_model(at), at)
         model.opt.disableflags |= NONLINEAR_FLAGS
+        model.actuator_delay[:] = 0.0
         data = mujoco.MjData(model)
         data.qpos[:], data.qvel[:] = models.initial_state(model, at)
         driven = drive_ids(model)
         dofs = dof_ids(model)
-        _hold(model, data, driven, plant.name)
+        _hold(model, data, model.actuator_ctrladr[driven], plant.name)
         block = rates(model, data)
     order = _order(model, dofs)
     n = len(order)
     a = block[:n, :n][np.ix_(order, order)]
-    b = block[:n, n:][np.ix_(order, driven)]
+    b = block[:n, n:][np.ix_(order, model.actuator_ctrladr[driven])]
     names = channel_names(plant)
     if plant.pose:
         labels = names
@@ -104,13 +105,15 @@ def _of(kind: str, names: Sequence[str]) -> list[str]:
     return [f"{kind}[{name}]" for name in names]
 
 
-def _hold(model: mujoco.MjModel, data: mujoco.MjData, driven: Array, name: str) -> None:
-    """Set the commands that hold a mechanism at rest; raise ScenarioError if there are none."""
+def _hold(model: mujoco.MjModel, data: mujoco.MjData, commands: Array, name: str) -> None:
+    """Set the numbers of ctrl that hold a mechanism at rest; raise ScenarioError if there are
+    none.
+    """
     last = 2 * model.nv + model.na
-    b = rates(model, data)[model.nv : 2 * model.nv, last:][:, driven]
+    b = rates(model, data)[model.nv : 2 * model.nv, last:][:, commands]
     mujoco.mj_forward(model, data)
     solution = np.linalg.lstsq(b, data.qacc)
-    data.ctrl[driven] -= solution[0]
+    data.ctrl[commands] -= solution[0]
     mujoco.mj_forward(model, data)
     if np.abs(data.qacc).max() > MAX_REST_ACCELERATION:
         x = ", ".join(f"{one:g}" for one in data.qpos)

@@ -33,7 +33,7 @@ def lag(scenario: Scenario) -> float:
     """Return the sum of all delays and time constants between command and force, s."""
     lags = []
     for chain in scenario.drive_train.chains:
-        lags.append(sum(part.delay for part in chain if part.drives))
+        lags.append(sum(part.delay + part.lateness for part in chain if part.drives))
     return scenario.resolved.input_delay + max(lags)
 
 

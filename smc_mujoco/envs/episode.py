@@ -124,6 +124,7 @@ class Setting:
         edit(spec)
         base = models.compiled(spec, self.scenario, models.USERDATA)
         self.model = models.with_values(base, self.scenario)
+        self.activations = models.initial_activations(self.model, self.scenario)
         table = channels(self.model)
         self.mechanism = models.Mechanism(base, table)
         self.qpos = table["qpos"]  # addresses of the channels, (n,)
@@ -273,8 +274,7 @@ class Episode:
         if setting.uses_callback:
             self.callback_records = Records(setting, 1)
             data.userdata[:] = self.callback_records.begin(0, *self.start)
-            if setting.model.nkey and setting.model.na:  # thrust behind a lag
-                data.act[:] = setting.model.key_act[0]
+        data.act[:] = setting.activations
         self.commands_given = []
         self.sample = 0
         self.read_state(data)

@@ -152,6 +152,8 @@ class BatchEnv(VectorEnv):
         ids = np.flatnonzero(mask)
         with mjcb.installed(None):
             self.batch.reset(ids.astype(np.int32), stage=0)
+        if self.setting.model.na:
+            self.batch.bind("act")[ids] = self.setting.activations
         for i in ids.tolist():
             start = self.setting.draw_start(self.randoms[i], options)
             self.qpos[i], self.qvel[i] = state_with(self.setting.model, self.setting.joints, *start)

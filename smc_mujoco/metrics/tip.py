@@ -115,7 +115,8 @@ def _with_hidden_state(scenario: Scenario) -> list:
     """Return the actuators with a state, or a force, that a trace lacks."""
     parts = []
     for part in scenario.actuator:
-        if part.in_callback or part.delay or part.act is not None or not part.drives:
+        follows = part.in_callback or part.delay or part.lateness or part.act is not None
+        if follows or not part.drives:
             parts.append(part)
     return parts
 

@@ -519,15 +519,14 @@ def _kept(items: list[Actuator], plant: Plant) -> list[Actuator]:
     """
     parts = []
     kept = plant.suggested.get("actuator", ())
-    for joint, part in zip(driven_names(plant), kept, strict=False):
-        if part is None:
-            continue
-        own = dataclasses.replace(part, on=() if plant.driven == 1 else (joint,))
-        vars(own)["kept"] = True  # the class is frozen
-        if own in items:
-            items.remove(own)
-        if not _given(items, part, joint):
-            parts.append(own)
+    for joint, chain in zip(driven_names(plant), kept, strict=False):
+        for part in chain:
+            own = dataclasses.replace(part, on=() if plant.driven == 1 else (joint,))
+            vars(own)["kept"] = True  # the class is frozen
+            if own in items:
+                items.remove(own)
+            if not _given(items, part, joint):
+                parts.append(own)
     return parts
 
 

@@ -134,7 +134,7 @@ def of_default_gains(s: Any) -> str:
     """Return a sentence on default gains of the library's, which are for a force, before an
     actuator of a file that takes another command, or "".
     """
-    if not any(part.kept for part in s.actuator):
+    if not any(part.kept and part.unit for part in s.actuator):
         return ""
     known = catalogue()
     for law in s.law.parts:

@@ -18,10 +18,10 @@ def default_bound(s: Any) -> float | tuple[float, ...]:
         return suggested
     bounds = list(suggested) if isinstance(suggested, tuple) else [suggested] * s.plant.driven
     # what the plant suggests is for the servos that it keeps
-    none = (None,) * s.plant.driven
+    none = ((),) * s.plant.driven
     kept = s.plant.suggested.get("actuator", none)
     for i, motor in enumerate(s.drive_train.motors):
-        if motor.bound is not None and kept[i] is None:
+        if motor.bound is not None and not any(part.unit for part in kept[i]):
             bounds[i] = motor.bound
     return tuple(bounds) if len(set(bounds)) > 1 else bounds[0]
 

@@ -11,6 +11,7 @@ Here `s` is a Scenario, which imports this module.
 
 import dataclasses
 import math
+import operator
 from typing import Any
 
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction
@@ -132,19 +133,27 @@ def _step_of_mechanism(s: Any) -> float:
 def default_steps(s: Any) -> int:
     """Return the default number of physics steps per control period.
 
-    Behind a drive, and with `exact_friction`, up to four times as many steps are tried, until the
-    input delay is a whole number of steps.
+    Behind a drive, and with `exact_friction`, up to four times as many steps are tried, until all
+    delays are a whole number of steps.
     """
     # a scenario that needs less is refused later
     shortest = min(map(longest_step, s.machines))
     longest = max(shortest, s.control_period / MAX_DEFAULT_STEPS)
     minimum = math.ceil(s.control_period / longest - 1e-9)
-    delay = s.input_delay / s.control_period
     if s.actuator or s.exact_friction:
         for steps in range(minimum, 4 * minimum + 1):
-            if abs(math.remainder(delay * steps, 1.0)) < 1e-6:
+            if _divides_delays(s, steps):
                 return steps
     return minimum
+
+
+def _divides_delays(s: Any, steps: int) -> bool:
+    """Return whether all delays are whole numbers of this many steps a control period."""
+    for delay in (s.input_delay, *map(operator.attrgetter("lateness"), s.actuator)):
+        periods = delay / s.control_period
+        if abs(math.remainder(periods * steps, 1.0)) >= 1e-6:
+            return False
+    return True
 
 
 def stepped_by_mujoco(s: Any) -> Any:

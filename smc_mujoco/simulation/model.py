@@ -303,6 +303,7 @@ def keeps_torques(rows: np.ndarray) -> bool:
 def spec(scenario: Scenario) -> mujoco.MjSpec:
     """Return a scenario's mechanism as an editable MjSpec."""
     spec = scenario.plant.spec()
+    spec.option.timestep = scenario.resolved.physics_step
     if scenario.mechanism != "equation":
         scenario.plant.mechanisms[scenario.mechanism].edit(spec)
     for obstacle in scenario.contact:
@@ -430,14 +431,23 @@ def initial_state(model: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray
     return state_with(model, moving_joints(model), scenario.resolved.x0, scenario.resolved.v0)
 
 
+def initial_activations(model: mujoco.MjModel, scenario: Scenario) -> np.ndarray:
+    """Return the activations of the actuators at t = 0, (na,)."""
+    act = np.zeros(model.na)
+    if scenario.plant.pose and model.nkey:  # thrust behind a lag
+        act[:] = model.key_act[0]
+    for part in scenario.actuator:
+        part.begin(model, act)
+    return act
+
+
 def put_initial_state(model: mujoco.MjModel, data: mujoco.MjData, scenario: Scenario) -> None:
     """Write a scenario's state at t = 0 into the data of its model, with the past readings of
     delayed sensors.
     """
     data.qpos[:], data.qvel[:] = initial_state(model, scenario)
-    if scenario.plant.pose and model.nkey:  # thrust behind a lag
-        data.act[:] = model.key_act[0]
-    if model.nhistory:
+    data.act[:] = initial_activations(model, scenario)
+    if scenario.readings:
         remember(model, data)
 
 

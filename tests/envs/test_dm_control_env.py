@@ -58,6 +58,8 @@ def test_a_law_as_an_agent_gives_the_trace_of_its_run(plant, task):
         {"friction": smc.Coulomb(0.1), "actuator": smc.Lag(0.02)},
         {"actuator": (smc.DCMotor(), smc.Backlash(0.01)), "x0": 0.3},
         {"actuator": smc.hardware.ElasticJoint(500.0, 0.1, 0.02), "x0": 0.3},
+        {"actuator": smc.hardware.PositionServo(9.0, 1.0, goal=0.2, ki=2.0, slewmax=0.4)},
+        {"actuator": smc.hardware.CommandDelay(0.02), "x0": 0.3},
         {"mismatch": {"mass": 1.3}, "u_max": 2.0},
         {"friction": dahl(level=0.1), "actuator": worn()},
         {"actuator": smc.DCMotor(inductance=0.0, ripple=0.1), "friction": smc.Coulomb(0.1)},

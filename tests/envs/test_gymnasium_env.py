@@ -104,8 +104,9 @@ def test_a_copy_in_a_batch_moves_as_the_single_environment_does(plant, task):
         {"friction": dahl(level=0.1), "actuator": worn()},
         {"actuator": smc.hardware.Stepper(torque=9.0)},
         {"actuator": (smc.Lag(0.01), smc.hardware.ElasticJoint(500.0, 0.1, 0.02))},
+        {"actuator": (smc.hardware.CommandDelay(0.02), smc.hardware.PositionServo(9.0, ki=2.0))},
     ],
-    ids=["motor", "two lags", "own", "stepper", "elastic joint"],
+    ids=["motor", "two lags", "own", "stepper", "elastic joint", "late servo"],
 )
 def test_friction_and_drives_hold_in_a_batch_too(parts):
     changes = {"duration": 0.1} | parts

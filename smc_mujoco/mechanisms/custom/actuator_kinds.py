@@ -32,8 +32,8 @@ def no_motor(model: mujoco.MjModel, i: int) -> str:
     kind = kind or _with_bias(model, i, dynamics)
     if not kind and dynamics != "mjDYN_NONE":
         kind = f"has dynamics (dyntype {dynamics.removeprefix('mjDYN_').lower()})"
-    if delay := float(model.actuator_delay[i]):
-        kind = f"{kind or 'is a motor'}, with a delay of {delay:g} s"
+    if not kind and not model.actuator_gainprm[i, 0]:
+        kind = "has gain 0"
     return kind or spoilt(model, i)
 
 
@@ -48,9 +48,12 @@ def spoilt(model: mujoco.MjModel, i: int) -> str:
     group = int(model.actuator_group[i])
     if 0 <= group <= 30 and model.opt.disableactuator >> group & 1:
         return "is in a group that actuatorgroupdisable turns off"
-    if not model.actuator_gear[i, 0] * model.actuator_gainprm[i, 0]:
-        return "has gear or gain 0"
-    return ""
+    return "" if gear_of(model, i) else "has gear 0"
+
+
+def gear_of(model: mujoco.MjModel, i: int) -> float:
+    """Return the gear of an actuator on a hinge or a slide."""
+    return float(model.actuator_gear[model.actuator_outadr[i], 0])
 
 
 def _with_bias(model: mujoco.MjModel, i: int, dynamics: str) -> str:

@@ -25,8 +25,14 @@ from smc_mujoco.common.errors import (
     shown,
     users_stacklevel,
 )
-from smc_mujoco.mechanisms.custom.actuator_kinds import no_motor
-from smc_mujoco.mechanisms.custom.kept_actuators import forcerange_of, kept, not_kept
+from smc_mujoco.mechanisms.custom.actuator_kinds import gear_of, no_motor
+from smc_mujoco.mechanisms.custom.kept_actuators import (
+    ctrlrange_of,
+    delay_of,
+    forcerange_of,
+    kept,
+    not_kept,
+)
 from smc_mujoco.mechanisms.custom.mjcf import pick
 from smc_mujoco.mechanisms.hardware.part import Actuator
 from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
@@ -62,10 +68,11 @@ class Channel:
         their forcerange, a motor's ctrlrange, and the joint's actuatorfrcrange. Without it, the
         joint needs exactly one actuator, which stays as it is. In a file without actuators, such as
         a URDF, a joint whose force is bounded gets an ideal motor.
-      servo: what the joint's actuator has to be. True: a `<position>`, whose set-point u is, rad
-        (m) from the joint's default goal, with its kp, kv, gear, timeconst, forcerange and
-        ctrlrange, and without a nominal model; or a `<dcmotor>`, whose voltage u is, V. False: a
-        motor, whose force u is, N m (N). None: one of the three, and a warning if u is no force.
+      servo: what the joint's actuator has to be. True: a `<position>` or a `<pid>`, whose
+        set-point u is, rad (m) from the joint's default goal, with its gains, gear, timeconst,
+        forcerange and ctrlrange, and without a nominal model; or a `<dcmotor>`, whose voltage u is,
+        V. False: a motor, whose force u is, N m (N). None: any of these, and a warning if u is no
+        force. Each keeps its delay.
       set_point_step: the servo rounds its set-point to multiples of this, rad (m); 0: it does not.
       partner: a joint without an actuator that moves with this one, such as a pole on its cart. It
         is measured and scored as a separate channel, after the driven ones. The law of this channel
@@ -386,6 +393,7 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> Floats:
     for i in drives:
         name = model.actuator(i).name or f"number {i}"
         known = model.actuator_dyntype[i] in plain and model.actuator_trnid[i, 1] < 0
+        known = known and not model.actuator_delay[i]
         if (
             not known
             or model.actuator_gaintype[i] != FIXED
@@ -393,10 +401,11 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> Floats:
         ):
             raise ScenarioError(
                 f"actuator {name!r} of {label} is more than a force behind a lag: "
-                "make it a <motor> without a refsite"
+                "make it a <motor> without a refsite and without a delay"
             )
-    ends = model.actuator_gainprm[drives, :1] * model.actuator_ctrlrange[drives]
-    ends[model.actuator_ctrllimited[drives] == 0] = math.inf
+    commands = model.actuator_ctrladr[drives]
+    ends = model.actuator_gainprm[drives, :1] * model.actuator_ctrlrange[commands]
+    ends[model.actuator_ctrllimited[commands] == 0] = math.inf
     allowed = model.actuator_forcerange[drives].T[:, :, None]
     clamped = np.clip(ends, *allowed)
     ends[model.actuator_forcelimited[drives] == 1] = clamped[
@@ -492,7 +501,8 @@ class Motor(NamedTuple):
     joint: str
     limit: float  # bound on its force, N m or N
     replaced: tuple[int, ...]  # indices of the actuators that it replaces
-    kept: Actuator | None = None  # of the file, if a law commands it as it is
+    # of the file, as they are: its delay, and what takes another command than a force
+    kept: tuple[Actuator, ...] = ()
 
 
 def motor_of(
@@ -533,12 +543,16 @@ def motor_of(
         bounds.append(_of_actuator(model, actuators[0]))
     gives = f"actuator {names!r} gives joint {joint!r} of {label}"
     limit = _limit(gives, cure, *bounds)
-    part = kept(model, actuators[0], goal, channel.set_point_step) if stays else None
-    if channel.set_point_step and not isinstance(part, PositionServo):
+    parts = ()
+    if actuators and not channel.motor:
+        parts = delay_of(model, actuators[0])
+    if stays:
+        parts += (kept(model, actuators[0], goal, channel.set_point_step),)
+    if channel.set_point_step and not any(isinstance(part, PositionServo) for part in parts):
         raise ScenarioError(
             f"the drive of joint {joint!r} of {label} has no set-point: leave set_point_step out"
         )
-    return Motor(joint, limit, tuple(actuators), part)
+    return Motor(joint, limit, tuple(actuators), parts)
 
 
 def _check_kept(model: mujoco.MjModel, i: int, joint: str, channel: Channel, cure: str) -> None:
@@ -547,12 +561,12 @@ def _check_kept(model: mujoco.MjModel, i: int, joint: str, channel: Channel, cur
         name = model.actuator(i).name or f"number {i}"
         if not no_motor(model, i):
             raise ScenarioError(
-                f"actuator {name!r} of joint {joint!r} {why}, but servo=True is for a <position> "
-                "or a <dcmotor>: leave servo out"
+                f"actuator {name!r} of joint {joint!r} {why}, but servo=True is for a <position>, "
+                "a <pid> or a <dcmotor>: leave servo out"
             )
         raise ScenarioError(
-            f"actuator {name!r} of joint {joint!r} {why}, and only a <motor>, a <position> or a "
-            f"plain <dcmotor> can be used as it is: {cure}"
+            f"actuator {name!r} of joint {joint!r} {why}, and only a <motor>, a <position>, a "
+            f"<pid> or a plain <dcmotor> can be used as it is: {cure}"
         )
 
 
@@ -606,12 +620,8 @@ def _limit(who: str, cure: str, *ranges: Floats) -> float:
 def _of_actuator(model: mujoco.MjModel, i: int) -> Pair:
     """Return the least and the largest force of an actuator at its joint, N m or N."""
     gain = model.actuator_gainprm[i, 0]
-    gear = model.actuator_gear[i, 0]
-    low = -math.inf
-    high = math.inf
-    clamped = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL.value
-    if model.actuator_ctrllimited[i] and clamped:
-        low, high = sorted(float(gain * end) for end in model.actuator_ctrlrange[i])
+    gear = gear_of(model, i)
+    low, high = sorted(float(gain * end) for end in ctrlrange_of(model, i))
     if model.actuator_forcelimited[i]:
         lowest, highest = model.actuator_forcerange[i]
         low, high = (float(min(max(end, lowest), highest)) for end in (low, high))
@@ -633,7 +643,7 @@ def _together(model: mujoco.MjModel, actuators: Sequence[int]) -> Pair:
         if not no_motor(model, i):
             ends = _of_actuator(model, i)
         elif model.actuator_forcelimited[i]:
-            of_gear = model.actuator_gear[i, 0] * model.actuator_forcerange[i]
+            of_gear = gear_of(model, i) * model.actuator_forcerange[i]
             ends = sorted(of_gear)
         low += float(ends[0])
         high += float(ends[1])

@@ -1,15 +1,18 @@
 """Actuators of a user's file that stay as they are: u is their own command.
 
-A `<position>` is a PositionServo, and a `<dcmotor>` on a voltage a DCMotor, each as it acts at its
-joint with gear 1.
+A `<position>` or a `<pid>` is a PositionServo, a `<dcmotor>` on a voltage a DCMotor, and the delay
+of any of them, or of a motor, a CommandDelay, each as it acts at its joint with gear 1.
 """
 
+import dataclasses
 import math
 
 import mujoco
+import numpy as np
 
 from smc_mujoco.common.aliases import Pair
-from smc_mujoco.mechanisms.custom.actuator_kinds import no_motor, spoilt
+from smc_mujoco.mechanisms.custom.actuator_kinds import gear_of, no_motor, spoilt
+from smc_mujoco.mechanisms.hardware.command_delay import INTERPOLATIONS, ROUNDING, CommandDelay
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.part import Actuator
 from smc_mujoco.mechanisms.hardware.position_servo import UNBOUNDED, PositionServo
@@ -20,15 +23,18 @@ FIXED = mujoco.mjtGain.mjGAIN_FIXED.value
 FILTERED = mujoco.mjtDyn.mjDYN_FILTEREXACT.value
 INTEGRATED = mujoco.mjtDyn.mjDYN_INTEGRATOR.value
 OF_DCMOTOR = mujoco.mjtGain.mjGAIN_DCMOTOR.value
+OF_PID = mujoco.mjtGain.mjGAIN_PID.value
+POSITION = mujoco.mjtCtrlInput.mjINPUT_POS.value
+VELOCITY = mujoco.mjtCtrlInput.mjINPUT_VEL.value
 VOLTAGE = mujoco.mjtCtrlInput.mjINPUT_VOLTAGE.value
 
 
 def not_kept(model: mujoco.MjModel, i: int) -> str:
     """Return why an actuator cannot stay as it is; "" if it can."""
-    if delay := float(model.actuator_delay[i]):
-        return f"has a delay of {delay:g} s, which input_delay has instead"
     if model.actuator_gaintype[i] == OF_DCMOTOR:
         return _no_plain_dcmotor(model, i)
+    if model.actuator_gaintype[i] == OF_PID:
+        return _no_plain_pid(model, i)
     bias, stiffness, _ = model.actuator_biasprm[i, :3].tolist()
     if model.actuator_gaintype[i] != FIXED or model.actuator_biastype[i] != AFFINE or not stiffness:
         return no_motor(model, i) or "is a motor, whose command is a force"
@@ -55,6 +61,18 @@ def _with_dynamics(model: mujoco.MjModel, i: int) -> str:
     return ""
 
 
+def _no_plain_pid(model: mujoco.MjModel, i: int) -> str:
+    """Return why the set-point of a `<pid>` cannot be all of its command; "" if it can."""
+    inputs = int(model.actuator_ctrlspec[i])
+    if not inputs & POSITION or not model.actuator_biasprm[i, 1]:
+        return "is a <pid> without a position as its command, or with kp 0"
+    if inputs & VELOCITY:
+        low, high = _range_of(model, int(model.actuator_ctrladr[i]) + 1)
+        if not low <= 0.0 <= high:
+            return f"is a <pid> whose velrange {low:g} to {high:g} leaves out 0"
+    return spoilt(model, i)
+
+
 def _no_plain_dcmotor(model: mujoco.MjModel, i: int) -> str:
     """Return what a `<dcmotor>` has besides resistance, torque constant, inductance and cogging;
     "" if nothing.
@@ -67,8 +85,10 @@ def _no_plain_dcmotor(model: mujoco.MjModel, i: int) -> str:
         return "is a <dcmotor> with a controller, heat, friction, a slew rate or a cogging phase"
     if model.actuator_ctrlspec[i] != VOLTAGE:
         return "is a <dcmotor> whose command is not a voltage"
-    if model.actuator_gear[i, 0] < 0.0:
-        return f"is a <dcmotor> of gear {model.actuator_gear[i, 0]:g}, which is negative"
+    if state[0] and model.actuator_delay[i]:
+        return "is a <dcmotor> with an inductance and a delay"
+    if gear_of(model, i) < 0.0:
+        return f"is a <dcmotor> of gear {gear_of(model, i):g}, which is negative"
     for what, (low, high) in (
         ("ctrlrange", ctrlrange_of(model, i)),
         ("forcerange", forcerange_of(model, i)),
@@ -78,22 +98,42 @@ def _no_plain_dcmotor(model: mujoco.MjModel, i: int) -> str:
     return spoilt(model, i)
 
 
+def delay_of(model: mujoco.MjModel, i: int) -> tuple[CommandDelay, ...]:
+    """Return the delay of an actuator as MuJoCo has it at the file's timestep; () without one.
+
+    A held command is late by whole steps, and by no more of them than the buffer has samples.
+    """
+    delay = float(model.actuator_delay[i])
+    if not delay:
+        return ()
+    samples, order = model.actuator_history[i].tolist()
+    step = float(model.opt.timestep)
+    if order == 0:
+        delay = step * math.ceil(delay / step - ROUNDING)
+    return (CommandDelay(min(delay, samples * step), INTERPOLATIONS[order]),)
+
+
 def kept(model: mujoco.MjModel, i: int, goal: float, step: float) -> Actuator:
     """Return an actuator that stays as it is. `goal` and `step` are those of a set-point."""
-    gear = float(model.actuator_gear[i, 0])
+    gear = gear_of(model, i)
     if model.actuator_gaintype[i] == OF_DCMOTOR:
         return _dcmotor(model, i, gear)
     _, stiffness, damping = model.actuator_biasprm[i, :3].tolist()
-    filtered = model.actuator_dyntype[i] == FILTERED
-    return PositionServo(
+    servo = PositionServo(
         kp=-gear * gear * stiffness,
         kv=-gear * gear * damping,
         forcerange=forcerange_of(model, i),
         ctrlrange=_times(ctrlrange_of(model, i), 1.0 / gear),
         goal=goal,
         step=step,
-        timeconst=float(model.actuator_dynprm[i, 0]) if filtered else 0.0,
     )
+    if model.actuator_gaintype[i] == OF_PID:
+        largest, rate = np.abs(model.actuator_dynprm[i, :2] / gear).tolist()
+        ki = gear * gear * float(model.actuator_gainprm[i, 0])
+        return dataclasses.replace(servo, ki=ki, imax=largest, slewmax=rate)
+    if model.actuator_dyntype[i] == FILTERED:
+        return dataclasses.replace(servo, timeconst=float(model.actuator_dynprm[i, 0]))
+    return servo
 
 
 def _dcmotor(model: mujoco.MjModel, i: int, gear: float) -> DCMotor:
@@ -114,11 +154,18 @@ def _dcmotor(model: mujoco.MjModel, i: int, gear: float) -> DCMotor:
 
 
 def ctrlrange_of(model: mujoco.MjModel, i: int) -> Pair:
-    """Return the least and the largest command that an actuator takes, in its own unit."""
+    """Return the least and the largest command that an actuator takes, in its own unit; of a
+    `<pid>` the set-point.
+    """
+    return _range_of(model, int(model.actuator_ctrladr[i]))
+
+
+def _range_of(model: mujoco.MjModel, ctrl: int) -> Pair:
+    """Return the range of a number of ctrl."""
     clamped = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL.value
-    if not (model.actuator_ctrllimited[i] and clamped):
+    if not (model.actuator_ctrllimited[ctrl] and clamped):
         return UNBOUNDED
-    low, high = model.actuator_ctrlrange[i].tolist()
+    low, high = model.actuator_ctrlrange[ctrl].tolist()
     return low, high
 
 
@@ -129,8 +176,7 @@ def forcerange_of(model: mujoco.MjModel, i: int) -> Pair:
     if not model.actuator_forcelimited[i]:
         return UNBOUNDED
     low, high = model.actuator_forcerange[i].tolist()
-    gear = float(model.actuator_gear[i, 0])
-    return _times((low, high), gear)
+    return _times((low, high), gear_of(model, i))
 
 
 def _times(ends: Pair, factor: float) -> Pair:

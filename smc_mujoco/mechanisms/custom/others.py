@@ -105,11 +105,11 @@ def edit(
         return
     model, data = at_start(source, channels, keyframe)
     for i, servo in servos.items():
-        goal = -servo.biasprm[1] * data.actuator_length[i]
+        goal = -servo.biasprm[1] * data.actuator_length[model.actuator_outadr[i]]
         if keyframe is not None and np.any(data.ctrl):
             ctrl = data.ctrl[model.actuator_ctrladr[i]]
-            if model.actuator_ctrllimited[i]:
-                ctrl = np.clip(ctrl, *model.actuator_ctrlrange[i])
+            if model.actuator_ctrllimited[model.actuator_ctrladr[i]]:
+                ctrl = np.clip(ctrl, *model.actuator_ctrlrange[model.actuator_ctrladr[i]])
             goal = servo.gainprm[0] * ctrl
         servo.biasprm[0] += goal
         # its ctrl stays at 0, which its range may leave out, as a knee's does

@@ -162,18 +162,18 @@ def plant_from(
 
 def _assumed_drives(label: str, made: Plant, given: Pairs) -> Iterator[str]:
     """Yield a sentence on each drive that the file decides, and that is no motor of the file."""
-    parts = made.suggested.get("actuator", (None,) * len(given))
     build: Any = made.build
-    meant = zip(given, build.channels, parts, made.units, strict=False)
-    for (joint, asked), (_, taken), part, unit in meant:
+    meant = zip(given, build.channels, build.motors, made.units, strict=False)
+    for (joint, asked), (_, taken), motor, unit in meant:
         if taken.motor and not asked.motor:
             yield (
                 f"{label} has no actuators, so joint {joint!r} gets an ideal motor, bounded as the "
                 f"joint is: {joint}(motor), or smc.Channel(motor=True), says so without this line"
             )
         if taken.servo and asked.servo is None:
+            meaning = motor.kept[-1].meaning.format(x=unit)
             yield (
-                f"u of {joint!r} of {label} is {part.meaning.format(x=unit)}, as in the file: "
+                f"u of {joint!r} of {label} is {meaning}, as in the file: "
                 f"{joint}(servo), or smc.Channel(servo=True), says so without this line, and "
                 f"{joint}(motor), or motor=True, puts an ideal motor there, whose u is a force"
             )
@@ -326,7 +326,8 @@ def _with_drives(
         motors.append(made)
         # what the file decided is stated from now on, also in texts and records
         motor = channel.motor or not made.replaced
-        stated = dataclasses.replace(channel, motor=motor, servo=made.kept is not None)
+        servo = any(part.unit for part in made.kept)
+        stated = dataclasses.replace(channel, motor=motor, servo=servo)
         channels.append((joint, stated))
     limits = tuple(motor.limit for motor in motors)
     return dataclasses.replace(build, channels=tuple(channels), motors=tuple(motors)), limits
@@ -408,15 +409,17 @@ def _kept(
         return {}
     bounds = list(given.get("u_max", (None,) * len(motors)))
     for i, motor in enumerate(motors):
-        if motor.kept and bounds[i] is None:
-            bounds[i] = own.bound_of_kept(label, model, motor.joint, motor.kept)
-    return {"actuator": parts, "u_max": tuple(bounds)}
+        if bounds[i] is None and motor.kept and motor.kept[-1].unit:
+            bounds[i] = own.bound_of_kept(label, model, motor.joint, motor.kept[-1])
+    bounded = {"u_max": tuple(bounds)} if any(bounds) else {}
+    return {"actuator": parts, **bounded}
 
 
 def _unmodelled(model: mujoco.MjModel, joints: list[str], motors: Sequence[Motor]) -> str:
     """Return why a plant has no nominal model; "" if it has one."""
-    if any(isinstance(motor.kept, PositionServo) for motor in motors):
-        return SET_POINT
+    for motor in motors:
+        if any(isinstance(part, PositionServo) for part in motor.kept):
+            return SET_POINT
     return missing(model, joints, motors)
 
 

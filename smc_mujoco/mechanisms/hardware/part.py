@@ -107,6 +107,11 @@ class Part:
         del model
         yield from ()
 
+    def begin(self, model: mujoco.MjModel, act: np.ndarray) -> None:
+        """Write its activations at the start of a run, where they are not 0, into those of all
+        actuators, (na,).
+        """
+
     def structure(self) -> Hashable:
         """Return a key that is equal for parts whose `edit` does the same: their simulations share
         a model.
@@ -267,6 +272,7 @@ class Actuator(OnJoints):
     delay: ClassVar[float] = (
         0.0  # s, time constant with which the force follows a held u; 0 for none
     )
+    lateness: ClassVar[float] = 0.0  # s, by which it gets its command late
     limited: ClassVar[bool] = False  # whether the rate of the force is limited
     # of u, where {x} stands for that of the joint; "" for that of the joint's force
     unit: ClassVar[str] = ""

@@ -1,8 +1,9 @@
 """A position servo as an actuator of a user's file: u is its set-point.
 
-    force = kp (set-point - x) - kv v, within its forcerange, as MuJoCo computes it
+    force = kp (set-point - x) - kv v + ki z, within its forcerange, as MuJoCo computes it
+    z' = set-point - x
 
-`smc.Channel(servo=True)` reads its numbers from a `<position>` of the file.
+`smc.Channel(servo=True)` reads its numbers from a `<position>` or a `<pid>` of the file.
 """
 
 # pyright: reportIncompatibleVariableOverride=false
@@ -12,6 +13,7 @@ from collections.abc import Hashable, Iterator, Sequence
 from typing import Annotated, Any
 
 import mujoco
+import numpy as np
 from numba.extending import register_jitable
 
 from smc_mujoco.common.aliases import Pair
@@ -27,10 +29,12 @@ from smc_mujoco.mechanisms.plant import Field
 Span = Annotated[Pair, Range(infinite=True)]
 UNBOUNDED = (-math.inf, math.inf)
 # Where the numbers lie in the compiled model, in actuator_gainprm, actuator_biasprm and
-# actuator_dynprm
-STIFFNESS = 0
+# actuator_dynprm; of a <pid> the gain is ki
+GAIN = 0
 BIAS = slice(0, 3)
 TIMECONST = 0
+LIMITS = slice(0, 2)  # imax and slewmax
+POSITION = mujoco.mjtCtrlInput.mjINPUT_POS.value
 
 
 @frozen_data
@@ -45,6 +49,9 @@ class PositionServo(Actuator):
     delays only the set-point. Behind a `timeconst` MuJoCo filters the clipped set-point, from the
     goal at the start. A `Lag` may stand before it. A law has no nominal model of it.
 
+    With `ki` or `slewmax` it is MuJoCo's `<pid>`, whose speed set-point stays 0. MuJoCo integrates
+    the error of the position from 0, and the set-point follows the command from the goal.
+
     Attributes:
       kp: N m/rad (N/m) at the joint, greater than 0.
       kv: N m s/rad (N s/m) at the joint, 0 or more.
@@ -53,14 +60,18 @@ class PositionServo(Actuator):
       goal: position at which u is 0, rad (m) of the joint.
       step: the set-point is rounded to multiples of this, rad (m) of the joint; 0: it is not.
       timeconst: of the first-order filter of the set-point, s; 0: none.
+      ki: N m/(rad s) (N/(m s)) at the joint, 0 or more.
+      imax: bound on the integral of the error, rad s (m s); 0: none.
+      slewmax: bound on the rate of the set-point, rad/s (m/s); 0: none.
 
     Raises:
-      ScenarioError: `forcerange` does not contain 0 between its ends. In a scenario: another drive
+      ScenarioError: `forcerange` does not contain 0 between its ends, or a timeconst beside ki or
+        slewmax. In a scenario: another drive
         of the joint, a Fault other than stuck=True, or a nominal model.
     """
 
     unit = "{x}"
-    names = ("goal", "step")
+    names = ("goal", "step", "zero")
 
     kp: Positive
     kv: Natural = 0.0
@@ -69,6 +80,9 @@ class PositionServo(Actuator):
     goal: Offset = 0.0
     step: Natural = 0.0
     timeconst: Natural = 0.0
+    ki: Natural = 0.0
+    imax: Natural = 0.0
+    slewmax: Natural = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -78,6 +92,21 @@ class PositionServo(Actuator):
                 f"PositionServo's forcerange is {low:g} to {high:g}, but a servo pushes both "
                 "ways: give a lowest force below 0 and a highest above it"
             )
+        if self.timeconst and self.by_pid:
+            raise ScenarioError(
+                f"PositionServo has timeconst {self.timeconst:g}, and a servo with ki or slewmax "
+                "has no filter: give one of them"
+            )
+
+    @property
+    def by_pid(self) -> bool:
+        """Whether it is a `<pid>` of MuJoCo, whose control is the set-point itself."""
+        return bool(self.ki or self.slewmax)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether RK4 may integrate it: a bounded rate moves the set-point once a step."""
+        return not self.slewmax
 
     @property
     def delay(self) -> float:
@@ -120,7 +149,12 @@ class PositionServo(Actuator):
                 f"a PositionServo rounds its set-point to steps of {self.step:g}, and not behind a "
                 "Lag: leave one of them out"
             )
-        if before not in ([], ["Lag"]):
+        if before == ["Lag"] and self.by_pid:
+            raise ScenarioError(
+                "a PositionServo with ki or slewmax takes its set-point from the command, and not "
+                "from a Lag: leave one of them out"
+            )
+        if before not in ([], ["Lag"], ["CommandDelay"]):
             raise ScenarioError(
                 f"a PositionServo is a drive of its own, and so is {joined(before)}: leave that "
                 "out, or give smc.Channel(motor=True) for an ideal motor instead"
@@ -138,7 +172,15 @@ class PositionServo(Actuator):
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         for actuator in self.drives_of(spec):
-            actuator.set_to_position(kp=1.0, timeconst=1.0 if self.timeconst else 0.0)
+            if self.by_pid:
+                actuator.set_to_pid(
+                    kp=1.0,
+                    ki=1.0 if self.ki else 0.0,
+                    slewmax=1.0 if self.slewmax else 0.0,
+                    ctrlspec=POSITION,
+                )
+            else:
+                actuator.set_to_position(kp=1.0, timeconst=1.0 if self.timeconst else 0.0)
             actuator.ctrllimited = True
             actuator.ctrlrange = (-1.0, 1.0)
             actuator.forcelimited = True
@@ -147,33 +189,52 @@ class PositionServo(Actuator):
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         ids = self.drive_ids(model)
         low, high = self.ctrlrange
-        yield Field("actuator_gainprm", (ids, STIFFNESS), self.kp)
-        yield Field("actuator_biasprm", (ids, BIAS), (self.kp * self.goal, -self.kp, -self.kv))
-        yield Field("actuator_ctrlrange", ids, (low - self.goal, high - self.goal))
+        held = 0.0 if self.by_pid else self.kp * self.goal  # N m (N), at u = 0
+        gain = self.ki if self.by_pid else self.kp
+        commands = model.actuator_ctrladr[ids]
+        yield Field("actuator_gainprm", (ids, GAIN), gain)
+        yield Field("actuator_biasprm", (ids, BIAS), (held, -self.kp, -self.kv))
+        yield Field("actuator_ctrlrange", commands, (low - self.zero, high - self.zero))
         yield Field("actuator_forcerange", ids, self.forcerange)
+        if self.by_pid:
+            yield Field("actuator_dynprm", (ids, LIMITS), (self.imax, self.slewmax))
         if self.timeconst:
             yield Field("actuator_dynprm", (ids, TIMECONST), self.timeconst)
 
     def structure(self) -> tuple[Hashable, ...]:
-        return *super().structure(), bool(self.timeconst)
+        return *super().structure(), bool(self.timeconst), bool(self.ki), bool(self.slewmax)
+
+    @property
+    def zero(self) -> float:
+        """The set-point at which the control of MuJoCo's actuator is 0, rad (m)."""
+        return 0.0 if self.by_pid else self.goal
+
+    def begin(self, model: mujoco.MjModel, act: np.ndarray) -> None:
+        if self.slewmax:
+            ids = self.drive_ids(model)
+            act[model.actuator_actadr[ids]] = self.goal
 
     def numbers(self, run: Run) -> list[Sequence[float]]:
-        return [(self.goal, self.step)]
+        return [(self.goal, self.step, self.zero)]
 
     @property
     def act(self) -> Any:
-        """The function that rounds the set-point; None if it is not rounded."""
-        return rounded if self.step else None
+        """The function that writes the set-point, if it is rounded or no u; else None."""
+        return placed if self.step or self.by_pid else None
 
 
 numbers_at = record_at(floats(PositionServo.names))
 
 
 @register_jitable
-def rounded(sim, data, part):
-    """Round the set-point of MuJoCo's servo to a multiple of `step`, at the start of a step."""
+def placed(sim, data, part):
+    """Write the control of MuJoCo's servo at the start of a step: the set-point, a multiple of
+    `step`, counted from `zero`.
+    """
     if sim.stage == 0:
         channel = channel_at(sim.channels, part.channel)
         p = numbers_at(part.function.parameters, 0)
         aim = p.goal + state_at(sim.states, part.channel).delayed
-        data.ctrl[channel.ctrl] = p.step * math.floor(aim / p.step + 0.5) - p.goal
+        if p.step != 0.0:
+            aim = p.step * math.floor(aim / p.step + 0.5)
+        data.ctrl[channel.ctrl] = aim - p.zero

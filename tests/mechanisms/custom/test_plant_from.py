@@ -686,11 +686,9 @@ def test_a_file_is_hashed_parsed_and_compiled_once_for_a_plant(tmp_path, monkeyp
 
 ACTUATORS = {
     '<dcmotor joint="j" motorconst=".05" resistance="2" lugre="1 1 .1 .2 .1"/>': "<dcmotor>",
-    '<position joint="j" kp="9" delay=".01" nsample="12"/>': "a delay of 0.01 s",
-    '<motor joint="j" delay=".01" nsample="12"/>': "a delay of 0.01 s, which input_delay has",
     '<intvelocity joint="j" kp="9" actrange="-3 3"/>': "<intvelocity>, .* a speed",
     '<velocity joint="j" kv="5"/>': "<velocity> servo, .* a speed",
-    '<pid joint="j" kp="9" ki="1"/>': "<pid>",
+    '<pid joint="j" kp="9" input="ff"/>': "<pid> without a position",
     '<cylinder joint="j" area="1"/>': "<cylinder>",
     '<damper joint="j" kv="5" ctrlrange="0 1"/>': "<damper>",
     '<general joint="j" dyntype="integrator"/>': "dyntype integrator",

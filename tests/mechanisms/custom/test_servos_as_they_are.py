@@ -151,7 +151,6 @@ REFUSED = {
         {},
         ["actlimited"],
     ),
-    "a delay": ('<position joint="j" kp="9" delay=".02" nsample="10"/>', {}, ["delay of 0.02 s"]),
     "another gain": (
         '<general joint="j" gainprm="9" biastype="affine" biasprm="0 -8 0"/>',
         {},
@@ -163,7 +162,17 @@ REFUSED = {
         ["bias 1"],
     ),
     "one way": ('<position joint="j" kp="9" forcerange="0 3"/>', {}, ["0 to 3", "motor=True"]),
-    "a pid": ('<pid joint="j" kp="9"/>', {}, ["is a <pid>"]),
+    "a pid of a speed": ('<pid joint="j" kv="9" input="vel"/>', {}, ["without a position"]),
+    "a pid that moves": (
+        '<pid joint="j" kp="9" kv="1" velrange=".1 2"/>',
+        {},
+        ["velrange 0.1 to 2", "leaves out 0"],
+    ),
+    "a late winding": (
+        '<dcmotor joint="j" motorconst=".05" resistance="2" inductance=".04 0" delay=".02" nsample="10"/>',
+        {},
+        ["inductance and a delay"],
+    ),
     "a controller": (
         '<dcmotor joint="j" motorconst=".05" resistance="2" lugre="1 1 .1 .2 .1"/>',
         {},

@@ -1,0 +1,195 @@
+"""Delays, filters and `<pid>`s of a user's file that stay as they are, against MuJoCo's own loop."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.hardware import CommandDelay, PositionServo
+from smc_mujoco.simulation import scenario_json
+
+STEP = 1e-3
+PERIOD = 5e-3
+ARM = """<mujoco model="arm"><compiler angle="radian"/><option timestep="1e-3"/><worldbody>
+  <body><joint name="a" axis="0 1 0" damping=".1" armature=".02"/>
+    <geom type="capsule" fromto="0 0 0 .3 0 0" size=".02" mass=".6" contype="0" conaffinity="0"/>
+    <body pos=".3 0 0"><joint name="b" axis="0 1 0" damping=".05" armature=".01" range="-2 2"/>
+      <geom type="capsule" fromto="0 0 0 .2 0 0" size=".02" mass=".3" contype="0" conaffinity="0"/>
+    </body></body></worldbody>
+  <actuator>%s %s</actuator>
+  <keyframe><key name="home" qpos=".2 .4"/></keyframe></mujoco>"""
+SERVO = '<position joint="a" kp="30" kv="1.5" gear="-2" ctrlrange="-2 1" forcerange="-4 3"%s/>'
+MOTOR = '<motor joint="b" gear="3" ctrlrange="-.6 .6"%s/>'
+PID = """<pid joint="a" kp="30" kv="1.5" ki="40" imax=".02" slewmax="3" gear="-2"
+  posrange="-2 1" forcerange="-4 3"/>"""
+LATE = ' delay="%g" nsample="%d"'
+GOAL = 0.2
+
+
+@smc.law_function(gains={"kp": 2.0})
+def on_command(y, gains, memory):
+    """Command the reference, and a share of the error."""
+    return y.r - gains.kp * y.e, y.e
+
+
+def run(plant, **fields):
+    fields = {"reference": smc.Sine(0.5, 5.0), "control_period": PERIOD, "x0": (0.5, -0.3)} | fields
+    (trace,) = smc.run([smc.Scenario(plant=plant, law=on_command(), physics_step=STEP, **fields)])
+    assert trace.failure is None
+    return trace
+
+
+def arm(first, second, timestep="1e-3"):
+    channels = {"a": smc.Channel(servo=True), "b": smc.Channel()}
+    text = ARM.replace("1e-3", timestep) % (first, second)
+    return smc.plant_from(text, channels, keyframe="home")
+
+
+def by_mujoco(xml, trace, integrator, begin=lambda model, data: None):
+    """Return positions at the samples of a plain loop of MuJoCo with a trace's commands."""
+    model = mujoco.MjModel.from_xml_string(xml)
+    model.opt.timestep = STEP
+    model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
+    data = mujoco.MjData(model)
+    data.qpos[:] = trace.x[0]
+    begin(model, data)
+    places = []
+    for u in trace.u:
+        places.append(data.qpos.copy())
+        data.ctrl[model.actuator_ctrladr] = -2.0 * (GOAL + u[0]), u[1] / 3.0
+        for _ in range(round(PERIOD / STEP)):
+            mujoco.mj_step(model, data)
+    return np.array(places)
+
+
+def at_goal(model, data):
+    """Let MuJoCo remember the set-point at the goal, as before the first command of a run."""
+    for i in np.flatnonzero(model.actuator_delay):
+        count = model.actuator_history[i, 0]
+        times = STEP * np.arange(-count, 0.0)
+        values = np.full(count, -2.0 * GOAL if i == 0 else 0.0)
+        mujoco.mj_initCtrlHistory(model, data, i, times, values)
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
+def test_each_joint_keeps_the_delay_of_its_actuator(integrator):
+    parts = SERVO % (LATE % (0.012, 12)), MOTOR % (LATE % (0.003, 3))
+    trace = run(arm(*parts), duration=2.0, integrator=integrator)
+    x = by_mujoco(ARM % parts, trace, integrator, at_goal)
+    np.testing.assert_allclose(trace.x, x, rtol=0, atol=1e-12)
+    prompt = by_mujoco(ARM % (SERVO % "", MOTOR % ""), trace, integrator)
+    assert np.abs(trace.x - prompt).max() > 0.01
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
+def test_a_delay_of_all_actuators_is_an_input_delay_to_the_last_bit(integrator):
+    late = LATE % (0.012, 12)
+    # the file's timestep is none of the run's
+    plant = arm(SERVO % late, MOTOR % late, timestep="4e-3")
+    own = run(plant, duration=1.0, integrator=integrator)
+    prompt = arm(SERVO % "", MOTOR % "")
+    given = run(prompt, duration=1.0, integrator=integrator, input_delay=0.012)
+    np.testing.assert_array_equal(own.x, given.x)
+
+
+def test_all_stages_of_rk4_read_one_command_where_the_last_of_mujoco_reads_the_next():
+    parts = SERVO % (LATE % (0.012, 12)), MOTOR % (LATE % (0.003, 3))
+    trace = run(arm(*parts), duration=2.0, integrator="RK4")
+
+    def held(model, data):
+        at_goal(model, data)
+        model.actuator_delay += 0.25 * STEP
+
+    x = by_mujoco(ARM % parts, trace, "RK4", held)
+    np.testing.assert_allclose(trace.x, x, rtol=0, atol=1e-12)
+    x = by_mujoco(ARM % parts, trace, "RK4", at_goal)
+    assert 1e-4 < np.abs(trace.x - x).max() < 1e-2
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
+@pytest.mark.parametrize("left_out", ["", 'slewmax="3"', 'ki="40" imax=".02"'])
+def test_a_pid_moves_as_that_of_the_file(integrator, left_out):
+    parts = PID.replace(left_out, ""), MOTOR % ""
+    trace = run(arm(*parts), duration=2.0, integrator=integrator)
+
+    def slewed_from_the_goal(model, data):
+        if "slewmax" in parts[0]:
+            data.act[0] = -2.0 * GOAL
+
+    x = by_mujoco(ARM % parts, trace, integrator, slewed_from_the_goal)
+    np.testing.assert_allclose(trace.x, x, rtol=0, atol=1e-12)
+    assert trace.scenario.efforts == ("rad", "N m")
+    plain = by_mujoco(ARM % (SERVO % "", MOTOR % ""), trace, integrator)
+    assert np.abs(trace.x - plain).max() > 0.01
+
+
+LINK = """<mujoco><compiler angle="radian"/><option timestep="2e-3"/><worldbody><body>
+  <joint name="j" axis="0 -1 0" damping=".1" range="-2 2"/>
+  <geom type="capsule" fromto="0 0 0 .2 0 0" size=".02" mass=".3" contype="0" conaffinity="0"/>
+  </body></worldbody><actuator>%s</actuator></mujoco>"""
+LATE_MOTOR = '<motor joint="j" ctrlrange="-3 3" delay=".02" nsample="%d"/>'
+
+
+def link(actuator, **channel):
+    return smc.plant_from(LINK % actuator, {"j": smc.Channel(**channel)}, name="link")
+
+
+@pytest.mark.parametrize(
+    ("delay", "samples", "dead_time"), [(0.02, 10, 0.02), (0.021, 20, 0.022), (0.02, 4, 0.008)]
+)
+def test_a_delay_is_that_which_mujoco_has_at_the_timestep_of_the_file(delay, samples, dead_time):
+    part = f'<motor joint="j" ctrlrange="-3 3" delay="{delay}" nsample="{samples}"/>'
+    scenario = smc.Scenario(plant=link(part), law="pid")
+    (kept,) = scenario.actuator
+    assert isinstance(kept, CommandDelay)
+    assert kept.dead_time == pytest.approx(dead_time)
+    assert scenario.efforts == ("N m",)
+    assert scenario.limits == (3.0,)
+
+
+def test_a_delay_is_kept_in_texts_and_records_and_goes_with_an_ideal_motor():
+    late = link(LATE_MOTOR % 10)
+    assert late.argument == "FILE.xml:j"
+    assert smc.Scenario(plant=link(LATE_MOTOR % 10, motor=True), law="pid").actuator == ()
+    scenario = smc.Scenario(plant=late, law="pid")
+    back = scenario_json.restore(scenario_json.describe(scenario))
+    assert back == scenario
+    assert back.actuator == (CommandDelay(0.02),)
+    # one of the user's own stands in its place
+    own = smc.Scenario(plant=late, law="pid", actuator=CommandDelay(0.05))
+    assert own.actuator == (CommandDelay(0.05),)
+    with pytest.raises(ScenarioError, match="Lag and PositionServo, and the joint keeps the Com"):
+        smc.Scenario(plant=late, law="pid", actuator=(smc.Lag(0.01), PositionServo(9.0)))
+
+
+BARE = """<mujoco><compiler angle="radian"/><option timestep="1e-3" gravity="0 0 0"/><worldbody>
+  <body><joint name="j" axis="0 -1 0" damping=".6" armature=".028"/>
+  <geom type="capsule" fromto="0 0 0 .2 0 0" size=".02" mass=".3" contype="0" conaffinity="0"/>
+  </body></worldbody><actuator><motor joint="j" ctrlrange="-3 3"%s/></actuator></mujoco>"""
+
+
+def test_predicted_chattering_has_the_delay_of_an_actuator():
+    fields = {"law": smc.law("classical", k=0.5, c=8.0), "x0": 0.1}
+    own = smc.Scenario(plant=smc.plant_from(BARE % (LATE % (0.01, 10)), ["j"]), **fields)
+    given = smc.Scenario(plant=smc.plant_from(BARE % "", ["j"]), input_delay=0.01, **fields)
+    predicted = smc.design.chattering(own)
+    assert predicted.frequency == smc.design.chattering(given).frequency
+
+
+def test_the_default_step_divides_the_delay_of_an_actuator():
+    given = {"plant": link(MOTOR.replace('"b"', '"j"') % ""), "law": "pid"}
+    steps = []
+    for delay in (0.02, 0.0025):
+        steps.append(smc.Scenario(actuator=CommandDelay(delay), **given).resolved.physics_step)
+    assert steps == [1e-3, 5e-4]
+    with pytest.raises(ScenarioError, match=r"before DCMotor, whose state .* give input_delay"):
+        smc.Scenario(actuator=(CommandDelay(0.02), smc.DCMotor()), **given)
+
+
+def test_a_delay_that_is_interpolated_is_that_of_mujoco():
+    late = ' delay="0.0105" nsample="20" interp="linear"'
+    parts = SERVO % late, MOTOR % late
+    trace = run(arm(*parts), duration=1.0, integrator="implicitfast")
+    x = by_mujoco(ARM % parts, trace, "implicitfast", at_goal)
+    np.testing.assert_allclose(trace.x, x, rtol=0, atol=1e-12)
