@@ -35,8 +35,10 @@ from smc_mujoco.common.files import own, replacing
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.common.rebuild import helpers, names_in, rebuild, values_in
 
-# Without wrappers for Python, which take half the time to compile, and copied by LLVM to where it
-# is called: numba's own `inline="always"` takes twice the time to compile.
+# For compiled code alone: without wrappers for Python, which take half the time to compile.
+not_inlined = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+# The same, copied by LLVM to where it is called: numba's own `inline="always"` takes twice the time
+# to compile.
 inlined = njit(
     error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True
 )

@@ -35,6 +35,7 @@ from smc_mujoco.common.jit import (
     jit,
     loader,
     named,
+    not_inlined,
     pointer,
     record_at,
 )
@@ -42,7 +43,7 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import head_at, measurement_at
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.mechanisms.hardware.moments import JointState, Reach, Sight, part_at
+from smc_mujoco.mechanisms.hardware.moments import JointState, Sight, part_at, reached
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import SEEN, Plant
 from smc_mujoco.simulation.signals import Signal
@@ -200,25 +201,28 @@ def _compile_part(
 @functools.cache
 def _compile_act(function: Callable) -> CompiledFunction:
     """Compile what a part does at a stage: of the record of the run, and its PART."""
-    body = njit(error_model="numpy")(function)
+    body = not_inlined(function)
 
     def native(address, part, _, __):
         sim = simulation_at(address, 0)
-        at = sim.reach
-        reach = Reach(
-            pointer(at.qpos),
-            pointer(at.qvel),
-            pointer(at.ctrl),
-            pointer(at.xfrc_applied),
-            pointer(at.qfrc_applied),
-            pointer(at.actuator_force),
-            at.actuator_user,
-            at.body_user,
-        )
-        body(sim, reach, part_at(part, 0))
+        body(sim, reached(sim.reach), part_at(part, 0))
         return 0
 
     return _stored(native, function)
+
+
+@functools.cache
+def compile_moment(moment: Callable) -> CompiledFunction:
+    """Compile what only some runs do at a moment of the control step, a compiled function
+    (address, sim, k) -> failure code.
+
+    It is no part of the callback, so only those runs wait for it to compile.
+    """
+
+    def native(address, k, _, __):
+        return moment(address, simulation_at(address, 0), k)
+
+    return _stored(native, moment.py_func)
 
 
 def _stored(native: Callable, function: Callable) -> CompiledFunction:

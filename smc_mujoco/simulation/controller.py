@@ -21,11 +21,8 @@ otherwise.
 import math
 from collections import namedtuple
 
-from numba import njit
-
-from smc_mujoco.common.jit import inlined, integers, pointer, store
+from smc_mujoco.common.jit import call, inlined, integers, not_inlined, pointer, store
 from smc_mujoco.common.mjcb import slots
-from smc_mujoco.control.joint_law import begin_measurement, put_channel
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.moments import (
     channel_at,
@@ -126,12 +123,14 @@ def _position(numbers, at, turn):
 
 
 @inlined
-def _now(view, k, i):
+def log_row(view, k, i):
+    """Return the LOG of channel i at sample k."""
     return log_at(view.sim.log, k * view.sim.n + i)
 
 
 @inlined
-def _ring(view, k):
+def ring(view, k):
+    """Return the commands of sample k, (n,), in the delay buffer."""
     sim = view.sim
     return pointer(sim.delay_buffer + 8 * sim.n * (k % sim.delay_slots))
 
@@ -218,7 +217,7 @@ def _feedforward(view, t):
 
 
 @inlined
-def _refer(view, i, k, t):
+def refer(view, i, k, t):
     """Return whether the reference of channel i raised, and its motion."""
     address, sim, _ = view
     raised = False
@@ -238,12 +237,12 @@ def _compensate(view, k, t, i):
     return _compensation(view, k, t, i)
 
 
-@njit(error_model="numpy")
+@not_inlined
 def _compensation(view, k, t, i):
     address, sim, _ = view
     v = pointer(sim.seen.v)[i]
     if sim.on_reference != 0:
-        raised, _, v, _ = _refer(view, i, k, t)
+        raised, _, v, _ = refer(view, i, k, t)
         if raised:
             return True, 0.0
     y = sim.joint_state
@@ -263,7 +262,7 @@ def _compensation(view, k, t, i):
 
 
 @inlined
-def _evaluate_model(address, sim, i):
+def evaluate_model(address, sim, i):
     """Write nominal f and g of channel i into the record. Return whether the model raised."""
     sim.seen.i = i
     return evaluate(sim.nominal, 0, address + record.AT.seen, address + record.AT.model)
@@ -271,7 +270,7 @@ def _evaluate_model(address, sim, i):
 
 @inlined
 def _nominal(view, i):
-    raised = _evaluate_model(view.address, view.sim, i)
+    raised = evaluate_model(view.address, view.sim, i)
     return raised, view.sim.model.f, view.sim.model.g
 
 
@@ -305,26 +304,26 @@ def _commanded(view, i, u):
         last_u[i] += pointer(sim.other_forces)[i]
 
 
-@njit(error_model="numpy")
+@not_inlined
 def _asked(view, k):
     """Write commands and references of the channels that are only measured."""
     sim = view.sim
-    buffer = _ring(view, k)
+    buffer = ring(view, k)
     last_u = pointer(sim.seen.u)
     if sim.mixer != 0:
-        _mix(sim, last_u, buffer)
+        call(sim.mix, view.address, k, 0, 0)
     for i in range(sim.driven, sim.n):
-        sample = _now(view, k, i)
+        sample = log_row(view, k, i)
         buffer[i], sample.u, sample.s = 0.0, 0.0, 0.0
         if sim.referenced <= i:
             sample.r = 0.0
         elif sim.joint == 0:
-            if _refer(view, i, k, 0.0)[0]:
+            if refer(view, i, k, 0.0)[0]:
                 return record.RAISED
             sample.r = sim.motion.value
     for i in range(sim.n if sim.other_forces != 0 else 0):
         drive = drive_at(sim.drives, i)
-        last_u[i] = drive.gain * _now(view, k, i).u - drive.drag * pointer(sim.seen.v)[i]
+        last_u[i] = drive.gain * log_row(view, k, i).u - drive.drag * pointer(sim.seen.v)[i]
     return record.FINE
 
 
@@ -342,10 +341,11 @@ def _arrived(view):
 
 @inlined
 def _disturb(view, t, k):
-    address, sim, data = view
+    sim = view.sim
     if sim.disturbance_count == 0:
         return record.FINE
-    return exogenous.disturb(address, sim, data, t, k)
+    sim.instant.t = t
+    return call(sim.disturb, view.address, k, 0, 0)
 
 
 @inlined
@@ -366,104 +366,6 @@ def _disturbance(view, i):
     return generalised_disturbance(view.data, channel_at(view.sim.channels, i))
 
 
-@njit(error_model="numpy")
-def _mix(sim, u, controls):
-    """Write the controls of a free body's actuators for its force and torque u, (6,), by the
-    measured attitude.
-    """
-    for j in range(sim.n):
-        controls[j] = 0.0
-    rotation.mix(
-        pointer(sim.seen.x),
-        u,
-        pointer(sim.mixer),
-        sim.actuators,
-        sim.keeps_torques,
-        controls,
-    )
-
-
-@njit(error_model="numpy")
-def _measure_joints(view, k, t):
-    """Write what a law of many joints reads at sample k, at time t, s."""
-    address, sim, _ = view
-    seen = sim.seen
-    motion = sim.motion
-    dynamics = 0
-    if sim.handle.coriolis != 0.0:
-        dynamics = address + record.AT.handle
-    y = begin_measurement(sim.joint, t, sim.period, sim.uses_model, dynamics, sim.n, sim.driven)
-    for i in range(sim.n):
-        if _refer(view, i, k, t)[0]:
-            return record.RAISED
-        _now(view, k, i).r = motion.value
-        put_channel(
-            y,
-            i,
-            pointer(seen.x)[i],
-            pointer(seen.v)[i],
-            pointer(sim.a)[i],
-            drive_at(sim.drives, i).limit,
-            motion.value,
-            motion.rate,
-            motion.acceleration,
-        )
-    if sim.mixer != 0:
-        rotation.put_attitude_error(y.x, y.v, y.r, y.dr, y.e, y.de)
-    return _measure_dynamics(address, sim, y)
-
-
-@njit(error_model="numpy")
-def _measure_dynamics(address, sim, y):
-    """Write nominal M, h and g of all channels, per unit of u, into a joint measurement."""
-    n = sim.n
-    failure = record.FINE
-    if sim.uses_model == 0.0:
-        y.M[:] = 0.0
-        y.h[:] = 0.0
-        y.g[:] = 0.0
-        for i in range(n):
-            y.M[i, i] = 1.0
-        return failure
-    if sim.dynamics.address == 0:
-        failure = _separate_equations(address, sim, y)
-    elif evaluate(sim.dynamics, 0, address + record.AT.seen, y.M.ctypes.data):
-        failure = record.RAISED
-    v = pointer(sim.seen.v)
-    for i in range(n):
-        drive = drive_at(sim.drives, i)
-        for j in range(n):
-            y.M[i, j] /= drive.gain
-        y.h[i] = (y.h[i] + drive.drag * v[i]) / drive.gain
-        y.g[i] /= drive.gain
-    return failure
-
-
-@njit(error_model="numpy")
-def _separate_equations(address, sim, y):
-    """Write M, h and g of channels that each have their own equation x'' = f + g u:
-
-    M is diagonal.
-    """
-    n = sim.n
-    v = pointer(sim.seen.v)
-    y.M[:] = 0.0
-    for moving in (True, False):  # h at v, then g at rest
-        for i in range(n):
-            v[i] = y.v[i] if moving else 0.0
-        for i in range(n):
-            if _evaluate_model(address, sim, i):
-                return record.RAISED
-            y.M[i, i] = 1.0 / sim.model.g
-            if moving:
-                y.h[i] = -sim.model.f / sim.model.g
-            else:
-                y.g[i] = -sim.model.f / sim.model.g
-    for i in range(n):
-        v[i] = y.v[i]
-    return record.FINE
-
-
 @inlined
 def _zero_inputs(sim, data):
     """Set all commands and disturbances to 0."""
@@ -474,17 +376,16 @@ def _zero_inputs(sim, data):
             data.ctrl[ctrl] = 0.0
 
 
-@njit(error_model="numpy")
+@inlined
 def _ask_joints(view, k, t, i):
-    """Ask a law of many joints once, for all channels."""
+    """Ask a law of many joints once, for all channels, see joint_controller.py."""
     sim = view.sim
     commands = pointer(sim.commands)
     if i == 0:
-        failure = _measure_joints(view, k, t)
+        sim.instant.t = t
+        failure = call(sim.ask_joints, view.address, k, 0, 0)
         if failure != record.FINE:
             return failure, 0.0, 0.0
-        if evaluate(sim.law, 0, sim.joint, sim.commands):
-            return record.LAW_RAISED, 0.0, 0.0
     sim.seen.i = i
     return record.FINE, commands[i], commands[sim.width + i]
 
@@ -501,11 +402,11 @@ MOMENTS = Moments(
     driven=inlined(lambda view: view.sim.driven),
     settings=inlined(lambda view: view.sim),
     late=inlined(lambda view, k: lateness(view.sim, k, view.sim.samples - 1)),
-    now=_now,
-    before=inlined(lambda view, k, i: _now(view, k - 1, i)),
+    now=log_row,
+    before=inlined(lambda view, k, i: log_row(view, k - 1, i)),
     state=inlined(lambda view, i: state_at(view.sim.states, i)),
     drive=inlined(lambda view, i: drive_at(view.sim.drives, i)),
-    ring=_ring,
+    ring=ring,
     seen=_seen,
     errors=_errors,
     sense=_sense,
@@ -533,7 +434,7 @@ _ask_channel = asking(
     Asked(
         partners=inlined(lambda view: view.sim.partners != 0),
         knows=inlined(lambda view: view.sim.other_forces != 0),
-        refer=_refer,
+        refer=refer,
         nominal=_nominal,
         slides=inlined(lambda view: view.sim.surface.address != 0),
         slide=_slide,
@@ -543,7 +444,7 @@ _ask_channel = asking(
 BEGIN, BETWEEN = order(MOMENTS)
 
 
-@njit(error_model="numpy")
+@not_inlined
 def control(address, sim, data):
     """Do one callback of one simulation."""
     calls = sim.calls

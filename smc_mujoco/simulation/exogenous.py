@@ -11,8 +11,8 @@ import math
 
 from numba import njit
 
-from smc_mujoco.common.jit import call, pointer
-from smc_mujoco.mechanisms.hardware.moments import channel_at, evaluate
+from smc_mujoco.common.jit import call, not_inlined, pointer
+from smc_mujoco.mechanisms.hardware.moments import channel_at, evaluate, reached
 from smc_mujoco.simulation import state as record
 from smc_mujoco.simulation.state import disturbance_at, log_at
 
@@ -39,12 +39,14 @@ def measurement_error(address, sim, signal, t):
     return sim.motion.value
 
 
-@njit(error_model="numpy")
-def disturb(address, sim, data, t, k):
-    """Apply the sum of the disturbances at time t, s; k is the sample at its first stage, and -1 at
-    all others. Return a failure code of state.py.
+@not_inlined
+def disturb(address, sim, k):
+    """Apply the sum of the disturbances at the record's instant; k is the sample at its first
+    stage, and -1 at all others. Return a failure code of state.py.
+
+    It is a C function of its own, see `cfunctions.compile_moment`.
     """
-    sim.instant.t = t
+    data = reached(sim.reach)
     sim.instant.seed = sim.seed
     clear(sim, data)
     wind = sim.push.function.address != 0
@@ -65,7 +67,7 @@ def disturb(address, sim, data, t, k):
     return record.FINE
 
 
-@njit(error_model="numpy")
+@not_inlined
 def clear(sim, data):
     """Set all disturbances to 0."""
     for i in range(sim.n):
@@ -80,7 +82,7 @@ def clear(sim, data):
             data.xfrc_applied[body + axis] = 0.0
 
 
-@njit(error_model="numpy")
+@not_inlined
 def _push_bodies(address, sim, data):
     """Apply the disturbances of kind `Push`, forces in space. Return whether one raised."""
     for j in range(sim.disturbance_count):
@@ -93,7 +95,7 @@ def _push_bodies(address, sim, data):
     return False
 
 
-@njit(error_model="numpy")
+@not_inlined
 def _blow(address, sim):
     """Let the part that has drag push by the wind, whose signals have an axis in each channel.
 
@@ -113,7 +115,7 @@ def _blow(address, sim):
     return False
 
 
-@njit(error_model="numpy")
+@not_inlined
 def _load(address, sim, data, signal, k):
     """Apply a disturbance of every channel: a force on its joint, or a horizontal one on its body.
     Return whether it raised.
@@ -139,7 +141,7 @@ def _load(address, sim, data, signal, k):
     return False
 
 
-@njit(error_model="numpy")
+@not_inlined
 def _evaluate_feedback(address, sim, data, function, i, k):
     """Write the force of a disturbance that sees the loop into the record's motion. It is evaluated
     once a sample, in channel 0, and repeated in the other channels and at other stages.

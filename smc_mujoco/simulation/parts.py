@@ -7,7 +7,7 @@
 # (an intrinsic is called without its typing context)
 from numba import njit
 
-from smc_mujoco.common.jit import call, place
+from smc_mujoco.common.jit import call, not_inlined, place
 from smc_mujoco.mechanisms.hardware.moments import (
     PART,
     channel_at,
@@ -45,7 +45,7 @@ def keep_reach(reach, data):
     reach.body_user = data.body_user
 
 
-@njit(error_model="numpy")
+@not_inlined
 def act(address, sim, data):
     """Let the parts act at a stage, in their order. Return a failure code of state.py."""
     for j in range(sim.part_count):
@@ -59,7 +59,7 @@ def act(address, sim, data):
     return record.FINE
 
 
-@njit(error_model="numpy")
+@not_inlined
 def _exert(address, sim, data, part):
     """Evaluate a part on a joint. Its force goes to ctrl or to a sum; a brake sets friction, too.
 

@@ -14,6 +14,8 @@ import numpy as np
 from numba import njit, types
 from numba.extending import intrinsic
 
+from smc_mujoco.common.jit import not_inlined
+
 MEASUREMENT, PROCESS = (
     0,
     1,
@@ -23,6 +25,7 @@ JITTER, MISSED = (
     1 << 33,
     1 << 34,
 )  # streams that decide which samples are late, and which are missed
+NO_CHANNEL = 0  # of numbers for a whole run; as a literal it would be compiled for apart
 PAUSE = 1 << 36  # stream that decides when the controller has its first pause
 REFILL = 1 << 35  # stream that decides when the generators of stepper motors look at their queues
 
@@ -68,7 +71,7 @@ def block(seed, channel, stream, k):
     return c0, c1, c2, c3
 
 
-@njit(error_model="numpy")
+@not_inlined
 def polar(seed, channel, stream, k):
     """Return the radius and the angle, in [0, 2 pi), of two normal numbers from block k."""
     a, b, _, _ = block(seed, channel, stream, k)
@@ -76,7 +79,7 @@ def polar(seed, channel, stream, k):
     return radius, 2.0 * math.pi * ((b >> _SHIFT) * 2.0**-53)
 
 
-@njit(error_model="numpy")
+@not_inlined
 def cartesian(radius, angle):
     """Return the two normal numbers of a radius and an angle."""
     return radius * math.cos(angle), radius * math.sin(angle)

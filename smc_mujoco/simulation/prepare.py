@@ -29,7 +29,16 @@ from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, DRIVE, PART, READER, Run
 from smc_mujoco.mechanisms.hardware.part import Friction, Part
 from smc_mujoco.mechanisms.plant import Native, Plant
-from smc_mujoco.simulation import agreement, cfunctions, part_jump, philox, python_functions, state
+from smc_mujoco.simulation import (
+    agreement,
+    cfunctions,
+    exogenous,
+    joint_controller,
+    part_jump,
+    philox,
+    python_functions,
+    state,
+)
 from smc_mujoco.simulation.model import (
     Mechanism,
     check_start,
@@ -246,6 +255,7 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
     values["keeps_torques"] = keeps_torques(rows)
     values |= {"slots": state.address(mjcb.slots())}
     values |= {"samples": len(log), "disturbance_count": len(s.disturbance)}
+    values |= _rare_moments(s, rows)
     values["part_count"] = len(arrays["parts"])
     values["compensated"] = len(arrays["compensations"])
     channels = state.address(mechanism.channels)
@@ -470,6 +480,21 @@ def pause_phase(s: Resolved) -> int:
     return int(bits * 2.0**-53 * samples)
 
 
+def _rare_moments(s: Resolved, mixer: np.ndarray) -> dict[str, int]:
+    """Return the addresses of what only some runs do, compiled for them alone."""
+    functions = {}
+    if s.disturbance:
+        functions["disturb"] = exogenous.disturb
+    if s.law.joint:
+        functions["ask_joints"] = joint_controller.ask
+    if len(mixer):
+        functions["mix"] = joint_controller.mix
+    addresses = {}
+    for name, function in functions.items():
+        addresses[name] = cfunctions.compile_moment(function).address
+    return addresses
+
+
 def _joint_measurement(
     s: Resolved, nominal: Native | None, functions: Mapping[str, Any], buffer: Functions
 ) -> dict[str, Any]:
@@ -614,11 +639,12 @@ def _readers(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
 
 def _moments(prepared: Prepared, rows: list[dict[str, Any]], buffer: Functions) -> dict[str, Any]:
     """Return the fields of a record that say what the parts of these PARTs do."""
+    s = prepared.scenario.resolved
     fields: dict[str, Any] = {
         "exerts": any(not row["acts"] and row["ctrl"] < 0 for row in rows),
-        "reaches": any(row["acts"] for row in rows),
+        "reaches": any(row["acts"] for row in rows) or bool(s.disturbance),
     }
-    for part, _ in prepared.scenario.resolved.acting:
+    for part, _ in s.acting:
         if part.push is not None:
             address = buffer.part(part, "push").address
             fields["push"] = {"function": {"address": address}}

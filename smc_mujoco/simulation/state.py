@@ -99,6 +99,11 @@ SIMULATION = np.dtype(
         ("states", "i8"),
         ("log", "i8"),
         ("disturbances", "i8"),
+        # addresses of C functions for what only some runs have, see cfunctions.compile_moment:
+        # disturbances, a law of many joints, the mixing of a free body's force and torque
+        ("disturb", "i8"),
+        ("ask_joints", "i8"),
+        ("mix", "i8"),
         # the command: delay in physics steps, a ring of (delay_slots, n) commands; DRIVE (n,)
         ("delay", "i8"),
         ("delay_slots", "i8"),

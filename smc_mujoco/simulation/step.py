@@ -154,7 +154,10 @@ def lateness(settings, k, last):
     if k in (0, last):
         return 0
     missed = settings.missed
-    if missed != 0.0 and philox.uniform(settings.seed, 0, philox.MISSED, k) < missed:
+    if (
+        missed != 0.0
+        and philox.uniform(settings.seed, philox.NO_CHANNEL, philox.MISSED, k) < missed
+    ):
         return -1
     if settings.pause != 0:
         return after_pauses(
@@ -162,7 +165,9 @@ def lateness(settings, k, last):
         )
     if settings.jitter == 0:
         return 0
-    return int(philox.uniform(settings.seed, 0, philox.JITTER, k) * (settings.jitter + 1))
+    return int(
+        philox.uniform(settings.seed, philox.NO_CHANNEL, philox.JITTER, k) * (settings.jitter + 1)
+    )
 
 
 @inlined

@@ -38,7 +38,7 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from smc_mujoco.common.jit import call, floats, record_at, whole_numbers
+from smc_mujoco.common.jit import call, floats, inlined, pointer, record_at, whole_numbers
 
 # Indices of a channel in arrays of mjData, -1 if there is none:
 #   qpos, qvel, ctrl: in the arrays of these names
@@ -143,6 +143,22 @@ Reach = namedtuple(
     "qpos qvel ctrl xfrc_applied qfrc_applied actuator_force actuator_user body_user",
 )
 REACH = whole_numbers(Reach._fields)  # their addresses
+
+
+@inlined
+def reached(at):
+    """Return the Reach at the addresses of a REACH."""
+    return Reach(
+        pointer(at.qpos),
+        pointer(at.qvel),
+        pointer(at.ctrl),
+        pointer(at.xfrc_applied),
+        pointer(at.qfrc_applied),
+        pointer(at.actuator_force),
+        at.actuator_user,
+        at.body_user,
+    )
+
 
 channel_at, state_at, drive_at, reader_at, function_at, part_at = map(
     record_at, (CHANNEL, CHANNEL_STATE, DRIVE, READER, FUNCTION, PART)
