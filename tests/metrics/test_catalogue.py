@@ -775,8 +775,8 @@ def test_scoring_keeps_no_trace_and_looks_once_in_each_group(monkeypatch):
     )
     monkeypatch.setattr(
         limit_cycle,
-        "channel_cycle",
-        lambda trace, channel: asked.append(trace.s.shape) or (0.1, 10.0),
+        "largest_of",
+        lambda t, s: asked.append(s.shape) or (0.1, 10.0),
     )
     m.scores(both)
     m.score(both)
