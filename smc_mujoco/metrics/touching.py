@@ -26,9 +26,14 @@ class Shape(NamedTuple):
     model: mujoco.MjModel
 
 
-def shapes(scenario: Scenario) -> list[Shape]:
-    """Return the mechanism at the start of a run, and after its jump."""
-    compiled = models.mechanism(scenario).model
+def shapes(scenario: Scenario, scenery: bool = True) -> list[Shape]:
+    """Return the mechanism at the start of a run, and after its jump; without `scenery`, as runs
+    have it.
+    """
+    if scenery:
+        compiled = models.compile_model(scenario)
+    else:
+        compiled = models.mechanism(scenario).model
     shapes_of_run = [Shape(0.0, models.with_values(compiled, scenario, 0))]
     if scenario.jump:
         step = scenario.jump_step
@@ -43,7 +48,7 @@ def in_contact(trace: Trace) -> Array:
     contact = np.zeros(trace.x.shape, bool)
     if not trace.scenario.contact:
         return contact
-    parts = shapes(trace.scenario)
+    parts = shapes(trace.scenario, scenery=False)
     data = [mujoco.MjData(shape.model) for shape in parts]
     places = parts[0].model.jnt_qposadr[joint_ids(parts[0].model)]
     tables = [_channels(shape.model) for shape in parts]
@@ -79,7 +84,7 @@ def touched(trace: Trace) -> bool | None:
     """
     if not trace.scenario.contact:
         return None
-    model = shapes(trace.scenario)[0].model
+    model = shapes(trace.scenario, scenery=False)[0].model
     hits, _ = _channels(model)
     if not hits and not model.jnt_limited[joint_ids(model)].any():
         return None
