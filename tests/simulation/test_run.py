@@ -362,13 +362,13 @@ import numpy as np, smc_mujoco as smc
 def resident():
     return int(open("/proc/self/statm").read().split()[1]) * 4096
 smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))
-np.ones(2**19)
+np.ones(2**21)
 small = []
 before = resident()
 for _ in range(2):
     large = []
     for _ in range(20):
-        large.append(np.ones(2**19))
+        large.append(np.ones(2**21))
         small.append(bytearray(20_000))
     del large
 print(resident() - before)
@@ -378,7 +378,7 @@ print(resident() - before)
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc")
 def test_large_blocks_go_back_to_the_system_though_small_ones_lie_between_them(tmp_path):
     done = python("-c", LARGE, folder=tmp_path)
-    assert int(done.stdout) < 20 * 2**22 / 4
+    assert int(done.stdout) < 20 * 2**24 / 4  # some fit into what the heap has free
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="resource")
