@@ -33,6 +33,7 @@ scene = smc.Scene(
     title="A blow on the forearm",
     conditions={"blow": {name: arms.scenario("blow", arms.gained(name)) for name in LAWS}},
     answer=answer,
+    camera=(150.0, -18.0),  # the blow comes from the side: from there its arrow is seen
 )
 
 if __name__ == "__main__":

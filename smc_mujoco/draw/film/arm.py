@@ -128,7 +128,8 @@ class Overlay:
         if np.linalg.norm(way) > 1.0:
             points = np.linspace(line[0], line[1], 40)
             width = SHAFT_WIDTH * self.scale
-            arrows.stamp(image, points, width, arrow, self.scale, 0, share < 1.0)
+            rim = round(arrows.RIM * self.scale)
+            arrows.stamp(image, points, width, arrow, self.scale, rim, share < 1.0)
 
 
 def overlays(stages: Sequence[Stage]) -> list[Overlay]:

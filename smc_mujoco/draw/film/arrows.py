@@ -521,7 +521,8 @@ def write(
     scale: float,
 ) -> None:
     """Write a number at an arrow, whose free end and other end are given, px, where there is room
-    in the picture: beyond the free end, before the other or over the arrow; else below it.
+    in the picture: beyond the free end, over the arrow or beside a steep one, or before its other
+    end; else below it.
     """
     free, other = ends
     gap = 6 * scale
@@ -533,7 +534,10 @@ def write(
         reach = np.array([side * (gap + wide / 2), 0.0])
         low = np.array([wide, high]) / 2 + 2 * scale
         most = np.array(image.size) - low
-        places = [free + reach, other - reach, middle - apart]
+        steep = abs(free[1] - other[1]) > abs(free[0] - other[0])
+        beside = middle + reach if steep else middle - apart
+        beside[0] = np.clip(beside[0], low[0], max(low[0], most[0]))
+        places = [free + reach, beside, other - reach]
         inside = [(place >= low).all() and (place <= most).all() for place in places]
         if any(inside):
             place = places[inside.index(True)]

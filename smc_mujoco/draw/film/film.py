@@ -2,9 +2,10 @@
 clock.
 
 In order: pace.py sets the speed; track.py says what each run does at each frame; camera.py lays out
-the tiles, or shared_picture.py carts on one; world.py composes a machine's model, puppet.py poses
-it, stage.py adds the arrows of arrows.py, and canvas.py renders; arm.py draws over arms and what
-flies; sheet.py is the page with the text and the charts, made as figures are; video.py writes.
+the tiles, or shared_picture.py carts on one; viewpoint.py finds the side from which a user's
+machine is seen; world.py composes a machine's model, puppet.py poses it, stage.py adds the arrows
+of arrows.py, and canvas.py renders; arm.py draws over arms and what flies; sheet.py is the page
+with the text and the charts, made as figures are; video.py writes.
 Frames are made and written one by one, so that memory does not grow with a film's length.
 """
 
@@ -187,7 +188,8 @@ def film(
       camera: name of a camera of the model, or (azimuth, elevation) in degrees as of MuJoCo's free
         camera. It gives the direction of the view, and the camera is as near as it can see all
         machines. Default: the plant's own `look`; for your own model the first camera that does not
-        move.
+        move and shows what the driven joints do, else across the plane in which they turn, from a
+        side on which no other part hides them.
       at: the time of a single picture, s.
       span: the part of the runs that is shown, (start, stop) in s; default: all, and the first 4 s
         for .webp.
@@ -404,7 +406,7 @@ def placement(
     if not followed:  # all stand on one floor, on stands that are cut alike
         reaches = []
         for i, puppet in enumerate(puppets):
-            reach, puppets[i] = puppet.surrounded(points, courses)
+            reach, puppets[i] = puppet.surrounded(points, courses, turn)
             reaches.append(reach)
         points = np.concatenate(reaches)
     sizes = functools.partial(label_sizes, names, size)

@@ -11,9 +11,10 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.draw.film import arrows, world
+from smc_mujoco.draw.film import arrows, camera, viewpoint, world
 from smc_mujoco.draw.film.camera import Camera
 from smc_mujoco.draw.film.track import MachineTrack
+from smc_mujoco.mechanisms import layout
 from smc_mujoco.mechanisms.layout import OWN, ROTOR, joint_ids
 from smc_mujoco.metrics.touching import Shape, shapes
 from smc_mujoco.simulation import model as models
@@ -21,10 +22,12 @@ from smc_mujoco.simulation.scenario import Scenario
 
 POSES = 192  # of a trace, at which what must be in the picture is found
 # Chosen, in sizes of what moves: larger fixed things of a user's model may leave the picture, and
-# fixed things must be in it so far beside what moves, and a stand so far below and above.
+# fixed things must be in it so far beside what moves; loose parts that move less count as fixed.
 MAX_FIXED_SIZE = 4.0
 NEAR_SHARE = 0.1
-STAND_SHARE = 0.8
+CALM_SHARE = 0.1
+MOST_HEIGHT = 1.7  # of its height in the picture, of all that must be in it, a stand first; chosen
+MIN_UPRIGHT = 0.1  # of a vertical line, its length in the picture, for a camera that looks down
 OWN_STAND_SHARE = 0.15  # the same of the library's pendulums, whose picture is of the bob's arc
 # a machine whose foot is higher hangs from it; a floor of the model that is so near is its floor
 FLOOR_SHARE = 0.3
@@ -41,6 +44,25 @@ def moved_bodies(model: mujoco.MjModel, joints: Sequence[int] | Array) -> list[i
         if model.body_parentid[body] in moved:
             moved.add(body)
     return sorted(moved)
+
+
+def close(boxes: Array, low: Array, high: Array, far: float) -> Array:
+    """Return the boxes, (boxes, 8, 3) m, that are within `far`, m, of the box between two corners,
+    (3,) m, and are smaller than that.
+    """
+    below = boxes < high + far
+    above = boxes > low - far
+    inside = (below & above).all(axis=(1, 2))
+    extent = np.ptp(boxes, axis=1).max(axis=1)
+    return boxes[inside & (extent < far)]
+
+
+def within(boxes: Array, low: Array, high: Array) -> Array:
+    """Return the parts of boxes, (boxes, 8, 3) m, that are in the box between two corners, (3,)
+    m.
+    """
+    overlaps = (boxes.min(axis=1) <= high) & (boxes.max(axis=1) >= low)
+    return boxes[overlaps.all(axis=1)].clip(low, high)
 
 
 class Course(NamedTuple):
@@ -136,12 +158,34 @@ class Puppet:
 
     def turn(self, chosen: Camera | None) -> Array:
         """Return the frame of the camera, (3, 3), as camera.py has it: the chosen one, else the
-        plant's own.
+        plant's own `look`, or of a user's model the view that shows its motion.
         """
         plant = self.scenario.plant
         if chosen is None and plant.on_stage:
             chosen = "look"
-        return world.turn(self.model, self.start, chosen, plant.name)
+        if isinstance(chosen, str):
+            return world.named_turn(self.model, self.start, chosen, plant.name)
+        if chosen is None:
+            begun = layout.posed(self.model, plant.x0)
+            links = np.flatnonzero(self.moved & (self.model.geom_group < world.DRAWN_GROUPS))
+            chosen = viewpoint.view(self.model, begun, self.ids, links)
+        return camera.turn(*chosen)
+
+    @property
+    def floats(self) -> bool:
+        """Whether the machine may leave its place: its first joint is not a hinge."""
+        model = self.model
+        body = model.jnt_bodyid[self.ids[0]]
+        while model.body_weldid[model.body_parentid[body]] != 0:
+            body = model.body_parentid[body]
+        return bool(model.jnt_type[model.body_jntadr[body]] != world.HINGE)
+
+    @property
+    def moved(self) -> Array:
+        """Which geoms the channels move, without planes, (geoms,)."""
+        model = self.model
+        of_moved = np.isin(model.geom_bodyid, moved_bodies(model, self.ids))
+        return of_moved & (model.geom_type != world.PLANE)
 
     @property
     def shown(self) -> int:
@@ -191,9 +235,7 @@ class Puppet:
         trace = track.trace
         model = self.model
         plane = model.geom_type == world.PLANE
-        moved = moved_bodies(model, self.ids)
-        of_moved = np.isin(model.geom_bodyid, moved)
-        links = of_moved & ~plane
+        links = self.moved
         if not links.any():
             raise ScenarioError(
                 f"nothing that moves on {trace.scenario.plant.name} has a shape to be filmed: "
@@ -205,7 +247,7 @@ class Puppet:
         falling = np.array(falling_parts)
         loose = ~links & ~plane & ~world.still(model) & ~falling
         roots = model.body_rootid[model.geom_bodyid]
-        beside = np.isin(roots, roots[links])
+        beside = np.isin(roots, roots[links]) & self.floats
         body = links | (loose & beside)
         course = Course([], [], [], [])
         for share in np.linspace(0.0, 1.0, POSES) ** 2:  # most of the motion is early
@@ -230,13 +272,7 @@ class Puppet:
         it.
         """
         plant = self.scenario.plant
-        if plant.on_stage and not plant.pose:
-            return False
-        model = self.model
-        body = model.jnt_bodyid[self.ids[0]]
-        kind = model.jnt_type[model.body_jntadr[body]]
-        turns = kind == world.HINGE
-        if turns and model.body_weldid[model.body_parentid[body]] == 0:
+        if not self.floats or (plant.on_stage and not plant.pose):
             return False
         sizes = []
         for points in course.places:
@@ -291,17 +327,16 @@ class Puppet:
             height = 0.0
         return points, dataclasses.replace(self, mounts=mounts, height=height)
 
-    def surrounded(self, points: Array, courses: Sequence[Course]) -> tuple[Array, "Puppet"]:
+    def surrounded(
+        self, points: Array, courses: Sequence[Course], turn: Array
+    ) -> tuple[Array, "Puppet"]:
         """Return points that move on all machines, (m, 3) m, and those around them that must be in
-        the picture too, over the film's floor, and the machine at its height over it.
+        the picture of a camera's turn too, over the film's floor, and the machine at its height
+        over it.
 
         Of other things, those that move loosely and what stands still, only the part close to these
         counts, such as the upper half of a stand; rails and columns end there.
         """
-        others = []
-        for course in courses:
-            others.append(np.concatenate(course.others))
-        around = np.concatenate(others)
         lowest = min(course.reached[:, 2].min() for course in courses)
         model = self.model
         on_stage = self.scenario.plant.on_stage
@@ -314,34 +349,35 @@ class Puppet:
         low = points.min(axis=0)
         high = points.max(axis=0)
         size = (high - low).max()
+        around, calm = self.loose(courses, 0.0 if on_stage else CALM_SHARE * size)
         if not on_stage:
             far = MAX_FIXED_SIZE * size
-
-            def close(boxes: Array) -> Array:
-                below = boxes < high + far
-                above = boxes > low - far
-                inside = (below & above).all(axis=(1, 2))
-                extent = np.ptp(boxes, axis=1).max(axis=1)
-                return boxes[inside & (extent < far)]
-
-            around = close(around)
-            standing = close(standing)
-        stand = (OWN_STAND_SHARE if on_stage else STAND_SHARE) * size
+            around = close(around, low, high, far)
+            standing = close(np.concatenate([standing, calm]), low, high, far)
+        foot = float(standing[..., 2].min(initial=np.inf))
+        near = np.full(3, NEAR_SHARE * size)
+        stand = OWN_STAND_SHARE * size
+        if not on_stage:  # what moves fills half of the picture
+            reached = np.concatenate([course.reached for course in courses])
+            tall, whole = (np.ptp(some @ turn[:, 1]) for some in (reached, points))
+            room = max(0.0, MOST_HEIGHT * tall - whole) / max(turn[2, 1], MIN_UPRIGHT)
+            near[2] = np.inf
+            standing = within(standing, low - near, high + near)
+            stand = min(room, low[2] - standing[..., 2].min(initial=low[2]))
+            near[2] = room - stand
         if self.scenario.plant.tip or not on_stage:
-            near = NEAR_SHARE * size
-            standing = standing.clip(low - (near, near, stand), high + near)
+            standing = within(standing, low - (*near[:2], stand), high + near)
         if on_stage and self.slides.all():  # of a cart the rail, not its feet nor what is behind it
             stand = world.CUT_MARGIN * size
             least = low[1:] - (0.0, stand)
             standing[..., 1:] = standing[..., 1:].clip(least, high[1:])
-        standing[..., 2] = standing[..., 2].clip(low[2] - stand, high[2] + stand)
+        if on_stage:
+            standing[..., 2] = standing[..., 2].clip(low[2] - stand, high[2] + stand)
         points = np.concatenate([points, around.reshape(-1, 3), standing.reshape(-1, 3)])
         height = -raised
         if not on_stage:  # it stands on the floor, or hangs close above it
-            foot = float(standing[..., 2].min(initial=np.inf))
             height = -min(lowest, foot, float(around[..., 2].min(initial=np.inf)))
-            tall = high[2] - low[2]
-            hangs = foot > low[2] + FLOOR_SHARE * tall
+            hangs = foot > low[2] + FLOOR_SHARE * (high[2] - low[2])
             if lowest < foot and not hangs:  # a floor below the links would not be below its foot
                 height += NO_FLOOR * size
             floors = model.geom_pos[(model.geom_type == world.PLANE) & (model.geom_bodyid == 0), 2]
@@ -351,6 +387,19 @@ class Puppet:
         points = points + np.array([0.0, 0.0, height])
         points[:, 2] = points[:, 2].clip(0.0)
         return points, dataclasses.replace(self, height=height)
+
+    def loose(self, courses: Sequence[Course], little: float) -> tuple[Array, Array]:
+        """Return the boxes of what moves loosely on all machines, over its course, and of what
+        moves less than `little`, m, where it begins: (boxes, 8, 3) m each.
+        """
+        moving = []
+        calm = []
+        for course in courses:
+            places = np.stack(course.others)
+            way = np.ptp(places, axis=0).max(axis=(1, 2))
+            moving.append(places[:, way >= little].reshape(-1, 8, 3))
+            calm.append(places[0, way < little])
+        return np.concatenate(moving), np.concatenate(calm)
 
     def lines(
         self, track: MachineTrack, mounts: Sequence[arrows.Mount]

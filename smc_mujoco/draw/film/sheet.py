@@ -114,6 +114,14 @@ def one_line(words: str) -> str:
     return " ".join(words.split())
 
 
+def joint_shortened(label: str, room: float, high: float) -> str:
+    """Return the label of a panel with its first word, the joint's name, cut to what has room, px;
+    the quantity and its unit stay.
+    """
+    name, gap, quantity = label.partition(" ")
+    return style.cropped(name, room - style.width(gap + quantity, high), high) + gap + quantity
+
+
 class Labels(NamedTuple):
     """The names of machines, each on some lines, and the height of their letters, px."""
 
@@ -290,7 +298,7 @@ class Sheet:
                 drawn, flights = flight.draw_map(ax, panel, self.runs.colours)
                 ax.tick_params(length=0)
             else:
-                words = style.cropped(panel.label, room, high)
+                words = joint_shortened(panel.label, room, high)
                 ax.set_title(words, fontweight="normal", parse_math=False)
                 self.set_time(ax)
                 rows, drawn = lanes.below_film(

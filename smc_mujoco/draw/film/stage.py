@@ -21,7 +21,6 @@ from smc_mujoco.draw.film.track import MachineTrack
 
 LAW_SHARE = 0.75  # of the law's colour in a user's model, where several laws are shown; chosen
 DEFAULT_RGBA = np.array([0.5, 0.5, 0.5, 1.0], np.float32)  # MuJoCo's colour of geoms
-GROUPS = 3  # groups of geoms that MuJoCo draws by default
 OUTLINE = 2.6  # px of a film of full size, around where the reference wants the machine; chosen
 WHITE = np.ones(4, np.float32)
 SHAPE_FIELDS = ("geom_pos", "geom_size", "geom_group", "geom_sameframe")
@@ -55,7 +54,7 @@ class Stage:
         self.followed = followed
         self.beside = beside
         self.is_users = not puppet.scenario.plant.on_stage
-        self.model = world.compose(puppet.scenario, puppet.height, self.size)
+        self.model = world.compose(puppet.scenario, puppet.height, self.size, self.turn)
         if not self.is_users:
             world.restyle(self.model)
         self.data = mujoco.MjData(self.model)
@@ -66,7 +65,7 @@ class Stage:
         stated = (material >= 0)[:, None]
         self.paint = np.where(stated, painted, self.model.geom_rgba)
         opaque = self.paint[:, 3] > 0.0
-        visible = (self.model.geom_group < GROUPS) & opaque
+        visible = (self.model.geom_group < world.DRAWN_GROUPS) & opaque
         away = self.place - points.mean(axis=0)
         distance = float(away @ self.turn[:, 2])
         tall = self.size[1] * camera.pixel(self.size) * distance  # m

@@ -1,7 +1,6 @@
-"""The model of a machine in a film, without its surroundings, and a camera that suits it.
+"""The model of a machine in a film, without its surroundings, and its cameras.
 
-It is the scenario's mechanism with all that it touches. The camera looks in the direction
-of the plant's own camera `look`, or of the chosen one. Rails and columns are cut to what moves: a
+It is the scenario's mechanism with all that it touches. Rails and columns are cut to what moves: a
 film shows the motion. A user's model keeps its cameras; its lights, sky and floor are the film's.
 """
 
@@ -16,14 +15,14 @@ from smc_mujoco.common import mjcb
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import find
 from smc_mujoco.draw.film import camera
-from smc_mujoco.draw.film.camera import Camera
-from smc_mujoco.mechanisms.layout import OWN, joint_ids
+from smc_mujoco.mechanisms.layout import OWN
 from smc_mujoco.mechanisms.plant import model_path
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 
 # Numbers of presentation here are chosen.
 MAX_CHANNELS = 6  # of a network: more would be hidden by the next machine
+DRAWN_GROUPS = 3  # groups of geoms that MuJoCo draws by default
 HIDDEN_GROUP = 5  # a group of geoms that MuJoCo does not draw by default
 QUALITY = {"offsamples": 4, "shadowsize": 2048, "numslices": 36, "numstacks": 10, "numquads": 1}
 AMBIENT = (0.30, 0.31, 0.33)  # light that models the form: less from everywhere,
@@ -36,11 +35,6 @@ DIAL_OPACITY = 0.25  # of the dial behind a pendulum
 HAZE_AT_TOP = 0.9  # share of the full haze at the top of the picture
 HAZE_HORIZON = 3.0  # largest distance of that haze, in distances of the farthest machine
 MIN_HAZE_DISTANCE = 1.05  # of the farthest point: a nearer floor, seen from above, gets no haze
-LOW_ELEVATION = -12.0  # degrees: from a little above a user's model, so that the floor is seen
-FRONT = (90.0, LOW_ELEVATION)  # azimuth, elevation, degrees: for slides
-ABOVE = (90.0, -70.0)  # for vertical hinges
-CORNER = (125.0, -18.0)  # for hinges about several axes
-PARALLEL_COSINE = 0.95  # of two axes that count as parallel
 CUT_MARGIN = 0.08  # of the size of what moves, beyond which rails and columns are cut
 SLENDER = 3.0  # a rail or column is longer than this many thicknesses
 RAIL_END = 0.06  # of a rail's length: what stands within it of an end is moved with the end
@@ -52,11 +46,14 @@ HINGE = mujoco.mjtJoint.mjJNT_HINGE
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))  # of a box
 
 
-def compose(scenario: Scenario, height: float, size: tuple[int, int]) -> mujoco.MjModel:
+def compose(
+    scenario: Scenario, height: float, size: tuple[int, int], turn: Array
+) -> mujoco.MjModel:
     """Return the model of a machine at a height over the floor, m, its names prefixed m/, with a
     camera `film`.
 
-    Pictures are of `size` px.
+    Pictures are of `size` px. The lights of a user's machine go around it with the camera, whose
+    turn is given: it is as bright from every side.
     """
     spec = mujoco.MjSpec.from_file(str(model_path("common/theme.xml")))
     for name, value in QUALITY.items():
@@ -74,6 +71,11 @@ def compose(scenario: Scenario, height: float, size: tuple[int, int]) -> mujoco.
                 frame.attach_body(body, "m/", "")
     else:
         spec.attach(users_machine(machine, spec), frame=frame, prefix="m/")
+        around = np.arctan2(turn[0, 0], -turn[1, 0]) - 0.5 * np.pi
+        cosine, sine = np.cos(around), np.sin(around)
+        for light in spec.lights:
+            x, y, z = light.dir
+            light.dir = (cosine * x - sine * y, sine * x + cosine * y, z)
     spec.material("floor").emission = 0.13  # nearly as white as the page below
     spec.visual.headlight.ambient = AMBIENT
     spec.light("key").diffuse = KEY
@@ -157,12 +159,10 @@ def set_floor(model: mujoco.MjModel, view: camera.View, points: Array, moved: Ar
     model.vis.rgba.fog[:] = HAZE
 
 
-def turn(model: mujoco.MjModel, pose: Array, chosen: Camera | None, whose: str) -> Array:
-    """Return the frame of the camera of a model in a pose, (nq,), (3, 3), as camera.py has it: the
-    chosen one, or one that suits it. `whose` model it is, is for messages.
+def named_turn(model: mujoco.MjModel, pose: Array, chosen: str, whose: str) -> Array:
+    """Return the frame of a camera of a model in a pose, (nq,), (3, 3), as camera.py has it.
+    `whose` model it is, is for messages.
     """
-    if not isinstance(chosen, str):
-        return camera.turn(*(chosen or view(model)))
     names = {}
     for i in range(model.ncam):
         if model.camera(i).name:
@@ -172,40 +172,6 @@ def turn(model: mujoco.MjModel, pose: Array, chosen: Camera | None, whose: str) 
     data.qpos[:] = pose
     forward(model, data)
     return data.cam_xmat[which].reshape(3, 3).copy()
-
-
-def view(model: mujoco.MjModel) -> tuple[float, float]:
-    """Return azimuth and elevation, degrees, of a user's first fixed camera, or of one that sees
-    its joints turn.
-
-    The view looks down at least a little: along the floor, or from below, there is nothing to see.
-    """
-    still = model.cam_mode == mujoco.mjtCamLight.mjCAMLIGHT_FIXED.value
-    fixed = (model.cam_bodyid == 0) & still
-    for frame in model.cam_mat0[fixed].reshape(-1, 3, 3):
-        right, _, back = frame.T
-        angle = np.arctan2(right[0], -right[1])
-        azimuth = np.degrees(angle)
-        climb = np.clip(-back[2], -1.0, 1.0)
-        elevation = np.degrees(np.arcsin(climb))
-        return float(azimuth), min(float(elevation), LOW_ELEVATION)
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    hinges = []
-    for i in joint_ids(model):
-        if model.jnt_type[i] == HINGE:
-            hinges.append(i)
-    axes = data.xaxis[hinges]
-    if not len(axes):
-        return FRONT
-    along = np.abs(axes @ axes[0])
-    if (along < PARALLEL_COSINE).any():
-        return CORNER
-    x, y, z = axes[0]
-    if abs(z) > PARALLEL_COSINE:
-        return ABOVE
-    azimuth = np.degrees(np.arctan2(abs(y), x * np.sign(y or 1.0)))
-    return float(azimuth), LOW_ELEVATION
 
 
 def forward(model: mujoco.MjModel, data: mujoco.MjData) -> None:

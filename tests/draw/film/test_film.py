@@ -17,7 +17,7 @@ from helpers.sketch import failed
 import smc_mujoco as smc
 from smc_mujoco.common import gl, progress
 from smc_mujoco.draw import decimate, states, style
-from smc_mujoco.draw.film import film, pace, video, world
+from smc_mujoco.draw.film import camera, film, pace, video, world
 from smc_mujoco.draw.film.arrows import (
     Arrow,
     Scale,
@@ -219,7 +219,7 @@ def test_a_film_shows_all_that_a_scenario_s_mechanism_has(plant, field, name):
         duration=0.1,
         **{field: name},
     )
-    model = world.compose(scenario, 0.0, SIZE)
+    model = world.compose(scenario, 0.0, SIZE, camera.turn(90.0, 0.0))
     shown = {model.geom(i).name for i in range(model.ngeom)}
     wanted = []
     for geom in models.spec(scenario).geoms:
