@@ -3,20 +3,22 @@
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.step_halving import UNTRIED
+from smc_mujoco.analysis.tuning.objective import FAILURE_COST
 from smc_mujoco.analysis.tuning.result import Tuned
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
-from smc_mujoco.common.text import capital, counted, joined, number
+from smc_mujoco.common.text import capital, counted, joined, number, span
 from smc_mujoco.control.component import Component, gains_text
 from smc_mujoco.metrics.conventions import leans
 from smc_mujoco.robustness.margins import Margin
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.board import MAX_LEAD, MEDIANS, Boards, Lead
+from smc_mujoco.studies.board import MAX_LEAD, MEDIANS, Boards, Lead, heading, size
 from smc_mujoco.studies.race import FIRST, LOOKS, Race, needed
 from smc_mujoco.studies.table import Table
 
@@ -108,6 +110,32 @@ class Advice(Tables):
         return [*others, dataclasses.replace(last, notes=notes + self.answer)]
 
 
+class NoLaw(NamedTuple):
+    """How a plant does without a law, u = 0, on unseen runs of all conditions."""
+
+    times: float  # its J over that of the first law, median over instances; NaN where runs fail
+    runs: int  # in each condition
+    settled: Mapping[str, int]  # condition -> the number of its runs that settle
+    settled_by_law: int  # the number of all runs that settle under the first law
+    holds: bool  # whether u = 0 is the goal of a servo, which then holds it
+
+    @property
+    def words(self) -> str:
+        """How it does, and in which conditions the experiment shows no need of a law."""
+        held = "u = 0, at which the servo holds the goal" if self.holds else "u = 0"
+        every = self.runs * len(self.settled)
+        text = f"with {held}, {sum(self.settled.values())} of {every} runs settle "
+        text += f"({self.settled_by_law} with the law), and "
+        if math.isnan(self.times):
+            text += "some runs fail, so J is not compared"
+        else:
+            text += f"J is {number(self.times)} times the law's"
+        needless = [name for name, count in self.settled.items() if count == self.runs]
+        if needless:
+            text += f". All settle under {joined(needless)}, where no law is needed"
+        return text
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class RaceAdvice(Advice):
     """Advice within minutes: laws that raced, those that may be best first, and which to use."""
@@ -118,6 +146,8 @@ class RaceAdvice(Advice):
     # law -> condition -> the numbers of its runs that settle, and of all
     settled: Mapping[str, Mapping[str, tuple[int, int]]]
     weighs: Mapping[str, float]  # condition -> its share of J of the first law
+    no_law: NoLaw  # beside the first law
+    added: str  # noise beside the conditions asked for, in words; "" for none
     margins: Sequence[Margin]  # of the first law with its gains
     beside: str  # name of the condition beside which they are; "nominal" for none
     untried: Sequence[str]  # kinds of margins for which there was no time
@@ -145,10 +175,18 @@ class RaceAdvice(Advice):
             lines.append("With these gains: not tried, as the time was over")
         if len(self.weighs) > 1:
             lines.append(f"Its J: {self._weighs}")
+        lines.append(f"Its needs: {self._needs}")
+        if self.law.name != "none":
+            lines.append(f"Without a law: {self.no_law.words}")
+        if self.added:
+            lines.append(f"Added: {self.added}")
         lines += [f"Settles: {self._where}", f"Tolerates: {self._margins}"]
         for name, share in self.race.dropped.items():
             least = f"its lowest J was {number(share)} times the highest of the law that led"
             lines.append(f"Dropped after {FIRST} sets, not tested: {name}; {least}")
+        if self.race.unsearched:
+            late = f"{joined(self.race.unsearched)}, as the time was over"
+            lines.append(f"Not searched: {late}; the same call goes on with them")
         for name, why in self.left_out.items():
             lines.append(f"Left out: {name}, {why}")
         lines.append(f"Second: {self.second or 'none'}")
@@ -160,6 +198,8 @@ class RaceAdvice(Advice):
         words = [self.law.name]
         if len(self.laws) > 1 and not self.fixed and not self.race.winner:
             words.append("the first so far, not tested against the others")
+        if self.race.unsearched:
+            words.append("of the laws that were searched")
         if self.settles[self.law.name] < RELIABLE:
             words.append("which does not settle reliably in every condition")
         return ", ".join(words)
@@ -243,6 +283,23 @@ class RaceAdvice(Advice):
         return joined(parts)
 
     @property
+    def _needs(self) -> str:
+        """The first law's medians in each metric, from its best condition to its worst."""
+        found: dict[str, list[float]] = {}
+        headings = {}
+        for board in self.leaderboard:
+            headings[board.metric] = heading(board)
+            for entry in board.entries:
+                if entry.law == self.law.name:
+                    found.setdefault(board.metric, []).append(entry.interval.median)
+        parts = []
+        for metric, medians in found.items():
+            low, high = size(min(medians), metric), size(max(medians), metric)
+            parts.append(f"{headings[metric]} {span(low, high) or low}")
+        over = ", the medians by condition" if len(self.settled[self.law.name]) > 1 else ""
+        return f"{joined(parts)}{over}"
+
+    @property
     def _margins(self) -> str:
         late = ""
         if self.untried:
@@ -252,7 +309,9 @@ class RaceAdvice(Advice):
         parts = []
         for margin in self.margins:
             unit = "times" if margin.unit == "1" else margin.unit
-            level = f"{margin.text} {unit}".strip()
+            level = f"{margin.text} {unit}".strip().replace("≥", "at least")
+            if margin.unit == self.worst_run.efforts[0]:
+                level += f" (u reaches {number(max(self.worst_run.limits))} {unit})"
             if math.isnan(margin.value):
                 return "nothing more: without changes the error does not end below 5 % of its start"
             parts.append(f"{margin.kind} {level}")
@@ -298,8 +357,8 @@ class RaceAdvice(Advice):
             values = sorted(self.race.entrants[name].values)
             below = values[(len(values) - 1) // 2]
             above = values[len(values) // 2]
-            middle = number((below + above) / 2.0)
-            cell = Cell(middle, f"{number(values[0])}–{number(values[-1])}")
+            middle = _cost((below + above) / 2.0)
+            cell = Cell(middle, span(_cost(values[0]), _cost(values[-1])))
             rows.append([name, cell, f"{len(values)}"])
         return Tabular(
             headings=["law", "J (s^2)", "runs"],
@@ -311,6 +370,11 @@ class RaceAdvice(Advice):
                 "the conditions."
             ],
         )
+
+
+def _cost(J: float) -> str:
+    """Return J as text; "fails" where a run of it fails."""
+    return number(J) if J < FAILURE_COST else "fails"
 
 
 def _each(count: int) -> str:
@@ -327,6 +391,19 @@ def _ranked(comparison: Comparison, order: Sequence[str]) -> list[str]:
     return [law for law in order if enough.get(law)]
 
 
+def _lead(comparison: Comparison, first: str, rival: str) -> str:
+    """Return how J of a law compares with a rival's; where runs fail, without a ratio."""
+    effect = comparison.effect(0, first, rival)
+    lost = dict(zip(comparison.laws, comparison.away[:, 0].sum(axis=1).tolist(), strict=True))
+    if not lost[first] and not lost[rival]:
+        return Lead(first, rival, effect).words
+    what = "sets of gains" if effect.sets else "runs"
+    return (
+        f"lower than {rival}'s in {effect.ahead} of {effect.samples} {what}, of which "
+        f"{lost[first]} of {first} and {lost[rival]} of {rival} fail"
+    )
+
+
 def _verdict(comparison: Comparison, order: Sequence[str]) -> str:
     """Return which law has the lower J in a comparison of one block; `order` has laws by J."""
     winner = comparison.winners[0]
@@ -341,7 +418,7 @@ def _verdict(comparison: Comparison, order: Sequence[str]) -> str:
     rival = max(effects, key=lambda law: effects[law].high)
     at = comparison.laws.index(first), comparison.laws.index(rival)
     p = number(float(comparison.p[0][at]), 2)
-    lead = f"{Lead(first, rival, effects[rival]).words} (p {p})"
+    lead = f"{_lead(comparison, first, rival)} (p {p})"
     if winner:
         return f"{winner} wins; its J is {lead}"
     beaten = dict(zip(comparison.laws, comparison.worse[:, 0], strict=True))

@@ -14,9 +14,9 @@ import numpy as np
 
 from smc_mujoco.analysis.paired_runs import SETTLES, values
 from smc_mujoco.analysis.ranking import Comparison
-from smc_mujoco.analysis.step_halving import doubled
+from smc_mujoco.analysis.step_halving import doubled, halved
 from smc_mujoco.analysis.tuning import search
-from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective, shares
+from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective, weighed
 from smc_mujoco.analysis.tuning.result import Tuned
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError
 from smc_mujoco.common.progress import bar
@@ -27,19 +27,20 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.robustness.margins import COARSE, Margin, margins_of
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition
+from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.advice import RELIABLE, RaceAdvice
-from smc_mujoco.studies.answer_time import FEWEST_SEEDS, AnswerTime
+from smc_mujoco.studies.advice import RELIABLE, NoLaw, RaceAdvice
+from smc_mujoco.studies.answer_time import FEWEST_SEEDS, SHOWN, AnswerTime
 from smc_mujoco.studies.fair_gains import NOT_TUNED, Candidate, Laws, Trial, default_of
 from smc_mujoco.studies.leaderboard import leaderboard
 from smc_mujoco.studies.race import Entrant, Race, compared, judgements, race, unseen
 from smc_mujoco.studies.table import Table
 
 BY = "plant", "condition"  # what the runs of a table have in common
-SHOWN = 5  # laws in the tables by condition, at most; chosen
 CONSIDERED = 3  # sets of gains of a law, those of the lowest J; chosen
 CHOOSING = range(1001, 1003)  # unseen instances that choose one of them
 DECIDING = range(2000, 2008)  # and that compare laws with these; chosen
+BESIDE_NONE = range(3000, 3004)  # and on which the first law stands beside no law; chosen
 KINDS = ("delay", "friction", "mass", "blow")  # of the margins
 KINDS_OF_POSES = ("delay", "disturbance", "mass", "blow")  # of a free body
 TRIED = 15  # runs that a coarse margin takes, on average; chosen
@@ -65,16 +66,16 @@ def advise(
     table_work = sum(_coarse(trial, plant, "none", one).work for one in trial.conditions)
     margins_work = TRIED * len(KINDS) * _coarse(trial, plant, "none", trial.conditions[0]).work
     clock.unit = _work_of_judgement(plant, goal)
-    count = min(len(entrants), SHOWN)
     few = min(seeds, FEWEST_SEEDS)
-    clock.after = count * (AFTER * clock.unit + few * table_work) + margins_work
+    clock.each = AFTER * clock.unit + few * table_work
+    clock.after = margins_work + 2 * len(BESIDE_NONE) * clock.unit
     raced = race(trial, plant, entrants, goal, clock, relevant)
     shown = raced.first
     if raced.winner:
         shown = [*raced.first, _next(raced)] if len(raced.running) > 1 else raced.running
     chosen, tuned = _chosen(trial, plant, raced, shown[:SHOWN], goal)
     fixed = None
-    if clock.left > 0.0:
+    if clock.work_left >= len(chosen) * (judgements(DECIDING) * clock.unit + few * table_work):
         fixed = _fixed(trial, plant, chosen, goal, relevant)
     candidates = [Candidate(law, (law,)) for law in chosen.values()]
     made = clock.seeds(seeds, len(chosen) * table_work, margins_work)
@@ -87,7 +88,8 @@ def advise(
         raise ScenarioError(f"no need has a number in any run on {plant.name}: ask for others")
     ordered = tuple(chosen[law] for law in order)
     first = ordered[0]
-    weighs = shares(plant, first, goal, CHOOSING, trial.threads)
+    beside = max(1, int(min(len(BESIDE_NONE), clock.work_left / (2 * clock.unit))))
+    weighs, no_law = _weighed(trial, plant, first, goal, BESIDE_NONE[:beside])
     base = _base_of_margins(trial, plant, first)
     margins, untried = _margins(trial, base, clock)
     return RaceAdvice(
@@ -99,6 +101,8 @@ def advise(
         fixed=fixed,
         settled=settled,
         weighs=weighs,
+        no_law=no_law,
+        added=_added(trial, plant, goal),
         margins=margins,
         beside=str(base.condition),
         untried=untried,
@@ -228,6 +232,44 @@ def _settled(table: Table) -> Settled:
     return found
 
 
+def _weighed(
+    trial: Trial, plant: Plant, law: Component, goal: Objective, instances: Sequence[int]
+) -> tuple[dict[str, float], NoLaw]:
+    """Return condition -> its share in J of a law, and how no law does on the same instances."""
+    names = [condition.name for condition in goal.conditions]
+    costs, settled = weighed(plant, law, goal, instances, trial.threads)
+    none = coerce.law("none")
+    others, settled_without = weighed(plant, none, goal, instances, trial.threads)
+    total = costs.sum(axis=0)
+    parts = (total / total.sum()).tolist()
+    ratios = others.sum(axis=1) / costs.sum(axis=1)
+    failed = np.maximum(costs, others) >= FAILURE_COST
+    without = dict(zip(names, settled_without.sum(axis=0).tolist(), strict=True))
+    case = trial.case(plant, none, trial.conditions[0])
+    return dict(zip(names, parts, strict=True)), NoLaw(
+        times=math.nan if failed.any() else float(np.median(ratios)),
+        runs=len(instances),
+        settled=without,
+        settled_by_law=int(settled.sum()),
+        holds=case.efforts[0] == plant.unit,
+    )
+
+
+def _added(trial: Trial, plant: Plant, goal: Objective) -> str:
+    """Return the noise that a race adds to the conditions asked for, in words; "" for none."""
+    asked = {condition.name for condition in trial.conditions}
+    units = " or ".join(dict.fromkeys(plant.units[: plant.driven]))
+    for condition in goal.conditions:
+        noise = condition.on(plant, goal.duration).get("noise")
+        if noise and condition.name not in asked:
+            return (
+                f"{condition.name}, of {noise.position:g} {units} in positions and "
+                f"{noise.velocity:g} {units} a second in velocities (standard deviations), as no "
+                "condition that you asked for has any"
+            )
+    return ""
+
+
 def _worst_run(table: Table, law: str) -> Scenario:
     """Return the run of a law that settles last, or never, in the condition in which it settles in
     the fewest runs, or latest.
@@ -270,7 +312,10 @@ def _margins(trial: Trial, base: Scenario, clock: AnswerTime) -> tuple[list[Marg
 
 def _work_of_judgement(plant: Plant, goal: Objective) -> float:
     """Return the work of the runs that judge one set of gains, at twice their step where they may
-    have it.
+    have it. Their models are compiled here, so that the first judgement takes as long as others.
     """
-    cases = goal.holdout(plant, coerce.law("none"), 0)
-    return sum(doubled(case).work for case in cases)
+    cases = list(map(doubled, goal.holdout(plant, coerce.law("none"), 0)))
+    for case in cases:
+        prepare(case)
+        prepare(halved(case))
+    return sum(case.work for case in cases)

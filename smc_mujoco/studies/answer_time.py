@@ -11,6 +11,7 @@ import math
 import time
 
 FEWEST_SEEDS = 5  # of the tables, however short the time is; chosen
+SHOWN = 5  # laws in the tables by condition, at most; chosen
 
 
 @dataclasses.dataclass
@@ -18,13 +19,15 @@ class AnswerTime:
     """When an answer must be there, and how fast runs are.
 
     ends: a time, inf for no limit.
-    after: the work of the runs that must follow a race, at the least.
+    after: the work of the runs that must follow a race, at the least, beside those of
+    each: the work of those of a law in the tables.
     unit: the work of a judgement of one set of gains.
     pace: how long a unit of work takes, s, as the last runs of a race took; 0 before them.
     """
 
     ends: float = math.inf
     after: float = 0.0
+    each: float = 0.0
     unit: float = 0.0
     pace: float = 0.0
 
@@ -33,10 +36,9 @@ class AnswerTime:
         if sets and self.unit:
             self.pace = seconds / (sets * self.unit)
 
-    @property
-    def race_ends(self) -> float:
-        """When a race must end."""
-        return self.ends - self.pace * self.after
+    def race_ends(self, laws: int) -> float:
+        """Return when a race of so many laws must end."""
+        return self.ends - self.pace * (self.after + min(laws, SHOWN) * self.each)
 
     @property
     def left(self) -> float:

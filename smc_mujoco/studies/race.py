@@ -1,9 +1,10 @@
 """A race: sets of gains in turn over the laws, until one law wins, on one plant.
 
 Every law gets its first set of gains, then every law its second, so that laws have equal numbers
-wherever the race stops. J of a set is that of unseen runs of all conditions, in one number, so that
-neither more laws nor more conditions ask for more sets. This is a race in the sense of O. Maron,
-A. W. Moore, "Hoeffding races" (NIPS 6, 1994), by the tests of `analysis.ranking`.
+wherever the race stops. A law for whose first set there is no time does not race. J of a set is
+that of unseen runs of all conditions, in one number, so that neither more laws nor more conditions
+ask for more sets. This is a race in the sense of O. Maron, A. W. Moore, "Hoeffding races" (NIPS 6,
+1994), by the tests of `analysis.ranking`.
 
 - After three sets a law is dropped whose best J is more than twice the worst one of the law that
   leads. It is not tested against the others. Two laws always stay.
@@ -17,7 +18,7 @@ A. W. Moore, "Hoeffding races" (NIPS 6, 1994), by the tests of `analysis.ranking
 
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +31,7 @@ from smc_mujoco.analysis.tuning.evaluator import with_gains
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective, objectives
 from smc_mujoco.analysis.tuning.result import SearchResult
 from smc_mujoco.common.aliases import Array
+from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.files import writable
 from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.control.component import Component
@@ -60,10 +62,15 @@ class Entrant:
         self.known = known
         self.task = task
         self.law: Component = known.law if known else task.law  # pyright: ignore[reportOptionalMemberAccess]
-        self.failure = search.failure_of_law(task) if task else ""
         self.found: list[SearchResult] = []
         self.again: set[int] = set()  # searches that were made once more
         self.J: list[Unseen | None] = []
+
+    @cached_property
+    def failure(self) -> str:
+        """How its first run failed, see `search.failure_of_law`."""
+        assert self.task is not None
+        return search.failure_of_law(self.task)
 
     def gains(self, k: int) -> Component:
         """Return the law with set k of its gains."""
@@ -96,6 +103,7 @@ class Race(NamedTuple):
     """How laws stand after a race."""
 
     entrants: Mapping[str, Entrant]  # by name, those that were dropped, too
+    unsearched: Sequence[str]  # the laws for whose first set there was no time
     # law -> its best J over the worst of the leader's, of laws that were dropped
     dropped: Mapping[str, float]
     comparison: Comparison | None  # of the others, by J of their sets; None for one law
@@ -139,26 +147,30 @@ def race(
 
     The folder of the trial keeps each search. Sets that it has are taken even if the time is over.
     """
-    everyone = {one.law.name: one for one in entrants}
-    running = dict(everyone)
     dropped: dict[str, float] = {}
     comparison, looked = None, 0
-    rounds: list[float] = []  # s that a law took in each
     stopped = False
-    with bar("set of gains", LOOKS[0] * len(running), trial.progress, counted=True) as shown:
-        for k in range(LOOKS[-1]):
+    begin = time.monotonic()
+    with bar("set of gains", LOOKS[0] * len(entrants), trial.progress, counted=True) as shown:
+        everyone = _first_sets(trial, plant, entrants, goal, clock, shown)
+        running = dict(everyone)
+        # s that a law took in each round
+        rounds = [(time.monotonic() - begin) / len(running)]
+        for k in range(1, LOOKS[-1]):
             _expect(shown, k, len(running))
             start = time.monotonic()
             pieces = [(one, k, 0) for one in running.values() if one.task]
-            over = k > 0 and start + len(running) * _expected(rounds) > clock.race_ends
-            if over and any(_file(trial, *piece).read() is None for piece in pieces):
+            count = len(running)
+            over = start + count * _expected(rounds) > clock.race_ends(count)
+            kept = pieces and all(_file(trial, *piece).read() for piece in pieces)
+            if over and not kept:
                 stopped = True
                 break
-            for one, made in _searched(trial, pieces):
-                one.found.append(made)
+            for i, made in _searched(trial, pieces):
+                pieces[i][0].found.append(made)
                 shown.advance(1.0)
             _again(trial, list(running.values()))
-            _judge(trial, plant, list(running.values()), goal, k + 1, clock)
+            clock.judged(*_judge(trial, plant, list(running.values()), goal, k + 1))
             rounds.append((time.monotonic() - start) / len(running))
             if k + 1 == FIRST:
                 values = {name: one.values for name, one in running.items()}
@@ -172,8 +184,42 @@ def race(
     count = len(next(iter(running.values())).J)
     if count < LOOKS[0]:
         comparison, looked = judged(running, goal, relevant), count
-    seconds = len(running) * _expected(rounds)
-    return Race(everyone, dropped, comparison, count, looked, stopped, seconds)
+    unsearched = [one.law.name for one in entrants if one.law.name not in everyone]
+    seconds = (len(running) + len(unsearched)) * _expected(rounds)
+    return Race(everyone, unsearched, dropped, comparison, count, looked, stopped, seconds)
+
+
+def _first_sets(
+    trial: Trial,
+    plant: Plant,
+    entrants: Sequence[Entrant],
+    goal: Objective,
+    clock: AnswerTime,
+    shown: Bar,
+) -> dict[str, Entrant]:
+    """Search the first set of each law and judge it at once, so that the time of what follows is
+    known. Return the laws that have one, by name: those for which there was time, and at least one.
+    """
+    there = [one for one in entrants if one.task is None]
+    pieces = [(one, 0, 0) for one in entrants if one.task]
+    taken: list[float] = []  # s of each law
+    last = time.monotonic()
+    if there:
+        _judge(trial, plant, there, goal, 1)
+
+    def over() -> bool:
+        end = last + _expected(taken or [0.0])
+        return bool(there) and end > clock.race_ends(len(there) + 1)
+
+    for i, made in _searched(trial, pieces, over):
+        one = pieces[i][0]
+        one.found.append(made)
+        clock.judged(*_judge(trial, plant, [one], goal, 1))
+        there.append(one)
+        shown.advance(1.0)
+        taken.append(time.monotonic() - last)
+        last = time.monotonic()
+    return {one.law.name: one for one in entrants if one in there}
 
 
 def _expected(rounds: Sequence[float]) -> float:
@@ -280,30 +326,39 @@ def _file(trial: Trial, one: Entrant, k: int, draw: int):
 
 
 def _searched(
-    trial: Trial, pieces: Sequence[tuple[Entrant, int, int]]
-) -> Iterator[tuple[Entrant, SearchResult]]:
-    """Yield the search k of each entrant, of a draw, in order, as the folder keeps it."""
-    files = []
-    found = []
-    missing = []
+    trial: Trial,
+    pieces: Sequence[tuple[Entrant, int, int]],
+    over: Callable[[], bool] = lambda: False,
+) -> Iterator[tuple[int, SearchResult]]:
+    """Yield the number and the result of each search, given by its law, its k and its draw: those
+    that the folder has first, then the others, in turn or as workers end them, until `over`.
+    """
+    files = {}
     for i, piece in enumerate(pieces):
         file = _file(trial, *piece)
         made = file.read()
-        files.append(file)
-        found.append(made)
         if made is None:
-            missing.append(i)
+            files[i] = file
             writable(file.path)
-    if missing and trial.executor is not None:
+        else:
+            yield i, made
+    missing = list(files)
+    if trial.executor is None:
+        for i in missing:
+            if over():
+                return
+            one, k, draw = pieces[i]
+            yield i, files[i].keep(one.search(k, draw))
+    elif missing:
         calls = []
         for i in missing:
             one, k, draw = pieces[i]
             calls.append(one.call(k, draw))
         with opened(trial.executor) as pool:
             for j, made in called(pool, search.searched, calls):
-                found[missing[j]] = files[missing[j]].keep(made)
-    for (one, k, draw), file, made in zip(pieces, files, found, strict=True):
-        yield one, made or file.keep(one.search(k, draw))
+                yield missing[j], files[missing[j]].keep(made)
+                if over():
+                    return
 
 
 def _again(trial: Trial, running: Sequence[Entrant]) -> None:
@@ -314,7 +369,8 @@ def _again(trial: Trial, running: Sequence[Entrant]) -> None:
             if k not in one.again:
                 one.again.add(k)
                 pieces.append((one, k, 1))
-    for (one, k, _), (_, made) in zip(pieces, _searched(trial, pieces), strict=True):
+    for i, made in _searched(trial, pieces):
+        one, k, _ = pieces[i]
         if made.best.objective < one.found[k].best.objective:
             one.found[k] = made
             if k < len(one.J):
@@ -327,9 +383,10 @@ def _judge(
     running: Sequence[Entrant],
     goal: Objective,
     count: int,
-    clock: AnswerTime,
-) -> None:
-    """Compute J of the first sets, on unseen runs, where it is not known."""
+) -> tuple[int, float]:
+    """Compute J of the first sets, on unseen runs, where it is not known. Return the number of
+    `judgements` that this was, and how long it took, s.
+    """
     wanted = []
     laws = []
     numbers = []
@@ -342,9 +399,10 @@ def _judge(
                 numbers.append(k)
     start = time.monotonic()
     values, halves = unseen(trial, plant, laws, goal, numbers)
-    clock.judged(judgements(numbers), time.monotonic() - start)
+    spent = time.monotonic() - start
     for (one, k), value, half in zip(wanted, values.tolist(), halves.tolist(), strict=True):
         one.J[k] = Unseen(value, half)
+    return judgements(numbers), spent
 
 
 def judgements(numbers: Sequence[int]) -> int:

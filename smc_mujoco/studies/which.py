@@ -94,11 +94,12 @@ def which(
       minutes: how long the whole may take. Then laws race: their gains are searched under the
         conditions asked for and noise, a quarter as long, in turn over the laws until one has the
         lowest J, at most 12 sets a law. The race leaves time for the tables and the margins, which
-        are shorter where there is little. The first set of each law is searched in any case. The
-        clock may change how many sets, runs and margins there are, and with them the answer; with
-        the same ones it is the same to the last bit. After a stop, the same call goes on with the
-        sets that the folder has. The `RaceAdvice` that comes back has the `margins` of the first
-        law and its `worst_run`, too. Default: a whole comparison, which no clock stops.
+        are shorter where there is little. Laws for whose first set there is no time are in
+        `race.unsearched`. The clock may change which laws, sets, runs and margins there are, and
+        with them the answer; with the same ones it is the same to the last bit. After a stop, the
+        same call goes on with the sets that the folder has. The `RaceAdvice` that comes back has
+        the `margins` of the first law and its `worst_run`, too. Default: a whole comparison, which
+        no clock stops.
       starts, relevant, threads, progress, seed, device, executor: as in `compare`.
 
     Returns:

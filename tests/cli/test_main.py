@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers import commands
+from PIL import Image
 
 import smc_mujoco as smc
 from smc_mujoco.cli import console, main, tables
@@ -645,11 +646,24 @@ def test_a_film_of_an_answer_has_as_many_pictures_as_its_time_allows(tmp_path):
     scenario = smc.Scenario(plant="duffing", law=smc.law("pid"), duration=0.5)
     advice = types.SimpleNamespace(worst_trace=smc.run(scenario))
     said = []
-    terminal = types.SimpleNamespace(note=lambda text, wrap: said.append(text), wrote=said.append)
+    note = lambda text, **how: said.append(text)  # noqa: E731
+    terminal = types.SimpleNamespace(note=note, wrote=said.append)
     studies._film(advice, tmp_path, time.monotonic() - 1.0, terminal)
-    assert re.match(r"no film: \d+ s are too long for the time left", said[0])
-    assert not [*tmp_path.iterdir()]
+    assert said[0] == tmp_path / "worst_run_machine.png"
+    assert re.match(r"This picture stands in place of a film, which would take \d+ s; ", said[1])
+    with Image.open(said[0]) as picture:
+        assert picture.size == (1280, 720)
     studies._film(advice, tmp_path, time.monotonic() + 600.0, terminal)
-    assert said[1] == tmp_path / "worst_run.mp4"
-    made = next(ffmpeg.read_frames(str(said[1])))
+    assert said[2:] == [tmp_path / "worst_run.mp4", "The film has 15 pictures a second."]
+    made = next(ffmpeg.read_frames(str(said[2])))
     assert made["fps"] == studies.MAX_FPS
+    assert {path.name for path in tmp_path.iterdir()} == {said[0].name, said[2].name}
+
+
+def test_the_picture_of_an_answer_is_of_the_largest_error_after_half_of_the_run():
+    t = np.linspace(0.0, 1.0, 11)
+    x = np.where(t == 0.7, 0.3, 1.0 - t)[:, None]
+    trace = types.SimpleNamespace(t=t, x=x, r=np.zeros((11, 1)))
+    assert studies._worst_time(trace) == 0.5
+    trace.x = np.where(t[:, None] == t[7], -0.6, x)
+    assert studies._worst_time(trace) == t[7]

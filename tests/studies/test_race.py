@@ -38,7 +38,12 @@ class Drawn(module.Entrant):
         self.lead, self.random = lead, random
         self.outcome = {}
 
+    @staticmethod
+    def wait(seconds):
+        """What lets time pass while a law is searched or judged."""
+
     def search(self, k, draw):
+        self.wait(10.0)
         trained, J = drawn(self.random, self.lead)
         self.outcome[k, trained] = J
         best = Evaluation((1.0,), trained, trained, 0.0)
@@ -56,6 +61,7 @@ def run(monkeypatch):
     monkeypatch.setattr(module, "writable", lambda *paths: None)
 
     def unseen(trial, plant, values, goal, numbers):
+        Drawn.wait(module.judgements(numbers))
         return np.array(values), np.full(len(values), math.nan)
 
     monkeypatch.setattr(module, "unseen", unseen)
@@ -67,6 +73,19 @@ def run(monkeypatch):
         return module.race(trial, None, entrants, GOAL, clock or AnswerTime(), RELEVANT)
 
     return raced
+
+
+@pytest.fixture
+def now(monkeypatch):
+    """Return the time, s, in a list: a search takes 10 s, and a judgement 1 s."""
+    time = [0.0]
+
+    def wait(seconds):
+        time[0] += seconds
+
+    monkeypatch.setattr(Drawn, "wait", staticmethod(wait))
+    monkeypatch.setattr(module.time, "monotonic", lambda: time[0])
+    return time
 
 
 def test_a_law_that_cannot_win_any_more_is_dropped_and_two_stay():
@@ -125,10 +144,8 @@ def test_a_race_goes_on_after_the_first_look_only_if_it_may_be_decided(run):
     assert any(far for _, far in ended[7])
 
 
-def test_the_clock_ends_a_race_between_two_rounds(run, monkeypatch):
-    ticks = iter(range(100))
-    monkeypatch.setattr(module.time, "monotonic", lambda: float(next(ticks)))
-    raced = run({"a": 0.0, "b": 2.0}, clock=AnswerTime(19.0))
+def test_the_clock_ends_a_race_between_two_rounds(run, now):
+    raced = run({"a": 0.0, "b": 2.0}, clock=AnswerTime(110.0))
     assert raced.stopped
     assert 1 < raced.sets < module.LOOKS[0]
     assert {len(one.found) for one in raced.entrants.values()} == {raced.sets}
@@ -136,14 +153,12 @@ def test_the_clock_ends_a_race_between_two_rounds(run, monkeypatch):
     assert raced.first == raced.running == ["a", "b"]
 
 
-def test_a_race_that_stops_between_its_looks_keeps_what_the_first_look_said(run, monkeypatch):
-    ticks = iter(range(1000))
-    monkeypatch.setattr(module.time, "monotonic", lambda: float(next(ticks)))
+def test_a_race_that_stops_between_its_looks_keeps_what_the_first_look_said(run, now):
     whole = run({"a": 0.0, "b": 0.6}, 3)
     assert (whole.sets, whole.looked) == (12, 12)
     ends = []
-    for end in range(20, 60, 4):
-        ticks = iter(range(1000))
+    for end in range(60, 400, 40):
+        now[0] = 0.0
         raced = run({"a": 0.0, "b": 0.6}, 3, AnswerTime(float(end)))
         if raced.sets not in module.LOOKS:
             ends.append(raced.sets > 7)
@@ -171,18 +186,28 @@ def test_the_bar_never_shows_more_sets_than_are_to_be_made(run, monkeypatch):
     assert shares[-1] == (24, 24)
 
 
-def test_a_race_leaves_the_time_that_the_runs_after_it_take(run, monkeypatch):
-    """By the pace of its own judgements, of which a round has one or three times two sets here."""
+def test_a_race_leaves_the_time_that_the_runs_after_it_take(run, now):
+    """By the pace of its own judgements, which is known once a law was judged."""
     sets = []
-    for after in (0.0, 60.0, 1e6):
-        ticks = iter(range(100))
-        with monkeypatch.context() as patch:
-            patch.setattr(module.time, "monotonic", lambda ticks=ticks: float(next(ticks)))
-            clock = AnswerTime(31.0, after=after, unit=1.0)
-            sets.append(run({"a": 0.0, "b": 2.0}, clock=clock).sets)
-        assert clock.pace in (0.5, 1 / 6)
-        assert clock.race_ends == 31.0 - clock.pace * after
+    for after in (0.0, 80.0, 110.0):
+        now[0] = 0.0
+        clock = AnswerTime(160.0, after=after - 20.0, each=10.0, unit=1.0)
+        sets.append(run({"a": 0.0, "b": 2.0}, clock=clock).sets)
+        assert clock.pace == 1.0
+        assert now[0] <= clock.race_ends(2) == 160.0 - after
     assert sets[0] > sets[1] > sets[2] == 1
+
+
+def test_laws_for_whose_first_set_there_is_no_time_are_named_and_at_least_one_is_searched(run, now):
+    laws = dict.fromkeys("abcdefghijklm", 0.0)
+    raced = run(laws, clock=AnswerTime(105.0, after=1.0, each=4.0, unit=1.0))
+    assert [*raced.entrants] == [*"abcdef"]
+    assert raced.unsearched == [*"ghijklm"]
+    assert now[0] == 6 * 13.0 <= 105.0 - 21.0
+    assert raced.stopped
+    alone = run(laws, clock=AnswerTime(now[0]))
+    assert [*alone.entrants] == ["a"]
+    assert len(alone.unsearched) == 12
 
 
 def test_tables_have_fewer_runs_in_a_short_time_but_some(monkeypatch):

@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.tuning import quick_search, search
+from smc_mujoco.analysis.tuning.objective import FAILURE_COST
 from smc_mujoco.cli import main
+from smc_mujoco.common.text import number
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import catalogue
@@ -161,8 +164,9 @@ def raced(tmp_path_factory):
 def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(raced):
     _, advice, _ = raced
     lines = dict(line.split(": ", 1) for line in advice.answer)
-    verdicts = ["Use", "However tuned", "With these gains", "Its J", "Settles", "Tolerates"]
-    assert [*lines][:6] == verdicts
+    verdicts = ["Use", "However tuned", "With these gains", "Its J", "Its needs", "Without a law"]
+    assert [*lines][:9] == [*verdicts, "Added", "Settles", "Tolerates"]
+    assert lines["Added"].startswith("noise, of 0.01 m in positions and 0.05 m a second in veloc")
     shares = [float(share) for share in re.findall(r"(\d+) % \w+", lines["Its J"])]
     assert sum(shares) == pytest.approx(100.0, abs=1.0)
     assert shares == sorted(shares, reverse=True)
@@ -180,13 +184,51 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     assert "mass under coulomb: 4 seeds" in text
     assert ", one at a time and under coulomb: in 1.5 s the error" in lines["Tolerates"]
     (left,) = advice.race.entrants.keys() - {*compared}
-    assert "Without" not in text  # of a law that was dropped a line below says so
+    assert f"{left} left out" not in text  # of a law that was dropped a line below says so
     kept = dataclasses.replace(advice, race=advice.race._replace(dropped={}))
     words = " ".join(str(kept).split())
     assert f"{left} left out: these runs are of the laws that may be the best." in words
     assert "too few" not in text
     assert "J over coulomb and noise on mass" in text
     assert "*" not in text
+
+
+def test_the_answer_says_how_the_plant_does_without_a_law_and_where_it_needs_none(raced):
+    _, advice, _ = raced
+    without = advice.no_law
+    assert (without.runs, without.settled) == (4, {"coulomb": 0, "noise": 0})
+    assert without.times > 2.0
+    assert not without.holds
+    assert without.words.startswith("with u = 0, 0 of 8 runs settle (")
+    assert without.words.endswith(f"J is {number(without.times)} times the law's")
+    held = without._replace(holds=True, settled={"coulomb": 4, "noise": 1}, times=math.nan)
+    assert held.words.startswith("with u = 0, at which the servo holds the goal, 5 of 8 runs")
+    assert held.words.endswith(
+        "and some runs fail, so J is not compared. All settle under coulomb, where no law is needed"
+    )
+
+
+def test_the_needs_are_those_of_the_tables_and_margins_at_the_end_of_their_search_are_the_least(
+    raced,
+):
+    _, advice, _ = raced
+    lines = dict(line.split(": ", 1) for line in advice.answer)
+    bound = np.median(advice.table.select(law=advice.law.name).column("ultimate_bound"))
+    assert f"ultimate bound (m) {number(bound)}" in lines["Its needs"]
+    friction = advice.margins[1]
+    most = dataclasses.replace(friction, value=friction.searched)
+    widest = dataclasses.replace(advice, margins=[most])
+    assert f"friction at least {number(most.value)} N (u reaches 9.00 N)" in widest._margins
+
+
+def test_where_runs_fail_there_is_no_ratio_of_J():
+    """Such a run counts 1e9 s^2."""
+    J = {"a": np.full(8, 0.3), "b": np.full(8, 1e9)}
+    fine = {law: values < FAILURE_COST for law, values in J.items()}
+    found = advice_module._verdict(Comparison(J, arrived=fine), ["a", "b"])
+    assert "lower than b's in 8 of 8 runs, of which 0 of a and 8 of b fail" in found
+    assert "times" not in found
+    assert [*map(advice_module._cost, (0.3, 1e9))] == ["0.300", "fails"]
 
 
 def test_a_race_that_is_asked_for_again_gives_the_same_answer_from_its_folder(raced, monkeypatch):
@@ -218,12 +260,19 @@ def test_without_time_there_is_an_answer_of_the_sets_that_there_are_without_marg
     assert some._margins.endswith("; mass and blow not tried, as the time was over")
 
 
-def test_the_clock_may_end_a_race_before_the_first_look(raced, tmp_path):
-    asked, _, plant = raced
+def test_laws_for_which_there_is_no_time_are_named_and_the_clock_may_end_a_race_at_once(
+    raced, tmp_path
+):
+    asked, advice, plant = raced
     short = smc.which(plant, **asked | {"out": tmp_path}, minutes=1e-6, duration=1.5)
     assert short.race.stopped
+    assert [*short.race.entrants] == [law.name for law in HOLDING]
     assert {len(one.values) for one in short.race.entrants.values()} == {1}
-    (however,) = (line for line in short.answer if line.startswith("However tuned"))
+    late = "Not searched: observer_free, as the time was over; the same call goes on with them"
+    assert late in short.answer
+    assert "of the laws that were searched" in short.answer[0]
+    few = dataclasses.replace(advice, race=advice.race._replace(sets=1, stopped=True))
+    (however,) = (line for line in few.answer if line.startswith("However tuned"))
     assert "open; the time was enough for 1 set of gains of each law" in however
     assert "as the time cannot hold even 3" in however
     assert "7 can name a winner" in however

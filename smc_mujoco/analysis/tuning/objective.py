@@ -289,21 +289,27 @@ def objectives(
     return np.array(found), np.array(there)
 
 
-def shares(
+def weighed(
     plant: Plant, law: Component, goal: Objective, instances: Sequence[int], threads: int | None
-) -> dict[str, float]:
-    """Return condition -> its share of the tracking and variation in J of a law, over instances
-    that no search has seen, at twice the physics step where they may have it.
+) -> ArrayPair:
+    """Return what each run adds to J of a law, tracking and variation, s^2, and whether it settles,
+    (instances, conditions) each, on instances that no search has seen, at twice the physics step
+    where they may have it.
     """
     costs = []
-    laws = [law] * len(instances)
-    for _, runs in _unseen(plant, laws, goal, instances, threads, doubled=True):
+    settled = []
+    for _, runs in _unseen(plant, [law] * len(instances), goal, instances, threads, doubled=True):
         terms = np.array(list(map(goal.terms_of_run, runs)))
         costs.append(terms @ (1.0, goal.weight))
-    total = np.sum(costs, axis=0)
-    names = [condition.name for condition in goal.conditions]
-    parts = (total / total.sum()).tolist()
-    return dict(zip(names, parts, strict=True))
+        settled.append(list(map(_settles, runs)))
+    return np.array(costs), np.array(settled)
+
+
+def _settles(trace: Trace) -> bool:
+    """Return whether a run does not fail and settles."""
+    if trace.failure is not None or trace.diverged_at is not None:
+        return False
+    return bool(np.isfinite(metrics.settling_time(trace)))
 
 
 def _unseen(

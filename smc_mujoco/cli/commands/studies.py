@@ -1,6 +1,5 @@
 """smc-mujoco compare, which: questions that many runs of many laws answer."""
 
-import itertools
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,14 +14,14 @@ from smc_mujoco.common.interrupts import delay_signals
 from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
+    from smc_mujoco.simulation.trace import Trace
     from smc_mujoco.studies.advice import RaceAdvice
     from smc_mujoco.studies.table import Table
 
 FILMED = 0.5  # minutes that are for the figure and the film, and
 FILMED_SHARE = 0.2  # the largest share that they take of the minutes; chosen
 # pictures a second of the film; the largest is enough to follow a run, the smallest to see it
-MAX_FPS, MIN_FPS = 15.0, 4.0
-TIMED = 5  # pictures by which a film's time is estimated; chosen
+MAX_FPS, MIN_FPS = 15.0, 2.0
 MADE = 0.8  # of the time that is left, in which they must be made: then they are written; chosen
 
 Seed = Annotated[int, typer.Option(min=0, help="Seed of initial states, noise and phases.")]
@@ -59,9 +58,9 @@ Falling = Annotated[
 Minutes = Annotated[
     float | None,
     typer.Option(
-        help="Answer within so many minutes, with a film if time is left. "
-        "Laws race under the conditions asked for, until one has the lowest J. Each is searched "
-        "once however short the time is."
+        help="Answer within so many minutes, with a film, or with a picture where the time is too "
+        "short for one. Laws race under the conditions asked for, until one has the lowest J. "
+        "Laws that there was no time to search are named."
     ),
 ]
 Film = Annotated[
@@ -103,13 +102,13 @@ def which(
     Example: smc-mujoco which arm.xml:shoulder --x0 0.5 --condition "worn:
     sensor=Encoder(counts=4096)" --need accurate
     """
+    began = time.monotonic()
     with delay_signals():
         from smc_mujoco.studies.advice import RaceAdvice
         from smc_mujoco.studies.which import QUICK_MINUTES
         from smc_mujoco.studies.which import which as advise
 
     terminal = Terminal(json)
-    began = time.monotonic()
     whole = QUICK_MINUTES if quick and minutes is None else minutes
     advice = advise(
         plant,
@@ -153,33 +152,50 @@ def _save(advice: "RaceAdvice", out: Path, terminal: Terminal) -> None:
 
 def _film(advice: "RaceAdvice", out: Path, ends: float, terminal: Terminal) -> None:
     """Film the worst run of the first law of a race until a time of `time.monotonic`, s, with as
-    many pictures a second as can be made by then.
+    many pictures a second as can be made by then; if these are too few, write one picture.
     """
     from smc_mujoco.draw.film import film as films
 
+    run = [advice.worst_trace]
     try:
         begun = time.monotonic()
-        frames = films.Frames([advice.worst_trace], size=films.FULL_SIZE)
+        frames = films.Frames(run, size=films.FULL_SIZE)
         pictures = iter(frames)
         next(pictures)
         first = time.monotonic()
-        timed = sum(1 for _ in itertools.islice(pictures, TIMED))
-        each = (time.monotonic() - first) / max(1, timed)
+        next(pictures, None)
+        each = time.monotonic() - first
         pictures.close()
-        left = MADE * (ends - time.monotonic()) - (first - begun)
-        fps = min(MAX_FPS, films.FPS * left / (each * len(frames)))
-        if fps < MIN_FPS:
+        fit = (MADE * (ends - time.monotonic()) - (first - begun)) / each  # pictures
+        fps = min(MAX_FPS, films.FPS * fit / len(frames))
+        if fps >= MIN_FPS:  # with fewer pictures a second, motion is shown more slowly
+            frames = films.Frames(run, size=films.FULL_SIZE, fps=fps)
+            fps = min(fps, fps * fit / len(frames))
+        if fps >= MIN_FPS:
+            terminal.wrote(films.film(run, out / "worst_run.mp4", fps=fps))
+            terminal.note(f"The film has {fps:.2g} pictures a second.")
+        else:
+            file = out / "worst_run_machine.png"
+            terminal.wrote(films.film(run, file, at=_worst_time(advice.worst_trace)))
+            needed = MIN_FPS * each * len(frames) / frames.fps
             terminal.note(
-                f"no film: {len(frames) * each * MIN_FPS / films.FPS:.0f} s are too long for the "
-                "time left; the same command with more --minutes makes it",
+                f"This picture stands in place of a film, which would take {needed:.0f} s; the "
+                "same command with more --minutes makes it.",
                 wrap=True,
             )
-            return
-        films.film([advice.worst_trace], out / "worst_run.mp4", fps=fps)
     except ScenarioError as error:  # the answer stands without it
         terminal.note(f"no film: {error}", wrap=True)
-    else:
-        terminal.wrote(out / "worst_run.mp4")
+
+
+def _worst_time(trace: "Trace") -> float:
+    """Return when the error of a run is largest in its second half, in which single events are,
+    s.
+    """
+    import numpy as np
+
+    late = trace.t >= 0.5 * trace.t[-1]
+    apart = np.nan_to_num(np.abs(trace.x - trace.r)).max(axis=1)
+    return float(trace.t[late][np.argmax(apart[late])])
 
 
 Condition = Annotated[
