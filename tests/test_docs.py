@@ -171,6 +171,11 @@ def test_the_plain_notation_becomes_latex(generator, plain, latex):
     assert generator.notation.formula(plain).split() == latex.split()
 
 
+def test_initials_of_a_name_are_no_symbols(generator):
+    said = generator.notation.sentence("that of H. K. Khalil, whose gain K is 2")
+    assert said == "that of H. K. Khalil, whose gain $K$ is 2"
+
+
 @pytest.mark.parametrize("kind", sorted({template.kind for template in TEMPLATES}))
 def test_a_page_says_what_each_gain_is_and_typesets_all_equations(generator, kind):
     for template in (template for template in TEMPLATES if template.kind == kind):

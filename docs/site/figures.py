@@ -150,7 +150,9 @@ def _svg(traces: Sequence, colours: Sequence[str]) -> bytes:
         axes = figure.subplots(len(shown), sharex=True, squeeze=False)[:, 0]
         for ax, (panel, shades) in zip(axes, shown, strict=True):
             panels.over_time(ax, panel, shades)
-            ax.set(ylabel=panel.label, xlim=(0.0, end(traces)))
+            alone = len(panel.traces) == 1  # of several rows, which have no room for "control"
+            words = panel.label.removeprefix("control ") if alone else panel.label
+            ax.set(ylabel=words, xlim=(0.0, end(traces)))
             ax.locator_params(axis="y", nbins=5)
         axes[-1].set_xlabel("time (s)")
         figure.align_ylabels(axes)
