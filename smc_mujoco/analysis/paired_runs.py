@@ -354,6 +354,17 @@ def unit_of_x(plant: str, ran: Sequence[Scenario | None]) -> str:
     return ""
 
 
+def unit_of_u(ran: Sequence[Scenario | None]) -> str:
+    """Return the unit of u in runs where it is no force and the same in all, such as V; else ""."""
+    efforts = set()
+    for scenario in ran:
+        if not scenario or scenario.force_command:
+            efforts.add("")
+        else:
+            efforts.add(scenario.efforts[0])
+    return efforts.pop() if len(efforts) == 1 else ""
+
+
 def sources(table: RunColumns, rows: Array) -> dict[str, tuple[Source, ...]]:
     """Return law -> sources of its gains in some rows."""
     columns = [np.asarray(table.column(name))[rows] for name in ("law", "source", "search")]

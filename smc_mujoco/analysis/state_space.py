@@ -62,18 +62,18 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
         model.actuator_delay[:] = 0.0
         data = mujoco.MjData(model)
         data.qpos[:], data.qvel[:] = models.initial_state(model, at)
-        driven = drive_ids(model)
+        driven = model.actuator_ctrladr[drive_ids(model)]  # their places in ctrl
         dofs = dof_ids(model)
-        _hold(model, data, model.actuator_ctrladr[driven], plant.name)
+        _hold(model, data, driven, plant.name)
         block = rates(model, data)
     order = _order(model, dofs)
     n = len(order)
     a = block[:n, :n][np.ix_(order, order)]
-    b = block[:n, n:][np.ix_(order, model.actuator_ctrladr[driven])]
+    b = block[:n, n:][np.ix_(order, driven)]
     names = channel_names(plant)
     if plant.pose:
         labels = names
-        drives = [model.actuator(i).name for i in driven]
+        drives = [model.actuator(i).name for i in drive_ids(model)]
     else:
         labels = []
         for i in order[: model.nv]:

@@ -18,6 +18,7 @@ from smc_mujoco.analysis.paired_runs import (
     groups,
     scenarios,
     sources,
+    unit_of_u,
     unit_of_x,
 )
 from smc_mujoco.analysis.ranking import linked
@@ -118,7 +119,7 @@ class Dots(NamedTuple):
     intervals: dict[Cell, Interval]
     won: set[Cell]  # those with a ring
     logarithmic: set[str]  # metrics whose axis is, on all plants
-    units: dict[str, str]  # plant -> unit of positions
+    units: dict[str, tuple[str, str]]  # plant -> units of positions and of commands
     labels: dict[str, Plant | str]  # plant -> what pictures call it
     heading: str  # plants and conditions in words
 
@@ -160,7 +161,7 @@ def _dots(table: RunColumns, metrics: Sequence[str], winners: Collection[Cell]) 
     for group in groups(table, GROUPS[:1]):
         plant = group.name["plant"]
         runs = scenarios(table, group)
-        units[plant] = unit_of_x(plant, runs)
+        units[plant] = unit_of_x(plant, runs), unit_of_u(runs)
         labels[plant] = plant
         for scenario in runs:
             if scenario:
@@ -238,7 +239,7 @@ def _draw_plant(row: Array, dots: Dots, plant: str, named: bool) -> None:
                     rings.append(cell[2:])
         decades = name in dots.logarithmic
         _panel(ax, of_panel, dots.conditions[plant], dots.looks, name, rings, decades)
-        ax.set_xlabel(_label(name, dots.units[plant]))
+        ax.set_xlabel(_label(name, *dots.units[plant]))
         ax.tick_params(labelleft=named or ax is row[0])
 
 
@@ -360,11 +361,13 @@ def _dot(ax: Axes, interval: Interval, line: int, look: Mapping[str, str]) -> No
         ax.annotate("", *place, arrowprops=arrow)
 
 
-def _label(metric: str, x: str) -> str:
-    """Return the label of a panel with the metric's unit where positions are in x, on two lines."""
+def _label(metric: str, x: str, u: str) -> str:
+    """Return the label of a panel with the metric's unit where positions are in x and commands in
+    u, on two lines.
+    """
     if metric == SETTLES:
         return "share of runs\nthat settle"
-    heading = CATALOGUE[metric].heading(x)
+    heading = CATALOGUE[metric].heading(x, u)
     words, bracket, unit = heading.partition(" (")
     folded = bracket.replace(" ", "\n")
     squared = unit.replace("^2", "²")

@@ -267,11 +267,13 @@ class Metric:
         text = self.unit.replace("({x})", x).replace("({u})", f"({u})" if " " in u else u)
         return text.format(x=x, u=u, force=EFFORT[x])
 
-    def heading(self, x: str) -> str:
-        """Return the label with the unit where positions are in x; x="" where that is not known."""
+    def heading(self, x: str, u: str = "") -> str:
+        """Return the label with the unit where positions are in x and commands in u; x="" where
+        that is not known, u="" for forces.
+        """
         unit = self.unit
         if x:
-            unit = self.unit_for(x)
+            unit = self.unit_for(x, u)
         if not unit or "{" in unit:
             return self.label
         return f"{self.label} ({unit})"

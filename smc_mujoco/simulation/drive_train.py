@@ -65,7 +65,9 @@ class DriveTrain:
 
     @property
     def words(self) -> list[str]:
-        """Sentences that say what u is where it is no force, one for the joints that share it."""
+        """Sentences that say what u is where it is no force, one for the joints that share it, and
+        where an actuator gets it late.
+        """
         joints: dict[str, list[str]] = {}
         for motor, unit, joint in zip(
             self.motors, self.plant.units, driven_names(self.plant), strict=False
@@ -77,6 +79,11 @@ class DriveTrain:
         sentences = []
         for what, those in joints.items():
             sentences.append(f"u of {joined(those)} of {name} is {what}.")
+        for part in self.actuator:
+            if part.lateness:
+                late = joined(map(repr, part.joint_names(self.plant)))
+                ms = f"{1e3 * part.lateness:g} ms"
+                sentences.append(f"The actuator of {late} of {name} gets its command {ms} late.")
         return sentences
 
     @cached_property

@@ -54,10 +54,18 @@ class Advice(Tables):
         first = self.law
         return [
             f"Use: {self._name}",
-            f"Gains: {gains_text(first.gains) or 'none'}, {first.source}",
+            f"Gains: {gains_text(first.gains) or 'none'}{self._unit}, {first.source}",
             f"Second: {self.second or 'none'}",
             f"Evidence: {self._sure}",
         ]
+
+    @property
+    def _unit(self) -> str:
+        """The units of u in words where it is no force, beside the gains that make it; else ""."""
+        scenario = self.table.scenario(0)
+        if scenario.force_command:
+            return ""
+        return f" for u in {joined(dict.fromkeys(scenario.efforts[: scenario.plant.driven]))}"
 
     @property
     def _name(self) -> str:
@@ -190,7 +198,7 @@ class RaceAdvice(Advice):
         for name, why in self.left_out.items():
             lines.append(f"Left out: {name}, {why}")
         lines.append(f"Second: {self.second or 'none'}")
-        lines.append(f"Gains: {self.law}, {self.law.source}")
+        lines.append(f"Gains: {self.law}{self._unit}, {self.law.source}")
         return lines
 
     @property

@@ -265,15 +265,11 @@ def _board(
 
 
 def _unit(metric: str, ran: Sequence[Scenario | None]) -> str:
-    """Return the unit of a metric, with that of u where it is the same voltage in all blocks."""
-    efforts = set()
-    for scenario in ran:
-        if not scenario or scenario.force_command:
-            efforts.add("")
-        else:
-            efforts.add(scenario.efforts[0])
-    effort = efforts.pop()
-    if efforts or not effort:
+    """Return the unit of a metric, with that of u where it is no force and the same in all
+    blocks.
+    """
+    effort = paired_runs.unit_of_u(ran)
+    if not effort:
         return UNITS[metric]
     bracketed = effort if effort.isalpha() else f"({effort})"
     return UNITS[metric].replace("({u})", bracketed).replace("{u}", effort)

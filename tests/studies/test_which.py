@@ -308,6 +308,7 @@ def test_where_u_has_two_units_a_need_or_a_metric_of_u_says_so(tmp_path):
         smc.which(plant, needs=["accurate", "calm"], **given)
     found = smc.which(plant, **given)  # the default needs that have a value
     assert [board.metric for board in found.leaderboard] == ["settling_time", "ultimate_bound"]
+    assert " for u in N and m, yours" in found.answer[1]
     compared = smc.compare(plants=[plant], metrics=["tv_rate"], tune=False, **given)
     assert why in " ".join(str(compared).split())
 

@@ -32,7 +32,7 @@ from smc_mujoco.simulation.run import (
     ScenarioBatch,
     cores,
     memory_for,
-    run,
+    run_unjudged,
 )
 from smc_mujoco.simulation.scenario import Scenario
 
@@ -144,7 +144,7 @@ class Evaluator:
             for law in laws:
                 for case in self.cases:
                     cases.append(dataclasses.replace(case, law=law))
-            traces = run(cases, self.threads)
+            traces = run_unjudged(cases, self.threads)
         return list(map(self.goal.terms_of_run, traces))
 
     def _terms(self, case: Scenario, failed_at: float | None, log: np.ndarray) -> Pair:

@@ -85,6 +85,7 @@ from smc_mujoco.common.version import versions
 from smc_mujoco.control.component import Component, Template, unit_cure
 from smc_mujoco.mechanisms.custom import clearance
 from smc_mujoco.mechanisms.custom.scales import falls
+from smc_mujoco.mechanisms.layout import driven_names
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.conventions import leans
 from smc_mujoco.simulation import coerce, scenario_json
@@ -95,7 +96,7 @@ from smc_mujoco.simulation.grid import Starts
 from smc_mujoco.simulation.integration import stepped_by_mujoco
 from smc_mujoco.simulation.model import with_values
 from smc_mujoco.simulation.prepare import prepare
-from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.run import run, run_unjudged
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.simulation.workers import Workers, called, opened
@@ -403,7 +404,7 @@ class TuningTask(NamedTuple):
         """Return the evaluation of a set of gains by MuJoCo."""
         law = with_gains(self.law, tuple(self.box), gains)
         cases = [dataclasses.replace(case, law=law) for case in cases]
-        traces = run(cases, self.threads)
+        traces = run_unjudged(cases, self.threads)
         return self.goal.evaluation(cases[0], traces, gains)
 
     def _refuse_broken(self, best: Evaluation, failure: str) -> None:
@@ -435,13 +436,7 @@ def task_of(
         raise ScenarioError(
             f"the conditions of a tuning have commands in {both}: tune for each drive alone"
         )
-    if len({bool(motor.unit) for motor in first.drive_train.motors}) > 1:
-        names = dict.fromkeys(first.efforts[: first.plant.driven])
-        units = " and ".join(names)
-        raise ScenarioError(
-            f"joints of {first.plant.name} take commands in {units}, but a tuning has one bound on "
-            "u: give all of them servos or motors, as smc.Channel(motor=True)"
-        )
+    _refuse_mixed_commands(first)
     bound = goal.u_max or (default_u_max(first.plant) if first.force_command else min(first.limits))
     goal = dataclasses.replace(goal, u_max=bound)
     reach = goal.starts.largest(dataclasses.replace(first, x0=None))
@@ -473,6 +468,24 @@ def task_of(
     raise ScenarioError(
         f"no gains of {law.name} in its search range meet the conditions of its theorem: "
         "change its gains that are held, or give outside_theorem=True"
+    )
+
+
+def _refuse_mixed_commands(case: Scenario) -> None:
+    """Raise ScenarioError if joints take commands of different kinds."""
+    drives = case.drive_train.motors
+    if len({motor.unit for motor in drives}) < 2:
+        return
+    units = " and ".join(dict.fromkeys(case.efforts[: case.plant.driven]))
+    ideal = []
+    for motor, joint in zip(drives, driven_names(case.plant), strict=True):
+        if motor.unit:
+            ideal.append(f"{joint}(motor)")
+    raise ScenarioError(
+        f"joints of {case.plant.name} take commands in {units}, but a tuning has one bound on u "
+        f"and one set of gains for all joints: give {joined(ideal)} in the text of the plant, or "
+        "smc.Channel(motor=True), for ideal motors; or name the joints of one kind alone, as the "
+        "others then hold their place"
     )
 
 
@@ -593,7 +606,7 @@ def result_of(task: TuningTask, found: tuple[SearchResult, ...]) -> Tuned:
         versions=versions(),
     )
     cases = task.cases(found.index(tuned.best))
-    traces = run(cases, task.threads)
+    traces = run_unjudged(cases, task.threads)
     before = task.goal.evaluation(cases[0], traces).objective
     gains = tuned.best.best.gains
     law = with_gains(task.law, tuple(task.box), gains)
@@ -634,7 +647,7 @@ def failure_of_law(task: TuningTask) -> str:
     Raise BrokenLawError if it fails at once, or does not compile either.
     """
     cases = task.cases(0)
-    traces: list[Trace] = run(cases, task.threads)
+    traces = run_unjudged(cases, task.threads)
     if all(trace.broken for trace in traces):
         failure = traces[0].broken
     else:

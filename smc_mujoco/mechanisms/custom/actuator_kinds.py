@@ -8,6 +8,7 @@ DYNAMICS = {
     "mjDYN_PID": "is a <pid>, whose command is a position",
     "mjDYN_MUSCLE": "is a <muscle>, whose command is an activation",
 }
+FILTERS = ("mjDYN_FILTER", "mjDYN_FILTEREXACT")
 GAINS = {
     "mjGAIN_DCMOTOR": "is a <dcmotor>, whose command is no force",
     "mjGAIN_PID": "is a <pid>, whose command is a position",
@@ -32,6 +33,9 @@ def no_motor(model: mujoco.MjModel, i: int) -> str:
     kind = kind or _with_bias(model, i, dynamics)
     if not kind and dynamics != "mjDYN_NONE":
         kind = f"has dynamics (dyntype {dynamics.removeprefix('mjDYN_').lower()})"
+        if dynamics in FILTERS:
+            lag = f"Lag({model.actuator_dynprm[i, 0]:g})"
+            kind += f", which an ideal motor has with actuator={lag}"
     if not kind and not model.actuator_gainprm[i, 0]:
         kind = "has gain 0"
     return kind or spoilt(model, i)

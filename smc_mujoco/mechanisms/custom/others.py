@@ -28,10 +28,14 @@ from smc_mujoco.mechanisms.custom.mjcf import ModelSource, as_it_is
 OTHERS = ("file", "held", "locked")
 HELD = 2.0 * math.pi * 8.0  # rad/s, chosen: fast beside the channels, slow beside a physics step
 AFFINE = mujoco.mjtBias.mjBIAS_AFFINE
+PID = mujoco.mjtGain.mjGAIN_PID
+POSITION = mujoco.mjtCtrlInput.mjINPUT_POS.value
 
 
 def is_servo(actuator: mujoco.MjsActuator) -> bool:
-    """Return whether an actuator pulls to a position."""
+    """Return whether an actuator pulls to a position that is its command."""
+    if actuator.gaintype == PID and actuator.ctrlspec and not actuator.ctrlspec & POSITION:
+        return False
     return actuator.biastype == AFFINE and actuator.biasprm[1] < 0.0
 
 
@@ -105,19 +109,35 @@ def edit(
         return
     model, data = at_start(source, channels, keyframe)
     for i, servo in servos.items():
-        goal = -servo.biasprm[1] * data.actuator_length[model.actuator_outadr[i]]
+        place = float(data.actuator_length[model.actuator_outadr[i]])
+        stiffness = -servo.biasprm[1]
         if keyframe is not None and np.any(data.ctrl):
-            ctrl = data.ctrl[model.actuator_ctrladr[i]]
+            place = float(data.ctrl[model.actuator_ctrladr[i]])
             if model.actuator_ctrllimited[model.actuator_ctrladr[i]]:
-                ctrl = np.clip(ctrl, *model.actuator_ctrlrange[model.actuator_ctrladr[i]])
-            goal = servo.gainprm[0] * ctrl
-        servo.biasprm[0] += goal
+                low, high = model.actuator_ctrlrange[model.actuator_ctrladr[i]].tolist()
+                place = min(max(place, low), high)
+            stiffness = servo.gainprm[0]
+        if servo.gaintype == PID:
+            _hold_pid(servo, place)
+            continue
+        servo.biasprm[0] += stiffness * place
         # its ctrl stays at 0, which its range may leave out, as a knee's does
         servo.ctrllimited = servo.actlimited = False
     if others == "held":
         _hold(spec, model, data, limp(spec, seen))
     if others == "locked":
         _lock(spec, model, data, set(seen))
+
+
+def _hold_pid(servo: mujoco.MjsActuator, place: float) -> None:
+    """Let a `<pid>`, which integrates the distance from its command, hold a place: its ctrl stays
+    at 0, which MuJoCo clips to a range that begins or ends there.
+    """
+    servo.ctrllimited = True
+    servo.ctrlrange = (place, place + 1.0) if place > 0.0 else (place - 1.0, place)
+    servo.dynprm[1] = 0.0  # its slewmax, for which it would begin at 0
+    if not servo.gainprm[0]:
+        servo.dyntype = mujoco.mjtDyn.mjDYN_NONE
 
 
 def _hold(

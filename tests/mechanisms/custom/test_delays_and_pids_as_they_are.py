@@ -193,3 +193,39 @@ def test_a_delay_that_is_interpolated_is_that_of_mujoco():
     trace = run(arm(*parts), duration=1.0, integrator="implicitfast")
     x = by_mujoco(ARM % parts, trace, "implicitfast", at_goal)
     np.testing.assert_allclose(trace.x, x, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("place", ["qpos", "ctrl"])
+def test_another_joint_s_pid_holds_its_place(place):
+    """It would pull to 0, as its integral counts from its command."""
+    parts = PID, '<motor joint="b"/>'
+    ctrl = 'qpos=".2 .4" ctrl="-.6 0 0"' if place == "ctrl" else 'qpos=".2 .4"'
+    xml = ARM.replace('qpos=".2 .4"', ctrl) % parts
+    plant = smc.plant_from(xml, {"b": smc.Channel(x0=-0.3)}, keyframe="home", measured=["a"])
+    (trace,) = smc.run(
+        [smc.Scenario(plant=plant, law="pid", physics_step=STEP, duration=1.0, integrator="Euler")]
+    )
+    model = mujoco.MjModel.from_xml_string(xml)
+    model.opt.timestep = STEP
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.2, -0.3
+    data.ctrl[0] = data.act[0] = -0.6 if place == "ctrl" else -2.0 * 0.2
+    for x, u in zip(trace.x, trace.u[:, 0], strict=True):
+        np.testing.assert_allclose(data.qpos, x[[1, 0]], rtol=0, atol=1e-12)
+        data.ctrl[2] = u
+        mujoco.mj_step(model, data)
+
+
+def test_words_say_what_a_late_pid_is_given():
+    late = PID.replace("<pid", "<pid delay='.006' nsample='6'")
+    scenario = smc.Scenario(plant=arm(late, MOTOR % ""), law=on_command(), x0=(0.5, -0.3))
+    assert scenario.drive_train.words == [
+        "u of 'a' of arm is the set-point of its servo, in rad from its goal at 0.2.",
+        "The actuator of 'a' of arm gets its command 6 ms late.",
+    ]
+
+
+def test_a_filter_of_a_motor_is_refused_with_the_lag_that_has_it():
+    motor = '<general joint="j" dyntype="filterexact" dynprm=".05"/>'
+    with pytest.raises(ScenarioError, match=r"filterexact.* actuator=Lag\(0.05\)"):
+        link(motor)

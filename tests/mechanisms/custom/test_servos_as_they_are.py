@@ -428,6 +428,8 @@ def test_gains_tables_figures_and_files_have_the_unit_of_the_set_point(tmp_path)
     table = smc.study(
         smc.grid(plant, [smc.law("pid")], "nominal", seeds=2, duration=0.1), tmp_path / "runs"
     )
+    labels = [ax.get_xlabel().replace("\n", " ") for ax in smc.plot(table).axes]
+    assert "TV rate (rad/s)" in labels
     said = "u of 'j' of hobby is the set-point of its servo, in rad from its goal at 0."
     printed = str(smc.leaderboard(table, ["tv_rate"])).replace("\n", " ")
     assert said in printed
@@ -446,6 +448,14 @@ def test_default_gains_before_a_servo_are_told_when_they_run():
         run(law="pid", **fields | {"plant": smc.plant_from(HOBBY % MINE, ["j"])})
 
 
+def test_a_tuning_is_silent_on_gains_that_it_only_tries():
+    plant = servo(HOBBY % POSITION, name="hobby")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        smc.tune(plant, "pid", conditions=["nominal"], budget=2, searches=1)
+    assert not [one for one in caught if "default gains" in str(one.message)]
+
+
 def test_sizes_of_conditions_and_blows_follow_from_the_servo_s_force():
     plant = servo(HOBBY % POSITION, name="hobby")
     (friction,) = smc.grid(plant, [smc.law("pid")], "coulomb", duration=0.1)
@@ -461,7 +471,7 @@ def test_sizes_of_conditions_and_blows_follow_from_the_servo_s_force():
 
 def test_joints_with_a_servo_and_with_a_motor_are_not_tuned_together():
     channels = {"a": smc.Channel(servo=True), "b": smc.Channel(motor=True)}
-    with pytest.raises(ScenarioError, match="commands in rad and N m"):
+    with pytest.raises(ScenarioError, match=r"commands in rad and N m.* give a\(motor\)"):
         smc.design.objective(smc.plant_from(ARM, channels, keyframe="home"), "pid")
 
 
