@@ -321,11 +321,14 @@ class RaceAdvice(Advice):
             if margin.unit == self.worst_run.efforts[0]:
                 level += f" (u reaches {number(max(self.worst_run.limits))} {unit})"
             if math.isnan(margin.value):
-                return "nothing more: without changes the error does not end below 5 % of its start"
+                return (
+                    "nothing more: without changes the error does not end below 5 % of its "
+                    "initial value"
+                )
             parts.append(f"{margin.kind} {level}")
         where = "without these conditions" if self.beside == "nominal" else f"under {self.beside}"
         text = f"{joined(parts)}, one at a time and {where}: in {self.worst_run.duration:g} s "
-        text += "the error still ends below 5 % of its start"
+        text += "the error still ends below 5 % of its initial value"
         return f"{text}; {late}" if late else text
 
     @property
@@ -347,7 +350,7 @@ class RaceAdvice(Advice):
         missing = [law for law in self.race.running if law not in self.settled]
         if missing:
             notes.append(
-                f"{joined(missing)} left out: these runs are of the laws that may be the best"
+                f"No runs of {joined(missing)}: these are of the laws that may be the best"
                 f"{' and of the next one' if self.race.winner else ''}."
             )
         notes.append(

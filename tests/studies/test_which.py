@@ -187,7 +187,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     assert f"{left} left out" not in text  # of a law that was dropped a line below says so
     kept = dataclasses.replace(advice, race=advice.race._replace(dropped={}))
     words = " ".join(str(kept).split())
-    assert f"{left} left out: these runs are of the laws that may be the best." in words
+    assert f"No runs of {left}: these are of the laws that may be the best." in words
     assert "too few" not in text
     assert "J over coulomb and noise on mass" in text
     assert "*" not in text

@@ -126,7 +126,8 @@ Kinds = Annotated[
 Quick = Annotated[
     bool,
     typer.Option(
-        "--quick", help="Shorter runs, coarser results; default: 2 plants, 4 laws, 2 kinds."
+        "--quick",
+        help="Shorter runs and coarser results. By default of 2 plants, 4 laws and 2 kinds.",
     ),
 ]
 

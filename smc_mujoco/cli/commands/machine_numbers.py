@@ -44,13 +44,17 @@ PairsFile = Annotated[
 ]
 HeldOut = Annotated[
     Path | None,
-    typer.Option(help="A log, or pairs, that are not used, to check the numbers on."),
+    typer.Option(help="A log, or pairs, to check the numbers on; it is not used to find them."),
 ]
 FoundFigure = Annotated[
     Path | None, options.picture("prediction over log, residuals and friction; or the pairs")
 ]
 FoundFile = Annotated[
-    Path | None, typer.Option(help="File for --condition of compare, which and tune: FILE.txt.")
+    Path | None,
+    typer.Option(
+        help="Also write the numbers as a condition, FILE.txt, for --condition of compare, which "
+        "and tune."
+    ),
 ]
 Beside = Annotated[
     str | None,
@@ -64,7 +68,12 @@ Beside = Annotated[
 Corrected = Annotated[
     bool, typer.Option("--corrected", help="Correct for the errors of the simulation's steps.")
 ]
-Starts = Annotated[int, typer.Option(min=1, help="How many sets the search may start from.")]
+Starts = Annotated[
+    int,
+    typer.Option(
+        min=1, help="How many starting points the search may try, if the first fits badly."
+    ),
+]
 StartsSeed = Annotated[int, typer.Option(min=0, help="Seed of these starts.")]
 ModelJoints = Annotated[
     str, typer.Argument(metavar="MACHINE", help="FILE.xml:joint+joint, or a plant by its name.")
@@ -105,9 +114,10 @@ def identify(
     """Find numbers of a machine from its logs: friction, armature, delay, masses, with errors.
 
     A log may come from any controller, at 40 Hz or more. It has columns t in s, and x (rad or m)
-    and u (N m or N) of the joint, or x_JOINT and u_JOINT of each. No start is needed.
+    and u (N m or N) of the joint, or x_JOINT and u_JOINT of each. You need not guess
+    any number.
 
-    The paths of numbers are JOINT.damping, .frictionloss, .armature, .stiffness, .gain, .offset and
+    Numbers are named JOINT.damping, .frictionloss, .armature, .stiffness, .gain, .offset and
     .zero, input_delay, m and grav, and of a part that --condition gives FIELD.NAME, as
     friction.coulomb. The table has each number with its standard error. Notes below it say what the
     logs cannot determine.

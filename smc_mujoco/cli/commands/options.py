@@ -161,10 +161,10 @@ PlantName = Annotated[
         autocompletion=PLANTS,
         help="A plant from `smc-mujoco list`, or joints of your own .xml or .urdf: "
         "FILE.xml:joint+joint@keyframe+held. The keyframe is the goal; without one it is the "
-        "file's only one, or home, and @ alone is the pose of the file. +held holds the other "
-        "joints, as is usual; +locked welds them, and +file leaves those with motors free. "
+        "file's only one, or home, and @ alone is the pose of the file. Motors hold the other "
+        "joints (+held); +locked welds them, and +file leaves those with motors free. "
         "Brackets after a joint hold its options: (motor) puts an ideal motor in place of the "
-        "file's actuator, (servo) and (servo=false) say that this is a servo or a motor, "
+        "file's actuator, (servo) and (servo=false) say that the actuator is a servo or a motor, "
         "(partner=pole) names a passive joint, (u_max=9,x0=0.2) sets the bound on u and the start, "
         "and (measured) means read but not driven.",
     ),

@@ -64,7 +64,7 @@ Minutes = Annotated[
     ),
 ]
 Film = Annotated[
-    bool, typer.Option(help="Whether to film the advised law's worst run, with --minutes.")
+    bool, typer.Option(help="Whether to film the recommended law's worst run, with --minutes.")
 ]
 
 
@@ -145,7 +145,7 @@ def _save(advice: "RaceAdvice", out: Path, terminal: Terminal) -> None:
     if advice.tuned:
         file = advice.tuned.save(out / "advised.json")
         terminal.wrote(file)
-        terminal.note(f"--law {advice.law.name}  with these gains: --law {file}")
+        terminal.note(f"To use {advice.law.name} with these gains, give --law {file}")
     figure.figure([advice.worst_trace], out / "worst_run")
     terminal.wrote(*page.files(out / "worst_run"))
 
