@@ -20,7 +20,7 @@ from smc_mujoco.mechanisms.hardware.position_servo import UNBOUNDED, PositionSer
 EQUAL = 1e-9  # relative: numbers of a file that should agree
 AFFINE = mujoco.mjtBias.mjBIAS_AFFINE.value
 FIXED = mujoco.mjtGain.mjGAIN_FIXED.value
-FILTERED = mujoco.mjtDyn.mjDYN_FILTEREXACT.value
+FILTERS = (mujoco.mjtDyn.mjDYN_FILTEREXACT.value, mujoco.mjtDyn.mjDYN_FILTER.value)
 INTEGRATED = mujoco.mjtDyn.mjDYN_INTEGRATOR.value
 OF_DCMOTOR = mujoco.mjtGain.mjGAIN_DCMOTOR.value
 OF_PID = mujoco.mjtGain.mjGAIN_PID.value
@@ -52,7 +52,7 @@ def _with_dynamics(model: mujoco.MjModel, i: int) -> str:
     """Return which dynamics a servo has beside a timeconst, or ""."""
     if model.actuator_dyntype[i] == INTEGRATED:
         return no_motor(model, i)  # it takes a speed
-    if model.actuator_dyntype[i] == FILTERED:
+    if model.actuator_dyntype[i] in FILTERS:
         if model.actuator_actlimited[i] or model.actuator_actearly[i]:
             return "is a servo with a timeconst and with actlimited or actearly"
     elif model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
@@ -131,8 +131,10 @@ def kept(model: mujoco.MjModel, i: int, goal: float, step: float) -> Actuator:
         largest, rate = np.abs(model.actuator_dynprm[i, :2] / gear).tolist()
         ki = gear * gear * float(model.actuator_gainprm[i, 0])
         return dataclasses.replace(servo, ki=ki, imax=largest, slewmax=rate)
-    if model.actuator_dyntype[i] == FILTERED:
-        return dataclasses.replace(servo, timeconst=float(model.actuator_dynprm[i, 0]))
+    if model.actuator_dyntype[i] in FILTERS:
+        euler = bool(model.actuator_dyntype[i] == FILTERS[1])
+        timeconst = float(model.actuator_dynprm[i, 0])
+        return dataclasses.replace(servo, timeconst=timeconst, euler=euler)
     return servo
 
 

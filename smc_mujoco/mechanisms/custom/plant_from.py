@@ -172,6 +172,8 @@ def _assumed_drives(label: str, made: Plant, given: Pairs) -> Iterator[str]:
             )
         if taken.servo and asked.servo is None:
             meaning = motor.kept[-1].meaning.format(x=unit)
+            if late := motor.kept[0].lateness:
+                meaning += f", which it gets {1e3 * late:g} ms late"
             yield (
                 f"u of {joint!r} of {label} is {meaning}, as in the file: "
                 f"{joint}(servo), or smc.Channel(servo=True), says so without this line, and "

@@ -17,7 +17,7 @@ import numpy as np
 from numba.extending import register_jitable
 
 from smc_mujoco.common.aliases import Pair
-from smc_mujoco.common.constraints import Range
+from smc_mujoco.common.constraints import Boolean, Range
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import floats, record_at
@@ -60,6 +60,8 @@ class PositionServo(Actuator):
       goal: position at which u is 0, rad (m) of the joint.
       step: the set-point is rounded to multiples of this, rad (m) of the joint; 0: it is not.
       timeconst: of the first-order filter of the set-point, s; 0: none.
+      euler: whether MuJoCo steps that filter by Euler's rule (dyntype filter), else exactly
+        (filterexact).
       ki: N m/(rad s) (N/(m s)) at the joint, 0 or more.
       imax: bound on the integral of the error, rad s (m s); 0: none.
       slewmax: bound on the rate of the set-point, rad/s (m/s); 0: none.
@@ -83,6 +85,7 @@ class PositionServo(Actuator):
     ki: Natural = 0.0
     imax: Natural = 0.0
     slewmax: Natural = 0.0
+    euler: Boolean = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -181,6 +184,8 @@ class PositionServo(Actuator):
                 )
             else:
                 actuator.set_to_position(kp=1.0, timeconst=1.0 if self.timeconst else 0.0)
+            if self.timeconst and self.euler:
+                actuator.dyntype = mujoco.mjtDyn.mjDYN_FILTER
             actuator.ctrllimited = True
             actuator.ctrlrange = (-1.0, 1.0)
             actuator.forcelimited = True
@@ -202,7 +207,8 @@ class PositionServo(Actuator):
             yield Field("actuator_dynprm", (ids, TIMECONST), self.timeconst)
 
     def structure(self) -> tuple[Hashable, ...]:
-        return *super().structure(), bool(self.timeconst), bool(self.ki), bool(self.slewmax)
+        states = bool(self.timeconst), self.euler, bool(self.ki), bool(self.slewmax)
+        return *super().structure(), *states
 
     @property
     def zero(self) -> float:

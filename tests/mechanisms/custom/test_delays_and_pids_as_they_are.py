@@ -218,6 +218,10 @@ def test_another_joint_s_pid_holds_its_place(place):
 
 def test_words_say_what_a_late_pid_is_given():
     late = PID.replace("<pid", "<pid delay='.006' nsample='6'")
+    with pytest.warns(
+        smc.errors.ScenarioWarning, match=r"set-point .*, which it gets 6 ms late, as"
+    ):
+        smc.plant_from(ARM % (late, MOTOR % ""), ["a", "b"])
     scenario = smc.Scenario(plant=arm(late, MOTOR % ""), law=on_command(), x0=(0.5, -0.3))
     assert scenario.drive_train.words == [
         "u of 'a' of arm is the set-point of its servo, in rad from its goal at 0.2.",
