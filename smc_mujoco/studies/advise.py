@@ -70,10 +70,7 @@ def advise(
     clock.each = AFTER * clock.unit + few * table_work
     clock.after = margins_work + 2 * len(BESIDE_NONE) * clock.unit
     raced = race(trial, plant, entrants, goal, clock, relevant)
-    shown = raced.first
-    if raced.winner:
-        shown = [*raced.first, _next(raced)] if len(raced.running) > 1 else raced.running
-    chosen, tuned = _chosen(trial, plant, raced, shown[:SHOWN], goal)
+    chosen, tuned = _chosen(trial, plant, raced, _shown(raced), goal)
     fixed = None
     if clock.work_left >= len(chosen) * (judgements(DECIDING) * clock.unit + few * table_work):
         fixed = _fixed(trial, plant, chosen, goal, relevant)
@@ -88,8 +85,7 @@ def advise(
         raise ScenarioError(f"no need has a number in any run on {plant.name}: ask for others")
     ordered = tuple(chosen[law] for law in order)
     first = ordered[0]
-    beside = max(1, int(min(len(BESIDE_NONE), clock.work_left / (2 * clock.unit))))
-    weighs, no_law = _weighed(trial, plant, first, goal, BESIDE_NONE[:beside])
+    weighs, no_law = _weighed(trial, plant, first, goal, clock)
     base = _base_of_margins(trial, plant, first)
     margins, untried = _margins(trial, base, clock)
     return RaceAdvice(
@@ -126,9 +122,14 @@ def _least_share(settled: Mapping[str, tuple[int, int]]) -> float:
     return min(count / of for count, of in settled.values())
 
 
-def _next(raced: Race) -> str:
-    """Return the law of the lowest J beside the winner."""
-    return next(law for law in raced.running if law != raced.winner)
+def _shown(raced: Race) -> list[str]:
+    """Return the laws that tables show: those that may be the best, or the winner and the law of
+    the lowest J beside it.
+    """
+    if not raced.winner:
+        return raced.first[:SHOWN]
+    others = [law for law in raced.running if law != raced.winner]
+    return [raced.winner, *others[:1]]
 
 
 def _entrants(trial: Trial, plant: Plant, laws: Laws) -> tuple[list[Entrant], dict[str, str]]:
@@ -233,9 +234,13 @@ def _settled(table: Table) -> Settled:
 
 
 def _weighed(
-    trial: Trial, plant: Plant, law: Component, goal: Objective, instances: Sequence[int]
+    trial: Trial, plant: Plant, law: Component, goal: Objective, clock: AnswerTime
 ) -> tuple[dict[str, float], NoLaw]:
-    """Return condition -> its share in J of a law, and how no law does on the same instances."""
+    """Return condition -> its share in J of a law, and how no law does on the same instances, of
+    which there is at least one.
+    """
+    fit = min(len(BESIDE_NONE), clock.work_left / (2 * clock.unit))
+    instances = BESIDE_NONE[: max(1, int(fit))]
     names = [condition.name for condition in goal.conditions]
     costs, settled = weighed(plant, law, goal, instances, trial.threads)
     none = coerce.law("none")

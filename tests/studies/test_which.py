@@ -251,6 +251,7 @@ def test_without_time_there_is_an_answer_of_the_sets_that_there_are_without_marg
     untested = ", the first so far, not tested against the others"
     assert (untested in short.answer[0]) == (not short.race.winner)
     assert not short.margins
+    assert (advice.no_law.runs, short.no_law.runs) == (4, 1)
     assert len(short.table) == FEWEST_SEEDS * len(short.laws)
     text = " ".join(str(short).split())
     assert "5 runs of a law in each condition, as the time left was too short for 9." in text
