@@ -307,12 +307,15 @@ def _margins(trial: Trial, base: Scenario, clock: AnswerTime) -> tuple[list[Marg
     if not math.dist(base.resolved.x0, plant.origin):
         return [], []
     kinds = KINDS_OF_POSES if plant.pose else KINDS
-    count = int(min(len(kinds), clock.work_left / (TRIED * base.work)))
-    if not count:
-        return [], [*kinds]
-    with bar("what the law tolerates", shown=trial.progress) as drawn:
-        found = margins_of([base], kinds[:count], COARSE, trial.threads, drawn.reached)
-    return found, [*kinds[count:]]
+    found: list[Margin] = []
+    for some in (kinds[:2], kinds[2:]):
+        tried = some[: int(min(len(some), clock.work_left / (TRIED * base.work)))]
+        if tried:
+            with bar(f"margins of {joined(tried)}", shown=trial.progress) as drawn:
+                found += margins_of([base], tried, COARSE, trial.threads, drawn.reached)
+        if len(tried) < len(some):
+            break
+    return found, [*kinds[len(found) :]]
 
 
 def _work_of_judgement(plant: Plant, goal: Objective) -> float:

@@ -215,6 +215,14 @@ def test_the_needs_are_those_of_the_tables_and_margins_at_the_end_of_their_searc
     lines = dict(line.split(": ", 1) for line in advice.answer)
     bound = np.median(advice.table.select(law=advice.law.name).column("ultimate_bound"))
     assert f"ultimate bound (m) {number(bound)}" in lines["Its needs"]
+    board = advice.leaderboard[1]
+    entries = []
+    for entry in board.entries:
+        interval = entry.interval._replace(median=3.0 * entry.interval.median)
+        entries.append(dataclasses.replace(entry, interval=interval))
+    worse = dataclasses.replace(board, entries=tuple(entries))
+    both = dataclasses.replace(advice, leaderboard=[board, worse])
+    assert f"{number(bound)}–{number(3.0 * bound)}" in both._needs
     friction = advice.margins[1]
     most = dataclasses.replace(friction, value=friction.searched)
     widest = dataclasses.replace(advice, margins=[most])
