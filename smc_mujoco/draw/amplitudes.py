@@ -15,13 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
 
 from smc_mujoco.analysis.chattering import predict
 from smc_mujoco.analysis.step_halving import step_halving
 from smc_mujoco.common.aliases import AnyPath, Fields
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
+from smc_mujoco.draw.panels import number_decades
 from smc_mujoco.metrics.limit_cycle import channel_cycle
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -117,11 +117,10 @@ def amplitudes(
         handles.append(doubtful)
         first = next(iter(runs.values()))[0]
         plant = first.scenario.plant
-        factor, unit = style.prefixed(ax.dataLim.ymax, f"{plant.unit}/s")
         ticks = set()
         for over_lag in drawn:
             ticks.update(over_lag.lags)
-        set_axes(ax, sorted(ticks), factor, unit)
+        set_axes(ax, sorted(ticks), f"{plant.unit}/s")
         pages.set_head(page, style.FULL_WIDTH, title, handles, shared)
         return pages.write(page, pages.files(path))
 
@@ -165,13 +164,10 @@ def draw_law(ax: Axes, traces: Sequence[Trace], over_lag: OverLag, colour: str) 
         ax.plot(at, size, "o", ms=size_of_dot, **look)
 
 
-def set_axes(ax: Axes, lags: Sequence[float], factor: float, unit: str) -> None:
-    """Label axes with ticks at the lags, ms, and at 1, 2 and 5 of each decade of amplitude."""
+def set_axes(ax: Axes, lags: Sequence[float], unit: str) -> None:
+    """Label axes with ticks at the lags, ms, and at the decades of amplitude."""
     ax.set(xlabel="lag of the actuator (ms)", ylabel=f"amplitude of s ({unit})")
     ax.set_xticks(lags, [f"{tick:.3g}" for tick in lags])
     ax.set_xticks([], minor=True)
-    locator = LogLocator(subs=(1.0, 2.0, 5.0))
-    ax.yaxis.set_major_locator(locator)
-    ax.yaxis.set_major_formatter(lambda size, _: f"{factor * size:g}")
-    ax.yaxis.set_minor_formatter(NullFormatter())
     ax.margins(0.04, 0.06)
+    number_decades(ax.yaxis, (ax.dataLim.minposy, ax.dataLim.ymax))

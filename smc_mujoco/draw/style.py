@@ -70,6 +70,7 @@ MAX_VALUES = 8  # numbers of a label
 MIN_DISTANCE = 15.0  # colours closer than this are mistaken for each other, see `distance`; chosen
 LIGHTEST = 61.0  # lightness in CIELAB: up to it lines have a contrast of 3 : 1 to paper
 DARKEST = 21.0  # of a ramp
+RAMP_ON_DARK = (90.0, 56.0)  # its ends on a dark page, to which all of it has a contrast of 4.5 : 1
 # linear sRGB -> as it looks with all cones, no red, no green, no blue ones (Machado et al.)
 SIGHTS = np.array([
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
@@ -749,14 +750,17 @@ def mixed(colour: str, other: str, share: float) -> str:
 
 
 def ramp(colour: str, count: int, lightest: float = LIGHTEST) -> list[str]:
-    """Return shades of a colour from light to dark, in equal steps of lightness."""
+    """Return shades of a colour from light to dark, in equal steps of lightness; all are light on a
+    dark page.
+    """
+    ends = RAMP_ON_DARK if neutral_on_dark() else (lightest, DARKEST)
     shades = []
     for other in (PAPER, "#000000"):
         for share in np.linspace(0.0, 0.95, 96):
             shades.append(mixed(colour, other, share))
     values = [_seen(shade)[0][0] for shade in shades]
     lightness = np.array(values)
-    wanted = np.linspace(lightest, DARKEST, count)
+    wanted = np.linspace(*ends, count)
     misses = np.abs(lightness - wanted[:, None])
     nearest = misses.argmin(axis=1)
     return [shades[i] for i in nearest]

@@ -20,6 +20,8 @@ from smc_mujoco.identification.rig import Values
 from smc_mujoco.mechanisms.layout import channel_names, dof_ids, driven_names
 
 ROW_HEIGHT = 2.5  # inches, height of a joint's panels
+LOG_WIDTH = 2.4  # points, of a log, beside which dashes over it are seen in grey, too; chosen
+DASHES = (0, (3, 2))
 SPEEDS = 200  # of the friction's curve, on each side of 0
 
 
@@ -41,8 +43,8 @@ def friction_figure(
     paths = pages.files(path)
     colour = style.spread(1)[0]
     handles = [
-        Line2D([], [], color=style.INK, label="log"),
-        Line2D([], [], color=colour, label="found"),
+        Line2D([], [], color=style.INK, lw=LOG_WIDTH, label="log"),
+        Line2D([], [], color=colour, ls=DASHES, label="found"),
         Line2D([], [], color=colour, lw=6.0, alpha=0.25, label="± 2 standard errors"),
     ]
     joints = channel_names(rig.plant)
@@ -54,14 +56,16 @@ def friction_figure(
         for i, name in enumerate(rig.columns.x):
             unit = rig.plant.units[i]
             left, middle, right = axes[i]
-            left.plot(t, measured[name], color=style.INK, lw=1.6)
-            left.plot(t, predicted[name], color=colour, lw=0.9)
+            left.plot(t, measured[name], color=style.INK, lw=LOG_WIDTH)
+            left.plot(t, predicted[name], color=colour, lw=1.2, ls=DASHES)
             left.set_title(f"log in an open loop, fit {fit[name]:.1f} %")
             left.set_ylabel(f"{name} ({unit})")
             speed = records.rate(measured[name], records.step_of(t))
             middle.axhline(0.0, color=style.RULE, lw=0.8)
-            middle.plot(speed, measured[name] - predicted[name], ".", ms=1.5, color=colour)
-            middle.set_title(f"residual ({unit})")
+            residual = measured[name] - predicted[name]
+            factor, short = style.prefixed(float(np.abs(residual).max()), unit)
+            middle.plot(speed, factor * residual, ".", ms=1.5, color=colour)
+            middle.set_title(f"residual ({short})")
             _friction(right, rig, covariance, i, forces, colour)
         speed_label = f"speed ({rig.plant.units[-1]}/s)"
         for ax, label in zip(axes[-1], ("time (s)", speed_label, speed_label), strict=True):

@@ -3,13 +3,14 @@
 import itertools
 import random
 
+import matplotlib.pyplot as plt
 import pytest
 from helpers.runs import at_defaults
 from helpers.sketch import made
 
 import smc_mujoco as smc
 from smc_mujoco.control.gain_sets import COMPARED, LAWS
-from smc_mujoco.draw import style
+from smc_mujoco.draw import dark, style
 
 pytestmark = pytest.mark.quick
 
@@ -144,3 +145,15 @@ def test_contrasts_are_those_of_wcag():
     assert 4.5 < light / grey < 4.7
     assert style.letters_on("#757575") == style.PAPER
     assert style.letters_on("#FFE000") == style.INK
+
+
+@pytest.mark.parametrize("colour", ["#009E73", "#7A2D0B", "#0072B2"])
+def test_a_ramp_keeps_its_order_on_a_dark_page(colour):
+    """A shade that were made lighter for its contrast would pass its neighbour."""
+    with plt.style.context("dark_background"):
+        neutral = style.neutral_on_dark()
+        shades = style.ramp(colour, 5)
+        light = [style.luminance(shade) for shade in shades]
+        assert light == sorted(light, reverse=True)
+        assert len(set(light)) == 5
+        assert [dark.on_dark(shade, neutral) for shade in shades] == shades
