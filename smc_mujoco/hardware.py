@@ -1,6 +1,7 @@
 """Friction models, drives and kinds of contact beyond those at the root, and your own."""
 
 from smc_mujoco.mechanisms.hardware.command_delay import CommandDelay
+from smc_mujoco.mechanisms.hardware.command_filter import CommandFilter
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import RateLimit
 from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
@@ -12,6 +13,6 @@ from smc_mujoco.mechanisms.hardware.sliding import Sigmoid
 from smc_mujoco.mechanisms.hardware.stepper import Stepper
 from smc_mujoco.mechanisms.hardware.stribeck import Stribeck
 
-__all__ = ["CommandDelay", "Contact", "ElasticJoint", "LuGre", "PositionServo", "RateLimit"]
-__all__ += ["ServoFriction", "Sigmoid", "Stepper", "Stribeck"]
+__all__ = ["CommandDelay", "CommandFilter", "Contact", "ElasticJoint", "LuGre", "PositionServo"]
+__all__ += ["RateLimit", "ServoFriction", "Sigmoid", "Stepper", "Stribeck"]
 __all__ += ["actuator_function", "friction_function", "servo"]

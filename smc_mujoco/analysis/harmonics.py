@@ -28,6 +28,7 @@ from smc_mujoco.common.mjcb import installed
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
+from smc_mujoco.mechanisms.hardware.command_filter import CommandFilter
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
 from smc_mujoco.mechanisms.hardware.part import Actuator
@@ -149,6 +150,8 @@ class Loop:
         for part in s.actuator:
             if isinstance(part, DCMotor):
                 motors.append(dataclasses.replace(part, inductance=0.0))
+            if isinstance(part, CommandFilter):
+                motors.append(part)
             if isinstance(part, PositionServo):  # `transition` puts its filter before it
                 motors.append(dataclasses.replace(part, timeconst=0.0))
         for part in s.actuator:
@@ -500,7 +503,7 @@ def transition(
 
     block = rates(model, data)
     for drive in reversed(actuator):
-        if drive.delay:
+        if drive.delay and not isinstance(drive, CommandFilter):  # which is in the model
             block = _behind(drive, block, model)
     n = len(block) - model.nu
     stepped = expm(block * float(model.opt.timestep))

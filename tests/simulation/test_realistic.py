@@ -103,6 +103,7 @@ PARTS = {
         "noise": smc.Noise(0.01, 0.05),
     },
     "delay": {"input_delay": 7.5e-4, "actuator": MOTOR},
+    "filter": {"actuator": (smc.Lag(0.01), smc.hardware.CommandFilter(0.02))},
     "delays": {"input_delay": 2e-3, "actuator": smc.hardware.CommandDelay(5e-3)},
     "series": {
         "disturbance": smc.signals.TimeSeries((0.0, 0.02, 0.05), (0.0, 1.0, -1.0)),

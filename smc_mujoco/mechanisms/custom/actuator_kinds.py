@@ -31,14 +31,19 @@ def no_motor(model: mujoco.MjModel, i: int) -> str:
     bias = mujoco.mjtBias(model.actuator_biastype[i]).name
     kind = DYNAMICS.get(dynamics) or GAINS.get(gain) or BIASES.get(bias)
     kind = kind or _with_bias(model, i, dynamics)
-    if not kind and dynamics != "mjDYN_NONE":
+    if not kind and dynamics != "mjDYN_NONE" and not filters(model, i):
         kind = f"has dynamics (dyntype {dynamics.removeprefix('mjDYN_').lower()})"
         if dynamics in FILTERS:
-            lag = f"Lag({model.actuator_dynprm[i, 0]:g})"
-            kind += f", which an ideal motor has with actuator={lag}"
+            kind += " with actlimited or actearly"
     if not kind and not model.actuator_gainprm[i, 0]:
         kind = "has gain 0"
     return kind or spoilt(model, i)
+
+
+def filters(model: mujoco.MjModel, i: int) -> bool:
+    """Return whether MuJoCo filters the command of an actuator, and does no more to it."""
+    filtered = mujoco.mjtDyn(model.actuator_dyntype[i]).name in FILTERS
+    return filtered and not (model.actuator_actlimited[i] or model.actuator_actearly[i])
 
 
 def spoilt(model: mujoco.MjModel, i: int) -> str:

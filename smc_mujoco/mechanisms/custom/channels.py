@@ -25,10 +25,11 @@ from smc_mujoco.common.errors import (
     shown,
     users_stacklevel,
 )
-from smc_mujoco.mechanisms.custom.actuator_kinds import gear_of, no_motor
+from smc_mujoco.mechanisms.custom.actuator_kinds import filters, gear_of, no_motor
 from smc_mujoco.mechanisms.custom.kept_actuators import (
     ctrlrange_of,
     delay_of,
+    filter_of,
     forcerange_of,
     kept,
     not_kept,
@@ -546,6 +547,8 @@ def motor_of(
     parts = ()
     if actuators and not channel.motor:
         parts = delay_of(model, actuators[0])
+        if not stays:
+            parts += filter_of(model, actuators[0])
     if stays:
         parts += (kept(model, actuators[0], goal, channel.set_point_step),)
     if channel.set_point_step and not any(isinstance(part, PositionServo) for part in parts):
@@ -640,7 +643,7 @@ def _together(model: mujoco.MjModel, actuators: Sequence[int]) -> Pair:
     high = 0.0
     for i in actuators:
         ends = -math.inf, math.inf
-        if not no_motor(model, i):
+        if not no_motor(model, i) and not filters(model, i):
             ends = _of_actuator(model, i)
         elif model.actuator_forcelimited[i]:
             of_gear = gear_of(model, i) * model.actuator_forcerange[i]

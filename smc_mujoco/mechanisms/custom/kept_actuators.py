@@ -1,7 +1,8 @@
 """Actuators of a user's file that stay as they are: u is their own command.
 
-A `<position>` or a `<pid>` is a PositionServo, a `<dcmotor>` on a voltage a DCMotor, and the delay
-of any of them, or of a motor, a CommandDelay, each as it acts at its joint with gear 1.
+A `<position>` or a `<pid>` is a PositionServo, a `<dcmotor>` on a voltage a DCMotor, the filter of
+a motor a CommandFilter, and the delay of any of them a CommandDelay, each as it acts at its joint
+with gear 1.
 """
 
 import dataclasses
@@ -11,16 +12,19 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.aliases import Pair
-from smc_mujoco.mechanisms.custom.actuator_kinds import gear_of, no_motor, spoilt
+from smc_mujoco.mechanisms.custom.actuator_kinds import filters, gear_of, no_motor, spoilt
 from smc_mujoco.mechanisms.hardware.command_delay import INTERPOLATIONS, ROUNDING, CommandDelay
+from smc_mujoco.mechanisms.hardware.command_filter import CommandFilter
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.part import Actuator
 from smc_mujoco.mechanisms.hardware.position_servo import UNBOUNDED, PositionServo
 
 EQUAL = 1e-9  # relative: numbers of a file that should agree
+LEAST_TAU = 1e-15  # s, as in MuJoCo
 AFFINE = mujoco.mjtBias.mjBIAS_AFFINE.value
 FIXED = mujoco.mjtGain.mjGAIN_FIXED.value
-FILTERS = (mujoco.mjtDyn.mjDYN_FILTEREXACT.value, mujoco.mjtDyn.mjDYN_FILTER.value)
+EULER = mujoco.mjtDyn.mjDYN_FILTER.value
+FILTERED = (mujoco.mjtDyn.mjDYN_FILTEREXACT.value, EULER)
 INTEGRATED = mujoco.mjtDyn.mjDYN_INTEGRATOR.value
 OF_DCMOTOR = mujoco.mjtGain.mjGAIN_DCMOTOR.value
 OF_PID = mujoco.mjtGain.mjGAIN_PID.value
@@ -52,10 +56,11 @@ def _with_dynamics(model: mujoco.MjModel, i: int) -> str:
     """Return which dynamics a servo has beside a timeconst, or ""."""
     if model.actuator_dyntype[i] == INTEGRATED:
         return no_motor(model, i)  # it takes a speed
-    if model.actuator_dyntype[i] in FILTERS:
-        if model.actuator_actlimited[i] or model.actuator_actearly[i]:
-            return "is a servo with a timeconst and with actlimited or actearly"
-    elif model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
+    if filters(model, i):
+        return ""
+    if model.actuator_dyntype[i] in FILTERED:
+        return "is a servo with a timeconst and with actlimited or actearly"
+    if model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
         kind = mujoco.mjtDyn(model.actuator_dyntype[i]).name
         return f"is a servo with dynamics (dyntype {kind.removeprefix('mjDYN_').lower()})"
     return ""
@@ -131,11 +136,25 @@ def kept(model: mujoco.MjModel, i: int, goal: float, step: float) -> Actuator:
         largest, rate = np.abs(model.actuator_dynprm[i, :2] / gear).tolist()
         ki = gear * gear * float(model.actuator_gainprm[i, 0])
         return dataclasses.replace(servo, ki=ki, imax=largest, slewmax=rate)
-    if model.actuator_dyntype[i] in FILTERS:
-        euler = bool(model.actuator_dyntype[i] == FILTERS[1])
+    if filters(model, i):
         timeconst = float(model.actuator_dynprm[i, 0])
-        return dataclasses.replace(servo, timeconst=timeconst, euler=euler)
+        return dataclasses.replace(servo, timeconst=timeconst, euler=_by_euler(model, i))
     return servo
+
+
+def filter_of(model: mujoco.MjModel, i: int) -> tuple[CommandFilter, ...]:
+    """Return the filter of a motor, which MuJoCo lets follow faster than a step at once; () without
+    one.
+    """
+    if not filters(model, i):
+        return ()
+    tau = max(float(model.actuator_dynprm[i, 0]), LEAST_TAU)
+    return (CommandFilter(tau, _by_euler(model, i)),)
+
+
+def _by_euler(model: mujoco.MjModel, i: int) -> bool:
+    """Return whether MuJoCo steps the filter of an actuator by Euler's rule."""
+    return bool(model.actuator_dyntype[i] == EULER)
 
 
 def _dcmotor(model: mujoco.MjModel, i: int, gear: float) -> DCMotor:

@@ -169,12 +169,19 @@ BARE = """<mujoco><compiler angle="radian"/><option timestep="1e-3" gravity="0 0
   </body></worldbody><actuator><motor joint="j" ctrlrange="-3 3"%s/></actuator></mujoco>"""
 
 
-def test_predicted_chattering_has_the_delay_of_an_actuator():
+@pytest.mark.parametrize(
+    ("own", "given"),
+    [
+        (LATE % (0.01, 10), {"input_delay": 0.01}),
+        (' dyntype="filterexact" dynprm=".01"', {"actuator": smc.Lag(0.01)}),
+    ],
+)
+def test_predicted_chattering_has_the_delay_and_the_filter_of_an_actuator(own, given):
     fields = {"law": smc.law("classical", k=0.5, c=8.0), "x0": 0.1}
-    own = smc.Scenario(plant=smc.plant_from(BARE % (LATE % (0.01, 10)), ["j"]), **fields)
-    given = smc.Scenario(plant=smc.plant_from(BARE % "", ["j"]), input_delay=0.01, **fields)
-    predicted = smc.design.chattering(own)
-    assert predicted.frequency == smc.design.chattering(given).frequency
+    kept = smc.plant_from(BARE.replace("<motor", "<general") % own, ["j"])
+    predicted = smc.design.chattering(smc.Scenario(plant=kept, **fields))
+    plain = smc.Scenario(plant=smc.plant_from(BARE % "", ["j"]), **fields, **given)
+    assert predicted.frequency == pytest.approx(smc.design.chattering(plain).frequency)
 
 
 def test_the_default_step_divides_the_delay_of_an_actuator():
@@ -229,7 +236,23 @@ def test_words_say_what_a_late_pid_is_given():
     ]
 
 
-def test_a_filter_of_a_motor_is_refused_with_the_lag_that_has_it():
-    motor = '<general joint="j" dyntype="filterexact" dynprm=".05"/>'
-    with pytest.raises(ScenarioError, match=r"filterexact.* actuator=Lag\(0.05\)"):
+@pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
+@pytest.mark.parametrize("kind", ["filter", "filterexact"])
+def test_a_motor_keeps_its_filter_and_its_delay(kind, integrator):
+    late = f' dyntype="{kind}" dynprm=".05" delay=".003" nsample="3"'
+    motor = (MOTOR % late).replace("motor", "general")
+    trace = run(arm(SERVO % "", motor), duration=1.0, integrator=integrator)
+
+    def held(model, data):
+        model.actuator_delay[1] += 0.25 * STEP
+
+    x = by_mujoco(ARM % (SERVO % "", motor), trace, integrator, held)
+    np.testing.assert_allclose(trace.x, x, rtol=0, atol=1e-12)
+    assert trace.scenario.efforts == ("rad", "N m")
+    assert trace.scenario.limits[1] == pytest.approx(1.8)
+
+
+def test_a_filter_that_is_limited_is_refused():
+    motor = '<general joint="j" dyntype="filter" dynprm=".05" actlimited="true" actrange="-1 1"/>'
+    with pytest.raises(ScenarioError, match=r"dyntype filter\) with actlimited or actearly"):
         link(motor)

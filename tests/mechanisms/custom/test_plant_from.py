@@ -877,7 +877,7 @@ WRONG = {
     },
     "slow motor": {
         "channels": ["elbow"],
-        "rest": '<actuator><general joint="elbow" dyntype="filter"/></actuator>',
+        "rest": '<actuator><general joint="elbow" dyntype="filter" actearly="true"/></actuator>',
     },
     "no gear": {
         "channels": ["elbow"],
