@@ -66,7 +66,10 @@ SET_POINT = f"u is the set-point of a servo, and a nominal u is a force: {WITHOU
 EMPTY_NAMES = "scene", "model", "robot"  # of files, which say nothing about the machine
 UNNAMED_MODEL = "mujoco_model"  # MuJoCo's name of a model without one, as `_name` writes it
 # dynamics of an actuator whose state changes even at ctrl = 0
-DCMOTOR = mujoco.mjtDyn.mjDYN_DCMOTOR.value
+UNMEASURED = {
+    mujoco.mjtDyn.mjDYN_DCMOTOR.value: "a dcmotor has a current",
+    mujoco.mjtDyn.mjDYN_PID.value: "a pid has an integral",
+}
 
 
 @constrained
@@ -442,8 +445,8 @@ def missing(model: mujoco.MjModel, joints: list[str], motors: Sequence[Motor]) -
         idle[own.thrusters(model, joints[0])] = False
     for motor in motors:
         idle[list(motor.replaced)] = False
-    if np.any(model.actuator_dyntype[idle] == DCMOTOR):
-        return f"a dcmotor has a current that is not measured: {WITHOUT_MODEL}"
+    if states := UNMEASURED.keys() & set(model.actuator_dyntype[idle].tolist()):
+        return f"{UNMEASURED[min(states)]} that is not measured: {WITHOUT_MODEL}"
     # what may couple trees
     kinds = np.isin(model.actuator_trntype[idle], own.ONE_JOINT)
     alone = np.all(kinds)

@@ -82,14 +82,15 @@ def test_each_joint_keeps_the_delay_of_its_actuator(integrator):
     assert np.abs(trace.x - prompt).max() > 0.01
 
 
+@pytest.mark.parametrize("sensor", [None, smc.Encoder(delay=0.004)])
 @pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
-def test_a_delay_of_all_actuators_is_an_input_delay_to_the_last_bit(integrator):
+def test_a_delay_of_all_actuators_is_an_input_delay_to_the_last_bit(integrator, sensor):
     late = LATE % (0.012, 12)
     # the file's timestep is none of the run's
     plant = arm(SERVO % late, MOTOR % late, timestep="4e-3")
-    own = run(plant, duration=1.0, integrator=integrator)
-    prompt = arm(SERVO % "", MOTOR % "")
-    given = run(prompt, duration=1.0, integrator=integrator, input_delay=0.012)
+    fields = {"duration": 1.0, "integrator": integrator, "sensor": sensor}
+    own = run(plant, **fields)
+    given = run(arm(SERVO % "", MOTOR % ""), input_delay=0.012, **fields)
     np.testing.assert_array_equal(own.x, given.x)
 
 
@@ -209,6 +210,7 @@ def test_another_joint_s_pid_holds_its_place(place):
     ctrl = 'qpos=".2 .4" ctrl="-.6 0 0"' if place == "ctrl" else 'qpos=".2 .4"'
     xml = ARM.replace('qpos=".2 .4"', ctrl) % parts
     plant = smc.plant_from(xml, {"b": smc.Channel(x0=-0.3)}, keyframe="home", measured=["a"])
+    assert plant.unmodelled.startswith("a pid has an integral that is not measured")
     (trace,) = smc.run(
         [smc.Scenario(plant=plant, law="pid", physics_step=STEP, duration=1.0, integrator="Euler")]
     )
