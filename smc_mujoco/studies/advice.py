@@ -159,6 +159,7 @@ class RaceAdvice(Advice):
     margins: Sequence[Margin]  # of the first law with its gains
     beside: str  # name of the condition beside which they are; "nominal" for none
     untried: Sequence[str]  # kinds of margins for which there was no time
+    helped: bool  # whether a load pushes the joint from the start of their runs to its goal
     seeds: int  # from which each law was to run in each condition, if the time allowed it
     worst_run: Scenario  # of the first law in the condition where it fares worst
     tuned: Tuned | None  # the searches for the gains of the first law; None if they were known
@@ -329,6 +330,11 @@ class RaceAdvice(Advice):
         where = "without these conditions" if self.beside == "nominal" else f"under {self.beside}"
         text = f"{joined(parts)}, one at a time and {where}: in {self.worst_run.duration:g} s "
         text += "the error still ends below 5 % of its initial value"
+        if self.helped:
+            text += (
+                ". What the joint carries pushes it to its goal in these runs; from the other side "
+                "less friction stops it"
+            )
         return f"{text}; {late}" if late else text
 
     @property

@@ -23,10 +23,12 @@ from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component
+from smc_mujoco.mechanisms.custom.scales import at_goal
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.robustness.margins import COARSE, Margin, margins_of
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition
+from smc_mujoco.simulation.force_bounds import default_u_max
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.advice import RELIABLE, NoLaw, RaceAdvice
@@ -43,6 +45,7 @@ DECIDING = range(2000, 2008)  # and that compare laws with these; chosen
 BESIDE_NONE = range(3000, 3004)  # and on which the first law stands beside no law; chosen
 KINDS = ("delay", "friction", "mass", "blow")  # of the margins
 KINDS_OF_POSES = ("delay", "disturbance", "mass", "blow")  # of a free body
+LIGHT = 0.01  # of the bound on u: a smaller load pushes nothing; chosen
 TRIED = 15  # runs that a coarse margin takes, on average; chosen
 # judgements of each law after a race: of the sets considered, and of the one chosen
 AFTER = CONSIDERED * len(CHOOSING) + judgements(DECIDING)
@@ -102,6 +105,7 @@ def advise(
         margins=margins,
         beside=str(base.condition),
         untried=untried,
+        helped=_is_helped(base),
         seeds=seeds,
         worst_run=_worst_run(table, first.name),
         tuned=tuned.get(first.name),
@@ -316,6 +320,18 @@ def _margins(trial: Trial, base: Scenario, clock: AnswerTime) -> tuple[list[Marg
         if len(tried) < len(some):
             break
     return found, [*kinds[len(found) :]]
+
+
+def _is_helped(base: Scenario) -> bool:
+    """Return whether what a joint of a user's model carries pushes it from the start of a run to
+    its goal.
+    """
+    plant = base.plant
+    if not plant.is_user_model or plant.pose:
+        return False
+    apart = np.subtract(base.resolved.x0, plant.origin)[: plant.driven]
+    helps = at_goal(plant).load * np.sign(apart)
+    return bool(np.any(helps > LIGHT * default_u_max(plant)))
 
 
 def _work_of_judgement(plant: Plant, goal: Objective) -> float:

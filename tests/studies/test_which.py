@@ -229,6 +229,22 @@ def test_the_needs_are_those_of_the_tables_and_margins_at_the_end_of_their_searc
     assert f"friction at least {number(most.value)} N (u reaches 9.00 N)" in widest._margins
 
 
+HANGING = """<mujoco model="lift"><worldbody><body><joint name="z" type="slide" axis="0 0 1"/>
+<geom size=".1" mass="2" contype="0"/></body></worldbody><actuator>
+<motor joint="z" ctrlrange="-40 40"/></actuator></mujoco>"""
+
+
+def test_margins_from_the_side_from_which_gravity_helps_say_so(raced):
+    _, advice, _ = raced
+    lift = smc.plant_from(HANGING, ["z"])
+    for x0, helped in ((0.1, True), (-0.1, False)):
+        assert advise._is_helped(smc.Scenario(plant=lift, law="none", x0=x0)) == helped
+    assert not advice.helped
+    said = "What the joint carries pushes it to its goal"
+    assert said not in advice._margins
+    assert said in dataclasses.replace(advice, helped=True)._margins
+
+
 def test_where_runs_fail_there_is_no_ratio_of_J():
     """Such a run counts 1e9 s^2."""
     J = {"a": np.full(8, 0.3), "b": np.full(8, 1e9)}
