@@ -23,7 +23,6 @@ from smc_mujoco.common.constraints import of_fields
 from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
 from smc_mujoco.identification.rig import Quantity
 from smc_mujoco.mechanisms.custom.joint_numbers import joint_numbers, with_joint_numbers
-from smc_mujoco.mechanisms.hardware.joint_force import of_joint
 from smc_mujoco.mechanisms.hardware.moments import JointState
 from smc_mujoco.mechanisms.hardware.part import Friction, Part
 from smc_mujoco.mechanisms.layout import channel_names, driven_names
@@ -159,12 +158,8 @@ def steady_force(part: Friction, v: np.ndarray, i: int) -> np.ndarray:
             f"{type(part).__name__} has no force at a steady speed: identify without it, or give "
             "Coulomb, Viscous, LuGre or ServoFriction"
         )
-    numbers = []
-    fields = []
-    for name in part.names:
-        numbers.append(of_joint(getattr(part, name), i))
-        fields.append((name, float))
-    p = np.rec.array([tuple(numbers)], dtype=fields)[0]
+    fields = [(name, float) for name in part.names]
+    p = np.rec.array([part.parameters(i)], dtype=fields)[0]
     memory = np.zeros(part.memory)
     at = JointState(*[0.0] * 7)
     forces = []

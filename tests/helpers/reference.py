@@ -162,7 +162,7 @@ class Loop:
         for formula in self.scenario.friction:
             if not isinstance(formula, Sliding):
                 continue
-            record = jit.named(formula.per_joint)
+            record = jit.named(formula.names)
             for place, joint in enumerate(formula.joint_names(scenario.plant)):
                 i = names.index(joint)
                 self.formulas[i] = formula
@@ -558,6 +558,20 @@ class Loop:
             self.line[i] = v0, f0, (f - f0) / (v - v0) if v != v0 else 0.0
         return f
 
+    def opening_speed(
+        self, i: int, v: float, slow: bool, mobility_step: float, smooth: float
+    ) -> float:
+        """Return the speed of joint i at which its friction is taken first in a step."""
+        if not self.seldom(i):
+            return v
+        if slow:
+            return 0.0
+        formula = self.formulas[i]
+        alone = abs(v) <= -math.copysign(mobility_step, v) * smooth
+        if formula.levels and alone and self.evaluate(i, 0.0, 0.0, 0.0)[2] > 0.0:
+            return math.copysign(STICKING_SPEED, v)
+        return v
+
     def begin_friction(
         self, data: mujoco.MjData, i: int, smooth: float, drive: float, load: float
     ) -> tuple | None:
@@ -579,7 +593,7 @@ class Loop:
                 return self.evaluate(i, v, drive, load)
 
             slow = abs(v) < STICKING_SPEED and (self.stuck[i] or abs(v) <= abs(self.speed[i]))
-            f, low, high = force(0.0 if slow and self.seldom(i) else v)
+            f, low, high = force(self.opening_speed(i, v, slow, h * mobility, smooth))
             self.speed[i] = v
             stops = abs(v) <= -math.copysign(h * mobility, v) * (smooth - f)
             if low >= high or not (slow or stops or v == 0.0):

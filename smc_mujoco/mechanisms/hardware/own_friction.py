@@ -14,7 +14,9 @@ The function returns one of two things:
 - F, low, high: the force F, with its sign, that a joint needs to move against it, and the bounds of
   the force that it holds at rest. If it holds none, low and high are 0.
 
-How a joint then stops, rests and breaks away is in sliding.py.
+How a joint then stops, rests and breaks away is in sliding.py. If all that a function does with y
+is to read y.v, what its level is at rest and just beside it does not change in a run. So these
+levels are numbers of the friction, and the function is called only while the joint moves.
 
 With a memory, F, low and high may depend on what the function keeps, such as a temperature. The
 function moves its memory once a step. If a function with a memory returns one number, this is a
@@ -23,7 +25,9 @@ force on the joint, with its sign, that is held over the step: see `joint_force.
 
 # pyright: reportIncompatibleVariableOverride=false
 # (a constant of the base class is a function or a property here)
+import dis
 import functools
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ClassVar
@@ -32,10 +36,11 @@ import numpy as np
 from numba import njit, types
 from numba.extending import overload, register_jitable
 
+from smc_mujoco.common.aliases import Floats, Names
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.jit import named
-from smc_mujoco.mechanisms.hardware.joint_force import JointForce
+from smc_mujoco.mechanisms.hardware.joint_force import JointForce, of_joint
 from smc_mujoco.mechanisms.hardware.moments import JointState
 from smc_mujoco.mechanisms.hardware.sliding import (
     SLIDES,
@@ -48,6 +53,10 @@ from smc_mujoco.mechanisms.plant import Plant
 OWN = SLIDES + 1  # where the memory of the function begins; a copy for further calls follows it
 # of a friction at ten times STICKING_SPEED: one that has more at this speed has a step at rest
 STEP_SHARE = 0.5
+# of a level that depends on the speed alone: name of a number -> the speed at which this is it
+BESIDE_REST = {"level_at_0": 0.0, "level_above_0": STICKING_SPEED, "level_below_0": -STICKING_SPEED}
+LOADS = "LOAD_FAST", "LOAD_FAST_BORROW"  # ends of instructions that load a variable last
+NO_MEMORY = np.zeros(0)
 
 
 @frozen_data
@@ -56,10 +65,32 @@ class OwnFriction(Sliding):
 
     function: ClassVar[Callable]
     own_memory: ClassVar[int] = 0
+    of_speed: ClassVar[bool] = False  # whether it is a level that depends on the speed alone
+
+    @property
+    def levels(self) -> tuple[Floats, ...]:
+        """Its levels at BESIDE_REST, of each joint or of all; () if they are not known."""
+        if not self.of_speed:
+            return ()
+        values = tuple(getattr(self, name) for name in self.per_joint)
+        return _levels(type(self).function, self.per_joint, values)
+
+    @property
+    def names(self) -> Names:
+        return self.per_joint + tuple(BESIDE_REST) if self.levels else self.per_joint
+
+    def parameters(self, i: int) -> Floats:
+        numbers = super().parameters(i)
+        levels = self.levels
+        if not levels:
+            return numbers
+        return numbers + levels[i if len(levels) > 1 else 0]
 
     @property
     def formula(self) -> Formula:
         """F and its bounds as functions that compiled code calls."""
+        if self.levels:
+            return _by_speed(type(self).function)
         return _by_function(type(self).function, self.own_memory)
 
     @property
@@ -116,7 +147,52 @@ def _by_function(function: Callable, size: int) -> Formula:
     def at(y, v, p, memory):
         return _force(found(y, v, p, memory), v)
 
-    return Formula(first, _force, bounds, at, True, function.py_func.__module__)
+    @njit
+    def beside(y, v, p, memory):
+        return at(y, math.copysign(STICKING_SPEED, v), p, memory)
+
+    return Formula(first, _force, bounds, at, beside, True, function.py_func.__module__)
+
+
+@functools.cache
+def _by_speed(function: Callable) -> Formula:
+    """Return the formula of a user's level whose numbers have what it is at BESIDE_REST.
+
+    In a step in which the other forces alone stop the joint, the level is that just above rest: so
+    the function is not called, and the friction is as near to its mean over the step.
+    """
+    function = njit(function)
+
+    @njit
+    def level(y, v, p, memory):
+        return float(function(at_speed(y, v), p, memory[OWN:OWN]))
+
+    @njit
+    def near(v, p):
+        return p.level_above_0 if v > 0.0 else p.level_below_0
+
+    @njit
+    def first(y, v, p, memory):
+        if v == 0.0:
+            return p.level_at_0
+        speed_lost = -math.copysign(y.h * y.mobility, v) * (y.others + y.mean)
+        if abs(v) <= speed_lost and p.level_at_0 > 0.0:
+            return near(v, p)
+        return level(y, v, p, memory)
+
+    @njit
+    def bounds(found, y, v, p, memory):
+        return -p.level_at_0, p.level_at_0
+
+    @njit
+    def at(y, v, p, memory):
+        return resisting(level(y, v, p, memory), v)
+
+    @njit
+    def beside(y, v, p, memory):
+        return resisting(near(v, p), v)
+
+    return Formula(first, resisting, bounds, at, beside, True, function.py_func.__module__)
 
 
 @register_jitable
@@ -168,6 +244,50 @@ def returns_bounds(function: Callable, numbers: Mapping[str, float], memory: int
         return isinstance(function(_state(0.1, 1.0), p, np.zeros(memory)), tuple)
     except Exception:
         return False
+
+
+def is_of_speed(function: Callable, numbers: Mapping[str, float]) -> bool:
+    """Return whether a function without a memory returns a level that depends on the speed alone:
+    all that it does with its first argument y is to read y.v.
+    """
+    code = getattr(function, "__code__", None)
+    if code is None or not code.co_argcount:
+        return False
+    if not _levels(function, tuple(numbers), tuple(numbers.values())):
+        return False
+    state = code.co_varnames[0]
+    for one, following in itertools.pairwise(dis.get_instructions(code)):
+        names = one.argval if isinstance(one.argval, tuple) else (one.argval,)
+        if state not in names:
+            continue
+        loads = one.opname.endswith(LOADS) and names.index(state) == len(names) - 1
+        if not (loads and following.opname == "LOAD_ATTR" and following.argval == "v"):
+            return False
+    return True
+
+
+@functools.lru_cache(maxsize=256)
+def _levels(function: Callable, names: Names, values: tuple) -> tuple[Floats, ...]:
+    """Return the levels of a user's function at BESIDE_REST, in Python, of each joint or of all; ()
+    if one is not finite, or if it raises, which its run says.
+
+    The values of the names are numbers, or one for each joint.
+    """
+    joints = 1
+    for value in values:
+        if isinstance(value, tuple):
+            joints = len(value)
+    found = []
+    for i in range(joints):
+        p = named(names)(*([of_joint(value, i) for value in values] or (0.0,)))
+        try:
+            levels = [float(function(_state(v, 0.0), p, NO_MEMORY)) for v in BESIDE_REST.values()]
+        except Exception:
+            return ()
+        if not all(map(math.isfinite, levels)):
+            return ()
+        found.append(tuple(levels))
+    return tuple(found)
 
 
 def _state(v: float, load: float) -> JointState:

@@ -193,7 +193,12 @@ class Friction(OnJoints):
     def numbers(self, run: Run) -> list[Sequence[float]]:
         if self.steady is None:
             return super().numbers(run)
-        return [[getattr(self, name) for name in self.names]]
+        return [self.parameters(0)]
+
+    def parameters(self, i: int) -> tuple[float, ...]:
+        """Return the numbers of its joint i."""
+        del i  # they are the same for all
+        return tuple(getattr(self, name) for name in self.names)
 
     def joints(self, spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
         """Return the joints that it acts on."""

@@ -10,9 +10,11 @@ from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.mechanisms.hardware.joint_force import Drive, JointForce, JointPart, NumberPerJoint
 from smc_mujoco.mechanisms.hardware.own_friction import (
+    BESIDE_REST,
     OWN,
     HeldForce,
     OwnFriction,
+    is_of_speed,
     returns_bounds,
 )
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER
@@ -65,6 +67,9 @@ def _friction(numbers: Numbers | None, memory: int, function: Callable) -> Any:
         space = {"memory": size, "force": staticmethod(function)}
         return _made(HeldForce, numbers, space, function)
     space = {"memory": OWN + 2 * size, "own_memory": size, "function": staticmethod(function)}
+    space["of_speed"] = not size and is_of_speed(
+        function, frozen({} if numbers is None else numbers)
+    )
     return _made(OwnFriction, numbers, space, function)
 
 
@@ -104,7 +109,7 @@ def _size(memory: int, function: Callable) -> int:
 
 def _made(base: type[JointPart], numbers: Numbers | None, space: Fields, function: Callable) -> Any:
     name = function.__name__
-    taken = set(dir(base))
+    taken = {*dir(base), *BESIDE_REST}
     fields = []
     for key, value in frozen({} if numbers is None else numbers).items():
         if not (isinstance(key, str) and key.isidentifier()) or key in taken:

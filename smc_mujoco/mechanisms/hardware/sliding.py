@@ -179,6 +179,7 @@ class Formula(NamedTuple):
     force: Callable  # (found, v) -> F, of what `first` has found
     bounds: Callable  # (found, y, v, p, memory) -> low and high, of what `first` has found
     at: Callable  # (y, v, p, memory) -> F at another speed
+    beside: Callable  # (y, v, p, memory) -> F at STICKING_SPEED, in the direction of v
     seldom: bool  # whether it is called as seldom as it can be, and not at every stage of RK4
     module: str  # of the author
 
@@ -204,7 +205,11 @@ def _by_value(value: Callable) -> Formula:
     def at(y, v, p, memory):
         return value(v, y.motor, y.load, p)[0]
 
-    return Formula(first, force, bounds, at, False, value.py_func.__module__)
+    @njit
+    def beside(y, v, p, memory):
+        return value(math.copysign(STICKING_SPEED, v), y.motor, y.load, p)[0]
+
+    return Formula(first, force, bounds, at, beside, False, value.py_func.__module__)
 
 
 def _authored(formula: Formula, function: Callable) -> Callable:
@@ -265,7 +270,7 @@ def _at_stages(formula: Formula) -> Callable:
     A formula that is called seldom is so at speed 0 alone where the joint is slow, and while the
     joint stops, F is that of the step's start.
     """
-    first, force, bounds, at, seldom, _ = formula
+    first, force, bounds, at, _, seldom, _ = formula
     starts = _starting(formula)
     later = _while_sliding(formula)
 
@@ -315,7 +320,7 @@ def _starting(formula: Formula) -> Callable:
     """Return a function (y, p, memory, smooth, low, high) -> the speed at which a joint starts from
     rest, and the force on it then.
     """
-    at = formula.at
+    beside = formula.beside
     seldom = formula.seldom
 
     @inlined
@@ -325,7 +330,7 @@ def _starting(formula: Formula) -> Callable:
             start = math.copysign(STICKING_SPEED, smooth - high)
         elif seldom:  # it does not start
             return start, -high if start > 0.0 else -low
-        return start, -at(y, start, p, memory)
+        return start, -beside(y, start, p, memory)
 
     return starts
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from helpers import reference
 from helpers.runs import assert_same
+from numba import njit
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine import group
@@ -124,6 +125,72 @@ def test_a_level_may_fall_in_mid_run():
     assert np.abs(trace.x[:1000]).max() < 1e-12
 
 
+@friction_function(numbers=NUMBERS)
+def with_time(y, p, memory):
+    level = p.coulomb + (p.static - p.coulomb) * math.exp(-((y.v / p.speed) ** 2))
+    return level if y.t >= 0.0 else p.static
+
+
+@njit
+def speed_of(y):
+    return y.v
+
+
+@friction_function(numbers=NUMBERS)
+def by_helper(y, p, memory):
+    return p.coulomb + abs(speed_of(y))
+
+
+@friction_function(numbers=NUMBERS)
+def renamed(y, p, memory):
+    joint = y
+    return p.coulomb + abs(joint.v)
+
+
+@friction_function(numbers=NUMBERS)
+def by_place(y, p, memory):
+    return p.coulomb + abs(y[3])
+
+
+@friction_function(numbers=NUMBERS)
+def without_rest(y, p, memory):
+    if y.v == 0.0:
+        raise ValueError("no level at rest")
+    return p.coulomb
+
+
+@pytest.mark.parametrize(
+    ("kind", "known"),
+    [
+        (stribeck, True),
+        (viscous, True),
+        (with_time, False),
+        (by_helper, False),
+        (renamed, False),
+        (by_place, False),
+        (bounded, False),
+        (warming, False),
+        (without_rest, False),
+    ],
+)
+def test_levels_at_rest_are_numbers_of_what_reads_the_speed_alone(kind, known):
+    assert ("level_at_0" in kind().names) == known
+
+
+def test_a_level_is_the_same_whether_it_is_known_or_called():
+    """It differs a little where the other forces alone stop the joint."""
+    fields = {"law": smc.law("pid"), "disturbance": smc.Sine(3.0, 60.0), "duration": 2.0}
+    numbers = {"coulomb": (0.4,), "static": (0.5,), "speed": 0.1}
+    known, called = (cart(friction=kind(**numbers), **fields) for kind in (stribeck, with_time))
+    assert np.abs(known.x).max() > 2e-3
+    np.testing.assert_allclose(known.x, called.x, atol=2e-8)
+
+
+def test_what_raises_at_rest_says_so_in_its_run():
+    failure = cart(friction=without_rest(), v0=0.1, duration=1.0).failure
+    assert "raised" in str(failure)
+
+
 def test_a_memory_moves_once_a_step():
     trace = cart(friction=warming(), v0=2.0, duration=1.0)
     expected = -0.4 * np.exp(-trace.t[:-1])
@@ -181,6 +248,11 @@ def remembered_sign(y, p, memory):
 @friction_function(memory=1)
 def remembered_level(y, p, memory):
     return 0.2 + memory[0]
+
+
+def test_a_number_may_not_have_the_name_of_a_level_beside_rest():
+    with pytest.raises(smc.ScenarioError, match="level_at_0"):
+        friction_function(numbers={"level_at_0": 1.0})(lambda y, p, memory: p.level_at_0)
 
 
 @friction_function()
