@@ -269,7 +269,7 @@ def is_of_speed(function: Callable, numbers: Mapping[str, float]) -> bool:
 @functools.lru_cache(maxsize=256)
 def _levels(function: Callable, names: Names, values: tuple) -> tuple[Floats, ...]:
     """Return the levels of a user's function at BESIDE_REST, in Python, of each joint or of all; ()
-    if one is not finite, or if it raises, which its run says.
+    if it raises, which its run says.
 
     The values of the names are numbers, or one for each joint.
     """
@@ -283,8 +283,6 @@ def _levels(function: Callable, names: Names, values: tuple) -> tuple[Floats, ..
         try:
             levels = [float(function(_state(v, 0.0), p, NO_MEMORY)) for v in BESIDE_REST.values()]
         except Exception:
-            return ()
-        if not all(map(math.isfinite, levels)):
             return ()
         found.append(tuple(levels))
     return tuple(found)

@@ -205,6 +205,13 @@ def test_the_reference_loop_has_the_same_bits(kind, plant):
     assert_same(smc.run(one), reference.run(one))
 
 
+@pytest.mark.parametrize("kind", [stribeck, viscous])
+def test_the_reference_loop_has_the_same_bits_where_other_forces_turn_a_joint(kind):
+    fields = {"law": "pid", "disturbance": smc.Sine(3.0, 60.0), "duration": 0.3}
+    one = smc.Scenario(plant="duffing", friction=kind(), **fields)
+    assert_same(smc.run(one), reference.run(one))
+
+
 @pytest.mark.parametrize("kind", [stribeck, bounded, warming])
 def test_the_fast_engine_runs_it(kind):
     fields = {"law": smc.law("pid"), "disturbance": smc.Sine(0.5, 5.0), "duration": 0.5}
