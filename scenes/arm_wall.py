@@ -38,7 +38,7 @@ def answer(runs):
     )
     return (
         f"{force}; {varying}; always on the wall and less "
-        f"than 1 mm in it: {runs.those(stays).named}"
+        f"than 1 mm in it: {runs.select(stays).named}"
     )
 
 

@@ -26,8 +26,8 @@ def upright(trace):
 
 def answer(runs):
     return (
-        f"pole and cart come to rest with {runs.those().named}; the pole comes to rest with "
-        f"{runs.those(upright).named}; the cart ends farthest "
+        f"pole and cart come to rest with {runs.select().named}; the pole comes to rest with "
+        f"{runs.select(upright).named}; the cart ends farthest "
         f"from 0 with {runs.most('ultimate_bound')}"
     )
 

@@ -13,7 +13,7 @@ import smc_mujoco as smc
 
 def answer(runs):
     paper = runs.only("observer_free")
-    settled = runs.those()
+    settled = runs.select()
     return (
         "of those that settle, u varies least at the end under "
         f"{settled.least('tv_rate')}, and most under "

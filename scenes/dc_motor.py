@@ -13,10 +13,10 @@ import smc_mujoco as smc
 
 def answer(runs):
     return (
-        f"{runs.who('settle')}; settling time from the ideal drive to the 3 V supply: "
+        f"{runs.count('settle')}; settling time from the ideal drive to the 3 V supply: "
         f"{runs.changes('settling_time', 'ideal', '3 V supply')}; "
         "least TV rate of those that settle: "
-        f"{runs.those().least('tv_rate')}"
+        f"{runs.select().least('tv_rate')}"
     )
 
 

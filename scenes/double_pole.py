@@ -26,7 +26,7 @@ def run(share):
 
 
 def answer(runs):
-    stands = runs.those(lambda trace: abs(trace.x[-1, 1:]).max() < 0.01)
+    stands = runs.select(lambda trace: abs(trace.x[-1, 1:]).max() < 0.01)
     return f"the poles stand after 8 s with {stands.named}; the cart runs farthest with " + str(
         runs.most("peak")
     )

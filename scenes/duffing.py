@@ -14,7 +14,7 @@ import smc_mujoco as smc
 
 def answer(runs):
     return (
-        f"{runs.who('reach the hump and stay')}; first: {runs.least('settling_time')}; "
+        f"{runs.count('reach the hump and stay')}; first: {runs.least('settling_time')}; "
         f"last: {runs.most('settling_time')}; largest overshoot: {runs.most('overshoot')}"
     )
 

@@ -35,7 +35,7 @@ def rocking(trace):
 
 def answer(runs):
     rubs = runs["arm rubs"]
-    up = rubs.those(lambda trace: abs(trace.x[-1, 1]) < 0.1)
+    up = rubs.select(lambda trace: abs(trace.x[-1, 1]) < 0.1)
     least = rubs.least(rocking)
     most = rubs.most(rocking)
     upright = f"with friction in the arm, the pendulum stays up under {up.named}"

@@ -19,7 +19,7 @@ def answer(runs):
     return (
         "the strongest gust of those tried up to which the pendulum "
         f"stays off the floor: {runs.up_to(stands)}; "
-        f"after {last} {runs[last].who('end upright')}"
+        f"after {last} {runs[last].count('end upright')}"
     )
 
 

@@ -12,7 +12,7 @@ import smc_mujoco as smc
 
 def answer(runs):
     return (
-        f"{runs.who('come back')}; first: {runs.least('settling_time')}; hardest blow: "
+        f"{runs.count('come back')}; first: {runs.least('settling_time')}; hardest blow: "
         f"{runs.most('peak_reaction')}; softest: {runs.least('peak_reaction')}"
     )
 

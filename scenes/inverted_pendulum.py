@@ -12,9 +12,9 @@ import smc_mujoco as smc
 
 
 def answer(runs):
-    settled = runs.those()
+    settled = runs.select()
     return (
-        f"{runs.who('settle')}; first: {runs.least('settling_time')}; "
+        f"{runs.count('settle')}; first: {runs.least('settling_time')}; "
         f"last: {runs.most('settling_time')}; "
         f"of those that settle, u varies least under {settled.least('tv_rate')}, "
         f"most under {settled.most('tv_rate')}"

@@ -14,7 +14,7 @@ import smc_mujoco as smc
 def answer(runs):
     worst = runs["0.4 N m"]
     return (
-        f"{runs.who('settle')}; largest steady error at 0.4 N "
+        f"{runs.count('settle')}; largest steady error at 0.4 N "
         f"m: {worst.most('steady_error')}; widest "
         f"ripple: {worst.most('ripple')}"
     )

@@ -16,8 +16,8 @@ def gentle(trace):
 
 def answer(runs):
     return (
-        f"{runs.who('settle without a clash', gentle)}; first of those: "
-        f"{runs.those(gentle).least('settling_time')}; hardest blow: {runs.most('peak_reaction')}"
+        f"{runs.count('settle without a clash', gentle)}; first of those: "
+        f"{runs.select(gentle).least('settling_time')}; hardest blow: {runs.most('peak_reaction')}"
     )
 
 

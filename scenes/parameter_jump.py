@@ -13,7 +13,7 @@ import smc_mujoco as smc
 
 def answer(runs):
     return (
-        f"{runs.who('settle and stay there')}; the farthest off after the hard jump: "
+        f"{runs.count('settle and stay there')}; the farthest off after the hard jump: "
         f"{runs['hard'].most('ultimate_bound')}"
     )
 

@@ -15,7 +15,7 @@ def push(trace):
 
 
 def answer(runs):
-    pushes = runs.who("end at the actuator's limit", lambda run: push(run) >= 1.0)
+    pushes = runs.count("end at the actuator's limit", lambda run: push(run) >= 1.0)
     return (
         f"{pushes}; softest push at the end, as a share of the "
         f"limit: {runs.least(push)}; hardest blow: "

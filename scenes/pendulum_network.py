@@ -13,7 +13,7 @@ import smc_mujoco as smc
 
 def answer(runs):
     return (
-        f"{runs.who('bring all five to rest')}; first: {runs.least('settling_time')}; last: "
+        f"{runs.count('bring all five to rest')}; first: {runs.least('settling_time')}; last: "
         f"{runs.most('settling_time')}; the angles come together "
         f"first under {runs.least('spread_settling_time')}"
     )

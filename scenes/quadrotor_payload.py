@@ -29,7 +29,7 @@ def back(trace):
 
 
 def answer(runs):
-    returned = runs.who("return within 20 mm", lambda trace: back(trace) < 3.0)
+    returned = runs.count("return within 20 mm", lambda trace: back(trace) < 3.0)
     low = runs.least(height, unit="m")
     high = runs.most(height, unit="m")
     first = runs.least(back, unit="s")

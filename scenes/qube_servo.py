@@ -21,7 +21,7 @@ STANDING = [label for label in TWINS if label != "arm m r²/3"]
 
 
 def answer(runs):
-    start = runs["the start"].those(lambda trace: abs(trace.x[:, 1]).max() < 0.5)
+    start = runs["the start"].select(lambda trace: abs(trace.x[:, 1]).max() < 0.5)
     return f"the pendulum still stands after 1.5 s with {start.named}"
 
 

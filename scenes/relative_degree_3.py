@@ -14,7 +14,7 @@ import smc_mujoco as smc
 
 def answer(runs):
     return (
-        f"{runs.who('settle')}; first: {runs.least('settling_time')}; "
+        f"{runs.count('settle')}; first: {runs.least('settling_time')}; "
         f"last: {runs.most('settling_time')}; "
         f"the largest ultimate bound: {runs.most('ultimate_bound')}"
     )

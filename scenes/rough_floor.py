@@ -19,7 +19,7 @@ def answer(runs):
     return (
         f"farthest from the centre: {runs.most('steady_error')}; "
         f"nearest: {runs.least('steady_error')}; "
-        f"{runs.who('stick and slip', restarts)}"
+        f"{runs.count('stick and slip', restarts)}"
     )
 
 

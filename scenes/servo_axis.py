@@ -45,7 +45,7 @@ def still(trace):
 
 def answer(runs):
     return (
-        f"it sticks and slips with {runs.those(lambda trace: still(trace) > 1.0).named}, "
+        f"it sticks and slips with {runs.select(lambda trace: still(trace) > 1.0).named}, "
         "at rest for most of the time, "
         f"in %, with {runs.most(still)}; least rms error, in um, with "
         f"{runs.least(error)}, most with {runs.most(error)}"

@@ -14,7 +14,7 @@ import smc_mujoco as smc
 
 def answer(runs):
     return (
-        f"{runs.who('get up and stay up')}; first: {runs.least('settling_time')}; the farthest "
+        f"{runs.count('get up and stay up')}; first: {runs.least('settling_time')}; the farthest "
         f"from upright at the end with the heavy bob: {runs['heavy bob'].most('ultimate_bound')}"
     )
 

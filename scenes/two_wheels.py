@@ -46,8 +46,8 @@ def run(law):
 
 
 def answer(runs):
-    stands = runs.those(lambda trace: abs(trace.x[-1, TILT]) < 0.02)
-    back = runs.those(lambda trace: abs(trace.x[-1, LEFT]) < 0.3)
+    stands = runs.select(lambda trace: abs(trace.x[-1, TILT]) < 0.02)
+    back = runs.select(lambda trace: abs(trace.x[-1, LEFT]) < 0.3)
     return f"upright after 6 s: {stands.named}; back in their place: {back.named}"
 
 

@@ -12,7 +12,7 @@ import smc_mujoco as smc
 
 
 def answer(runs):
-    settled = runs.those()
+    settled = runs.select()
     metrics = ("settling_time", "itae", "tv_rate")
     time, error, effort = (settled.least(name) for name in metrics)
     leads = runs.only(*settled.leaders(*metrics)).named

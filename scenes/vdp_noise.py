@@ -18,7 +18,7 @@ def answer(runs):
         f"from nominal to noise, settling time: {change['settling_time']}; "
         f"ultimate bound: {change['ultimate_bound']}; "
         f"TV rate of u: {change['tv_rate']}, with noise the least: "
-        f"{runs['noise'].those().least('tv_rate')}"
+        f"{runs['noise'].select().least('tv_rate')}"
     )
 
 

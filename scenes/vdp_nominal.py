@@ -11,9 +11,9 @@ import smc_mujoco as smc
 
 def answer(runs):
     paper = runs.only("observer_free")
-    settled = runs.those()
+    settled = runs.select()
     return (
-        f"{paper.who('settle')} (settling time {paper.size('settling_time')}, TV rate at the end "
+        f"{paper.count('settle')} (settling time {paper.size('settling_time')}, TV rate at the end "
         f"{paper.size('tv_rate')}); first of all: {settled.least('settling_time')}; least TV rate: "
         f"{settled.least('tv_rate')}"
     )

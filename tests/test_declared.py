@@ -40,7 +40,7 @@ from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation.scenario import Resolved
 from smc_mujoco.simulation.signals import Signal
-from smc_mujoco.simulation.workers import Where
+from smc_mujoco.simulation.workers import ExecutorAddress
 
 pytestmark = pytest.mark.quick
 
@@ -124,7 +124,7 @@ BAD = {  # of another kind, and just beyond each end
     Each: bad_by_channel,
     Range: bad_ranges,
     FilePath: lambda one: [None, 3, b"x", ["x"]],
-    Where: lambda one: [None, 3, "ray", "dask://host", "dask://host:port"],
+    ExecutorAddress: lambda one: [None, 3, "ray", "dask://host", "dask://host:port"],
     Called: lambda one: [None, 3, "x", ()],
 }
 BAD[Available] = BAD[OneOf]
@@ -132,7 +132,7 @@ GOOD = {  # a plain value, and the ends themselves
     OrNone: lambda one: [*good(one.one), None],
     Number: good_numbers,
     Whole: lambda one: [one.low, one.high, float(one.high // 2)] + [math.inf] * one.infinite,
-    Where: lambda one: ["dask://host:8786", "tcp://127.0.0.1:1"],
+    ExecutorAddress: lambda one: ["dask://host:8786", "tcp://127.0.0.1:1"],
     OneOf: lambda one: [*one.names],
     Flag: lambda one: [True, False],
     Each: lambda one: [*good(one.one), (good(one.one)[0],) * 2],
@@ -150,7 +150,7 @@ TOLD = {
     Each: lambda one: f"{reported(one.one)}, or one for each channel",
     Range: lambda one: f"range of {reported(Number(above=one.above, low=one.low))}",
     FilePath: lambda one: "path",
-    Where: lambda one: "an executor, a dask client, or an address",
+    ExecutorAddress: lambda one: "an executor, a dask client, or an address",
     Called: lambda one: "function",
     Available: lambda one: f"{', '.join(one.names)} if this machine has it",
 }
@@ -342,7 +342,7 @@ from __future__ import annotations
 import dataclasses
 from smc_mujoco.common.constraints import Positive
 from smc_mujoco.simulation.signals import Signal
-from smc_mujoco.simulation.workers import Where
+from smc_mujoco.simulation.workers import ExecutorAddress
 
 @dataclasses.dataclass(frozen=True)
 class Mine(Signal):

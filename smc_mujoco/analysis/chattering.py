@@ -24,7 +24,7 @@ import numpy as np
 from smc_mujoco.analysis.harmonics import Loop, Wave
 from smc_mujoco.analysis.step_halving import StepChange
 from smc_mujoco.common.aliases import Array, Fields, Names, Pair
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, whole
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
@@ -77,7 +77,7 @@ Balance = tuple[float, float]  # amplitude of e, rad or m, and omega, rad/s, whe
 Cell = tuple[np.ndarray, np.ndarray]
 
 
-@named_data
+@keyword_dataclass
 class Chattering:
     """A predicted limit cycle of one channel.
 

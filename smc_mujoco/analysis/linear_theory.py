@@ -110,7 +110,7 @@ def linear_gains(law: Law) -> Pair | None:
     """Return lam and k1 of u = -lam (e' + k1 e), the law near s = 0; None if it is not linear
     there.
     """
-    rest = law.template and law.template.rest
+    rest = law.template and law.template.linear_part
     if rest:
         return rest.linear(SimpleNamespace(**law.gains))
     return None
@@ -227,7 +227,7 @@ def restoring_force(
     """Return the force, N or N m, that pulls all channels back from the same x > 0, (k,), or None
     without theory.
     """
-    rest = law.template and law.template.rest
+    rest = law.template and law.template.linear_part
     gains = SimpleNamespace(**law.gains)
     if not rest:
         return None

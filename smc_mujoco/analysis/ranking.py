@@ -190,7 +190,7 @@ class Comparison:
                         self._lead(b, a, k, first, units, plain)
         # (blocks, laws, laws), one-sided p-value, not corrected, that a law is better; 1 of itself
         self.p = p_values(self.leads - self.beyond)
-        self.p[self.both_below] = 1.0
+        self.p[self.pairs_below_floor] = 1.0
         # the largest p-values with which a law is better than another, and wins a block
         self.limit = BEST_ERROR / looks / max(count - 1, rivals)
         self.error = WIN_ERROR / looks  # of any wrong winner
@@ -240,7 +240,7 @@ class Comparison:
         return middle(self.cells)
 
     @property
-    def both_below(self) -> np.ndarray:
+    def pairs_below_floor(self) -> np.ndarray:
         """Whether two laws are both below the floor, (blocks, laws, laws)."""
         return self.below.T[:, :, None] & self.below.T[:, None, :]
 
@@ -556,7 +556,7 @@ def _units(error: float) -> int:
 def ranks(comparison: Comparison) -> list[Rank]:
     """Return the laws' ranks over all blocks, see `placed` and `ranks_by_block`."""
     lacking = comparison.without_value
-    tied = comparison.both_below.transpose(1, 2, 0)
+    tied = comparison.pairs_below_floor.transpose(1, 2, 0)
     by_block = ranks_by_block(
         lacking, comparison.centres, comparison.floors, comparison.relevant, tied
     )

@@ -62,7 +62,7 @@ class StepChange:
         return max(self.amplitude, self.frequency) > MAX_CHANGE
 
 
-def repeats_all(scenario: Scenario) -> bool:
+def repeats_every_run(scenario: Scenario) -> bool:
     """Return whether a study repeats every such run at half the step: constraints may act, or it is
     not under RK4.
     """

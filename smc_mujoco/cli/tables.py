@@ -84,7 +84,7 @@ def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) 
     Scores that differ from those of the same runs `again` are marked, with the smallest and the
     largest value.
     """
-    style.same_plant(list(traces.values()))
+    style.traces_of_one_plant(list(traces.values()))
     scenario = next(iter(traces.values())).scenario
     values = _several(metric_scores, traces, again)
     tables = []

@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 
 @dataclasses.dataclass(frozen=True)
-class Kept(Generic[T]):
+class CachedResult(Generic[T]):
     """The file of one result.
 
     Its name ends in two hashes. One is of `depends` (as JSON), the code and the versions. The other
@@ -73,8 +73,8 @@ def cached(
     save: Callable[[T, Path], object],
     load: Callable[[Path], T],
 ) -> T:
-    """Return the result of `make`, from its file if there is one; see `Kept`."""
-    kept = Kept(path, depends, save, load)
+    """Return the result of `make`, from its file if there is one; see `CachedResult`."""
+    kept = CachedResult(path, depends, save, load)
     if (found := kept.read()) is not None:
         return found
     writable(path)

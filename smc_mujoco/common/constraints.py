@@ -19,7 +19,7 @@ from typing import Annotated, Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, told, unknown, whole
 from smc_mujoco.common.files import as_path
 
@@ -37,7 +37,7 @@ class Constraint:
         raise NotImplementedError
 
 
-@named_data
+@keyword_dataclass
 class Number(Constraint):
     """A number > `above`, >= `low` and <= `high`, finite unless `infinite`, as a float."""
 
@@ -57,7 +57,7 @@ class Number(Constraint):
         )
 
 
-@named_data
+@keyword_dataclass
 class Whole(Constraint):
     """A whole number from `low` to `high`, as an int; also inf if `infinite`."""
 
@@ -71,7 +71,7 @@ class Whole(Constraint):
         return whole(what, value, self.low, self.high)
 
 
-@named_data
+@keyword_dataclass
 class OneOf(Constraint):
     """One of some names."""
 
@@ -83,7 +83,7 @@ class OneOf(Constraint):
         raise unknown(what, value, self.names)
 
 
-@named_data
+@keyword_dataclass
 class Flag(Constraint):
     """True or False."""
 
@@ -93,7 +93,7 @@ class Flag(Constraint):
         raise ScenarioError(f"{what} is {shown(value)}: give True or False")
 
 
-@named_data
+@keyword_dataclass
 class Each(Constraint):
     """A value that satisfies `one`, or a list with such a value for each channel, as a tuple."""
 
@@ -113,7 +113,7 @@ class Each(Constraint):
         return tuple(checked)
 
 
-@named_data
+@keyword_dataclass
 class Range(Constraint):
     """Two numbers, as `Number` declares them, the lowest first; also infinite ones if
     `infinite`.
@@ -140,7 +140,7 @@ class Range(Constraint):
         return number(what, value, above=self.above, low=self.low)
 
 
-@named_data
+@keyword_dataclass
 class Called(Constraint):
     """A function."""
 
@@ -150,7 +150,7 @@ class Called(Constraint):
         return value
 
 
-@named_data
+@keyword_dataclass
 class FilePath(Constraint):
     """The path of a file or folder, as a Path."""
 
@@ -158,7 +158,7 @@ class FilePath(Constraint):
         return as_path(value, what)
 
 
-@named_data
+@keyword_dataclass
 class OrNone(Constraint):
     """None, or what satisfies `one`."""
 

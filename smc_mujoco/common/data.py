@@ -16,7 +16,7 @@ def frozen_data(kind: type[T]) -> type[T]:
 @dataclass_transform(
     frozen_default=True, kw_only_default=True, field_specifiers=(dataclasses.field,)
 )
-def named_data(kind: type[T]) -> type[T]:
+def keyword_dataclass(kind: type[T]) -> type[T]:
     """Make a class a frozen dataclass whose fields are given by name."""
     return dataclasses.dataclass(frozen=True, kw_only=True)(kind)
 

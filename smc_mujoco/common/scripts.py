@@ -43,7 +43,7 @@ def execute(path: Path) -> dict:
         raise ScenarioError(f"{where}: {error}") from error
 
 
-def named(text: str, what: str, wanted: Callable[[Any], bool]) -> Any:
+def object_named(text: str, what: str, wanted: Callable[[Any], bool]) -> Any:
     """Return what FILE.py:NAME names, such as "my_parts.py:stribeck". The file is run, unless it is
     imported already.
 

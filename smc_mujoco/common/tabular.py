@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.common import html
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType
@@ -61,7 +61,7 @@ class Cell(NamedTuple):
     label: str = ""  # what LaTeX prints instead of the text
 
 
-@named_data
+@keyword_dataclass
 class Tabular:
     """A table."""
 

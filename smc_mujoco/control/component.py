@@ -21,7 +21,7 @@ from typing import Annotated, Any, NamedTuple, TypedDict
 from smc_mujoco.common import errors
 from smc_mujoco.common.aliases import Data, Names, Pair
 from smc_mujoco.common.constraints import Each, Number, Whole, constrained
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown, users_stacklevel
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.source import DEFAULT, NONE, YOURS, GainSearch, Source, combined
@@ -35,7 +35,7 @@ FINITE_TIME = ("", "s", "e")  # values of the option: what a law brings to 0 in 
 AccuracyOrder = float | Callable[[SimpleNamespace], float]  # a number, or a function of the gains
 
 
-class Rest(NamedTuple):
+class LinearPart(NamedTuple):
     """The linear part of a law that is linear near s = 0."""
 
     # gains -> (lam, k1) of u = -lam (e' + k1 e), near s = 0
@@ -58,7 +58,7 @@ class Options(TypedDict, total=False):
     short: str
     label: str
     colour: str
-    rest: Rest | None
+    linear_part: LinearPart | None
     family: str
     continuous: bool
     finite_time: str
@@ -75,7 +75,7 @@ class GainWarning(UserWarning):
     """Gains violate a condition of the law's theorem."""
 
 
-@named_data
+@keyword_dataclass
 class Component:
     """A function bound to its gains. Laws with equal gains are equal, whatever their sources."""
 
@@ -256,7 +256,7 @@ def _unpickled(
     return component
 
 
-@named_data
+@keyword_dataclass
 class Template:
     """A function with the properties that its decorator gives it, see `law_function`."""
 
@@ -273,7 +273,7 @@ class Template:
     label: str = ""  # this and the next two: "" means automatic, see `smc_mujoco.draw.style`
     short: str = ""
     colour: str = ""
-    rest: Rest | None = None
+    linear_part: LinearPart | None = None
     family: str = ""
     continuous: bool = False
     finite_time: str = ""

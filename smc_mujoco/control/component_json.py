@@ -9,7 +9,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.registry import Catalogue
 from smc_mujoco.control import source as sources
 from smc_mujoco.control.component import Component, Template, by_channel
-from smc_mujoco.control.law import known_laws
+from smc_mujoco.control.law import all_laws
 
 ANNEXES = ("evidence", "problems")  # with laws that are not in the catalogue, as those of rigs
 
@@ -34,7 +34,7 @@ def law(data: Data, source: Data | None) -> Component:
     if "each" in data:
         component = by_channel([law(item, source) for item in data["each"]])
     else:
-        component = restore(data, "law", known_laws() | _laws_of_annex(data["module"]))
+        component = restore(data, "law", all_laws() | _laws_of_annex(data["module"]))
     if source is None:
         return component.sourced(sources.YOURS)
     restored = dataclasses.replace(sources.restore(source), gains=component.gains)

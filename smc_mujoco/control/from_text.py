@@ -24,10 +24,10 @@ from smc_mujoco.common import annexes
 from smc_mujoco.common.aliases import Data
 from smc_mujoco.common.errors import ScenarioError, find, shown, warn_once
 from smc_mujoco.common.files import read_json, reading
-from smc_mujoco.common.scripts import IN_FILE, execute, named
+from smc_mujoco.common.scripts import IN_FILE, execute, object_named
 from smc_mujoco.control import component_json, gain_sets
 from smc_mujoco.control.component import Component, GainValue, Template
-from smc_mujoco.control.law import Law, known_laws
+from smc_mujoco.control.law import Law, all_laws
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
@@ -95,7 +95,7 @@ def law(
             f"{text} has several laws, {', '.join(names)}: give one, as FILE.py:{names[0]}"
         )
     first = of_text[0]
-    return _with_gains(known_laws()[first]() if isinstance(first, str) else first, gains)
+    return _with_gains(all_laws()[first]() if isinstance(first, str) else first, gains)
 
 
 def _shipped(text: object, plant: Plant, gains: Mapping[str, float | Sequence[float]]) -> Law:
@@ -106,18 +106,18 @@ def _shipped(text: object, plant: Plant, gains: Mapping[str, float | Sequence[fl
         )
     head, given = _parts("law", text, "pid(kp=50,ki=50,kd=8)")
     shipped = gain_sets.law(plant, head)
-    warn_once(gain_sets.of_other_parameters(plant))
+    warn_once(gain_sets.other_parameters_warning(plant))
     if not (given or gains):
         return shipped
-    return known_laws()[head].bind({**shipped.gains, **given, **gains}, warn=True)
+    return all_laws()[head].bind({**shipped.gains, **given, **gains}, warn=True)
 
 
 def laws(text: object) -> list[str | Law]:
     """Return the laws of a text. The name of a law of the library stays a name, which sets of gains
     need.
     """
-    if not isinstance(text, str) or text in known_laws():
-        find("law", text, known_laws())
+    if not isinstance(text, str) or text in all_laws():
+        find("law", text, all_laws())
         return [str(text)]
     if os.path.exists(text):
         head = text
@@ -139,10 +139,10 @@ def laws(text: object) -> list[str | Law]:
     else:
         head, gains = _parts("law", text, "pid(kp=50,ki=50,kd=8)")
     if IN_FILE.fullmatch(head):
-        return [_with_gains(law(named(head, "law", _is_law)), gains)]
+        return [_with_gains(law(object_named(head, "law", _is_law)), gains)]
     if read := _reader(head):
         return [_with_gains(law, gains) for law in read(head)]
-    return [find("law", head, known_laws()).bind(gains, warn=True)]
+    return [find("law", head, all_laws()).bind(gains, warn=True)]
 
 
 def component(kind: str, text: str, known: Mapping[str, Template], example: str) -> Component:
@@ -207,10 +207,10 @@ def _of_python(path: str) -> list[Law]:
             bound[value.name] = value
     laws = []
     for name, template in templates.items():
-        if template is not known_laws().get(name):
+        if template is not all_laws().get(name):
             laws.append(template())
     # a law that is a template with gains is not one more
-    functions = {template.function for template in (*templates.values(), *known_laws().values())}
+    functions = {template.function for template in (*templates.values(), *all_laws().values())}
     for law in bound.values():
         if functions.isdisjoint(part.function for part in law.parts):
             laws.append(law)

@@ -24,7 +24,7 @@ from typing import Annotated
 
 from smc_mujoco.common.aliases import Data, Floats, Names, Numbers
 from smc_mujoco.common.constraints import OneOf, constrained
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import read_json
 from smc_mujoco.control import source
@@ -112,7 +112,7 @@ def law(
     return law.sourced(source.SHIPPED if search else source.STUDY, search)
 
 
-def said(plant: Plant, law: Component) -> str:
+def shipped_gains_notice(plant: Plant, law: Component) -> str:
     """Return a sentence on a law that was given by its name, and has shipped gains."""
     gains = gains_text(law.gains)
     text = (
@@ -120,10 +120,10 @@ def said(plant: Plant, law: Component) -> str:
         f"smc.law({law.name!r}, plant={plant.name!r}) to say so, smc.law({law.name!r}) for its "
         "defaults"
     )
-    return f"{text}; {doubt}" if (doubt := of_other_parameters(plant)) else text
+    return f"{text}; {doubt}" if (doubt := other_parameters_warning(plant)) else text
 
 
-def of_other_parameters(plant: Plant, gains: str = "tuned") -> str:
+def other_parameters_warning(plant: Plant, gains: str = "tuned") -> str:
     """Return a sentence on a plant that has not the parameters for which gains were tuned, or
     "".
     """
@@ -178,7 +178,7 @@ def in_set(plant: Plant, name: str, gains: str) -> bool:
     return True
 
 
-@named_data
+@keyword_dataclass
 class TunedGains:
     """The gains of a law on a plant, and the searches that found them."""
 

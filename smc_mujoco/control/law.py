@@ -152,7 +152,8 @@ def law_function(
       label: name in figures and tables. Default: the function's name.
       short: name in two or three letters. Default: initials.
       colour: "#RRGGBB". Default: a colour of a palette, always the same.
-      rest: the linear part of a law that has one, a `smc_mujoco.control.component.Rest`.
+      linear_part: a `smc_mujoco.control.component.LinearPart`, of a law that is linear near
+        s = 0.
       family: one word, such as "terminal", by which lists group the laws.
       continuous: whether u is a continuous function of the measurement at s = 0 (at e = 0 for laws
         of e), however short the control period. Default: no.
@@ -207,7 +208,7 @@ def joint_catalogue() -> Catalogue[Template]:
 
 
 @functools.cache
-def known_laws() -> Catalogue[Template]:
+def all_laws() -> Catalogue[Template]:
     """Return every law of one channel and of many joints, by name."""
     return catalogue() | joint_catalogue()
 
@@ -216,7 +217,7 @@ def checked_name(law: Law) -> Law:
     """Return the law. Raise ScenarioError if it is a user's with the name of a law of the
     catalogue.
     """
-    known = known_laws().get(law.name)
+    known = all_laws().get(law.name)
     if known is None or law.function is None:
         return law
     # module and name stay the same when the module is loaded again
@@ -225,7 +226,7 @@ def checked_name(law: Law) -> Law:
         names.add((getattr(f, "__module__", ""), getattr(f, "__qualname__", f)))
     if len(names) == 1:
         return law
-    package = known_laws().package(law.name)
+    package = all_laws().package(law.name)
     if package:
         owner = f"package {package!r}"
     else:
@@ -240,7 +241,7 @@ def law(name: str, /, **gains: float | Sequence[float]) -> Law:
     """Return the library's law `name` with these gains: one number for all channels, or one for
     each driven channel.
     """
-    return find("law", name, known_laws()).bind(gains, warn=True)
+    return find("law", name, all_laws()).bind(gains, warn=True)
 
 
 def suits(law: Law | Template, plant: Plant) -> bool:
@@ -301,7 +302,7 @@ def laws(plant: Plant | str | None = None, kind: str = "law") -> list[str]:
     if kind != "law":
         raise ScenarioError(f"laws of kind {kind!r} are not for single plants: leave plant out")
     plant = as_plant(plant)
-    known = known_laws() if plant.pose else catalogue()
+    known = all_laws() if plant.pose else catalogue()
     whole = not plant.free and plant.pose != "heading"
     found = []
     for name, law in known.items():

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from smc_mujoco.common.errors import find
 from smc_mujoco.control.component import Template
-from smc_mujoco.control.law import Measurement, known_laws, laws
+from smc_mujoco.control.law import Measurement, all_laws, laws
 from smc_mujoco.mechanisms.plant import Plant
 
 # fields of the measurement that a velocity sensor or an estimator gives
@@ -72,7 +72,7 @@ def suitable(needs: Iterable[str] = (), plant: Plant | str | None = None) -> lis
         properties.append(find("property of a law", need, PROPERTIES))
     templates = []
     for name in laws(plant):
-        templates.append(known_laws()[name])
+        templates.append(all_laws()[name])
     for needed in properties:
         templates = list(filter(needed.holds, templates))
     return templates

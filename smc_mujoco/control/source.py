@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from smc_mujoco.common.aliases import Data, Fields
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import find
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import joined
@@ -43,7 +43,7 @@ def spread_in_words(searches: int, spread: float) -> str:
     return f"{searches} searches, whose J differ by up to {1.0 + spread:.2g} times"
 
 
-@named_data
+@keyword_dataclass
 class GainSearch:
     """The searches for gains behind a law."""
 
@@ -68,7 +68,7 @@ class GainSearch:
         return f"{self.name}, {self.evaluations} evaluations, {spread}"
 
 
-@named_data
+@keyword_dataclass
 class Source:
     """Where a set of gains comes from."""
 

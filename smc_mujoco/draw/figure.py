@@ -64,7 +64,7 @@ class DrawnRuns(NamedTuple):
     @classmethod
     def of(cls, traces: Trace | Sequence[Trace], labels: Sequence[str] | None) -> "DrawnRuns":
         """Return traces of one plant, up to where they are finite, as they are drawn."""
-        traces = style.same_plant(traces)
+        traces = style.traces_of_one_plant(traces)
         names = style.labels(traces, labels)
         scenarios = [trace.scenario for trace in traces]
         sources = [scenario.law.source.words for scenario in scenarios]

@@ -26,7 +26,7 @@ from smc_mujoco.common.text import capital, stated
 from smc_mujoco.control import estimator as estimators
 from smc_mujoco.control import surface as surfaces
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.control.law import known_laws
+from smc_mujoco.control.law import all_laws
 from smc_mujoco.mechanisms.plant import EFFORT, Plant, catalogue
 from smc_mujoco.metrics.conventions import ChannelGroup, group_trace, groups
 from smc_mujoco.metrics.once_per_trace import once_per_trace
@@ -277,11 +277,11 @@ def _farthest(used: Sequence[str], count: int) -> list[str]:
     """Return so many colours of the grid, each the one whose least `distance` to the used ones and
     to those before it is largest.
     """
-    seen = map(_seen, _grid())
+    seen = map(_as_each_sight, _grid())
     grid = np.array(list(seen))
     chosen = list(used)
     for _ in range(count):
-        beside = np.array(list(map(_seen, chosen)))
+        beside = np.array(list(map(_as_each_sight, chosen)))
         distances = np.linalg.norm(grid[:, None] - beside, axis=-1)
         apart = distances.min(axis=(1, 2))
         farthest = int(apart.argmax())
@@ -298,13 +298,13 @@ def _grid() -> list[str]:
         shade = colorsys.hls_to_rgb(hue / HUES, lightness, saturation)
         numbers = bytes(round(255 * part) for part in shade)
         colour = "#" + numbers.hex().upper()
-        if _seen(colour)[0][0] < LIGHTEST:
+        if _as_each_sight(colour)[0][0] < LIGHTEST:
             grid.append(colour)
     return grid
 
 
 @functools.cache
-def _seen(colour: str) -> np.ndarray:
+def _as_each_sight(colour: str) -> np.ndarray:
     """Return a colour in CIELAB (D65) as each of SIGHTS sees it, (4, 3)."""
     seen = np.clip(SIGHTS @ _linear(colour), 0.0, 1.0)
     t = seen @ XYZ.T / XYZ.sum(axis=1)
@@ -325,14 +325,14 @@ def distance(one: str, other: str) -> float:
     """Return the least distance of two colours in CIELAB over normal sight and three kinds of
     colour blindness.
     """
-    apart = _seen(one) - _seen(other)
+    apart = _as_each_sight(one) - _as_each_sight(other)
     return float(np.linalg.norm(apart, axis=1).min())
 
 
 def law_name(law: Component | str) -> str:
     """Return a law's label: its own, or its name in words. A user's law keeps the user's name."""
     template, name = _template(law)
-    return (template and template.label) or (in_words(name) if name in known_laws() else name)
+    return (template and template.label) or (in_words(name) if name in all_laws() else name)
 
 
 def label(name: str) -> str:
@@ -340,7 +340,7 @@ def label(name: str) -> str:
     unchanged.
     """
     known = surfaces.catalogue() | estimators.catalogue()
-    if name in known_laws():
+    if name in all_laws():
         return law_name(name)
     return in_words(name) if name in known else name
 
@@ -348,8 +348,8 @@ def label(name: str) -> str:
 def _template(law: Component | str) -> tuple[Template | None, str]:
     """Return the template of a law, if there is one, and the law's name."""
     if isinstance(law, str):
-        return known_laws().get(law), law
-    return law.template or known_laws().get(law.name), law.name
+        return all_laws().get(law), law
+    return law.template or all_laws().get(law.name), law.name
 
 
 def titled(title: object, default: str) -> str:
@@ -632,7 +632,7 @@ def folded(label: str, room: float = 120.0) -> str:
     return wrapped(breakable, room, letters, 4).replace("_ ", "_")
 
 
-def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
+def traces_of_one_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
     """Return the traces as a list; refuse those that cannot share axes."""
     if isinstance(traces, str):
         raise ScenarioError(
@@ -758,7 +758,7 @@ def ramp(colour: str, count: int, lightest: float = LIGHTEST) -> list[str]:
     for other in (PAPER, "#000000"):
         for share in np.linspace(0.0, 0.95, 96):
             shades.append(mixed(colour, other, share))
-    values = [_seen(shade)[0][0] for shade in shades]
+    values = [_as_each_sight(shade)[0][0] for shade in shades]
     lightness = np.array(values)
     wanted = np.linspace(*ends, count)
     misses = np.abs(lightness - wanted[:, None])

@@ -20,7 +20,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array, ArrayPair
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
 from smc_mujoco.control.law import FREE_BODY, law_function
-from smc_mujoco.envs.tasks import FLIGHT_TASKS, TASKS, Task, rest, reward, starts, tasks
+from smc_mujoco.envs.tasks import FLIGHT_TASKS, TASKS, Task, rest_position, reward, starts, tasks
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant, check_ranges
 from smc_mujoco.simulation import callback, coerce, state
@@ -103,7 +103,7 @@ class Setting:
         self.scale = np.array(self.scenario.drive_train.scales)
         # the channels that the task treats differently, (n,) of bool
         self.selected = self.task.selected(plant)
-        self.rest_x = rest(plant)  # from where positions count in errors, (n,)
+        self.rest_x = rest_position(plant)  # from where positions count in errors, (n,)
         # the channels that the reward counts: not the tilt of a body that leans to move
         self.counted: Any = list(plant.scored_channels) if flies else slice(None)
         samples = self.scenario.samples + 1 if self.task.moving else 1

@@ -79,7 +79,7 @@ class Task:
         """Return the lowest and the highest start of the channels from rest, (n,) each, ignoring
         joints' ranges.
         """
-        reach = np.abs(usual_start(plant) - rest(plant))
+        reach = np.abs(usual_start(plant) - rest_position(plant))
         return -reach, reach
 
     def errors(self, x: Array, v: Array, r: Array, selected: Array) -> ArrayPair:
@@ -211,13 +211,13 @@ def starts(task: Task, plant: Plant) -> ArrayPair:
     """
     lowest, highest = _ranges(plant)
     low, high = task.spread(plant)
-    middle = rest(plant)
+    middle = rest_position(plant)
     lowest_start = np.clip(middle + low, lowest, highest)
     highest_start = np.clip(middle + high, lowest, highest)
     return lowest_start, highest_start
 
 
-def rest(plant: Plant) -> Array:
+def rest_position(plant: Plant) -> Array:
     """Return the positions from which errors and spreads count, (n,): the plant's rest, or 0."""
     return np.array(plant.rest or (0.0,) * plant.n)
 

@@ -12,7 +12,7 @@ from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.exchange.c.law_from_c import law_from_c
 from smc_mujoco.exchange.fmu.law_from_fmu import law_from_fmu
-from smc_mujoco.exchange.linear_law import MATRICES, POLYNOMIALS, has_all, law_from_control
+from smc_mujoco.exchange.linear_law import MATRICES, POLYNOMIALS, has_attributes, law_from_control
 from smc_mujoco.exchange.policy import controller, policy
 
 READERS = {
@@ -89,7 +89,7 @@ def law_from(
 def _reader(source: Any) -> Any:
     if isinstance(source, str | os.PathLike):
         return find("ending of a law's file", Path(source).suffix, READERS)
-    linear = has_all(source, MATRICES) or has_all(source, POLYNOMIALS)
+    linear = has_attributes(source, MATRICES) or has_attributes(source, POLYNOMIALS)
     if linear or isinstance(source, tuple | list | np.ndarray | float | int):
         return law_from_control
     if callable(getattr(source, "compute", None)):

@@ -241,7 +241,7 @@ def _of_all_channels(K: Any) -> Array | None:
     return gains
 
 
-def has_all(thing: Any, names: Iterable[str]) -> bool:
+def has_attributes(thing: Any, names: Iterable[str]) -> bool:
     """Say whether a thing has all of these attributes."""
     return all(hasattr(thing, name) for name in names)
 
@@ -257,11 +257,11 @@ def _system(K: Any) -> System:
     if isinstance(K, tuple | list) and K:
         with contextlib.suppress(TypeError, ValueError):
             K = np.asarray(K, float)
-    if has_all(K, MATRICES):
+    if has_attributes(K, MATRICES):
         return _matrices(K.A, K.B, K.C, K.D, getattr(K, "dt", None))  # pyright: ignore[reportAttributeAccessIssue] see the line above
     if isinstance(K, np.ndarray) and K.ndim in (1, 2):
         return _matrices([], [], [], K, None)
-    if has_all(K, POLYNOMIALS):
+    if has_attributes(K, POLYNOMIALS):
         return _realisation(K.num, K.den, getattr(K, "dt", None))  # pyright: ignore[reportAttributeAccessIssue] see the line above
     raise ScenarioError(f"K is {shown(K)}: {CURE}")
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import AnyPath, Array, Fields, Floats, Numbers
 from smc_mujoco.common.constraints import Natural, Positive, constrained
-from smc_mujoco.common.data import attributes, named_data
+from smc_mujoco.common.data import attributes, keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, find, items_of, number, shown
 from smc_mujoco.common.files import as_path, replacing
 from smc_mujoco.control.from_text import law as find_law
@@ -64,7 +64,7 @@ SLOW = 0.02  # of the largest speed of a joint: below it the joint counts as at 
 HOLD, RAMP = 0.6, 0.15  # s, of a stair
 
 
-@named_data
+@keyword_dataclass
 class ExcitingMotion:
     """A motion, and what its log would tell.
 
@@ -107,7 +107,7 @@ class ExcitingMotion:
         return math.exp(sum(logarithms) / len(logarithms))
 
 
-@named_data
+@keyword_dataclass
 class Excitation:
     """Candidate motions, best first: that whose relative errors have the least geometric mean."""
 

@@ -31,7 +31,7 @@ from smc_mujoco.identification.records import Columns, Record, stacked, step_of
 from smc_mujoco.mechanisms.custom.joint_numbers import KINDS
 from smc_mujoco.mechanisms.hardware.part import Friction
 from smc_mujoco.mechanisms.layout import channel_names, driven_names
-from smc_mujoco.mechanisms.plant import degrees_meant
+from smc_mujoco.mechanisms.plant import degrees_hint
 
 # least squares, one after the other, in which parameters of a plant of the library may be no
 # linear factors of forces; chosen
@@ -363,7 +363,7 @@ def _beyond_ranges(rig: OwnRig, record: Record) -> list[str]:
             said.append(
                 f"{name} reaches {farthest:.4g} {unit}, beyond the range of {joint} in the model "
                 f"from {low:.4g} to {high:.4g}: correct the file"
-                f"{degrees_meant((low, high), farthest, unit)}"
+                f"{degrees_hint((low, high), farthest, unit)}"
             )
     return said
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.aliases import Array, Data, Fields, Names, Numbers
-from smc_mujoco.common.data import frozen_data, named_data
+from smc_mujoco.common.data import frozen_data, keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.law import law_function
 from smc_mujoco.identification import records
@@ -58,7 +58,7 @@ class LogPart(RecordPart):
     period: float = 0.0  # s, between commands
 
 
-@named_data
+@keyword_dataclass
 class OwnRig(Rig):
     """A rig whose quantities are paths.
 

@@ -167,7 +167,7 @@ def positions(trace: Trace, columns: Columns, noisy: bool = False) -> Record:
 
 def of_trace(trace: Trace, columns: Columns) -> Record:
     """Return a run as a record with a rig's columns."""
-    feedforward = trace.scenario.known_signal
+    feedforward = trace.scenario.feedforward_signal
     added = np.zeros(len(trace.t))
     if feedforward is not None:
         added[:] = [evaluate(feedforward, t)[0] for t in trace.t]

@@ -22,7 +22,7 @@ import numpy as np
 from smc_mujoco.common import annexes
 from smc_mujoco.common.aliases import Array, Data, Fields, Floats, Names, Numbers
 from smc_mujoco.common.cached import cached_property
-from smc_mujoco.common.data import frozen_data, named_data
+from smc_mujoco.common.data import frozen_data, keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, number
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.registry import Catalogue, added, discover, imported
@@ -85,7 +85,7 @@ class RecordPart:
     stride: int = 1  # control periods of the replay for each sample of the record
 
 
-@named_data
+@keyword_dataclass
 class Rig:
     """A real machine.
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array, Floats, Names, Numbers, Pair
 from smc_mujoco.common.constraints import Number
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, unknown, whole
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.frozen import frozen
@@ -102,7 +102,7 @@ class Dynamics(NamedTuple):
     g: Array
 
 
-@named_data
+@keyword_dataclass
 class Plant:
     """A mechanism with n channels obeying x'' = f(x, v) + g(x) (u + d)."""
 
@@ -421,11 +421,11 @@ def check_ranges(
             outside = f"outside its range from {low:g} to {high:g}"
             raise ScenarioError(
                 f"x0 of joint {joint!r} of {plant} is {x:g}, {outside}: give another x0"
-                f"{degrees_meant((low, high), x, unit)}"
+                f"{degrees_hint((low, high), x, unit)}"
             )
 
 
-def degrees_meant(ends: tuple[float, float], x: float, unit: str) -> str:
+def degrees_hint(ends: tuple[float, float], x: float, unit: str) -> str:
     """Return a clause for a range that was written in rad and read in degrees, as x within the
     same numbers in rad suggests; "" for others.
     """

@@ -65,7 +65,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, has, shown
 from smc_mujoco.common.text import first_paragraph, joined, number
 from smc_mujoco.mechanisms.custom.scales import falls
@@ -94,7 +94,7 @@ AFTER_TURN = 0.15
 CATALOGUE: dict[str, Metric] = {}  # filled by @metric, in order of definition
 
 
-@named_data
+@keyword_dataclass
 class ChannelGroup:
     """Channels of one kind and one unit."""
 
@@ -169,7 +169,7 @@ def group_trace(trace: Trace, group: ChannelGroup) -> Trace:
     return dataclasses.replace(trace, **arrays)
 
 
-@named_data
+@keyword_dataclass
 class Metric:
     """A metric's entry in the catalogue."""
 

@@ -25,7 +25,7 @@ class Fold(NamedTuple):
     signal: str
     # of the worst channel: "largest", "range", "sum", "mean"; summed over the channels: "integral"
     # by the trapezoid rule, "held" of a signal that is held between samples
-    how: Literal["largest", "range", "sum", "mean", "integral", "held"]
+    reduction: Literal["largest", "range", "sum", "mean", "integral", "held"]
     # of the signal's magnitude; of a mean 2 with its root; 0 takes the signal with its sign
     power: int = 1
     part: Literal["", "early", "late"] = ""  # all samples; all but the transient; the last part
@@ -35,22 +35,22 @@ class Fold(NamedTuple):
 
     def of(self, t: Array, signal: Array) -> float:
         """Return the value for times t, (K + 1,), and a signal, (K + 1, n)."""
-        if self.how not in ("integral", "held"):
+        if self.reduction not in ("integral", "held"):
             return self.channels(t, signal).max()
         t, y = self._taken(t, signal)
         total = y.sum(axis=1)
         if self.timed:
             total = (t - t[0]) * total
-        return np.trapezoid(total, t) if self.how == "integral" else total[:-1] @ np.diff(t)
+        return np.trapezoid(total, t) if self.reduction == "integral" else total[:-1] @ np.diff(t)
 
     def channels(self, t: Array, signal: Array) -> Array:
         """Return the value of each channel, (n,), of a fold of the worst channel."""
         t, y = self._taken(t, signal)
-        if self.how == "largest":
+        if self.reduction == "largest":
             return y.max(axis=0, initial=0.0)
-        if self.how == "range":
+        if self.reduction == "range":
             return np.ptp(y, axis=0)
-        if self.how == "mean":
+        if self.reduction == "mean":
             mean = y.mean(axis=0)
             return np.sqrt(mean) if self.power == 2 else np.abs(mean)
         total = y.sum(axis=0)

@@ -1,4 +1,4 @@
-"""Results kept for each trace, because tables, figures and films ask for the same."""
+"""Results cached for each trace, because tables, figures and films ask for the same."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ V = TypeVar("V")
 
 
 def once_per_trace(function: Callable[[Trace], V]) -> Callable[[Trace], V]:
-    """Decorate a function of a trace: a result is computed once, and kept as long as its trace
+    """Decorate a function of a trace: a result is computed once, and cached as long as its trace
     exists.
     """
 
     @functools.wraps(function)
-    def kept(trace: Trace) -> V:
-        results = vars(kept)["results"]
+    def cached(trace: Trace) -> V:
+        results = vars(cached)["results"]
         if trace not in results:
             results[trace] = function(trace)
         return results[trace]
 
     # of the function, not of its closure, because a hash of its code has to leave the results out
-    vars(kept)["results"] = weakref.WeakKeyDictionary()
-    return kept
+    vars(cached)["results"] = weakref.WeakKeyDictionary()
+    return cached

@@ -79,7 +79,7 @@ def enter(
         "seed": seed,
         "instances": count,
         "entry": entry.about,
-        "hashes": {"table": hashlib.sha256(content).hexdigest()} | made_under(problems),
+        "hashes": {"table": hashlib.sha256(content).hexdigest()} | rules_digests(problems),
         "versions": versions(),
         "machine": f"{platform.machine()}, {platform.system()}, {os.cpu_count()} cores",
     }
@@ -111,7 +111,7 @@ def _check_same_runs(target: Path, folder: AnyPath, content: bytes) -> None:
         )
 
 
-def made_under(problems: Sequence[str]) -> dict[str, str]:
+def rules_digests(problems: Sequence[str]) -> dict[str, str]:
     """Return the hashes of the rules and of the list of a suite's problems."""
     texts = {"rules": problem(problems[0]).rules, "suite": "\n".join(problems)}
     digests = {}

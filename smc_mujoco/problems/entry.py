@@ -26,12 +26,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from smc_mujoco.common.aliases import AnyPath, Data, Fields, Names, Numbers
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
 from smc_mujoco.common.files import reading
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.from_text import law as law_of
-from smc_mujoco.control.law import Law, known_laws
+from smc_mujoco.control.law import Law, all_laws
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.mechanisms.plant import plants
 
@@ -46,7 +46,7 @@ DIVISIONS = {
 EVERYWHERE = "all"  # the set of gains of the division "one set"
 
 
-@named_data
+@keyword_dataclass
 class Entry:
     """An entry, as its folder says.
 
@@ -94,7 +94,7 @@ def read(folder: AnyPath) -> Entry:
       ScenarioError: no or several laws, a missing or wrong line of entry.toml, or gains for a
         single problem.
     """
-    if folder in known_laws() and not os.path.isdir(folder):
+    if folder in all_laws() and not os.path.isdir(folder):
         return _of_library(str(folder))
     folder = Path(folder)
     laws = []

@@ -23,11 +23,11 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array, Data, Floats, Names, Numbers
 from smc_mujoco.common.cached import cached_property
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown, whole
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
-from smc_mujoco.control.law import Law, known_laws
+from smc_mujoco.control.law import Law, all_laws
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import ITAE, TV
@@ -48,7 +48,7 @@ MEASURES = "accuracy", "settling", "calm"  # that have targets
 SIZES = "sigma", "amplitude", "x", "y", "z", "w20"  # fields of a disturbance that scale it
 
 
-@named_data
+@keyword_dataclass
 class Instance:
     """What distinguishes an instance of a problem from the others: a side and factors, see the
     rules.
@@ -61,7 +61,7 @@ class Instance:
     seed: int
 
 
-@named_data
+@keyword_dataclass
 class Problem:
     """A problem. It is made by `problem`.
 
@@ -172,7 +172,7 @@ class Problem:
 
     def _base(self, law: str | Law | Template) -> Scenario:
         """Return the scenario before anything is drawn."""
-        if isinstance(law, str) and law in known_laws():
+        if isinstance(law, str) and law in all_laws():
             shipped = gain_sets.in_set(find_plant(self.plant), law, "tuned")
             law = gain_sets.law(self.plant, law, "tuned" if shipped else "default")
         changes = {"u_max": self.u_max, "control_period": self._values["control_period"]}
@@ -242,7 +242,7 @@ class Problem:
             "failed": 0.0,
             "accuracy": max(last, self._values["floor"]),
             "itae": float(ITAE.of(trace.t, total[:, None])),
-            "settling": _kept(trace, worst, conventions.SETTLING_BAND),
+            "settling": _within_from(trace, worst, conventions.SETTLING_BAND),
             "calm": float(variation.max() / self.duration),
         }
         return values | self._times(trace, worst, values)
@@ -251,7 +251,7 @@ class Problem:
         """Return the time of each target, by name."""
         reached = []
         for level in self.targets.get("accuracy", ()):
-            reached.append(_kept(trace, worst, level))
+            reached.append(_within_from(trace, worst, level))
         times = dict(zip(self._names(), map(_or_never, reached), strict=False))
         counted = {
             "settling": _or_never(values["settling"]),
@@ -357,7 +357,7 @@ def _scaled(signal: Any, factor: float) -> Any:
     return dataclasses.replace(signal, **sizes)
 
 
-def _kept(trace: Trace, error: Array, level: float) -> float:
+def _within_from(trace: Trace, error: Array, level: float) -> float:
     """Return the time from which an error, (K + 1,), is kept below a level, s; inf if that is in
     the last fifth.
     """

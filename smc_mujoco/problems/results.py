@@ -28,7 +28,7 @@ from smc_mujoco.analysis import ranking
 from smc_mujoco.analysis.bootstrap import LEVEL, draws
 from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair, Data, Fields, Names, Numbers
 from smc_mujoco.common.cached import cached_property
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import as_path, read_json, reading, slug
 from smc_mujoco.problems import enter, entry_runs, suite
@@ -82,7 +82,7 @@ def _check(values: Any, fields: Data) -> None:
             raise ScenarioError(f"its {name} is {shown(values.get(name))}")
 
 
-@named_data
+@keyword_dataclass
 class Standing:
     """The place of an entry on a board."""
 
@@ -95,7 +95,7 @@ class Standing:
     reached: float  # share of the targets of all runs that are reached and kept
 
 
-@named_data
+@keyword_dataclass
 class QuestionBoard:
     """A question and the entries' places."""
 
@@ -127,7 +127,7 @@ class EntryResult:
             if slug(self.name) != folder.name:
                 raise ScenarioError(f"it is the result of {shown(self.name)}, in another's folder")
             self.problems = suite.suite(self.about["suite"])
-            for what, digest in enter.made_under(self.problems).items():
+            for what, digest in enter.rules_digests(self.problems).items():
                 if digest != self.about["hashes"][what]:
                     raise ScenarioError(f"it is of another {what} than {self.about['suite']} here")
         with reading(self.table, "table of runs", CURE) as file:
@@ -296,7 +296,7 @@ class Results:
         return Change(entry=name, question=question, ratios=ratios)
 
 
-@named_data
+@keyword_dataclass
 class Change:
     """How the medians of an entry on a board's problems changed: problem -> the new one over the
     old one.
@@ -333,7 +333,7 @@ class Change:
         return line
 
 
-@named_data
+@keyword_dataclass
 class Changes:
     """What changed between two results on a suite, by entry and board."""
 

@@ -32,7 +32,7 @@ from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.common.constraints import Boolean, Called, constrained
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.common.text import number
@@ -130,7 +130,7 @@ def find_boundaries(
 # the kinds of margins
 
 
-@named_data
+@keyword_dataclass
 class MarginKind:
     """A kind of margin: something that a law tolerates up to some level."""
 
@@ -337,7 +337,7 @@ KINDS = "delay", "disturbance", "friction", "mass", "noise"
 # margins of laws on plants
 
 
-@named_data
+@keyword_dataclass
 class Margin:
     """The largest level of one kind that one law tolerates on one plant."""
 

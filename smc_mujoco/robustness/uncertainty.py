@@ -23,7 +23,7 @@ import numpy as np
 from smc_mujoco.common import constraints
 from smc_mujoco.common.aliases import Array, Pair
 from smc_mujoco.common.constraints import Natural, Positive, constrain, suggesting
-from smc_mujoco.common.data import frozen_data, named_data
+from smc_mujoco.common.data import frozen_data, keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
@@ -51,7 +51,7 @@ Range = Annotated[tuple[float, float], constraints.Range(low=0.0)]
 
 
 @suggesting
-@named_data
+@keyword_dataclass
 class Uncertainty:
     """What may happen: bounds on disturbance, noise, delay and parameters.
 
@@ -214,7 +214,7 @@ class Member:
     noise: Array  # (2, times); times is 0 without noise
     kind: str = ""  # the strategy that made it
 
-    def named(self, kind: str) -> "Member":
+    def of_kind(self, kind: str) -> "Member":
         """Return this member as one of another strategy."""
         return dataclasses.replace(self, kind=kind)
 

@@ -248,7 +248,7 @@ class WorstCaseSearch:
             else:
                 base = members.bare
             if self.swing is None:
-                yield [Case(members.bare.named("no error"))]
+                yield [Case(members.bare.of_kind("no error"))]
             if self.swing:
                 errors = measurement_errors(self.swing, members.times, members.hold)
             else:
@@ -267,7 +267,7 @@ class WorstCaseSearch:
             then = "sign of e'"
             if kind != then:
                 kind = f"{kind}, then {then}"
-            member = worst.member.named(kind)
+            member = worst.member.of_kind(kind)
             relays = []
             for share in SWITCH_TIMES:
                 relays.append(Relay(self.members.within.disturbance, rate=1.0, start=share * end))
@@ -276,7 +276,7 @@ class WorstCaseSearch:
 
     def _relayed(self, kind: str, sign: float = 1.0, **weights: float) -> Case:
         relay = Relay(sign * self.members.within.disturbance, **weights, slope=self.members.slope)
-        return Case(self.members.bare.named(kind), relay)
+        return Case(self.members.bare.of_kind(kind), relay)
 
     def _forced(self, kind: str, force: Array) -> Case:
         """Return a member with a force, limited to the class."""

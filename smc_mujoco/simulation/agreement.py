@@ -41,7 +41,7 @@ Call = Callable[..., int]  # with the pointers of a C function, see cfunctions
 def check_component(c: Component, n: int, driven: int) -> None:
     """Check a law, a surface or an estimator, of a plant of n channels."""
     made = cfunctions.compile_component(c)
-    if isinstance(made, AtAddress) or _known(made, c.function):
+    if isinstance(made, AtAddress) or _needs_no_check(made, c.function):
         return
     name = f"{c.kind} {c.name!r}"
     if c.joint:
@@ -58,7 +58,7 @@ def check_component(c: Component, n: int, driven: int) -> None:
 def check_signal(signal: Signal) -> None:
     """Check a reference, a disturbance or another signal."""
     made = cfunctions.compile_signal(signal)
-    if _known(made, type(signal).value):
+    if _needs_no_check(made, type(signal).value):
         return
     inputs = _inputs(state.INSTANT.names)
     python = python_functions.of_signal(signal)
@@ -70,7 +70,7 @@ def check_signal(signal: Signal) -> None:
 def check_part(part: Part, kind: str, numbers: Callable[[], Sequence[float]]) -> None:
     """Check what a part does on one joint, with its numbers of one."""
     made = cfunctions.compile_part(part, kind)
-    if kind not in cfunctions.OF_JOINTS or _known(made, getattr(part, kind)):
+    if kind not in cfunctions.OF_JOINTS or _needs_no_check(made, getattr(part, kind)):
         return
     record = Sight if kind == "read" else JointState
     inputs = _inputs(record._fields)
@@ -94,7 +94,7 @@ class NoDynamics:
         raise ValueError("there is no tip")
 
 
-def _known(made: CompiledFunction, function: Any) -> bool:
+def _needs_no_check(made: CompiledFunction, function: Any) -> bool:
     """Return whether a function needs no check: it had one, or is of this package."""
     return made.checked or fingerprint.ours(function)
 
@@ -157,7 +157,7 @@ def _check(
 
     attended([measure], bool)  # it may never return
     once, twice = rounds
-    if not all(map(_same, once, twice)):
+    if not all(map(_agree, once, twice)):
         warnings.warn(
             f"{name} gives other numbers when it is called again with the same inputs, so its runs "
             "cannot be repeated: keep its state in its memory, and let smc.Noise or a disturbance "
@@ -176,7 +176,7 @@ def _check(
         warnings.simplefilter("ignore")
         expected = _results(python.call, inputs, parameters, memory, count, python)
     for own, other in zip(once, expected, strict=False):  # as far as Python came
-        if not _same(own, other):
+        if not _agree(own, other):
             made.differs = (
                 f"gives {_words(own, count)} compiled and {_words(other, count)} in Python, for "
                 "the same inputs: compiled integers have 64 bits and wrap, and numbers of small "
@@ -218,7 +218,7 @@ def _results(
     return found
 
 
-def _same(a: Array | None, b: Array | None) -> bool:
+def _agree(a: Array | None, b: Array | None) -> bool:
     if a is None or b is None:
         return a is b
     alike = np.allclose(a, b, rtol=TOLERANCE, atol=1e-12, equal_nan=True)

@@ -22,7 +22,7 @@ def code_hashes(s: Scenario, plants: Hashes) -> list[str]:
         if part is not None:
             things.append(part.function)
     references = dict.fromkeys(s.references)
-    for signal in (*references, s.known_signal, *s.disturbance):
+    for signal in (*references, s.feedforward_signal, *s.disturbance):
         if signal is not None:
             things.append(type(signal))
     for part in (*s.friction, *s.compensated, *s.contact, *s.actuator):

@@ -92,7 +92,7 @@ def laws(name: str, value: Laws | None, s: Any) -> Law:
     if not isinstance(value, Mapping | list | tuple):
         return _of_plant(value, s)
     channels = []
-    for item in one_per_channel(name, value, s.plant):
+    for item in values_per_channel(name, value, s.plant):
         channels.append(_of_plant(item, s))
     return by_channel(channels)
 
@@ -106,7 +106,7 @@ def _of_plant(value: Any, s: Any) -> Law:
     as_tuned = s.model in (None, model) and s.surface is None and s.tracks == "position"
     if value == chosen.name and as_tuned and gain_sets.in_set(s.plant, chosen.name, "tuned"):
         chosen = gain_sets.law(s.plant, chosen.name)
-        warn_once(gain_sets.said(s.plant, chosen))
+        warn_once(gain_sets.shipped_gains_notice(s.plant, chosen))
     return chosen
 
 
@@ -154,7 +154,7 @@ def input_delay(name: str, value: float, s: Any) -> float:
     return number(name, value, low=0.0, high=s.duration)
 
 
-def one_per_channel(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
+def values_per_channel(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
     """Return one value for each driven channel of a plant, in order, from a sequence, or a mapping
     by joint.
     """
@@ -185,7 +185,7 @@ def bound(name: str, value: float | ByChannel[float] | None, s: Any) -> float | 
         value = value.tolist()
     items: list[Any] = [value]
     if isinstance(value, Mapping | list | tuple):
-        items = one_per_channel(name, value, s.plant)
+        items = values_per_channel(name, value, s.plant)
     bounds = tuple(number(name, item, above=0.0, infinite=True) for item in items)
     return bounds[0] if len(set(bounds)) == 1 else bounds
 
@@ -329,7 +329,7 @@ def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
     others: list[Any] = []  # of measured channels
     if isinstance(value, Mapping | list | tuple):
         own, others = _split(value, plant)
-        items = one_per_channel("reference", own, plant) + others
+        items = values_per_channel("reference", own, plant) + others
     for item in items:
         if not isinstance(item, Signal):
             amplitude = "0.0"
@@ -525,12 +525,12 @@ def _kept(items: list[Actuator], plant: Plant) -> list[Actuator]:
             vars(own)["kept"] = True  # the class is frozen
             if own in items:
                 items.remove(own)
-            if not _given(items, part, joint):
+            if not _has_drive(items, part, joint):
                 parts.append(own)
     return parts
 
 
-def _given(items: Sequence[Actuator], part: Actuator, joint: str) -> bool:
+def _has_drive(items: Sequence[Actuator], part: Actuator, joint: str) -> bool:
     """Say whether a joint has a given drive of the part's kind; one without names is of all."""
     for item in items:
         on_joint = not item.on or joint in item.on

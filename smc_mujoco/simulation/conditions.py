@@ -50,7 +50,7 @@ from smc_mujoco.common.errors import ScenarioError, find, number, shown, unknown
 from smc_mujoco.common.files import reading
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.registry import subclasses
-from smc_mujoco.common.scripts import IN_FILE, WITHIN, named, place
+from smc_mujoco.common.scripts import IN_FILE, WITHIN, object_named, place
 from smc_mujoco.common.text import stated
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template
@@ -251,7 +251,7 @@ def find_condition(value: Condition | str) -> Condition:
         raise ScenarioError(f"condition is {shown(value)}: give a name, or smc.condition(...)")
     if in_file := IN_FILE.fullmatch(value):
         kind = f'condition (of a part: "{in_file["name"]}: friction={value}")'
-        return named(value, kind, lambda thing: isinstance(thing, Condition))
+        return object_named(value, kind, lambda thing: isinstance(thing, Condition))
     if ":" in value:
         return parse(value)
     if set("=(") & set(value):
@@ -368,7 +368,7 @@ def _call(node: ast.Call) -> Any:
     """Return the part, signal or estimator that a call makes."""
     kind: Any
     if isinstance(node.func, ast.Constant):
-        kind = named(str(node.func.value), WHAT, _usable)
+        kind = object_named(str(node.func.value), WHAT, _usable)
     else:
         name = ast.unparse(node.func).removeprefix("smc.")
         kind = find(WHAT, name, estimators() | _kinds())
@@ -534,13 +534,13 @@ def _stepper(plant: Plant, duration: float) -> Data:
         motor = of_rig(30.0 * default_u_max(plant))
         return {"actuator": motor, "u_max": motor.ramp}
     slowest, fastest = STEPPER_ACCELERATIONS
-    for name, joint in zip(channel_names(plant), _own_joints(plant), strict=False):
+    for name, joint in zip(channel_names(plant), _joint_sizes(plant), strict=False):
         able = joint.limit / joint.inertia
-        if not slowest <= able <= fastest or joint.way < SHORTEST_WAY_OF_STEPS:
+        if not slowest <= able <= fastest or joint.travel < SHORTEST_WAY_OF_STEPS:
             raise ScenarioError(
                 f"condition 'stepper' has the steps and rates of a rig, and joint {name!r} of "
                 f"{plant.name} has {able:.2g} rad/s^2 (m/s^2) at its bound and moves by "
-                f"{joint.way:.2g} rad (m): give your own, as pulses: "
+                f"{joint.travel:.2g} rad (m): give your own, as pulses: "
                 "actuator=Stepper(torque=2, speed=60, ramp=80), u_max=80"
             )
     each: Any = _each_joint("actuator", lambda limit, plant: of_rig(30.0 * limit))
@@ -604,15 +604,15 @@ def _bristles(level: float, plant: Plant) -> Friction:
     return LuGre(0.5 * level, level, stribeck=0.05, stiffness=stiffness)
 
 
-class Own(NamedTuple):
+class JointSize(NamedTuple):
     """The size of a driven joint."""
 
     limit: float  # N m or N, its largest force
     inertia: float  # kg m^2 or kg, at the goal
-    way: float  # rad or m, from where runs start to the goal
+    travel: float  # rad or m, from where runs start to the goal
 
 
-def _own_joints(plant: Plant) -> list[Own]:
+def _joint_sizes(plant: Plant) -> list[JointSize]:
     """Return the sizes of the driven joints."""
     at = at_goal(plant)
     inertias = np.diag(at.M)[at.dofs].tolist()
@@ -622,11 +622,11 @@ def _own_joints(plant: Plant) -> list[Own]:
     joints = zip(limits, inertias, ways, strict=True)
     own = []
     for limit, inertia, way in joints:
-        own.append(Own(limit, inertia, way or BESIDE))
+        own.append(JointSize(limit, inertia, way or BESIDE))
     return own
 
 
-def _fitted(usual: Actuator, fit: Callable[[Own], Actuator]) -> Recipe:
+def _fitted(usual: Actuator, fit: Callable[[JointSize], Actuator]) -> Recipe:
     """Return a recipe for an actuator: the usual one, or one that fits each driven joint of a
     user's model.
     """
@@ -634,7 +634,7 @@ def _fitted(usual: Actuator, fit: Callable[[Own], Actuator]) -> Recipe:
     def fields(plant: Plant, duration: float) -> Data:
         if not plant.is_user_model or plant.pose:
             return {"actuator": usual}
-        parts = list(map(fit, _own_joints(plant)))
+        parts = list(map(fit, _joint_sizes(plant)))
         if len(set(parts)) == 1:
             return {"actuator": parts[0]}
         by_joint = zip(channel_names(plant), parts, strict=False)
@@ -643,10 +643,10 @@ def _fitted(usual: Actuator, fit: Callable[[Own], Actuator]) -> Recipe:
     return fields
 
 
-def _backlash(joint: Own) -> Backlash:
+def _backlash(joint: JointSize) -> Backlash:
     """Return the study's play and rotor as shares of the way and of the inertia."""
     rotor = max(ROTOR_SHARE * joint.inertia, MIN_INERTIA)
-    return Backlash(0.01 * min(1.0, joint.way / BESIDE), rotor_inertia=rotor)
+    return Backlash(0.01 * min(1.0, joint.travel / BESIDE), rotor_inertia=rotor)
 
 
 def _elastic(plant: Plant, duration: float) -> Data:
@@ -656,8 +656,8 @@ def _elastic(plant: Plant, duration: float) -> Data:
     if plant.pose:
         return {"actuator": ElasticJoint(1.0)}  # which the caller refuses
     parts = []
-    joints = _own_joints(plant)
-    way = max(joint.way for joint in joints)
+    joints = _joint_sizes(plant)
+    way = max(joint.travel for joint in joints)
     for joint in joints:
         rotor = max(ELASTIC_ROTOR * joint.inertia, MIN_INERTIA)
         moving = rotor * joint.inertia / (rotor + joint.inertia)
@@ -685,11 +685,11 @@ def _encoder(plant: Plant, duration: float) -> Data:
     """
     way = BESIDE
     if plant.is_user_model and not plant.pose:
-        way = min(BESIDE, *(joint.way for joint in _own_joints(plant)))
+        way = min(BESIDE, *(joint.travel for joint in _joint_sizes(plant)))
     return {"sensor": Encoder(counts=math.ceil(4096 * BESIDE / way))}
 
 
-def _motor(joint: Own) -> DCMotor:
+def _motor(joint: JointSize) -> DCMotor:
     """Return as many default motors in parallel as the bound is times the study's; with less gear
     where the joint accelerates faster than the study's, so that the rotors are no heavier beside
     it.

@@ -26,7 +26,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Data, Fields, Floats
 from smc_mujoco.common.constraints import Natural, Whole, constrained
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import (
     MAX_ITEMS,
     ScenarioError,
@@ -42,7 +42,7 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import from_text
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.control.law import Law, checked_name, known_laws
+from smc_mujoco.control.law import Law, all_laws, checked_name
 from smc_mujoco.mechanisms.custom.clearance import raised
 from smc_mujoco.mechanisms.custom.scales import beside_goal
 from smc_mujoco.mechanisms.hardware.contact import kinds
@@ -66,7 +66,7 @@ ERROR_STREAM = 2**31  # beyond the channels, whose starts are drawn with their i
 START_CURE = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"
 
 
-@named_data
+@keyword_dataclass
 class Starts:
     """Where runs begin, by seed. The fields are the arguments of `starts`."""
 
@@ -394,11 +394,11 @@ def check_names(
 
 def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Component:
     """Return a law, or the law of a name with its gains for the plant."""
-    if not isinstance(law, str) or law not in known_laws():
+    if not isinstance(law, str) or law not in all_laws():
         return checked_name(coerce.law(law))
     gains = "default" if law == "none" else gains
     with_gains = sets.law(plant, law, gains, seed)
-    if gains != "default" and (doubt := sets.of_other_parameters(plant, gains)):
+    if gains != "default" and (doubt := sets.other_parameters_warning(plant, gains)):
         warnings.warn(doubt, ScenarioWarning, users_stacklevel())
     return with_gains
 

@@ -156,7 +156,7 @@ def _compile(s: Resolved) -> None:
     """
     signals = (
         *dict.fromkeys(s.references),
-        *filter(None, (s.known_signal, *s.noise.errors)),
+        *filter(None, (s.feedforward_signal, *s.noise.errors)),
         *s.disturbance,
     )
     for signal in signals:
@@ -282,7 +282,7 @@ class Functions(state.Buffer):
 
     def component(self, c: Component) -> Any:
         """Return a law, a surface or an estimator."""
-        return self._made(cfunctions.compile_component, "of_component", c, self.s)
+        return self._compiled_or_called(cfunctions.compile_component, "of_component", c, self.s)
 
     def laws(self) -> list[Component]:
         """Return the laws of the driven channels, or one for all.
@@ -297,20 +297,22 @@ class Functions(state.Buffer):
 
     def signal(self, signal: Signal) -> Any:
         """Return a reference, a disturbance or another signal."""
-        return self._made(cfunctions.compile_signal, "of_signal", signal)
+        return self._compiled_or_called(cfunctions.compile_signal, "of_signal", signal)
 
     def nominal(self, plant: Plant) -> Any:
         """Return a nominal model that is not MuJoCo's."""
-        return self._made(cfunctions.compile_nominal, "of_nominal", plant)
+        return self._compiled_or_called(cfunctions.compile_nominal, "of_nominal", plant)
 
     def part(self, part: Part, kind: str) -> Any:
         """Return a function of a part, see hardware/moments.py."""
         if kind not in cfunctions.OF_JOINTS:
             return cfunctions.compile_part(part, kind)
         compiler = functools.partial(cfunctions.compile_part, kind=kind)
-        return self._made(compiler, "of_part", part, kind)
+        return self._compiled_or_called(compiler, "of_part", part, kind)
 
-    def _made(self, compiler: Callable, caller: str, thing: Any, *arguments: Any) -> Any:
+    def _compiled_or_called(
+        self, compiler: Callable, caller: str, thing: Any, *arguments: Any
+    ) -> Any:
         if not self.called:
             with contextlib.suppress(NotCompilable):
                 return compiler(thing)
@@ -388,8 +390,8 @@ def _shared_functions(s: Resolved, nominal: Native | None, buffer: Functions) ->
         )
     elif not s.plant.by_mujoco:
         function = buffer.nominal(s.plant)
-        fields["nominal"] = _function(function, known_values(s), buffer)
-    signals = {"feedforward": s.known_signal}
+        fields["nominal"] = _function(function, nominal_values(s), buffer)
+    signals = {"feedforward": s.feedforward_signal}
     signals |= {"position_error": s.noise.position_error, "velocity_error": s.noise.velocity_error}
     for name, signal in signals.items():
         if signal:
@@ -461,7 +463,7 @@ def _arrays(s: Resolved, buffer: Functions) -> dict[str, Any]:
     }
 
 
-def known_values(s: Resolved) -> list[float]:
+def nominal_values(s: Resolved) -> list[float]:
     """Return the values of the plant's parameters as the law's model has them: true ones in the
     model "true".
     """
@@ -517,7 +519,7 @@ def _native_nominal(s: Resolved) -> Native | None:
     if not s.plant.by_mujoco:
         return None
     if not s.law.joint:
-        known = dict(zip(s.plant.parameters, known_values(s), strict=True))
+        known = dict(zip(s.plant.parameters, nominal_values(s), strict=True))
         return s.plant.nominal.native(known)
     if s.model == "none":
         return None

@@ -120,7 +120,7 @@ def run(
     one core busy until Python ends, with exit code 130.
     """
     shown_bar = Flag()("progress", progress)
-    prepared = list(map(prepare, one_or_several(scenarios)))
+    prepared = list(map(prepare, as_iterable(scenarios)))
     for item in prepared:
         warn_once(blind(item.scenario.plant, item.scenario.law.parts))
         warn_once(doubts.of_default_gains(item.scenario))
@@ -139,7 +139,7 @@ def run(
     return [traces[i] for i in range(len(prepared))]
 
 
-def one_or_several(scenarios: Any) -> Iterable[Scenario | Prepared]:
+def as_iterable(scenarios: Any) -> Iterable[Scenario | Prepared]:
     """Return one scenario, or what yields several, as the latter."""
     if isinstance(scenarios, Scenario):
         return [scenarios]
@@ -171,7 +171,7 @@ def stream(
     threads = cores(threads)
     if not callable(report):
         raise ScenarioError(f"report is {shown(report)}: give a function of a number of steps")
-    for batch in _batches(enumerate(map(prepare, one_or_several(scenarios))), threads):
+    for batch in _batches(enumerate(map(prepare, as_iterable(scenarios))), threads):
         indices, items = zip(*batch, strict=True)
         if items[0].why_not:
             words = f"{items[0].why_not}; it runs in Python, several times slower"
@@ -217,7 +217,7 @@ def return_freed_memory() -> None:
 
 
 @functools.cache
-def give_large_blocks_pages_of_their_own() -> None:
+def lower_mmap_threshold() -> None:
     """Have the C library, if it is glibc, return freed blocks of LARGE bytes to the system at once.
 
     Otherwise it keeps them for later blocks of that size, such as the arena of an mjData, whose
@@ -314,7 +314,7 @@ class ScenarioBatch:
         off: int = 0,
         python: bool = False,
     ):
-        give_large_blocks_pages_of_their_own()
+        lower_mmap_threshold()
         self.prepared = prepared
         self.python = python
         self.scenarios = scenarios = [item.scenario.resolved for item in prepared]

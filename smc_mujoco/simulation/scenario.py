@@ -390,7 +390,7 @@ class Scenario:
         return next((part for part in self.sensors if i in part.channels(self.plant)), None)
 
     @property
-    def known_signal(self) -> Signal | None:
+    def feedforward_signal(self) -> Signal | None:
         """The feedforward that is a signal."""
         return self.feedforward if isinstance(self.feedforward, Signal) else None
 

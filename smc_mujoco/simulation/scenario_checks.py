@@ -16,7 +16,7 @@ from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
 from smc_mujoco.mechanisms.hardware.part import Friction
 from smc_mujoco.mechanisms.hardware.rotors import flies
 from smc_mujoco.mechanisms.layout import driven_names, loaded
-from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant, check_ranges, degrees_meant
+from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant, check_ranges, degrees_hint
 from smc_mujoco.simulation.law_checks import check_inertia, check_law
 from smc_mujoco.simulation.signals import (
     Dryden,
@@ -102,18 +102,18 @@ def check_signals(s: Any) -> None:
             raise ScenarioError(
                 f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it"
             )
-    for signal in (*s.disturbance, s.known_signal):
+    for signal in (*s.disturbance, s.feedforward_signal):
         if getattr(signal, "about", ""):
             raise ScenarioError(f"{shown(signal)} is about the goal: only a reference may be")
-    if any(isinstance(signal, PerChannel) for signal in (*s.disturbance, s.known_signal)):
+    if any(isinstance(signal, PerChannel) for signal in (*s.disturbance, s.feedforward_signal)):
         raise ScenarioError(
             "only a reference may have a signal for each channel: give one signal for all"
         )
     _check_forces(s)
     for signal in dict.fromkeys(s.references):
         check_function_of_time("reference", signal, "a smooth signal")
-    if s.known_signal:
-        check_function_of_time("feedforward", s.known_signal, "a known signal of u")
+    if s.feedforward_signal:
+        check_function_of_time("feedforward", s.feedforward_signal, "a known signal of u")
 
 
 def _check_forces(s: Any) -> None:
@@ -151,7 +151,7 @@ def check_reference_ranges(s: Any) -> None:
             raise ScenarioError(
                 f"the reference of joint {joint!r} of {s.plant.name} goes from {least:.4g} to "
                 f"{most:.4g}, beyond its range from {low:g} to {high:g}: give another reference"
-                f"{degrees_meant((low, high), max(least, most, key=abs), unit)}"
+                f"{degrees_hint((low, high), max(least, most, key=abs), unit)}"
             )
 
 

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.constraints import Constraint
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, one_line, shown
 from smc_mujoco.common.extras import extra
 from smc_mujoco.common.version import versions
@@ -72,7 +72,7 @@ def called(
         why = one_line(str(error)).rstrip(".") or "its tasks were cancelled"
         raise ScenarioError(f"the executor has stopped ({why}): {AGAIN}") from None
     except ImportError as error:  # of this module, by the executor itself
-        raise ScenarioError(_other_software(str(error))) from None
+        raise ScenarioError(_version_mismatch(str(error))) from None
     finally:
         for future in sent:
             future.cancel()
@@ -103,15 +103,15 @@ def _on_worker(call: bytes, sender: dict[str, str]) -> Any:
         for name, version in sender.items():
             if here.get(name) != version:
                 other.append(f"{name} {here.get(name)}")
-        raise ScenarioError(_other_software(", ".join(other)))
+        raise ScenarioError(_version_mismatch(", ".join(other)))
     try:
         function, arguments = pickle.loads(call)
     except (ImportError, AttributeError) as error:
-        raise ScenarioError(_other_software(one_line(str(error)))) from None
+        raise ScenarioError(_version_mismatch(one_line(str(error)))) from None
     return function(*arguments)
 
 
-def _other_software(what: str) -> str:
+def _version_mismatch(what: str) -> str:
     return (
         f"a worker has other software than this process ({what}): install there what is installed "
         "here, and your own modules"
@@ -126,8 +126,8 @@ def software() -> dict[str, str]:
     return {"Python": python, **versions(), "code": code}
 
 
-@named_data
-class Where(Constraint):
+@keyword_dataclass
+class ExecutorAddress(Constraint):
     """An Executor, a dask Client, or the address of a dask scheduler."""
 
     def __call__(self, what: str, value: Any) -> Any:
@@ -141,7 +141,7 @@ class Where(Constraint):
         )
 
 
-Workers = Annotated["Executor | Client | str", Where()]  # where calls are made
+Workers = Annotated["Executor | Client | str", ExecutorAddress()]  # where calls are made
 
 
 @contextlib.contextmanager

@@ -18,7 +18,7 @@ from smc_mujoco.analysis.paired_runs import (
 from smc_mujoco.analysis.ranking import LEVEL_SHARE, Effect, Rank, needed_to_rank, needed_to_win
 from smc_mujoco.analysis.step_halving import APART, RANGE, UNTRIED
 from smc_mujoco.common.aliases import Names, Numbers, Pair
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import capital, counted, every, joined, number
 from smc_mujoco.control.source import Source, in_words, kinds
@@ -69,7 +69,7 @@ UNDER = {
 }
 
 
-@named_data
+@keyword_dataclass
 class BoardEntry:
     """A law's line in a board."""
 
@@ -115,7 +115,7 @@ class Lead(NamedTuple):
         return f"{ratio} times {self.rival}'s ({low} to {high}), {ahead}"
 
 
-@named_data
+@keyword_dataclass
 class Block:
     """Laws compared on one plant in one condition. A law's name is the key of the mappings."""
 
@@ -175,7 +175,7 @@ class Block:
         return f"{names} are below the floor of {self.floor}, so they are not ranked"
 
     @property
-    def all_alike(self) -> bool:
+    def all_settle_or_none(self) -> bool:
         """Whether every run of every law settles, or none, for the share of runs that do not."""
         shares = set(self.medians.values())
         return shares in ({0.0}, {1.0})
@@ -258,7 +258,7 @@ class Board(Tables):
         return LABELS.get(self.metric) or CATALOGUE[self.metric].label
 
     @property
-    def where(self) -> str:
+    def setting(self) -> str:
         """The plant and the conditions in words, such as " on duffing under noise"."""
         if self.metric == OBJECTIVE:
             return f" of {self.group['plant']}"
@@ -268,7 +268,7 @@ class Board(Tables):
     @property
     def verdict(self) -> str:
         """The metric, the plant, the conditions and the `result`."""
-        return f"{self.label}{self.where}: {self.result}"
+        return f"{self.label}{self.setting}: {self.result}"
 
     @property
     def result(self) -> str:
@@ -327,22 +327,22 @@ class Board(Tables):
             return reason
         if not self.best:
             return "every law is beaten in some condition"
-        return self.alike
+        return self.tie
 
     def _tied(self, block: Block) -> str:
         """Return why no number of samples would tell the laws of a block apart; "" if one may."""
-        if self.metric == SETTLES and block.all_alike:
+        if self.metric == SETTLES and block.all_settle_or_none:
             return f"{'both laws' if len(self.entries) == 2 else 'all laws'} {SAME_RUNS}"
         return block.lowest
 
     @property
-    def alike(self) -> str:
+    def tie(self) -> str:
         """That the best laws are level or statistically indistinguishable, and the largest of the
         least leads that would have been seen; which law is below the floor, where one is.
         """
         for block in self.blocks:
             if block.lead and block.lead.floor:
-                undefeated = f"{joined(self.best)} {_are(self.best)} undefeated"
+                undefeated = f"{joined(self.best)} {_is_or_are(self.best)} undefeated"
                 return f"{undefeated}; the value of {block.lead.law} is {block.lead.words}"
         if len(self.best) == 1:
             return f"{self.best[0]} is undefeated, but does not beat every rival"
@@ -428,7 +428,7 @@ class Board(Tables):
         for law, count in self.few.items():
             words.append(f"{law} ({self._counted(count)})")
         least = min(needed_to_win(self.family), needed_to_rank(len(self.entries)))
-        not_ranked = f"{joined(words)} {_are(words)} not ranked"
+        not_ranked = f"{joined(words)} {_is_or_are(words)} not ranked"
         return f"{not_ranked}, which needs {least} ({self._cure(least)})"
 
     def failures(self, entry: BoardEntry) -> str:
@@ -504,7 +504,7 @@ class Boards(Tables, list[Board]):
         return [*tabulars[:-1], dataclasses.replace(tabulars[-1], notes=notes)]
 
 
-def _are(things: Sequence[str]) -> str:
+def _is_or_are(things: Sequence[str]) -> str:
     return "is" if len(things) == 1 else "are"
 
 
@@ -652,7 +652,7 @@ def _verdicts(boards: Sequence[Board]) -> list[str]:
     """Return the verdicts of boards; metrics with the same result share a sentence."""
     labels: dict[str, list[str]] = {}
     for board in boards:
-        labels.setdefault(f"{board.where}: {board.result}.", []).append(board.label)
+        labels.setdefault(f"{board.setting}: {board.result}.", []).append(board.label)
     sentences = []
     for result, names in labels.items():
         sentences.append(f"{joined(names)}{result}")

@@ -35,7 +35,7 @@ from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import counted, joined
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.control.law import catalogue, known_laws
+from smc_mujoco.control.law import all_laws, catalogue
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.robustness.uncertainty import Uncertainty
@@ -87,7 +87,7 @@ class Candidate(NamedTuple):
 def law_or_template(law: Component | Template | str) -> Component | Template:
     """Return the law if the user gave its gains, else its template."""
     if isinstance(law, str):
-        return known_laws()[law]
+        return all_laws()[law]
     if isinstance(law, Template):
         return law
     given = coerce.law(law)

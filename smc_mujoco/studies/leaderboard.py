@@ -26,7 +26,7 @@ from smc_mujoco.analysis.paired_runs import (
     Scores,
 )
 from smc_mujoco.analysis.ranking import RELEVANT, Comparison, corrected, linked, ranks
-from smc_mujoco.analysis.step_halving import first_order, repeats_all
+from smc_mujoco.analysis.step_halving import first_order, repeats_every_run
 from smc_mujoco.common.aliases import Array, Names
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.control.source import DEFAULT, Source
@@ -259,7 +259,7 @@ def _board(
         blocks=tuple(blocks),
         family=family,
         relevant=comparison.relevant,
-        by_step=not repeated and any(map(repeats_all, filter(None, ran))),
+        by_step=not repeated and any(map(repeats_every_run, filter(None, ran))),
         x=paired_runs.unit_of_x(group.name["plant"], ran),
     )
 
@@ -375,7 +375,7 @@ def _lead(comparison: Comparison, at: int, order: Sequence[str], floor: str) -> 
     b = comparison.laws.index(rival)
     lacking = comparison.without_value[:, at]
     effect = effects[rival]
-    if lacking[a] or not effect.samples or comparison.both_below[at, a, b]:
+    if lacking[a] or not effect.samples or comparison.pairs_below_floor[at, a, b]:
         return None
     lost = ""
     if lacking[b]:

@@ -25,7 +25,7 @@ from pathlib import Path
 from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.analysis.ranking import exceeds
 from smc_mujoco.common import errors
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, items_of, shown
 from smc_mujoco.common.errors import find as lookup
 from smc_mujoco.common.files import shipped, slug
@@ -80,15 +80,15 @@ class Outcome:
         """Return the outcome of the runs with these labels."""
         for label in labels:
             lookup("label of the scene", label, dict.fromkeys(self.labels))
-        return self._kept(lambda label, run: label in labels)
+        return self._filtered(lambda label, run: label in labels)
 
-    def those(self, holds: Holds = settles) -> "Outcome":
+    def select(self, holds: Holds = settles) -> "Outcome":
         """Return the outcome of the runs for which `holds` is true; by default, of those that
         settle.
         """
-        return self._kept(lambda label, run: run.failure is None and bool(holds(run)))
+        return self._filtered(lambda label, run: run.failure is None and bool(holds(run)))
 
-    def _kept(self, wanted: Callable[[str, Trace], bool]) -> "Outcome":
+    def _filtered(self, wanted: Callable[[str, Trace], bool]) -> "Outcome":
         kept = {}
         for name, runs in self.traces.items():
             kept[name] = {}
@@ -153,7 +153,7 @@ class Outcome:
         """Return whose value is largest, as `least` does."""
         return self._first(measure, unit, -1.0)
 
-    def who(self, plural: str, holds: Holds = settles) -> str:
+    def count(self, plural: str, holds: Holds = settles) -> str:
         """Return for how many runs `holds` is true: "3 of 4 settle (not c)"; over several
         conditions "1 of 2 settle under nominal (not b), 2 of 2 under noise".
 
@@ -161,7 +161,7 @@ class Outcome:
           plural: the verb, such as "settle", with what follows it.
           holds: whether a run counts; by default whether it settles.
         """
-        kept = self.those(holds).traces
+        kept = self.select(holds).traces
         parts = []
         for name, runs in self.traces.items():
             others = []
@@ -182,7 +182,7 @@ class Outcome:
         """Return the last condition that each label tolerates, if the conditions are ordered from
         weak to strong: the last one before `holds` is first false, as in "a and b 20 ms, c none".
         """
-        kept = self.those(holds).traces
+        kept = self.select(holds).traces
         last: dict[str, list[str]] = {}
         for label in self.labels:
             tolerated = "none"
@@ -298,8 +298,8 @@ def _from_to(pair: tuple[float, float], unit: str) -> str:
 
 def summary(runs: Outcome) -> str:
     """Return who settles, is first, and failed: the answer of a scene that declares none."""
-    parts = [runs.who("settle"), f"first: {runs.those().least('settling_time')}"]
-    failed = runs._kept(lambda label, run: run.failure is not None)
+    parts = [runs.count("settle"), f"first: {runs.select().least('settling_time')}"]
+    failed = runs._filtered(lambda label, run: run.failure is not None)
     if failed.labels:
         parts.append(f"failed: {failed.named}")
     return "; ".join(parts)
@@ -308,7 +308,7 @@ def summary(runs: Outcome) -> str:
 # the scene
 
 
-@named_data
+@keyword_dataclass
 class Scene:
     """What a scene file declares.
 

@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from smc_mujoco.analysis.step_halving import halved, repeats_all
+from smc_mujoco.analysis.step_halving import halved, repeats_every_run
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import AnyPath, Data, Fields, Names
 from smc_mujoco.common.constraints import FilePath, constrained
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, printable, shown
 from smc_mujoco.common.files import reading, to_json
 from smc_mujoco.common.progress import counter
@@ -166,7 +166,7 @@ class Store:
         return part if complete else None
 
 
-@named_data
+@keyword_dataclass
 class Extent:
     """The grid of a study; its fields are arguments of `grid`."""
 
@@ -299,7 +299,7 @@ def _repeated(
     """
     again = {}
     for name, scenario in runs.items():
-        if repeats_all(scenario) or scenario.seed % REPEATED_SEEDS == 0:
+        if repeats_every_run(scenario) or scenario.seed % REPEATED_SEEDS == 0:
             with contextlib.suppress(ScenarioError):  # its step cannot be halved
                 half = halved(scenario).named(scenario.condition)
                 again[name] = run_key.key(half, plants=plants), half

@@ -116,7 +116,7 @@ def which(
     machine = as_plant(plant)
     if not falling and (why := falls(machine)):
         raise ScenarioError(f"{why}; falling=True (--falling) goes on all the same")
-    asked, properties = _asked(needs)
+    asked, properties = _metrics_and_properties(needs)
     chosen = _suited(machine, properties, laws)
     if minutes and machine.is_user_model and laws is None:
         chosen = [law for law in chosen if law.name in gain_sets.COMPARED] or chosen
@@ -152,7 +152,7 @@ def which(
     return Advice(table=table, leaderboard=boards, laws=ordered, settles=settles)
 
 
-def _asked(needs: str | Sequence[str]) -> tuple[list[str], list[str]]:
+def _metrics_and_properties(needs: str | Sequence[str]) -> tuple[list[str], list[str]]:
     """Return the metrics and the properties among the needs; without metrics, DEFAULT_NEEDS."""
     compared, properties = [], []
     given = needs.split(",") if isinstance(needs, str) else listed("needs", needs)

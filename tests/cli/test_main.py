@@ -164,7 +164,7 @@ Look for: nothing.
 import smc_mujoco as smc
 run = smc.Scenario(plant="duffing", law="none", duration=0.01)
 conditions = {"calm": {"only": run}}
-answer = lambda runs: runs.who("rest")
+answer = lambda runs: runs.count("rest")
 scene = smc.Scene(title="Asked [/s]", conditions=conditions, answer=answer)
 ''')
     code, out, _ = call("run", "asks.py", "--no-film", "--out", "out")

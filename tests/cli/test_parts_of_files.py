@@ -14,7 +14,7 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import Objective, restore
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.main import app
-from smc_mujoco.common.scripts import named
+from smc_mujoco.common.scripts import object_named
 from smc_mujoco.simulation import run_key, scenario_json, workers
 from smc_mujoco.simulation.conditions import find_condition, from_file
 
@@ -117,7 +117,7 @@ def test_a_part_is_itself_until_its_file_changes_and_then_a_run_has_another_key(
         return run_key.key(smc.Scenario(plant="duffing", law="pid", **mine.fields))
 
     def kind() -> type:
-        return named("my_parts.py:stribeck", "part", callable)
+        return object_named("my_parts.py:stribeck", "part", callable)
 
     first, same = key(), kind()
     assert (key(), kind()) == (first, same)

@@ -25,7 +25,7 @@ EXAMPLE = ROOT / "examples" / "my_smc_package"
 CACHED = (
     registry._points,
     law.catalogue,
-    law.known_laws,
+    law.all_laws,
     law.joint_catalogue,
     surface.catalogue,
     estimator.catalogue,
@@ -132,7 +132,7 @@ def test_a_package_is_imported_by_the_use_of_its_entries_alone(install):
         lazy_laws=LAW.replace("NAME", "lazy_law"),
     )
     smc.run(smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.01))
-    assert "lazy_law" in law.known_laws()
+    assert "lazy_law" in law.all_laws()
     assert "lazy_laws" not in sys.modules
     smc.law("lazy_law")
     assert "lazy_laws" in sys.modules

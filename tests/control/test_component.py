@@ -12,7 +12,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.control import estimator, surface
 from smc_mujoco.control.component import gain_at
-from smc_mujoco.control.law import known_laws
+from smc_mujoco.control.law import all_laws
 from smc_mujoco.control.units import RATE, Gain
 
 pytestmark = pytest.mark.quick
@@ -40,7 +40,7 @@ def test_a_channel_without_a_gain_in_a_list_has_the_last_and_one_number_is_each_
 
 # conditions
 
-TEMPLATES = [*known_laws().values(), *surface.catalogue().values(), *estimator.catalogue().values()]
+TEMPLATES = [*all_laws().values(), *surface.catalogue().values(), *estimator.catalogue().values()]
 # many of them lie on bounds
 VALUES = 0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 4.0, 64.0, 128.0, 256.0, 257.0
 RATIOS = 1.0 + np.geomspace(1e-3, 1e3, 500)

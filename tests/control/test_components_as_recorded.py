@@ -193,8 +193,11 @@ def text(template):
         else:
             size = "F^{:.4g} X^{:.4g} T^{:.4g}".format(*unit)
         parts.append(", ".join([f"{name} = {gain_text(gain.default)}", size, *marks]))
-    if template.rest:
-        numbers = [*template.rest.linear(g), *template.rest.force(g, np.array([-0.2, 0.05, 3.0]))]
+    if template.linear_part:
+        numbers = [
+            *template.linear_part.linear(g),
+            *template.linear_part.force(g, np.array([-0.2, 0.05, 3.0])),
+        ]
         parts.append(f"at rest {', '.join(f'{number:.7g}' for number in numbers)}")
     sums: dict[str, list[str]] = {}  # of the ways that compute the same
     for way, inputs in ways(template).items():

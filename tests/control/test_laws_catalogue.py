@@ -19,7 +19,7 @@ from helpers.runs import at_defaults
 
 import smc_mujoco as smc
 from smc_mujoco.control import estimator, surface
-from smc_mujoco.control.law import catalogue, known_laws
+from smc_mujoco.control.law import all_laws, catalogue
 from smc_mujoco.metrics.catalogue import ultimate_bound
 from smc_mujoco.simulation import gaber_study as paper
 
@@ -158,7 +158,7 @@ def test_memory_belongs_to_a_channel_and_a_run():
         np.testing.assert_array_equal(again.x, trace.x)
 
 
-ALL = [*known_laws().values(), *surface.catalogue().values(), *estimator.catalogue().values()]
+ALL = [*all_laws().values(), *surface.catalogue().values(), *estimator.catalogue().values()]
 
 
 @pytest.mark.parametrize("template", ALL, ids=lambda t: f"{t.kind}-{t.name}")

@@ -19,7 +19,7 @@ from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
 from smc_mujoco.mechanisms.hardware.friction import Viscous
 from smc_mujoco.mechanisms.plant import Dynamics, Values
 from smc_mujoco.simulation import philox
-from smc_mujoco.simulation.prepare import known_values, references
+from smc_mujoco.simulation.prepare import nominal_values, references
 from smc_mujoco.simulation.python_functions import (
     USER_EXCEPTIONS,
     Failure,
@@ -51,7 +51,7 @@ class Controller:
         self.surface = scenario.surface and PythonComponent(scenario.surface, n)
         self.limits = np.array(scenario.limits)
         self.scale = math.prod(part.scale for part in scenario.actuator)
-        known = zip(scenario.plant.parameters, known_values(self.scenario), strict=True)
+        known = zip(scenario.plant.parameters, nominal_values(self.scenario), strict=True)
         self.values = Values(**dict(known))
         if scenario.plant.by_mujoco:  # compiles now, not at the first call
             scenario.plant.nominal(np.zeros(n), np.zeros(n), 0, self.values)
@@ -128,8 +128,8 @@ class Controller:
         n = len(x)
         driven = len(self.limits)
         feedforward = 0.0
-        if scenario.known_signal is not None:
-            feedforward = evaluate(scenario.known_signal, t)[0]
+        if scenario.feedforward_signal is not None:
+            feedforward = evaluate(scenario.feedforward_signal, t)[0]
         # one for all channels, or one for each
         values = [evaluate(signal, t) for signal in references(scenario)]
         motion = np.array([values[i % len(values)] for i in range(n)]).T.copy()

@@ -47,7 +47,7 @@ def entered(folder, name, factor, failures=()):
         "failed": len(failures),
         "failures": list(failures),
         "sample": [1e-8, 2e-8, 1.5],
-        "hashes": {"table": table} | enter.made_under(PROBLEMS),
+        "hashes": {"table": table} | enter.rules_digests(PROBLEMS),
         "machine": "m",
         "versions": {},
     }

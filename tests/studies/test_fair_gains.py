@@ -13,7 +13,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.tuning.objective import Objective
-from smc_mujoco.control.law import catalogue, known_laws, law_function
+from smc_mujoco.control.law import all_laws, catalogue, law_function
 from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
 from smc_mujoco.simulation.conditions import NAMED, find_condition
 from smc_mujoco.studies import fair_gains
@@ -195,7 +195,7 @@ def test_j_on_unseen_runs_is_kept(tmp_path, monkeypatch):
 
 
 def test_laws_that_cannot_see_what_nothing_drives_are_named_before_the_runs(tmp_path, capsys):
-    laws = [known_laws()[name] for name in ("pid", "hierarchical")]
+    laws = [all_laws()[name] for name in ("pid", "hierarchical")]
     for plant, told in (("cart_pole", ["pid"]), ("duffing", [])):
         machine = smc.plant(plant)
         trial = Trial.of(

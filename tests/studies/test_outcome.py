@@ -109,7 +109,7 @@ def test_positions_that_the_sensor_does_not_tell_apart_are_tied_as_on_leaderboar
 def test_a_run_that_failed_has_no_value_and_nothing_holds_for_it():
     runs = Outcome(traces={"nominal": {"a": FAILED, "b": made(RUN, 0.5)}})
     assert runs.least("settling_time") == runs.most("settling_time") == "b (1.00 s)"
-    assert runs.who("run", lambda trace: True) == "1 of 2 run (not a)"
+    assert runs.count("run", lambda trace: True) == "1 of 2 run (not a)"
     assert runs.only("a").least("settling_time") == "none"
     assert summary(runs) == "1 of 2 settle (not a); first: b (1.00 s); failed: a"
     assert runs.size("settling_time") == "1.00 s, 1 failed"
@@ -117,11 +117,11 @@ def test_a_run_that_failed_has_no_value_and_nothing_holds_for_it():
 
 def test_those_are_the_runs_for_which_something_holds():
     runs = single(a=NEVER, b=0.5, c=0.4)
-    assert runs.who("settle") == "2 of 3 settle (not a)"
-    assert runs.those().named == "b and c"
-    assert runs.those().most("settling_time") == "b (1.00 s)"
-    assert runs.those(lambda trace: False).named == "none"
-    assert runs.those(lambda trace: False).least("itae") == "none"
+    assert runs.count("settle") == "2 of 3 settle (not a)"
+    assert runs.select().named == "b and c"
+    assert runs.select().most("settling_time") == "b (1.00 s)"
+    assert runs.select(lambda trace: False).named == "none"
+    assert runs.select(lambda trace: False).least("itae") == "none"
 
 
 def test_over_several_conditions_each_is_told():
@@ -149,7 +149,7 @@ def test_over_several_conditions_each_is_told():
     reported = (
         "3 of 4 settle under weak (not c), 1 of 4 under middle (not b, c and d), 2 of 4 under "
     )
-    assert runs.who("settle") == f"{reported}strong (not b and c)"
+    assert runs.count("settle") == f"{reported}strong (not b and c)"
     assert runs["weak"].least("settling_time") == "a and d tied (0.400 s)"
     assert runs.changes("settling_time", "weak", "strong") == (
         "a 0.400 to 0.600 s, b 0.800 s to never, c never, d 0.400 s"

@@ -13,13 +13,13 @@ numbers are shown, MuJoCo repeats CHECKED runs. All others are MuJoCo's.
 from typing import Annotated, Any
 
 from smc_mujoco.common.constraints import OneOf
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 
 CHECKED = 20  # of its runs, which MuJoCo makes again where their numbers are shown; chosen
 CONVERGES, UNDECIDED, DOES_NOT = 1, 0, -1  # outcomes of a run
 
 
-@named_data
+@keyword_dataclass
 class Available(OneOf):
     """One of some devices, of which this machine has the package and the hardware."""
 

@@ -35,7 +35,7 @@ from smc_mujoco.mechanisms.layout import moves_alone
 from smc_mujoco.metrics.conventions import SETTLING_BAND, groups, settling_band
 from smc_mujoco.metrics.fold import first_sample
 from smc_mujoco.simulation.cfunctions import compile_component
-from smc_mujoco.simulation.prepare import compensation, known_values, references, run_of, settings
+from smc_mujoco.simulation.prepare import compensation, nominal_values, references, run_of, settings
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import Constant, Push, Signal
@@ -134,7 +134,7 @@ def _users(s: Resolved) -> list[tuple[Any, int]]:
     found = []
     for part in _components(s):
         found.append((part.function, part.memory))
-    for signal in (*s.references, *s.disturbance, s.known_signal, *s.noise.errors):
+    for signal in (*s.references, *s.disturbance, s.feedforward_signal, *s.noise.errors):
         if signal is not None:
             found.append((type(signal).value, signal.memory))
     for part in s.sensors:
@@ -243,7 +243,7 @@ def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
         on_reference=bool(compensation(s).get("on_reference")),
         references=tuple(map(type, references(s))),
         disturbances=tuple(Counter(map(type, s.disturbance)).elements()),
-        feedforward=s.known_signal and type(s.known_signal),
+        feedforward=s.feedforward_signal and type(s.feedforward_signal),
         errors=tuple(None if error is None else type(error) for error in s.noise.errors),
         noise=bool(s.noise.position or s.noise.velocity),
         true_model=s.model == "true",
@@ -408,7 +408,7 @@ class FormGroup:
         bands = np.array([settling_band(s, scale) for scale in scales])
         _put(row, at.bands, bands)
         _put(row, at.shares, SETTLING_BAND * scales)
-        _put(row, at.known, known_values(s))
+        _put(row, at.known, nominal_values(s))
         first = s.plant.values(s.factors(0))
         _put(row, at.before, [*vars(first).values()])
         later = s.plant.values(s.factors(max(s.jump_step, 0)))
@@ -500,7 +500,7 @@ class FormGroup:
 
     def _fill_signals(self, row: np.ndarray, s: Resolved) -> None:
         at = self.layout
-        self._fill_signal(row, at.feedforward, s.known_signal)
+        self._fill_signal(row, at.feedforward, s.feedforward_signal)
         for place, signal in zip(at.references, references(s), strict=True):
             self._fill_signal(row, place, signal)
         for place, signal in zip(at.errors, s.noise.errors, strict=True):

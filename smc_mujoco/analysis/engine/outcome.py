@@ -30,7 +30,7 @@ NAME = "outcome"
 SIGNALS = 3  # x, v and u, whose ranges tell rest
 
 
-def kept_at(n: int, first: int) -> tuple[int, ...]:
+def work_indices(n: int, first: int) -> tuple[int, ...]:
     """Return where a run of n channels keeps each value in its row of work, from index `first` on.
 
     In order: the squared distance at the start; whether a late sample is in the band, and out of
@@ -45,7 +45,7 @@ def taking(n: int, reach: int, now: int, first: int) -> Any:
     """Return a compiled function (row, work, k): take sample k of n channels, from place `now` of
     `work` on. The row has the reach from place `reach` on.
     """
-    START, INSIDE, OUTSIDE, FIRST, SECOND, LARGEST_U, LARGEST, LOW, HIGH = kept_at(n, first)
+    START, INSIDE, OUTSIDE, FIRST, SECOND, LARGEST_U, LARGEST, LOW, HIGH = work_indices(n, first)
 
     @inlined
     def take(row, work, k):
@@ -91,7 +91,7 @@ def judging(n: int, reach: int, first: int) -> Any:
     """Return a compiled function (row, work) -> verdict; UNDECIDED also where a run needs to be
     longer.
     """
-    START, INSIDE, OUTSIDE, FIRST, SECOND, LARGEST_U, LARGEST, LOW, HIGH = kept_at(n, first)
+    START, INSIDE, OUTSIDE, FIRST, SECOND, LARGEST_U, LARGEST, LOW, HIGH = work_indices(n, first)
 
     @inlined
     def judge(row, work):

@@ -127,7 +127,7 @@ def folding(fold: Fold, samples: Samples, at: int) -> tuple[Any, Any]:
     `work` from place `at` on.
     """
     values = _valuing(fold, samples, at)
-    if fold.how in ("integral", "held"):
+    if fold.reduction in ("integral", "held"):
         return _pooling(fold, samples.n, values, at)
     return _worst(fold, samples.n, values, at)
 
@@ -214,9 +214,9 @@ def _worst(fold: Fold, n: int, value: Any, at: int) -> tuple[Any, Any]:
     first = _first(fold)
     change = fold.change
     turned = fold.signal == "turned"
-    largest = fold.how == "largest"
-    ranges = fold.how == "range"
-    mean = fold.how == "mean"
+    largest = fold.reduction == "largest"
+    ranges = fold.reduction == "range"
+    mean = fold.reduction == "mean"
     root = mean and fold.power == 2
     rate = fold.rate
 
@@ -259,7 +259,7 @@ def _worst(fold: Fold, n: int, value: Any, at: int) -> tuple[Any, Any]:
 def _pooling(fold: Fold, n: int, value: Any, at: int) -> tuple[Any, Any]:
     """Return the functions of a fold that is summed over the channels."""
     first = _first(fold)
-    held = fold.how == "held"
+    held = fold.reduction == "held"
     timed = fold.timed
 
     @inlined

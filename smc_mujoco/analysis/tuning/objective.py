@@ -33,7 +33,7 @@ from smc_mujoco.analysis import step_halving
 from smc_mujoco.analysis.chattering import predict
 from smc_mujoco.common.aliases import Array, ArrayPair, Data, Fields, Floats, Pair
 from smc_mujoco.common.constraints import Natural, Positive, Whole, constrain
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
@@ -81,7 +81,7 @@ class Evaluation(NamedTuple):
         return self.tracking >= FAILURE_COST
 
 
-@named_data
+@keyword_dataclass
 class Objective:
     """J as data. Tunings can be compared only if their objectives are equal.
 

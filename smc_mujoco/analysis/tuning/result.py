@@ -9,7 +9,7 @@ from typing import Any
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, restore
 from smc_mujoco.common.aliases import AnyPath, Data, Fields
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
 from smc_mujoco.common.tabular import Tables, Tabular
@@ -25,7 +25,7 @@ HEADINGS = ("gain", "tuned", "searched from", "to", "")  # of a tuning's table
 SAVED_FIELDS = ("before", "rule", "budget", "seed", "scales", "bounds", "searched", "versions")
 
 
-@named_data
+@keyword_dataclass
 class SearchResult:
     """What one search found. Searches share nothing: each has its own starts, noise and runs."""
 
@@ -42,16 +42,16 @@ class SearchResult:
         return min(self.history, key=lambda one: one.objective)
 
     def save(self, path: Path) -> Path:
-        """Write a .json file that `load_found` reads back."""
+        """Write a .json file that `load_search` reads back."""
         return write_json(path, vars(self))
 
 
-def load_found(path: Path) -> SearchResult:
+def load_search(path: Path) -> SearchResult:
     """Read what `SearchResult.save` wrote."""
-    return _found(read_json(path))
+    return _search_result(read_json(path))
 
 
-def _found(data: Data) -> SearchResult:
+def _search_result(data: Data) -> SearchResult:
     history = tuple(map(_evaluation, data["history"]))
     best = _evaluation(data["best"])
     return SearchResult(**dict(data) | {"best": best, "history": history})
@@ -236,7 +236,7 @@ def load_tuned(path: AnyPath, plant: Plant | None = None) -> Tuned:
             fields[name] = {gain: tuple(ends) for gain, ends in data[name].items()}
         return Tuned(
             **fields,
-            searches=tuple(map(_found, data["searches"])),
+            searches=tuple(map(_search_result, data["searches"])),
             law=scenario.law,
             plant=scenario.plant,
             definition=restore(data["definition"]),

@@ -55,7 +55,7 @@ from smc_mujoco.analysis.tuning.objective import (
     Objective,
     Searches,
 )
-from smc_mujoco.analysis.tuning.result import SearchResult, Tuned, load_found
+from smc_mujoco.analysis.tuning.result import SearchResult, Tuned, load_search
 from smc_mujoco.analysis.tuning.search_space import Box
 from smc_mujoco.analysis.tuning.stages import (
     DRAWS,
@@ -69,7 +69,7 @@ from smc_mujoco.analysis.tuning.stages import (
 )
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import AnyPath, Array, Floats
-from smc_mujoco.common.cache import Kept
+from smc_mujoco.common.cache import CachedResult
 from smc_mujoco.common.constraints import Boolean, FilePath, Whole, constrained
 from smc_mujoco.common.errors import (
     BrokenLawError,
@@ -313,7 +313,7 @@ class TuningTask(NamedTuple):
         made_of = self.plant, self.law, self.goal, self.budget, self.seed
         return (*made_of, self.outside_theorem, self.quick, self.codes(), i, failure, draw)
 
-    def file(self, i: int, folder: AnyPath, draw: int = 0) -> "Kept[SearchResult]":
+    def file(self, i: int, folder: AnyPath, draw: int = 0) -> "CachedResult[SearchResult]":
         """Return the file of search i in a folder."""
         first, *_ = self.cases(i)
         depends = (
@@ -328,7 +328,7 @@ class TuningTask(NamedTuple):
         )
         again = f"-{draw}" if draw else ""
         path = Path(folder) / f"{self.plant.name}-{self.law.name}-{i}{again}.json"
-        return Kept(path, depends, SearchResult.save, load_found)
+        return CachedResult(path, depends, SearchResult.save, load_search)
 
     def search(self, i: int, failure: str, report: Report, draw: int = 0) -> SearchResult:
         """Make search i, with its first random numbers or those of another draw.
@@ -348,12 +348,12 @@ class TuningTask(NamedTuple):
             trials = self._search(self._trials(by_equation, by_equation, report), random)
             best = self._on_record(trials.best.gains, cases)
             if abs(best.objective - trials.best.objective) <= AGREEMENT * best.objective:
-                return self._found(trials, best, failure)
+                return self._best_of(trials, best, failure)
             random = np.random.default_rng([self.seed, i, draw] if draw else [self.seed, i])
         accurate = self._evaluator(cases)
         every = self._trials(_cheap(accurate), accurate, report)
         trials = self._search(every, random)
-        return self._found(trials, trials.best, failure)
+        return self._best_of(trials, trials.best, failure)
 
     def _evaluator(self, cases: Sequence[Scenario], by_equation: bool = False) -> Evaluator:
         return Evaluator(
@@ -413,7 +413,7 @@ class TuningTask(NamedTuple):
         if failure and whole and best.objective >= FAILURE_COST * len(self.goal.conditions):
             raise _broken(self.law, failure)
 
-    def _found(self, trials: Trials, best: Evaluation, failure: str) -> SearchResult:
+    def _best_of(self, trials: Trials, best: Evaluation, failure: str) -> SearchResult:
         self._refuse_broken(best, failure)
         history = tuple(trials.decided.values())
         engine = trials.accurate.engine
@@ -622,7 +622,7 @@ def _warn_of_result(tuned: Tuned) -> None:
         )
     first, *_ = tuned.definition.scenarios(tuned.plant, tuned.law, tuned.seed)
     if tuned.plant.is_user_model:
-        _warn_if_it_leans(run(first))
+        _warn_of_leaning(run(first))
     if tuned.definition.excess(first):
         _warn(
             f"all gains {tried} are predicted to chatter with more than "
@@ -630,7 +630,7 @@ def _warn_of_result(tuned: Tuned) -> None:
         )
 
 
-def _warn_if_it_leans(trace: Trace) -> None:
+def _warn_of_leaning(trace: Trace) -> None:
     """Warn of a run of a user's model that leans on something."""
     if leans(trace) and not falls(trace.scenario.plant):
         _warn(

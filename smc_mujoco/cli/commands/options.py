@@ -67,7 +67,7 @@ def _completing(module: str, name: str) -> Callable[[str], list[str]]:
 
 CONDITIONS = _completing("simulation.conditions", "NAMED")
 PLANTS = _completing("mechanisms.plant", "plants")
-LAWS = _completing("control.law", "known_laws")
+LAWS = _completing("control.law", "all_laws")
 SCENES = _completing("studies.scene", "scenes")
 
 Columns = Annotated[
@@ -227,11 +227,11 @@ def names(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> lis
 
 def plants(texts: Sequence[str] | None, default: Sequence[str] = ()) -> list[str]:
     """Return the names of plants in texts, or the default; a law's name is refused."""
-    from smc_mujoco.control.law import known_laws
+    from smc_mujoco.control.law import all_laws
 
     found = names(texts, default)
     for name in found:
-        if name in known_laws():
+        if name in all_laws():
             raise ScenarioError(f"{name!r} is a law, not a plant: give it as --law {name}")
     return found
 

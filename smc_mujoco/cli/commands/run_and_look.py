@@ -83,7 +83,7 @@ def show(
     Example: smc-mujoco show videos/duffing/nominal-classical.npz --figure classical
     """
     with delay_signals():
-        from smc_mujoco.analysis.step_halving import UNTRIED, repeats_all
+        from smc_mujoco.analysis.step_halving import UNTRIED, repeats_every_run
         from smc_mujoco.cli import tables
         from smc_mujoco.common.text import capital
         from smc_mujoco.simulation.conditions import Condition
@@ -117,7 +117,7 @@ def show(
     else:
         for table in tables.trace_summary(loaded):
             terminal.print(table)
-        if repeats_all(s):
+        if repeats_every_run(s):
             terminal.note(f"{capital(UNTRIED)}.", "dim", wrap=True)
     terminal.wrote(*written)
     terminal.finish()

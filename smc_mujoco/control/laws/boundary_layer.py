@@ -10,11 +10,11 @@ Source: J.-J. Slotine, "Sliding controller design for non-linear systems", Int. 
 
 import numpy as np
 
-from smc_mujoco.control.component import Rest
+from smc_mujoco.control.component import LinearPart
 from smc_mujoco.control.law import command, law_function, sliding
 from smc_mujoco.control.units import FORCE, SLOPE, SPEED, Gain
 
-REST = Rest(
+LINEAR_PART = LinearPart(
     linear=lambda g: (g.k / g.phi, g.c),
     force=lambda g, x: g.k * np.clip(g.c * x / g.phi, -1.0, 1.0),
 )
@@ -31,7 +31,7 @@ REST = Rest(
         "phi": Gain(0.5, SPEED, positive=True),
     },
     colour="#CC79A7",
-    rest=REST,
+    linear_part=LINEAR_PART,
 )
 def boundary_layer(y, gains, memory):
     s, v_eq = sliding(y, gains.c)

@@ -13,11 +13,13 @@ import math
 
 import numpy as np
 
-from smc_mujoco.control.component import Rest
+from smc_mujoco.control.component import LinearPart
 from smc_mujoco.control.law import command, law_function, sliding
 from smc_mujoco.control.units import OBSERVER_FREE
 
-REST = Rest(linear=lambda g: (g.lam, g.k1), force=lambda g, x: g.lam * np.tanh(g.k1 * x))
+LINEAR_PART = LinearPart(
+    linear=lambda g: (g.lam, g.k1), force=lambda g, x: g.lam * np.tanh(g.k1 * x)
+)
 
 
 @law_function(
@@ -29,7 +31,7 @@ REST = Rest(linear=lambda g: (g.lam, g.k1), force=lambda g, x: g.lam * np.tanh(g
     label="Observer-free",
     short="OF",
     colour="#0072B2",
-    rest=REST,
+    linear_part=LINEAR_PART,
 )
 def observer_free(y, gains, memory):
     s, v_eq = sliding(y, gains.k1)

@@ -83,7 +83,7 @@ class Frames:
     def __post_init__(self) -> None:
         self.camera = checked(self.camera)
         if self.at is not None:
-            last = end(style.same_plant(self.traces))
+            last = end(style.traces_of_one_plant(self.traces))
             time = number("at", self.at, low=0.0, high=last + 1e-9)
             self.clock = pace.clock(self.traces, self.fps, self.speed).still(time)
         else:

@@ -89,7 +89,7 @@ def clock(traces: Trace | Sequence[Trace], fps: Rate, speed: Speed | None = None
     """Return the times of a film's frames from t = 0 to the end of the longest trace; `speed` None:
     the rule above.
     """
-    traces = style.same_plant(traces)
+    traces = style.traces_of_one_plant(traces)
     whole = end(traces)
     if speed is not None:
         count = int(whole * fps / speed + 1e-6) + 1

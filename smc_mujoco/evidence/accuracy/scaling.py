@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from smc_mujoco.common.aliases import Array, Floats
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 
 # ratio of the errors in one part of a run and the next above which they fall or grow; chosen
 TREND = 1.5
@@ -26,7 +26,7 @@ QUANTITIES = ("e", "s")
 UNTOLD = "the order cannot be told"
 
 
-@named_data
+@keyword_dataclass
 class Scaling:
     """The order with which the error of one quantity falls with the control period, and its 95 %
     interval.
@@ -56,7 +56,7 @@ class Scaling:
         )
 
 
-@named_data
+@keyword_dataclass
 class Accuracy:
     """The accuracy of one law on one plant in one condition."""
 

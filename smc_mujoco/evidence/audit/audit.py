@@ -81,7 +81,7 @@ def audit(
 
     Args:
       paper: a name of `smc-mujoco claims --papers`, or a folder.
-      only: ids of the claims wanted; None for all.
+      only: ids of the claims to audit; None for all.
       gains: names of the paper's sets of gains; None for all of them, or for its quick sets if
         `quick`.
       quick: whether to measure less, as each claim says: coarser grids, shorter runs.
@@ -107,7 +107,7 @@ def audit(
         check_table(table)
         rows = of_table(table)
     shared: dict[str, RunResult] = {}
-    entries = wanted(audited, only)
+    entries = select_claims(audited, only)
     names = sets(audited, gains, quick)
     evidence: dict[str, dict[str, Evidence]] = defaultdict(dict)
     used: dict[str, dict[str, dict[str, Used]]] = defaultdict(dict)
@@ -148,7 +148,7 @@ def claims(
     return audit(paper, only, gains, quick, threads, table=table).claims
 
 
-def wanted(paper: Paper, only: Iterable[str | int] | None) -> list[ClaimEntry]:
+def select_claims(paper: Paper, only: Iterable[str | int] | None) -> list[ClaimEntry]:
     """Return the claims of some ids, or all for None, in the order of the file; refuse an unknown
     id.
     """

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 from smc_mujoco.common import files
 from smc_mujoco.common.aliases import Data, Fields, Names, Numbers, Pair
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, unknown, whole, words
 from smc_mujoco.common.files import as_path, reading, replacing
 from smc_mujoco.common.frozen import frozen
@@ -97,7 +97,7 @@ class Allowed(NamedTuple):
     near: int = NEAR_SETS  # and around the best of them
 
 
-@named_data
+@keyword_dataclass
 class ClaimEntry(Statement):
     """A claim of a paper, with what measures it."""
 
@@ -119,7 +119,7 @@ class ClaimEntry(Statement):
     values: Data = NO_FIELDS  # its numbers, such as the levels of a sweep
 
 
-@named_data
+@keyword_dataclass
 class Paper:
     """A paper, its claims, and what their runs are made of."""
 

@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 from smc_mujoco.common import html
 from smc_mujoco.common.aliases import Fields, Names, Numbers
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.frozen import frozen
 
@@ -231,7 +231,7 @@ class Threshold(NamedTuple):
             yield Beside(what, value)
 
 
-@named_data
+@keyword_dataclass
 class Statement:
     """What the paper claims, and how it is measured."""
 
@@ -269,7 +269,7 @@ class Statement:
         )
 
 
-@named_data
+@keyword_dataclass
 class Claim(Statement):
     """A claim and its verdict."""
 

@@ -15,7 +15,7 @@ from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.jit import AtAddress
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.component import Component, Template, gain_at, gain_text
-from smc_mujoco.control.law import FREE_BODY, catalogue, known_laws
+from smc_mujoco.control.law import FREE_BODY, all_laws, catalogue
 from smc_mujoco.control.laws import observer_free_q15 as q15
 from smc_mujoco.exchange.c import body, build, compensation
 from smc_mujoco.exchange.c.compensation import Compensate
@@ -272,7 +272,7 @@ def _literal(value: float, single: bool) -> str:
 
 def _head(law: Component, numbers: str, slots: int, joints: int, code: str) -> str:
     """Return the comment at the top: formula, source, gains, sizes."""
-    template = known_laws().get(law.name)
+    template = all_laws().get(law.name)
     doc = inspect.cleandoc(law.function.__doc__ or "")
     if template is not None and template.function is law.function:
         doc = template.doc

@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from smc_mujoco.common.cached import cached_property
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.control.component import Component, gain_at
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
@@ -94,7 +94,7 @@ class Variable(NamedTuple):
     positive: bool = False  # whether it must be greater than 0
 
 
-@named_data
+@keyword_dataclass
 class ExportedLaw:
     """A law with all that an FMU needs to control one joint, or many."""
 

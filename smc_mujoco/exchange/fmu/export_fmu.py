@@ -143,7 +143,7 @@ def _of_scenario(scenario: Scenario, chosen: Data) -> Fields:
     what = ""
     if len(limits) > 1 and not s.law.joint:
         what = "a bound for each channel"
-    elif s.known_signal is not None:
+    elif s.feedforward_signal is not None:
         what = "a feedforward that is a signal"
     elif s.accelerates:
         what = "a Stepper"

@@ -15,7 +15,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Floats, Names, Numbers, Pair
 from smc_mujoco.common.constraints import Boolean, Bound, Number, constrain
-from smc_mujoco.common.data import named_data
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import (
     ScenarioError,
     ScenarioWarning,
@@ -60,7 +60,7 @@ HOLD = "hold:"  # prefix of names of motors that hold other joints, see others.p
 MOTOR_GROUP = 31  # actuator group of motors, which actuatorgroupdisable cannot turn off
 
 
-@named_data
+@keyword_dataclass
 class Channel:
     """How a joint of a user's model is driven.
 

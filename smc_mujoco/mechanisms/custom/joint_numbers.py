@@ -16,7 +16,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import unknown
-from smc_mujoco.mechanisms.custom.model_constraints import SOFT_SOLREF, says_how_soft
+from smc_mujoco.mechanisms.custom.model_constraints import SOFT_SOLREF, sets_friction_solref
 from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF
 from smc_mujoco.mechanisms.layout import all_joints, loaded
 from smc_mujoco.mechanisms.plant import Field, Plant, Values
@@ -97,7 +97,9 @@ def with_joint_numbers(plant: Plant, names: Iterable[str]) -> Plant:
             rubbing.append(one.joint)
     # only MuJoCo's constraints are as soft as the file says
     model = loaded(plant)
-    soft = any(says_how_soft(model, _place(model, joint, "frictionloss")) for joint in rubbing)
+    soft = any(
+        sets_friction_solref(model, _place(model, joint, "frictionloss")) for joint in rubbing
+    )
     return dataclasses.replace(
         plant,
         parameters=parameters,

@@ -140,7 +140,7 @@ def _parsed(source: ModelSource) -> mujoco.MjSpec:
 
 
 @functools.lru_cache(maxsize=MAX_KEPT)
-def as_it_is(source: ModelSource) -> mujoco.MjModel:
+def unedited_model(source: ModelSource) -> mujoco.MjModel:
     """Return the model of a source, compiled without an edit, which is shared."""
     return source.compiled(source.spec())
 

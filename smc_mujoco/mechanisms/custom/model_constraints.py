@@ -94,7 +94,7 @@ def default_friction(model: mujoco.MjModel) -> bool:
     return bool(np.any(dry) and np.all(model.dof_solref[dry] == SOFT_SOLREF))
 
 
-def says_how_soft(model: mujoco.MjModel, dof: int) -> bool:
+def sets_friction_solref(model: mujoco.MjModel, dof: int) -> bool:
     """Return whether a model's file says how soft the dry friction of a joint is."""
     return tuple(model.dof_solref[dof]) not in (SOFT_SOLREF, HARD_SOLREF)
 

@@ -23,7 +23,7 @@ from smc_mujoco.mechanisms.custom.channels import (
     joints_of,
     starts,
 )
-from smc_mujoco.mechanisms.custom.mjcf import ModelSource, as_it_is
+from smc_mujoco.mechanisms.custom.mjcf import ModelSource, unedited_model
 
 OTHERS = ("file", "held", "locked")
 HELD = 2.0 * math.pi * 8.0  # rad/s, chosen: fast beside the channels, slow beside a physics step
@@ -78,7 +78,7 @@ def at_start(
         spec.compiler.fusestatic = False
         model = source.compiled(spec)
     else:
-        model = as_it_is(source)
+        model = unedited_model(source)
     data = mujoco.MjData(model)
     if keyframe is not None:
         mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)

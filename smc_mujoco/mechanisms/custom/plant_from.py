@@ -141,7 +141,7 @@ def plant_from(
     measured = items_of("measured", () if measured is None else measured)
     made = _plant(source, pairs, name, keyframe, tip, others or "", measured)
     spec = source.spec()
-    model = mjcf.as_it_is(source)
+    model = mjcf.unedited_model(source)
     read = urdf.read(Path(source.path))
     doubts = [
         *_assumed_drives(source.label, made, pairs),
@@ -244,7 +244,7 @@ def _plant(
     """Return the plant of a model, see `plant_from`."""
     label = source.label
     title = source.spec().modelname
-    model = mjcf.as_it_is(source)
+    model = mjcf.unedited_model(source)
     mjcf.check_model(label, model)
     scenarios = own.suggested(pairs)
     pairs = _without_suggestions(pairs)

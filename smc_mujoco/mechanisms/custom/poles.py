@@ -14,7 +14,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.mjcb import compiled
-from smc_mujoco.mechanisms.custom.model_constraints import says_how_soft, touches
+from smc_mujoco.mechanisms.custom.model_constraints import sets_friction_solref, touches
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.layout import moving_joints, state_with
 from smc_mujoco.mechanisms.plant import Plant, write
@@ -149,7 +149,7 @@ def rubs(plant: Plant) -> bool:
     model = compiled(plant.spec())
     for name in plant.parameters:
         joint, _, kind = name.rpartition(".")
-        if kind == "frictionloss" and says_how_soft(model, model.joint(joint).dofadr[0]):
+        if kind == "frictionloss" and sets_friction_solref(model, model.joint(joint).dofadr[0]):
             return True
     return bool(np.any(model.dof_frictionloss) or np.any(model.tendon_frictionloss))
 

@@ -142,7 +142,7 @@ class OfBody(Obstacle):
         """Add it to the world, as a body and a geom of the same name."""
         raise NotImplementedError
 
-    def way(self, model: mujoco.MjModel) -> tuple[Array, float]:
+    def direction_and_distance(self, model: mujoco.MjModel) -> tuple[Array, float]:
         """Return the direction from the body to it, (3,), and how far it is at the start, m."""
         raise NotImplementedError
 
@@ -171,7 +171,7 @@ class Wall(OfBody):
             raise ScenarioError(f"{what} is {way}: give three numbers, not all 0, as (0, 0, -1)")
         object.__setattr__(self, "direction", way)
 
-    def way(self, model: mujoco.MjModel) -> tuple[Array, float]:
+    def direction_and_distance(self, model: mujoco.MjModel) -> tuple[Array, float]:
         """Return its direction and the gap."""
         size = np.linalg.norm(self.direction)
         return np.array(self.direction) / size, self.gap
@@ -223,7 +223,7 @@ class Ball(OfBody):
     height: Positive = 0.5
     radius: Positive = 0.03
 
-    def way(self, model: mujoco.MjModel) -> tuple[Array, float]:
+    def direction_and_distance(self, model: mujoco.MjModel) -> tuple[Array, float]:
         """Return the way up and the height."""
         if not model.opt.gravity.any():
             raise ScenarioError("a Ball does not fall without gravity: leave it out")
@@ -245,7 +245,7 @@ def _placed(part: OfBody, plant: Plant) -> Placed:
     _name_geoms(spec, part.body)
     name = part.add(spec).name
     model = plant.load(spec=spec)
-    away, room = part.way(model)
+    away, room = part.direction_and_distance(model)
     body = model.body(part.body).id
     shape = model.geom(name).id
     at_start = posed(model, plant.x0)

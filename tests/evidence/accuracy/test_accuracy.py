@@ -6,7 +6,7 @@ import math
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.control.law import catalogue, known_laws
+from smc_mujoco.control.law import all_laws, catalogue
 from smc_mujoco.evidence.accuracy import orders
 from smc_mujoco.simulation.conditions import Condition
 
@@ -46,7 +46,7 @@ def pushing_away(y, gains, memory):
 
 def test_every_law_states_its_order_of_accuracy():
     orders = {}
-    for name, law in known_laws().items():
+    for name, law in all_laws().items():
         for q in ("s", "e"):
             orders[(name, q)] = law.order(q, law.defaults)
     assert {

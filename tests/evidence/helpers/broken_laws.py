@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.evidence.audit.audit import measure, sets, wanted
+from smc_mujoco.evidence.audit.audit import measure, select_claims, sets
 from smc_mujoco.evidence.audit.claim_runs import ClaimRuns, RunResult
 from smc_mujoco.evidence.audit.paper import ClaimEntry, Paper
 from smc_mujoco.evidence.audit.paper import paper as find_paper
@@ -46,7 +46,7 @@ def survivors(
         each mutant another.
     """
     audited = paper if isinstance(paper, Paper) else find_paper(paper)
-    kept = {entry.id: entry for entry in wanted(audited, only) if not entry.immune}
+    kept = {entry.id: entry for entry in select_claims(audited, only) if not entry.immune}
     names = sets(audited, gains, quick)
 
     def measured(

@@ -43,7 +43,7 @@ class Arrays(Constants):
             raise refuse(node, f"{value.text or 'nothing'} as a number")
         return value
 
-    def kept(self, value: Value) -> Value:
+    def stored(self, value: Value) -> Value:
         """Return a value after a line that stores it in a new variable."""
         place = self.temporary(value.kind)
         self.fill(place, value)
@@ -81,14 +81,14 @@ class Arrays(Constants):
                 real = value.kind._replace(of="real")
                 values[i] = value._replace(kind=real)
             elif not value.kind.shape and "(" in value.text:
-                values[i] = self.kept(value)
+                values[i] = self.stored(value)
         return values, shapes.pop()
 
     def argument(self, node: ast.expr) -> Value:
         """Translate an argument of a function: a number, an array as a pointer, or y or gains."""
         value = self.value(node)
         if value.kind.shape and not value.pointer:  # its numbers are not stored
-            value = self.kept(value)
+            value = self.stored(value)
         return value
 
     def filled(self, function: Any, node: ast.Call) -> Value:

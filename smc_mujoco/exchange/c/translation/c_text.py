@@ -181,7 +181,7 @@ class Lines:
         self.views = set[str]()  # names that are pointers to arrays or parts of them
         self.names = dict[str, Value]()
         for name in self.parameters:
-            self.names[name] = self.named(name)
+            self.names[name] = self.variable(name)
         self.results = list[Kind]()
         self.fields: Names = ()  # names of its results, if it returns a named tuple
         self.begin()
@@ -230,7 +230,7 @@ class Lines:
         arguments = [f"{self.pointer_to(n)}{self.c_name(n)}" for n in self.parameters]
         if self.entry:
             return f"int {name}({', '.join(arguments)}, smc_real *out)"
-        if self.gives_number():
+        if self.returns_scalar():
             return f"static {TYPES[self.results[0].of]} {name}({', '.join(arguments) or 'void'})"
         for i, kind in enumerate(self.results):
             arguments.append(f"{TYPES[kind.of]} *out_{i}")
@@ -248,11 +248,11 @@ class Lines:
             of = f"const {of}"
         return f"{of} *"
 
-    def gives_number(self) -> bool:
+    def returns_scalar(self) -> bool:
         """Return whether it returns one number."""
         return len(self.results) == 1 and not self.results[0].shape
 
-    def named(self, name: str) -> Value:
+    def variable(self, name: str) -> Value:
         """Return the value of a variable that has a kind."""
         kind = self.kinds[name]
         if kind.shape:

@@ -286,7 +286,7 @@ class Expressions(Arrays):
         elif function is np.array and isinstance(node.args[0], ast.List | ast.Tuple):
             made = gathered([*map(self.number, node.args[0].elts)])
             kind = made.kind._replace(fields=None)
-            made = self.kept(made._replace(kind=kind))
+            made = self.stored(made._replace(kind=kind))
         elif self.calls_python(node):
             made = self.results_of(node)
         else:

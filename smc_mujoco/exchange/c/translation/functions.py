@@ -82,10 +82,10 @@ class Function(Statements):
         for parameter in made.parameters:
             value = values[made.source.position[parameter]]
             arguments.append(value.pointer or value.text)
-        if made.gives_number():
+        if made.returns_scalar():
             value = Value(f"{name}({', '.join(arguments)})", made.results[0])
             if made.changed & made.parameters.keys():
-                return self.kept(value)
+                return self.stored(value)
             return value
         sources = frozenset[str]()
         for i in made.returned:

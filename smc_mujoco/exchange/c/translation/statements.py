@@ -100,7 +100,7 @@ class Statements(Expressions):
             raise refuse(self.line, "a range of other than integers with a constant step")
         end = self.whole(bounds[1])
         if end is None:  # Python computes it once
-            last = self.kept(last)
+            last = self.stored(last)
         natural = self.natural(bounds[0])
         sign = "<"
         if step < 0:
@@ -145,7 +145,7 @@ class Statements(Expressions):
 
     def results_at(self) -> list[Value]:
         """Return the places of the results; none for a number."""
-        if not self.entry and self.gives_number():
+        if not self.entry and self.returns_scalar():
             return []
         places = []
         for i, kind in enumerate(self.results):
@@ -177,7 +177,7 @@ class Statements(Expressions):
         written = set[str]()
         for part, value in zip(targets, values, strict=True):
             if self.origins(value.text) & written:
-                value = self.kept(value)  # noqa: PLW2901
+                value = self.stored(value)  # noqa: PLW2901
             held.append(value)
             if isinstance(part, ast.Name):
                 written.add(part.id)
@@ -207,7 +207,7 @@ class Statements(Expressions):
             others = joined(value.items or (value,))
             rest = others.replace(place.text, "")
             if self.origins(rest) & self.origins(place.text):
-                value = self.kept(value)
+                value = self.stored(value)
         self.fill(place, value)
 
     def destination(self, target: ast.Name, value: Value) -> Value | None:
@@ -226,7 +226,7 @@ class Statements(Expressions):
             self.lines.append(f"{self.c_name(name)} = {value.pointer};")
             return None
         self.kinds[name] = wider(before or kind, kind)
-        self.names[name] = self.named(name)
+        self.names[name] = self.variable(name)
         if value.sources and kind.shape and kind.fields is None:
             self.copies.append((value.sources | {name}, target))
             self.names[name] = self.names[name]._replace(sources=value.sources | {name})
