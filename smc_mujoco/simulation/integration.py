@@ -144,7 +144,9 @@ def default_steps(s: Any) -> int:
         for steps in range(minimum, 4 * minimum + 1):
             if _divides_delays(s, steps):
                 return steps
-    return minimum
+    # an actuator's delay is rounded up to whole steps
+    rounded = any(map(operator.attrgetter("lateness"), s.actuator))
+    return 4 * minimum if rounded else minimum
 
 
 def _divides_delays(s: Any, steps: int) -> bool:

@@ -23,6 +23,7 @@ INTERPOLATIONS = ("zoh", "linear", "cubic")  # in MuJoCo's order
 # then read the same command: the last stage is one step later than the first.
 HELD = 0.25
 ROUNDING = 1e-6  # physics steps
+MOST_LATE = 0.05  # of a delay, by which a whole number of steps may exceed it; chosen
 MORE = 2  # samples on each side of an interpolation
 
 
@@ -33,9 +34,9 @@ class CommandDelay(Actuator):
         smc.hardware.CommandDelay(0.02)
 
     It adds to `input_delay`, which is of all joints. The command is held over each physics step, as
-    that of `input_delay`, and is late by a whole number of them, rounded up. Until the first one
-    arrives, the actuator has the command 0. In a trace `applied` is the command before it. A law
-    has no nominal model of it.
+    that of `input_delay`, and is late by a whole number of them, at most 5 % more. Until the first
+    one arrives, the actuator has the command 0. In a trace `applied` is the command before it. A
+    law has no nominal model of it.
 
     It stands before a PositionServo, an even DCMotor without inductance, or no drive at all. What
     MuJoCo's callback simulates before the actuator, such as a Lag, would be delayed too, with
@@ -47,7 +48,8 @@ class CommandDelay(Actuator):
         "cubic" interpolate, also at the stages of RK4.
 
     Raises:
-      ScenarioError: beside a drive that the callback simulates.
+      ScenarioError: in a scenario beside a drive that the callback simulates, or with a physics
+        step that is too long for it.
     """
 
     units: ClassVar[Mapping[str, str]] = {"dead_time": "s"}
@@ -78,6 +80,14 @@ class CommandDelay(Actuator):
         return *super().structure(), self.dead_time, self.interp
 
     def suits(self, s: Any, chain: Sequence[Actuator]) -> None:
+        steps = self.dead_time / s.physics_step
+        late = math.ceil(steps - ROUNDING)
+        if self.interp == "zoh" and late > (1.0 + MOST_LATE) * steps:
+            raise ScenarioError(
+                f"CommandDelay's dead_time {self.dead_time:g} s would be "
+                f"{late * s.physics_step:g} s at physics steps of {s.physics_step:g} s: give a "
+                "physics_step that divides it"
+            )
         simulated = drive_step(tuple(chain), s.physics_step, s.integrator == "RK4") is not None
         for part in chain:
             if part.drives and part is not self and (simulated or part.force is not None):

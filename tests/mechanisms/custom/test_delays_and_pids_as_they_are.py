@@ -40,13 +40,13 @@ def run(plant, **fields):
     return trace
 
 
-def arm(first, second, timestep="1e-3"):
-    channels = {"a": smc.Channel(servo=True), "b": smc.Channel()}
+def arm(first, second, timestep="1e-3", step=0.0):
+    channels = {"a": smc.Channel(servo=True, set_point_step=step), "b": smc.Channel()}
     text = ARM.replace("1e-3", timestep) % (first, second)
     return smc.plant_from(text, channels, keyframe="home")
 
 
-def by_mujoco(xml, trace, integrator, begin=lambda model, data: None):
+def by_mujoco(xml, trace, integrator, begin=lambda model, data: None, step=0.0):
     """Return positions at the samples of a plain loop of MuJoCo with a trace's commands."""
     model = mujoco.MjModel.from_xml_string(xml)
     model.opt.timestep = STEP
@@ -57,7 +57,10 @@ def by_mujoco(xml, trace, integrator, begin=lambda model, data: None):
     places = []
     for u in trace.u:
         places.append(data.qpos.copy())
-        data.ctrl[model.actuator_ctrladr] = -2.0 * (GOAL + u[0]), u[1] / 3.0
+        aim = GOAL + u[0]
+        if step:
+            aim = step * np.floor(aim / step + 0.5)
+        data.ctrl[model.actuator_ctrladr] = -2.0 * aim, u[1] / 3.0
         for _ in range(round(PERIOD / STEP)):
             mujoco.mj_step(model, data)
     return np.array(places)
@@ -112,13 +115,14 @@ def test_all_stages_of_rk4_read_one_command_where_the_last_of_mujoco_reads_the_n
 @pytest.mark.parametrize("left_out", ["", 'slewmax="3"', 'ki="40" imax=".02"'])
 def test_a_pid_moves_as_that_of_the_file(integrator, left_out):
     parts = PID.replace(left_out, ""), MOTOR % ""
-    trace = run(arm(*parts), duration=2.0, integrator=integrator)
+    step = 0.01 if left_out else 0.0  # rad, of the set-point
+    trace = run(arm(*parts, step=step), duration=2.0, integrator=integrator)
 
     def slewed_from_the_goal(model, data):
         if "slewmax" in parts[0]:
             data.act[0] = -2.0 * GOAL
 
-    x = by_mujoco(ARM % parts, trace, integrator, slewed_from_the_goal)
+    x = by_mujoco(ARM % parts, trace, integrator, slewed_from_the_goal, step)
     np.testing.assert_allclose(trace.x, x, rtol=0, atol=1e-12)
     assert trace.scenario.efforts == ("rad", "N m")
     plain = by_mujoco(ARM % (SERVO % "", MOTOR % ""), trace, integrator)
@@ -188,9 +192,11 @@ def test_predicted_chattering_has_the_delay_and_the_filter_of_an_actuator(own, g
 def test_the_default_step_divides_the_delay_of_an_actuator():
     given = {"plant": link(MOTOR.replace('"b"', '"j"') % ""), "law": "pid"}
     steps = []
-    for delay in (0.02, 0.0025):
+    for delay in (0.02, 0.0025, 1.0 / 240.0):
         steps.append(smc.Scenario(actuator=CommandDelay(delay), **given).resolved.physics_step)
-    assert steps == [1e-3, 5e-4]
+    assert steps == [1e-3, 5e-4, 2.5e-4]
+    with pytest.raises(ScenarioError, match=r"dead_time 0.003 s would be 0.005 s at .* divides it"):
+        smc.Scenario(actuator=CommandDelay(0.003), physics_step=5e-3, control_period=5e-3, **given)
     with pytest.raises(ScenarioError, match=r"before DCMotor, whose state .* give input_delay"):
         smc.Scenario(actuator=(CommandDelay(0.02), smc.DCMotor()), **given)
 
