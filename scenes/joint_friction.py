@@ -12,7 +12,7 @@ import smc_mujoco as smc
 
 
 def answer(runs):
-    worst = runs["0.4 N m"]
+    worst = runs["0.4 N·m"]
     return (
         f"{runs.count('settle')}; largest steady error at 0.4 N "
         f"m: {worst.most('steady_error')}; widest "
@@ -29,11 +29,11 @@ scene = smc.Scene(
         for name, friction in {
             "none": smc.Coulomb(0.0),
             "0.1 N m": smc.Coulomb(0.1),
-            "0.4 N m": smc.Coulomb(0.4),
+            "0.4 N·m": smc.Coulomb(0.4),
             "LuGre": smc.hardware.LuGre(coulomb=0.2, static=0.4, stribeck=0.05),
         }.items()
     },
-    film="0.4 N m",
+    film="0.4 N·m",
     answers=("steady_error", "ripple", "stick_time"),
     answer=answer,
 )

@@ -24,7 +24,8 @@ caption, td[colspan] div {{ position: sticky; left: 0; max-width: min(70ch, 100v
 caption, th:first-child, td:first-child {{ padding-left: 0 !important; }}
 img {{ display: block; width: 100%; height: auto; }}
 @media (max-width: {PHONE}px) {{ table {{ font-size: 14px; }} }}
-@media (prefers-color-scheme: dark) {{ img {{ filter: invert(0.9) hue-rotate(180deg); }} }}
+@media (prefers-color-scheme: dark) {{
+  img {{ filter: invert(0.9) hue-rotate(180deg); mix-blend-mode: lighten; }} }}
 """
 
 

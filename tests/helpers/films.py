@@ -15,7 +15,7 @@ from smc_mujoco.draw.film.track import MachineTrack
 class Blank:
     """In the place of a film's page: drawing its panels takes half of a picture's time."""
 
-    def __init__(self, runs, size, tiles, labels, title=None, key=(), start=0.0, lines=2):
+    def __init__(self, runs, size, tiles, labels, title=None, key=(), start=0.0, lines=2, order=""):
         self.tiles = tiles
         self.image = np.full((size[1], size[0], 3), 255, np.uint8)
 

@@ -130,6 +130,7 @@ class Overlay:
             width = SHAFT_WIDTH * self.scale
             rim = round(arrows.RIM * self.scale)
             arrows.stamp(image, points, width, arrow, self.scale, rim, share < 1.0)
+            arrows.write(image, arrow, points, self.scale, {})
 
 
 def overlays(stages: Sequence[Stage]) -> list[Overlay]:

@@ -72,6 +72,7 @@ MIN_BAR = 0.1  # of the longest arrow: smaller ranges have no bar
 
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
+Numbers = dict[tuple[str, tuple[int, ...]], Array]  # words and colour of a number -> its box, px
 
 
 class Arrow(NamedTuple):
@@ -491,21 +492,17 @@ def stamp(
     rim: int = 0,
     cut: bool = True,
 ) -> None:
-    """Draw an arrow along a line, (m, 2) px, of a film `scale` times as large as a full one, with
-    its number at its free end, and a break mark if it is cut.
+    """Draw an arrow along a line, (m, 2) px, of a film `scale` times as large as a full one, with a
+    break mark if it has a number and is cut.
     """
     paint(image, outline(line, width, arrow.head), arrow.rgba, rim)
-    if not arrow.words:
-        return
-    if cut:
+    if arrow.words and cut:
         k = round(BREAK * len(line))
         way = line[k] - line[k - 1]
         way = width * way / max(np.linalg.norm(way), 1e-9)
         across = way[::-1] * (-0.9, 0.9) + 0.3 * way
         corners = [across + 0.3 * way, across - 0.3 * way, -across - 0.3 * way, 0.3 * way - across]
         paint(image, line[k] + np.array(corners), WHITE)
-    ends = (line[0], line[-1]) if arrow.body else (line[-1], line[0])
-    write(image, arrow.words, ends, arrow.rgba, scale)
 
 
 def bytes_of(rgba: Sequence[float]) -> tuple[int, ...]:
@@ -513,41 +510,50 @@ def bytes_of(rgba: Sequence[float]) -> tuple[int, ...]:
     return tuple(round(255 * part) for part in rgba[:3])
 
 
-def write(
-    image: Image.Image,
-    words: str,
-    ends: tuple[Array, Array],
-    rgba: Sequence[float],
-    scale: float,
-) -> None:
-    """Write a number at an arrow, whose free end and other end are given, px, where there is room
-    in the picture: beyond the free end, over the arrow or beside a steep one, or before its other
-    end; else below it.
+def write(image: Image.Image, arrow: Arrow, line: Array, scale: float, said: Numbers) -> None:
+    """Write the number of an arrow along a line, (m, 2) px, where there is room in the picture:
+    beyond its free end, over the arrow or beside a steep one, or before its other end; else below
+    it.
+
+    Nothing is written over another number, and none twice in a colour: `said` has the numbers of
+    the picture and their boxes, (2, 2) px, and gets this one.
+    """
+    words = arrow.words
+    ends = (line[0], line[-1]) if arrow.body else (line[-1], line[0])
+    colour = bytes_of(arrow.rgba)
+    key = words, colour
+    if not words or key in said:
+        return
+    for high in (LETTERS * scale, SMALL_LETTERS * scale):
+        half = np.array([style.width(words, high, bold=True), high]) / 2 + 2 * scale
+        most = np.array(image.size) - half
+        for place in number_places(ends, half, most, 6 * scale):
+            box = np.array([place - half, place + half])
+            apart = [(box[0] >= old[1]).any() or (box[1] <= old[0]).any() for old in said.values()]
+            if (place >= half).all() and (place <= most).all() and all(apart):
+                said[key] = box
+                rim = {"stroke_width": round(2 * scale), "stroke_fill": style.PAPER}
+                letters = style.font(high, True)
+                at = tuple(place.tolist())
+                ImageDraw.Draw(image).text(at, words, colour, letters, anchor="mm", **rim)
+                return
+
+
+def number_places(ends: tuple[Array, Array], half: Array, most: Array, gap: float) -> list[Array]:
+    """Return the places of the middle of an arrow's number, px, the best first.
+
+    `half` is half the size of the number, and `most` the farthest place that it may have.
     """
     free, other = ends
-    gap = 6 * scale
     side = 1.0 if free[0] >= other[0] else -1.0
     middle = (free + other) / 2
-    for high in (LETTERS * scale, SMALL_LETTERS * scale):
-        wide = style.width(words, high, bold=True)
-        apart = np.array([0.0, abs(free[1] - other[1]) / 2 + high])
-        reach = np.array([side * (gap + wide / 2), 0.0])
-        low = np.array([wide, high]) / 2 + 2 * scale
-        most = np.array(image.size) - low
-        steep = abs(free[1] - other[1]) > abs(free[0] - other[0])
-        beside = middle + reach if steep else middle - apart
-        beside[0] = np.clip(beside[0], low[0], max(low[0], most[0]))
-        places = [free + reach, beside, other - reach]
-        inside = [(place >= low).all() and (place <= most).all() for place in places]
-        if any(inside):
-            place = places[inside.index(True)]
-            break
-    else:
-        place = (middle + apart).clip(low, np.maximum(low, most))
-    rim = {"stroke_width": round(2 * scale), "stroke_fill": style.PAPER}
-    at = tuple(place.tolist())
-    letters = style.font(high, True)
-    ImageDraw.Draw(image).text(at, words, bytes_of(rgba), letters, anchor="mm", **rim)
+    reach = np.array([side * (gap + half[0]), 0.0])
+    apart = np.array([0.0, abs(free[1] - other[1]) / 2 + 2 * half[1]])
+    steep = abs(free[1] - other[1]) > abs(free[0] - other[0])
+    beside = middle + reach if steep else middle - apart
+    within = np.maximum(half, most)
+    beside[0] = np.clip(beside[0], half[0], within[0])
+    return [free + reach, beside, other - reach, (middle + apart).clip(half, within)]
 
 
 def paint(image: Image.Image, edge: Array, rgba: Sequence[float], rim: int = 0) -> None:

@@ -302,7 +302,8 @@ def pictures(frames: Frames) -> Generator[Array]:
     lines = head_lines(runs, size, frames.title, keys)
     placed = placement(tracks, frames.camera, runs.names, size, lines)
     whole = size, placed.tiles, placed.labels, frames.title
-    sheet = Sheet(runs, *whole, keys[0], lines=lines)
+    order = "" if placed.lanes is None else "back to front"
+    sheet = Sheet(runs, *whole, keys[0], lines=lines, order=order)
     with contextlib.ExitStack() as opened:
         stages = [opened.enter_context(stage) for stage in staged(tracks, placed, clock.times)]
         shots = separate_shots
@@ -321,7 +322,7 @@ def pictures(frames: Frames) -> Generator[Array]:
             last = runs._replace(traces=closing)
             stop = end(last.traces)
             last = last._replace(span=(stop, stop))
-            sheet = Sheet(last, *whole, keys[-1], start, lines)
+            sheet = Sheet(last, *whole, keys[-1], start, lines, order)
             for stage, track in zip(stages, tracks_at(close, runs, scales), strict=True):
                 middle = track.x.mean(axis=0)
                 larger = close.factor * (track.x - middle)

@@ -163,8 +163,9 @@ def label_sizes(names: Sequence[str], size: tuple[int, int], room: float) -> tup
 class Sheet:
     """The page of a film of some size, px, from the time `start` of the run, s.
 
-    `key` has the words below the title, before the source of the gains; beside it, of one of the
-    `lines`. `tiles` and `labels`, (machines, 4) px, are where the machines and their labels are.
+    `key` has the words below the title, before the `order` of machines in one picture and the
+    source of the gains; beside it, of one of the `lines`. `tiles` and `labels`, (machines, 4) px,
+    are where the machines and their labels are.
     """
 
     def __init__(
@@ -177,6 +178,7 @@ class Sheet:
         key: Sequence[str] = (),
         start: float = 0.0,
         lines: int = 2,
+        order: str = "",
     ):
         self.runs = runs
         self.size = size
@@ -188,7 +190,7 @@ class Sheet:
             inches = (WIDTH, WIDTH * size[1] / size[0])
             self.page = Figure(figsize=inches, dpi=size[0] / WIDTH)
             self.canvas = FigureCanvasAgg(self.page)
-            self.write_head(one_line(style.titled(title, runs.head)), key, lines)
+            self.write_head(one_line(style.titled(title, runs.head)), key, lines, order)
             self.write_labels(labels)
             rim = withStroke(linewidth=style.points(3), foreground=style.PAPER)
             corners = tiles[:, :2] + 0.3 * self.letters
@@ -218,7 +220,7 @@ class Sheet:
         place = (x / self.size[0], 1.0 - y / self.size[1])
         return self.page.text(*place, words, parse_math=False, animated=not words, **look)
 
-    def write_head(self, title: str, key: Sequence[str], lines: int) -> None:
+    def write_head(self, title: str, key: Sequence[str], lines: int, order: str) -> None:
         """Write the title, and below or beside it the key, with the clock at the right."""
         high = self.letters
         left = EDGE * high
@@ -243,7 +245,7 @@ class Sheet:
         if style.width(gains, high) > self.room:  # in the order of the machines
             sources = [trace.scenario.law.source.words for trace in self.runs.traces]
             gains = f"gains: {', '.join(sources)}"
-        said = [*key, gains]
+        said = list(filter(None, [*key, order, gains]))
         least = lines - 1  # beside the title there may be no words
         while len(said) > least and style.width(" · ".join(said), high) > self.room:
             said.pop()

@@ -211,20 +211,30 @@ class Stage:
         if not drawn:
             return picture
         image = Image.fromarray(picture)
+        lines = []
         for i, arrow in sorted(drawn, key=lambda item: item[1].head):  # bars are behind arrows
-            self.draw_arrow(image, self.mounts[i], arrow)
+            line = self.draw_arrow(image, self.mounts[i], arrow)
+            lines.append((arrow, line))
+        said: arrows.Numbers = {}
+        for arrow, line in lines:  # over all arrows
+            if line is not None:
+                arrows.write(image, arrow, line, self.scale, said)
         return np.asarray(image)
 
-    def draw_arrow(self, image: Image.Image, mount: arrows.Mount, arrow: arrows.Arrow) -> None:
-        """Draw an arrow over the picture; nothing if it has no place or points at the camera."""
+    def draw_arrow(
+        self, image: Image.Image, mount: arrows.Mount, arrow: arrows.Arrow
+    ) -> Array | None:
+        """Draw an arrow over the picture and return its line, (m, 2) px; nothing, None, if it has
+        no place or points at the camera.
+        """
         found = arrows.path(self.model, self.data, mount, arrow)
         if not found:
-            return
+            return None
         points, width = found
         line = self.project(points)
         length = np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
         if length < arrows.MIN_PIXELS * self.scale:
-            return
+            return None
         beside = points[0] + width * self.turn[:, 1]
         across = self.project(np.array([points[0], beside]))
         least = arrows.MIN_SHAFT * self.scale * arrow.size
@@ -236,6 +246,7 @@ class Stage:
             ImageDraw.Draw(image).line(leader, style.INK, max(1, round(self.scale)))
             rim = round(arrows.RIM * self.scale)
         arrows.stamp(image, line, thick, arrow, self.scale, rim)
+        return line
 
     def project(self, points: Array) -> Array:
         """Return where points (m, 3) m are in the picture, (m, 2) px."""

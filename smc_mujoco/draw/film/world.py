@@ -32,6 +32,7 @@ SUN = "sun"  # the light whose shadows lie on the floor, see canvas.py
 FLOOR_CELLS = 7  # of the floor's grid, in the width of what is seen
 HAZE = (0.76, 0.81, 0.86, 1.0)  # red, green, blue, opacity
 DIAL_OPACITY = 0.25  # of the dial behind a pendulum
+PALE = (0.62, 0.64, 0.67, 1.0)  # of what stands behind a rod
 HAZE_AT_TOP = 0.9  # share of the full haze at the top of the picture
 HAZE_HORIZON = 3.0  # largest distance of that haze, in distances of the farthest machine
 MIN_HAZE_DISTANCE = 1.05  # of the farthest point: a nearer floor, seen from above, gets no haze
@@ -221,7 +222,9 @@ def first_channels(scenario: Scenario) -> Scenario:
 
 
 def restyle(model: mujoco.MjModel) -> None:
-    """Enlarge the bobs of pendulums, to which the eye should go, and make dials translucent."""
+    """Enlarge the bobs of pendulums, to which the eye should go; make dials translucent, and the
+    box pale before which a rod hangs.
+    """
     names = []
     for i in range(model.ngeom):
         name = model.geom(i).name
@@ -230,6 +233,9 @@ def restyle(model: mujoco.MjModel) -> None:
     painted = model.mat_rgba[model.geom_matid[dial]]
     model.geom_rgba[dial] = painted * (1.0, 1.0, 1.0, DIAL_OPACITY)
     model.geom_matid[dial] = -1
+    box = np.isin(names, "cube")
+    model.geom_rgba[box] = PALE
+    model.geom_matid[box] = -1
     for field in (model.geom_size, model.geom_aabb, model.geom_rbound):
         field[np.isin(names, "bob")] *= 1.3
 

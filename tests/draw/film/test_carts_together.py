@@ -88,6 +88,7 @@ def test_a_number_at_an_arrow_hides_nothing_where_there_is_room_beside_it():
     line = np.linspace((100.0, 25.0), (150.0, 25.0), 40)
     arrow = arrows.Arrow(0.0, 1.0, arrows.rgba(style.DISTURBANCE), words="180 N·m")
     arrows.stamp(image, line, 6.0, arrow, 0.625)
+    arrows.write(image, arrow, line, 0.625, {})
     dark = np.asarray(image).min(axis=2) < 128
     assert not dark[45:].any()
     assert dark[:, :95].any()
@@ -107,3 +108,22 @@ def test_a_free_body_s_picture_says_how_far_it_is_off_its_place():
     (said,) = states.timeline(dataclasses.replace(run, x=far), np.array([0.02]))
     assert said is not None
     assert said.words == "1.2 m off"
+
+
+@renders
+def test_in_one_picture_of_several_machines_words_say_their_order(monkeypatch):
+    """In grey nothing else tells the carts apart."""
+    made = film.Sheet
+    keys = []
+
+    def kept(*parts, **fields):
+        page = made(*parts, **fields)
+        keys.append(page.key)
+        return page
+
+    monkeypatch.setattr(film, "Sheet", kept)
+    runs = smc.run(list(smc.paper.comparison("duffing", duration=0.1).values()))
+    for shown in (runs, runs[:1]):
+        next(iter(film.Frames(shown, size=SIZE, at=0.05)))
+    assert "back to front" in keys[0]
+    assert "back to front" not in keys[1]

@@ -1,5 +1,7 @@
 """A film of a user's machine looks across what its driven joints do, from a free side, and near."""
 
+import itertools
+
 import numpy as np
 import pytest
 from helpers.films import staged
@@ -132,8 +134,8 @@ def test_a_chart_keeps_the_unit_of_a_joint_with_a_long_name():
 )
 def test_an_arrow_s_number_hides_neither_the_arrow_nor_what_it_is_at(free, other, place):
     image = Image.new("RGB", (200, 100), "white")
-    ends = np.array(free), np.array(other)
-    arrows.write(image, "20 N", ends, (0.0, 0.0, 0.0, 1.0), 0.5)
+    arrow = arrows.Arrow(0.0, 1.0, (0.0, 0.0, 0.0, 1.0), words="20 N")
+    arrows.write(image, arrow, np.array([other, free]), 0.5, {})
     y, x = np.nonzero(np.asarray(image)[..., 0] < 128)
     if place == "beyond":
         assert x.min() > free[0]
@@ -143,3 +145,16 @@ def test_an_arrow_s_number_hides_neither_the_arrow_nor_what_it_is_at(free, other
     else:
         assert x.min() > free[0]
         assert y.min() > other[1]
+
+
+def test_numbers_of_arrows_are_apart_and_none_is_written_twice():
+    """Two wheels have four arrows so close that their numbers hid each other."""
+    image = Image.new("RGB", (300, 200), "white")
+    said = {}
+    black = (0.0, 0.0, 0.0, 1.0)
+    for words, x in (("2.4 N", 150.0), ("2.4 N", 160.0), ("1.3 N", 152.0), ("9 N", 155.0)):
+        arrow = arrows.Arrow(0.0, 1.0, black, words=words)
+        arrows.write(image, arrow, np.array([(x - 40.0, 100.0), (x, 100.0)]), 0.5, said)
+    assert [words for words, _ in said] == ["2.4 N", "1.3 N", "9 N"]
+    for one, other in itertools.combinations(said.values(), 2):
+        assert (one[0] >= other[1]).any() or (one[1] <= other[0]).any()
