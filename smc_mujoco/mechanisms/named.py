@@ -128,6 +128,12 @@ def _left_out(source: mjcf.ModelSource, seen: Sequence[str], given: dict) -> dic
             f"{source.label} starts and ends in its keyframe {keyframe!r}: @{keyframe} after the "
             "joints says so without this line, and @ alone takes the pose of the file"
         )
+    elif "keyframe" not in given and [key.name for key in spec.keys] == [""]:
+        _say(
+            f"{source.label} has a keyframe without a name, and runs start and end in the pose of "
+            "the file: give the keyframe a name to start there, or write @ after the joints to say "
+            "so without this line"
+        )
     if "others" not in given and (idle := limp(spec, seen)):
         taken["others"] = "held"
         _say(

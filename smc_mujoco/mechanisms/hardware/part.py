@@ -269,8 +269,6 @@ class Actuator(OnJoints):
 
     drives: ClassVar[bool] = True  # whether it turns u into force; else it stands after a drive
     leads: ClassVar[bool] = False  # whether another drive may follow
-    # whether it is that of the plant's file, which a scenario with another plant leaves behind
-    kept: ClassVar[bool] = False
     in_callback: ClassVar[bool] = False  # whether the callback simulates all of it
 
     scale: ClassVar[float] = 1.0  # control of the model's actuator per unit of u
@@ -289,6 +287,18 @@ class Actuator(OnJoints):
     even: ClassVar[bool] = False  # whether `mujoco_torque` is all that it does
     smooth: ClassVar[bool] = True  # whether RK4 may integrate it
     nominal: ClassVar[NominalDrive] = NominalDrive()  # what the law's model knows of it
+
+    # whether it is that of the plant's file, which a scenario with another plant leaves behind; a
+    # copy with other numbers is not
+    kept: bool = dataclasses.field(
+        default=False, init=False, compare=False, repr=False, kw_only=True
+    )
+
+    def of_file(self, on: tuple[str, ...]) -> "Actuator":
+        """Return a copy on these joints that is marked as that of the plant's file."""
+        copy = dataclasses.replace(self, on=on)
+        object.__setattr__(copy, "kept", True)  # as a frozen class sets what is no argument
+        return copy
 
     def drives_of(self, spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:
         """Return the actuators that it changes."""

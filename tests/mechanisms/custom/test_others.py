@@ -237,6 +237,16 @@ def test_a_text_takes_the_only_keyframe_or_home(keys, taken, tmp_path, monkeypat
         assert as_plant("m.xml:b+held").argument == f"m.xml:b{taken}+held"
 
 
+def test_a_keyframe_without_a_name_is_told_in_a_text(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "m.xml").write_text(ARM.replace('<key name="home"', "<key"))
+    with pytest.warns(ScenarioWarning, match="keyframe without a name.*give the keyframe a name"):
+        made = as_plant("m.xml:b+held")
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", ".*without a name")
+        assert as_plant("m.xml:b@+held") == made
+
+
 def test_motors_that_nothing_commands_are_told_with_a_cure_that_works():
     with pytest.warns(ScenarioWarning, match="nothing commands, 'c' and 'roll'") as told:
         plant("arm", None)
