@@ -34,7 +34,7 @@ def least(colours, others=()) -> float:
 )
 def test_colours_are_measured_in_cielab_as_published(colour, lab):
     """B. Lindbloom, for D65. Who sees no red takes red and dark yellow for each other."""
-    assert style._seen(colour)[0] == pytest.approx(lab, abs=0.05)
+    assert style._as_each_sight(colour)[0] == pytest.approx(lab, abs=0.05)
     assert style.distance("#FF0000", "#6E5E00") < 20.0 < style.distance("#FF0000", "#0000FF")
 
 
