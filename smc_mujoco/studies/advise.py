@@ -70,7 +70,7 @@ def advise(
     margins_work = TRIED * len(KINDS) * _coarse(trial, plant, "none", trial.conditions[0]).work
     clock.unit = _work_of_judgement(plant, goal)
     few = min(seeds, FEWEST_SEEDS)
-    clock.each = AFTER * clock.unit + few * table_work
+    clock.table, clock.choice = few * table_work, AFTER * clock.unit
     clock.after = margins_work + 2 * len(BESIDE_NONE) * clock.unit
     raced = race(trial, plant, entrants, goal, clock, relevant)
     chosen, tuned = _chosen(trial, plant, raced, _shown(raced), goal)

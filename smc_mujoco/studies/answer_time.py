@@ -20,14 +20,16 @@ class AnswerTime:
 
     ends: a time, inf for no limit.
     after: the work of the runs that must follow a race, at the least, beside those of
-    each: the work of those of a law in the tables.
+    table: the work of those of a law in the tables, and of
+    choice: those that choose among its sets of gains and compare it with others.
     unit: the work of a judgement of one set of gains.
     pace: how long a unit of work takes, s, as the last runs of a race took; 0 before them.
     """
 
     ends: float = math.inf
     after: float = 0.0
-    each: float = 0.0
+    table: float = 0.0
+    choice: float = 0.0
     unit: float = 0.0
     pace: float = 0.0
 
@@ -36,9 +38,12 @@ class AnswerTime:
         if sets and self.unit:
             self.pace = seconds / (sets * self.unit)
 
-    def race_ends(self, laws: int) -> float:
-        """Return when a race of so many laws must end."""
-        return self.ends - self.pace * (self.after + min(laws, SHOWN) * self.each)
+    def race_ends(self, laws: int, first: bool = False) -> float:
+        """Return when a race of so many laws must end; if it is to have the first set of each, that
+        goes before choice.
+        """
+        of_law = self.table if first else self.table + self.choice
+        return self.ends - self.pace * (self.after + min(laws, SHOWN) * of_law)
 
     @property
     def left(self) -> float:

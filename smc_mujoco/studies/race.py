@@ -209,7 +209,7 @@ def _first_sets(
 
     def over() -> bool:
         end = last + _expected(taken or [0.0])
-        return bool(there) and end > clock.race_ends(len(there) + 1)
+        return bool(there) and end > clock.race_ends(len(there) + 1, first=True)
 
     for i, made in _searched(trial, pieces, over):
         one = pieces[i][0]

@@ -191,7 +191,7 @@ def test_a_race_leaves_the_time_that_the_runs_after_it_take(run, now):
     sets = []
     for after in (0.0, 80.0, 110.0):
         now[0] = 0.0
-        clock = AnswerTime(160.0, after=after - 20.0, each=10.0, unit=1.0)
+        clock = AnswerTime(160.0, after=after - 20.0, table=4.0, choice=6.0, unit=1.0)
         sets.append(run({"a": 0.0, "b": 2.0}, clock=clock).sets)
         assert clock.pace == 1.0
         assert now[0] <= clock.race_ends(2) == 160.0 - after
@@ -200,7 +200,7 @@ def test_a_race_leaves_the_time_that_the_runs_after_it_take(run, now):
 
 def test_laws_for_whose_first_set_there_is_no_time_are_named_and_at_least_one_is_searched(run, now):
     laws = dict.fromkeys("abcdefghijklm", 0.0)
-    raced = run(laws, clock=AnswerTime(105.0, after=1.0, each=4.0, unit=1.0))
+    raced = run(laws, clock=AnswerTime(105.0, after=1.0, table=4.0, choice=50.0, unit=1.0))
     assert [*raced.entrants] == [*"abcdef"]
     assert raced.unsearched == [*"ghijklm"]
     assert now[0] == 6 * 13.0 <= 105.0 - 21.0
