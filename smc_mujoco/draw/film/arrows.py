@@ -524,10 +524,11 @@ def write(image: Image.Image, arrow: Arrow, line: Array, scale: float, said: Num
     key = words, colour
     if not words or key in said:
         return
-    for high in (LETTERS * scale, SMALL_LETTERS * scale):
+    for size, count in ((LETTERS, 3), (SMALL_LETTERS, 4)):  # below it, only small ones
+        high = size * scale
         half = np.array([style.width(words, high, bold=True), high]) / 2 + 2 * scale
         most = np.array(image.size) - half
-        for place in number_places(ends, half, most, 6 * scale):
+        for place in number_places(ends, half, most, 6 * scale)[:count]:
             box = np.array([place - half, place + half])
             apart = [(box[0] >= old[1]).any() or (box[1] <= old[0]).any() for old in said.values()]
             if (place >= half).all() and (place <= most).all() and all(apart):

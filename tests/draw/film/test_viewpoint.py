@@ -154,7 +154,10 @@ def test_numbers_of_arrows_are_apart_and_none_is_written_twice():
     black = (0.0, 0.0, 0.0, 1.0)
     for words, x in (("2.4 N", 150.0), ("2.4 N", 160.0), ("1.3 N", 152.0), ("9 N", 155.0)):
         arrow = arrows.Arrow(0.0, 1.0, black, words=words)
+        count = len(said)
+        before = np.asarray(image)
         arrows.write(image, arrow, np.array([(x - 40.0, 100.0), (x, 100.0)]), 0.5, said)
+        assert (np.asarray(image) != before).any() == (len(said) > count)
     assert [words for words, _ in said] == ["2.4 N", "1.3 N", "9 N"]
     for one, other in itertools.combinations(said.values(), 2):
         assert (one[0] >= other[1]).any() or (one[1] <= other[0]).any()
