@@ -521,8 +521,7 @@ def _kept(items: list[Actuator], plant: Plant) -> list[Actuator]:
     kept = plant.suggested.get("actuator", ())
     for joint, chain in zip(driven_names(plant), kept, strict=False):
         for part in chain:
-            own = dataclasses.replace(part, on=() if plant.driven == 1 else (joint,))
-            vars(own)["kept"] = True  # the class is frozen
+            own = part.of_file(() if plant.driven == 1 else (joint,))
             if own in items:
                 items.remove(own)
             if not _has_drive(items, part, joint):

@@ -3,7 +3,6 @@ and for plays.
 """
 
 # pyright: reportCallIssue=false
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -127,9 +126,7 @@ def _turning(form: Form, compile_user: Compiler) -> Any:
         x = work[work_at.x + first + k]
         v = work[work_at.v + first + k]
         of_rotor = _state_of(y.t, y.h, x, v, y.u, y.motor, 0.0)
-        force = motor + rub(view, of_rotor, i)
-        angle = play.turns * x
-        force += play.weight * math.cos(angle) + play.weight_across * math.sin(angle)
+        force = motor + rub(view, of_rotor, i) + play.weight
         mobility = 1.0 / play.rotor_inertia
         damping = play.rotor_damping + row[row_at.damping + first + k]
         a = mobility * (force - damping * v)

@@ -3,7 +3,6 @@ MuJoCo's limits.
 """
 
 import dataclasses
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, ClassVar
 
@@ -42,9 +41,8 @@ class Backlash(BesideJoint):
 
     smooth = False
     units: ClassVar[Mapping[str, str]] = {"gap": "{x}", **BesideJoint.units}
-    # of the little mass that the compiler needs: whether it turns, and its weight's force at 0 and
-    # after a quarter of a turn
-    names = "gap", "rotor_inertia", "rotor_damping", "turns", "weight", "weight_across"
+    # weight: of the little mass that the compiler needs; on a hinge it is on the axis
+    names = "gap", "rotor_inertia", "rotor_damping", "weight"
 
     gap: Natural
     rotor_inertia: Annotated[float, Number(low=MIN_INERTIA, high=MAX_PARAMETER)] = 1e-3
@@ -57,17 +55,12 @@ class Backlash(BesideJoint):
         model = run.model
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
-        at_0 = -data.qfrc_bias
-        data.qpos[:] = math.pi / 2
-        mujoco.mj_forward(model, data)
-        across = -data.qfrc_bias
         rows = []
         for dof in run.dofs:
             joint = model.joint(ROTOR + model.joint(int(model.dof_jntid[dof])).name)
             rotor = joint.dofadr[0]
-            turns = float(joint.type[0] == mujoco.mjtJoint.mjJNT_HINGE)
-            of_rotor = self.gap, model.dof_M0[rotor], self.rotor_damping
-            rows.append((*of_rotor, turns, at_0[rotor], across[rotor]))
+            weight = -data.qfrc_bias[rotor]
+            rows.append((self.gap, model.dof_M0[rotor], self.rotor_damping, weight))
         return rows
 
     def couple(self, tendon: mujoco.MjsTendon) -> None:

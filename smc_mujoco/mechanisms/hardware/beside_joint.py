@@ -101,6 +101,7 @@ def _add_rotor(
             thinnest = np.argmin(np.abs(axis))
             arm = np.cross(axis, np.eye(3)[thinnest])
         away = arm / np.linalg.norm(arm)
+        rotor.ipos = MIN_ARM * away  # MuJoCo refuses a body whose centre does not move
         # in front of the hub, towards the camera at -y
         face = axis * math.copysign(0.045, -axis[1])
         ends = (*face, *(face + 0.16 * away))

@@ -118,3 +118,17 @@ def test_friction_is_on_the_side_of_the_gap_that_it_names():
     ends = [(trace.x[-1, 0], trace.s[-1, 0]) for trace in (motor, link)]  # joint, rotor
     assert ends[0] == pytest.approx((GAP / 2, 0.0), abs=0.1 * GAP)
     assert ends[1] == pytest.approx((0.0, GAP / 2), abs=0.1 * GAP)
+
+
+def test_the_mass_of_a_rotor_on_a_hinge_is_on_its_axis():
+    scenario = smc.Scenario(
+        plant="inverted_pendulum", law="none", actuator=smc.Backlash(GAP, rotor_inertia=1e-9)
+    )
+    model = models.with_values(models.compile_model(scenario), scenario)
+    rotor = models.moving_joints(model)[1, 0]
+    data = mujoco.MjData(model)
+    for angle in (0.0, 1.0, math.pi / 2):
+        data.qpos[model.jnt_qposadr[rotor]] = angle
+        mujoco.mj_forward(model, data)
+        assert abs(data.qfrc_bias[model.jnt_dofadr[rotor]]) < 1e-13
+    assert model.dof_M0[model.jnt_dofadr[rotor]] == pytest.approx(1e-9, rel=1e-3)
