@@ -212,7 +212,7 @@ def _compile_act(function: Callable) -> CompiledFunction:
 
 
 @functools.cache
-def compile_moment(moment: Callable) -> CompiledFunction:
+def compile_moment(moment: Any) -> CompiledFunction:
     """Compile what only some runs do at a moment of the control step, a compiled function
     (address, sim, k) -> failure code.
 

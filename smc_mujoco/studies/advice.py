@@ -222,9 +222,9 @@ class RaceAdvice(Advice):
             more = math.ceil((LOOKS[0] - race.sets) * race.seconds / 60.0)
             short = ""
             if race.sets < FIRST:
-                short = f", as the time cannot hold even {FIRST}"
+                short = f", not even the first {FIRST}"
             return (
-                f"open; the time was enough for {counted(race.sets, 'set')} of gains of each "
+                f"open; there was time for {counted(race.sets, 'set')} of gains of each "
                 f"law{short}, and {LOOKS[0]} can name a winner; the same call goes on from there, "
                 f"and takes about {counted(more, 'more minute')}"
             )
