@@ -529,15 +529,25 @@ def write(image: Image.Image, arrow: Arrow, line: Array, scale: float, said: Num
         half = np.array([style.width(words, high, bold=True), high]) / 2 + 2 * scale
         most = np.array(image.size) - half
         for place in number_places(ends, half, most, 6 * scale)[:count]:
+            inside = (place >= half).all() and (place <= most).all()
             box = np.array([place - half, place + half])
-            apart = [(box[0] >= old[1]).any() or (box[1] <= old[0]).any() for old in said.values()]
-            if (place >= half).all() and (place <= most).all() and all(apart):
+            if inside and is_apart(box, said):
                 said[key] = box
                 rim = {"stroke_width": round(2 * scale), "stroke_fill": style.PAPER}
                 letters = style.font(high, True)
                 at = tuple(place.tolist())
                 ImageDraw.Draw(image).text(at, words, colour, letters, anchor="mm", **rim)
                 return
+
+
+def is_apart(box: Array, said: Numbers) -> bool:
+    """Return whether a box, (2, 2) px, overlaps that of no number."""
+    for old in said.values():
+        left = (box[1] <= old[0]).any()
+        right = (box[0] >= old[1]).any()
+        if not left and not right:
+            return False
+    return True
 
 
 def number_places(ends: tuple[Array, Array], half: Array, most: Array, gap: float) -> list[Array]:

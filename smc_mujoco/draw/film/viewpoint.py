@@ -38,8 +38,11 @@ def view(
       links: the geoms that these joints move.
     """
     own = models_camera(model)
-    if own and shown(data, joints, own) * visible(model, data, links, own) >= ENOUGH:
-        return own
+    if own:
+        motion = shown(data, joints, own)
+        share = motion * visible(model, data, links, own)
+        if share >= ENOUGH:
+            return own
     rated = []
     for azimuth, elevation in itertools.product(AZIMUTHS.tolist(), ELEVATIONS):
         angles = azimuth, elevation
