@@ -184,7 +184,7 @@ class RaceAdvice(Advice):
             lines.append("With these gains: not tried, as the time was over")
         if len(self.weighs) > 1:
             lines.append(f"Its J: {self._weighs}")
-        lines.append(f"Its needs: {self._needs}")
+        lines.append(f"Its scores: {self._needs}")
         if self.law.name != "none":
             lines.append(f"Without a law: {self.no_law.words}")
         if self.added:

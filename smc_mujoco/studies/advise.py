@@ -273,7 +273,7 @@ def _added(trial: Trial, plant: Plant, goal: Objective) -> str:
         if noise and condition.name not in asked:
             return (
                 f"{condition.name}, of {noise.position:g} {units} in positions and "
-                f"{noise.velocity:g} {units} a second in velocities (standard deviations), as no "
+                f"{noise.velocity:g} {units}/s in velocities (standard deviations), as no "
                 "condition that you asked for has any"
             )
     return ""

@@ -164,7 +164,7 @@ def raced(tmp_path_factory):
 def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(raced):
     _, advice, _ = raced
     lines = dict(line.split(": ", 1) for line in advice.answer)
-    verdicts = ["Use", "However tuned", "With these gains", "Its J", "Its needs", "Without a law"]
+    verdicts = ["Use", "However tuned", "With these gains", "Its J", "Its scores", "Without a law"]
     assert [*lines][:9] == [*verdicts, "Added", "Settles", "Tolerates"]
     assert lines["Added"].startswith("noise, of 0.01 m in positions and 0.05 m a second in veloc")
     shares = [float(share) for share in re.findall(r"(\d+) % \w+", lines["Its J"])]
@@ -214,7 +214,7 @@ def test_the_needs_are_those_of_the_tables_and_margins_at_the_end_of_their_searc
     _, advice, _ = raced
     lines = dict(line.split(": ", 1) for line in advice.answer)
     bound = np.median(advice.table.select(law=advice.law.name).column("ultimate_bound"))
-    assert f"ultimate bound (m) {number(bound)}" in lines["Its needs"]
+    assert f"ultimate bound (m) {number(bound)}" in lines["Its scores"]
     board = advice.leaderboard[1]
     entries = []
     for entry in board.entries:
