@@ -4,9 +4,11 @@
     print(advice)
     advice.save("motion.csv")
 
-Each motion is as large as range, speed and force allow, is run under a PD law on the model with
-typical numbers, and its log's slopes give the errors that white noise of the encoder would leave.
-What a wrong model adds is not in them. Source of the idea: J. Swevers, C. Ganseman, D. B. Tukel, J.
+Each motion is as large as range, speed and force allow, and is run on the model with typical
+numbers: a force by a PD law that knows them, a position servo by its set-point. The log of the run
+gives the errors that identification would tell of it: those of the encoder's noise, of the replays'
+steps, and of dry friction that may give way before it slides. What another wrong model adds is not
+in them. Source of the idea: J. Swevers, C. Ganseman, D. B. Tukel, J.
 De Schutter and H. Van Brussel, Optimal robot excitation and identification, IEEE Transactions on
 Robotics and Automation 13(5), 1997; here the motions are given, and only their sizes are found.
 """
@@ -27,13 +29,17 @@ from smc_mujoco.common.data import attributes, keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, find, items_of, number, shown
 from smc_mujoco.common.files import as_path, replacing
 from smc_mujoco.control.from_text import law as find_law
-from smc_mujoco.identification.least_squares import least_squares
-from smc_mujoco.identification.own_rig import RUN_STEP, OwnRig, own_rig
+from smc_mujoco.control.law import Law
+from smc_mujoco.identification import gauss_newton
+from smc_mujoco.identification.lack_of_fit import lack_of_fit
+from smc_mujoco.identification.own_rig import RUN_STEP, OwnRig, as_recorded, own_rig
 from smc_mujoco.identification.paths import DELAY, named_once
+from smc_mujoco.identification.presliding import presliding
 from smc_mujoco.identification.replays import Point, Replays
 from smc_mujoco.identification.rig import Values
 from smc_mujoco.identification.standard_errors import check_told_apart, statistics
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
+from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
 from smc_mujoco.mechanisms.layout import (
     channel_names,
     column_ends,
@@ -43,14 +49,13 @@ from smc_mujoco.mechanisms.layout import (
 )
 from smc_mujoco.mechanisms.named import jointed
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation.force_bounds import suggested_u_max
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Noise
 from smc_mujoco.simulation.time_series import TimeSeries
 from smc_mujoco.simulation.trace import Trace
 
-# Hz and damping ratio of the PD law, which has no gravity compensation; chosen
+# Hz and damping ratio of the PD law; chosen
 BANDWIDTH, DAMPING_RATIO = 2.0, 0.7
 SOFT_START = 0.5  # s
 BISECTIONS = 10  # of the size of a motion
@@ -61,6 +66,7 @@ SLOPE_STEP = 2e-3  # s, longest physics step for slopes: errors need no more; ch
 # Typical numbers where the model has 0: of the bound on u, of a joint's inertia, s; chosen
 FRICTION_SHARE, ARMATURE_SHARE, TYPICAL_DELAY = 0.03, 0.2, 0.004
 SLOW = 0.02  # of the largest speed of a joint: below it the joint counts as at rest; chosen
+FORCE_STRIDE = 10  # samples between those whose forces are computed; chosen
 HOLD, RAMP = 0.6, 0.15  # s, of a stair
 
 
@@ -196,16 +202,17 @@ def excitation(
     names = named_once(names)
     rig = own_rig(base, names)
     plant = rig.plant
-    bounds = _bounds(plant, u_max)
-    rig = rig.with_values(typical(rig, bounds) | dict(guess or {}), "typical")
+    drives = _drives(rig, u_max)
+    forces = largest_forces(drives)
+    rig = rig.with_values(typical(rig, forces) | dict(guess or {}), "typical")
     shapes = candidate_shapes(plant.driven, duration, rate)
-    ways = _ways(plant, amplitude)
+    ways = _ways(drives, amplitude)
     goal = np.array(plant.rest or (0.0,) * plant.n)[: plant.driven]
     moved = {}
     for name, shape in shapes.items():
-        size = largest_size(rig, goal, ways[:, None] * shape, 1.0 / rate, bounds, v_max)
+        size = largest_size(rig, goal, ways[:, None] * shape, 1.0 / rate, forces, v_max)
         moved[name] = goal[:, None] + size * ways[:, None] * shape
-    found = _motions(rig, names, moved, 1.0 / rate, bounds, noise)
+    found = _motions(rig, names, moved, 1.0 / rate, drives, noise)
     if not found:
         raise ScenarioError(
             f"{plant.name} follows none of {', '.join(shapes)}: give a smaller amplitude"
@@ -215,20 +222,24 @@ def excitation(
     return Excitation(motions=tuple(ranked), columns=tuple(f"r{end}" for end in ends))
 
 
-def _bounds(plant: Plant, u_max: float | None) -> Array:
-    """Return the bound on |u| of each motor, (driven,)."""
-    bounds = np.broadcast_to(np.asarray(suggested_u_max(plant), float), (plant.driven,))
-    if plant.limits:
-        bounds = np.minimum(bounds, plant.limits)
-    if u_max is not None:
-        bounds = np.full(plant.driven, u_max)
-        if plant.limits:
-            bounds = np.minimum(bounds, plant.limits)
-    return bounds
+def _drives(rig: OwnRig, u_max: float | None) -> Scenario:
+    """Return a scenario with the drives of the machine's joints, and their bounds."""
+    return Scenario.recorded(
+        plant=rig.plant, law="none", actuator=rig.base.actuator or None, u_max=u_max
+    )
 
 
-def _ways(plant: Plant, amplitude: float | Sequence[float] | None) -> Array:
+def largest_forces(drives: Scenario) -> Array:
+    """Return the largest force of each drive at rest, N m or N, (driven,)."""
+    found = []
+    for motor, bound in zip(drives.drive_train.motors, drives.limits, strict=True):
+        found.append(motor.force_at(bound))
+    return np.array(found)
+
+
+def _ways(drives: Scenario, amplitude: float | Sequence[float] | None) -> Array:
     """Return the largest way of each driven joint to each side of its goal, (driven,)."""
+    plant = drives.plant
     if amplitude is not None:
         given: Any = [amplitude] if np.ndim(amplitude) == 0 else amplitude
         ways = []
@@ -243,6 +254,9 @@ def _ways(plant: Plant, amplitude: float | Sequence[float] | None) -> Array:
     for joint, low, high in plant.ranges:
         if (i := names.index(joint)) < plant.driven:
             ways[i] = min(ways[i], OF_RANGE * min(goal[i] - low, high - goal[i]))
+    for i, motor in enumerate(drives.drive_train.motors):
+        if isinstance(motor, PositionServo):
+            ways[i] = min(ways[i], OF_RANGE * (drives.limits[i] - abs(goal[i] - motor.goal)))
     return ways
 
 
@@ -352,7 +366,7 @@ def motion_forces(rig: OwnRig, positions: Array, step: float) -> Array:
     a = np.gradient(v, step, axis=1)
     data.qpos[places] = plant.rest or (0.0,) * plant.n
     forces = []
-    for k in range(0, positions.shape[1], 10):
+    for k in range(0, positions.shape[1], FORCE_STRIDE):
         data.qpos[places[:driven]] = positions[:, k]
         data.qvel[dofs[:driven]] = v[:, k]
         data.qacc[dofs[:driven]] = a[:, k]
@@ -366,39 +380,15 @@ def _motions(
     names: list[str],
     moved: Mapping[str, Array],
     period: float,
-    bounds: Array,
+    drives: Scenario,
     noise: float,
 ) -> list[ExcitingMotion]:
     """Return what a log of each motion would tell; without those that the machine does not
     follow.
     """
-    plant = rig.plant
-    model = plant.load()
-    w = 2.0 * math.pi * BANDWIDTH
-    laws = []
-    for inertia in model.dof_M0[dof_ids(model)][: plant.driven].tolist():
-        kd = 2.0 * DAMPING_RATIO * w * inertia
-        laws.append(find_law("pid", kp=inertia * w * w, ki=0.0, kd=kd))
     scenarios = []
     for positions in moved.values():
-        times = (period * np.arange(positions.shape[1])).tolist()
-        start = list(plant.rest or (0.0,) * plant.n)
-        start[: plant.driven] = positions[:, 0].tolist()
-        references = [TimeSeries(times, row.tolist()) for row in positions]
-        fields = rig.machine(Values(**rig.values)) | {
-            "law": laws,
-            "reference": references,
-            "duration": times[-1],
-            "control_period": period,
-            "x0": tuple(start),
-            "noise": Noise(position=noise),
-            "sensor": rig.base.sensor or Encoder(),
-            "u_max": tuple(bounds.tolist()),
-        }
-        step = period / math.ceil(period / RUN_STEP - 1e-9)
-        late = round(fields.pop(DELAY, 0.0) / step) * step
-        fields |= {DELAY: late, "physics_step": step}
-        scenarios.append(Scenario.recorded(**fields))
+        scenarios.append(_played(rig, positions, period, drives, noise))
     found = []
     for (name, positions), trace in zip(moved.items(), run(scenarios), strict=True):
         if not trace.failure:
@@ -421,20 +411,85 @@ def _motions(
     return found
 
 
+def _played(
+    rig: OwnRig, positions: Array, period: float, drives: Scenario, noise: float
+) -> Scenario:
+    """Return the run of a motion of the driven joints, (driven, K)."""
+    plant = rig.plant
+    times = (period * np.arange(positions.shape[1])).tolist()
+    start = list(plant.rest or (0.0,) * plant.n)
+    start[: plant.driven] = positions[:, 0].tolist()
+    laws = []
+    references = []
+    for law, command in _commands(rig, positions, period, drives):
+        laws.append(law)
+        references.append(TimeSeries(times, command.tolist()))
+    fields = rig.machine(Values(**rig.values)) | {
+        "law": laws,
+        "reference": references,
+        "duration": times[-1],
+        "control_period": period,
+        "x0": tuple(start),
+        "noise": Noise(position=noise),
+        "sensor": rig.base.sensor or Encoder(),
+        "u_max": drives.limits,
+    }
+    step = period / math.ceil(period / RUN_STEP - 1e-9)
+    late = round(fields.pop(DELAY, 0.0) / step) * step
+    return Scenario.recorded(**fields | {DELAY: late, "physics_step": step})
+
+
+def _commands(
+    rig: OwnRig, positions: Array, period: float, drives: Scenario
+) -> list[tuple[Law, Array]]:
+    """Return the law of each driven joint, and the reference with which it follows a motion: of a
+    servo the motion, as its set-point; of a PD law the motion and what makes up for the force that
+    it takes.
+    """
+    model = rig.plant.load()
+    inertias = model.dof_M0[dof_ids(model)][: rig.plant.driven].tolist()
+    forces = motion_forces(rig, positions, period)
+    times = np.arange(positions.shape[1])
+    w = 2.0 * math.pi * BANDWIDTH
+    found = []
+    for i, (motor, inertia) in enumerate(zip(drives.drive_train.motors, inertias, strict=True)):
+        if isinstance(motor, PositionServo):
+            found.append((as_recorded(), positions[i] - motor.goal))
+            continue
+        kp, kd = inertia * w * w, 2.0 * DAMPING_RATIO * w * inertia
+        needed = np.interp(times, times[::FORCE_STRIDE], forces[i])
+        led = positions[i] + _led(needed / kp, kd / kp / period)
+        gain = motor.nominal.gain
+        found.append((find_law("pid", kp=kp / gain, ki=0.0, kd=kd / gain), led))
+    return found
+
+
+def _led(values: Array, samples: float) -> Array:
+    """Return the signal z of which z and its rate, times a number of samples, add up to values."""
+    z = values.copy()
+    share = 1.0 - math.exp(-1.0 / samples)
+    for k in range(len(z) - 1):
+        z[k + 1] = z[k] + share * (values[k] - z[k])
+    return z
+
+
 def _told(rig: OwnRig, names: list[str], trace: Trace) -> dict[str, Any]:
     """Return the condition number, the expected errors and the worst pair of a log."""
     _, data = rig.reading([trace])
     replays = Replays(rig, names, data, False)
     control = replays.rig(replays.start).repeated(replays.pieces[0].part).control_period  # pyright: ignore[reportArgumentType]
+    true = Point(replays.start.values, _of_run(replays, rig, trace))
     replays.steps = {"physics_step": control / math.ceil(control / SLOPE_STEP - 1e-9)}
-    states, noise = _of_run(replays, rig, trace)
-    slopes = replays.slopes(Point(replays.start.values, states))
+    slopes = replays.slopes(true, central=False)
     check_told_apart(replays, slopes)
-    # what is left by the true machine is noise and counts, without errors by steps
-    slopes = dataclasses.replace(slopes, residuals=noise)
-    J = slopes.freed_slopes
-    solved = slopes.stepped(-least_squares(J, slopes.freed_residuals))
-    errors, correlations, _ = statistics(replays, solved, np.zeros(len(names)))
+    replays.steps = {}
+    (residuals,) = replays.residuals([true])
+    slopes = dataclasses.replace(slopes, residuals=residuals)
+    solved, changes = gauss_newton.extrapolated(replays, slopes)
+    may_lack = lack_of_fit(solved, presliding(replays, solved))
+    by_model = np.hypot(gauss_newton.moves(solved, changes), may_lack.moved)
+    errors, correlations, _ = statistics(replays, solved, by_model)
+    J = solved.freed_slopes
     singular = np.linalg.svd(J / np.linalg.norm(J, axis=0), compute_uv=False)
     apart = correlations - np.eye(len(names))
     i, j = np.unravel_index(np.argmax(np.abs(apart)), apart.shape)
@@ -447,21 +502,16 @@ def _told(rig: OwnRig, names: list[str], trace: Trace) -> dict[str, Any]:
     return {"condition": condition, "errors": errors, "worst_pair": worst}
 
 
-def _of_run(replays: Replays, rig: OwnRig, trace: Trace) -> tuple[Array, list[Array]]:
-    """Return the moves of the pieces' states to those that the machine had, and the noise of each
-    piece as residuals.
-    """
+def _of_run(replays: Replays, rig: OwnRig, trace: Trace) -> Array:
+    """Return the moves of the pieces' states to those that the machine had."""
     true = np.hstack([trace.x + rig.zeros, trace.v])
-    states, noise = [], []
+    states = []
     first = 0
     for piece in replays.pieces:
         assert piece.part is not None
         states.append((true[first] - piece.part.state) / piece.scales)
-        count = len(next(iter(piece.measured.values())))
-        exact = dict(zip(piece.measured, true[first : first + count].T, strict=False))
-        noise.append(replays.relative(piece, exact))
-        first += count - 1
-    return np.array(states), noise
+        first += len(next(iter(piece.measured.values()))) - 1
+    return np.array(states)
 
 
 def _rest(v: Array) -> float:

@@ -71,21 +71,29 @@ def better(replays: Replays, *points: Point) -> Point:
     return points[replays.costs(points).sum(axis=1).argmin()]
 
 
-def by_steps(replays: Replays, slopes: Slopes) -> list[Array]:
-    """Return about how far shorter steps would change the residuals of each piece, (N,): twice what
-    half steps do, as errors by steps are of first order.
+def extrapolated(replays: Replays, slopes: Slopes) -> tuple[Slopes, list[Array]]:
+    """Return the solution for replays whose steps are extrapolated to 0, and about how far that is
+    off in the residuals of each piece, (N,).
+
+    Errors by steps h are of first order, so 2 x(h/2) - x(h) has none of them; what it changes from
+    h to h/2 is what it may be off.
     """
     point = slopes.point
     if not replays.free.size:  # records of simulated runs have the same steps
-        return [np.zeros(len(r)) for r in slopes.residuals]
+        return slopes, [np.zeros(len(r)) for r in slopes.residuals]
     plain = replays.rig(point).repeated(replays._part(0))
-    steps, replays.steps = replays.steps, {"physics_step": plain.resolved.physics_step / 2.0}
-    (residuals,) = replays.residuals([point])
+    steps = replays.steps
+    rows = [slopes.residuals]
+    for parts in (2.0, 4.0):
+        replays.steps = {"physics_step": plain.resolved.physics_step / parts}
+        rows += replays.residuals([point])
     replays.steps = steps
-    changed = []
-    for half, full in zip(residuals, slopes.residuals, strict=True):
-        changed.append(2.0 * (half - full))
-    return changed
+    residuals, changed = [], []
+    for full, half, quarter in zip(*rows, strict=True):
+        residuals.append(2.0 * quarter - half)
+        changed.append(2.0 * (quarter - half) - (half - full))
+    slopes = dataclasses.replace(slopes, residuals=residuals)
+    return slopes.stepped(_moved(replays, slopes, 0.0) - point.values), changed
 
 
 def moves(slopes: Slopes, changes: list[Array]) -> Array:

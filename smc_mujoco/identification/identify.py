@@ -30,7 +30,7 @@ from smc_mujoco.common.files import write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.identification import first_guess, gauss_newton, log_quality, number_text, records
-from smc_mujoco.identification.lack_of_fit import Lack, LackOfFit, lack_of_fit
+from smc_mujoco.identification.lack_of_fit import LackOfFit, lack_of_fit
 from smc_mujoco.identification.lacking_forces import lacking_forces
 from smc_mujoco.identification.own_rig import SETTINGS, OwnRig, condition_fields, own_rig
 from smc_mujoco.identification.paths import DELAY, named_once
@@ -70,7 +70,6 @@ RELATIVE = (
     "with a gain free, forces and inertias are relative to the model's mass: if the model is too "
     "light, gain, damping, friction and armature are too small by the same share"
 )
-STEPS = "the steps of the replays show in the residuals: identify with corrected=True (--corrected)"
 LEFT = (
     "a whole log is left in an open loop, as an arm under gravity leaves it however good its "
     "numbers are: judge by the pieces of 1 s"
@@ -342,8 +341,8 @@ def identify(
         replays, slopes, by_steps = _solved(
             twin, names, data, doubts, starts, seed, most, corrected, report
         )
-        lacking, by_steps = _lacking(replays, slopes, corrected, by_steps)
-        by_model = np.hypot(by_steps, lacking.moved(len(names)))
+        lacking = _lacking(replays, slopes)
+        by_model = np.hypot(by_steps, lacking.moved)
         errors, correlations, independent = statistics(replays, slopes, by_model)
     values = replays.values(slopes.point)
     fitted = twin.with_values(values, "identified from records")
@@ -553,7 +552,8 @@ def _solved(
     reached = gauss_newton.search(pieces, starts, seed, most)
     if twin.controller is None:
         if not corrected:
-            return pieces, reached, np.zeros(len(names))
+            slopes, changes = gauss_newton.extrapolated(pieces, reached)
+            return pieces, slopes, gauss_newton.moves(slopes, changes)
         slopes, moved = gauss_newton.accurate(pieces, reached)
         return pieces, gauss_newton.not_worse(pieces, slopes), moved
     closed = Replays(twin, names, data, True, report)
@@ -565,21 +565,12 @@ def _solved(
     return closed, slopes, np.zeros(len(names))
 
 
-def _lacking(
-    replays: Replays, slopes: Slopes, corrected: bool, moved: Array
-) -> tuple[LackOfFit, Array]:
-    """Return what the model lacks, and how far steps move the solution, (p,): as corrected replays
-    have `moved` it, or by half steps.
-    """
+def _lacking(replays: Replays, slopes: Slopes) -> LackOfFit:
+    """Return what the model lacks; of a published machine nothing is looked for."""
     lacks = []
-    if not corrected and not replays.closed:
-        changes = gauss_newton.by_steps(replays, slopes)
-        moved = gauss_newton.moves(slopes, changes)
-        lacks.append(Lack(STEPS, changes))
-    if not isinstance(replays.twin, OwnRig):
-        return lack_of_fit(slopes, []), moved
-    lacks += lacking_forces(replays, slopes) + presliding(replays, slopes)
-    return lack_of_fit(slopes, lacks), moved
+    if isinstance(replays.twin, OwnRig):
+        lacks = lacking_forces(replays, slopes) + presliding(replays, slopes)
+    return lack_of_fit(slopes, lacks)
 
 
 def _starting_states(

@@ -20,6 +20,7 @@ from smc_mujoco.identification.replays import Point, Slopes
 
 SIGNIFICANT = 6.0  # deviations between blocks, beyond which a lack stands out; chosen
 BLOCKS = 8  # of a piece; chosen
+UNSEEN = 3.0  # deviations between blocks, of a lack that gives way and is not seen; chosen
 OWN_SHARE = 0.04  # of a lack's change, which no number and no earlier lack can cause; chosen
 MOST = 6  # lacks that are taken; chosen
 # of the squared residuals, and of a number's error: a lack of more is told; chosen
@@ -53,8 +54,6 @@ class Taken(NamedTuple):
 
     def matters(self, errors: Array) -> bool:
         """Return whether it explains much, or moves a number by most of its error, (p,)."""
-        if self.deviations <= SIGNIFICANT:
-            return False
         return self.explained > EXPLAINED or bool(np.any(np.abs(self.move) > MOVED * errors))
 
 
@@ -63,10 +62,12 @@ class LackOfFit(NamedTuple):
 
     taken: list[Taken]
     slopes: Slopes  # at the least squares with the lacks as further numbers, which come last
+    unseen: Array  # how far what does not stand out may move the numbers, in their scales, (p,)
 
-    def moved(self, p: int) -> Array:
-        """Return how far the lacks move the p numbers, in their scales, (p,)."""
-        squares = np.zeros(p)
+    @property
+    def moved(self) -> Array:
+        """How far the lacks move the numbers, in their scales, (p,)."""
+        squares = self.unseen**2
         for taken in self.taken:
             squares = squares + taken.move**2
         return np.sqrt(squares)
@@ -88,30 +89,40 @@ def lack_of_fit(slopes: Slopes, lacks: Sequence[Lack]) -> LackOfFit:
     rest = list(lacks)
     while rest and len(taken) < MOST:
         shares = _shares(fitted, rest)
-        k = _strongest(shares, rest)
+        k = _strongest(shares)
         if k < 0:
             break
         lack = rest.pop(k)
-        wider, move = _with(fitted, lack, p)
+        fitted, move = _with(fitted, lack, p)
         taken.append(Taken(lack, *shares[k], move))
-        if shares[k].deviations <= SIGNIFICANT:
-            break
-        fitted = wider
-    return LackOfFit(taken, fitted)
+    return LackOfFit(taken, fitted, _unseen(fitted, rest, p))
 
 
-def _strongest(shares: Sequence[Explained], lacks: Sequence[Lack]) -> int:
-    """Return the index of the lack that explains most of those that stand out. If none does, of
-    those that give way. -1 if there is none.
+def _unseen(slopes: Slopes, lacks: Sequence[Lack], p: int) -> Array:
+    """Return how far lacks that give way may move the first p numbers and not stand out, (p,): the
+    most of any, by UNSEEN deviations or those that it has, and at most as far as it does.
     """
+    most = np.zeros(p)
+    giving = [lack for lack in lacks if lack.gives_way]
+    for lack in giving:
+        either = dataclasses.replace(lack, gives_way=False)
+        (share,) = _shares(slopes, [either])
+        if not share.deviations:
+            continue
+        wider, move = _with(slopes, either, p)
+        size = float(wider.point.values[-1])
+        may_be = max(UNSEEN * abs(size) / share.deviations, size)
+        most = np.maximum(most, np.abs(move / size) * min(may_be, 1.0))
+    return most
+
+
+def _strongest(shares: Sequence[Explained]) -> int:
+    """Return the index of the lack that explains most of those that stand out; -1 if none does."""
     best = -1
-    for floor in (SIGNIFICANT, 0.0):
-        for k, (share, lack) in enumerate(zip(shares, lacks, strict=True)):
-            counts = share.deviations > floor and (floor or lack.gives_way)
-            if counts and (best < 0 or share.explained > shares[best].explained):
-                best = k
-        if best >= 0:
-            break
+    for k, share in enumerate(shares):
+        stands_out = share.deviations > SIGNIFICANT
+        if stands_out and (best < 0 or share.explained > shares[best].explained):
+            best = k
     return best
 
 

@@ -342,35 +342,40 @@ class Replays:
         rows = np.nan_to_num(np.column_stack(columns), nan=WORST, posinf=WORST, neginf=-WORST)
         return np.clip(rows, -WORST, WORST).ravel()
 
-    def slopes(self, point: Point) -> Slopes:
-        """Return residuals and their derivatives at a point, by central differences that stay
-        within the ranges.
+    def slopes(self, point: Point, central: bool = True) -> Slopes:
+        """Return residuals and their derivatives at a point, by differences that stay within the
+        ranges: central ones, or in half the time those to one side.
         """
         p = len(self.names)
-        moved = []
-        for sign in (1.0, -1.0):
-            step = sign * DIFFERENCE_STEP
-            for e in np.eye(p):
-                values = np.clip(point.values + step * e, self.low, self.high)
-                moved.append(Point(values, point.states))
-            for e in np.eye(len(self.free)):
-                moved.append(Point(point.values, point.states + step * e))
-        residuals, *rows = self.residuals([point, *moved])
-        count = len(moved) // 2
-        gaps = np.full(count, 2.0 * DIFFERENCE_STEP)
+        moved = self._moved(point, DIFFERENCE_STEP)
+        opposite = self._moved(point, -DIFFERENCE_STEP) if central else [point] * len(moved)
+        residuals, *rows = self.residuals([point, *moved, *(opposite if central else ())])
+        count = len(moved)
+        behind = rows[count:] if central else [residuals] * count
+        gaps = np.full(count, (2.0 if central else 1.0) * DIFFERENCE_STEP)
         for j in range(p):
-            gaps[j] = moved[j].values[j] - moved[count + j].values[j]
+            gaps[j] = moved[j].values[j] - opposite[j].values[j]
         by_values = []
         by_states = []
         for k in range(len(self.pieces)):
             columns = []
-            for ahead, back, gap in zip(rows[:count], rows[count:], gaps, strict=True):
+            for ahead, back, gap in zip(rows[:count], behind, gaps, strict=True):
                 columns.append((ahead[k] - back[k]) / gap)
             every = np.column_stack(columns)
             by_values.append(every[:, :p])
             by_states.append(every[:, p:])
         columns = len(self.pieces[0].measured)
         return Slopes(point, residuals, by_values, by_states, columns, len(self.data))
+
+    def _moved(self, point: Point, step: float) -> list[Point]:
+        """Return the point with each value, then each free state moved by a step."""
+        moved = []
+        for e in np.eye(len(self.names)):
+            values = np.clip(point.values + step * e, self.low, self.high)
+            moved.append(Point(values, point.states))
+        for e in np.eye(len(self.free)):
+            moved.append(Point(point.values, point.states + step * e))
+        return moved
 
     def _pieces(self, i: int) -> list[Piece]:
         """Return the pieces of record i."""

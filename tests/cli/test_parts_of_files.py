@@ -195,3 +195,17 @@ def test_identify_refuses_what_no_replay_has(refused):
         "'noise' has noise",
         "it may have friction",
     )
+
+
+def test_a_command_that_takes_one_condition_takes_it_from_a_file(tmp_path, refused):
+    """`margins`, `worst`, `sensitivity` and `chatter`, as `compare` does."""
+    file = tmp_path / "found.txt"
+    file.write_text("# found\nmine: mismatch={'M': 1.2}, friction=Coulomb(0.05)\n")
+    run = ["chatter", "duffing", "--law", "classical", "--gains", "default", "--duration", "1"]
+    texts = []
+    for condition in (file, "mine: mismatch={'M': 1.2}, friction=Coulomb(0.05)", "nominal"):
+        printed = shell(*run, "--condition", condition)
+        texts.append(printed.partition("gains:")[0])  # without the time that it took
+    assert texts[0] == texts[1] != texts[2]
+    file.write_text("a: x0=0.2\nb: x0=0.3\n")
+    refused(lambda: options.one_condition(str(file)), "has 2 conditions ('a', 'b')", "takes one")

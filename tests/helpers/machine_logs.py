@@ -139,6 +139,25 @@ def log(
     return columns
 
 
+def servo_log(
+    xml: str, truth: Mapping[str, float], t: np.ndarray, u: np.ndarray, seed: int = 0
+) -> dict[str, np.ndarray]:
+    """Return a log of the joint j1, whose `<position>` gets set-points u, (K,) as t."""
+    model = compiled(xml, split(truth, ["j1"]), {})
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(seed)
+    every = round((t[1] - t[0]) / STEP)
+    quantum = 2.0 * np.pi / 8192.0
+    data.qpos[0] = u[0]
+    x = np.zeros(len(t))
+    for k, set_point in enumerate(u):
+        y = data.qpos[0] + 2e-4 * rng.standard_normal()
+        x[k] = quantum * np.floor(y / quantum + 0.5)
+        data.ctrl[0] = set_point
+        mujoco.mj_step(model, data, every)
+    return {"t": t, "x": x, "u": u}
+
+
 def sines(
     centre: Sequence[float], amplitudes: Sequence[float], frequencies: Sequence[float]
 ) -> Callable[[float], tuple[np.ndarray, np.ndarray]]:

@@ -34,14 +34,14 @@ def lacking(size, one_sided=False):
 def test_a_lack_moves_a_number_by_what_the_number_has_absorbed():
     found, absorbed = lacking(0.05)
     assert found.told(np.full(1, 1e-3)) == ("b",)
-    assert found.moved(1)[0] == pytest.approx(abs(absorbed), rel=0.05)
+    assert found.moved[0] == pytest.approx(abs(absorbed), rel=0.05)
     assert found.slopes.by_values[0].shape == (200, 2)
 
 
 def test_noise_alone_shows_no_lack_and_changes_nothing():
     found, _ = lacking(0.0)
     assert not found.taken
-    assert found.moved(1).tolist() == [0.0]
+    assert found.moved.tolist() == [0.0]
     assert found.slopes.by_values[0].shape == (200, 1)
 
 

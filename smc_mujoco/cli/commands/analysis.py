@@ -180,7 +180,7 @@ def margins(
             quick,
             threads,
             progress.reached,
-            condition,
+            options.one_condition(condition),
             options.starts(x0),
             device,
         )
@@ -329,7 +329,8 @@ def sensitivity(
     over = _within(disturbance, bound)
     options.check_files(None, *files(figure))
     chosen = options.law(law)
-    scenario = case(as_plant(plant), chosen, condition, duration, gains)
+    asked = options.one_condition(condition)
+    scenario = case(as_plant(plant), chosen, asked, duration, gains)
     found = sensitivity(scenario, over, metric, points, seed, threads, True, device)
     terminal.print(found)
     runs = f"{found.runs} runs, {len(found.values)} of them independent"
@@ -386,8 +387,9 @@ def _attacked_cases(
     chosen = options.laws(law, gain_sets.LAWS)
     machine = as_plant(plant)
     cases = []
+    asked = options.one_condition(condition)
     for attacked in chosen:
-        cases.append([case(machine, attacked, condition, duration, gains)])
+        cases.append([case(machine, attacked, asked, duration, gains)])
     return cases
 
 
@@ -446,9 +448,10 @@ def chatter(
     options.check_files(None, *pictures)
     fields = {} if actuator is None else {"actuator": options.actuator(actuator)}
     machine = jointed(plant, "chattering")
+    asked = options.one_condition(condition)
     cases = []
     for tried in chosen:
-        cases.append(case(machine, tried, condition, duration, gains, changes=fields))
+        cases.append(case(machine, tried, asked, duration, gains, changes=fields))
     with bar("chattering") as progress:
         cycles = _cycles(cases, channel, progress.reached)
         traces = run(cases, threads=threads)

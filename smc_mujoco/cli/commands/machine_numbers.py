@@ -52,17 +52,18 @@ FoundFigure = Annotated[
 FoundFile = Annotated[
     Path | None,
     typer.Option(
-        help="Also write the numbers as a condition, FILE.txt, for --condition of compare, which "
-        "and tune."
+        help="Also write the numbers as a condition, FILE.txt, for --condition of other "
+        "commands."
     ),
 ]
 Beside = Annotated[
     str | None,
     typer.Option(
         "--condition",
-        metavar="NAME|TEXT",
+        metavar="NAME|TEXT|FILE",
         help="What the machine has beside its model, with numbers to find, such as "
-        '"mine: friction=LuGre(0.3, 0.4, 0.1)" or "mine: friction=my_parts.py:stribeck()".',
+        '"mine: friction=LuGre(0.3, 0.4, 0.1)" or "mine: friction=my_parts.py:stribeck()", or a '
+        "file with it.",
     ),
 ]
 Corrected = Annotated[
@@ -150,7 +151,7 @@ def identify(
         options.names(names) or None,
         held_out=held_out,
         columns=renamed,
-        condition=condition,
+        condition=None if condition is None else options.one_condition(condition),
         corrected=corrected,
         starts=starts,
         seed=seed,

@@ -81,10 +81,10 @@ Condition = Annotated[
     str,
     typer.Option(
         "--condition",
-        metavar="NAME|TEXT",
+        metavar="NAME|TEXT|FILE",
         autocompletion=CONDITIONS,
-        help='The condition of all runs: encoder, noise+encoder or "worn gear: '
-        'friction=Coulomb(0.05)".',
+        help='The condition of all runs: encoder, noise+encoder, "worn gear: '
+        'friction=Coulomb(0.05)", or a file with one.',
     ),
 ]
 Defaults = Annotated[
@@ -325,6 +325,18 @@ def conditions(texts: Sequence[str] | None) -> "list[named.Condition]":
         else:
             chosen += [find_condition(text)]
     return chosen
+
+
+def one_condition(text: str) -> "named.Condition":
+    """Return the condition of a command that takes one: a name, a text, or a file with one."""
+    found = conditions([text])
+    if len(found) != 1:
+        listed = ", ".join(repr(one.name) for one in found)
+        raise ScenarioError(
+            f"--condition {text} has {len(found)} conditions ({listed}), and this command "
+            "takes one: leave the others out, or join two as noise+encoder"
+        )
+    return found[0]
 
 
 def compared_laws(
