@@ -32,7 +32,7 @@ from smc_mujoco.control.from_text import law as find_law
 from smc_mujoco.control.law import Law
 from smc_mujoco.identification import gauss_newton
 from smc_mujoco.identification.lack_of_fit import lack_of_fit
-from smc_mujoco.identification.own_rig import RUN_STEP, OwnRig, as_recorded, own_rig
+from smc_mujoco.identification.own_rig import RUN_STEP, OwnRig, as_recorded, check_named, own_rig
 from smc_mujoco.identification.paths import DELAY, named_once
 from smc_mujoco.identification.presliding import presliding
 from smc_mujoco.identification.replays import Point, Replays
@@ -201,6 +201,7 @@ def excitation(
     base = machine if isinstance(machine, Scenario) else jointed(machine, "excitation")
     names = named_once(names)
     rig = own_rig(base, names)
+    check_named(rig)
     plant = rig.plant
     drives = _drives(rig, u_max)
     forces = largest_forces(drives)

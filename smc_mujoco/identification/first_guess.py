@@ -50,6 +50,9 @@ SHIFT = 0.01  # of a parameter, for the slope of forces by it
 LARGEST_ANGLE = 3.0 * math.pi  # rad: a larger one may be in degrees; chosen
 MAX_BEYOND = 0.1  # of a joint's range, by which a log may pass it, as stops are soft; chosen
 TOO_SMALL = 0.1  # of the force that a motion takes: angles may be in degrees; chosen
+# cosine of the commands and the forces that a motion takes: beyond it they agree, and beyond its
+# negative one of their columns has the other sign; chosen
+AGREES = 0.5
 TOO_LARGE = 50.0  # times that force: a command may be in another unit; chosen
 
 
@@ -65,7 +68,7 @@ def first_guess(rig: OwnRig, data: Sequence[Data]) -> OwnRig:
     """Return the rig with values from least squares of the forces of its logs.
 
     Raises:
-      ScenarioError: angles in degrees.
+      ScenarioError: angles in degrees, or a column with the wrong sign.
     """
     delays = [0.0]
     if DELAY in rig.quantities:
@@ -75,7 +78,7 @@ def first_guess(rig: OwnRig, data: Sequence[Data]) -> OwnRig:
     for step in range(PASSES if checked else 0):
         logs = [forces(guessed, record, delays) for record in checked]
         if not step:
-            check_angles(rig, checked, logs)
+            check_columns(rig, checked, logs)
         guessed = _guessed(guessed, data, logs, delays)
         if rig.plant.is_user_model:
             break  # the forces are linear
@@ -246,18 +249,20 @@ def cutoff(record: Record, columns: Columns) -> float:
     return min(max(CUTOFF, rate / SAMPLES_A_PERIOD), FASTEST)
 
 
-def motion_forces(rig: OwnRig, record: Record, late: float) -> tuple[Array, Array, Array]:
-    """Return speeds, the forces that the motion takes by the rig's own numbers, and the commands
-    that reach the motors, (M, n), (M, n) and (M, driven), below 5 Hz.
+def motion_forces(rig: OwnRig, record: Record, late: float) -> tuple[Array, Array, Array, Array]:
+    """Return positions, speeds, the forces that the motion takes by the rig's own numbers, and the
+    commands that reach the motors, (M, n) each but the last, (M, driven), below 5 Hz.
     """
     columns = dataclasses.replace(rig.columns, torque=rig.columns.x)
     filtered = Filter(record, columns)
     needed = inverse_dynamics.torques(rig.plant, record, columns)
-    speeds = []
+    positions, speeds = [], []
     for name in rig.columns.x:
+        positions.append(filtered.low(filtered.cubic(name)))
         speeds.append(filtered.low(filtered.cubic(name, 1)))
     commands = _low_commands(rig, record, filtered, late)
-    return np.column_stack(speeds), stacked(needed, rig.columns.x), commands
+    forces = stacked(needed, rig.columns.x)
+    return np.column_stack(positions), np.column_stack(speeds), forces, commands
 
 
 def _of_parts(rig: OwnRig, filtered: Filter, v: Array) -> Array:
@@ -322,20 +327,56 @@ def _low_commands(rig: OwnRig, record: Record, filtered: Filter, late: float) ->
     return np.column_stack(found)
 
 
-def check_angles(rig: OwnRig, data: Sequence[Record], logs: Sequence[Forces]) -> None:
-    """Raise ScenarioError where angles are in degrees: larger than a turn and a half, with a motion
-    that takes far more than the recorded force.
-    """
+def check_columns(rig: OwnRig, data: Sequence[Record], logs: Sequence[Forces]) -> None:
+    """Raise ScenarioError where angles are in degrees, and where a column has the wrong sign."""
     for record, log in zip(data, logs, strict=True):
         shares = force_shares(rig, log)
+        cosines = force_cosines(log)
         for i, name in enumerate(rig.columns.x[: len(shares)]):
-            reach = float(np.abs(record[name]).max())
-            if rig.plant.units[i] == "rad" and reach > LARGEST_ANGLE and shares[i] < TOO_SMALL:
+            if rig.plant.units[i] == "rad" and shares[i] < TOO_SMALL:
+                _check_angle(rig, record, i, shares[i])
+            if cosines[i] < -AGREES:
+                u = rig.columns.inputs[i]
                 raise ScenarioError(
-                    f"column {name} of {rig.name} reaches {reach:.3g}, and in rad its motion takes "
-                    f"{1.0 / max(shares[i], 1e-9):.3g} times the recorded force: if it is in "
-                    "degrees, divide it by 57.3"
+                    f"{u} of {rig.name} pushes against the motion of {name} (cosine "
+                    f"{cosines[i]:.2f} of {u} and the force that the motion takes): one of the two "
+                    "has the other sign in the model, so turn the sign of that column, or the "
+                    "joint's axis in the file"
                 )
+
+
+def _check_angle(rig: OwnRig, record: Record, i: int, share: float) -> None:
+    """Raise ScenarioError where the angle of a joint, with the share of the recorded force in the
+    force that its motion takes, is in degrees: it is larger than a turn and a half, or the recorded
+    forces agree with the motion if it is.
+    """
+    name = rig.columns.x[i]
+    reach = float(np.abs(record[name]).max())
+    if reach < LARGEST_ANGLE:
+        turned = dict(record)
+        for angle, unit in zip(rig.columns.x, rig.plant.units, strict=True):
+            if unit == "rad":
+                turned[angle] = np.radians(record[angle])
+        if force_cosines(forces(rig, turned, [0.0]))[i] < AGREES:
+            return
+    raise ScenarioError(
+        f"column {name} of {rig.name} reaches {reach:.3g}, and in rad its motion takes "
+        f"{1.0 / max(share, 1e-9):.3g} times the recorded force: if it is in degrees, divide it by "
+        "57.3"
+    )
+
+
+def force_cosines(log: Forces) -> list[float]:
+    """Return for each motor the cosine of the recorded force and that which the motion of its joint
+    takes by the model's inertia and gravity.
+    """
+    commands = log.commands[0]
+    needed = log.rigid.reshape(len(commands), -1)
+    found = []
+    for i in range(commands.shape[1]):
+        sizes = np.linalg.norm(commands[:, i]) * np.linalg.norm(needed[:, i])
+        found.append(float(commands[:, i] @ needed[:, i] / max(sizes, 1e-300)))
+    return found
 
 
 def force_shares(rig: OwnRig, log: Forces) -> list[float]:
@@ -363,9 +404,17 @@ def _beyond_ranges(rig: OwnRig, record: Record) -> list[str]:
             said.append(
                 f"{name} reaches {farthest:.4g} {unit}, beyond the range of {joint} in the model "
                 f"from {low:.4g} to {high:.4g}: correct the file"
+                f"{_in_degrees(low, farthest, high, unit)}"
                 f"{degrees_hint((low, high), farthest, unit)}"
             )
     return said
+
+
+def _in_degrees(low: float, x: float, high: float, unit: str) -> str:
+    """Return a clause for x that lies in its range if it is in degrees; "" for another."""
+    if unit != "rad" or not low <= math.radians(x) <= high:
+        return ""
+    return ", or, if the log is in degrees, divide the column by 57.3"
 
 
 def doubts(rig: OwnRig, data: Sequence[Data]) -> list[str]:

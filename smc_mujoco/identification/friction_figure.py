@@ -17,7 +17,9 @@ from smc_mujoco.identification.own_rig import OwnRig
 from smc_mujoco.identification.paths import DELAY, steady_force
 from smc_mujoco.identification.records import Record
 from smc_mujoco.identification.rig import Values
-from smc_mujoco.mechanisms.layout import channel_names, dof_ids, driven_names
+from smc_mujoco.mechanisms.hardware.part import Actuator
+from smc_mujoco.mechanisms.layout import channel_names, dof_ids
+from smc_mujoco.simulation.scenario import Scenario
 
 ROW_HEIGHT = 2.5  # inches, height of a joint's panels
 LOG_WIDTH = 2.4  # points, of a log, beside which dashes over it are seen in grey, too; chosen
@@ -138,8 +140,15 @@ def measured_friction(rig: OwnRig, record: Record) -> tuple[Array, Array]:
         free=(),
     )
     late = rig.values.get(DELAY, rig.base.input_delay)
-    speeds, needed, commands = first_guess.motion_forces(frictionless, record, late)
-    drives = len(driven_names(rig.plant))
-    points = np.zeros_like(needed)
-    points[:, :drives] = rig.of_motors("gain", 1.0) * commands + rig.of_motors("offset", 0.0)
-    return speeds, points - needed
+    x, v, needed, commands = first_guess.motion_forces(frictionless, record, late)
+    u = rig.of_motors("gain", 1.0) * commands + rig.of_motors("offset", 0.0)
+    points = -needed
+    for i, motor in enumerate(_motors(rig)):
+        points[:, i] += motor.force_of(u[:, i], x[:, i] - rig.zeros[i], v[:, i])
+    return v, points
+
+
+def _motors(rig: OwnRig) -> list[Actuator]:
+    """Return the motor of each driven joint, with the rig's values."""
+    drives = rig.numbers_of(Values(**rig.values)).get("actuator")
+    return Scenario.recorded(plant=rig.plant, law="none", actuator=drives).drive_train.motors

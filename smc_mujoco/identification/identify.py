@@ -32,7 +32,13 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.identification import first_guess, gauss_newton, log_quality, number_text, records
 from smc_mujoco.identification.lack_of_fit import LackOfFit, lack_of_fit
 from smc_mujoco.identification.lacking_forces import lacking_forces
-from smc_mujoco.identification.own_rig import SETTINGS, OwnRig, condition_fields, own_rig
+from smc_mujoco.identification.own_rig import (
+    SETTINGS,
+    OwnRig,
+    check_named,
+    condition_fields,
+    own_rig,
+)
 from smc_mujoco.identification.paths import DELAY, named_once
 from smc_mujoco.identification.presliding import presliding
 from smc_mujoco.identification.records import Record
@@ -441,6 +447,7 @@ def _read(
     if isinstance(twin, OwnRig):
         for given, record in zip(many, data, strict=True):
             _check_log(twin, given, record)
+        check_named(twin)
         twin = first_guess.first_guess(twin, data)
     return twin, data
 

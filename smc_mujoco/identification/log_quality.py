@@ -34,12 +34,15 @@ def doubts(rig: OwnRig, data: Sequence[Data]) -> list[str]:
 def _slow(rig: OwnRig, period: float) -> list[str]:
     """Return a sentence on a log that may lack commands of a faster loop."""
     known = abs(period - rig.base.control_period) < SAME_PERIOD * period
-    if period <= LONG_PERIOD or known or DELAY not in rig.quantities:
+    if period <= LONG_PERIOD or known:
         return []
+    late = ""
+    if DELAY in rig.quantities:
+        late = f", and {DELAY} may be {500.0 * period:.3g} ms off"
     return [
         f"the log has {1.0 / period:.4g} samples a second: if its loop is faster, the commands "
-        f"between them are missing, and {DELAY} may be {500.0 * period:.3g} ms off; record every "
-        f"command, or say that it is not by a Scenario with control_period={period:g}"
+        f"between them are missing{late}; record every command of the loop. If the loop is not "
+        f'faster, say so by --condition "loop: control_period={period:g}"'
     ]
 
 

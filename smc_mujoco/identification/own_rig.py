@@ -261,15 +261,8 @@ def moves(x: Array) -> bool:
 
 
 def own_rig(given: Plant | Scenario, names: Sequence[str]) -> OwnRig:
-    """Return the rig of a plant or a scenario whose quantities are the named paths, one or more."""
+    """Return the rig of a plant or a scenario whose quantities are the named paths."""
     base = given if isinstance(given, Scenario) else Scenario.recorded(plant=given, law="none")
-    if not names:
-        known = list(known_paths(base))
-        example = next((path for path in known if "." in path), known[0])
-        raise ScenarioError(
-            f"no number of {base.plant.name} is named: name some with --for, in Python with names, "
-            f"such as {example!r}; there are {', '.join(known)}"
-        )
     paths = resolved(base, names)
     ends = column_ends(base.plant)
     inputs = tuple(f"u{end}" for end in ends[: base.plant.driven])
@@ -291,6 +284,18 @@ def own_rig(given: Plant | Scenario, names: Sequence[str]) -> OwnRig:
         places=paths.parts,
     )
     return rig
+
+
+def check_named(rig: OwnRig) -> None:
+    """Raise ScenarioError, which lists what there is, if no number of a rig is named."""
+    if rig.free:
+        return
+    known = list(known_paths(rig.base))
+    example = next((path for path in known if "." in path), known[0])
+    raise ScenarioError(
+        f"no number of {rig.name} is named: name some with --for, in Python with names, such as "
+        f"{example!r}; there are {', '.join(known)}"
+    )
 
 
 def of_runs(rig: OwnRig, values: Values) -> Fields:

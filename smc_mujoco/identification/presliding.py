@@ -28,6 +28,7 @@ from smc_mujoco.mechanisms.plant import Values as Parameters
 BENDS = 2e-4, 1e-3, 4e-3  # rad (m), by which a joint gives way before it slides; chosen
 SLIDES_AT = 1.0  # rad/s (m/s): of bristles without a Stribeck drop, where it changes nothing
 DAMPING = 0.6  # of bristles, relative to the root of stiffness and inertia; chosen
+WRITTEN_SOFTNESS = "0.0201 1"  # MuJoCo's default itself counts as not written, and is hardened
 FOUND = "coulomb", "stiffness", "damping"  # of bristles
 
 
@@ -82,12 +83,8 @@ def _ways(rig: OwnRig) -> dict[str, OwnRig]:
     levels = model.dof_frictionloss[dofs].tolist()
     inertias = model.dof_M0[dofs].tolist()
     joints = channel_names(rig.plant)
-    found = {
-        "as MuJoCo's default does: if a simulation made the logs, give the file its softness, as "
-        'solreffriction="0.0201 1" of the joint': dataclasses.replace(
-            rig, plant=_yielding(rig.plant, False)
-        )
-    }
+    creeps = "as MuJoCo's default does: if a simulation made the logs, " + _softness(joints, levels)
+    found = {creeps: dataclasses.replace(rig, plant=_yielding(rig.plant, False))}
     for bend in BENDS:
         bristles = []
         for joint, level, inertia in zip(joints, levels, inertias, strict=True):
@@ -99,6 +96,15 @@ def _ways(rig: OwnRig) -> dict[str, OwnRig]:
         way = f"as bristles that bend by {1e3 * bend:g} mrad (mm): {_with_bristles(rig, bristles)}"
         found[way] = dataclasses.replace(rig, base=base, plant=_yielding(rig.plant, True))
     return found
+
+
+def _softness(joints: Sequence[str], levels: Sequence[float]) -> str:
+    """Return what to write into the file, where dry friction creeps as MuJoCo's default does."""
+    lines = []
+    for joint, level in zip(joints, levels, strict=True):
+        if level:
+            lines.append(f'<joint name="{joint}" ... solreffriction="{WRITTEN_SOFTNESS}"/>')
+    return f"write {', '.join(lines)} into the file, and find the numbers again"
 
 
 def _with_bristles(rig: OwnRig, bristles: Sequence[LuGre]) -> str:

@@ -52,8 +52,7 @@ FoundFigure = Annotated[
 FoundFile = Annotated[
     Path | None,
     typer.Option(
-        help="Also write the numbers as a condition, FILE.txt, for --condition of other "
-        "commands."
+        help="Also write the numbers as a condition, FILE.txt, for --condition of other commands."
     ),
 ]
 Beside = Annotated[

@@ -14,6 +14,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.constraints import Number, OneOf, constrain
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.text import stated
@@ -319,6 +320,13 @@ class Actuator(OnJoints):
     def force_at(self, bound: float) -> float:
         """Return the largest force that a bound on |u| allows at rest, N m (N)."""
         return bound * self.nominal.gain
+
+    def force_of(self, u: Array, x: Array, v: Array) -> Array:
+        """Return the force of commands at positions and velocities, N m (N), as the nominal drive
+        has it.
+        """
+        del x
+        return self.nominal.gain * u - self.nominal.drag * v
 
     def longest_step(self, plant: Plant) -> float:
         """Return the longest default physics step beside it, s."""

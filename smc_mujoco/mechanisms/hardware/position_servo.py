@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 from numba.extending import register_jitable
 
-from smc_mujoco.common.aliases import Pair
+from smc_mujoco.common.aliases import Array, Pair
 from smc_mujoco.common.constraints import Boolean, Range
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError
@@ -143,6 +143,10 @@ class PositionServo(Actuator):
     def force_at(self, bound: float) -> float:
         force = super().force_at(bound)
         return force if self.stall is None else min(force, self.stall)
+
+    def force_of(self, u: Array, x: Array, v: Array) -> Array:
+        aim = np.clip(self.goal + u, *self.ctrlrange)
+        return np.clip(self.kp * (aim - x) - self.kv * v, *self.forcerange)
 
     def suits(self, s: Any, chain: Sequence[Actuator]) -> None:
         drives = [part for part in chain if part.drives]
