@@ -332,10 +332,11 @@ def check_columns(rig: OwnRig, data: Sequence[Record], logs: Sequence[Forces]) -
     for record, log in zip(data, logs, strict=True):
         shares = force_shares(rig, log)
         cosines = force_cosines(log)
+        stopped = bool(_beyond_ranges(rig, record))  # their stops take most of the force
         for i, name in enumerate(rig.columns.x[: len(shares)]):
             if rig.plant.units[i] == "rad" and shares[i] < TOO_SMALL:
-                _check_angle(rig, record, i, shares[i])
-            if cosines[i] < -AGREES:
+                _check_angle(rig, record, i, shares[i], stopped)
+            if cosines[i] < -AGREES and not stopped:
                 u = rig.columns.inputs[i]
                 raise ScenarioError(
                     f"{u} of {rig.name} pushes against the motion of {name} (cosine "
@@ -345,7 +346,7 @@ def check_columns(rig: OwnRig, data: Sequence[Record], logs: Sequence[Forces]) -
                 )
 
 
-def _check_angle(rig: OwnRig, record: Record, i: int, share: float) -> None:
+def _check_angle(rig: OwnRig, record: Record, i: int, share: float, stopped: bool) -> None:
     """Raise ScenarioError where the angle of a joint, with the share of the recorded force in the
     force that its motion takes, is in degrees: it is larger than a turn and a half, or the recorded
     forces agree with the motion if it is.
@@ -353,6 +354,8 @@ def _check_angle(rig: OwnRig, record: Record, i: int, share: float) -> None:
     name = rig.columns.x[i]
     reach = float(np.abs(record[name]).max())
     if reach < LARGEST_ANGLE:
+        if stopped:
+            return
         turned = dict(record)
         for angle, unit in zip(rig.columns.x, rig.plant.units, strict=True):
             if unit == "rad":

@@ -16,7 +16,7 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.engine import group
 from smc_mujoco.cli.main import app
 from smc_mujoco.identification.first_guess import first_guess
-from smc_mujoco.identification.friction_figure import curve_error, friction
+from smc_mujoco.identification.friction_figure import curve_error, friction, measured_friction
 from smc_mujoco.identification.own_rig import condition_fields, own_rig
 from smc_mujoco.mechanisms.hardware.servos import ServoFriction
 from smc_mujoco.simulation.conditions import from_file
@@ -307,6 +307,47 @@ def test_the_units_of_a_slide_s_friction_are_those_of_a_slide():
 def test_a_log_that_cannot_be_used_is_refused_in_a_sentence(arm, run, change, words):
     with pytest.raises(smc.ScenarioError, match=words):
         smc.identify(arm, change(run), ["j1.damping"])
+
+
+def test_a_column_with_the_other_sign_and_small_angles_in_degrees_are_named(arm, run, refused):
+    """Of a range of 0.07 rad, in degrees 4, which is no large angle."""
+    names = ["j1.damping", "j1.frictionloss"]
+    for turned in ("x", "u"):
+        with pytest.raises(smc.ScenarioError, match="u of chain pushes against.* turn the sign"):
+            smc.identify(arm, run | {turned: -run[turned]}, names)
+    t = np.arange(0.0, 2.0, 2e-3)
+    x = 0.07 * np.sin(12.0 * t)
+    small = {"t": t, "x": np.degrees(x), "u": 0.05 * -144.0 * x + 1.96 * np.sin(x)}
+    refused(lambda: smc.identify(arm, small, names), "column x of chain reaches 4", "in degrees")
+
+
+def test_a_column_that_is_missing_is_named_before_the_numbers_are_asked_for(run, tmp_path):
+    (tmp_path / "arm.xml").write_text(ONE)
+    rows = np.column_stack([run["t"], run["x"], run["u"]])
+    np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header="t,angle,u", comments="")
+    words = ["identify", str(tmp_path / "arm.xml"), str(tmp_path / "run.csv")]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 2
+    told = " ".join(done.output.split())
+    assert "has no column x (it has t, angle, u)" in told
+    assert "--columns x=NAME" in told
+    done = CliRunner().invoke(app, [*words, "--columns", "x=angle"])
+    assert "no number of arm is named: name some with --for" in " ".join(done.output.split())
+
+
+def test_the_friction_panel_of_a_servo_has_its_force_and_no_set_point():
+    """By a log of MuJoCo alone: damping times speed and dry friction, where the joint slides."""
+    servo = '<position joint="j1" kp="60" kv="3" ctrlrange="-1.5 1.5" forcerange="-12 12"/>'
+    xml = chain([0.5], [0.8]).replace('<motor joint="j1"/>', servo)
+    truth = {"j1.damping": 0.4, "j1.frictionloss": 0.3, "j1.armature": 0.03}
+    rig = own_rig(smc.plant_from(xml, {"j1": smc.Channel(servo=True)}), list(truth))
+    rig = rig.with_values(truth)
+    t = np.arange(0.0, 3.0, 2e-3)
+    log = servo_log(xml, truth, t, 0.4 * np.sin(3.0 * t))
+    v, forces = measured_friction(rig, rig.checked(log))
+    slides = np.abs(v[:, 0]) > 0.8
+    expected = 0.4 * v[slides, 0] + 0.3 * np.sign(v[slides, 0])
+    np.testing.assert_allclose(forces[slides, 0], expected, atol=0.06)
 
 
 def test_a_motor_s_column_that_is_missing_is_named():
