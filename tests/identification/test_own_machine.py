@@ -313,7 +313,7 @@ def test_a_column_with_the_other_sign_and_small_angles_in_degrees_are_named(arm,
     """Of a range of 0.07 rad, in degrees 4, which is no large angle."""
     names = ["j1.damping", "j1.frictionloss"]
     for turned in ("x", "u"):
-        with pytest.raises(smc.ScenarioError, match="u of chain pushes against.* turn the sign"):
+        with pytest.raises(smc.ScenarioError, match=r"u of chain pushes against.* turn the sign"):
             smc.identify(arm, run | {turned: -run[turned]}, names)
     t = np.arange(0.0, 2.0, 2e-3)
     x = 0.07 * np.sin(12.0 * t)
