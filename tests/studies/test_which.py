@@ -166,7 +166,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     lines = dict(line.split(": ", 1) for line in advice.answer)
     verdicts = ["Use", "However tuned", "With these gains", "Its J", "Its scores", "Without a law"]
     assert [*lines][:9] == [*verdicts, "Added", "Settles", "Tolerates"]
-    assert lines["Added"].startswith("noise, of 0.01 m in positions and 0.05 m a second in veloc")
+    assert lines["Added"].startswith("noise, of 0.01 m in positions and 0.05 m/s in veloc")
     shares = [float(share) for share in re.findall(r"(\d+) % \w+", lines["Its J"])]
     assert sum(shares) == pytest.approx(100.0, abs=1.0)
     assert shares == sorted(shares, reverse=True)
