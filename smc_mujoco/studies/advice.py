@@ -225,8 +225,8 @@ class RaceAdvice(Advice):
                 short = f", not even the first {FIRST}"
             return (
                 f"open; there was time for {counted(race.sets, 'set')} of gains of each "
-                f"law{short}, and {LOOKS[0]} can name a winner; the same call goes on from there, "
-                f"and takes about {counted(more, 'more minute')}"
+                f"law{short}, and {LOOKS[0]} can name a winner; the same call goes on from there "
+                f"if it is given about {counted(more, 'more minute')}"
             )
         text = _verdict(comparison, race.running)
         ranked = _ranked(comparison, race.running)

@@ -301,6 +301,7 @@ def test_laws_for_which_there_is_no_time_are_named_and_the_clock_may_end_a_race_
     assert "open; there was time for 1 set of gains of each law" in however
     assert "not even the first 3" in however
     assert "7 can name a winner" in however
+    assert re.search(r"goes on from there if it is given about \d+ more minute", however)
 
 
 def test_a_law_that_does_not_settle_is_not_advised_without_saying_where(raced):
