@@ -453,15 +453,18 @@ def _commands(
     times = np.arange(positions.shape[1])
     w = 2.0 * math.pi * BANDWIDTH
     found = []
-    for i, (motor, inertia) in enumerate(zip(drives.drive_train.motors, inertias, strict=True)):
+    for i, motor in enumerate(drives.drive_train.motors):
         if isinstance(motor, PositionServo):
-            found.append((as_recorded(), positions[i] - motor.goal))
+            set_point = positions[i] - motor.goal
+            found.append((as_recorded(), set_point))
             continue
-        kp, kd = inertia * w * w, 2.0 * DAMPING_RATIO * w * inertia
-        needed = np.interp(times, times[::FORCE_STRIDE], forces[i])
-        led = positions[i] + _led(needed / kp, kd / kp / period)
+        kp = w * w * inertias[i]
+        kd = 2.0 * DAMPING_RATIO * w * inertias[i]
         gain = motor.nominal.gain
-        found.append((find_law("pid", kp=kp / gain, ki=0.0, kd=kd / gain), led))
+        law = find_law("pid", kp=kp / gain, ki=0.0, kd=kd / gain)
+        needed = np.interp(times, times[::FORCE_STRIDE], forces[i])
+        lead = _led(needed / kp, kd / kp / period)
+        found.append((law, positions[i] + lead))
     return found
 
 
@@ -490,17 +493,32 @@ def _told(rig: OwnRig, names: list[str], trace: Trace) -> dict[str, Any]:
     may_lack = lack_of_fit(solved, presliding(replays, solved))
     by_model = np.hypot(gauss_newton.moves(solved, changes), may_lack.moved)
     errors, correlations, _ = statistics(replays, solved, by_model)
-    J = solved.freed_slopes
-    singular = np.linalg.svd(J / np.linalg.norm(J, axis=0), compute_uv=False)
-    apart = correlations - np.eye(len(names))
-    i, j = np.unravel_index(np.argmax(np.abs(apart)), apart.shape)
-    other = names[j] if len(names) > 1 else ""
-    worst = (names[i], other, float(apart[i, j]))
-    condition = float(singular[0] / max(singular[-1], 1e-300))
     for name, error in errors.items():
         if math.isnan(error):
             errors[name] = math.inf
-    return {"condition": condition, "errors": errors, "worst_pair": worst}
+    return {
+        "condition": _condition_number(solved.freed_slopes),
+        "errors": errors,
+        "worst_pair": _worst_pair(names, correlations),
+    }
+
+
+def _condition_number(J: Array) -> float:
+    """Return the condition number of scaled slopes."""
+    scaled = J / np.linalg.norm(J, axis=0)
+    singular = np.linalg.svd(scaled, compute_uv=False)
+    return float(singular[0] / max(singular[-1], 1e-300))
+
+
+def _worst_pair(names: Sequence[str], correlations: Array) -> tuple[str, str, float]:
+    """Return the two quantities whose errors correlate most; the second is "" if there is one."""
+    apart = correlations - np.eye(len(names))
+    largest = np.argmax(np.abs(apart))
+    i, j = np.unravel_index(largest, apart.shape)
+    other = ""
+    if len(names) > 1:
+        other = names[j]
+    return names[i], other, float(apart[i, j])
 
 
 def _of_run(replays: Replays, rig: OwnRig, trace: Trace) -> Array:

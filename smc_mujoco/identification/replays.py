@@ -347,19 +347,26 @@ class Replays:
         ranges: central ones, or in half the time those to one side.
         """
         p = len(self.names)
-        moved = self._moved(point, DIFFERENCE_STEP)
-        opposite = self._moved(point, -DIFFERENCE_STEP) if central else [point] * len(moved)
-        residuals, *rows = self.residuals([point, *moved, *(opposite if central else ())])
-        count = len(moved)
-        behind = rows[count:] if central else [residuals] * count
-        gaps = np.full(count, (2.0 if central else 1.0) * DIFFERENCE_STEP)
+        ahead = self._moved(point, DIFFERENCE_STEP)
+        behind = []
+        if central:
+            behind = self._moved(point, -DIFFERENCE_STEP)
+        residuals, *rows = self.residuals([point, *ahead, *behind])
+        count = len(ahead)
+        rows_behind = rows[count:]
+        if not central:
+            behind = [point] * count
+            rows_behind = [residuals] * count
+        gaps = np.full(count, DIFFERENCE_STEP)
+        if central:
+            gaps = 2.0 * gaps
         for j in range(p):
-            gaps[j] = moved[j].values[j] - opposite[j].values[j]
+            gaps[j] = ahead[j].values[j] - behind[j].values[j]
         by_values = []
         by_states = []
         for k in range(len(self.pieces)):
             columns = []
-            for ahead, back, gap in zip(rows[:count], behind, gaps, strict=True):
+            for ahead, back, gap in zip(rows[:count], rows_behind, gaps, strict=True):
                 columns.append((ahead[k] - back[k]) / gap)
             every = np.column_stack(columns)
             by_values.append(every[:, :p])

@@ -363,6 +363,24 @@ def _within(disturbance: float | None, bounds: str | None) -> "Uncertainty | Non
     return Uncertainty(**fields) if fields else None
 
 
+def _cases(
+    machine: "Machine",
+    laws: "Sequence[str | Law]",
+    condition: str,
+    duration: float,
+    gains: str,
+    changes: dict[str, Any],
+) -> "list[Scenario]":
+    """Return the scenario of each law under a condition, with changes of its fields."""
+    from smc_mujoco.simulation.grid import case
+
+    asked = options.one_condition(condition)
+    cases = []
+    for law in laws:
+        cases.append(case(machine, law, asked, duration, gains, changes=changes))
+    return cases
+
+
 def _attacked_cases(
     plant: str, law: list[str] | None, condition: str, duration: float, gains: str
 ) -> "list[list[Scenario]]":
@@ -374,7 +392,6 @@ def _attacked_cases(
     from smc_mujoco.identification.rig import rig as find_rig
     from smc_mujoco.identification.rig import rigs
     from smc_mujoco.mechanisms.named import as_plant
-    from smc_mujoco.simulation.grid import case
 
     if plant in rigs():
         rig = find_rig(plant)
@@ -387,9 +404,8 @@ def _attacked_cases(
     chosen = options.laws(law, gain_sets.LAWS)
     machine = as_plant(plant)
     cases = []
-    asked = options.one_condition(condition)
-    for attacked in chosen:
-        cases.append([case(machine, attacked, asked, duration, gains)])
+    for one in _cases(machine, chosen, condition, duration, gains, {}):
+        cases.append([one])
     return cases
 
 
@@ -439,7 +455,6 @@ def chatter(
         from smc_mujoco.draw.page import files
         from smc_mujoco.mechanisms.named import jointed
         from smc_mujoco.metrics.limit_cycle import channel_cycle
-        from smc_mujoco.simulation.grid import case
         from smc_mujoco.simulation.run import run
 
     terminal = Terminal(json)
@@ -448,10 +463,7 @@ def chatter(
     options.check_files(None, *pictures)
     fields = {} if actuator is None else {"actuator": options.actuator(actuator)}
     machine = jointed(plant, "chattering")
-    asked = options.one_condition(condition)
-    cases = []
-    for tried in chosen:
-        cases.append(case(machine, tried, asked, duration, gains, changes=fields))
+    cases = _cases(machine, chosen, condition, duration, gains, fields)
     with bar("chattering") as progress:
         cycles = _cycles(cases, channel, progress.reached)
         traces = run(cases, threads=threads)

@@ -146,11 +146,11 @@ def identify(
 
     found = identification.identify(
         machine,
-        list(files),
+        files,
         options.names(names) or None,
         held_out=held_out,
         columns=renamed,
-        condition=None if condition is None else options.one_condition(condition),
+        condition=condition and options.one_condition(condition),
         corrected=corrected,
         starts=starts,
         seed=seed,

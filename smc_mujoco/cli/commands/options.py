@@ -331,10 +331,12 @@ def one_condition(text: str) -> "named.Condition":
     """Return the condition of a command that takes one: a name, a text, or a file with one."""
     found = conditions([text])
     if len(found) != 1:
-        listed = ", ".join(repr(one.name) for one in found)
+        listed = []
+        for one in found:
+            listed.append(repr(one.name))
         raise ScenarioError(
-            f"--condition {text} has {len(found)} conditions ({listed}), and this command "
-            "takes one: leave the others out, or join two as noise+encoder"
+            f"--condition {text} has {len(found)} conditions ({', '.join(listed)}), and this "
+            "command takes one: leave the others out, or join two as noise+encoder"
         )
     return found[0]
 
