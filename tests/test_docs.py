@@ -22,6 +22,7 @@ from helpers.pages import ROOT, beside, blocks, titled
 
 import smc_mujoco as smc
 from smc_mujoco.cli import law_pages
+from smc_mujoco.draw import style
 
 TEMPLATES = [template for known in law_pages.CATALOGUES.values() for template in known().values()]
 DOCS = ROOT / "docs"
@@ -169,6 +170,16 @@ def test_the_tutorial_s_tests_pass_and_tell_a_law_that_is_too_soft(tmp_path):
 )
 def test_the_plain_notation_becomes_latex(generator, plain, latex):
     assert generator.notation.formula(plain).split() == latex.split()
+
+
+@pytest.mark.parametrize("name", ["furuta", "quadrotor", "panda"])
+def test_lines_of_a_plant_s_figure_are_seen_on_a_white_and_on_a_dark_page(generator, name):
+    figures = generator.figures
+    dark = style.luminance(figures.SLATE) + 0.05
+    for colour in figures.page_colours(figures.plant_laws(name)):
+        lit = style.luminance(colour) + 0.05
+        assert lit / dark > 3.0
+        assert 1.05 / lit > 3.0
 
 
 def test_initials_of_a_name_are_no_symbols(generator):

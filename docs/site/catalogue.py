@@ -414,7 +414,7 @@ def _plant_page(plant: Plant, drawn: Mapping[tuple[str, ...], bytes]) -> Page:
         formula = equation(SOURCE.split(described(explained))[0])[1]
         known = re.sub(r"\b(\w+)\.py\b", r"`\1`", known)
     laws_shown = figures.plant_laws(name)
-    labels = style.law_colours(laws_shown)
+    labels = figures.page_colours(laws_shown)
     key = "".join(
         f'<span style="--key: {colour}">{style.law_name(each)}</span>'
         for each, colour in zip(laws_shown, labels, strict=True)

@@ -19,6 +19,7 @@ CACHE = ROOT / ".cache" / "site"
 PLANTS = ("inverted_pendulum", "van_der_pol", "duffing")
 # condition -> colour, seen on white and on slate
 CONDITIONS = {"nominal": "#2E86C1", "noise + sine": "#D35400"}
+SLATE = "#1E2129"  # the dark page
 FLIGHT_LAWS = "geometric", "quaternion_sliding", "cascaded_pid"
 ARM_LAWS = (
     "computed_torque_sliding",
@@ -57,10 +58,17 @@ def law_figure(law: str, plant: str) -> bytes:
 def plant_figure(plant: str) -> bytes:
     """Return x and u of the laws of `plant_laws` on a plant, as SVG."""
     import smc_mujoco as smc
-    from smc_mujoco.draw import style
 
     traces = smc.run([_case(plant, law, "nominal") for law in plant_laws(plant)])
-    return _svg(traces, style.law_colours([trace.scenario.law for trace in traces]))
+    return _svg(traces, page_colours([trace.scenario.law for trace in traces]))
+
+
+def page_colours(laws: Sequence) -> list[str]:
+    """Return the colours of laws, those that are dark so light that they are seen on slate, too."""
+    from smc_mujoco.draw import dark, style
+
+    slate = {style.PAPER: SLATE, style.INK: style.PAPER}
+    return [dark.on_dark(colour, slate) for colour in style.law_colours(laws)]
 
 
 def still(plant: str) -> bytes:
