@@ -164,12 +164,12 @@ def _by_speed(function: Callable) -> Formula:
     function = njit(function)
 
     @njit
-    def level(y, v, p, memory):
-        return float(function(at_speed(y, v), p, memory[OWN:OWN]))
+    def at(y, v, p, memory):
+        return resisting(float(function(at_speed(y, v), p, memory[OWN:OWN])), v)
 
     @njit
-    def near(v, p):
-        return p.level_above_0 if v > 0.0 else p.level_below_0
+    def beside(y, v, p, memory):
+        return math.copysign(p.level_above_0 if v > 0.0 else p.level_below_0, v)
 
     @njit
     def first(y, v, p, memory):
@@ -177,22 +177,14 @@ def _by_speed(function: Callable) -> Formula:
             return p.level_at_0
         speed_lost = -math.copysign(y.h * y.mobility, v) * (y.others + y.mean)
         if abs(v) <= speed_lost and p.level_at_0 > 0.0:
-            return near(v, p)
-        return level(y, v, p, memory)
+            return beside(y, v, p, memory)
+        return at(y, v, p, memory)
 
     @njit
     def bounds(found, y, v, p, memory):
         return -p.level_at_0, p.level_at_0
 
-    @njit
-    def at(y, v, p, memory):
-        return resisting(level(y, v, p, memory), v)
-
-    @njit
-    def beside(y, v, p, memory):
-        return resisting(near(v, p), v)
-
-    return Formula(first, resisting, bounds, at, beside, True, function.py_func.__module__)
+    return Formula(first, math.copysign, bounds, at, beside, True, function.py_func.__module__)
 
 
 @register_jitable

@@ -286,9 +286,9 @@ def _at_stages(formula: Formula) -> Callable:
             if not math.isfinite(f):  # which ends the run
                 return -f, 0.0
             memory[STAGE_SPEED] = y.v
-            stops = abs(y.v) <= -math.copysign(y.h * y.mobility, y.v) * (smooth - f)
             low = high = 0.0
-            if slow or stops or y.v == 0.0:
+            speed_lost = -math.copysign(y.h * y.mobility, y.v) * (smooth - f)
+            if slow or y.v == 0.0 or abs(y.v) <= speed_lost:
                 low, high = bounds(found, y, speed, p, memory)
             if not low < high:
                 if speed != y.v:

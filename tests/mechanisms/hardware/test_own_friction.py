@@ -205,7 +205,12 @@ def test_the_reference_loop_has_the_same_bits(kind, plant):
     assert_same(smc.run(one), reference.run(one))
 
 
-@pytest.mark.parametrize("kind", [stribeck, viscous])
+@friction_function(numbers={"forward": 0.2, "backward": 0.5})
+def one_sided(y, p, memory):
+    return p.forward if y.v > 0.0 else p.backward
+
+
+@pytest.mark.parametrize("kind", [stribeck, viscous, one_sided])
 def test_the_reference_loop_has_the_same_bits_where_other_forces_turn_a_joint(kind):
     fields = {"law": "none", "disturbance": smc.Sine(30.0, 200.0), "duration": 0.3}
     one = smc.Scenario(plant="duffing", friction=kind(), **fields)
