@@ -3,10 +3,10 @@
     python benchmarks/own_friction.py
 
 A pendulum at 1 ms under super-twisting, with dry friction that is held about a point, without and
-with noise, follows a sine, or takes a blow. Three frictions take turns with Coulomb in each round: a
-Stribeck curve; a level without an exponential, which no curve undercuts; and a curve that also
-reads the time, so that its levels at rest are not known beforehand. A ratio is of processor time, the median over rounds, with the
-quartiles; frictions in one round run the same starts and seeds.
+with noise, follows a sine, or takes a blow. Three frictions take turns with Coulomb in each round:
+a Stribeck curve; a level without an exponential; and a curve that also reads the time, so that its
+levels at rest are not known beforehand. A ratio is of processor time, the median over rounds, with
+the quartiles; frictions in one round run the same starts and seeds.
 """
 
 import math
