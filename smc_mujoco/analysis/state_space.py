@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.aliases import Array
+from smc_mujoco.common.aliases import Array, Names
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.mjcb import installed
@@ -70,15 +70,7 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     n = len(order)
     a = block[:n, :n][np.ix_(order, order)]
     b = block[:n, n:][np.ix_(order, driven)]
-    names = channel_names(plant)
-    if plant.pose:
-        labels = names
-        drives = [model.actuator(i).name for i in drive_ids(model)]
-    else:
-        labels = []
-        for i in order[: model.nv]:
-            labels.append(model.joint(int(model.dof_jntid[i])).name)
-        drives = names[: plant.driven]
+    labels, drives = _labels(plant, model, order)
     return StateSpace(
         a,
         b,
@@ -86,7 +78,7 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
         0.0,
         states=[*_of("x", labels), *_of("v", labels)],
         inputs=_of("u", drives),
-        outputs=_of("x", names),
+        outputs=_of("x", channel_names(plant)),
         name=plant.name,
     )
 
@@ -98,6 +90,17 @@ def _order(model: mujoco.MjModel, dofs: Array) -> Array:
         if i not in dofs:
             order.append(i)
     return np.concatenate([order, np.add(order, model.nv)])
+
+
+def _labels(plant: Plant, model: mujoco.MjModel, order: Array) -> tuple[Names, Names]:
+    """Return the names of what moves, in the order of the states, and of what drives it."""
+    names = channel_names(plant)
+    if plant.pose:
+        return names, tuple(model.actuator(i).name for i in drive_ids(model))
+    joints = []
+    for i in order[: model.nv]:
+        joints.append(model.joint(int(model.dof_jntid[i])).name)
+    return tuple(joints), names[: plant.driven]
 
 
 def _of(kind: str, names: Sequence[str]) -> list[str]:

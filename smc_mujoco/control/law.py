@@ -152,8 +152,7 @@ def law_function(
       label: name in figures and tables. Default: the function's name.
       short: name in two or three letters. Default: initials.
       colour: "#RRGGBB". Default: a colour of a palette, always the same.
-      linear_part: a `smc_mujoco.control.component.LinearPart`, of a law that is linear near
-        s = 0.
+      linear_part: a `smc_mujoco.control.component.LinearPart`, of laws linear near s = 0.
       family: one word, such as "terminal", by which lists group the laws.
       continuous: whether u is a continuous function of the measurement at s = 0 (at e = 0 for laws
         of e), however short the control period. Default: no.

@@ -114,8 +114,7 @@ def identify(
     """Find numbers of a machine from its logs: friction, armature, delay, masses, with errors.
 
     A log may come from any controller, at 40 Hz or more. It has columns t in s, and x (rad or m)
-    and u (N m or N) of the joint, or x_JOINT and u_JOINT of each. You need not guess
-    any number.
+    and u (N m or N) of the joint, or x_JOINT and u_JOINT of each. You need no first guess.
 
     Numbers are named JOINT.damping, .frictionloss, .armature, .stiffness, .gain, .offset and
     .zero, input_delay, m and grav, and of a part that --condition gives FIELD.NAME, as
