@@ -513,8 +513,8 @@ def _condition_number(J: Array) -> float:
 def _worst_pair(names: Sequence[str], correlations: Array) -> tuple[str, str, float]:
     """Return the two quantities whose errors correlate most; the second is "" if there is one."""
     apart = correlations - np.eye(len(names))
-    largest = np.argmax(np.abs(apart))
-    i, j = np.unravel_index(largest, apart.shape)
+    largest = int(np.argmax(np.abs(apart)))
+    i, j = divmod(largest, len(names))
     other = ""
     if len(names) > 1:
         other = names[j]

@@ -72,28 +72,37 @@ def better(replays: Replays, *points: Point) -> Point:
 
 
 def extrapolated(replays: Replays, slopes: Slopes) -> tuple[Slopes, list[Array]]:
-    """Return the solution for replays whose steps are extrapolated to 0, and about how far that is
-    off in the residuals of each piece, (N,).
+    """Return the solution near slopes for replays whose steps are extrapolated to 0, and about how
+    far that is off in the residuals of each piece, (N,).
 
     Errors by steps h are of first order, so 2 x(h/2) - x(h) has none of them; what it changes from
-    h to h/2 is what it may be off.
+    h to h/2 is what it may be off. If the replays with steps h fit better, as they fit a log of a
+    simulation with such steps, their solution is returned, and what shorter steps would change.
     """
-    point = slopes.point
     if not replays.free.size:  # records of simulated runs have the same steps
         return slopes, [np.zeros(len(r)) for r in slopes.residuals]
-    plain = replays.rig(point).repeated(replays._part(0))
+    plain = replays.rig(slopes.point).repeated(replays._part(0))
     steps = replays.steps
     rows = [slopes.residuals]
     for parts in (2.0, 4.0):
         replays.steps = {"physics_step": plain.resolved.physics_step / parts}
-        rows += replays.residuals([point])
+        rows += replays.residuals([slopes.point])
     replays.steps = steps
-    residuals, changed = [], []
+    residuals, by_half, by_quarter = [], [], []
     for full, half, quarter in zip(*rows, strict=True):
         residuals.append(2.0 * quarter - half)
-        changed.append(2.0 * (quarter - half) - (half - full))
-    slopes = dataclasses.replace(slopes, residuals=residuals)
-    return slopes.stepped(_moved(replays, slopes, 0.0) - point.values), changed
+        by_half.append(2.0 * (half - full))
+        by_quarter.append(2.0 * (quarter - half) - (half - full))
+    before = _solved(replays, slopes)
+    after = _solved(replays, dataclasses.replace(slopes, residuals=residuals))
+    if before.cost < after.cost:
+        return before, by_half
+    return after, by_quarter
+
+
+def _solved(replays: Replays, slopes: Slopes) -> Slopes:
+    """Return the slopes after a step to the least squares."""
+    return slopes.stepped(_moved(replays, slopes, 0.0) - slopes.point.values)
 
 
 def moves(slopes: Slopes, changes: list[Array]) -> Array:
