@@ -271,11 +271,18 @@ def _levels(function: Callable, names: Names, values: tuple) -> tuple[Floats, ..
             joints = len(value)
     found = []
     for i in range(joints):
-        p = named(names)(*([of_joint(value, i) for value in values] or (0.0,)))
-        try:
-            levels = [float(function(_state(v, 0.0), p, NO_MEMORY)) for v in BESIDE_REST.values()]
-        except Exception:
-            return ()
+        numbers = []
+        for value in values:
+            numbers.append(of_joint(value, i))
+        p = named(names)(*(numbers or (0.0,)))
+        levels = []
+        for v in BESIDE_REST.values():
+            joint = _state(v, 0.0)
+            try:
+                level = function(joint, p, NO_MEMORY)
+                levels.append(float(level))
+            except Exception:
+                return ()
         found.append(tuple(levels))
     return tuple(found)
 
