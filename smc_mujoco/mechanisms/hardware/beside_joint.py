@@ -101,7 +101,8 @@ def _add_rotor(
             thinnest = np.argmin(np.abs(axis))
             arm = np.cross(axis, np.eye(3)[thinnest])
         away = arm / np.linalg.norm(arm)
-        rotor.ipos = MIN_ARM * away  # MuJoCo refuses a body whose centre does not move
+        # not on the axis: MuJoCo refuses a rotor there that an ElasticJoint has left no mass
+        rotor.ipos = MIN_ARM * away
         # in front of the hub, towards the camera at -y
         face = axis * math.copysign(0.045, -axis[1])
         ends = (*face, *(face + 0.16 * away))
