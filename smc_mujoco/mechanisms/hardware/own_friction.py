@@ -15,8 +15,9 @@ The function returns one of two things:
   the force that it holds at rest. If it holds none, low and high are 0.
 
 How a joint then stops, rests and breaks away is in sliding.py. If all that a function does with y
-is to read y.v, what its level is at rest and just beside it does not change in a run. So these
-levels are numbers of the friction, and the function is called only while the joint moves.
+is to read y.v, and it reads nothing of its file, what its level is at rest and just beside it does
+not change in a run. So these levels are numbers of the friction, and the function is called only
+while the joint moves.
 
 With a memory, F, low and high may depend on what the function keeps, such as a temperature. The
 function moves its memory once a step. If a function with a memory returns one number, this is a
@@ -29,6 +30,7 @@ import dis
 import functools
 import itertools
 import math
+import types as kinds
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, ClassVar
 
@@ -40,6 +42,7 @@ from smc_mujoco.common.aliases import Floats, Names
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.jit import named
+from smc_mujoco.common.rebuild import names_in
 from smc_mujoco.mechanisms.hardware.joint_force import JointForce, of_joint
 from smc_mujoco.mechanisms.hardware.moments import JointState
 from smc_mujoco.mechanisms.hardware.sliding import (
@@ -240,10 +243,11 @@ def returns_bounds(function: Callable, numbers: Mapping[str, float], memory: int
 
 def is_of_speed(function: Callable, numbers: Mapping[str, float]) -> bool:
     """Return whether a function without a memory returns a level that depends on the speed alone:
-    all that it does with its first argument y is to read y.v.
+    all that it does with its first argument y is to read y.v, and it reads nothing of its file.
     """
+    function = getattr(function, "py_func", function)
     code = getattr(function, "__code__", None)
-    if code is None or not code.co_argcount:
+    if code is None or not code.co_argcount or _reads_its_file(function):
         return False
     if not _levels(function, tuple(numbers), tuple(numbers.values())):
         return False
@@ -256,6 +260,18 @@ def is_of_speed(function: Callable, numbers: Mapping[str, float]) -> bool:
         if not (loads and following.opname == "LOAD_ATTR" and following.argval == "v"):
             return False
     return True
+
+
+def _reads_its_file(function: Callable) -> bool:
+    """Return whether a function reads a number or calls a function of its file.
+
+    Compiled code keeps the values that these had, and its levels at rest would be of later ones.
+    """
+    lasting = kinds.NoneType, kinds.ModuleType, kinds.BuiltinFunctionType, np.ufunc
+    for name in names_in(function.__code__).variables:
+        if not isinstance(function.__globals__.get(name), lasting):
+            return True
+    return False
 
 
 @functools.lru_cache(maxsize=256)

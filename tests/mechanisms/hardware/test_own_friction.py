@@ -3,6 +3,7 @@ cannot hold is named before a run.
 """
 
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -152,6 +153,14 @@ def by_place(y, p, memory):
     return p.coulomb + abs(y[3])
 
 
+SHARED = 0.2
+
+
+@friction_function(numbers={"more": 0.0})
+def of_file(y, p, memory):
+    return SHARED + p.more + 0.0 * y.v
+
+
 @friction_function(numbers=NUMBERS)
 def without_rest(y, p, memory):
     if y.v == 0.0:
@@ -168,6 +177,7 @@ def without_rest(y, p, memory):
         (by_helper, False),
         (renamed, False),
         (by_place, False),
+        (of_file, False),
         (bounded, False),
         (warming, False),
         (without_rest, False),
@@ -184,6 +194,19 @@ def test_a_level_is_the_same_whether_it_is_known_or_called():
     known, called = (cart(friction=kind(**numbers), **fields) for kind in (stribeck, with_time))
     assert np.abs(known.x).max() > 2e-3
     np.testing.assert_allclose(known.x, called.x, atol=2e-8)
+
+
+def test_a_joint_rests_and_slides_by_one_value_of_a_variable_that_changes(monkeypatch):
+    """Compiled code keeps the value that the variable had."""
+    for value in (0.5, 0.1):
+        monkeypatch.setattr(sys.modules[__name__], "SHARED", value)
+        for more in (0.0, 0.01):
+            friction = of_file(more=more)
+            kept = 1.0 - cart(friction=friction, v0=1.0, duration=1.0).v[-1, 0]
+            held = cart(friction=friction, feedforward=smc.Constant(0.99 * kept), duration=1.0)
+            gone = cart(friction=friction, feedforward=smc.Constant(1.01 * kept), duration=1.0)
+            assert np.abs(held.x).max() < 1e-12
+            assert gone.x[-1, 0] > 1e-4
 
 
 def test_what_raises_at_rest_says_so_in_its_run():
