@@ -499,7 +499,7 @@ def in_readme(points: Sequence[dict]) -> str:
         f"{noisy['contradicted']}. In {quiet['all']} cases without noise it leads in "
         f"{leads(quiet)} and trails in {quiet['contradicted']}; in {quiet['not ranked']} the "
         "errors are below a ten-thousandth of the start, or near it, and are not ranked. In "
-        f"{noisy['not settled'] + quiet['not settled']} of all these cases the runs do not settle "
+        f"{noisy['not settled'] + quiet['not settled']} of these cases the runs do not determine "
         "an error, and no lead is counted. Smooth "
         f"first-order sliding leads the best rival in {sum(map(leads, smooth))} of "
         f"{sum(its['all'] for its in smooth)} cases, with and without noise, and trails in "
