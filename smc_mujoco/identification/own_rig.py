@@ -36,7 +36,7 @@ from smc_mujoco.simulation.signals import Fault
 from smc_mujoco.simulation.time_series import TimeSeries
 from smc_mujoco.simulation.trace import Trace
 
-MAX_PERIOD = 2.5e-3  # s, of a replay's commands; chosen: a mixed command then errs by 3 us^2 u/J
+MAX_PERIOD = 1e-3  # s, of a replay's commands; chosen: a mixed command then errs by 0.5 us^2 u/J
 SLOWEST = 40.0  # Hz: a log of fewer samples a second misses too much of the commands; chosen
 STILL = 3.0  # deviations of the noise, or steps of the sensor: less is no motion; chosen
 RUN_STEP = 2.5e-4  # s, longest physics step of runs with a delay, which it divides

@@ -116,6 +116,19 @@ def test_friction_that_gives_way_before_it_slides_is_told_and_in_the_errors():
     assert cured.values["j1.armature"] == pytest.approx(TRUTH["j1.armature"], rel=0.02)
 
 
+def test_commands_of_one_sample_break_a_joint_away_though_a_delay_is_between_samples(arm):
+    """A mean of such a command and the one before would not. The delay is 1.5 samples."""
+    level, force, period = TRUTH["j1.frictionloss"], 0.7, 2e-3
+    t = period * np.arange(501)
+    u = np.where(np.arange(501) % 10 == 5, force, 0.0)
+    rig = own_rig(arm, list(TRUTH)).with_values(TRUTH | {"input_delay": 0.003}, "true")
+    part = rig.part({"t": t, "x": 0.1 * np.sin(10.0 * t), "u": u})
+    trace = smc.run(rig.repeated(part, state=np.zeros(2)))
+    inertia = float(arm.load().dof_M0[0]) + TRUTH["j1.armature"]
+    each = 0.5 * (force - level) * period**2 / inertia * force / level  # sped up, then stopped
+    assert trace.x[-1, 0] == pytest.approx(50.0 * each, rel=0.05)
+
+
 def test_a_log_that_an_open_loop_leaves_is_told_apart_from_a_poor_fit(found):
     left = tuple(dict.fromkeys(fit, -210.0) for fit in found.fits)
     (note,) = dataclasses.replace(found, fits=left).notes
