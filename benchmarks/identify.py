@@ -30,7 +30,7 @@ from smc_mujoco.identification.own_rig import own_rig
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from helpers.machine_logs import chain, chirp, log, sines, stairs
-from helpers.public_logs import double_pendulum, double_pendulum_log
+from helpers.public_logs import double_pendulum, double_pendulum_log, pendulum, pendulum_log
 
 NO_CONTACT = 'contype="0" conaffinity="0"'
 CART = f"""<mujoco model="cart"><compiler angle="radian"/><worldbody><body name="cart">
@@ -259,19 +259,11 @@ def known(names: list[str], seeds: int) -> None:
 def public(folder: Path) -> None:
     """Print what is found of the AK80-6 pendulum, and its fit on records that were not used."""
 
-    def record(name: str) -> dict:
-        data = np.load(folder / f"simple_pendulum-{name}.npz")
-        return {"t": data["time"], "x": data["position"], "u": data["torque"]}
-
-    xml = f"""<mujoco model="ak80"><compiler angle="radian"/><worldbody><body>
-    <joint name="j" axis="0 1 0" frictionloss=".21"/>
-    <inertial pos="0 0 -.5" mass=".66" diaginertia="1e-4 1e-4 1e-4"/>
-    <geom type="sphere" size=".02" pos="0 0 -.5" mass="0" {NO_CONTACT}/></body></worldbody>
-    <actuator><motor joint="j"/></actuator></mujoco>"""
-    arm = smc.plant_from(xml, ["j"], name="ak80")
+    arm = smc.plant_from(pendulum(), ["j"], name="ak80")
     names = ["m", "j.armature", "j.damping", "j.frictionloss", "j.offset", "input_delay"]
-    used = record("ddp"), record("direct_collocation")
-    others = {name: record(name) for name in ("energy_shaping", "pd-system_identification")}
+    used = tuple(pendulum_log(folder, name) for name in ("ddp", "direct_collocation"))
+    names_of_others = "energy_shaping", "pd-system_identification"
+    others = {name: pendulum_log(folder, name) for name in names_of_others}
     beside_published(arm, names, used, others)
     arm = smc.plant_from(double_pendulum(), ["shoulder", "elbow"])
     names = [f"{joint}.{kind}" for joint in ("shoulder", "elbow") for kind in KINDS]

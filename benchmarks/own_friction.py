@@ -12,6 +12,7 @@ the quartiles; frictions in one round run the same starts and seeds.
 import math
 import statistics
 import time
+from typing import Any
 
 import numpy as np
 
@@ -56,7 +57,7 @@ CASES = {
 }
 
 
-def group_of(friction: object, fields: dict) -> tuple[FormGroup, np.ndarray]:
+def group_of(friction: Any, fields: dict) -> tuple[FormGroup, np.ndarray]:
     """Return a group of one run, and the rows of RUNS that differ in start and seed."""
     scenario = smc.Scenario(
         plant="inverted_pendulum",
@@ -85,6 +86,7 @@ def times(fields: dict) -> tuple[dict[str, list[float]], int]:
             group.run(rows, threads=1)
             if k:  # the first compiles
                 found[name].append(time.process_time() - began)
+    rows = groups["Coulomb"][1]
     steps = RUNS * rows[0, SETTING.samples] * rows[0, SETTING.steps]
     return found, int(steps)
 

@@ -23,6 +23,8 @@ SHARES = 0.3, 1.0
 TRIALS = len(DAMPINGS) * (len(SHARES) + 1)  # points that a step tries
 # scales of a state at the start, by which it may differ from the measured one; chosen
 MAX_STATE = 100.0
+# scales of velocity by which starts differ from which a piece's own is fitted; chosen
+KICKS = 0.0, -4.0, 4.0
 MAX_FACTOR = 10.0  # by which a step may change a quantity that cannot be negative; chosen
 NEGLIGIBLE_VALUE = 1e-4  # of its scale: below it such a quantity may become 0; chosen
 COST_TOLERANCE = 1e-5  # relative change of the cost at which the search ends; chosen
@@ -159,13 +161,31 @@ def refine(replays: Replays, point: Point, most: int) -> Slopes:
     return best
 
 
+def fit_starts(replays: Replays, most: int) -> Slopes:
+    """Return the slopes of replays without quantities, in which the states at the starts of pieces
+    are fitted.
+
+    A joint that dry friction holds at a start has no slope there. So each piece is fitted from
+    several velocities, and keeps the best.
+    """
+    n = len(replays.twin.columns.x)
+    reached = []
+    for velocity in KICKS if len(replays.free) else (0.0,):
+        states = replays.start.states.copy()
+        states[:, -n:] += velocity
+        reached.append(refine(replays, Point(replays.start.values, states), most).point)
+    best = replays.costs(reached).argmin(axis=0)
+    states = np.array([reached[i].states[k] for k, i in enumerate(best)])
+    return refine(replays, Point(replays.start.values, states), most)
+
+
 def _best_step(replays: Replays, slopes: Slopes) -> tuple[Point, float]:
     """Return the best of several damped steps, and its cost.
 
     Each piece chooses the best move of its own states.
     """
     groups = []
-    for damping in DAMPINGS:
+    for damping in DAMPINGS if len(slopes.point.values) else DAMPINGS[:1]:
         groups.append(_variants(replays, slopes, _moved(replays, slopes, damping)))
     costs = replays.costs(list(itertools.chain(*groups)))
     reached = []
@@ -190,9 +210,12 @@ def _variants(replays: Replays, slopes: Slopes, values: Array) -> list[Point]:
     for share in SHARES:
         states = np.clip(slopes.point.states + share * moves, -MAX_STATE, MAX_STATE)
         moved.append(Point(values, states))
-    if len(replays.free):
-        return [*moved, replays.at_rest(moved[-1])]
-    return moved[-1:]
+    if not len(replays.free):
+        return moved[-1:]
+    moved.append(replays.at_rest(moved[-1]))
+    if not len(values):  # then pieces have nothing in common, and each may stay
+        moved.append(slopes.point)
+    return moved
 
 
 def _moved(replays: Replays, slopes: Slopes, damping: float) -> Array:

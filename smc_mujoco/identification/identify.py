@@ -394,7 +394,7 @@ def check(rig: Rig, log: Log, columns: Mapping[str, str] | None = None) -> HeldO
     if twin.controller is not None or twin.dynamics is not None:
         return HeldOutFit(fit, {})
     replays = Replays(twin, [], data, False)
-    slopes = gauss_newton.refine(replays, replays.start, PIECE_STEPS)
+    slopes = gauss_newton.fit_starts(replays, PIECE_STEPS)
     return HeldOutFit(fit, fits_by_pieces(replays, slopes)[0])
 
 

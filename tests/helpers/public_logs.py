@@ -1,5 +1,5 @@
-"""Public logs of double pendulum C.1 (DFKI's Underactuated Lab, double_pendulum, BSD-3) as columns,
-and its published model 1.0 as MJCF.
+"""Public logs of two machines of DFKI's Underactuated Lab (BSD-3) as columns, with their published
+models as MJCF: the AK80-6 pendulum, and double pendulum C.1 with its model 1.0.
 """
 
 from pathlib import Path
@@ -39,3 +39,18 @@ def double_pendulum_log(folder: Path, name: str, duration: float) -> dict[str, n
             columns[f"x_{joint}"] = record[f"pos_meas{i}"][kept]
             columns[f"u_{joint}"] = record[f"tau_meas{i}"][kept]
     return columns
+
+
+def pendulum() -> str:
+    """Return the MJCF of the AK80-6 pendulum, with a motor at joint j."""
+    return f"""<mujoco model="ak80"><compiler angle="radian"/><worldbody><body>
+<joint name="j" axis="0 1 0" frictionloss=".21"/>
+<inertial pos="0 0 -.5" mass=".66" diaginertia="1e-4 1e-4 1e-4"/>
+<geom pos="0 0 -.5" {STILL}/></body></worldbody>
+<actuator><motor joint="j"/></actuator></mujoco>"""
+
+
+def pendulum_log(folder: Path, name: str) -> dict[str, np.ndarray]:
+    """Return a record of the AK80-6 pendulum, with the measured torque as the command."""
+    with np.load(folder / f"simple_pendulum-{name}.npz") as record:
+        return {"t": record["time"], "x": record["position"], "u": record["torque"]}

@@ -8,6 +8,7 @@ microseconds.
 import math
 from collections.abc import Sequence
 from types import SimpleNamespace
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -566,7 +567,7 @@ class Loop:
             return v
         if slow:
             return 0.0
-        formula = self.formulas[i]
+        formula: Any = self.formulas[i]
         alone = abs(v) <= -math.copysign(mobility_step, v) * smooth
         if formula.levels and alone and self.evaluate(i, 0.0, 0.0, 0.0)[2] > 0.0:
             return math.copysign(STICKING_SPEED, v)

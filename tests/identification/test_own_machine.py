@@ -9,7 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.machine_logs import chain, chirp, log, servo_log, sines
-from helpers.public_logs import DRY, double_pendulum, double_pendulum_log
+from helpers.public_logs import (
+    DRY,
+    double_pendulum,
+    double_pendulum_log,
+    pendulum,
+    pendulum_log,
+)
 from typer.testing import CliRunner
 
 import smc_mujoco as smc
@@ -17,6 +23,7 @@ from smc_mujoco.analysis.engine import group
 from smc_mujoco.cli.main import app
 from smc_mujoco.identification.first_guess import first_guess
 from smc_mujoco.identification.friction_figure import curve_error, friction, measured_friction
+from smc_mujoco.identification.identify import check
 from smc_mujoco.identification.own_rig import condition_fields, own_rig
 from smc_mujoco.mechanisms.hardware.servos import ServoFriction
 from smc_mujoco.simulation.conditions import from_file
@@ -669,6 +676,20 @@ def test_the_dry_friction_of_a_public_double_pendulum_is_between_its_authors_fit
         name = f"{joint}.frictionloss"
         assert min(published) < found.values[name] < max(published), found
         assert found.errors[name] < 0.1 * max(published), found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dry", [0.13, 0.14])
+def test_pieces_that_begin_where_dry_friction_holds_are_fitted_as_well_as_others(dry):
+    """A public log in which a pendulum stands upright for a while. The fit depends on no number so
+    much as on the velocities at which pieces begin.
+    """
+    folder = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
+    if not folder.is_dir():
+        pytest.skip("the public records are not at hand")
+    values = {"m": 0.7244, "j.frictionloss": dry, "j.offset": -0.0168}
+    rig = own_rig(smc.plant_from(pendulum(), ["j"]), list(values)).with_values(values, "by hand")
+    assert check(rig, pendulum_log(folder, "energy_shaping")).by_pieces["x"] > 97.5
 
 
 def test_a_condition_that_was_found_has_no_servo_of_the_file_so_it_suits_ideal_motors():

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 from types import FunctionType
+from typing import Any
 
 import numba
 import numpy as np
@@ -336,12 +337,15 @@ def test_the_callback_is_compiled_without_what_few_runs_have():
     from smc_mujoco.simulation import controller, exogenous, joint_controller
 
     compiled_with_it = set()
-    left = [controller.control.py_func]
+    ask_joints: Any = controller._ask_joints
+    callback: Any = controller.control
+    left = [callback.py_func]
     while left:
         function = left.pop()
         if function not in compiled_with_it:
             compiled_with_it.add(function)
             left += helpers(function)
-    assert controller._ask_joints.py_func in compiled_with_it
-    for apart in (joint_controller.ask, joint_controller.mix, exogenous.disturb):
+    assert ask_joints.py_func in compiled_with_it
+    seldom: list[Any] = [joint_controller.ask, joint_controller.mix, exogenous.disturb]
+    for apart in seldom:
         assert apart.py_func not in compiled_with_it

@@ -390,10 +390,8 @@ class FormGroup:
 
     def _put_cycle(self, scores: np.ndarray, row: np.ndarray, log: np.ndarray) -> None:
         """Write the numbers of a run's limit cycle into its scores."""
-        samples = int(row[SETTING.samples]) + 1
-        found = cycles(
-            log[:samples, : self.form.driven], int(row[SETTING.late]), row[SETTING.period]
-        )
+        driven = log[: int(row[SETTING.samples]) + 1, : self.form.driven]
+        found = cycles(driven, int(row[SETTING.late]), float(row[SETTING.period]))
         for name, value in zip(CYCLE, found, strict=True):
             if name in self.form.metrics:
                 scores[SCORES + self.form.metrics.index(name)] = value
