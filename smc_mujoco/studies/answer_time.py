@@ -19,9 +19,9 @@ class AnswerTime:
     """When an answer must be there, and how fast runs are.
 
     ends: a time, inf for no limit.
-    after: the work of the runs that must follow a race, at the least, beside those of
-    table: the work of those of a law in the tables, and of
-    choice: those that choose among its sets of gains and compare it with others.
+    after: the work of the runs that must follow a race, beside those of single laws.
+    table: the work of a law's runs for the tables, at the least.
+    choice: the work of the runs that choose a law's gains and compare the law with others.
     unit: the work of a judgement of one set of gains.
     pace: how long a unit of work takes, s, as the last runs of a race took; 0 before them.
     """
@@ -39,8 +39,8 @@ class AnswerTime:
             self.pace = seconds / (sets * self.unit)
 
     def race_ends(self, laws: int, first: bool = False) -> float:
-        """Return when a race of so many laws must end; if it is to have the first set of each, that
-        goes before choice.
+        """Return when a race of so many laws must end. For the `first` set of a law it may go on
+        into the time of the choice.
         """
         of_law = self.table if first else self.table + self.choice
         return self.ends - self.pace * (self.after + min(laws, SHOWN) * of_law)

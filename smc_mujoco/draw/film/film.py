@@ -187,9 +187,9 @@ def film(
         pace.py.
       camera: name of a camera of the model, or (azimuth, elevation) in degrees as of MuJoCo's free
         camera. It gives the direction of the view, and the camera is as near as it can see all
-        machines. Default: the plant's own `look`; for your own model the first camera that does not
-        move and shows what the driven joints do, else across the plane in which they turn, from a
-        side on which no other part hides them.
+        machines. Default: the plant's own `look`. For your own model: its first camera that does
+        not move, if that shows at least half of what the driven joints do; else across the plane in
+        which they turn, from a side on which other parts hide least of them.
       at: the time of a single picture, s.
       span: the part of the runs that is shown, (start, stop) in s; default: all, and the first 4 s
         for .webp.

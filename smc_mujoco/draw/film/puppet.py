@@ -28,7 +28,8 @@ NEAR_SHARE = 0.1
 CALM_SHARE = 0.1
 MOST_HEIGHT = 1.7  # of its height in the picture, of all that must be in it, a stand first; chosen
 MIN_UPRIGHT = 0.1  # of a vertical line, its length in the picture, for a camera that looks down
-OWN_STAND_SHARE = 0.15  # the same of the library's pendulums, whose picture is of the bob's arc
+# of the size of what moves, so much of a library's stand is seen: its picture is of the bob's arc
+OWN_STAND_SHARE = 0.15
 # a machine whose foot is higher hangs from it; a floor of the model that is so near is its floor
 FLOOR_SHARE = 0.3
 NO_FLOOR = 20.0  # sizes over a floor that is not seen

@@ -48,7 +48,7 @@ def view(
         angles = azimuth, elevation
         motion = round(shown(data, joints, angles), 2)
         rated.append((-motion, abs(azimuth - FRONT), angles))
-    best = LOWEST, FRONT
+    best = FRONT, LOWEST
     most = -1.0
     for motion, _, angles in sorted(rated):
         if -motion <= most:  # no part that hides it can make it better

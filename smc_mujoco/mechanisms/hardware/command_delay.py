@@ -38,9 +38,9 @@ class CommandDelay(Actuator):
     one arrives, the actuator has the command 0. In a trace `applied` is the command before it. A
     law has no nominal model of it.
 
-    It stands before a PositionServo, an even DCMotor without inductance, or no drive at all. What
-    MuJoCo's callback simulates before the actuator, such as a Lag, would be delayed too, with
-    speeds that are not.
+    It stands before a PositionServo, a CommandFilter, a DCMotor without ripple and inductance, or
+    no drive at all. What MuJoCo's callback simulates before the actuator, such as a Lag, would be
+    delayed too, with speeds that are not.
 
     Attributes:
       dead_time: s, greater than 0.
