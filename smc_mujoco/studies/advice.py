@@ -140,7 +140,7 @@ class NoLaw(NamedTuple):
             text += f"J is {number(self.times)} times the law's"
         needless = [name for name, count in self.settled.items() if count == self.runs]
         if needless:
-            text += f". All settle under {joined(needless)}, where no law is needed"
+            text += f". All of them settle under {joined(needless)}"
         return text
 
 
@@ -299,13 +299,15 @@ class RaceAdvice(Advice):
         for board in self.leaderboard:
             headings[board.metric] = heading(board)
             for entry in board.entries:
-                if entry.law == self.law.name:
+                if entry.law == self.law.name and not math.isnan(entry.interval.median):
                     found.setdefault(board.metric, []).append(entry.interval.median)
         parts = []
+        count = len(self.settled[self.law.name])
         for metric, medians in found.items():
             low, high = size(min(medians), metric), size(max(medians), metric)
-            parts.append(f"{headings[metric]} {span(low, high) or low}")
-        over = ", the medians by condition" if len(self.settled[self.law.name]) > 1 else ""
+            few = f" in {len(medians)} of {count} conditions" if len(medians) < count else ""
+            parts.append(f"{headings[metric]} {span(low, high) or low}{few}")
+        over = ", the medians by condition" if count > 1 else ""
         return f"{joined(parts)}{over}"
 
     @property

@@ -204,7 +204,7 @@ def test_the_answer_says_how_the_plant_does_without_a_law_and_where_it_needs_non
     held = without._replace(holds=True, settled={"coulomb": 4, "noise": 1}, times=math.nan)
     assert held.words.startswith("with u = 0, at which the servo holds the goal, 5 of 8 runs")
     assert held.words.endswith(
-        "and some runs fail, so J is not compared. All settle under coulomb, where no law is needed"
+        "and some runs fail, so J is not compared. All of them settle under coulomb"
     )
 
 
@@ -223,6 +223,12 @@ def test_the_needs_are_those_of_the_tables_and_margins_at_the_end_of_their_searc
     worse = dataclasses.replace(board, entries=tuple(entries))
     both = dataclasses.replace(advice, leaderboard=[board, worse])
     assert f"{number(bound)}–{number(3.0 * bound)}" in both._needs
+    none = []
+    for entry in board.entries:
+        none.append(dataclasses.replace(entry, interval=entry.interval._replace(median=math.nan)))
+    blank = dataclasses.replace(board, entries=tuple(none))
+    either = dataclasses.replace(advice, leaderboard=[blank, board])
+    assert f"ultimate bound (m) {number(bound)}" in either._needs
     friction = advice.margins[1]
     most = dataclasses.replace(friction, value=friction.searched)
     widest = dataclasses.replace(advice, margins=[most])
