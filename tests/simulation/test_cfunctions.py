@@ -3,6 +3,7 @@ reaches is not.
 """
 
 import ctypes
+import importlib
 import os
 import pickle
 import subprocess
@@ -297,15 +298,11 @@ def test_own_functions_divide_as_numpy_does_and_those_of_laws_as_python_does():
     In a law it ends the run.
     """
     from smc_mujoco.control import law
-    from smc_mujoco.simulation import (
-        controller,
-        exogenous,
-        joint_controller,
-        parts,
-        philox,
-        signals,
-        time_series,
-    )
+
+    of_callbacks = "controller", "exogenous", "joint_controller", "parts", "philox", "signals"
+    modules = []
+    for name in (*of_callbacks, "time_series"):
+        modules.append(importlib.import_module(f"smc_mujoco.simulation.{name}"))
 
     def models(*modules):
         found = []
@@ -315,15 +312,7 @@ def test_own_functions_divide_as_numpy_does_and_those_of_laws_as_python_does():
                     found.append(one.targetoptions.get("error_model", "python"))
         return found
 
-    callbacks = models(
-        controller,
-        exogenous,
-        joint_controller,
-        parts,
-        philox,
-        signals,
-        time_series,
-    )
+    callbacks = models(*modules)
     assert len(callbacks) > 20
     assert set(callbacks) == {"numpy"}
     assert set(models(law)) == {"python"}
