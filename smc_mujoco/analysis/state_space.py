@@ -36,8 +36,8 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     The states are the positions of its joints, then their velocities, the channels first in their
     order; u are the commands of the driven channels, and y the positions of all channels. Those of
     a free body are errors of its pose, and its u are the forces of its actuators. SI units. Drives
-    are ideal; contacts, limits and dry friction are left out. A and B are central differences of
-    the accelerations that MuJoCo computes.
+    are ideal, without delay; contacts, limits and dry friction are left out. A and B are central
+    differences of the accelerations that MuJoCo computes.
 
     Args:
       plant: a Plant or its name.

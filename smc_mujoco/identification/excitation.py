@@ -203,7 +203,7 @@ def excitation(
     rig = own_rig(base, names)
     check_named(rig)
     plant = rig.plant
-    drives = _drives(rig, u_max)
+    drives = rig.drives(u_max)
     forces = largest_forces(drives)
     rig = rig.with_values(typical(rig, forces) | dict(guess or {}), "typical")
     shapes = candidate_shapes(plant.driven, duration, rate)
@@ -221,13 +221,6 @@ def excitation(
     ends = column_ends(plant)[: plant.driven]
     ranked = sorted(found, key=lambda motion: motion.mean_share)
     return Excitation(motions=tuple(ranked), columns=tuple(f"r{end}" for end in ends))
-
-
-def _drives(rig: OwnRig, u_max: float | None) -> Scenario:
-    """Return a scenario with the drives of the machine's joints, and their bounds."""
-    return Scenario.recorded(
-        plant=rig.plant, law="none", actuator=rig.base.actuator or None, u_max=u_max
-    )
 
 
 def largest_forces(drives: Scenario) -> Array:

@@ -168,15 +168,19 @@ def fit_starts(replays: Replays, most: int) -> Slopes:
     A joint that dry friction holds at a start has no slope there. So each piece is fitted from
     several velocities, and keeps the best.
     """
+    if not len(replays.free):
+        return refine(replays, replays.start, most)
     n = len(replays.twin.columns.x)
     reached = []
-    for velocity in KICKS if len(replays.free) else (0.0,):
+    for velocity in KICKS:
         states = replays.start.states.copy()
         states[:, -n:] += velocity
         reached.append(refine(replays, Point(replays.start.values, states), most).point)
     best = replays.costs(reached).argmin(axis=0)
-    states = np.array([reached[i].states[k] for k, i in enumerate(best)])
-    return refine(replays, Point(replays.start.values, states), most)
+    states = []
+    for k, i in enumerate(best):
+        states.append(reached[i].states[k])
+    return refine(replays, Point(replays.start.values, np.array(states)), most)
 
 
 def _best_step(replays: Replays, slopes: Slopes) -> tuple[Point, float]:
@@ -185,7 +189,8 @@ def _best_step(replays: Replays, slopes: Slopes) -> tuple[Point, float]:
     Each piece chooses the best move of its own states.
     """
     groups = []
-    for damping in DAMPINGS if len(slopes.point.values) else DAMPINGS[:1]:
+    dampings = DAMPINGS if len(slopes.point.values) else DAMPINGS[:1]
+    for damping in dampings:
         groups.append(_variants(replays, slopes, _moved(replays, slopes, damping)))
     costs = replays.costs(list(itertools.chain(*groups)))
     reached = []

@@ -313,7 +313,7 @@ def identify(
       condition: what your own machine has beside its model: a condition or its text, such as
         "mine: friction=LuGre(0.3, 0.4, 0.1)", whose numbers `names` may find; as in a Scenario.
       corrected: whether to correct open loops for the errors of the simulation's steps, in several
-        times the time. Without it a standard error has what half steps would change.
+        times the time. Without it replays are extrapolated to steps of 0.
       starts: number of sets from which the search may start, if the first fits badly: the present
         one, and the best of random ones, which differ from it by up to a factor of 100.
       seed: of these starts. The same seed gives the same result.

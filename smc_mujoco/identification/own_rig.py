@@ -72,6 +72,11 @@ class OwnRig(Rig):
     plant: Plant
     places: Mapping[str, PartNumber]
 
+    def drives(self, u_max: float | None = None) -> Scenario:
+        """Return a scenario with the drives of the machine's joints, and their bounds."""
+        actuator = self.base.actuator or None
+        return Scenario.recorded(plant=self.plant, law="none", actuator=actuator, u_max=u_max)
+
     def values_of_plant(self, values: Numbers | None = None) -> dict[str, float]:
         """Return the parameters of the plant with some values, by default the rig's own."""
         found = self.values if values is None else values

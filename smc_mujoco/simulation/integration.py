@@ -11,7 +11,6 @@ Here `s` is a Scenario, which imports this module.
 
 import dataclasses
 import math
-import operator
 from typing import Any
 
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction
@@ -145,13 +144,16 @@ def default_steps(s: Any) -> int:
             if _divides_delays(s, steps):
                 return steps
     # an actuator's delay is rounded up to whole steps
-    rounded = any(map(operator.attrgetter("lateness"), s.actuator))
+    rounded = any(part.lateness for part in s.actuator)
     return 4 * minimum if rounded else minimum
 
 
 def _divides_delays(s: Any, steps: int) -> bool:
     """Return whether all delays are whole numbers of this many steps a control period."""
-    for delay in (s.input_delay, *map(operator.attrgetter("lateness"), s.actuator)):
+    delays = [s.input_delay]
+    for part in s.actuator:
+        delays.append(part.lateness)
+    for delay in delays:
         periods = delay / s.control_period
         if abs(math.remainder(periods * steps, 1.0)) >= 1e-6:
             return False

@@ -357,15 +357,15 @@ def compile_model(scenario: Scenario, nuserdata: int = 0, scenery: bool = True) 
     """Return the base model of a scenario's structure: compiled, without the scenario's values.
 
     It is not for pictures. Its procedural textures have a few pixels, because MuJoCo paints them at
-    each compilation, in three quarters of its time. Without `scenery` it has no geoms that touch
-    nothing, and a user's robot without the meshes of these takes 0.02 MB in place of 30. Users'
-    models keep all their bodies: a fixed one may be a floor. They keep all their geoms if these
-    define all inertias.
+    each compilation, in three quarters of its time. Without `scenery` a user's robot has no geoms
+    that touch nothing, and without their meshes it takes 0.02 MB in place of 30. It keeps all its
+    bodies, as a fixed one may be a floor, and all its geoms if these define all inertias.
     """
     edited = spec(scenario)
-    if not scenery and edited.compiler.inertiafromgeom != OF_GEOMS:
-        edited.compiler.discardvisual = True
-    if not (scenery or scenario.plant.direct):
+    plant = scenario.plant
+    if not scenery and plant.is_user_model:
+        edited.compiler.discardvisual = edited.compiler.inertiafromgeom != OF_GEOMS
+    elif not (scenery or plant.direct):
         without_scenery(edited, pushed(scenario))
     for texture in edited.textures:
         texture.width, texture.height = 1, 6  # a skybox has six sides

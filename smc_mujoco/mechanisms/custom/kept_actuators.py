@@ -135,9 +135,9 @@ def kept(model: mujoco.MjModel, i: int, goal: float, step: float) -> Actuator:
     if model.actuator_gaintype[i] == OF_PID:
         largest, rate = np.abs(model.actuator_dynprm[i, :2] / gear).tolist()
         ki = gear * gear * float(model.actuator_gainprm[i, 0])
-        return dataclasses.replace(servo, ki=ki, imax=largest, slewmax=rate)
-    if filters(model, i):
-        timeconst = float(model.actuator_dynprm[i, 0])
+        return dataclasses.replace(servo, ki=ki, imax=largest if ki else 0.0, slewmax=rate)
+    timeconst = float(model.actuator_dynprm[i, 0])
+    if filters(model, i) and timeconst:
         return dataclasses.replace(servo, timeconst=timeconst, euler=_by_euler(model, i))
     return servo
 

@@ -67,9 +67,9 @@ class PositionServo(Actuator):
       slewmax: bound on the rate of the set-point, rad/s (m/s); 0: none.
 
     Raises:
-      ScenarioError: `forcerange` does not contain 0 between its ends, or a timeconst beside ki or
-        slewmax. In a scenario: another drive
-        of the joint, a Fault other than stuck=True, or a nominal model.
+      ScenarioError: `forcerange` does not contain 0 between its ends, a timeconst beside ki or
+        slewmax, or imax without ki or euler without timeconst. In a scenario: another drive of the
+        joint, a Fault other than stuck=True, or a nominal model.
     """
 
     unit = "{x}"
@@ -100,6 +100,11 @@ class PositionServo(Actuator):
                 f"PositionServo has timeconst {self.timeconst:g}, and a servo with ki or slewmax "
                 "has no filter: give one of them"
             )
+        for name, of in (("imax", "ki"), ("euler", "timeconst")):
+            if getattr(self, name) and not getattr(self, of):
+                raise ScenarioError(
+                    f"PositionServo has {name}, which does nothing without {of}: give {of}, too"
+                )
 
     @property
     def by_pid(self) -> bool:

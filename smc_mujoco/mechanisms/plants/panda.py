@@ -113,9 +113,7 @@ def fields(model, p):
     yield Field("body_mass", ball, p.payload)
     yield Field("body_inertia", ball, (inertia, inertia, inertia))
     yield Field("body_pos", ball, (0.0, 0.0, FLANGE_DISTANCE + p.lp))
-    drawn = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, "ball")
-    if drawn >= 0:  # runs leave out what is only drawn
-        yield Field("geom_size", (drawn, 0), max(radius, 0.001))
+    yield Field("geom_size", (model.geom("ball").id, 0), max(radius, 0.001))
     yield Field("opt.gravity", 2, -p.grav)
 
 

@@ -264,3 +264,12 @@ def test_a_filter_that_is_limited_is_refused():
     motor = '<general joint="j" dyntype="filter" dynprm=".05" actlimited="true" actrange="-1 1"/>'
     with pytest.raises(ScenarioError, match=r"dyntype filter\) with actlimited or actearly"):
         link(motor)
+
+
+@pytest.mark.parametrize(
+    ("given", "needed"), [({"imax": 1.0}, {"ki": 1.0}), ({"euler": True}, {"timeconst": 0.1})]
+)
+def test_a_number_of_a_servo_that_does_nothing_alone_is_refused(given, needed):
+    with pytest.raises(ScenarioError, match=f"does nothing without {min(needed)}"):
+        PositionServo(10.0, **given)
+    PositionServo(10.0, **given, **needed)
