@@ -398,7 +398,9 @@ def margins(
       threads: as in `run`.
       report: called with the work done and the whole work, in simulated steps; the whole is an
         estimate until the end.
-      condition: condition of the runs, such as "coulomb".
+      condition: condition of the runs, such as "coulomb". A level of delay, mass, noise, jitter,
+        missed samples or lost gain includes the condition's own; disturbances, friction and blows
+        are on top of its own.
       starts: initial states, see `smc.starts`. Default: the plant's own x0.
       device: on which the fast engine searches, "cpu" or "cuda"; a quick search on the processor is
         MuJoCo's.

@@ -332,6 +332,8 @@ class RaceAdvice(Advice):
         where = "without these conditions" if self.beside == "nominal" else f"under {self.beside}"
         text = f"{joined(parts)}, one at a time and {where}: in {self.worst_run.duration:g} s "
         text += "the error still ends below 5 % of its initial value"
+        if self.beside != "nominal":
+            text += ". Delay and mass include those of the condition, friction and blows are on top"
         if self.helped:
             text += (
                 ". What the joint carries pushes it to its goal in these runs; from the other side "

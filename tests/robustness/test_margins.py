@@ -250,6 +250,30 @@ def test_the_mass_ratio_is_of_the_nominal_mass_under_whichever_name():
     assert margin.kind == "mass"
 
 
+def test_levels_take_the_place_of_a_conditions_own_or_come_on_top():
+    own = {
+        "input_delay": 0.01,
+        "mismatch": {"mass": 1.5},
+        "noise": smc.Noise(0.1),
+        "clock": dataclasses.replace(BASE.clock, jitter=2.5e-4, missed=0.2),
+        "fault": smc.Fault(at=1.0, gain=0.9),
+    }
+    added = {"disturbance": smc.Constant(1.0), "friction": smc.Coulomb(1.0)}
+    under = dataclasses.replace(BASE, physics_step=1.25e-4, **own, **added)
+    put = {}
+    for name, kind in margins.MARGIN_KINDS.items():
+        put[name] = kind.put(under, 0.5)
+    assert put["delay"].input_delay == 0.5
+    assert put["mass"].mismatch == {"mass": 0.5}
+    assert put["noise"].noise.position == 0.5
+    assert put["jitter"].clock.jitter == 0.5 * BASE.control_period
+    assert put["missed"].clock.missed == 0.5
+    assert put["loss"].fault.gain == 0.5
+    assert put["disturbance"].disturbance == (smc.Constant(1.0), smc.Constant(0.5))
+    assert put["blow"].disturbance[0] == smc.Constant(1.0)
+    assert put["friction"].friction == (smc.Coulomb(1.5),)
+
+
 def test_levels_of_time_are_multiples_of_the_shortest_that_a_run_can_have():
     """Of a delay one control period, of jitter an eighth of one; others may have any level."""
     for kind, least in {"delay": BASE.control_period, "jitter": 0.125}.items():

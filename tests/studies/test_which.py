@@ -183,6 +183,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     text = str(advice)
     assert "mass under coulomb: 4 seeds" in text
     assert ", one at a time and under coulomb: in 1.5 s the error" in lines["Tolerates"]
+    assert "mass include those of the condition, friction and blows are on" in lines["Tolerates"]
     (left,) = advice.race.entrants.keys() - {*compared}
     assert f"{left} left out" not in text  # of a law that was dropped a line below says so
     kept = dataclasses.replace(advice, race=advice.race._replace(dropped={}))
