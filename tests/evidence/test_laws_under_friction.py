@@ -293,6 +293,7 @@ def test_an_own_loop_has_the_order_that_the_page_says():
     assert friction_by_own_loop.in_words(POINTS, OWN) in " ".join(PAGE.split())
 
 
+@pytest.mark.slow
 def test_the_own_loop_gives_its_medians_again():
     """A law through reversals and one at rest, with other starts, phases and noise."""
     its = ("pid", "sine"), ("hodob", "rest")

@@ -32,6 +32,7 @@ def pairs(model, seed=0, noise=0.1):
     return 0.3 * SHAPES[model] + 0.25 * SPEED + 0.1 + noise * random.standard_normal(len(T))
 
 
+@pytest.mark.slow
 def test_level_and_offset_are_within_two_standard_errors_in_90_of_100():
     model = "level, viscous, offset"
     within = dict.fromkeys(("level", "offset", "viscous"), 0)
@@ -43,6 +44,7 @@ def test_level_and_offset_are_within_two_standard_errors_in_90_of_100():
     assert max(within.values()) < 100  # errors that are too large would tell nothing
 
 
+@pytest.mark.slow
 def test_neighbours_that_depend_on_each_other_count_once():
     """Noise that keeps its value for 50 pairs."""
     model = "level, viscous, offset"
