@@ -19,6 +19,7 @@ from smc_mujoco.identification.records import Record
 from smc_mujoco.identification.rig import Values
 from smc_mujoco.mechanisms.hardware.part import Actuator
 from smc_mujoco.mechanisms.layout import channel_names, dof_ids
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.scenario import Scenario
 
 ROW_HEIGHT = 2.5  # inches, height of a joint's panels
@@ -55,13 +56,13 @@ def friction_figure(
         page = pages.blank(style.FULL_WIDTH, height)
         axes = page.subplots(len(joints), 3, squeeze=False, width_ratios=(3, 2, 2))
         forces = measured_friction(rig, log)
-        for i, name in enumerate(rig.columns.x):
+        for i, (name, joint) in enumerate(zip(rig.columns.x, joints, strict=True)):
             unit = rig.plant.units[i]
             left, middle, right = axes[i]
             left.plot(t, measured[name], color=style.INK, lw=LOG_WIDTH)
             left.plot(t, predicted[name], color=colour, lw=1.2, ls=DASHES)
             left.set_title(f"log in an open loop, fit {fit[name]:.1f} %")
-            left.set_ylabel(f"{name} ({unit})")
+            left.set_ylabel(style.folded(f"{joint} ({unit})"))
             speed = records.rate(measured[name], records.step_of(t))
             middle.axhline(0.0, color=style.RULE, lw=0.8)
             residual = measured[name] - predicted[name]
@@ -98,14 +99,21 @@ def friction(rig: OwnRig, values: Numbers, i: int, v: Array) -> Array:
     """Return the friction of channel i at steady speeds v, (K,), by the model and the parts."""
     fields = rig.numbers_of(Values(**values))
     plant = fields["plant"]
-    model = plant.load()
-    dof = dof_ids(model)[i]
-    found = model.dof_damping[dof] * v + model.dof_frictionloss[dof] * np.sign(v)
+    found = friction_of_model(plant, i, v)
     joint = channel_names(plant)[i]
     for part in fields.get("friction", ()):
         if joint in (names := part.joint_names(plant)):
             found = found + steady_force(part, v, names.index(joint))
     return found
+
+
+def friction_of_model(plant: Plant, i: int, v: Array) -> Array:
+    """Return the friction of channel i at speeds v, (K,), by the damping and the frictionloss of
+    its joint in the model.
+    """
+    model = plant.load()
+    dof = dof_ids(model)[i]
+    return model.dof_damping[dof] * v + model.dof_frictionloss[dof] * np.sign(v)
 
 
 def curve_error(rig: OwnRig, covariance: Array, i: int, v: Array) -> Array:
@@ -143,6 +151,8 @@ def measured_friction(rig: OwnRig, record: Record) -> tuple[Array, Array]:
     x, v, needed, commands = first_guess.motion_forces(frictionless, record, late)
     u = rig.of_motors("gain", 1.0) * commands + rig.of_motors("offset", 0.0)
     points = -needed
+    for i in range(v.shape[1]):  # the file's own, of a joint whose friction is not a quantity
+        points[:, i] += friction_of_model(frictionless.plant, i, v[:, i])
     for i, motor in enumerate(_motors(rig)):
         points[:, i] += motor.force_of(u[:, i], x[:, i] - rig.zeros[i], v[:, i])
     return v, points

@@ -57,7 +57,7 @@ def pairs_figure(
         height = pages.head_height(style.FULL_WIDTH, handles) + HEIGHT
         page = pages.blank(style.FULL_WIDTH, height)
         ax = page.subplots()
-        ax.plot(v, torque, ".", ms=1.5, color=style.INK, alpha=0.3)
+        ax.plot(v, torque, ".", ms=2.5, color=style.INK, alpha=0.35)
         for speeds in (side[::-1] * v.min(), side * v.max()):
             for model, look in looks.items():
                 ax.plot(speeds, forces[model](speeds), **look)
@@ -65,8 +65,8 @@ def pairs_figure(
             wide = 2.0 * error(speeds)
             ax.plot(speeds, curve, color=colour, lw=1.8)
             ax.fill_between(speeds, curve - wide, curve + wide, color=colour, alpha=0.25, lw=0.0)
-        ax.set_xlabel("speed (rad/s or m/s)")
-        ax.set_ylabel("torque (N·m or N)")
+        ax.set_xlabel("speed (rad/s)")
+        ax.set_ylabel("torque (N·m)")
         ax.set_title(title)
         pages.set_head(page, style.FULL_WIDTH, "Friction from speed and torque", handles)
         pages.write(page, paths)

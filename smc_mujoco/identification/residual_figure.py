@@ -1,24 +1,35 @@
-"""The figure of a record beside what twins predict, with its residuals."""
+"""The figure of a record beside what twins predict, with its residuals.
 
-from collections.abc import Mapping
+The record is a broad pale line, so that twins are seen over it, in grey, too. The first twin is
+drawn last: of several it is the one that matters.
+"""
+
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from smc_mujoco.common.aliases import Array, Fields, Numbers
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.identification.records import Record
+from smc_mujoco.identification.rig import Fall
 
 ROW_HEIGHT = 2.6  # inches, height of a column's panels
+RECORD_WIDTH = 3.5  # points, of a record; chosen
+TWIN_WIDTH = 1.3  # points, of a twin and its residual; chosen
+SHARES = (3, 2)  # of the width: signals, residuals
+TITLE_MARGIN = 0.8  # of a panel's share of the page, the part beside its numbers; chosen
 
 
 def residual_figure(
     title: str,
-    t: np.ndarray,
+    t: Array,
     measured: Record,
     predicted: Mapping[str, Record],
-    fits: Mapping[str, Mapping[str, float]],
+    fits: Mapping[str, Numbers],
     units: Mapping[str, str],
     path: str | Path,
 ) -> list[Path]:
@@ -30,31 +41,75 @@ def residual_figure(
     each column, percent. `units`: of the columns.
     """
     paths = pages.files(path)
-    colours = dict(zip(predicted, style.spread(len(predicted)), strict=True))
-    handles = [Line2D([], [], color=style.INK, label="measured")]
-    for twin, colour in colours.items():
-        handles.append(Line2D([], [], color=colour, label=twin))
+    looks = looks_of(list(predicted))
+    handles = [Line2D([], [], color=style.RULE, lw=RECORD_WIDTH, label="measured")]
+    for twin, look in looks.items():
+        handles.append(Line2D([], [], label=twin, **look))
     with style.page():
         height = pages.head_height(style.FULL_WIDTH, handles) + ROW_HEIGHT * len(measured)
         page = pages.blank(style.FULL_WIDTH, height)
-        axes = page.subplots(len(measured), 2, squeeze=False, sharex=True, width_ratios=(3, 2))
-        for k, (name, values) in enumerate(measured.items()):
-            left, right = axes[k]
-            left.plot(t, values, color=style.INK, lw=1.6)
-            right.axhline(0.0, color=style.RULE, lw=0.8)
-            reached = []
-            remains = []
-            for twin, colour in colours.items():
-                residual = values - predicted[twin][name]
-                left.plot(t, predicted[twin][name], color=colour, lw=0.9)
-                right.plot(t, residual, color=colour, lw=0.7)
-                reached.append(f"{list(fits[twin].values())[k]:.1f}")
-                remains.append(f"{np.sqrt(np.mean(residual**2)):.3g}")
-            left.set_title(f"fit, %: {', '.join(reached)}")
-            right.set_title(f"residual, rms: {', '.join(remains)}")
-            left.set_ylabel(f"{name} ({units[name]})")
+        axes = page.subplots(len(measured), 2, squeeze=False, sharex=True, width_ratios=SHARES)
+        shown = next(iter(fits.values()))  # what tables call the columns
+        rows = zip(axes, measured.items(), shown, strict=True)
+        for (left, right), (name, values), column in rows:
+            unit = units[name].replace(" ", "·")
+            left.set_ylabel(style.folded(f"{column} ({unit})"))
+            left.plot(t, values, color=style.RULE, lw=RECORD_WIDTH)
+            residuals = {}
+            reached = {}
+            for twin, look in looks.items():
+                residuals[twin] = values - predicted[twin][name]
+                reached[twin] = percent(fits[twin][column])
+                left.plot(t, predicted[twin][name], **look)
+            _entitle(left, "fit", reached, SHARES[0])
+            _draw_residuals(right, t, residuals, looks, unit)
         for ax in axes[-1]:
             ax.set_xlabel("time (s)")
         pages.set_head(page, style.FULL_WIDTH, title, handles)
         pages.write(page, paths)
     return paths
+
+
+def _draw_residuals(
+    ax: Axes, t: Array, residuals: Mapping[str, Array], looks: Mapping[str, Fields], unit: str
+) -> None:
+    """Draw the residuals of a column, twin -> (K,), with the prefix of their unit that suits."""
+    largest = max(float(np.abs(one).max()) for one in residuals.values())
+    factor, short = style.prefixed(largest, unit)
+    ax.axhline(0.0, color=style.RULE, lw=0.8)
+    for twin, residual in residuals.items():
+        ax.plot(t, factor * residual, **looks[twin])
+    remains = {}
+    for twin in looks:
+        rms = factor * np.sqrt(np.mean(residuals[twin] ** 2))
+        remains[twin] = f"{rms:.3g}"
+    ax.set_ylabel(f"residual ({short})")
+    _entitle(ax, "rms", remains, SHARES[1])
+
+
+def looks_of(twins: Sequence[str]) -> dict[str, Fields]:
+    """Return the look of each twin's lines. The first lies over the others, which are thinner."""
+    looks = {}
+    for k, colour in enumerate(style.spread(len(twins))):
+        width = TWIN_WIDTH if k == 0 else 0.7 * TWIN_WIDTH
+        looks[twins[k]] = {"color": colour, "lw": width, "zorder": 3.0 - 0.1 * k}
+    return looks
+
+
+def percent(fit: float) -> str:
+    """Return a fit in words, such as "−16.6 %", or when the twin falls."""
+    if isinstance(fit, Fall):
+        return str(fit)
+    return f"{fit:.1f} %".replace("-", "−")
+
+
+def _entitle(ax: Axes, what: str, numbers: Mapping[str, str], share: float) -> None:
+    """Name a number of each twin above a panel that has a share of the page's width; on two lines
+    if one is too short.
+    """
+    words = ", ".join(f"{twin} {number}" for twin, number in numbers.items())
+    if len(numbers) == 1:
+        words = next(iter(numbers.values()))
+    room = TITLE_MARGIN * 72 * style.FULL_WIDTH * share / sum(SHARES)
+    title = style.wrapped(f"{what}: {words}", room, style.RC["axes.titlesize"], 2, bold=True)
+    ax.set_title(title, parse_math=False)

@@ -420,8 +420,23 @@ def test_residuals_are_what_was_measured_less_what_was_predicted(tmp_path, monke
     _, residuals, left, _ = drawn[0].axes
     assert residuals.lines[1].get_ydata().tolist() == [1.0, 1.0, 4.0]
     assert residuals.lines[2].get_ydata().tolist() == [1.0, 2.0, 6.0]
-    assert left.get_title(loc="left") == "fit, %: 3.2, falls at 8.4 s"
+    assert left.get_title(loc="left") == "fit: twin 3.2 %, driver falls at 8.4 s"
     assert left.get_ylabel() == "u (V)"
+    assert residuals.get_ylabel() == "residual (m)"
+    assert residuals.get_title(loc="left") == "rms: twin 2.45, driver 3.7"
+
+
+def test_small_residuals_have_the_prefix_of_their_unit(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
+    t = np.arange(3.0)
+    measured = {"x": t + 2e-3}
+    twins = {"twin": {"x": t}}
+    residual_figure("A", t, measured, twins, {"twin": {"x": -16.62}}, {"x": "rad"}, tmp_path / "a")
+    left, right = drawn[0].axes
+    assert left.get_title(loc="left") == "fit: −16.6 %"
+    assert right.get_ylabel() == "residual (mrad)"
+    np.testing.assert_allclose(right.lines[1].get_ydata(), 2.0)
 
 
 def test_files_of_columns_and_traces_are_read_alike(moved, tmp_path):
