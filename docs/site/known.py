@@ -42,7 +42,7 @@ OTHERS = {  # title -> names of modules that are no public names
     draw.film.film.Frames
     identification.rig.Rig
     envs.flight_env.FlightEnv
-    studies.which.Advice
+    studies.which.Recommendation
     analysis.tuning.result.Tuned
     identification.identify.Identified
     evidence.accuracy.orders.AccuracyTable

@@ -5,6 +5,8 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
+LEAST = 1e-9  # smaller numbers are not printed digit by digit
+
 
 def number(value: float, digits: int = 3) -> str:
     """Return a number to `digits` significant digits; "never" for inf, "none" for NaN, "<1e-9" if
@@ -14,7 +16,7 @@ def number(value: float, digits: int = 3) -> str:
         return "none"
     if math.isinf(value):
         return "never"
-    if 0.0 < abs(value) < 1e-9:
+    if 0.0 < abs(value) < LEAST:
         return "<1e-9"
     if value == 0.0:
         return "0"

@@ -1,8 +1,8 @@
 """What to record, so that numbers of a machine can be told apart: candidate motions, best first.
 
-    advice = smc.design.excitation(arm, ["shoulder.damping", "shoulder.frictionloss"], u_max=5.0)
-    print(advice)
-    advice.save("motion.csv")
+    motions = smc.design.excitation(arm, ["shoulder.damping", "shoulder.frictionloss"], u_max=5.0)
+    print(motions)
+    motions.save("motion.csv")
 
 Each motion is as large as range, speed and force allow, and is run on the model with typical
 numbers: a force by a PD law that knows them, a position servo by its set-point. The log of the run

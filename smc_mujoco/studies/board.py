@@ -20,7 +20,7 @@ from smc_mujoco.analysis.step_halving import APART, RANGE, UNTRIED
 from smc_mujoco.common.aliases import Names, Numbers, Pair
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
-from smc_mujoco.common.text import capital, counted, every, joined, number
+from smc_mujoco.common.text import LEAST, capital, counted, every, joined, number
 from smc_mujoco.control.source import Source, in_words, kinds
 from smc_mujoco.draw import style
 from smc_mujoco.metrics.catalogue import CATALOGUE
@@ -520,10 +520,12 @@ def size(value: float, metric: str) -> str:
 
 
 def spread(interval: Interval, metric: str) -> str:
-    """Return the ends of an interval, rounded like its median; "" if they are not known, or both
-    infinite.
+    """Return the ends of an interval, rounded like its median; "" if they are not known, both
+    infinite, or both below 1e-9, which the median says.
     """
     if math.isnan(interval.low) or math.isinf(interval.low):
+        return ""
+    if interval.low > 0.0 and interval.high < LEAST:
         return ""
     return f"{size(interval.low, metric)}–{size(interval.high, metric)}"
 

@@ -6,7 +6,7 @@ settles most often is not compared, because a law that does nothing would be the
 stand by the number of their runs that fail, then by their mean rank over all needs and conditions,
 see `Boards.order`. This order is not tested; the last line of the answer says how sure it is.
 
-Within minutes the laws race instead, see `race` and `advise`.
+Within minutes the laws race instead, see `race` and `recommend`.
 """
 
 import time
@@ -32,12 +32,12 @@ from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import Starts, listed, listed_laws
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.workers import Workers
-from smc_mujoco.studies.advice import Advice
-from smc_mujoco.studies.advise import advise
 from smc_mujoco.studies.answer_time import AnswerTime
 from smc_mujoco.studies.compare import DrawSeed
 from smc_mujoco.studies.fair_gains import Laws, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import leaderboard
+from smc_mujoco.studies.recommend import recommend
+from smc_mujoco.studies.recommendation import Recommendation
 from smc_mujoco.studies.table import Table
 
 NEEDS: Mapping[str, str] = {metric.need: metric.name for metric in metrics() if metric.need}
@@ -68,13 +68,13 @@ def which(
     executor: Workers | None = None,
     falling: Boolean = False,
     minutes: Positive | None = None,
-) -> Advice:
+) -> Recommendation:
     """Recommend a law for a plant: compare all laws that suit, with gains for the plant, and say
     how certain the answer is.
 
-        advice = smc.which("duffing", "friction", laws=["pid", "adrc"], minutes=1)
-        print(advice)
-        print(advice.law)
+        recommended = smc.which("duffing", "friction", laws=["pid", "adrc"], minutes=1)
+        print(recommended)
+        print(recommended.law)
 
     Args:
       plant: a name, a Plant, or your own MJCF and its joints, as "arm.xml:shoulder,elbow".
@@ -97,14 +97,14 @@ def which(
         are shorter where there is little. Laws for whose first set there is no time are in
         `race.unsearched`. The clock may change which laws, sets, runs and margins there are, and
         with them the answer; with the same ones it is the same to the last bit. After a stop, the
-        same call goes on with the sets that the folder has. The `RaceAdvice` that comes back has
-        the `margins` of the first law and its `worst_run`, too. Default: a whole comparison, which
-        no clock stops.
+        same call goes on with the sets that the folder has. The `RaceRecommendation` that comes
+        back has the `margins` of the first law and its `worst_run`, too. Default: a whole
+        comparison, which no clock stops.
       starts, relevant, threads, progress, seed, device, executor: as in `compare`.
 
     Returns:
-      An `Advice`, which prints as tables and lines: `law` has the gains to use, `second` is the
-      next law, `table` has a row a run.
+      A `Recommendation`, which prints as tables and lines: `law` has the gains to use, `second` is
+      the next law, `table` has a row a run.
 
     Raises:
       ScenarioError: an unknown name, no law that suits, a need without a number on this plant, or
@@ -139,7 +139,7 @@ def which(
     compared = _with_values(trial.case(machine, "none", trial.conditions[0]), asked)
     if minutes:
         clock = AnswerTime(began + 60.0 * minutes)
-        return advise(trial, machine, chosen, compared, seeds or RACE_SEEDS, clock, relevant)
+        return recommend(trial, machine, chosen, compared, seeds or RACE_SEEDS, clock, relevant)
     count = seeds or SEEDS
     candidates = trial.candidates({machine.name: chosen}, count)
     table = trial.run(candidates, count)
@@ -149,7 +149,7 @@ def which(
         raise ScenarioError(f"no need has a number in any run on {machine.name}: ask for others")
     found = {law.name: law for law, *_ in candidates[machine.name]}
     ordered = tuple(found[name] for name in boards.order)
-    return Advice(table=table, leaderboard=boards, laws=ordered, settles=settles)
+    return Recommendation(table=table, leaderboard=boards, laws=ordered, settles=settles)
 
 
 def _metrics_and_properties(needs: str | Sequence[str]) -> tuple[list[str], list[str]]:

@@ -644,16 +644,16 @@ def test_x0_is_one_number_or_one_for_each_channel():
 def test_a_film_of_an_answer_has_as_many_pictures_as_its_time_allows(tmp_path):
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
     scenario = smc.Scenario(plant="duffing", law=smc.law("pid"), duration=0.5)
-    advice = types.SimpleNamespace(worst_trace=smc.run(scenario))
+    recommendation = types.SimpleNamespace(worst_trace=smc.run(scenario))
     said = []
     note = lambda text, **how: said.append(text)  # noqa: E731
     terminal = types.SimpleNamespace(note=note, wrote=said.append)
-    studies._film(advice, tmp_path, time.monotonic() - 1.0, terminal)
+    studies._film(recommendation, tmp_path, time.monotonic() - 1.0, terminal)
     assert said[0] == tmp_path / "worst_run_machine.png"
     assert re.match(r"This picture stands in place of a film, which would take \d+ s; ", said[1])
     with Image.open(said[0]) as picture:
         assert picture.size == (1280, 720)
-    studies._film(advice, tmp_path, time.monotonic() + 600.0, terminal)
+    studies._film(recommendation, tmp_path, time.monotonic() + 600.0, terminal)
     assert said[2:] == [tmp_path / "worst_run.mp4", "The film has 15 pictures a second."]
     made = next(ffmpeg.read_frames(str(said[2])))
     assert made["fps"] == studies.MAX_FPS

@@ -14,9 +14,9 @@ from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, objectiv
 from smc_mujoco.analysis.tuning.result import SearchResult
 from smc_mujoco.common.progress import Bar
 from smc_mujoco.studies import race as module
-from smc_mujoco.studies.advise import in_order
 from smc_mujoco.studies.answer_time import FEWEST_SEEDS, AnswerTime
 from smc_mujoco.studies.fair_gains import Candidate
+from smc_mujoco.studies.recommend import in_order
 
 GOAL = Objective(conditions=("nominal",), duration=1.0)
 SPREAD, STUCK_SHARE, STUCK_BY = 0.25, 0.2, 0.7  # of log J between searches, as a pilot saw them

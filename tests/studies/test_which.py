@@ -19,8 +19,8 @@ from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.properties import searched
-from smc_mujoco.studies import advice as advice_module
-from smc_mujoco.studies import advise, race
+from smc_mujoco.studies import race, recommend
+from smc_mujoco.studies import recommendation as recommendation_module
 from smc_mujoco.studies import which as module
 from smc_mujoco.studies.answer_time import FEWEST_SEEDS
 from smc_mujoco.studies.board import Boards
@@ -41,7 +41,7 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def advice(folder):
+def recommendation(folder):
     """A law that chatters, a fast one, a slow one, and none, which is the calmest."""
     laws = ["classical", FAST, SLOW, IDLE]
     return smc.which(
@@ -53,22 +53,22 @@ def advice(folder):
     )
 
 
-def test_laws_stand_by_their_mean_rank_and_doing_nothing_is_not_compared(advice):
+def test_laws_stand_by_their_mean_rank_and_doing_nothing_is_not_compared(recommendation):
     ranks = dict.fromkeys(("observer_free", "slow", "classical"), 0.0)
-    for board in advice.leaderboard:
+    for board in recommendation.leaderboard:
         for entry in board.entries:
             ranks[entry.law] += entry.rank.mean
-    assert [law.name for law in advice.laws] == sorted(ranks, key=ranks.__getitem__)
-    assert advice.law == FAST
-    assert advice.second == SLOW
-    calm = advice.table.select(law="idle").column("tv_rate")
+    assert [law.name for law in recommendation.laws] == sorted(ranks, key=ranks.__getitem__)
+    assert recommendation.law == FAST
+    assert recommendation.second == SLOW
+    calm = recommendation.table.select(law="idle").column("tv_rate")
     assert calm.max() == 0.0  # no law is calmer
-    assert advice.settles["idle"] < 0.5 * advice.settles["observer_free"] == 0.5
-    assert "as many runs as another law: idle" in " ".join(advice.tables[-1].notes)
+    assert recommendation.settles["idle"] < 0.5 * recommendation.settles["observer_free"] == 0.5
+    assert "as many runs as another law: idle" in " ".join(recommendation.tables[-1].notes)
 
 
-def test_a_law_whose_runs_fail_comes_after_one_whose_runs_do_not(advice):
-    fast, calm = advice.leaderboard
+def test_a_law_whose_runs_fail_comes_after_one_whose_runs_do_not(recommendation):
+    fast, calm = recommendation.leaderboard
     first, *others = fast.entries
     assert Boards([fast, calm]).order[0] == first.law
     failing = dataclasses.replace(first, failed=first.failed + 99)
@@ -76,18 +76,18 @@ def test_a_law_whose_runs_fail_comes_after_one_whose_runs_do_not(advice):
     assert Boards([changed, calm]).order[-1] == first.law
 
 
-def test_the_answer_has_four_lines_and_counts_comparisons(advice):
-    wins = sum(len(board.wins("observer_free")) for board in advice.leaderboard)
-    assert advice.answer == [
+def test_the_answer_has_four_lines_and_counts_comparisons(recommendation):
+    wins = sum(len(board.wins("observer_free")) for board in recommendation.leaderboard)
+    assert recommendation.answer == [
         "Use: observer_free",
         "Gains: lam=6, k1=2, yours",
         f"Second: {SLOW}",
         f"Evidence: it wins {wins} of 4 comparisons, and another law wins 0",
     ]
-    assert advice.tables[-1].notes[-4:] == advice.answer
+    assert recommendation.tables[-1].notes[-4:] == recommendation.answer
 
 
-def test_what_cannot_be_decided_is_said(advice, folder):
+def test_what_cannot_be_decided_is_said(recommendation, folder):
     few = smc.which(
         "duffing",
         needs="fast",
@@ -111,9 +111,9 @@ def test_what_cannot_be_decided_is_said(advice, folder):
     )
     assert "no law is reliable here; this one settles in 0 %" in short.answer[3]
     assert short.answer[0].startswith("Use: no law settles reliably; the nearest is ")
-    barred = dataclasses.replace(advice.leaderboard[0].blocks[0], untuned=("slow",))
-    board = dataclasses.replace(advice.leaderboard[0], blocks=(barred,))
-    untuned = dataclasses.replace(advice, leaderboard=[board])
+    barred = dataclasses.replace(recommendation.leaderboard[0].blocks[0], untuned=("slow",))
+    board = dataclasses.replace(recommendation.leaderboard[0], blocks=(barred,))
+    untuned = dataclasses.replace(recommendation, leaderboard=[board])
     assert untuned.answer[3].startswith(
         "Evidence: first so far; --allow-defaults lets a law win over slow's"
     )
@@ -162,31 +162,36 @@ def raced(tmp_path_factory):
 
 
 def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(raced):
-    _, advice, _ = raced
-    lines = dict(line.split(": ", 1) for line in advice.answer)
+    _, recommendation, _ = raced
+    lines = dict(line.split(": ", 1) for line in recommendation.answer)
     verdicts = ["Use", "However tuned", "With these gains", "Its J", "Its scores", "Without a law"]
     assert [*lines][:9] == [*verdicts, "Added", "Settles", "Tolerates"]
     assert lines["Added"].startswith("noise, of 0.01 m in positions and 0.05 m/s in veloc")
     shares = [float(share) for share in re.findall(r"(\d+) % \w+", lines["Its J"])]
     assert sum(shares) == pytest.approx(100.0, abs=1.0)
     assert shares == sorted(shares, reverse=True)
-    assert advice.weighs.keys() == {"coulomb", "noise"}
-    assert lines["Use"] == advice.law.name
-    compared = [law.name for law in advice.laws]
-    assert len(compared) < len(advice.race.entrants)  # so the sentence says which
+    assert recommendation.weighs.keys() == {"coulomb", "noise"}
+    assert lines["Use"] == recommendation.law.name
+    compared = [law.name for law in recommendation.laws]
+    assert len(compared) < len(recommendation.race.entrants)  # so the sentence says which
     assert lines["With these gains"].startswith(f"of {compared[0]} and {compared[1]}, ")
-    assert smc.law(lines["Gains"].split(", tuned here")[0]).gains == advice.law.gains
-    assert [margin.kind for margin in advice.margins] == ["delay", "friction", "mass", "blow"]
-    assert advice.worst_run.law == advice.law
-    assert advice.worst_run.condition == "coulomb"
-    assert len(advice.table) == 4 * len(advice.laws)
-    text = str(advice)
+    assert smc.law(lines["Gains"].split(", tuned here")[0]).gains == recommendation.law.gains
+    assert [margin.kind for margin in recommendation.margins] == [
+        "delay",
+        "friction",
+        "mass",
+        "blow",
+    ]
+    assert recommendation.worst_run.law == recommendation.law
+    assert recommendation.worst_run.condition == "coulomb"
+    assert len(recommendation.table) == 4 * len(recommendation.laws)
+    text = str(recommendation)
     assert "mass under coulomb: 4 seeds" in text
     assert ", one at a time and under coulomb: in 1.5 s the error" in lines["Tolerates"]
     assert "mass include those of the condition, friction and blows are on" in lines["Tolerates"]
-    (left,) = advice.race.entrants.keys() - {*compared}
+    (left,) = recommendation.race.entrants.keys() - {*compared}
     assert f"{left} left out" not in text  # of a law that was dropped a line below says so
-    kept = dataclasses.replace(advice, race=advice.race._replace(dropped={}))
+    kept = dataclasses.replace(recommendation, race=recommendation.race._replace(dropped={}))
     words = " ".join(str(kept).split())
     assert f"No runs of {left}: these are of the laws that may be the best." in words
     assert "too few" not in text
@@ -195,8 +200,8 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
 
 
 def test_the_answer_says_how_the_plant_does_without_a_law_and_where_it_needs_none(raced):
-    _, advice, _ = raced
-    without = advice.no_law
+    _, recommendation, _ = raced
+    without = recommendation.no_law
     assert (without.runs, without.settled) == (4, {"coulomb": 0, "noise": 0})
     assert without.times > 2.0
     assert not without.holds
@@ -212,27 +217,29 @@ def test_the_answer_says_how_the_plant_does_without_a_law_and_where_it_needs_non
 def test_the_needs_are_those_of_the_tables_and_margins_at_the_end_of_their_search_are_the_least(
     raced,
 ):
-    _, advice, _ = raced
-    lines = dict(line.split(": ", 1) for line in advice.answer)
-    bound = np.median(advice.table.select(law=advice.law.name).column("ultimate_bound"))
+    _, recommendation, _ = raced
+    lines = dict(line.split(": ", 1) for line in recommendation.answer)
+    bound = np.median(
+        recommendation.table.select(law=recommendation.law.name).column("ultimate_bound")
+    )
     assert f"ultimate bound (m) {number(bound)}" in lines["Its scores"]
-    board = advice.leaderboard[1]
+    board = recommendation.leaderboard[1]
     entries = []
     for entry in board.entries:
         interval = entry.interval._replace(median=3.0 * entry.interval.median)
         entries.append(dataclasses.replace(entry, interval=interval))
     worse = dataclasses.replace(board, entries=tuple(entries))
-    both = dataclasses.replace(advice, leaderboard=[board, worse])
+    both = dataclasses.replace(recommendation, leaderboard=[board, worse])
     assert f"{number(bound)}–{number(3.0 * bound)}" in both._needs
     none = []
     for entry in board.entries:
         none.append(dataclasses.replace(entry, interval=entry.interval._replace(median=math.nan)))
     blank = dataclasses.replace(board, entries=tuple(none))
-    either = dataclasses.replace(advice, leaderboard=[blank, board])
+    either = dataclasses.replace(recommendation, leaderboard=[blank, board])
     assert f"ultimate bound (m) {number(bound)}" in either._needs
-    friction = advice.margins[1]
+    friction = recommendation.margins[1]
     most = dataclasses.replace(friction, value=friction.searched)
-    widest = dataclasses.replace(advice, margins=[most])
+    widest = dataclasses.replace(recommendation, margins=[most])
     assert f"friction at least {number(most.value)} N (u reaches 9.00 N)" in widest._margins
 
 
@@ -242,60 +249,60 @@ HANGING = """<mujoco model="lift"><worldbody><body><joint name="z" type="slide" 
 
 
 def test_margins_from_the_side_from_which_gravity_helps_say_so(raced):
-    _, advice, _ = raced
+    _, recommendation, _ = raced
     lift = smc.plant_from(HANGING, ["z"])
     for x0, helped in ((0.1, True), (-0.1, False)):
-        assert advise._is_helped(smc.Scenario(plant=lift, law="none", x0=x0)) == helped
-    assert not advice.helped
+        assert recommend._is_helped(smc.Scenario(plant=lift, law="none", x0=x0)) == helped
+    assert not recommendation.helped
     said = "What the joint carries pushes it to its goal"
-    assert said not in advice._margins
-    assert said in dataclasses.replace(advice, helped=True)._margins
+    assert said not in recommendation._margins
+    assert said in dataclasses.replace(recommendation, helped=True)._margins
 
 
 def test_where_runs_fail_there_is_no_ratio_of_J():
     """Such a run counts 1e9 s^2."""
     J = {"a": np.full(8, 0.3), "b": np.full(8, 1e9)}
     fine = {law: values < FAILURE_COST for law, values in J.items()}
-    found = advice_module._verdict(Comparison(J, arrived=fine), ["a", "b"])
+    found = recommendation_module._verdict(Comparison(J, arrived=fine), ["a", "b"])
     assert "lower than b's in 8 of 8 runs, of which 0 of a and 8 of b fail" in found
     assert "times" not in found
-    assert [*map(advice_module._cost, (0.3, 1e9))] == ["0.300", "fails"]
+    assert [*map(recommendation_module._cost, (0.3, 1e9))] == ["0.300", "fails"]
 
 
 def test_a_race_that_is_asked_for_again_gives_the_same_answer_from_its_folder(raced, monkeypatch):
-    asked, advice, plant = raced
+    asked, recommendation, plant = raced
     monkeypatch.setattr(search.TuningTask, "search", None)
     again = smc.which(plant, **asked, quick=True, duration=1.5)
-    assert str(again) == str(advice)
+    assert str(again) == str(recommendation)
 
 
 def test_without_time_there_is_an_answer_of_the_sets_that_there_are_without_margins(
     raced, monkeypatch
 ):
-    asked, advice, plant = raced
+    asked, recommendation, plant = raced
     monkeypatch.setattr(search.TuningTask, "search", None)
     asked = asked | {"seeds": 9}
     short = smc.which(plant, **asked, minutes=1e-6, duration=1.5)
-    assert short.law.name in {law.name for law in advice.laws}
-    assert short.race.sets == advice.race.sets
+    assert short.law.name in {law.name for law in recommendation.laws}
+    assert short.race.sets == recommendation.race.sets
     assert "With these gains: not tried, as the time was over" in short.answer
     untested = ", the first so far, not tested against the others"
     assert (untested in short.answer[0]) == (not short.race.winner)
     assert not short.margins
-    assert (advice.no_law.runs, short.no_law.runs) == (4, 1)
+    assert (recommendation.no_law.runs, short.no_law.runs) == (4, 1)
     assert len(short.table) == FEWEST_SEEDS * len(short.laws)
     text = " ".join(str(short).split())
     assert "5 runs of a law in each condition, as the time left was too short for 9." in text
     late = "delay, friction, mass and blow not tried, as the time was over"
     assert f"Tolerates: {late}" in short.answer
-    some = dataclasses.replace(short, margins=advice.margins[:2], untried=["mass", "blow"])
+    some = dataclasses.replace(short, margins=recommendation.margins[:2], untried=["mass", "blow"])
     assert some._margins.endswith("; mass and blow not tried, as the time was over")
 
 
 def test_laws_for_which_there_is_no_time_are_named_and_the_clock_may_end_a_race_at_once(
     raced, tmp_path
 ):
-    asked, advice, plant = raced
+    asked, recommendation, plant = raced
     short = smc.which(plant, **asked | {"out": tmp_path}, minutes=1e-6, duration=1.5)
     assert short.race.stopped
     assert [*short.race.entrants] == [law.name for law in HOLDING]
@@ -303,7 +310,9 @@ def test_laws_for_which_there_is_no_time_are_named_and_the_clock_may_end_a_race_
     late = "Not searched: observer_free, as the time was over; the same call goes on with them"
     assert late in short.answer
     assert "of the laws that were searched" in short.answer[0]
-    few = dataclasses.replace(advice, race=advice.race._replace(sets=1, stopped=True))
+    few = dataclasses.replace(
+        recommendation, race=recommendation.race._replace(sets=1, stopped=True)
+    )
     (however,) = (line for line in few.answer if line.startswith("However tuned"))
     assert "open; there was time for 1 set of gains of each law" in however
     assert "not even the first 3" in however
@@ -311,16 +320,20 @@ def test_laws_for_which_there_is_no_time_are_named_and_the_clock_may_end_a_race_
     assert re.search(r"goes on from there if it is given about \d+ more minute", however)
 
 
-def test_a_law_that_does_not_settle_is_not_advised_without_saying_where(raced):
-    _, advice, _ = raced
-    name = advice.law.name
+def test_a_law_that_does_not_settle_is_not_recommended_without_saying_where(raced):
+    _, recommendation, _ = raced
+    name = recommendation.law.name
     rare = dataclasses.replace(
-        advice, settles={**advice.settles, name: 0.5}, settled={name: {"coulomb": (2, 4)}}
+        recommendation,
+        settles={**recommendation.settles, name: 0.5},
+        settled={name: {"coulomb": (2, 4)}},
     )
     lines = dict(line.split(": ", 1) for line in rare.answer)
     assert lines["Use"] == f"{name}, which does not settle reliably in every condition"
     assert lines["Settles"] == "not reliably: in 2 of 4 runs under coulomb"
-    pushed = dataclasses.replace(advice.worst_run, disturbance=smc.Constant(20.0))  # u_max is 9
+    pushed = dataclasses.replace(
+        recommendation.worst_run, disturbance=smc.Constant(20.0)
+    )  # u_max is 9
     weak = dataclasses.replace(rare, worst_run=pushed)
     assert weak._where.startswith(f"{lines['Settles']}; u stays at its bound in the worst run: ")
 
@@ -357,7 +370,7 @@ def test_the_page_has_the_numbers_of_the_code():
         f"{max(row['worst'] for row in found):.2f} times",
         f"`--quick` is `--minutes {module.QUICK_MINUTES:g}`",
         f"in how many of {module.RACE_SEEDS} more runs",
-        f"fewer than {100 * advice_module.RELIABLE:g} %",
+        f"fewer than {100 * recommendation_module.RELIABLE:g} %",
         f"{quick_search.BUDGET} evaluations a gain",
         f"after {race.LOOKS[0]} sets the laws are compared",
         f"again after {race.LOOKS[1]}, unless the {race.LOOKS[0]} say that more than {race.WITHIN} ",
@@ -423,12 +436,12 @@ class Columns:
 
 
 def test_the_worst_run_is_of_the_condition_in_which_the_law_settles_least_and_then_latest():
-    assert advise._settled(Columns()) == {
+    assert recommend._settled(Columns()) == {
         "a": {"nominal": (2, 2), "noise": (1, 2)},
         "b": {"nominal": (0, 2), "noise": (2, 2)},
     }
-    assert advise._worst_run(Columns(), "a") == 2
-    assert advise._worst_run(Columns(), "b") == 4
+    assert recommend._worst_run(Columns(), "a") == 2
+    assert recommend._worst_run(Columns(), "b") == 4
 
 
 def test_a_law_with_few_shipped_sets_is_said_not_to_be_told_from_others(tmp_path):

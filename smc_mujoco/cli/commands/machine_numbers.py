@@ -231,9 +231,9 @@ def excitation(
     terminal = Terminal(json)
     options.check_files(None, out and with_ending(out, ".csv"))
     with delay_signals():
-        from smc_mujoco.identification import excitation as recommendation
+        from smc_mujoco.identification import excitation as exciting
 
-    advice = recommendation.excitation(
+    motions = exciting.excitation(
         machine,
         options.names(names),
         u_max=u_max,
@@ -242,13 +242,13 @@ def excitation(
         duration=duration,
         rate=rate,
     )
-    terminal.note(str(advice), wrap=True)
+    terminal.note(str(motions), wrap=True)
     if out:
-        terminal.wrote(advice.save(out))
+        terminal.wrote(motions.save(out))
         logged = ["t"]
         for quantity in "xu":
-            for column in advice.columns:
+            for column in motions.columns:
                 logged.append(quantity + column.removeprefix("r"))
         words = f"play it, record {', '.join(logged)}, and run smc-mujoco identify"
         terminal.note(words, wrap=True)
-    terminal.finish(advice.about())
+    terminal.finish(motions.about())

@@ -159,14 +159,16 @@ PlantName = Annotated[
     typer.Argument(
         metavar="PLANT",
         autocompletion=PLANTS,
-        help="A plant from `smc-mujoco list`, or joints of your own .xml or .urdf: "
-        "FILE.xml:joint+joint@keyframe+held. The keyframe is the goal; without one it is the "
-        "file's only one, or home, and @ alone is the pose of the file. Motors hold the other "
-        "joints (+held); +locked welds them, and +file leaves those with motors free. "
-        "Brackets after a joint hold its options: (motor) puts an ideal motor in place of the "
-        "file's actuator, (servo) and (servo=false) say that the actuator is a servo or a motor, "
-        "(partner=pole) names a passive joint, (u_max=9,x0=0.2) sets the bound on u and the start, "
-        "and (measured) means read but not driven.",
+        help="A plant from `smc-mujoco list`, or joints of your own .xml or .urdf, such as "
+        "arm.xml:shoulder+elbow.\n\n"
+        "- The goal is the keyframe home, or the only one of the file. Add @NAME for another one, "
+        "or @ for the pose as drawn: arm.xml:elbow@up.\n\n"
+        "- Motors hold the other joints. Add +locked to weld them, or +file to leave those with "
+        "motors free.\n\n"
+        "- Brackets after a joint hold its options. elbow(u_max=9,x0=0.2) sets the bound on u and "
+        "the start. (motor) puts an ideal motor in place of the file's actuator. (servo) and "
+        "(servo=false) say what the actuator is. (partner=pole) names a passive joint. A joint "
+        "with (measured) is read, not driven.",
     ),
 ]
 Quick = Annotated[

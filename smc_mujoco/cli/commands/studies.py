@@ -15,7 +15,7 @@ from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
-    from smc_mujoco.studies.advice import RaceAdvice
+    from smc_mujoco.studies.recommendation import RaceRecommendation
     from smc_mujoco.studies.table import Table
 
 FILMED = 0.5  # minutes that are for the figure and the film, and
@@ -37,19 +37,19 @@ Needs = Annotated[
         "property that the law must have.",
     ),
 ]
-AdviceCondition = Annotated[
+WhichCondition = Annotated[
     list[str] | None, options.conditions_by_default("nominal, noise and sine")
 ]
-AdviceSeeds = Annotated[
+WhichSeeds = Annotated[
     int | None,
     typer.Option(
         min=1, help="Runs of each law in each condition; default 24, or 14 with --minutes."
     ),
 ]
-AdviceDuration = Annotated[
+WhichDuration = Annotated[
     float | None, typer.Option(help="Duration of a run, s; default 5, or 3 with --minutes.")
 ]
-AdviceQuick = Annotated[
+WhichQuick = Annotated[
     bool, typer.Option("--quick", help="Answer within ten minutes, as --minutes 10 does.")
 ]
 Falling = Annotated[
@@ -71,11 +71,11 @@ Film = Annotated[
 def which(
     plant: options.PlantName,
     needs: Needs = "fast,accurate,calm",
-    condition: AdviceCondition = None,
+    condition: WhichCondition = None,
     law: options.Laws = None,
-    quick: AdviceQuick = False,
-    seeds: AdviceSeeds = None,
-    duration: AdviceDuration = None,
+    quick: WhichQuick = False,
+    seeds: WhichSeeds = None,
+    duration: WhichDuration = None,
     x0: options.X0 = None,
     relevant: options.Relevant = RELEVANT,
     out: options.Folder = Path("which"),
@@ -104,13 +104,13 @@ def which(
     """
     began = time.monotonic()
     with delay_signals():
-        from smc_mujoco.studies.advice import RaceAdvice
+        from smc_mujoco.studies.recommendation import RaceRecommendation
         from smc_mujoco.studies.which import QUICK_MINUTES
-        from smc_mujoco.studies.which import which as advise
+        from smc_mujoco.studies.which import which as recommend
 
     terminal = Terminal(json)
     whole = QUICK_MINUTES if quick and minutes is None else minutes
-    advice = advise(
+    recommendation = recommend(
         plant,
         options.conditions(condition) or None,
         needs,
@@ -130,33 +130,33 @@ def which(
         falling=falling,
         minutes=whole and whole - film * min(FILMED, FILMED_SHARE * whole),
     )
-    terminal.print(advice)
-    if isinstance(advice, RaceAdvice):
-        _save(advice, out, terminal)
+    terminal.print(recommendation)
+    if isinstance(recommendation, RaceRecommendation):
+        _save(recommendation, out, terminal)
         if film and whole:
-            _film(advice, out, began + 60.0 * whole, terminal)
-    _finish(advice.table, out, terminal)
+            _film(recommendation, out, began + 60.0 * whole, terminal)
+    _finish(recommendation.table, out, terminal)
 
 
-def _save(advice: "RaceAdvice", out: Path, terminal: Terminal) -> None:
+def _save(recommendation: "RaceRecommendation", out: Path, terminal: Terminal) -> None:
     """Write the gains of the first law of a race, and a figure of its worst run."""
     from smc_mujoco.draw import figure, page
 
-    if advice.tuned:
-        file = advice.tuned.save(out / "advised.json")
+    if recommendation.tuned:
+        file = recommendation.tuned.save(out / "recommended.json")
         terminal.wrote(file)
-        terminal.note(f"To use {advice.law.name} with these gains, give --law {file}")
-    figure.figure([advice.worst_trace], out / "worst_run")
+        terminal.note(f"To use {recommendation.law.name} with these gains, give --law {file}")
+    figure.figure([recommendation.worst_trace], out / "worst_run")
     terminal.wrote(*page.files(out / "worst_run"))
 
 
-def _film(advice: "RaceAdvice", out: Path, ends: float, terminal: Terminal) -> None:
+def _film(recommendation: "RaceRecommendation", out: Path, ends: float, terminal: Terminal) -> None:
     """Film the worst run of the first law of a race until a time of `time.monotonic`, s, with as
     many pictures a second as can be made by then; if these are too few, write one picture.
     """
     from smc_mujoco.draw.film import film as films
 
-    run = [advice.worst_trace]
+    run = [recommendation.worst_trace]
     try:
         begun = time.monotonic()
         frames = films.Frames(run, size=films.FULL_SIZE)
@@ -176,7 +176,7 @@ def _film(advice: "RaceAdvice", out: Path, ends: float, terminal: Terminal) -> N
             terminal.note(f"The film has {fps:.2g} pictures a second.")
         else:
             file = out / "worst_run_machine.png"
-            terminal.wrote(films.film(run, file, at=_worst_time(advice.worst_trace)))
+            terminal.wrote(films.film(run, file, at=_worst_time(recommendation.worst_trace)))
             needed = MIN_FPS * each * len(frames) / frames.fps
             terminal.note(
                 f"This picture stands in place of a film, which would take {needed:.0f} s; the "

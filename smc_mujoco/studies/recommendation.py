@@ -1,4 +1,4 @@
-"""Advice: which law to use on a plant, with its gains, and how certain that is, in words."""
+"""A recommendation: which law to use on a plant, its gains, and how certain that is, in words."""
 
 import dataclasses
 import math
@@ -30,7 +30,7 @@ RELIABLE = 0.9  # share of the runs of every condition in which a reliable law s
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Advice(Tables):
+class Recommendation(Tables):
     """Laws compared for a plant, best first, and which to use; `print` shows it."""
 
     table: Table  # the runs of all laws
@@ -145,8 +145,8 @@ class NoLaw(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class RaceAdvice(Advice):
-    """Advice within minutes: laws that raced, those that may be best first, and which to use."""
+class RaceRecommendation(Recommendation):
+    """What a race within minutes found: its laws, the best first, and which of them to use."""
 
     race: Race
     # of `laws` with these gains, by J of the same unseen runs; None for one law, or without time

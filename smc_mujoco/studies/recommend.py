@@ -1,4 +1,4 @@
-"""Advice within minutes: a race over sets of gains, then runs with the gains that are advised.
+"""Recommend a law within minutes: a race over sets of gains, then runs with the gains to use.
 
 The race says which law has the lowest J however it is tuned. Of each law that may be the best, the
 three sets of the lowest J run on the same two unseen instances, which choose one. Eight others say
@@ -31,11 +31,11 @@ from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.force_bounds import default_u_max
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.advice import RELIABLE, NoLaw, RaceAdvice
 from smc_mujoco.studies.answer_time import FEWEST_SEEDS, SHOWN, AnswerTime
 from smc_mujoco.studies.fair_gains import NOT_TUNED, Candidate, Laws, Trial, default_of
 from smc_mujoco.studies.leaderboard import leaderboard
 from smc_mujoco.studies.race import Entrant, Race, compared, judgements, race, unseen
+from smc_mujoco.studies.recommendation import RELIABLE, NoLaw, RaceRecommendation
 from smc_mujoco.studies.table import Table
 
 BY = "plant", "condition"  # what the runs of a table have in common
@@ -52,7 +52,7 @@ AFTER = CONSIDERED * len(CHOOSING) + judgements(DECIDING)
 Settled = dict[str, dict[str, tuple[int, int]]]
 
 
-def advise(
+def recommend(
     trial: Trial,
     plant: Plant,
     laws: Laws,
@@ -60,9 +60,9 @@ def advise(
     seeds: int,
     clock: AnswerTime,
     relevant: float,
-) -> RaceAdvice:
-    """Race laws on a plant and advise one of them, all as long as the clock lets it; `metrics` are
-    those of the tables, from that many seeds.
+) -> RaceRecommendation:
+    """Race laws on a plant and recommend one of them, all as long as the clock lets it; `metrics`
+    are those of the tables, from that many seeds.
     """
     goal = trial.asked_goal(plant)
     entrants, left_out = _entrants(trial, plant, laws)
@@ -91,7 +91,7 @@ def advise(
     weighs, no_law = _weighed(trial, plant, first, goal, clock)
     base = _base_of_margins(trial, plant, first)
     margins, untried = _margins(trial, base, clock)
-    return RaceAdvice(
+    return RaceRecommendation(
         table=table,
         leaderboard=boards,
         laws=ordered,
