@@ -57,7 +57,7 @@ REFUSED = {
     "no scenarios": (lambda: smc.score(MASKED), "cannot score masked"),
     "beyond floats": (lambda: smc.identify_friction([10**400, -1], [1, 2]), "give one number"),
     "a number for names": (lambda: smc.design.excitation("duffing", np.nan), "names is nan"),  # pyright: ignore
-    "no names": (lambda: smc.design.excitation("duffing", []), "there are M, delta"),
+    "no names": (lambda: smc.design.excitation("duffing", []), "There are M, delta"),
     "endless points": (
         lambda: smc.signals.cartesian_path("panda", [0.0, 1.0], range(10**9), body="link7"),  # pyright: ignore
         "give fewer",

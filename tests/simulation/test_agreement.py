@@ -83,7 +83,7 @@ class Wrapping(Signal):
 
 @smc.hardware.friction_function(numbers={"level": 0.1})
 def wrapping(y, p, memory):
-    return -p.level * y.v * (2**70 * 1e-21)
+    return p.level * abs(y.v) * (2**70 * 1e-21)
 
 
 @pytest.mark.parametrize("fields", [{"disturbance": Wrapping()}, {"friction": wrapping()}])

@@ -8,9 +8,8 @@
 
 The function returns one of two things:
 
-- its level at the speed y.v, N m (N), 0 or more. Friction has the sign that resists. At rest it
-  holds any force up to the level at y.v = 0. Only the size counts: `-p.b * y.v` is viscous
-  friction, too.
+- its level at the speed y.v, N m (N), 0 or more: `p.b * abs(y.v)` is viscous friction. Friction has
+  the sign that resists. At rest it holds any force up to the level at y.v = 0.
 - F, low, high: the force F, with its sign, that a joint needs to move against it, and the bounds of
   the force that it holds at rest. If it holds none, low and high are 0.
 
@@ -201,8 +200,8 @@ def at_speed(y, v):
 @register_jitable
 def resisting(found, v):
     """Return the level that was found with the sign that resists the speed v."""
-    if found < 0.0 and v < 0.0:
-        raise ValueError("it pushes along the motion: a level is 0 or more")
+    if found < 0.0:
+        raise ValueError("it is negative: return a level of 0 or more, or F, low, high")
     return math.copysign(found, v)
 
 
@@ -359,11 +358,13 @@ def _check_signs(name: str, function: Callable[[float], Any]) -> None:
             f"friction {name} flips from {back:g} to {ahead:g} at v = 0, and a force holds no "
             "joint at rest: return its level without the sign, and the joint is held up to it"
         )
-    if back < 0.0:
-        raise ScenarioError(
-            f"friction {name} is {back:g} just below v = 0, along the motion: return a level of 0 "
-            "or more; a force with a sign of its own is F, low, high"
-        )
+    for place, level in (("just below", back), ("at", rest), ("just above", ahead)):
+        if level < 0.0:
+            raise ScenarioError(
+                f"friction {name} is {level:g} {place} v = 0: return a level of 0 or more, as "
+                "p.b * abs(y.v), which gets the sign that resists; a force with a sign of its own "
+                "is F, low, high"
+            )
     if rest == 0.0 and ahead > 0.0 and _step(function, ahead):
         raise ScenarioError(
             f"friction {name} is {ahead:g} just above v = 0 and 0 at v = 0, so it holds no joint "

@@ -56,7 +56,7 @@ def friction_function(
 
     Raises:
       ScenarioError: for a name or a number that cannot be one. A scenario refuses a friction that
-        flips its sign at v = 0.
+        flips its sign at v = 0, or whose level is negative beside it; elsewhere that ends the run.
     """
     return functools.partial(_friction, numbers, memory)
 

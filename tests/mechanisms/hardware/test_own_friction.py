@@ -39,7 +39,7 @@ def warming(y, p, memory):
 
 @friction_function(numbers={"b": 0.4})
 def viscous(y, p, memory):
-    return -p.b * y.v
+    return p.b * abs(y.v)
 
 
 @smc.law_function(gains={"kp": 20.0, "kd": 3.0})
@@ -109,7 +109,7 @@ def test_a_level_is_the_friction_of_the_library_with_its_numbers():
     np.testing.assert_allclose(ours.x, same.x, atol=1e-9)
 
 
-def test_a_smooth_force_against_the_motion_is_its_level():
+def test_a_smooth_level_is_its_force_against_the_motion():
     trace = cart(friction=viscous(), v0=1.0, duration=2.0)
     np.testing.assert_allclose(trace.v[:, 0], np.exp(-0.4 * trace.t), rtol=1e-10)
 
@@ -270,6 +270,21 @@ def pushing(y, p, memory):
     return 0.2 * y.v
 
 
+@friction_function(numbers={"b": 0.4})
+def signed_viscous(y, p, memory):
+    return -p.b * y.v
+
+
+@friction_function()
+def below_zero(y, p, memory):
+    return 0.2 if y.v else -0.1
+
+
+@friction_function()
+def smooth(y, p, memory):
+    return 0.2 * abs(math.tanh(y.v / 1e-2))
+
+
 @friction_function()
 def crossed(y, p, memory):
     return 0.2 * y.v, 0.1, -0.1
@@ -301,7 +316,9 @@ def two(y, p, memory):
         (signed(), "flips .* return its level"),
         (steep(), "flips .* return its level"),
         (nothing_at_rest(), "0 at v = 0, .* return the level at v = 0"),
-        (pushing(), "along the motion: return a level"),
+        (pushing(), "is -2e-05 just below v = 0: return a level of 0 or more"),
+        (signed_viscous(), "is -4e-05 just above v = 0: return a level of 0 or more"),
+        (below_zero(), "is -0.1 at v = 0: return a level of 0 or more"),
         (crossed(), "low 0.1 and high -0.1"),
         (remembered_sign(), "holds no joint at rest: return F, low, high"),
         (remembered_level(), "holds no joint at rest: return F, low, high"),
@@ -313,5 +330,17 @@ def test_what_cannot_hold_is_named_before_the_run(part, words):
         smc.Scenario(plant="duffing", law="none", friction=part)
 
 
-def test_a_smooth_sign_that_a_step_resolves_is_no_flip():
-    assert cart(friction=steep(eps=1e-2), v0=0.5).failure is None
+@friction_function()
+def falling(y, p, memory):
+    return 0.3 - 0.5 * abs(y.v)
+
+
+@pytest.mark.parametrize("v0", [1.0, -1.0])
+def test_a_level_that_becomes_negative_ends_a_run_in_both_directions(v0):
+    failure = cart(friction=falling(), v0=v0).failure
+    assert "friction falling" in failure
+    assert "it is negative: return a level of 0 or more" in failure
+
+
+def test_a_smooth_level_that_is_0_at_rest_is_no_flip():
+    assert cart(friction=smooth(), v0=0.5).failure is None
