@@ -201,7 +201,7 @@ def excitation(
     base = machine if isinstance(machine, Scenario) else jointed(machine, "excitation")
     names = named_once(names)
     rig = own_rig(base, names)
-    check_named(rig)
+    check_named(rig, ["smc-mujoco", "excitation", machine] if isinstance(machine, str) else [])
     plant = rig.plant
     drives = rig.drives(u_max)
     forces = largest_forces(drives)

@@ -17,6 +17,7 @@ encoders and delays, and needs ten more packages.
 
 import dataclasses
 import itertools
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -431,6 +432,7 @@ def _read(
     if not many:
         raise ScenarioError("there are no logs: give at least one")
     read = [records.given(log, columns) for log in many]
+    line = _shell_line(machine, many, columns, condition)
     if isinstance(machine, str):
         machine = (
             find_rig(machine) if machine in rigs() else _named_plant(machine, read, names or ())
@@ -447,9 +449,24 @@ def _read(
     if isinstance(twin, OwnRig):
         for given, record in zip(many, data, strict=True):
             _check_log(twin, given, record)
-        check_named(twin)
+        check_named(twin, line)
         twin = first_guess.first_guess(twin, data)
     return twin, data
+
+
+def _shell_line(machine: Any, logs: Sequence[Any], columns: Any, condition: Any) -> list[str]:
+    """Return the words of a command that reads logs of a machine; none for what has no name or
+    file.
+    """
+    words = [machine, *logs]
+    if not all(isinstance(word, str | os.PathLike) for word in words):
+        return []
+    if columns:
+        renamed = ",".join(f"{ours}={theirs}" for ours, theirs in columns.items())
+        words += ["--columns", renamed]
+    if condition is not None:
+        words += ["--condition", condition]
+    return ["smc-mujoco", "identify", *map(str, words)]
 
 
 def _under(machine: Any, condition: Condition) -> Scenario:

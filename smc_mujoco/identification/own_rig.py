@@ -8,6 +8,7 @@ depends on the delay smoothly, and no physics step has to divide it.
 
 import dataclasses
 import math
+import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -26,6 +27,7 @@ from smc_mujoco.identification.paths import (
     known_paths,
     parts_of,
     resolved,
+    usual_paths,
 )
 from smc_mujoco.identification.records import Columns, Record
 from smc_mujoco.identification.rig import RecordPart, Rig, Source, Values
@@ -291,15 +293,18 @@ def own_rig(given: Plant | Scenario, names: Sequence[str]) -> OwnRig:
     return rig
 
 
-def check_named(rig: OwnRig) -> None:
-    """Raise ScenarioError, which lists what there is, if no number of a rig is named."""
+def check_named(rig: OwnRig, line: Sequence[str]) -> None:
+    """Raise ScenarioError if no number of a rig is named. It lists what there is, and ends with the
+    words of a shell's `line` that names some, or without a line with such names.
+    """
     if rig.free:
         return
-    known = list(known_paths(rig.base))
-    example = next((path for path in known if "." in path), known[0])
+    names = usual_paths(rig.base)
+    cure = f"give names={names!r}"
+    if line:
+        cure = f"write {shlex.join([*line, '--for', ','.join(names)])}"
     raise ScenarioError(
-        f"no number of {rig.name} is named: name some with --for, in Python with names, such as "
-        f"{example!r}; there are {', '.join(known)}"
+        f"no number of {rig.name} is named. There are {', '.join(known_paths(rig.base))}: {cure}"
     )
 
 

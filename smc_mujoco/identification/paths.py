@@ -107,6 +107,23 @@ def known_paths(base: Scenario) -> list[str]:
     return paths
 
 
+def usual_paths(base: Scenario) -> list[str]:
+    """Return paths to numbers of a scenario that most logs determine, for a user who names none."""
+    plant = base.plant
+    paths = paths_of_parts(base, "friction")
+    kinds = ["armature"]
+    if not paths:
+        kinds = ["damping", "frictionloss", "armature"]
+    of_joints = joint_numbers(plant)
+    for joint in driven_names(plant):
+        for kind in kinds:
+            if f"{joint}.{kind}" in of_joints:
+                paths.append(f"{joint}.{kind}")
+    if not of_joints:
+        paths += sorted(NATURAL & plant.parameters.keys())
+    return [*paths, DELAY]
+
+
 def _of_signals(base: Scenario, name: str) -> Quantity | None:
     """Return a number of the signals between machine and log; None if the name is no such."""
     if name == DELAY:

@@ -37,6 +37,7 @@ import dataclasses
 import functools
 import inspect
 import math
+import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -45,13 +46,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from smc_mujoco.common import errors
-from smc_mujoco.common.aliases import Data
+from smc_mujoco.common.aliases import AnyPath, Data
 from smc_mujoco.common.errors import ScenarioError, find, number, shown, unknown
 from smc_mujoco.common.files import reading
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.registry import subclasses
 from smc_mujoco.common.scripts import IN_FILE, WITHIN, object_named, place
-from smc_mujoco.common.text import stated
+from smc_mujoco.common.text import joined, stated
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.estimator import catalogue as estimators
@@ -211,6 +212,9 @@ def condition(name: str, **fields: Any) -> Condition:
 
         smc.condition("dry", friction=smc.Coulomb(0.05), noise=smc.Noise(position=1e-3))
 
+    In its place these functions, as the commands, take its text, or the path of a text file with
+    one condition a line, as `Identified.save` writes it.
+
     Args:
       name: its name in tables and figures; not a name of the suite.
       fields: fields of a Scenario, such as friction=smc.Coulomb(0.05), except plant, law, model,
@@ -241,12 +245,39 @@ def condition(name: str, **fields: Any) -> Condition:
     return Condition(name, fields)
 
 
-def find_condition(value: Condition | str) -> Condition:
-    """Return the Condition for a Condition, a name, several names joined by "+", or the text of a
-    condition.
+def find_condition(value: "Condition | AnyPath") -> Condition:
+    """Return the Condition for a Condition, a name, several names joined by "+", the text of a
+    condition, or the path of a text file with one.
     """
+    found = find_conditions(value)
+    if len(found) != 1:
+        names = joined(repr(one.name) for one in found)
+        raise ScenarioError(
+            f"{str(value)!r} has {len(found)} conditions ({names}), and this takes one: leave the "
+            "others out, or join two as noise+encoder"
+        )
+    return found[0]
+
+
+def find_conditions(value: "Condition | AnyPath") -> list[Condition]:
+    """Return what `find_condition` does, or every condition of a file."""
     if isinstance(value, Condition):
-        return value
+        return [value]
+    if isinstance(value, os.PathLike) or _is_path(value):
+        return from_file(Path(value))
+    return [_of_text(value)]
+
+
+def _is_path(text: object) -> bool:
+    """Return whether a text is the path of a file, and no name or text of a condition."""
+    if not isinstance(text, str) or set(":=(") & set(text) or text in NAMED:
+        return False
+    path = Path(text)
+    return path.name != text or bool(path.suffix) or os.path.isfile(path)
+
+
+def _of_text(value: object) -> Condition:
+    """Return the condition of names joined by "+", or of a text."""
     if not isinstance(value, str):
         raise ScenarioError(f"condition is {shown(value)}: give a name, or smc.condition(...)")
     if in_file := IN_FILE.fullmatch(value):
@@ -317,14 +348,15 @@ def from_file(path: Path) -> list[Condition]:
 
     Empty lines and lines that begin with # are skipped.
     """
-    with reading(path, "file of conditions", "give a text file, one condition a line") as file:
+    cure = "give a text file, one condition a line, or a condition, such as worn: x0=0.3"
+    with reading(path, "file of conditions", cure) as file:
         lines = file.read_text(encoding="utf-8").splitlines()
     conditions = []
     for count, line in enumerate(lines, 1):
         text = line.strip()
         try:
             if text and not text.startswith("#"):
-                conditions.append(find_condition(text))
+                conditions.append(_of_text(text))
         except ScenarioError as error:
             raise ScenarioError(f"line {count} of {str(path)!r}: {error}") from None
     if not conditions:

@@ -17,6 +17,7 @@ start inwards, and pendulums that may touch each other ("bobs") start in order f
 """
 
 import dataclasses
+import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Annotated
@@ -51,7 +52,13 @@ from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import REST
-from smc_mujoco.simulation.conditions import CONTROL_PERIOD, DURATION, Condition, find_condition
+from smc_mujoco.simulation.conditions import (
+    CONTROL_PERIOD,
+    DURATION,
+    Condition,
+    find_condition,
+    find_conditions,
+)
 from smc_mujoco.simulation.force_bounds import U_MAX
 from smc_mujoco.simulation.model import compile_model, initial_state, with_values
 from smc_mujoco.simulation.scenario import Scenario
@@ -233,12 +240,11 @@ def grid(
     seeds = _seeds(seeds)
     plants = listed("plants", plants)
     laws = listed_laws(laws)
-    conditions = listed("conditions", conditions)
+    conditions = listed_conditions(conditions)
     if (runs := len(plants) * len(laws) * len(conditions) * len(seeds)) > MAX_ITEMS:
         raise ScenarioError(
             f"the grid has {runs:,} runs: give fewer seeds, {MAX_ITEMS:,} runs at most"
         )
-    conditions = [find_condition(condition) for condition in conditions]
     check_names(plants, laws, conditions)
 
     def laws_on(plant: Plant) -> list[LawOfSeed]:
@@ -414,9 +420,17 @@ def listed_laws(laws: object) -> list[str | Law | Template]:
     return components
 
 
+def listed_conditions(conditions: object) -> list[Condition]:
+    """Return one or several conditions as a list. The path of a file stands for all that it has."""
+    found = []
+    for value in listed("conditions", conditions):
+        found += find_conditions(value)
+    return found
+
+
 def listed(what: str, values: object) -> list:
     """Return one or several values as a list."""
-    if isinstance(values, str | Plant | Component | Template | Condition):
+    if isinstance(values, str | os.PathLike | Plant | Component | Template | Condition):
         return [values]
     if (
         isinstance(values, bytes | Mapping)

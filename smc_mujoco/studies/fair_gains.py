@@ -41,8 +41,14 @@ from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.robustness.uncertainty import Uncertainty
 from smc_mujoco.robustness.worst_case import WorstCase, cached_worst_case
 from smc_mujoco.simulation import coerce, run_key
-from smc_mujoco.simulation.conditions import NAMED, Condition, applicable, find_condition
-from smc_mujoco.simulation.grid import Starts, all_combinations, check_moving, check_names, listed
+from smc_mujoco.simulation.conditions import NAMED, Condition, applicable
+from smc_mujoco.simulation.grid import (
+    Starts,
+    all_combinations,
+    check_moving,
+    check_names,
+    listed_conditions,
+)
 from smc_mujoco.simulation.grid import case as run_of_grid
 from smc_mujoco.simulation.law_checks import blind
 from smc_mujoco.simulation.scenario import Scenario
@@ -180,7 +186,7 @@ class Trial(NamedTuple):
         given = conditions
         if given is None:
             given = applicable(known, plants, duration)
-        parsed = list(map(find_condition, listed("conditions", given)))
+        parsed = listed_conditions(given)
         return cls(plants=plants, conditions=parsed, duration=duration, folder=Path(out), **fields)
 
     @property

@@ -17,6 +17,7 @@ from smc_mujoco.cli.main import app
 from smc_mujoco.common.scripts import object_named
 from smc_mujoco.simulation import run_key, scenario_json, workers
 from smc_mujoco.simulation.conditions import find_condition, from_file
+from smc_mujoco.testing.response import respond
 
 STRIBECK = """import math
 
@@ -207,5 +208,12 @@ def test_a_command_that_takes_one_condition_takes_it_from_a_file(tmp_path, refus
         printed = shell(*run, "--condition", condition)
         texts.append(printed.partition("gains:")[0])  # without the time that it took
     assert texts[0] == texts[1] != texts[2]
+    taken = respond("duffing", "pid", 0.2, str(file), {"duration": 0.1})
+    assert taken.condition == "mine, duration=0.1"
+    assert taken.scenario.friction == (smc.Coulomb(0.05),)
     file.write_text("a: x0=0.2\nb: x0=0.3\n")
-    refused(lambda: options.one_condition(str(file)), "has 2 conditions ('a', 'b')", "takes one")
+    grid = smc.grid("duffing", "pid", [file, "nominal"], seeds=1, gains="default")
+    assert [one.condition for one in grid] == ["a", "b", "nominal"]
+    words = "has 2 conditions ('a' and 'b')", "takes one"
+    refused(lambda: respond("duffing", "pid", 0.2, file, {}), *words)
+    refused(lambda: respond("duffing", "pid", 0.2, "lost.txt", {}), "no file of conditions at lost")

@@ -352,7 +352,12 @@ def test_a_column_that_is_missing_is_named_before_the_numbers_are_asked_for(run,
     assert "has no column x (it has t, angle, u)" in told
     assert "--columns x=NAME" in told
     done = CliRunner().invoke(app, [*words, "--columns", "x=angle"])
-    assert "no number of arm is named: name some with --for" in " ".join(done.output.split())
+    assert done.exit_code == 2
+    told = " ".join(done.output.split())
+    assert "no number of arm is named. There are m, grav, input_delay, j1.damping" in told
+    wanted = ["j1.damping", "j1.frictionloss", "j1.armature", "input_delay"]
+    line = ["smc-mujoco", *words, "--columns", "x=angle", "--for", ",".join(wanted)]
+    assert told.endswith(f"write {' '.join(line)}")
 
 
 def test_the_friction_panel_of_a_servo_has_its_force_and_no_set_point():
@@ -431,7 +436,7 @@ def test_a_command_in_milliamperes_is_doubted_unless_its_gain_is_asked_for(arm, 
 def test_an_unknown_path_lists_what_there_is(arm, run):
     with pytest.raises(smc.ScenarioError, match=r"input_delay, j1\.armature, j1\.damping"):
         smc.identify(arm, run, ["mass of the thing"])
-    with pytest.raises(smc.ScenarioError, match=r"there are m, grav, input_delay, j1\.damping"):
+    with pytest.raises(smc.ScenarioError, match=r"There are m, grav.*give names=\['j1\.damping'"):
         smc.identify(arm, run)
     loads = (smc.Constant(0.1), smc.Constant(0.2))
     several = smc.Scenario(plant=arm, law="none", disturbance=loads)

@@ -39,8 +39,14 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.rotation import pose_errors
 from smc_mujoco.metrics import catalogue as metrics
-from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, Condition, find_condition
-from smc_mujoco.simulation.grid import GRID_SEEDS, START_CURE, Starts, checked_starts
+from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, Condition
+from smc_mujoco.simulation.grid import (
+    GRID_SEEDS,
+    START_CURE,
+    Starts,
+    checked_starts,
+    listed_conditions,
+)
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -101,15 +107,12 @@ class Objective:
     chattering: Positive | None = None
 
     def __post_init__(self):
-        if isinstance(self.conditions, tuple | list):
-            conditions = self.conditions
-        else:
-            conditions = (self.conditions,)
+        conditions = listed_conditions(self.conditions)
         if not 0 < len(conditions) <= SEEDS_PER_SEARCH:
             raise ScenarioError(
                 f"conditions is {shown(self.conditions)}: give names, such as ('nominal', 'noise')"
             )
-        object.__setattr__(self, "conditions", tuple(map(find_condition, conditions)))
+        object.__setattr__(self, "conditions", tuple(conditions))
         checked_starts(self.starts)
         constrain(self)
 

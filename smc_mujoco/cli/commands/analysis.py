@@ -180,7 +180,7 @@ def margins(
             quick,
             threads,
             progress.reached,
-            options.one_condition(condition),
+            condition,
             options.starts(x0),
             device,
         )
@@ -329,8 +329,7 @@ def sensitivity(
     over = _within(disturbance, bound)
     options.check_files(None, *files(figure))
     chosen = options.law(law)
-    asked = options.one_condition(condition)
-    scenario = case(as_plant(plant), chosen, asked, duration, gains)
+    scenario = case(as_plant(plant), chosen, condition, duration, gains)
     found = sensitivity(scenario, over, metric, points, seed, threads, True, device)
     terminal.print(found)
     runs = f"{found.runs} runs, {len(found.values)} of them independent"
@@ -374,10 +373,9 @@ def _cases(
     """Return the scenario of each law under a condition, with changes of its fields."""
     from smc_mujoco.simulation.grid import case
 
-    asked = options.one_condition(condition)
     cases = []
     for law in laws:
-        cases.append(case(machine, law, asked, duration, gains, changes=changes))
+        cases.append(case(machine, law, condition, duration, gains, changes=changes))
     return cases
 
 

@@ -149,7 +149,7 @@ def identify(
         options.names(names) or None,
         held_out=held_out,
         columns=renamed,
-        condition=condition and options.one_condition(condition),
+        condition=condition,
         corrected=corrected,
         starts=starts,
         seed=seed,

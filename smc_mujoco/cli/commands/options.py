@@ -1,8 +1,6 @@
 """Options and arguments that several commands have, and functions that parse them."""
 
 import importlib
-import itertools
-import os
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -303,44 +301,13 @@ def conditions(texts: Sequence[str] | None) -> "list[named.Condition]":
     """Return the conditions of the option --condition: names and files, as a,b, or a text with a
     colon.
     """
-    from smc_mujoco.simulation.conditions import find_condition, from_file
+    from smc_mujoco.simulation.conditions import find_conditions
 
     chosen = []
-    parts = []
     for text in texts or ():
-        if ":" in text:
-            parts.append([text])
-        else:
-            parts.append(names(text))
-    for text in itertools.chain(*parts):
-        if (
-            ":" not in text
-            and (Path(text).name != text or Path(text).suffix)
-            and not os.path.exists(text)
-        ):
-            raise ScenarioError(
-                f"no file {text!r}: give a file of conditions, or a condition, such as worn: "
-                "friction=Coulomb(0.05)"
-            )
-        if os.path.exists(text):
-            chosen += from_file(Path(text))
-        else:
-            chosen += [find_condition(text)]
+        for one in [text] if ":" in text else names(text):
+            chosen += find_conditions(one)
     return chosen
-
-
-def one_condition(text: str) -> "named.Condition":
-    """Return the condition of a command that takes one: a name, a text, or a file with one."""
-    found = conditions([text])
-    if len(found) != 1:
-        listed = []
-        for one in found:
-            listed.append(repr(one.name))
-        raise ScenarioError(
-            f"--condition {text} has {len(found)} conditions ({', '.join(listed)}), and this "
-            "command takes one: leave the others out, or join two as noise+encoder"
-        )
-    return found[0]
 
 
 def compared_laws(

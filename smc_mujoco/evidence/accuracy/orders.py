@@ -40,8 +40,15 @@ from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.conventions import last_part
 from smc_mujoco.simulation.coerce import MIN_TIME
-from smc_mujoco.simulation.conditions import Condition, find_condition
-from smc_mujoco.simulation.grid import DURATION, Starts, case, listed, listed_laws
+from smc_mujoco.simulation.conditions import Condition
+from smc_mujoco.simulation.grid import (
+    DURATION,
+    Starts,
+    case,
+    listed,
+    listed_conditions,
+    listed_laws,
+)
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Noise
@@ -169,8 +176,8 @@ def orders(
     )
     setups = []
     for plant in listed("plants", plants):
-        for condition in listed("conditions", conditions):
-            at = as_plant(plant), find_condition(condition)
+        for condition in listed_conditions(conditions):
+            at = as_plant(plant), condition
             for law in listed_laws(laws):
                 setups.append(_setup(*at, law, descending, numbers, gains, duration, starts))
     return _ordered(_run(setups, threads, report))
