@@ -10,7 +10,6 @@ law `pid` is timed in turn with it, on the same measurements.
 
 # pyright: reportCallIssue=false
 # (an intrinsic is called without its typing context)
-import dataclasses
 import time
 from typing import NamedTuple
 
@@ -75,15 +74,14 @@ def _measured(scenario: Scenario) -> Array:
     """Return what the law measures in the last channel at each sample of a run, (samples, fields
     of a Measurement).
     """
-    duration = min(scenario.resolved.duration, LONGEST)
-    short = dataclasses.replace(scenario, duration=duration)
+    samples = min(scenario.samples, round(LONGEST / scenario.control_period))
     seen = []
     with callback.installed():
-        batch = ScenarioBatch([prepare(short)], threads=1)
+        batch = ScenarioBatch([prepare(scenario)], threads=1)
 
         def measure() -> None:
-            for k in range(short.samples):
-                batch.advance_to((k + 1) * short.steps)
+            for k in range(samples):
+                batch.advance_to((k + 1) * scenario.steps)
                 if batch.records["failure"][0] != state.FINE:
                     break
                 seen.append(batch.records["y"][0].item())

@@ -39,11 +39,21 @@ def share_of_limit(trace: Trace) -> Array:
     return 100.0 * shares.max(axis=1, keepdims=True)
 
 
+def error_rate(trace: Trace) -> Array:
+    """Return v - r', (K+1, n). Of the slopes of r before and after a sample the smaller counts, so
+    that a step of r, which has none, is no peak.
+    """
+    slopes = np.diff(trace.r, axis=0) / np.diff(trace.t)[:, None]
+    before = np.concatenate([slopes[:1], slopes])
+    after = np.concatenate([slopes, slopes[-1:]])
+    return trace.v - np.where(np.abs(before) < np.abs(after), before, after)
+
+
 QUANTITIES: dict[str, Callable[[Trace], Array]] = {  # name -> (K+1, n)
     "x": lambda trace: trace.x,
     "e": lambda trace: trace.x - trace.r,
     "v": lambda trace: trace.v,
-    "de": lambda trace: trace.v - np.gradient(trace.r, trace.t, axis=0),
+    "de": error_rate,
     "u": lambda trace: trace.u,
     "applied": lambda trace: trace.applied,
     "d": lambda trace: trace.d,

@@ -20,6 +20,7 @@ LAST = 0.2  # of the run, in which u is looked at: that of the metrics
 # 1/s, chosen: variation of u a second over its range, from which it chatters: five times up and
 # down
 CHATTER = 10.0
+LEAST_SWING = 1e-6  # of the largest |u| of a run: less is no chattering; chosen
 
 
 def unresolved(trace: Any) -> str:
@@ -95,7 +96,8 @@ def switches(trace: Any) -> bool:
     variation = np.abs(changes).sum(axis=0)
     seconds = len(u) * trace.scenario.control_period
     swing = np.ptp(u, axis=0)
-    return bool(np.any(variation > CHATTER * seconds * swing))
+    visible = swing > LEAST_SWING * np.abs(trace.u[:, :driven]).max(axis=0)
+    return bool(np.any(visible & (variation > CHATTER * seconds * swing)))
 
 
 def _last(trace: Any) -> slice:

@@ -187,7 +187,8 @@ class Block:
         if self.runs < self.seeds:
             parts.append(counted(self.runs, "distinct run"))
         if self.sets > 1:
-            parts.append(f"{self.sets} sets of gains")
+            least = "at least " if self.samples > self.sets else ""
+            parts.append(f"{least}{self.sets} sets of gains")
         return ", ".join(parts)
 
 
@@ -411,9 +412,12 @@ class Board(Tables):
 
     def _cure(self, least: int) -> str:
         """How to have so many samples."""
+        cures = []
         if max(block.runs for block in self.blocks) < least:
-            return f"seeds={least}"
-        return f"searches={least} in compare"
+            cures.append(f"seeds={least}")
+        if not cures or any(1 < block.sets < least for block in self.blocks):
+            cures.append(f"searches={least} in compare")
+        return joined(cures)
 
     def _counted(self, count: int) -> str:
         """Return a number of samples, such as "3 sets of gains"."""

@@ -331,11 +331,14 @@ class Trial(NamedTuple):
         if not noisy and applicable([NOISE], [plant], self.duration):
             conditions.append(NAMED[NOISE])
         usual = Objective()
+        duration = SEARCHED * self.duration
+        for condition in conditions:
+            _check_events(condition.name, condition.on(plant, duration), duration)
         return dataclasses.replace(
             usual,
             conditions=tuple(conditions),
             starts=self.starts or usual.starts,
-            duration=SEARCHED * self.duration,
+            duration=duration,
         )
 
     def _goal(self, plant: Plant, starts: Starts | None) -> Objective:
@@ -504,3 +507,18 @@ def candidate_of(default: Component, tuned: result.Tuned) -> Candidate:
         given = f"no unit is given for {joined(names)}"
         remark = f"{given}, so the search is centred on their defaults"
     return Candidate(best, tuple(sets), remark)
+
+
+def _check_events(name: str, fields: Mapping[str, Any], duration: float) -> None:
+    """Raise ScenarioError if a condition's jump or fault comes after the end of a search's runs."""
+    times = []
+    if fields.get("jump"):
+        times.append(fields["jump"].time)
+    if fields.get("fault"):
+        times.append(fields["fault"].at)
+    if times and max(times) >= duration:
+        raise ScenarioError(
+            f"condition {name!r} changes at {max(times):g} s, and runs that judge gains end at "
+            f"{duration:.3g} s, two thirds of the duration: give an earlier time, or a duration "
+            f"above {max(times) / SEARCHED:.3g} s"
+        )

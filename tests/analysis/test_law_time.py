@@ -32,6 +32,12 @@ def test_the_law_is_given_what_it_measures_in_its_run():
     np.testing.assert_allclose(asked.clip(-seen[0].limit, seen[0].limit), u, rtol=1e-9, atol=1e-9)
 
 
+def test_a_law_is_timed_in_the_first_seconds_of_a_run_whose_fault_comes_later(monkeypatch):
+    monkeypatch.setattr(law_time, "LONGEST", 0.05)
+    late = smc.Scenario(plant="duffing", law="none", fault=smc.Fault(0.1), duration=0.2)
+    assert len(law_time._measured(late)) == 50
+
+
 @pytest.mark.parametrize(
     "law", [acting(lambda seen: -0.1 * seen[0]), smc.law("observer_free_joint")]
 )

@@ -251,3 +251,13 @@ def test_the_close_up_shows_no_round_off(pair, level):
     switching = dataclasses.replace(pair[0], u=np.sign(held - level))
     panels.last_samples(full, shown._replace(traces=[switching]), ["#000000"])
     assert full.get_ylim() == pytest.approx((-1.24, 1.24))  # what is large fills it
+
+
+def test_a_step_of_the_reference_is_no_peak_of_the_error_s_rate():
+    scenario = smc.Scenario(plant="duffing", law="none", x0=0.0, duration=1.0)
+    step = smc.Step(0.2, time=0.5)
+    trace = smc.run(dataclasses.replace(scenario, reference=step))
+    np.testing.assert_allclose(quantities.QUANTITIES["de"](trace), trace.v, atol=1e-12)
+    trace = smc.run(dataclasses.replace(scenario, reference=smc.Sine(0.2, 3.0)))
+    rate = trace.v - 0.6 * np.cos(3.0 * trace.t)[:, None]
+    np.testing.assert_allclose(quantities.QUANTITIES["de"](trace), rate, atol=1e-3)

@@ -21,6 +21,7 @@ from typer.testing import CliRunner
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine import group
 from smc_mujoco.cli.main import app
+from smc_mujoco.errors import ScenarioWarning
 from smc_mujoco.identification.first_guess import first_guess
 from smc_mujoco.identification.friction_figure import curve_error, friction, measured_friction
 from smc_mujoco.identification.identify import check
@@ -640,7 +641,8 @@ def test_a_range_in_degrees_that_was_meant_in_rad_is_told(refused):
     """MuJoCo reads the file's 1.57 as degrees where its compiler does not say radian."""
     limited = ONE.replace('name="j1"', 'name="j1" limited="true" range="-1.57 1.57"')
     slack = limited.replace('name="j1"', 'name="j1" solreflimit="0.001 1"')
-    arm = smc.plant_from(slack.replace('<compiler angle="radian"/>', ""), ["j1"])
+    with pytest.warns(ScenarioWarning, match="moves from -0.0274 to 0.0274 rad. If the file"):
+        arm = smc.plant_from(slack.replace('<compiler angle="radian"/>', ""), ["j1"])
     words = "-1.57 to 1.57 rad", 'angle="radian"'
     refused(lambda: smc.Scenario(plant=arm, law="none", x0=0.3), *words)
     refused(lambda: smc.Scenario(plant=arm, law="none", reference=smc.Constant(0.5)), *words)

@@ -2,6 +2,7 @@
 touch; and what a run cannot resolve is told in one sentence.
 """
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import smc_mujoco as smc
 from smc_mujoco.errors import ScenarioWarning
 from smc_mujoco.hardware import ElasticJoint, LuGre
 from smc_mujoco.mechanisms.custom import poles
-from smc_mujoco.simulation import integration
+from smc_mujoco.simulation import integration, resolution
 
 CHAIN = """<mujoco model="chain"><compiler angle="radian"/>
 <default><geom type="capsule" size=".02" contype="0" conaffinity="0"/></default><worldbody>
@@ -177,6 +178,16 @@ def test_what_a_step_does_not_resolve_is_told_once_at_the_run(fields, told, recw
     assert bool(told) == bool(trace.unresolved)
     sentences = [str(w.message) for w in recwarn if "runs under" in str(w) or "chatters" in str(w)]
     assert sentences == ([trace.unresolved] if told else [])
+
+
+def test_u_that_varies_in_its_last_digits_does_not_chatter():
+    trace = smc.run(scenario(joint=RANGE, law="super_twisting", duration=0.5))
+    assert resolution.switches(trace)
+    last = len(trace.u) // 2
+    for size, chatters in ((1e-3, True), (1e-9, False)):
+        u = trace.u.copy()
+        u[last:] = 1.0 + size * (-1.0) ** np.arange(len(u) - last)[:, None]
+        assert resolution.switches(dataclasses.replace(trace, u=u)) == chatters
 
 
 def test_one_joint_alone_that_chatters_is_resolved():

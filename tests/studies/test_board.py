@@ -328,6 +328,10 @@ RESULTS = {  # changes of both blocks -> the result
         {"ahead": None, "samples": 4, "runs": 4},
         "4 runs cannot rank 3 laws here; 7 can (seeds=7)",
     ),
+    "few runs of few sets": (
+        {"ahead": None, "samples": 3, "runs": 4, "sets": 3},
+        "3 sets of gains cannot rank 3 laws here; 7 can (seeds=7 and searches=7 in compare)",
+    ),
     "few runs of many sets": (
         {"ahead": None, "samples": 4, "runs": 4, "sets": 12},
         "4 sets of gains cannot rank 3 laws here; 7 can (seeds=7)",
@@ -384,3 +388,9 @@ def test_a_law_that_is_not_ranked_is_named_with_the_cure_beside_the_winner_of_th
     assert result.endswith(
         "; second (3 sets of gains) is not ranked, which needs 7 (searches=7 in compare)"
     )
+
+
+def test_a_heading_says_if_some_laws_have_more_sets_of_gains(boards):
+    block = dataclasses.replace(boards[0].blocks[0], seeds=8, runs=8, samples=7, sets=7)
+    assert block.sample == "8 seeds, 7 sets of gains"
+    assert dataclasses.replace(block, sets=3).sample == "8 seeds, at least 3 sets of gains"

@@ -56,7 +56,7 @@ from smc_mujoco.mechanisms.custom.others import OTHERS, limp, ties
 from smc_mujoco.mechanisms.custom.scales import rises
 from smc_mujoco.mechanisms.custom.user_model import UserFields, UserModel
 from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
-from smc_mujoco.mechanisms.plant import Plant, catalogue, check_ranges
+from smc_mujoco.mechanisms.plant import Plant, catalogue, check_ranges, degrees_hint
 
 if TYPE_CHECKING:
     from dm_control.mjcf import RootElement
@@ -121,10 +121,11 @@ def plant_from(
         range.
 
     Warns:
-      ScenarioWarning: what u is where the file's actuator takes no force, and an ideal motor in a
-        file without actuators; what is changed in a URDF; constraints that give way, or dry
-        friction that creeps; a joint drawn outside its range; motors that nothing commands, without
-        `others`; equality constraints that are left out.
+      ScenarioWarning: a range in degrees that may be meant in rad; what u is where the file's
+        actuator takes no force, and an ideal motor in a file without actuators; what is changed in
+        a URDF; constraints that give way, or dry friction that creeps; a joint drawn outside its
+        range; motors that nothing commands, without `others`; equality constraints that are left
+        out.
 
     A scenario may have model="nominal" if every joint that moves with the channels is a channel or
     a partner, and no equality constraint acts; `plant.unmodelled` says why not. Films show the
@@ -144,6 +145,7 @@ def plant_from(
     model = mjcf.unedited_model(source)
     read = urdf.read(Path(source.path))
     doubts = [
+        *_narrow_ranges(source.label, made, spec),
         *_assumed_drives(source.label, made, pairs),
         *(read.notes(source.label, spec) if read else ()),
         *softness_warnings(source.label, made),
@@ -161,6 +163,15 @@ def plant_from(
     for doubt in doubts:
         warnings.warn(doubt, ScenarioWarning, users_stacklevel())
     return made
+
+
+def _narrow_ranges(label: str, made: Plant, spec: mujoco.MjSpec) -> Iterator[str]:
+    """Yield a sentence on each range in degrees that is as narrow as if it was meant in rad."""
+    if not spec.compiler.degree:
+        return
+    for (joint, low, high), unit in zip(made.ranges, made.units, strict=False):
+        if hint := degrees_hint((low, high), 0.5 * (low + high), unit):
+            yield f"joint {joint!r} of {label} moves from {low:.3g} to {high:.3g} rad{hint}"
 
 
 def _assumed_drives(label: str, made: Plant, given: Pairs) -> Iterator[str]:
