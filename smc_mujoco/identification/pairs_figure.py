@@ -45,12 +45,22 @@ def pairs_figure(
     rivals = dict(zip(others, more, strict=True))
     handles: list[Line2D | Patch] = [
         Line2D([], [], ls="", marker=".", color=style.INK, label="pairs"),
-        Line2D([], [], color=colour, lw=1.8, label=f"taken: {taken}"),
+        Line2D(
+            [],
+            [],
+            color=colour,
+            lw=1.8,
+            label=f"taken: {taken}",
+        ),
         Patch(color=colour, alpha=0.25, lw=0.0, label="± 2 standard errors"),
     ]
     looks = {}
     for place, (model, other) in enumerate(rivals.items(), 1):
-        looks[model] = {"color": other, "lw": 1.2, "ls": style.DASHES[place % len(style.DASHES)]}
+        looks[model] = {
+            "color": other,
+            "lw": 1.2,
+            "ls": style.DASHES[place % len(style.DASHES)],
+        }
         handles.append(Line2D([], [], label=model, **looks[model]))
     side = np.linspace(1e-3, 1.0, SPEEDS)
     with style.page():
@@ -64,7 +74,14 @@ def pairs_figure(
             curve = forces[taken](speeds)
             wide = 2.0 * error(speeds)
             ax.plot(speeds, curve, color=colour, lw=1.8)
-            ax.fill_between(speeds, curve - wide, curve + wide, color=colour, alpha=0.25, lw=0.0)
+            ax.fill_between(
+                speeds,
+                curve - wide,
+                curve + wide,
+                color=colour,
+                alpha=0.25,
+                lw=0.0,
+            )
         ax.set_xlabel("speed (rad/s)")
         ax.set_ylabel("torque (N·m)")
         ax.set_title(title)

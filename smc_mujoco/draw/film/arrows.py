@@ -10,6 +10,7 @@ model that is pushed has one that ends before it. All are drawn over the picture
 hides them.
 """
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -54,7 +55,7 @@ BENT_RAISE = 0.5  # by which the middle of a bent arrow is higher than the direc
 HEAD_WIDTH = 2.25  # half the width of a head, in shafts
 HEAD_LENGTH = 2.2  # in half widths
 SUPERSAMPLING = 3  # pixels of a flat arrow for each of the picture, in both directions
-NETWORK_FACTOR = 1.6  # arrows of a network are longer: they are seen from the side
+NETWORK_FACTOR = 3.0  # the arrow of a network is longer: it stands for all, seen from the side
 MIN_LENGTH = 0.05  # of the longest: shorter arrows are not drawn
 MAX_THICKNESS = 0.25  # of the shaft of a short arrow, of its length
 MIN_LEVER = 1e-6  # m: a body centred on its hinge has no arc for an arrow
@@ -161,8 +162,9 @@ class Scale(NamedTuple):
     """The largest values that arrows show, in the units of u and of a force, and those of the
     longest arrows: `longest` of forces, one in a picture, and `full` of the control.
 
-    They are of the runs that lasted. Short peaks, such as that of an estimator at the start, do not
-    set the longest arrow, nor do blows, which are far larger than what drives the machine.
+    They are of the runs that lasted, and of a network of its mean. Short peaks, such as that of an
+    estimator at the start, do not set the longest arrow, nor do blows, which are far larger than
+    what drives the machine.
     """
 
     control: float
@@ -175,7 +177,11 @@ class Scale(NamedTuple):
 
 
 def _of_one_unit(traces: Sequence[Trace]) -> dict[ChannelGroup, Sequence[Trace]]:
-    """Return the traces of each group of channels, or of each channel where units of u differ."""
+    """Return the traces of each group of channels, or of each channel where units of u differ;
+    of a network, its means.
+    """
+    if is_network(traces[0].scenario.plant):
+        traces = list(map(mean_trace, traces))
     found = {}
     for group, parts in style.split(traces).items():
         if group.effort or traces[0].scenario.plant.pose:
@@ -368,6 +374,15 @@ def without_number(drawn: Drawn) -> Drawn:
 def is_network(plant: Plant) -> bool:
     """Return whether a plant is made of many alike, such as pendulums; a robot is not."""
     return plant.network and not plant.direct
+
+
+def mean_trace(trace: Trace) -> Trace:
+    """Return a trace of a network on whose every channel the mean of each force acts."""
+    means = {}
+    for name in ("applied", "d", "force", "reaction"):
+        mean = getattr(trace, name).mean(axis=1, keepdims=True)
+        means[name] = np.repeat(mean, trace.x.shape[1], 1)
+    return dataclasses.replace(trace, **means)
 
 
 def mean_of(acting: Envelope) -> Envelope:

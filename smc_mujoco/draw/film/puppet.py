@@ -189,6 +189,11 @@ class Puppet:
         return of_moved & (model.geom_type != world.PLANE)
 
     @property
+    def on_bars(self) -> Array:
+        """Which channels slide on a rail, or turn on the shaft of a network, (n,)."""
+        return self.slides | arrows.is_network(self.scenario.plant)
+
+    @property
     def shown(self) -> int:
         """The number of channels."""
         return self.scenario.plant.n
@@ -341,7 +346,7 @@ class Puppet:
         lowest = min(course.reached[:, 2].min() for course in courses)
         model = self.model
         on_stage = self.scenario.plant.on_stage
-        axes = self.data[0].xaxis[self.ids[self.slides]]
+        axes = self.data[0].xaxis[self.ids[self.on_bars]]
         machines = [shape.model for shape in self.shapes]
         raised = world.cut(machines, points, axes, on_stage)
         world.forward(model, self.data[0])

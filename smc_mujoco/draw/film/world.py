@@ -240,9 +240,9 @@ def restyle(model: mujoco.MjModel) -> None:
         field[np.isin(names, "bob")] *= 1.3
 
 
-def cut(machines: Sequence[mujoco.MjModel], points: Array, slides: Array, own: bool) -> float:
-    """Shorten columns, and rails along `slides`, (k, 3), to what moves, whose points are (m, 3) m,
-    in all models.
+def cut(machines: Sequence[mujoco.MjModel], points: Array, bars: Array, own: bool) -> float:
+    """Shorten columns, and rails and shafts along `bars`, (k, 3), to what moves, whose points are
+    (m, 3) m, in all models.
 
     The foot of a column and the posts at the ends of a rail come closer, and marks beyond are
     hidden. Columns are cut of the library's `own` machines. Returns how far the foot came up, m.
@@ -266,13 +266,13 @@ def cut(machines: Sequence[mujoco.MjModel], points: Array, slides: Array, own: b
         most = corners[..., axis].max(axis=1)
         long = _slender(sides, axis) & (turned.max(axis=1) > 0.999)
         upright = axis == 2
-        wanted = own if upright else (np.abs(slides[:, axis]) > 0.9).any()
+        wanted = own if upright else (np.abs(bars[:, axis]) > 0.9).any()
         if not long.any() or not wanted:
             continue
         first = lows[axis]
         last = highs[axis]
         if upright:  # only from below
-            beyond = least[~long & (most > first)].min(initial=first)
+            beyond = least[~long & (most > first)].min(initial=np.inf)
             first = min(beyond - margin, first)
             last = np.inf
         start, stop = least[long].min(), most[long].max()

@@ -125,6 +125,17 @@ def test_a_rail_is_cut_to_what_moves_and_its_posts_and_marks_stay_true(monkeypat
         assert np.ptp(shown.project(ends)[:, 1]) > 120.0
 
 
+def test_the_posts_of_a_network_come_closer_with_their_feet(monkeypatch):
+    """They stand 0.22 m beside the outer pendulums."""
+    with filmed(two("pendulum_network"), monkeypatch) as (stages, _):
+        shown = stages[0]
+        places = {}
+        for name in ("front_post", "front_foot", "p0/bob"):
+            places[name] = shown.data.geom_xpos[shown.model.geom(f"m/{name}").id]
+        assert 0.1 < places["p0/bob"][1] - places["front_post"][1] < 0.19
+        assert places["front_foot"][1] == pytest.approx(places["front_post"][1])
+
+
 def test_a_pendulum_s_picture_is_of_the_bob_s_arc(monkeypatch):
     stands, falls = two("inverted_pendulum")
     falls = dataclasses.replace(falls, x=falls.x + 3.0)
