@@ -92,8 +92,7 @@ def plot(
         tall = WORDS_HEIGHT + LINE_HEIGHT * dots.lines
         heights = np.repeat(tall, len(dots.metrics) // across)
         space = pages.head_height(width, key) + style.points(0.6)
-        whole = height or space + style.points(heights.sum())
-        page = pages.blank(width, whole, fig)
+        page = pages.blank(width, height or space + style.points(heights.sum()), fig)
         axes = page.subplots(len(heights), across, squeeze=False, height_ratios=heights.tolist())
         by_plant = axes.reshape(len(dots.conditions), -1)
         for plant, high, row in zip(dots.conditions, tall, by_plant, strict=True):
@@ -101,6 +100,7 @@ def plot(
             if title is not None or len(dots.conditions) > 1:
                 _name_row(row[0], dots.labels[plant], high)
         pages.set_head(page, width, head, key, shared)
+        pages.space_ticks(page)
         return pages.write(page, paths)
 
 

@@ -2,14 +2,14 @@
 and the other models.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair
+from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair, Fields
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 
@@ -38,11 +38,7 @@ def pairs_figure(
     paths = pages.files(path)
     v, torque = pairs
     colour, *more = style.spread(len(forces))
-    others = []
-    for model in forces:
-        if model != taken:
-            others.append(model)
-    rivals = dict(zip(others, more, strict=True))
+    looks = _looks(forces, taken, more)
     handles: list[Line2D | Patch] = [
         Line2D([], [], ls="", marker=".", color=style.INK, label="pairs"),
         Line2D(
@@ -54,14 +50,8 @@ def pairs_figure(
         ),
         Patch(color=colour, alpha=0.25, lw=0.0, label="± 2 standard errors"),
     ]
-    looks = {}
-    for place, (model, other) in enumerate(rivals.items(), 1):
-        looks[model] = {
-            "color": other,
-            "lw": 1.2,
-            "ls": style.DASHES[place % len(style.DASHES)],
-        }
-        handles.append(Line2D([], [], label=model, **looks[model]))
+    for model, look in looks.items():
+        handles.append(Line2D([], [], label=model, **look))
     side = np.linspace(1e-3, 1.0, SPEEDS)
     with style.page():
         height = pages.head_height(style.FULL_WIDTH, handles) + HEIGHT
@@ -88,3 +78,19 @@ def pairs_figure(
         pages.set_head(page, style.FULL_WIDTH, "Friction from speed and torque", handles)
         pages.write(page, paths)
     return paths
+
+
+def _looks(models: Iterable[str], taken: str, colours: Sequence[str]) -> dict[str, Fields]:
+    """Return the look of the line of each model that is not taken."""
+    looks: dict[str, Fields] = {}
+    for model in models:
+        if model == taken:
+            continue
+        place = len(looks)
+        dashes = style.DASHES[(place + 1) % len(style.DASHES)]
+        looks[model] = {
+            "color": colours[place],
+            "lw": 1.2,
+            "ls": dashes,
+        }
+    return looks

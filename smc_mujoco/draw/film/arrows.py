@@ -23,6 +23,7 @@ from smc_mujoco.draw import quantities, style
 from smc_mujoco.draw.decimate import Envelope, windows
 from smc_mujoco.draw.film import world
 from smc_mujoco.draw.panels import Panel, by_channel
+from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.mechanisms.plant import EFFORT, Plant, catalogue
 from smc_mujoco.metrics.conventions import ChannelGroup
 from smc_mujoco.simulation import model as models
@@ -55,7 +56,8 @@ BENT_RAISE = 0.5  # by which the middle of a bent arrow is higher than the direc
 HEAD_WIDTH = 2.25  # half the width of a head, in shafts
 HEAD_LENGTH = 2.2  # in half widths
 SUPERSAMPLING = 3  # pixels of a flat arrow for each of the picture, in both directions
-NETWORK_FACTOR = 3.0  # the arrow of a network is longer: it stands for all, seen from the side
+CHAIN_FACTOR = 1.6  # arrows of several pendulums are longer: they are seen from the side
+NETWORK_LENGTH = 0.72  # of the way between the outer pivots of a network, of its one arrow
 MIN_LENGTH = 0.05  # of the longest: shorter arrows are not drawn
 MAX_THICKNESS = 0.25  # of the shaft of a short arrow, of its length
 MIN_LEVER = 1e-6  # m: a body centred on its hinge has no arc for an arrow
@@ -130,8 +132,12 @@ def mounts(
         hinge = slide._replace(unit=1.0, radius=USER_RADIUS * extent)
     else:
         thick = min(SLIDE_THICKNESS, MAX_RAIL_SHARE * rail)
-        slide = Mount(0, SLIDE_LENGTH * rail, thick, front, plant.network)
-        turning = NETWORK_FACTOR if plant.n > 1 else 1.0
+        slide = Mount(0, SLIDE_LENGTH * rail, thick, front, is_network(plant))
+        turning = CHAIN_FACTOR if plant.n > 1 else 1.0
+        if is_network(plant):
+            pivots = model.body_pos[model.jnt_bodyid[list(joints)]]
+            way = float(np.linalg.norm(np.ptp(pivots, axis=0)))
+            turning = NETWORK_LENGTH * way / (HINGE_LENGTH * plant.parameters["l"])
         usual = catalogue().get(plant.name)
         if plant.n == 1 and "l" in plant.parameters and usual:  # as large on any rod
             turning = usual.parameters["l"] / plant.parameters["l"]
@@ -372,8 +378,13 @@ def without_number(drawn: Drawn) -> Drawn:
 
 
 def is_network(plant: Plant) -> bool:
-    """Return whether a plant is made of many alike, such as pendulums; a robot is not."""
-    return plant.network and not plant.direct
+    """Return whether a plant is made of many alike, such as pendulums, whose joints have the same
+    name; a robot and a double pendulum are not.
+    """
+    if not plant.network or plant.direct:
+        return False
+    kinds = {name.rpartition("/")[2] for name in channel_names(plant)}
+    return len(kinds) == 1
 
 
 def mean_trace(trace: Trace) -> Trace:

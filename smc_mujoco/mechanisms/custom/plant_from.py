@@ -63,7 +63,7 @@ if TYPE_CHECKING:
 
 WITHOUT_MODEL = "give model='none' and a law that reads no model"
 SET_POINT = f"u is the set-point of a servo, and a nominal u is a force: {WITHOUT_MODEL}"
-EMPTY_NAMES = "scene", "model", "robot"  # of files, which say nothing about the machine
+EMPTY_NAMES = "scene", "model", "robot"  # of files, or their first words: they say nothing
 UNNAMED_MODEL = "mujoco_model"  # MuJoCo's name of a model without one, as `_name` writes it
 # dynamics of an actuator whose state changes even at ctrl = 0
 UNMEASURED = {
@@ -364,7 +364,8 @@ def _name(source: ModelSource, title: str) -> str:
     of its model or its folder if the file's says nothing.
     """
     file = source.name.removesuffix(".xml")
-    if source.path and Path(file).stem.lower() in EMPTY_NAMES:
+    first = Path(file).stem.lower().partition("_")[0]
+    if source.path and first in EMPTY_NAMES:
         model = re.sub(r"[\W_]+", "_", title.lower().removesuffix("scene")).strip("_")
         folder = Path(source.path).parent.name
         file = next(filter(_says_something, (model, folder)), file)

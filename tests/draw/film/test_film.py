@@ -27,6 +27,7 @@ from smc_mujoco.draw.film.arrows import (
     scales,
     scales_by_channel,
 )
+from smc_mujoco.draw.film.arrows import frames as arrow_frames
 from smc_mujoco.draw.film.pace import FilmClock
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.draw.film.track import MachineTrack
@@ -407,6 +408,17 @@ def test_a_brief_peak_of_the_mean_does_not_set_the_longest_arrow(peak, samples, 
     scale = found[driven([trace])]
     assert scale.longest == scale.full == pytest.approx(longest)
     assert key([trace], found) == [f"→ mean u {words}"]
+
+
+def test_each_joint_of_a_double_pendulum_has_its_own_arrow():
+    """A shoulder and an elbow are not alike: their mean says nothing."""
+    run = smc.Scenario(plant="double_pendulum", law=smc.law("pid"), duration=0.2)
+    trace = smc.run(run)
+    found = scales([trace])
+    assert key([trace], found)[0].startswith("→ u ")
+    sizes = scales_by_channel(found)
+    drawn = arrow_frames(trace, np.array([0.0, 0.05]), np.zeros(1), sizes, "#112233")
+    assert {channel for channel, _ in drawn[0].arrows} == {0, 1}
 
 
 def test_behind_a_drive_the_force_is_shown_and_the_command_pale():

@@ -252,9 +252,10 @@ def test_a_file_whose_name_says_nothing_has_that_of_its_model_or_folder(tmp_path
     </worldbody><actuator><motor joint="j" ctrlrange="-1 1"/></actuator></mujoco>"""
     folder = tmp_path / "big_arm"
     folder.mkdir()
-    for file in ("scene.xml", "lift.xml"):
+    for file in ("scene.xml", "scene_right.xml", "lift.xml"):
         (folder / file).write_text(text)
     assert smc.plant_from(folder / "scene.xml", ["j"]).name == name
+    assert smc.plant_from(folder / "scene_right.xml", ["j"]).name == name
     assert smc.plant_from(folder / "lift.xml", ["j"]).name == "lift"
 
 
