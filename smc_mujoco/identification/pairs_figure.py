@@ -72,8 +72,8 @@ def pairs_figure(
                 alpha=0.25,
                 lw=0.0,
             )
-        ax.set_xlabel("speed (rad/s)")
-        ax.set_ylabel("torque (N·m)")
+        ax.set_xlabel("speed (rad/s or m/s)")
+        ax.set_ylabel("torque (N·m or N)")
         ax.set_title(title)
         pages.set_head(page, style.FULL_WIDTH, "Friction from speed and torque", handles)
         pages.write(page, paths)

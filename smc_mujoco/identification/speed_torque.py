@@ -170,7 +170,7 @@ class FrictionFound:
 
         forces = {model: fit.force for model, fit in self.fits.items()}
         best = self.best
-        title = f"rms {best.rms:.3g} N·m, held out {best.held_out:.3g} N·m, R² {best.r2:.3f}"
+        title = f"rms {best.rms:.3g}, held out {best.held_out:.3g}, R² {best.r2:.3f}"
         return pairs_figure(self.pairs, forces, best.model, best.force_error, title, path)
 
     def __str__(self) -> str:
