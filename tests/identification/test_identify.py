@@ -197,7 +197,7 @@ def test_parameters_that_cannot_be_told_apart_are_named(swung):
         (
             "servo_axis",
             None,
-            "no number of servo_axis is named: name some with --for.* M, b, cf, offset",
+            "no number of servo_axis is named. There are M, b, cf, offset.* give names=",
         ),
         (3, None, "cannot identify 3: give a plant"),
     ],
