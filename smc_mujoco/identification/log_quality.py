@@ -1,5 +1,5 @@
 """What makes any number found from a log doubtful: samples that stick out, a motion of few steps of
-its sensor, a rate at which commands may be missing, and an integral that is not in it.
+its sensor, and a rate at which commands may be missing.
 """
 
 from collections.abc import Sequence
@@ -7,13 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from smc_mujoco.common.aliases import Array, Data
-from smc_mujoco.common.text import joined
 from smc_mujoco.identification import records
 from smc_mujoco.identification.own_rig import OwnRig, moves
 from smc_mujoco.identification.paths import DELAY
 from smc_mujoco.identification.records import Record
-from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
-from smc_mujoco.mechanisms.layout import driven_names
 
 SPIKE = 10.0  # times the noise or the sensor's step: a sample that sticks out by more; chosen
 LARGE_SPIKE = 0.02  # of the motion's deviation; a smaller spike hardly moves a number; chosen
@@ -25,28 +22,13 @@ SAME_PERIOD = 0.02  # of a period, by which a loop's own may differ from the log
 
 def doubts(rig: OwnRig, data: Sequence[Data]) -> list[str]:
     """Return sentences on what is doubtful in logs."""
-    said = _integrals(rig)
+    said = []
     for record in map(rig.checked, data):
         said += _slow(rig, records.step_of(record[rig.columns.time]))
         for name, unit in zip(rig.columns.x, rig.plant.units, strict=True):
             said += _spikes(record, name, rig.columns.time, unit)
             said += _small(record[name], name, unit)
     return list(dict.fromkeys(said))
-
-
-def _integrals(rig: OwnRig) -> list[str]:
-    """Return a sentence on servos whose integral a log does not have."""
-    joints = []
-    for joint, motor in zip(driven_names(rig.plant), rig.drives().drive_train.motors, strict=True):
-        if isinstance(motor, PositionServo) and motor.ki:
-            joints.append(repr(joint))
-    if not joints:
-        return []
-    return [
-        f"the integral of the servo of {joined(joints)} is not in the log, and is taken as 0 where "
-        "each piece of 1 s begins: numbers may be far off, and what the model seems to lack may be "
-        "this; record a log with ki=0"
-    ]
 
 
 def _slow(rig: OwnRig, period: float) -> list[str]:

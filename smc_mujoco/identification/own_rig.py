@@ -31,6 +31,8 @@ from smc_mujoco.identification.paths import (
 )
 from smc_mujoco.identification.records import Columns, Record
 from smc_mujoco.identification.rig import RecordPart, Rig, Source, Values
+from smc_mujoco.mechanisms.hardware.part import Actuator
+from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
 from smc_mujoco.mechanisms.layout import channel_names, column_ends, driven_names
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.scenario import Scenario
@@ -152,6 +154,11 @@ class OwnRig(Rig):
         plain = super().part(record, start, duration, closed)
         data = self.checked(record)
         period = self.step(data)
+        hidden = []
+        for i, servo in self.integrators.items():
+            x = data[self.columns.x[i]] - self.zeros[i]
+            integrals = servo.integrals(data[self.columns.inputs[i]], x, period)
+            hidden.append(integrals[self._first(start, period)])
         stride = math.ceil(period / MAX_PERIOD - 1e-9)
         first = self._first(start, period)
         count = round(plain.fields["duration"] / period) + 1
@@ -161,7 +168,7 @@ class OwnRig(Rig):
         commands = np.repeat(padded[first : first + ahead + count], stride, axis=0)
         return LogPart(
             fields=plain.fields,
-            state=plain.state,
+            state=np.concatenate([hidden, plain.state]),
             largest_u=plain.largest_u,
             zero={},
             stride=stride,
@@ -194,6 +201,34 @@ class OwnRig(Rig):
         return np.array(found)
 
     @property
+    def integrators(self) -> dict[int, PositionServo]:
+        """Driven channel -> its servo, where that integrates its error. What it has integrated is
+        in no log: it is a free number of each piece, as velocities are, and starts from the log.
+        """
+        found = {}
+        for i, motor in enumerate(self.base.drive_train.motors):
+            if isinstance(motor, PositionServo) and motor.ki:
+                found[i] = motor
+        return found
+
+    def _integrating(self, parts: Sequence[Actuator], integrals: Array) -> tuple[Actuator, ...]:
+        """Return the actuators with the integrals of their servos, (q,)."""
+        joints = driven_names(self.plant)
+        of_joint = {}
+        for i, integral in zip(self.integrators, integrals.tolist(), strict=True):
+            of_joint[joints[i]] = integral
+        found = []
+        for part in parts:
+            if not isinstance(part, PositionServo) or not part.ki:
+                found.append(part)
+                continue
+            for joint in part.joint_names(self.plant):
+                bound = part.imax or math.inf
+                integral = min(max(of_joint[joint], -bound), bound)
+                found.append(dataclasses.replace(part, on=(joint,), integral=integral))
+        return tuple(found)
+
+    @property
     def zeros(self) -> Array:
         """What the encoders read at 0, (n,)."""
         return self._of_joints(channel_names(self.plant), "zero", 0.0)
@@ -206,7 +241,11 @@ class OwnRig(Rig):
         fields = self.numbers_of(Values(**self.values))
         # the machine has had these commands, whatever its limits are
         fields["plant"] = dataclasses.replace(fields["plant"], limits=(), reach=None)
-        x, v = np.split(np.array(part.state if state is None else state, float), 2)
+        given = np.array(part.state if state is None else state, float)
+        integrals, motion = np.split(given, [len(self.integrators)])
+        if len(integrals):
+            fields["actuator"] = self._integrating(fields["actuator"], integrals)
+        x, v = np.split(motion, 2)
         x = x - self.zeros
         if sensors := fields.get("sensor"):
             plant = fields["plant"]

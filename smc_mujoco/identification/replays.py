@@ -1,11 +1,11 @@
 """Residuals of records and their slopes: what a twin predicts at trial values, in pieces that have
 states of their own.
 
-A piece of a record is replayed from positions and velocities at its start. These are free numbers
-of the search, one set for each piece (multiple shooting), because a few samples give them too
-poorly. They enter almost linearly, so each step of the search moves them by linear least squares,
-and only the quantities remain. Source: H. G. Bock, "Recent advances in parameter identification
-techniques for ODE", 1983.
+A piece of a record is replayed from positions and velocities at its start, and from what servos
+have integrated by then. These are free numbers of the search, one set for each piece (multiple
+shooting), because a few samples give them too poorly. They enter almost linearly, so each step of
+the search moves them by linear least squares, and only the quantities remain. Source: H. G. Bock,
+"Recent advances in parameter identification techniques for ODE", 1983.
 
 MuJoCo's steps are of first order where there is dry friction or a motor, and their error biases the
 quantities by many standard errors. So replays of measured open loops are corrected by what short
@@ -186,9 +186,9 @@ class Replays:
         self.low = np.array(low) / self.scales
         self.high = np.array(high) / self.scales
         n = len(twin.columns.x)
-        self.free = np.arange(2 * n)
+        self.free = np.arange(len(twin.integrators) + 2 * n)
         if closed:  # the controller has read the first positions as they were measured
-            self.free = self.free[n:]
+            self.free = self.free[-n:]
         forgotten = closed and twin.score_from > twin.start
         if twin.columns.state or twin.dynamics is not None or forgotten:
             self.free = np.zeros(0, int)
@@ -223,8 +223,8 @@ class Replays:
         return self.pieces[k].part
 
     def state(self, point: Point, k: int) -> Array | None:
-        """Return positions and velocities at the start of piece k, (2n,); None if they are not
-        free.
+        """Return integrals of servos, positions and velocities at the start of piece k, (q + 2n,);
+        None if they are not free.
         """
         if not len(self.free):
             return None
@@ -237,7 +237,7 @@ class Replays:
         n = len(self.twin.columns.x)
         states = point.states.copy()
         for k, piece in enumerate(self.pieces):
-            states[k, -n:] = -self._part(k).state[n:] / piece.scales[-n:]
+            states[k, -n:] = -self._part(k).state[-n:] / piece.scales[-n:]
         return Point(point.values, states)
 
     def residuals(self, points: Sequence[Point]) -> list[list[Array]]:
@@ -404,7 +404,11 @@ class Replays:
         ends = np.linspace(first, last, count + 1).round().astype(int)
         x = [data[name] for name in twin.columns.x]
         rates = [records.rate(column, period) for column in x]
-        varied = np.array([column.std() or 1.0 for column in (*x, *rates)])
+        varied = []
+        for joint, servo in twin.integrators.items():  # by its force
+            varied.append(servo.kp / servo.ki * (x[joint].std() or 1.0))
+        for column in (*x, *rates):
+            varied.append(column.std() or 1.0)
         names = [*twin.columns.x]
         skipped = 0
         if self.closed:
@@ -420,7 +424,7 @@ class Replays:
             measured = {}
             for name in names:
                 measured[name] = data[name][first + skipped : last + 1]
-            scales = STATE_SCALE * varied[self.free]
+            scales = STATE_SCALE * np.array(varied)[self.free]
             pieces.append(Piece(i, part, skipped, measured, spread, scales))
         return pieces
 

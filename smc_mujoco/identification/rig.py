@@ -79,7 +79,8 @@ class RecordPart:
     """What a replay takes from a record, whatever the quantities of the rig."""
 
     fields: Data  # of the replay's Scenario: law, duration, signals
-    state: Array  # measured positions and velocities at the start, (2n,)
+    # integrals of servos, positions and velocities at the start, (q + 2n,), see `Rig.integrators`
+    state: Array
     largest_u: float  # of the recorded command, in the unit of u
     zero: Numbers  # quantities that the record determines, see `Rig.zero`
     stride: int = 1  # control periods of the replay for each sample of the record
@@ -269,6 +270,13 @@ class Rig:
             f"the record of {self.name} lasts {lasts:.3g} s, too short to {what} it: "
             f"give at least {samples * period:.3g} s"
         )
+
+    @property
+    def integrators(self) -> Mapping[int, Any]:
+        """Driven channel -> its servo, where that integrates its error; none of a published
+        machine.
+        """
+        return {}
 
     def repeated(
         self, part: RecordPart, rounded: bool = False, state: Array | None = None, **changes: Any

@@ -142,7 +142,7 @@ def log(
 def servo_log(
     xml: str, truth: Mapping[str, float], t: np.ndarray, u: np.ndarray, seed: int = 0
 ) -> dict[str, np.ndarray]:
-    """Return a log of the joint j1, whose `<position>` gets set-points u, (K,) as t."""
+    """Return a log of the joint j1, whose `<position>` or `<pid>` gets set-points u, (K,) as t."""
     model = compiled(xml, split(truth, ["j1"]), {})
     data = mujoco.MjData(model)
     rng = np.random.default_rng(seed)
@@ -150,11 +150,13 @@ def servo_log(
     quantum = 2.0 * np.pi / 8192.0
     data.qpos[0] = u[0]
     x = np.zeros(len(t))
-    for k, set_point in enumerate(u):
+    late = round(truth.get("input_delay", 0.0) / STEP)
+    for k in range(len(u)):
         y = data.qpos[0] + 2e-4 * rng.standard_normal()
         x[k] = quantum * np.floor(y / quantum + 0.5)
-        data.ctrl[0] = set_point
-        mujoco.mj_step(model, data, every)
+        for step in range(k * every, (k + 1) * every):
+            data.ctrl[0] = u[max(step - late, 0) // every]
+            mujoco.mj_step(model, data)
     return {"t": t, "x": x, "u": u}
 
 

@@ -72,14 +72,3 @@ def test_a_log_that_may_lack_commands_is_told_unless_its_loop_is_known_to_be_as_
     assert 'say so by --condition "loop: control_period=0.01"' in sentence
     known = smc.Scenario(plant=rig.plant, law="none", control_period=0.01)
     assert not log_quality.doubts(own_rig(known, ["input_delay"]), [slow])
-
-
-@pytest.mark.parametrize(("ki", "told"), [(5.0, True), (0.0, False)])
-def test_an_integral_that_no_log_has_is_told(ki, told):
-    pid = f'<pid joint="j1" kp="20" kv="1" ki="{ki}" imax="1"/>'
-    text = chain([0.4], [1.0]).replace('<motor joint="j1"/>', pid)
-    assert pid in text
-    plant = smc.plant_from(text, {"j1": smc.Channel(servo=True, u_max=3.0)})
-    sentences = said(own_rig(plant, ["j1.damping"]), X)
-    assert bool(sentences) == told
-    assert all("the integral of the servo of 'j1' is not in the log" in one for one in sentences)

@@ -394,6 +394,49 @@ def check_friction_of_servo(rig, log):
     np.testing.assert_allclose(forces[slides, 0], expected, atol=0.06)
 
 
+def pid_log(imax, first):
+    """Return the file of an arm on a `<pid>`, the numbers that it lacks, and a log by MuJoCo alone
+    that begins `first` s after the servo.
+    """
+    pid = f'<pid joint="j1" kp="60" kv="3" ki="40" imax="{imax}"/>'
+    xml = chain([0.5], [0.8]).replace('<motor joint="j1"/>', pid)
+    truth = {"j1.damping": 0.4, "j1.frictionloss": 0.3, "j1.armature": 0.03}
+    truth["input_delay"] = 0.0039
+    t = np.arange(0.0, first + 3.0, 2e-3)
+    u = 0.6 + 0.4 * np.sin(2.5 * t) + 0.2 * np.sin(7.0 * t + 1.0) + 0.1 * np.sin(15.0 * t)
+    log = servo_log(xml, truth, t, u)
+    for name in log:
+        log[name] = log[name][t >= first]
+    return xml, truth, log
+
+
+def test_a_piece_of_a_pid_s_log_begins_with_what_its_servo_has_integrated():
+    """In a replay from 1 s on, by the log up to there; imax holds the integral for a while."""
+    xml, truth, log = pid_log(0.03, 0.0)
+    rig = own_rig(smc.plant_from(xml, {"j1": smc.Channel(servo=True, u_max=3.0)}), list(truth))
+    part = rig.with_values(truth).part(log, 1.0, 1.0)
+    assert 0.005 < abs(part.state[0]) <= 0.03
+    off = []
+    for integral in (part.state[0], 0.0):
+        trace = smc.run(rig.with_values(truth).repeated(part, state=[integral, *part.state[1:]]))
+        off.append(np.abs(trace.x[:: part.stride, 0] - log["x"][500:1001]).max())
+    assert off[0] < 2e-3
+    assert off[1] > 4e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("imax", [1.0, 0.03])
+def test_numbers_behind_a_pid_are_found_from_a_log_that_begins_in_its_course(imax):
+    """Two errors were fixed before. With integrals of 0 the damping was 0, and the delay 13 ms."""
+    xml, truth, log = pid_log(imax, 2.0)
+    arm = smc.plant_from(xml, {"j1": smc.Channel(servo=True, u_max=3.0)})
+    found = smc.identify(arm, log, list(truth))
+    for name, true in truth.items():
+        assert abs(found.values[name] - true) < 2.0 * found.errors[name], name
+        assert found.errors[name] < 0.05 * true, name
+    assert not found.notes
+
+
 def test_a_motor_s_column_that_is_missing_is_named():
     arm = smc.plant_from(TWO, ["j1", "j2"])
     t = np.arange(0.0, 2.0, 2e-3)

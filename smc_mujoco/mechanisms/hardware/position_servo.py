@@ -50,7 +50,7 @@ class PositionServo(Actuator):
     goal at the start. A `Lag` may stand before it. A law has no nominal model of it.
 
     With `ki` or `slewmax` it is MuJoCo's `<pid>`, whose speed set-point stays 0. MuJoCo integrates
-    the error of the position from 0, and the set-point follows the command from the goal.
+    the error of the position from `integral`, and the set-point follows the command from the goal.
 
     Attributes:
       kp: N m/rad (N/m) at the joint, greater than 0.
@@ -65,11 +65,12 @@ class PositionServo(Actuator):
       ki: N m/(rad s) (N/(m s)) at the joint, 0 or more.
       imax: bound on the integral of the error, rad s (m s); 0: none.
       slewmax: bound on the rate of the set-point, rad/s (m/s); 0: none.
+      integral: of the error at the start of a run, rad s (m s).
 
     Raises:
       ScenarioError: `forcerange` does not contain 0 between its ends, a timeconst beside ki or
-        slewmax, or imax without ki or euler without timeconst. In a scenario: another drive of the
-        joint, a Fault other than stuck=True, or a nominal model.
+        slewmax, imax or integral without ki, or euler without timeconst. In a scenario: another
+        drive of the joint, a Fault other than stuck=True, or a nominal model.
     """
 
     unit = "{x}"
@@ -86,6 +87,7 @@ class PositionServo(Actuator):
     imax: Natural = 0.0
     slewmax: Natural = 0.0
     euler: Boolean = False
+    integral: Offset = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -100,7 +102,7 @@ class PositionServo(Actuator):
                 f"PositionServo has timeconst {self.timeconst:g}, and a servo with ki or slewmax "
                 "has no filter: give one of them"
             )
-        for name, of in (("imax", "ki"), ("euler", "timeconst")):
+        for name, of in (("imax", "ki"), ("integral", "ki"), ("euler", "timeconst")):
             if getattr(self, name) and not getattr(self, of):
                 raise ScenarioError(
                     f"PositionServo has {name}, which does nothing without {of}: give {of}, too"
@@ -152,6 +154,17 @@ class PositionServo(Actuator):
     def force_of(self, u: Array, x: Array, v: Array) -> Array:
         aim = np.clip(self.goal + u, *self.ctrlrange)
         return np.clip(self.kp * (aim - x) - self.kv * v, *self.forcerange)
+
+    def integrals(self, u: Array, x: Array, period: float) -> Array:
+        """Return the integral of its error at K samples of u and x, `period` s apart, (K,): from 0
+        at the first one, and within imax.
+        """
+        bound = self.imax or math.inf
+        errors = np.clip(self.goal + u[:-1], *self.ctrlrange) - 0.5 * (x[:-1] + x[1:])
+        found = np.zeros(len(u))
+        for k, error in enumerate(errors.tolist()):
+            found[k + 1] = min(max(found[k] + period * error, -bound), bound)
+        return found
 
     def suits(self, s: Any, chain: Sequence[Actuator]) -> None:
         drives = [part for part in chain if part.drives]
@@ -225,9 +238,12 @@ class PositionServo(Actuator):
         return 0.0 if self.by_pid else self.goal
 
     def begin(self, model: mujoco.MjModel, act: np.ndarray) -> None:
+        ids = self.drive_ids(model)
+        first = model.actuator_actadr[ids]
         if self.slewmax:
-            ids = self.drive_ids(model)
-            act[model.actuator_actadr[ids]] = self.goal
+            act[first] = self.goal
+        if self.ki:  # the last of its activations
+            act[first + model.actuator_actnum[ids] - 1] = self.integral
 
     def numbers(self, run: Run) -> list[Sequence[float]]:
         return [(self.goal, self.step, self.zero)]

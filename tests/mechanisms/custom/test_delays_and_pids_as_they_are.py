@@ -1,5 +1,7 @@
 """Delays, filters and `<pid>`s of a user's file that stay as they are, against MuJoCo's own loop."""
 
+import dataclasses
+
 import mujoco
 import numpy as np
 import pytest
@@ -127,6 +129,24 @@ def test_a_pid_moves_as_that_of_the_file(integrator, left_out):
     assert trace.scenario.efforts == ("rad", "N m")
     plain = by_mujoco(ARM % (SERVO % "", MOTOR % ""), trace, integrator)
     assert np.abs(trace.x - plain).max() > 0.01
+
+
+@pytest.mark.parametrize("slew", ["", 'slewmax="3"'])
+def test_a_pid_goes_on_from_what_it_has_integrated(slew):
+    """In the file's gear of -2."""
+    parts = PID.replace('slewmax="3"', slew), MOTOR % ""
+    plant = arm(*parts)
+    servo = next(part for part in smc.Scenario(plant=plant, law="pid").actuator if part.unit)
+    begun = dataclasses.replace(servo, on=("a",), integral=0.008)
+    trace = run(plant, duration=1.0, integrator="implicitfast", actuator=begun)
+
+    def integrated(model, data):
+        data.act[-1] = -2.0 * 0.008
+        if slew:
+            data.act[0] = -2.0 * GOAL
+
+    x = by_mujoco(ARM % parts, trace, "implicitfast", integrated)
+    np.testing.assert_allclose(trace.x, x, rtol=0, atol=1e-12)
 
 
 LINK = """<mujoco><compiler angle="radian"/><option timestep="2e-3"/><worldbody><body>
@@ -267,7 +287,12 @@ def test_a_filter_that_is_limited_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("given", "needed"), [({"imax": 1.0}, {"ki": 1.0}), ({"euler": True}, {"timeconst": 0.1})]
+    ("given", "needed"),
+    [
+        ({"imax": 1.0}, {"ki": 1.0}),
+        ({"integral": 0.1}, {"ki": 1.0}),
+        ({"euler": True}, {"timeconst": 0.1}),
+    ],
 )
 def test_a_number_of_a_servo_that_does_nothing_alone_is_refused(given, needed):
     with pytest.raises(ScenarioError, match=f"does nothing without {min(needed)}"):
