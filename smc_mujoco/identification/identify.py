@@ -30,7 +30,14 @@ from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
-from smc_mujoco.identification import first_guess, gauss_newton, log_quality, number_text, records
+from smc_mujoco.identification import (
+    first_guess,
+    gauss_newton,
+    log_quality,
+    number_text,
+    records,
+    servo_columns,
+)
 from smc_mujoco.identification.lack_of_fit import LackOfFit, lack_of_fit
 from smc_mujoco.identification.lacking_forces import lacking_forces
 from smc_mujoco.identification.own_rig import (
@@ -337,7 +344,8 @@ def identify(
     fits_before = twin.fits(data)  # also refuses records that are too short
     doubts = []
     if isinstance(twin, OwnRig):
-        doubts = first_guess.doubts(twin, data) + log_quality.doubts(twin, data)
+        doubts = first_guess.doubts(twin, data) + servo_columns.doubts(twin, data)
+        doubts += log_quality.doubts(twin, data)
     expected = _expected_sets(twin, names, most)
     with bar(f"identify {twin.name}", expected, shown=progress) as drawn:
 

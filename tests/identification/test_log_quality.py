@@ -1,11 +1,13 @@
 """What is said of logs whose columns make every number doubtful, before anything is replayed."""
 
+import re
+
 import numpy as np
 import pytest
-from helpers.machine_logs import chain
+from helpers.machine_logs import chain, servo_log
 
 import smc_mujoco as smc
-from smc_mujoco.identification import log_quality
+from smc_mujoco.identification import log_quality, servo_columns
 from smc_mujoco.identification.own_rig import own_rig
 
 T = np.arange(0.0, 4.0, 2e-3)
@@ -72,3 +74,38 @@ def test_a_log_that_may_lack_commands_is_told_unless_its_loop_is_known_to_be_as_
     assert 'say so by --condition "loop: control_period=0.01"' in sentence
     known = smc.Scenario(plant=rig.plant, law="none", control_period=0.01)
     assert not log_quality.doubts(own_rig(known, ["input_delay"]), [slow])
+
+
+@pytest.fixture(scope="module")
+def servo():
+    """An arm on a position servo, and a log of it by MuJoCo alone."""
+    part = '<position joint="j1" kp="60" kv="3" ctrlrange="-1.5 1.5"/>'
+    xml = chain([0.5], [0.8]).replace('<motor joint="j1"/>', part)
+    truth = {"j1.damping": 0.4, "j1.frictionloss": 0.3, "j1.armature": 0.03}
+    log = servo_log(xml, truth, T, 0.1 * np.sin(5.0 * T) + 0.02 * np.sin(40.0 * T))
+    return own_rig(smc.plant_from(xml, {"j1": smc.Channel(servo=True)}), ["j1.damping"]), log
+
+
+def test_a_servo_s_right_log_leaves_no_doubt_also_of_a_joint_that_friction_holds(servo):
+    rig, log = servo
+    held = -5e-3 * np.sin(5.0 * T)
+    for x in (log["x"], held):
+        assert not servo_columns.doubts(rig, [log | {"x": x}])
+
+
+@pytest.mark.parametrize(
+    ("turned", "words"),
+    [
+        ({"x": -1.0}, "x moves against its set-point u: turn the sign"),
+        ({"u": -1.0}, "x moves against its set-point u: turn the sign"),
+        ({"x": 57.3}, "if x is in degrees"),
+        ({"u": 57.3}, "if u is in degrees"),
+        ({"x": 180.0, "u": 180.0}, "x and u reach 2.*if that is in degrees"),
+    ],
+)
+def test_a_servo_s_column_with_another_sign_or_unit_is_named(servo, turned, words):
+    rig, log = servo
+    for name, factor in turned.items():
+        log = log | {name: factor * log[name]}
+    (sentence,) = servo_columns.doubts(rig, [log])
+    assert re.search(words, sentence), sentence
