@@ -18,13 +18,13 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common.aliases import AnyPath, Array, Fields, Floats, Numbers
-from smc_mujoco.common.constraints import Natural, Positive, constrained
+from smc_mujoco.common.constraints import Natural, Positive, Whole, constrained
 from smc_mujoco.common.data import attributes, keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, find, items_of, number, shown
 from smc_mujoco.common.files import as_path, replacing
@@ -62,9 +62,12 @@ BISECTIONS = 10  # of the size of a motion
 AMPLITUDE = {"rad": 0.5, "m": 0.1}  # of a joint, where its range allows it; chosen
 OF_RANGE = 0.9  # of the way to a limit of the joint's range; chosen
 OF_FORCE = 0.7  # of the bound on u, that the motion itself may take; chosen
-SLOPE_STEP = 2e-3  # s, longest physics step for slopes: errors need no more; chosen
+# of slopes and of friction that gives way, and longest step of slopes, s: errors need no more;
+# chosen
+INTEGRATOR, SLOPE_STEP = "implicitfast", 2e-3
 # Typical numbers where the model has 0: of the bound on u, of a joint's inertia, s; chosen
 FRICTION_SHARE, ARMATURE_SHARE, TYPICAL_DELAY = 0.03, 0.2, 0.004
+Counts = Annotated[float, Whole(low=2, high=2**32, infinite=True)]
 SLOW = 0.02  # of the largest speed of a joint: below it the joint counts as at rest; chosen
 FORCE_STRIDE = 10  # samples between those whose forces are computed; chosen
 HOLD, RAMP = 0.6, 0.15  # s, of a stair
@@ -119,9 +122,10 @@ class Excitation:
 
     motions: tuple[ExcitingMotion, ...]
     columns: tuple[str, ...]  # of a file: references of the driven joints
+    assumed: str  # what the errors are expected of: a sentence
 
     def __str__(self) -> str:
-        """Return a line for each motion, and why the last is last."""
+        """Return a line for each motion, why the last is last, and what was assumed."""
         lines = []
         for motion in self.motions:
             errors = []
@@ -140,7 +144,7 @@ class Excitation:
         )
         if second:
             why += f"; {first} and {second} are told apart worst (correlation {correlation:.2f})"
-        return "\n".join([*lines, why])
+        return "\n".join([*lines, why, self.assumed])
 
     def about(self) -> Fields:
         """Return what a log of each motion would tell as JSON data, best first."""
@@ -172,6 +176,7 @@ def excitation(
     duration: Positive = 8.0,
     rate: Positive = 500.0,
     noise: Natural = 2e-4,
+    counts: Counts = 4096,
 ) -> Excitation:
     """Recommend a motion to record, from which numbers of a machine can be told apart.
 
@@ -189,11 +194,14 @@ def excitation(
         3 % of u_max, armature a fifth of the inertia, a delay of 4 ms.
       duration: s, of each motion.
       rate: Hz, of the log.
-      noise: standard deviation of the positions in the log, rad or m.
+      noise: standard deviation of the positions in the log, rad or m, before they are rounded.
+      counts: of the encoders, per revolution of a hinge or per metre of a slide; math.inf for none.
+        The sensor of a scenario counts instead.
 
     Returns:
       The motions, best first, with condition numbers, expected errors and the worst pair. `save`
-      writes the CSV to play.
+      writes the CSV to play. It prints what was assumed: give your own noise, counts, rate and
+      guess, because the errors follow them.
 
     Raises:
       ScenarioError: as `smc.identify` of paths; no motion that the machine can follow.
@@ -213,14 +221,31 @@ def excitation(
     for name, shape in shapes.items():
         size = largest_size(rig, goal, ways[:, None] * shape, 1.0 / rate, forces, v_max)
         moved[name] = goal[:, None] + size * ways[:, None] * shape
-    found = _motions(rig, names, moved, 1.0 / rate, drives, noise)
+    sensor = rig.base.sensor or Encoder(counts=counts)
+    found = _motions(rig, names, moved, 1.0 / rate, drives, (noise, sensor))
     if not found:
         raise ScenarioError(
             f"{plant.name} follows none of {', '.join(shapes)}: give a smaller amplitude"
         )
     ends = column_ends(plant)[: plant.driven]
     ranked = sorted(found, key=lambda motion: motion.mean_share)
-    return Excitation(motions=tuple(ranked), columns=tuple(f"r{end}" for end in ends))
+    columns = tuple(f"r{end}" for end in ends)
+    assumed = _assumed(rig, names, rate, noise, sensor)
+    return Excitation(motions=tuple(ranked), columns=columns, assumed=assumed)
+
+
+def _assumed(rig: OwnRig, names: Sequence[str], rate: float, noise: float, sensor: Any) -> str:
+    """Return a sentence on what the errors are expected of."""
+    values = []
+    for name in names:
+        values.append(f"{name} {rig.values[name]:.3g}")
+    rounding = "the scenario's sensor"
+    if not rig.base.sensor:
+        rounding = f"encoders of {sensor.counts:g} counts"
+    return (
+        f"assumed: {', '.join(values)}; a log of {rate:g} samples a second, noise of {noise:.2g} "
+        f"rad (m), {rounding}"
+    )
 
 
 def largest_forces(drives: Scenario) -> Array:
@@ -375,14 +400,14 @@ def _motions(
     moved: Mapping[str, Array],
     period: float,
     drives: Scenario,
-    noise: float,
+    measured: tuple[float, Any],
 ) -> list[ExcitingMotion]:
     """Return what a log of each motion would tell; without those that the machine does not
-    follow.
+    follow. `measured`: noise, rad or m, and the encoders.
     """
     scenarios = []
     for positions in moved.values():
-        scenarios.append(_played(rig, positions, period, drives, noise))
+        scenarios.append(_played(rig, positions, period, drives, measured))
     found = []
     for (name, positions), trace in zip(moved.items(), run(scenarios), strict=True):
         if not trace.failure:
@@ -406,10 +431,11 @@ def _motions(
 
 
 def _played(
-    rig: OwnRig, positions: Array, period: float, drives: Scenario, noise: float
+    rig: OwnRig, positions: Array, period: float, drives: Scenario, measured: tuple[float, Any]
 ) -> Scenario:
     """Return the run of a motion of the driven joints, (driven, K)."""
     plant = rig.plant
+    noise, sensor = measured
     times = (period * np.arange(positions.shape[1])).tolist()
     start = list(plant.rest or (0.0,) * plant.n)
     start[: plant.driven] = positions[:, 0].tolist()
@@ -425,7 +451,7 @@ def _played(
         "control_period": period,
         "x0": tuple(start),
         "noise": Noise(position=noise),
-        "sensor": rig.base.sensor or Encoder(),
+        "sensor": sensor,
         "u_max": drives.limits,
     }
     step = period / math.ceil(period / RUN_STEP - 1e-9)
@@ -476,14 +502,15 @@ def _told(rig: OwnRig, names: list[str], trace: Trace) -> dict[str, Any]:
     replays = Replays(rig, names, data, False)
     control = replays.rig(replays.start).repeated(replays.pieces[0].part).control_period  # pyright: ignore[reportArgumentType]
     true = Point(replays.start.values, _of_run(replays, rig, trace))
-    replays.steps = {"physics_step": control / math.ceil(control / SLOPE_STEP - 1e-9)}
+    step = control / math.ceil(control / SLOPE_STEP - 1e-9)
+    replays.steps = {"integrator": INTEGRATOR, "physics_step": step}
     slopes = replays.slopes(true, central=False)
     check_told_apart(replays, slopes)
     replays.steps = {}
     (residuals,) = replays.residuals([true])
     slopes = dataclasses.replace(slopes, residuals=residuals)
     solved, changes = gauss_newton.extrapolated(replays, slopes)
-    may_lack = lack_of_fit(solved, presliding(replays, solved))
+    may_lack = lack_of_fit(solved, presliding(replays, solved, INTEGRATOR))
     by_model = np.hypot(gauss_newton.moves(solved, changes), may_lack.moved)
     errors, correlations, _ = statistics(replays, solved, by_model)
     for name, error in errors.items():

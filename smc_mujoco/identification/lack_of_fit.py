@@ -103,14 +103,15 @@ def _unseen(slopes: Slopes, lacks: Sequence[Lack], p: int) -> Array:
     most of any, by UNSEEN deviations or those that it has, and at most as far as it does.
     """
     most = np.zeros(p)
-    giving = [lack for lack in lacks if lack.gives_way]
-    for lack in giving:
-        either = dataclasses.replace(lack, gives_way=False)
-        (share,) = _shares(slopes, [either])
+    giving = []
+    for lack in lacks:
+        if lack.gives_way:
+            giving.append(dataclasses.replace(lack, gives_way=False))
+    for lack, share in zip(giving, _shares(slopes, giving), strict=True):
         if not share.deviations:
             continue
-        wider, move = _with(slopes, either, p)
-        size = float(wider.point.values[-1])
+        _, step, move = _wider(slopes, lack, p)
+        size = float(step[-1])
         may_be = max(UNSEEN * abs(size) / share.deviations, size)
         most = np.maximum(most, np.abs(move / size) * min(may_be, 1.0))
     return most
@@ -166,15 +167,25 @@ def _with(slopes: Slopes, lack: Lack, p: int) -> tuple[Slopes, Array]:
     """Return the slopes at the least squares with a lack as a further number, and how far it moves
     the first p numbers, (p,).
     """
+    wider, step, move = _wider(slopes, lack, p)
+    return wider.stepped(step), move
+
+
+def _wider(slopes: Slopes, lack: Lack, p: int) -> tuple[Slopes, Array, Array]:
+    """Return the slopes with a lack as a further number, the step to the least squares, and how
+    far it moves the first p numbers, (p,).
+    """
     r = slopes.freed_residuals
-    before = least_squares(slopes.freed_slopes, -r)
+    J = slopes.freed_slopes
+    before = least_squares(J, -r)
     columns = []
-    for J, change in zip(slopes.by_values, lack.changes, strict=True):
-        columns.append(np.column_stack([J, change]))
+    for by_values, change in zip(slopes.by_values, lack.changes, strict=True):
+        columns.append(np.column_stack([by_values, change]))
     point = Point(np.append(slopes.point.values, 0.0), slopes.point.states)
     wider = dataclasses.replace(slopes, point=point, by_values=columns)
-    step = least_squares(wider.freed_slopes, -r)
+    change = np.concatenate(slopes.freed(lack.changes))
+    step = least_squares(np.column_stack([J, change]), -r)
     move = step[:p] - before[:p]
     if lack.gives_way:  # at most as it does
         move = move / max(abs(step[-1]), 1.0)
-    return wider.stepped(step), move
+    return wider, step, move

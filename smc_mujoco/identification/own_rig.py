@@ -257,12 +257,12 @@ class OwnRig(Rig):
                     unrounded.append(dataclasses.replace(sensor, counts=math.inf))
                 fields["sensor"] = tuple(unrounded)
         u = self.command(part)
-        times = (part.period * np.arange(len(u))).tolist()
-        references = [TimeSeries(times, column.tolist()) for column in u.T]
+        times = part.period * np.arange(len(u))
+        references = [TimeSeries(times, column) for column in u.T]
         replayed: Fields = {
             "law": as_recorded(),
             "reference": tuple(references),
-            "duration": times[-1],
+            "duration": float(times[-1]),
             "control_period": part.period,
             "u_max": math.inf,
             "x0": tuple(x),

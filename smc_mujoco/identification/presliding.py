@@ -52,8 +52,11 @@ class PreslidingFields:
         model.opt.noslip_iterations = 0  # a number, which no Field can write
 
 
-def presliding(replays: Replays, slopes: Slopes) -> list[Lack]:
-    """Return the ways in which dry friction may give way in the logs, as what the model lacks."""
+def presliding(replays: Replays, slopes: Slopes, integrator: str | None = None) -> list[Lack]:
+    """Return the ways in which dry friction may give way in the logs, as what the model lacks.
+
+    `integrator`: of the replays; None for that of each scenario.
+    """
     rig = replays.rig(slopes.point)
     if not isinstance(rig, OwnRig) or not rig.plant.rubs:
         return []
@@ -62,6 +65,8 @@ def presliding(replays: Replays, slopes: Slopes) -> list[Lack]:
     trial = copy.copy(replays)
     control = rig.repeated(replays.pieces[0].part).control_period  # pyright: ignore[reportArgumentType]
     trial.steps = {"physics_step": control / math.ceil(control / RUN_STEP - 1e-9)}
+    if integrator is not None:
+        trial.steps["integrator"] = integrator
     (holding,) = trial.residuals([slopes.point])
     found = []
     for way, yielding in _ways(rig).items():

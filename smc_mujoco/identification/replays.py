@@ -90,18 +90,28 @@ class Slopes:
         """Return rows of each piece, (N,) or (N, p), without the part that states at its start can
         cause.
         """
-        pairs = zip(self.by_states, rows, strict=True)
         freed = []
-        for S, row in pairs:
-            freed.append(row - S @ least_squares(S, row, SINGULAR_RATIO))
+        for basis, row in zip(self._bases, rows, strict=True):
+            freed.append(row - basis @ (basis.T @ row))
         return freed
 
-    @property
+    @cached_property
+    def _bases(self) -> list[Array]:
+        """What states at the start can cause in each piece, as orthonormal columns, (N, at most
+        s).
+        """
+        bases = []
+        for S in self.by_states:
+            left, sizes, _ = np.linalg.svd(S, full_matrices=False)
+            bases.append(left[:, sizes > SINGULAR_RATIO * sizes.max(initial=0.0)])
+        return bases
+
+    @cached_property
     def freed_slopes(self) -> Array:
         """The derivatives by the quantities, `freed`, of all pieces, (all N, p)."""
         return np.concatenate(self.freed(self.by_values))
 
-    @property
+    @cached_property
     def freed_residuals(self) -> Array:
         """The residuals, `freed`, of all pieces, (all N,)."""
         return np.concatenate(self.freed(self.residuals))

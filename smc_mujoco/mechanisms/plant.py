@@ -262,7 +262,7 @@ class Plant:
     @property
     def is_user_model(self) -> bool:
         """Whether it is a user's model, not one of the library."""
-        return hasattr(self.build, "argument")
+        return hasattr(type(self.build), "argument")  # no value is made
 
     @property
     def has_path(self) -> bool:

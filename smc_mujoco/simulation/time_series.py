@@ -244,6 +244,9 @@ class Waypoints(TimeSeries):
 def _floats(what: str, items: object) -> Floats:
     """Return a user's sequence of finite numbers as floats."""
     if isinstance(items, np.ndarray):
+        plain = items.dtype == float and items.ndim == 1 and len(items) <= MAX_POINTS
+        if plain and np.isfinite(items).all():
+            return tuple(items.tolist())
         items = items.tolist()
     if not isinstance(items, Iterable) or isinstance(items, str | bytes | dict | set):
         raise ScenarioError(f"{what} are {shown(items)}: give a sequence of numbers")

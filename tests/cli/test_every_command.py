@@ -89,7 +89,9 @@ CALLS = {
         "analysis.chattering.chattering"
     ],
     "excitation arm.xml --for m,input_delay --u-max 5 --v-max 2 --amplitude 0.3 --duration 4 "
-    "--rate 250 --out m.csv --json e.json": ["identification.excitation.excitation"],
+    "--rate 250 --noise 1e-4 --counts 8192 --out m.csv --json e.json": [
+        "identification.excitation.excitation"
+    ],
     "export pid.c": ["exchange.c.export_c.law_to_c"],
     "export pid there.c --gains kp=50 --type float --joints 2": ["exchange.c.export_c.law_to_c"],
     "export pid.fmu": ["exchange.fmu.export_fmu.law_to_fmu"],

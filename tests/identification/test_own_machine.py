@@ -543,6 +543,16 @@ def test_a_chirp_is_recommended_and_a_staircase_is_last_because_it_rests(arm, tm
         assert len(file.readlines()) == 1501
 
 
+def test_expected_errors_follow_the_encoder_and_the_noise_which_are_said(arm):
+    fields = {"u_max": 5.0, "duration": 2.0, "rate": 250.0}
+    coarse = smc.design.excitation(arm, ["j1.damping"], noise=0.0, counts=1024, **fields)
+    fine = smc.design.excitation(arm, ["j1.damping"], noise=0.0, counts=2**17, **fields)
+    noisy = smc.design.excitation(arm, ["j1.damping"], noise=1e-3, counts=2**17, **fields)
+    assert "noise of 0 rad (m), encoders of 131072 counts" in str(fine)
+    for other in (coarse, noisy):
+        assert other.motions[0].mean_share > 1.5 * fine.motions[0].mean_share
+
+
 @pytest.mark.slow
 def test_the_motion_that_the_command_writes_is_read_back_with_its_log(tmp_path):
     """The log here is columns x_j1 and u_j1 beside t and r, which `identify` takes as they are."""

@@ -91,6 +91,12 @@ Amplitude = Annotated[
 ]
 MotionDuration = Annotated[float, typer.Option(help="Duration of each motion, s.")]
 Rate = Annotated[float, typer.Option(help="Samples a second of the log.")]
+LogNoise = Annotated[
+    float, typer.Option(help="Standard deviation of the log's positions, rad or m.")
+]
+LogCounts = Annotated[
+    float, typer.Option(help="Counts of the encoders, per revolution or per metre; inf for none.")
+]
 MotionFile = Annotated[
     Path | None, typer.Option(help="CSV file of the best motion: t, and r or r_JOINT.")
 ]
@@ -216,6 +222,8 @@ def excitation(
     amplitude: Amplitude = None,
     duration: MotionDuration = 8.0,
     rate: Rate = 500.0,
+    noise: LogNoise = 2e-4,
+    counts: LogCounts = 4096,
     out: MotionFile = None,
     json: options.Json = None,
 ) -> None:
@@ -241,6 +249,8 @@ def excitation(
         amplitude=amplitude,
         duration=duration,
         rate=rate,
+        noise=noise,
+        counts=counts,
     )
     terminal.note(str(motions), wrap=True)
     if out:
