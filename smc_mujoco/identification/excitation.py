@@ -509,9 +509,9 @@ def _told(rig: OwnRig, names: list[str], trace: Trace) -> dict[str, Any]:
     replays.steps = {}
     (residuals,) = replays.residuals([true])
     slopes = dataclasses.replace(slopes, residuals=residuals)
-    solved, changes = gauss_newton.extrapolated(replays, slopes)
+    solved, by_steps = gauss_newton.extrapolated(replays, slopes)
     may_lack = lack_of_fit(solved, presliding(replays, solved, INTEGRATOR))
-    by_model = np.hypot(gauss_newton.moves(solved, changes), may_lack.moved)
+    by_model = np.hypot(by_steps, may_lack.moved)
     errors, correlations, _ = statistics(replays, solved, by_model)
     for name, error in errors.items():
         if math.isnan(error):

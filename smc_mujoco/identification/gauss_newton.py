@@ -5,14 +5,14 @@ of ten. So further starts are drawn evenly in their logarithms, and no step chan
 by more than a factor of ten.
 """
 
+import copy
 import dataclasses
-import itertools
 
 import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.identification.least_squares import least_squares
-from smc_mujoco.identification.replays import Point, Replays, Slopes, cost
+from smc_mujoco.identification.replays import PARTS, Point, Replays, Slopes, cost
 from smc_mujoco.identification.standard_errors import jackknife
 
 START_DECADES = 2.0  # by which a quantity of a further start may differ from the rig's own; chosen
@@ -24,10 +24,15 @@ TRIALS = len(DAMPINGS) * (len(SHARES) + 1)  # points that a step tries
 # scales of a state at the start, by which it may differ from the measured one; chosen
 MAX_STATE = 100.0
 # scales of velocity by which starts differ from which a piece's own is fitted; chosen
-KICKS = 0.0, -4.0, 4.0
+KICKS = -4.0, 4.0
+# percent: fit of a piece beyond which it is not fitted from there; chosen
+GOOD_PIECE = 99.5
 MAX_FACTOR = 10.0  # by which a step may change a quantity that cannot be negative; chosen
 NEGLIGIBLE_VALUE = 1e-4  # of its scale: below it such a quantity may become 0; chosen
-COST_TOLERANCE = 1e-5  # relative change of the cost at which the search ends; chosen
+# relative changes of the cost at which a search ends, if what it reaches is the solution, if more
+# steps follow, and with extrapolated replays, which cost six times as much; chosen
+COST_TOLERANCE, SMALL_CHANGE, LAST_CHANGE = 1e-5, 0.01, 0.1
+KEPT_PROMISE = 0.5  # of the decrease that derivatives promise: less calls for damping; chosen
 ROUGH_STEPS = 8  # steps from each start before the best is chosen; chosen
 CORRECTED_STEPS = 3  # steps after the first halving of the physics step; chosen
 MAX_HALVINGS = 5  # of the physics step in corrected replays; chosen
@@ -35,20 +40,26 @@ NEGLIGIBLE_MOVE = 0.5  # of a standard error, by which a halving may move a quan
 GOOD_FIT = 97.0  # percent: fit of the pieces beyond which a start needs no rival; chosen
 
 
-def search(replays: Replays, starts: int, seed: int, most: int) -> Slopes:
-    """Return the slopes at the least squares near the best of several starts, the rig's own values
-    first.
+def search(
+    replays: Replays, first: Slopes, starts: int, seed: int, most: int, tolerance: float
+) -> Slopes:
+    """Return the slopes at the least squares near the best of several starts, that of the `first`
+    slopes before others.
 
     Further starts, of which the random ones have a `seed`, are only tried while none fits well.
-    `most`: largest number of steps from the best start.
+    `most`: largest number of steps from the best start. `tolerance`: as of `refine`.
     """
-    reached = [refine(replays, replays.start, min(most, ROUGH_STEPS))]
-    if reached[-1].fit < GOOD_FIT and starts > 1:
+    if starts == 1:
+        return refine(replays, first, most, tolerance)
+    reached = [refine(replays, first, min(most, ROUGH_STEPS), tolerance)]
+    if reached[-1].fit < GOOD_FIT:
         for point in _random(replays, starts - 1, seed):
-            reached.append(refine(replays, point, min(most, ROUGH_STEPS)))
+            slopes = replays.slopes(point)
+            reached.append(refine(replays, slopes, min(most, ROUGH_STEPS), tolerance))
             if reached[-1].fit > GOOD_FIT:
                 break
-    return refine(replays, min(reached, key=lambda slopes: slopes.cost).point, most)
+    best = min(reached, key=lambda slopes: slopes.cost)
+    return refine(replays, best, most, tolerance)
 
 
 def _random(replays: Replays, count: int, seed: int) -> list[Point]:
@@ -73,33 +84,53 @@ def better(replays: Replays, *points: Point) -> Point:
     return points[replays.costs(points).sum(axis=1).argmin()]
 
 
-def extrapolated(replays: Replays, slopes: Slopes) -> tuple[Slopes, list[Array]]:
+def extrapolated(replays: Replays, slopes: Slopes, most: int = 0) -> tuple[Slopes, Array]:
     """Return the solution near slopes for replays whose steps are extrapolated to 0, and about how
-    far that is off in the residuals of each piece, (N,).
+    far it is off by them, (p,).
 
-    Errors by steps h are of first order, so 2 x(h/2) - x(h) has none of them; what it changes from
-    h to h/2 is what it may be off. If the replays with steps h fit better, as they fit a log of a
-    simulation with such steps, their solution is returned, and what shorter steps would change.
+    Errors by steps h are of first order, so 2 x(h/2) - x(h) has none of them. What it changes from
+    h to h/2 is what it may be off: the most of that at the slopes and at the solution. If the
+    replays with steps h fit better, as they fit a log of a simulation with such steps, their
+    solution is returned, and what shorter steps would change. After at most `most` steps, of which
+    extrapolated ones keep the derivatives of the slopes, the last one follows from derivatives
+    alone.
     """
     if not replays.free.size:  # records of simulated runs have the same steps
-        return slopes, [np.zeros(len(r)) for r in slopes.residuals]
-    plain = replays.rig(slopes.point).repeated(replays._part(0))
-    steps = replays.steps
-    rows = [slopes.residuals]
-    for parts in (2.0, 4.0):
-        replays.steps = {"physics_step": plain.resolved.physics_step / parts}
-        rows += replays.residuals([slopes.point])
-    replays.steps = steps
+        return refine(replays, slopes, most), np.zeros(len(slopes.point.values))
+    ends, by_half, by_quarter = _without_steps(replays, slopes, slopes.residuals)
+    if _solved(replays, slopes).cost < _solved(replays, ends).cost:
+        return _solved(replays, refine(replays, slopes, most)), _moves(slopes, by_half)
+    moved = _moves(slopes, by_quarter)
+    replays.limit = True
+    for _ in range(most):
+        after = _best_step(replays, ends)
+        change = 1.0 - after.cost / ends.cost
+        if change > 0.0:
+            ends = after
+        if change < LAST_CHANGE:
+            break
+    replays.limit = False
+    if most:
+        (full,) = replays.residuals([ends.point])
+        ends, _, by_quarter = _without_steps(replays, ends, full)
+        moved = np.maximum(moved, _moves(slopes, by_quarter))
+    return _solved(replays, ends), moved
+
+
+def _without_steps(
+    replays: Replays, slopes: Slopes, full: list[Array]
+) -> tuple[Slopes, list[Array], list[Array]]:
+    """Return slopes with residuals that are extrapolated to steps of 0, and about what that changes
+    in the residuals of each piece, (N,), from half steps and from quarters. `full`: those of whole
+    steps.
+    """
+    (half,), (quarter,) = replays.by_steps([slopes.point], PARTS)
     residuals, by_half, by_quarter = [], [], []
-    for full, half, quarter in zip(*rows, strict=True):
-        residuals.append(2.0 * quarter - half)
-        by_half.append(2.0 * (half - full))
-        by_quarter.append(2.0 * (quarter - half) - (half - full))
-    before = _solved(replays, slopes)
-    after = _solved(replays, dataclasses.replace(slopes, residuals=residuals))
-    if before.cost < after.cost:
-        return before, by_half
-    return after, by_quarter
+    for whole, halved, quartered in zip(full, half, quarter, strict=True):
+        residuals.append(2.0 * quartered - halved)
+        by_half.append(2.0 * (halved - whole))
+        by_quarter.append(2.0 * (quartered - halved) - (halved - whole))
+    return dataclasses.replace(slopes, residuals=residuals), by_half, by_quarter
 
 
 def _solved(replays: Replays, slopes: Slopes) -> Slopes:
@@ -107,7 +138,7 @@ def _solved(replays: Replays, slopes: Slopes) -> Slopes:
     return slopes.stepped(_moved(replays, slopes, 0.0) - slopes.point.values)
 
 
-def moves(slopes: Slopes, changes: list[Array]) -> Array:
+def _moves(slopes: Slopes, changes: list[Array]) -> Array:
     """Return how far changes of the residuals of each piece, (N,), move the solution, (p,)."""
     return np.abs(least_squares(slopes.freed_slopes, np.concatenate(slopes.freed(changes))))
 
@@ -123,7 +154,7 @@ def accurate(replays: Replays, slopes: Slopes) -> tuple[Slopes, Array]:
     moved = np.zeros(len(replays.names))
     if not replays.correct(slopes.point, 1):
         return slopes, moved
-    slopes = replays.sharpened(refine(replays, slopes.point, CORRECTED_STEPS))
+    slopes = replays.sharpened(refine(replays, replays.slopes(slopes.point), CORRECTED_STEPS))
     for halvings in range(2, MAX_HALVINGS + 1):
         before = slopes
         replays.correct(before.point, halvings)
@@ -141,66 +172,87 @@ def not_worse(replays: Replays, reached: Slopes) -> Slopes:
     first = replays.slopes(replays.start)
     if reached.cost <= cost(first.freed(first.residuals)):
         return reached
-    return min(reached, refine(replays, first.point, ROUGH_STEPS), key=lambda slopes: slopes.cost)
+    return min(reached, refine(replays, first, ROUGH_STEPS), key=lambda slopes: slopes.cost)
 
 
-def refine(replays: Replays, point: Point, most: int) -> Slopes:
-    """Return the slopes at the least squares near a point, after at most `most` steps that lower
-    the cost.
+def refine(
+    replays: Replays, slopes: Slopes, most: int, tolerance: float = COST_TOLERANCE
+) -> Slopes:
+    """Return the slopes at the least squares near others, after at most `most` steps that lower the
+    cost, until one lowers it by less than the share `tolerance`.
+
+    Derivatives of the last steps, which change little, are those of the step before.
     """
-    best = replays.slopes(point)
     for _ in range(most):
-        chosen, reached = _best_step(replays, best)
-        if not reached < best.cost:
+        after = _best_step(replays, slopes)
+        gain = slopes.cost - after.cost
+        if not gain > 0.0:
             break
-        after = replays.slopes(chosen)
-        gain = best.cost - after.cost
-        best = after
-        if gain < COST_TOLERANCE * best.cost:
+        change = gain / slopes.cost
+        slopes = after if change < SMALL_CHANGE else replays.slopes(after.point)
+        if change < tolerance:
             break
-    return best
+    return slopes
 
 
 def fit_starts(replays: Replays, most: int) -> Slopes:
     """Return the slopes of replays without quantities, in which the states at the starts of pieces
     are fitted.
 
-    A joint that dry friction holds at a start has no slope there. So each piece is fitted from
-    several velocities, and keeps the best.
+    A joint that dry friction holds at a start has no slope there. So a piece that does not fit well
+    is also fitted from other velocities, and keeps the best.
     """
-    if not len(replays.free):
-        return refine(replays, replays.start, most)
-    n = len(replays.twin.columns.x)
-    reached = []
-    for velocity in KICKS:
-        states = replays.start.states.copy()
-        states[:, -n:] += velocity
-        reached.append(refine(replays, Point(replays.start.values, states), most).point)
-    best = replays.costs(reached).argmin(axis=0)
-    states = []
-    for k, i in enumerate(best):
-        states.append(reached[i].states[k])
-    return refine(replays, Point(replays.start.values, np.array(states)), most)
+    reached = refine(replays, replays.slopes(replays.start), most, SMALL_CHANGE)
+    residuals = list(reached.residuals)
+    allowed = (1.0 - GOOD_PIECE / 100.0) ** 2 * reached.columns * reached.records
+    samples = sum(map(len, residuals))
+    hard = []
+    for k, r in enumerate(residuals):
+        if len(replays.free) and cost([r]) > allowed * len(r) / samples:
+            hard.append(k)
+    trial = copy.copy(replays)
+    trial.pieces = [replays.pieces[k] for k in hard]
+    states = reached.point.states.copy()
+    for velocity in KICKS if hard else ():
+        kicked = trial.start
+        kicked.states[:, -len(replays.twin.columns.x) :] += velocity
+        other = refine(trial, trial.slopes(kicked), most, SMALL_CHANGE)
+        for i, k in enumerate(hard):
+            if cost([other.residuals[i]]) < cost([residuals[k]]):
+                residuals[k] = other.residuals[i]
+                states[k] = other.point.states[i]
+    point = Point(reached.point.values, states)
+    return dataclasses.replace(reached, point=point, residuals=residuals)
 
 
-def _best_step(replays: Replays, slopes: Slopes) -> tuple[Point, float]:
-    """Return the best of several damped steps, and its cost.
+def _best_step(replays: Replays, slopes: Slopes) -> Slopes:
+    """Return what a damped step reaches, with the derivatives before it: the first of several that
+    keeps its promise, or the best.
 
     Each piece chooses the best move of its own states.
     """
-    groups = []
-    dampings = DAMPINGS if len(slopes.point.values) else DAMPINGS[:1]
-    for damping in dampings:
-        groups.append(_variants(replays, slopes, _moved(replays, slopes, damping)))
-    costs = replays.costs(list(itertools.chain(*groups)))
     reached = []
-    for group, of_group in zip(groups, np.split(costs, len(groups)), strict=True):
-        states = []
-        for k, best in enumerate(of_group.argmin(axis=0)):
-            states.append(group[best].states[k])
-        total = float(of_group.min(axis=0).sum())
-        reached.append((Point(group[0].values, np.array(states)), total))
-    return min(reached, key=lambda pair: pair[1])
+    for damping in DAMPINGS if len(slopes.point.values) else DAMPINGS[:1]:
+        values = _moved(replays, slopes, damping)
+        reached.append(_chosen(replays, slopes, _variants(replays, slopes, values)))
+        step = values - slopes.point.values
+        promised = cost([slopes.freed_residuals + slopes.freed_slopes @ step])
+        if slopes.cost - reached[-1].cost > KEPT_PROMISE * (slopes.cost - promised):
+            break
+    return min(reached, key=lambda slopes: slopes.cost)
+
+
+def _chosen(replays: Replays, slopes: Slopes, points: list[Point]) -> Slopes:
+    """Return slopes at the best of points for each piece, with the derivatives of others."""
+    tried = replays.residuals(points)
+    residuals = []
+    states = []
+    for k in range(len(replays.pieces)):
+        best = min(range(len(points)), key=lambda i: cost([tried[i][k]]))
+        residuals.append(tried[best][k])
+        states.append(points[best].states[k])
+    point = Point(points[0].values, np.array(states))
+    return dataclasses.replace(slopes, point=point, residuals=residuals)
 
 
 def _variants(replays: Replays, slopes: Slopes, values: Array) -> list[Point]:

@@ -581,18 +581,20 @@ def _solved(
     if doubts and first.fit < 0.0:
         raise ScenarioError(doubts[0])
     check_told_apart(pieces, first)
-    reached = gauss_newton.search(pieces, starts, seed, most)
+    extrapolates = twin.controller is None and not corrected
+    tolerance = gauss_newton.SMALL_CHANGE if extrapolates else gauss_newton.COST_TOLERANCE
+    reached = gauss_newton.search(pieces, first, starts, seed, most, tolerance)
     if twin.controller is None:
         if not corrected:
-            slopes, changes = gauss_newton.extrapolated(pieces, reached)
-            return pieces, slopes, gauss_newton.moves(slopes, changes)
+            return pieces, *gauss_newton.extrapolated(pieces, reached, most)
         slopes, moved = gauss_newton.accurate(pieces, reached)
         return pieces, gauss_newton.not_worse(pieces, slopes), moved
     closed = Replays(twin, names, data, True, report)
     points = [closed.start, Point(reached.point.values, closed.start.states)]
     if len(closed.free):  # a record may begin at rest with a jump of the command
         points += list(map(closed.at_rest, points))
-    slopes = gauss_newton.refine(closed, gauss_newton.better(closed, *points), most)
+    begin = closed.slopes(gauss_newton.better(closed, *points))
+    slopes = gauss_newton.refine(closed, begin, most)
     closed.evaluations += pieces.evaluations
     return closed, slopes, np.zeros(len(names))
 

@@ -39,6 +39,7 @@ from smc_mujoco.simulation.trace import Trace
 DIFFERENCE_STEP = 2e-3
 # scale of a state at the start, relative to the standard deviation of its column or rate; chosen
 STATE_SCALE = 0.05
+PARTS = 2.0, 4.0  # of a step, by which replays are extrapolated to steps of 0
 MAX_STEP = 2.5e-4  # s, of RK4 in corrected replays; chosen
 # of that step, for slopes: with dry friction they err by 5 % then, and by up to 45 % before; chosen
 SLOPE_HALVINGS = 2
@@ -206,6 +207,7 @@ class Replays:
         # integrator and step of replays; none for the scenario's own
         self.steps: Fields = {}
         self.corrections: list[Record] | None = None  # of each piece; None for none
+        self.limit = False  # whether residuals are extrapolated to steps of 0
         self.pieces: list[Piece] = []
         for i in range(len(data)):
             self.pieces += self._pieces(i)
@@ -252,6 +254,26 @@ class Replays:
 
     def residuals(self, points: Sequence[Point]) -> list[list[Array]]:
         """Return the residuals of each piece, (N,), at each point. All replays are one batch."""
+        if not self.limit:
+            return self._residuals(points)
+        extrapolated = []
+        for halves, quarters in zip(*self.by_steps(points, PARTS), strict=True):
+            pairs = zip(halves, quarters, strict=True)
+            extrapolated.append([2.0 * quarter - half for half, quarter in pairs])
+        return extrapolated
+
+    def by_steps(self, points: Sequence[Point], parts: Sequence[float]) -> list[list[list[Array]]]:
+        """Return `residuals` with each of some parts of the physics step."""
+        plain = self.rig(points[0]).repeated(self._part(0))
+        steps = self.steps
+        found = []
+        for part in parts:
+            self.steps = {"physics_step": plain.resolved.physics_step / part}
+            found.append(self._residuals(points))
+        self.steps = steps
+        return found
+
+    def _residuals(self, points: Sequence[Point]) -> list[list[Array]]:
         relative = []
         for by_piece in self.predicted(points):
             relative.append(list(map(self.relative, self.pieces, by_piece)))

@@ -60,6 +60,7 @@ class Curve(Replays):
 
         self.steps = {}
         self.corrections = None
+        self.limit = False
         self.closed = False
         self.report = lambda count: None
         self.twin = SimpleNamespace(dynamics=None, columns=SimpleNamespace(state=(), x=("y",)))
@@ -170,7 +171,7 @@ def test_moves_of_the_states_are_what_the_quantities_leave():
 
 def test_a_search_reaches_least_squares_and_tries_no_rival_of_a_good_start():
     curve = Curve(noise=0.002)
-    found = gauss_newton.search(curve, 4, 0, 30)
+    found = gauss_newton.search(curve, curve.slopes(curve.start), 4, 0, 30, 1e-5)
     rows = np.vstack([block(k, part) for k, part in enumerate(curve.parts)])
     y = np.concatenate([piece.measured["y"] for piece in curve.pieces]) / SPREAD
     exact = np.linalg.lstsq(-rows, y, rcond=None)[0]
@@ -178,7 +179,7 @@ def test_a_search_reaches_least_squares_and_tries_no_rival_of_a_good_start():
     np.testing.assert_allclose(found.point.states.ravel(), exact[2:], atol=1e-6)
     assert found.fit > gauss_newton.GOOD_FIT
     assert curve.evaluations < 80
-    none = gauss_newton.refine(curve, curve.start, 0)
+    none = gauss_newton.refine(curve, curve.slopes(curve.start), 0)
     assert none.point is not found.point
     np.testing.assert_array_equal(none.point.values, curve.start.values)
 
@@ -211,7 +212,7 @@ def test_a_solution_that_is_worse_than_the_start_is_not_kept():
 
 def test_a_jackknife_leaves_out_one_block_after_the_other():
     curve = Curve(noise=0.05)
-    slopes = gauss_newton.refine(curve, curve.start, 5)
+    slopes = gauss_newton.refine(curve, curve.slopes(curve.start), 5)
     parts = math.ceil(standard_errors._blocks(slopes) / 3)
     rows = np.vstack([block(k, part) for k, part in enumerate(curve.parts)])
     y = np.concatenate(slopes.residuals)
@@ -349,7 +350,7 @@ def test_replays_are_corrected_by_what_two_step_sizes_leave():
 
 def test_a_corrected_search_ends_when_a_halving_moves_nothing():
     curve = Curve(noise=0.002)
-    reached = gauss_newton.search(curve, 1, 0, 30)
+    reached = gauss_newton.search(curve, curve.slopes(curve.start), 1, 0, 30, 1e-5)
     ideal, moved = gauss_newton.accurate(curve, reached)
     assert ideal is reached
     assert moved.tolist() == [0.0, 0.0]
