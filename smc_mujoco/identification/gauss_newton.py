@@ -17,10 +17,10 @@ from smc_mujoco.identification.standard_errors import jackknife
 
 START_DECADES = 2.0  # by which a quantity of a further start may differ from the rig's own; chosen
 CANDIDATES = 8  # further starts that are drawn for each one that is refined; chosen
-DAMPINGS = 0.0, 1e-2, 1.0, 1e3  # of steps that are tried at once, relative to the curvature; chosen
+DAMPINGS = 0.0, 1e-2, 1.0, 1e3  # of steps that are tried in turn, relative to the curvature; chosen
 # of its linear move by which a piece's starting state is moved in trials; chosen
 SHARES = 0.3, 1.0
-TRIALS = len(DAMPINGS) * (len(SHARES) + 1)  # points that a step tries
+TRIALS = len(SHARES) + 1  # points that a step tries with each damping
 # scales of a state at the start, by which it may differ from the measured one; chosen
 MAX_STATE = 100.0
 # scales of velocity by which starts differ from which a piece's own is fitted; chosen

@@ -75,6 +75,7 @@ class Curve(Replays):
         plain = SimpleNamespace(
             realistic=self.lag > 0.0,
             control_period=1e-3,
+            resolved=SimpleNamespace(physics_step=1e-3),
             input_delay=0.0,
             friction=(),
         )
@@ -98,6 +99,48 @@ class Curve(Replays):
 
     def at_rest(self, point):
         return Point(point.values, 0.0 * point.states)
+
+
+class Bent(Curve):
+    """A curve that bends with a, and whose steps of 1 ms err."""
+
+    def _replayed(self, rigs, points, fields):
+        step = fields.get("physics_step", 1e-3)
+        self.replayed.append((step, len(points)))
+        every = []
+        for one in points:
+            a, b = one.values
+            columns = []
+            for k, part in enumerate(self.parts):
+                bent = curves(T[part]) @ [a + 0.2 * (a - TRUE[0]) ** 2, b] + one.states[k]
+                columns.append({"y": bent + 300.0 * step * a * T[part]})
+            every.append(columns)
+        return every
+
+
+class Held(Curve):
+    """Pieces without quantities, each an offset, whose states up to 2 change nothing."""
+
+    def __init__(self):
+        super().__init__(start=())
+        self.names = []
+        self.low = self.high = np.zeros(0)
+        self.pieces = [
+            Piece(0, None, 0, {"y": np.full(100, y)}, {"y": SPREAD}, np.ones(1))
+            for y in (0.0, 1.0, -0.5)
+        ]
+
+    @property
+    def start(self):
+        return Point(np.zeros(0), np.zeros((len(self.pieces), 1)))
+
+    def _replayed(self, rigs, points, fields):
+        self.replayed.append(len(self.pieces))
+        every = []
+        for one in points:
+            offsets = np.sign(one.states[:, 0]) * np.maximum(np.abs(one.states[:, 0]) - 2.0, 0.0)
+            every.append([{"y": np.full(100, offset)} for offset in offsets])
+        return every
 
 
 def block(k, rows):
@@ -359,6 +402,29 @@ def test_a_corrected_search_ends_when_a_halving_moves_nothing():
     assert (moved <= 0.5 * np.sqrt(np.diag(standard_errors.jackknife(slopes)))).all()
     np.testing.assert_allclose(slopes.point.values, reached.point.values, atol=2e-4)
     assert curve.replayed[-1]["physics_step"] == 2.5e-4  # residuals with the first step, corrected
+
+
+def test_replays_are_solved_for_steps_of_0_with_the_slopes_of_longer_ones():
+    curve = Bent()
+    reached = gauss_newton.search(curve, curve.slopes(curve.start), 1, 0, 30, 1e-5)
+    assert abs(reached.point.values[1] - TRUE[1]) > 0.1  # by the error of the steps
+    curve.replayed.clear()
+    found, moved = gauss_newton.extrapolated(curve, reached, 30)
+    np.testing.assert_allclose(found.point.values, TRUE, atol=1e-4)
+    assert (moved < 1e-3).all()
+    assert max(count for _, count in curve.replayed) == len(gauss_newton.SHARES) + 1
+    once, _ = gauss_newton.extrapolated(curve, reached)
+    assert abs(once.point.values[1] - TRUE[1]) > 5e-4  # one step of derivatives is not enough
+
+
+def test_a_piece_that_is_held_at_its_start_is_fitted_from_other_velocities():
+    curve = Held()
+    found = gauss_newton.fit_starts(curve, 12)
+    np.testing.assert_allclose(found.point.states.ravel(), [0.0, 3.0, -2.5], atol=1e-6)
+    assert found.cost < 1e-12
+    after = curve.replayed.index(2)
+    assert set(curve.replayed[:after]) == {3}
+    assert set(curve.replayed[after:]) == {2}
 
 
 def test_a_record_is_cut_into_pieces_of_its_window():
