@@ -104,10 +104,9 @@ def extrapolated(replays: Replays, slopes: Slopes, most: int = 0) -> tuple[Slope
     replays.limit = True
     for _ in range(most):
         after = _best_step(replays, ends)
-        change = 1.0 - after.cost / ends.cost
-        if change > 0.0:
-            ends = after
-        if change < LAST_CHANGE:
+        enough = after.cost >= (1.0 - LAST_CHANGE) * ends.cost
+        ends = min(after, ends, key=lambda slopes: slopes.cost)
+        if enough:
             break
     replays.limit = False
     if most:

@@ -112,8 +112,10 @@ class Bent(Curve):
             a, b = one.values
             columns = []
             for k, part in enumerate(self.parts):
-                bent = curves(T[part]) @ [a + 0.2 * (a - TRUE[0]) ** 2, b] + one.states[k]
-                columns.append({"y": bent + 300.0 * step * a * T[part]})
+                bent = curves(T[part]) @ [a + (a - TRUE[0]) ** 3, b] + one.states[k]
+                columns.append(
+                    {"y": bent + 300.0 * step * (curves(T[part])[:, 0] + np.sqrt(T[part]))}
+                )
             every.append(columns)
         return every
 
@@ -407,14 +409,14 @@ def test_a_corrected_search_ends_when_a_halving_moves_nothing():
 def test_replays_are_solved_for_steps_of_0_with_the_slopes_of_longer_ones():
     curve = Bent()
     reached = gauss_newton.search(curve, curve.slopes(curve.start), 1, 0, 30, 1e-5)
-    assert abs(reached.point.values[1] - TRUE[1]) > 0.1  # by the error of the steps
+    assert abs(reached.point.values[0] - TRUE[0]) > 0.1  # by the error of the steps
     curve.replayed.clear()
     found, moved = gauss_newton.extrapolated(curve, reached, 30)
-    np.testing.assert_allclose(found.point.values, TRUE, atol=1e-4)
+    np.testing.assert_allclose(found.point.values, TRUE, atol=1e-5)
     assert (moved < 1e-3).all()
     assert max(count for _, count in curve.replayed) == len(gauss_newton.SHARES) + 1
     once, _ = gauss_newton.extrapolated(curve, reached)
-    assert abs(once.point.values[1] - TRUE[1]) > 5e-4  # one step of derivatives is not enough
+    assert abs(once.point.values[0] - TRUE[0]) > 5e-3  # one step of derivatives is not enough
 
 
 def test_a_piece_that_is_held_at_its_start_is_fitted_from_other_velocities():
