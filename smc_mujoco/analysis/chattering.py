@@ -110,6 +110,19 @@ class Chattering:
     def __bool__(self) -> bool:
         return not math.isnan(self.frequency)
 
+    def __str__(self) -> str:
+        if self:
+            said = (
+                f"Limit cycle predicted: {self.frequency:.3g} Hz, with amplitudes "
+                f"{self.amplitude:.3g} of s, {self.amplitude_x:.3g} of x and "
+                f"{self.amplitude_u:.3g} of u."
+            )
+        else:
+            said = "No limit cycle predicted."
+        if self.assumptions:
+            said += f" Note: {'; '.join(self.assumptions)}."
+        return said
+
     @property
     def uncertainty(self) -> float:
         """Largest relative distance of an end of the ranges from what is predicted; inf where only
@@ -129,7 +142,8 @@ def chattering(
 ) -> Chattering:
     """Predict the limit cycle about rest of one driven channel.
 
-        print(smc.design.chattering("super_twisting", plant="duffing", input_delay=2e-3))
+        law = smc.law("super_twisting")
+        print(smc.design.chattering(law, plant="duffing", input_delay=2e-3))
 
     Args:
       law: a Scenario; or a law, with the other fields of a Scenario by name.
@@ -137,8 +151,9 @@ def chattering(
       fields: of the Scenario, such as plant, actuator, input_delay, control_period.
 
     Returns:
-      The stable limit cycle. If there are several, the fastest, and of equally fast ones the
-      smallest. `assumptions` says if there are others.
+      The stable limit cycle; its numbers are NaN, and it is false, if none is predicted. If there
+      are several, the fastest, and of equally fast ones the smallest. `assumptions` says if there
+      are others.
 
     Raises:
       ScenarioError: a law that does not compile, a channel that is not driven, or as Scenario.

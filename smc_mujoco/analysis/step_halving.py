@@ -146,7 +146,7 @@ def step_halving(
 ) -> list[StepChange]:
     """Return how the limit cycle of each run changes in its `repetitions`.
 
-        trace = smc.run(smc.Scenario(plant="duffing", law="classical", duration=1.0))
+        trace = smc.run(smc.Scenario(plant="duffing", law=smc.law("classical"), duration=1.0))
         print(smc.accuracy.step_halving([trace]))
 
     Args:
@@ -155,7 +155,8 @@ def step_halving(
       threads: as in `run`.
 
     Returns:
-      A list of `StepChange`, one for each trace, which prints as a table.
+      A list of `StepChange`, one for each trace: relative changes of amplitude and frequency, 0
+      also if no run has a limit cycle.
     """
     traces = items_of("traces", traces)
     for trace in traces:

@@ -56,7 +56,7 @@ def law(
         smc.law("pid", kp=30.0)          # the other gains are its defaults
         smc.law("pid", plant="duffing")  # the gains that searches found for this plant
 
-    `smc.law(...).named("slow")` gives it another name.
+    `smc.law(...).named("slow")` gives it another name, and `smc.law("pid").gains` are its gains.
 
     Args:
       text: the name of a law of the library, such as "pid"; a name with gains, such as

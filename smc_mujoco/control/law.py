@@ -132,12 +132,15 @@ def law_function(
             s = y.de + gains.c * y.e
             return -gains.k * np.sign(s), s
 
-    `y` is the measurement of one joint: y.e is the error, rad or m, y.de its rate, y.x and y.v
-    position and velocity, y.dt the control period; `help(smc_mujoco.control.measurement)` has more.
+    `y` is the measurement of one joint: y.e = x - r is the error, rad or m, y.de = v - r' its rate,
+    y.x and y.v position and velocity, y.dt the control period;
+    `help(smc_mujoco.control.measurement)` has more. (The "error" of
+    `smc.exchange.law_from_control` has the other sign, r - x.)
     A helper that the law calls needs @numba.njit above its def, or the law runs in slow Python.
 
     Args:
-      gains: name -> default value, or a Gain with unit and range. `smc.tune` needs the units.
+      gains: name -> default value, or a Gain with unit and range. `smc.tune` needs the units. Gain
+        and units, such as FORCE and RATE, are in `smc_mujoco.control.units`.
       memory: floats of memory per channel. Default: 8.
       positive, nonnegative: names of gains that must be greater than 0, or at least 0. A Gain can
         state this itself.

@@ -1,6 +1,6 @@
 """Plants as gymnasium environments.
 
-    environment = gymnasium.make("smc_mujoco:Duffing-v0", task="track")
+    environment = gymnasium.make("smc_mujoco:smc/Duffing-v0", task="track")
 
 An observation is one array of positions and velocities, and for `track` also r, r', r''. An action
 is the command of the driven channels, divided by their limits. An episode is truncated at the
@@ -57,7 +57,9 @@ class PlantEnv(Episode, gymnasium.Env):
     ):
         """Make a plant with one of its tasks.
 
-        `changes`: Scenario field -> value, of `episode.FIELDS`.
+        `changes`: Scenario field -> value. The fields are duration, control_period, physics_step,
+        integrator, u_max, x0, v0, reference, mismatch, friction, contact, mechanism and actuator.
+        An environment has no input_delay, noise, sensor or disturbance.
         """
         super().__init__(Setting(plant, task, changes, flies=self.flies))
         if render_mode is not None:

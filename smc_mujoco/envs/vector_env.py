@@ -1,7 +1,7 @@
 """Many copies of a plant as one gymnasium.vector.VectorEnv: all of them step in one MuJoCo Batch,
 on all cores.
 
-    environments = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=1024)
+    environments = gymnasium.make_vec("smc_mujoco:smc/Duffing-v0", num_envs=1024)
 
 Copy i moves like the single environment with seed + i, to 1e-12. After the end of an episode a copy
 begins the next one in the next step, which ignores the action, as gymnasium's own vector

@@ -55,7 +55,7 @@ class Policy(Uncompiled):
     reference: bool  # whether r, r' and r'' are at the end of the observation
     units: str  # of the action, one of UNITS
 
-    why = "is a policy, which is Python: several times slower than a law that compiles"
+    why = "is Python code that does not compile"
 
     @property
     def __name__(self) -> str:

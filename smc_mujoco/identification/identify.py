@@ -308,11 +308,13 @@ def identify(
 
     Args:
       machine: your own machine as a plant, or as a scenario whose parts have numbers to find, such
-        as a friction; or the name of either's plant, as "arm.xml:shoulder+elbow". Or a rig or its
-        name, see `smc.rigs()`.
+        as a friction (with law="none"); or the name of either's plant, as "arm.xml:shoulder+elbow".
+        Or a rig or its name, see `smc.rigs()`.
       logs: one log or several, of any controller, at 40 Hz or more: the path of a CSV or npz file,
-        a data frame, columns by name, or traces. A log has t in s, and x (rad or m) and u (in the
-        unit of the machine's command) of the joint, or x_JOINT and u_JOINT of each.
+        a data frame, columns by name, or traces. Of a trace x is what its encoder reads, with the
+        noise; in a file of `Trace.export` it is the true position. A log has t in s, and x (rad or
+        m) and u (in the unit of the machine's command) of the joint, or x_JOINT and u_JOINT of
+        each.
       names: paths of the numbers: "shoulder.damping", .frictionloss,
         .armature, .stiffness, .gain, .offset, .zero, "input_delay", "m", "friction.elbow.kc". None:
         the rig's `free`. No start is needed: it comes from least squares of forces.

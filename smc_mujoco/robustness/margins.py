@@ -384,7 +384,8 @@ def margins(
 ) -> list[Margin]:
     """Return the margins of laws on plants: plant by plant, law by law, kind by kind.
 
-        print(smc.margins("duffing", "pid", kinds="delay", gains="default", quick=True))
+        for margin in smc.margins("duffing", "classical", kinds="delay", quick=True):
+            print(margin.kind, margin.text, margin.unit)
 
     Args:
       plants, laws: names, or your own plants and laws, one or several.
@@ -406,7 +407,8 @@ def margins(
         MuJoCo's.
 
     Returns:
-      A list of `Margin`, which prints as a table.
+      A list of `Margin`: `value` in `unit`, nan where even the unchanged run fails; `text` says it
+      in words.
 
     Raises:
       ScenarioError: an unknown plant, law, kind, set or condition, or a plant that starts at 0.

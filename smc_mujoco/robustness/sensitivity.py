@@ -74,7 +74,7 @@ COUNTS = (2.0**11, 2.0**15)
 FRICTION_SHARE = 1 / 20  # of the force of the weakest drive: of the default class, chosen
 KEY = (
     "Alone: first-order index. With others: total index, 0 if the axis changes nothing. Below: 95 "
-    "% intervals. A run also fails if it ends beyond 5 % of its scale."
+    "% intervals."
 )
 HEADINGS = "axis", "from", "to", "alone", "with others", "more is"
 
@@ -111,11 +111,15 @@ class Sensitivity(Tables, SobolResult):
             f"The {self.label} of 90 % of {n} runs is {self.text(low)} to {self.text(high)}; "
             f"{self.unscored} runs have none, and count as the worst.",
             f"First: {self._first}.",
-            f"Failed: {_rate(share_interval(float(self.failed.mean()), n))}.",
+            f"Failed: {_rate(share_interval(float(self.failed.mean()), n))}; a run also fails if "
+            "it ends beyond 5 % of its scale.",
         ]
         for region in self.regions:
             rates = f"{_rate(region.rate)}, elsewhere {_rate(region.outside)}"
-            lines.append(f"Failed where {_words(self.space, region.cuts)}: {rates}.")
+            lines.append(
+                f"Failed where {_words(self.space, region.cuts)}: {rates}, of the runs that did "
+                "not choose these bounds."
+            )
         if self.failed.any() and not self.regions:
             lines.append("No bounds on one or two axes tell where runs fail.")
         if half := self.improvement:
@@ -137,7 +141,7 @@ class Sensitivity(Tables, SobolResult):
         if any(axis.total.high > first.total.low for axis in others):
             return "open, as intervals overlap (give more points)"
         share = _percent(first.total)
-        return f"{in_words(first.name)}, {share.text} % ({share.below} %)"
+        return f"{in_words(first.name)}, {share.text} % ({share.below} %) with others"
 
     @property
     def tables(self) -> list[Tabular]:
@@ -203,7 +207,7 @@ def sensitivity(
 ) -> Sensitivity:
     """Find which uncertainties explain a law's score, and where its runs fail.
 
-        scenario = smc.Scenario(plant="duffing", law="pid", duration=1.0)
+        scenario = smc.Scenario(plant="duffing", law=smc.law("pid"), duration=1.0)
         within = smc.Uncertainty(mass=(0.8, 1.2), delay=(0.0, 2e-3))
         print(smc.sensitivity(scenario, within, points=8))
 
@@ -224,8 +228,8 @@ def sensitivity(
       device: of the fast engine, "cpu", or "cuda" for any number of runs.
 
     Returns:
-      A `Sensitivity`: indices by axis, the share of failures, and where they are; it prints as
-      tables.
+      A `Sensitivity`: indices by axis, the share of failures, and where they are. It prints as
+      sentences; `tables` has the indices.
 
     Raises:
       ScenarioError: a class that the plant cannot have, an unknown metric, points that are no power

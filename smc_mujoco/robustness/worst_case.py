@@ -206,7 +206,7 @@ def worst_case(
 ) -> WorstCase:
     """Search for the worst run of a scenario within a class of uncertainty, and return it.
 
-        scenario = smc.Scenario(plant="duffing", law="pid", duration=1.0)
+        scenario = smc.Scenario(plant="duffing", law=smc.law("pid"), duration=1.0)
         print(smc.worst_case(scenario, within=smc.Uncertainty(disturbance=0.5), budget=8))
 
     Where there are very many runs the fast engine makes most of them. The worst run that is
@@ -217,7 +217,8 @@ def worst_case(
         parameters. Or several, such as a rig's parameter sets: the first is the nominal one, and
         the adversary chooses.
       metric: name of any metric; more is worse. In metrics of u a run that has not arrived is the
-        worst. Default: the rms error from a quarter of the run on.
+        worst. "peak" is the largest |x| of the whole run, also at its start. Default: the rms
+        error from a quarter of the run on.
       within: the class, such as smc.Uncertainty(disturbance=2.0, mass=(0.7, 1.3)). Default: what
         the plant declares as `uncertain`, such as an arm's payload, or else disturbances up to a
         sixth of the force of the weakest drive; and friction within 50 %.

@@ -213,7 +213,10 @@ def condition(name: str, **fields: Any) -> Condition:
         smc.condition("dry", friction=smc.Coulomb(0.05), noise=smc.Noise(position=1e-3))
 
     In its place these functions, as the commands, take its text, or the path of a text file with
-    one condition a line, as `Identified.save` writes it.
+    one condition a line, as `Identified.save` writes it. They take the names of
+    the suite's conditions, too, such as noise, sine, step, delay_10ms, light, heavy, jump_hard,
+    period_20ms, friction, coulomb, stiction, lag_20ms, dc_motor, backlash, encoder, contact and
+    fault; `list(smc_mujoco.simulation.conditions.NAMED)` has all.
 
     Args:
       name: its name in tables and figures; not a name of the suite.

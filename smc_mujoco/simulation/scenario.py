@@ -66,10 +66,11 @@ class Scenario:
 
     Attributes:
       plant: a Plant or the name of one.
-      law: a Law (`smc.law(name, **gains)` or your own), or the name of one. To give each driven
-        channel its own, give a list in the channels' order, or a mapping from the joints' names;
-        u_max and reference take these forms, too. Default of all three: what the plant's channels
-        suggest, see `smc.Channel`.
+      law: a Law (`smc.law(name, **gains)` or your own), or the name of one. A name has the gains
+        that are shipped for the plant, or else the law's defaults; `smc.law(name)` always has the
+        defaults. To give each driven channel its own, give a list in the channels' order, or a
+        mapping from the joints' names; u_max and reference take these forms, too. Default of all
+        three: what the plant's channels suggest, see `smc.Channel`.
       model: what the law may know of the plant: "none", or its "nominal" f and g, for x'' = f + g
         u. Default: "nominal" for a law that requires it, else "none". "true" is for controls, as no
         controller knows it: f and g of the true parameters, with the forces of disturbances,
@@ -109,7 +110,8 @@ class Scenario:
       jump: a change of the true plant's parameters, or of numbers of parts, in mid-run, or None.
       fault: a Fault of one or all actuators in mid-run: less gain, a bias, or stuck. Or None.
       tracks: "position", or "speed" for a speed loop: then x' is scored and drawn against r', so
-        that settling time, overshoot and bounds are of the speed. The law reads the same.
+        that settling time, overshoot and bounds are of the speed. The law reads the same. A speed
+        of 3 rad/s is `smc.signals.Ramp(3.0)`; a Step of the position asks for the speed 0.
       seed: of every random number of the run, 0 .. 2^53 - 1.
       integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation,
         also behind a Lag, a RateLimit or a DCMotor, with `exact_friction`, and for your own model;

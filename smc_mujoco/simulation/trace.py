@@ -333,9 +333,10 @@ class Trace:
 
         CSV: a header line with units, "t [s]", "x [rad]", ..., then a line per sample, with the
         fewest digits that identify each number (0.1, not 0.10000000000000001), and nan after a
-        failure. Parquet: the `columns`; the metadata of each column has its "unit", and that of the
-        schema the "scenario", as JSON. MAT: the arrays by name, (K + 1, n), a struct `units` with
-        the unit of each ("m, rad" if channels differ), and `scenario`.
+        failure. x and v are the true ones, not what a sensor read. Parquet: the `columns`; the
+        metadata of each column has its "unit", and that of the schema the "scenario", as JSON. MAT:
+        the arrays by name, (K + 1, n), a struct `units` with the unit of each ("m, rad" if channels
+        differ), and `scenario`.
 
         Raises:
           ScenarioError: the name has another ending.
@@ -458,7 +459,7 @@ def from_log(scenario: Scenario, log: Array, failed_step: int, failure: str | No
 def load(path: AnyPath) -> Trace:
     """Return the trace in a file that `Trace.save` wrote.
 
-        smc.run(smc.Scenario(plant="duffing", law="pid", duration=1.0)).save("run.npz")
+        smc.run(smc.Scenario(plant="duffing", law=smc.law("pid"), duration=1.0)).save("run.npz")
         trace = smc.load("run.npz")
 
     Returns:

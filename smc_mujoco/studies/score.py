@@ -40,7 +40,15 @@ def score(
 
     Metrics that compare channels are for networks only. For a cart with a pole, times and
     percentages of the motion are the worse of the two; metrics with a unit of length are the
-    cart's.
+    cart's. Some of the metrics:
+
+    - settling_time in s from t = 0, also if the reference steps later; rise_time in s, from 10 % to
+      90 % of the way; overshoot in % of the scale, the larger of the first error and r's range;
+    - peak (of x), steady_error, ultimate_bound, rms_error in rad or m; iae, ise, itae;
+    - max_u, tv (sum of |changes of u|), tv_rate, energy (integral of u^2) of the command;
+    - chattering_amplitude of s, and chattering_frequency in Hz.
+
+    `smc.score(trace)` has all names, and `help(smc_mujoco.metrics.catalogue)` all definitions.
 
     Args:
       runs: a Trace; or any number of scenarios, also from a generator.
@@ -52,9 +60,10 @@ def score(
 
     Returns:
       Of a trace name -> value. Of scenarios a Table, a row a scenario: the metrics are null where a
-      run failed, and `diverged_at` is its time, s. MuJoCo repeats 20 runs that it did
-      not make itself; the Table says how far apart the scores are, and why a card could not run
-      some.
+      run failed, and `diverged_at` is its time, s. A time is inf for "never", such as a
+      settling_time; a metric is nan where it has no value, such as chattering without a limit
+      cycle. MuJoCo repeats 20 runs that it did not make itself; the Table says how far apart the
+      scores are, and why a card could not run some.
 
     Raises:
       ScenarioError: the trace diverged, failed or holds NaN; not a scenario, an unknown metric, or

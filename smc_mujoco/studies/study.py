@@ -203,9 +203,11 @@ def study(
         table = smc.study(smc.grid("duffing", ["pid", "adrc"], seeds=4, duration=1.0), "study")
         print(table)
 
-    Rows are in the order of the scenarios; equal scenarios have one row. Finished runs are stored
-    in out/parts, some seconds of work in each file. If a study was killed, or filled the disk,
-    start it again with the same arguments: it continues, and ends with the same file, bit for bit.
+    Scenarios that `dataclasses.replace` changed have lost their condition's name: give it again, as
+    in `scenario.named("random")`. Rows are in the order of the scenarios; equal scenarios have one
+    row. Finished runs are stored in out/parts, some seconds of work in each file. If a study was
+    killed, or filled the disk, start it again with the same arguments: it continues, and ends with
+    the same file, bit for bit.
 
     Args:
       scenarios: any number of Scenarios, such as those of `smc.grid`.

@@ -243,7 +243,9 @@ class Table:
             for name, column in values.items():
                 row.append(_median(name, column[rows_of[case]]))
             cells.append(row)
-        notes = ["Medians; below each the least and the largest value."]
+        notes = []
+        if len(rows_of) < len(self):
+            notes.append("Medians; below each the least and the largest value.")
         if rest := len(rows_of) - len(shown):
             notes.append(f"And {rest} more: Table.select.")
         return Tabular(headings=[*CASE, *values], rows=cells, notes=notes, left=len(CASE))

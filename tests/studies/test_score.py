@@ -58,6 +58,8 @@ def test_the_median_of_two_runs_is_their_mean():
     values = table.column("itae")
     assert f" {sum(values) / 2.0:.3g}\n" in str(table)
     assert f"{number(min(values))}–{number(max(values))}" in str(table)
+    assert "below each the least" in str(table)
+    assert "least" not in str(smc.score(runs[:1], metrics=("itae",)))
 
 
 def test_what_cannot_be_scored_is_refused():

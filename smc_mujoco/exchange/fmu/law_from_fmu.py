@@ -84,7 +84,7 @@ class FmuLaw(Uncompiled):
     parameters: Names  # the FMU's names of its gains
     period: float | None  # of its steps, s; None for the control period
 
-    why = "is an FMU, called from Python: several times slower than a law that compiles"
+    why = "is an FMU, called from Python"
 
     @property
     def __name__(self) -> str:
