@@ -2,8 +2,9 @@
 
 A log has columns t, and x and u of the joint, or x_JOINT and u_JOINT of each. A replay commands
 what was recorded, to every motor. Each command is held until the next sample. A delay that is no
-whole number of samples mixes two neighbours, at a rate at which that hardly errs. So the replay
-depends on the delay smoothly, and no physics step has to divide it.
+whole number of samples mixes two neighbours, at a rate at which that hardly errs, and which grows
+with the steps that are extrapolated. So the replay depends on the delay smoothly, and no physics
+step has to divide it.
 """
 
 import dataclasses
@@ -187,6 +188,22 @@ class OwnRig(Rig):
         u = (1.0 - share) * part.u[first : first + count]
         u = u + share * part.u[first - 1 : first - 1 + count]
         return self.of_motors("gain", 1.0) * u + self.of_motors("offset", 0.0)
+
+    def finer(self, part: RecordPart, times: int) -> RecordPart:
+        """Return a part with that many times as many commands, if a delay may be between them: it
+        mixes two, and a joint that rests breaks away by their mean, the less so the finer they are.
+        """
+        assert isinstance(part, LogPart)
+        late = self.base.input_delay / part.period
+        if DELAY not in self.quantities and math.isclose(late, round(late), abs_tol=1e-6):
+            return part
+        return dataclasses.replace(
+            part,
+            u=np.repeat(part.u, times, axis=0),
+            before=times * part.before,
+            period=part.period / times,
+            stride=times * part.stride,
+        )
 
     def of_motors(self, kind: str, default: float) -> Array:
         """Return a quantity of each motor, (driven,)."""

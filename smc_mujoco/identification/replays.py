@@ -244,6 +244,14 @@ class Replays:
         state[self.free] += point.states[k] * self.pieces[k].scales
         return state
 
+    def _finer(self, times: int) -> list[Piece]:
+        """Return the pieces with that many times as many commands, where a delay needs them."""
+        finer = []
+        for k, piece in enumerate(self.pieces):
+            part = self.twin.finer(self._part(k), times)
+            finer.append(dataclasses.replace(piece, part=part))
+        return finer
+
     def at_rest(self, point: Point) -> Point:
         """Return the point with velocity 0 at the start of each piece. Velocities must be free."""
         n = len(self.twin.columns.x)
@@ -263,13 +271,15 @@ class Replays:
         return extrapolated
 
     def by_steps(self, points: Sequence[Point], parts: Sequence[float]) -> list[list[list[Array]]]:
-        """Return `residuals` with each of some parts of the physics step."""
+        """Return `residuals` with each of some parts of the physics step, and commands as fine."""
         plain = self.rig(points[0]).repeated(self._part(0))
-        steps = self.steps
+        steps, pieces = self.steps, self.pieces
         found = []
         for part in parts:
             self.steps = {"physics_step": plain.resolved.physics_step / part}
+            self.pieces = self._finer(round(part))
             found.append(self._residuals(points))
+            self.pieces = pieces
         self.steps = steps
         return found
 

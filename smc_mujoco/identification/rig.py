@@ -278,6 +278,10 @@ class Rig:
         """
         return {}
 
+    def finer(self, part: RecordPart, times: int) -> RecordPart:
+        """Return a part with that many times as many commands, where a delay needs them."""
+        return part
+
     def repeated(
         self, part: RecordPart, rounded: bool = False, state: Array | None = None, **changes: Any
     ) -> Scenario:

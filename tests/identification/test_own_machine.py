@@ -137,6 +137,22 @@ def test_commands_of_one_sample_break_a_joint_away_though_a_delay_is_between_sam
     assert trace.x[-1, 0] == pytest.approx(50.0 * each, rel=0.05)
 
 
+@pytest.mark.parametrize(("late", "coarse"), [(0.003, 1.0), (0.0035, 0.48)])
+def test_finer_commands_break_a_joint_away_though_a_delay_is_between_commands(arm, late, coarse):
+    """A mean of two commands is too weak for that, so it moves for half of the time."""
+    level, force, period = TRUTH["j1.frictionloss"], 0.7, 2e-3
+    t = period * np.arange(501)
+    u = np.where(np.arange(501) % 10 == 5, force, 0.0)
+    rig = own_rig(arm, list(TRUTH)).with_values(TRUTH | {"input_delay": late}, "true")
+    part = rig.part({"t": t, "x": 0.1 * np.sin(10.0 * t), "u": u})
+    finer = rig.finer(part, 4)
+    inertia = float(arm.load().dof_M0[0]) + TRUTH["j1.armature"]
+    each = 0.5 * (force - level) * period**2 / inertia * force / level
+    for one, share in ((part, coarse), (finer, 1.0)):
+        trace = smc.run(rig.repeated(one, state=np.zeros(2)))
+        assert trace.x[-1, 0] == pytest.approx(50.0 * each * share, rel=0.05)
+
+
 def test_a_log_that_an_open_loop_leaves_is_told_apart_from_a_poor_fit(found):
     left = tuple(dict.fromkeys(fit, -210.0) for fit in found.fits)
     (note,) = dataclasses.replace(found, fits=left).notes
