@@ -27,7 +27,10 @@ WAVES = 4  # half waves of a force over the range of positions; chosen
 SLOW_WAVES = 2  # of a friction over that range, and of a force over the time of a log; chosen
 AVERAGED = 0.02  # s, over which a command is averaged: what is left is fast; chosen
 RESTING = 1e-6  # of the speed's rms: below it a joint rests
-REST = "near rest, as friction that drops with speed: find it with a Stribeck in a scenario"
+REST = (
+    "near rest: friction that drops with speed looks like this, and so does a jerky command that "
+    "acts between samples; for the former find a Stribeck in a scenario"
+)
 DIRECTION = "of viscous friction that differs between the directions"
 SPEED = "that grows faster than the speed, as a drag"
 PLACE = "that depends on its position, as of another mass or centre of mass, a spring or cogging"
