@@ -63,7 +63,8 @@ class Curve(Replays):
         self.limit = False
         self.closed = False
         self.report = lambda count: None
-        self.twin = SimpleNamespace(dynamics=None, columns=SimpleNamespace(state=(), x=("y",)))
+        columns = SimpleNamespace(state=(), x=("y",))
+        self.twin = SimpleNamespace(dynamics=None, columns=columns, finer=lambda part, times: part)
         self.replayed = []
         self.lag = 0.0
 
