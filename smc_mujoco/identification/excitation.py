@@ -62,9 +62,8 @@ BISECTIONS = 10  # of the size of a motion
 AMPLITUDE = {"rad": 0.5, "m": 0.1}  # of a joint, where its range allows it; chosen
 OF_RANGE = 0.9  # of the way to a limit of the joint's range; chosen
 OF_FORCE = 0.7  # of the bound on u, that the motion itself may take; chosen
-# of slopes and of friction that gives way, and longest step of slopes, s: errors need no more;
-# chosen
-INTEGRATOR, SLOPE_STEP = "implicitfast", 2e-3
+SLOPE_STEP = 2e-3  # s, longest physics step for slopes: errors need no more; chosen
+INTEGRATOR = "implicitfast"  # of friction that gives way: errors need no more; chosen
 # Typical numbers where the model has 0: of the bound on u, of a joint's inertia, s; chosen
 FRICTION_SHARE, ARMATURE_SHARE, TYPICAL_DELAY = 0.03, 0.2, 0.004
 Counts = Annotated[float, Whole(low=2, high=2**32, infinite=True)]
@@ -502,8 +501,7 @@ def _told(rig: OwnRig, names: list[str], trace: Trace) -> dict[str, Any]:
     replays = Replays(rig, names, data, False)
     control = replays.rig(replays.start).repeated(replays.pieces[0].part).control_period  # pyright: ignore[reportArgumentType]
     true = Point(replays.start.values, _of_run(replays, rig, trace))
-    step = control / math.ceil(control / SLOPE_STEP - 1e-9)
-    replays.steps = {"integrator": INTEGRATOR, "physics_step": step}
+    replays.steps = {"physics_step": control / math.ceil(control / SLOPE_STEP - 1e-9)}
     slopes = replays.slopes(true, central=False)
     check_told_apart(replays, slopes)
     replays.steps = {}
