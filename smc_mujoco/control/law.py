@@ -133,19 +133,16 @@ def law_function(
             return -gains.k * np.sign(s), s
 
     `y` is the measurement of one joint: y.e = x - r is the error, rad or m, y.de = v - r' its rate,
-    y.x and y.v position and velocity, y.dt the control period;
-    `help(smc_mujoco.control.measurement)` has more. (The "error" of
-    `smc.exchange.law_from_control` has the other sign, r - x.)
+    y.x and y.v position and velocity, y.dt the control period, and more, see
+    `help(smc_mujoco.control.measurement)`. `smc.exchange.law_from_control` has r - x for an error.
     A helper that the law calls needs @numba.njit above its def, or the law runs in slow Python.
 
     Args:
-      gains: name -> default value, or a Gain with unit and range. `smc.tune` needs the units. Gain
-        and units, such as FORCE and RATE, are in `smc_mujoco.control.units`.
+      gains: name -> default value, or a Gain with unit and range, which `smc.tune` needs. Gain and
+        units, such as FORCE and RATE, are in `smc_mujoco.control.units`.
       memory: floats of memory per channel. Default: 8.
-      positive, nonnegative: names of gains that must be greater than 0, or at least 0. A Gain can
-        state this itself.
-      relative_degree: of the sliding variable that the law needs: 1, the default, or 2 or 3 for
-        laws of e.
+      positive, nonnegative: names of gains that must be above 0, or at least 0, as a Gain can say.
+      relative_degree: of the sliding variable that the law needs: 1, the default, 2 or 3 (of e).
       conditions: condition of the theorem, in words -> function of the gains, read by attribute,
         that tests it. A warning quotes the words, tuning stays within, and results of other gains
         are marked "outside its theorem".
