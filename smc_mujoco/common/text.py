@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-LEAST = 1e-9  # smaller numbers are not printed digit by digit
+LEAST_PRINTED = 1e-9  # smaller numbers are not printed digit by digit
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -16,7 +16,7 @@ def number(value: float, digits: int = 3) -> str:
         return "none"
     if math.isinf(value):
         return "never"
-    if 0.0 < abs(value) < LEAST:
+    if 0.0 < abs(value) < LEAST_PRINTED:
         return "<1e-9"
     if value == 0.0:
         return "0"

@@ -90,14 +90,7 @@ def _friction(
         curve = friction(rig, rig.values, i, v)
         error = 2.0 * curve_error(rig, covariance, i, v)
         ax.plot(v, curve, color=colour, lw=1.2)
-        ax.fill_between(
-            v,
-            curve - error,
-            curve + error,
-            color=colour,
-            alpha=0.25,
-            lw=0.0,
-        )
+        ax.fill_between(v, curve - error, curve + error, color=colour, alpha=0.25, lw=0.0)
     effort = rig.plant.efforts[i].replace(" ", "·")
     ax.set_title(f"friction ({effort})")
 

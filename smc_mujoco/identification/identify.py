@@ -469,7 +469,8 @@ def _shell_line(machine: Any, logs: Sequence[Any], columns: Any, condition: Any)
     file.
     """
     words = [machine, *logs]
-    if not all(isinstance(word, str | os.PathLike) for word in words):
+    named = words if condition is None else [*words, condition]
+    if not all(isinstance(word, str | os.PathLike) for word in named):
         return []
     if columns:
         renamed = ",".join(f"{ours}={theirs}" for ours, theirs in columns.items())

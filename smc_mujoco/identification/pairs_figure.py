@@ -41,13 +41,7 @@ def pairs_figure(
     looks = _looks(forces, taken, more)
     handles: list[Line2D | Patch] = [
         Line2D([], [], ls="", marker=".", color=style.INK, label="pairs"),
-        Line2D(
-            [],
-            [],
-            color=colour,
-            lw=1.8,
-            label=f"taken: {taken}",
-        ),
+        Line2D([], [], color=colour, lw=1.8, label=f"taken: {taken}"),
         Patch(color=colour, alpha=0.25, lw=0.0, label="± 2 standard errors"),
     ]
     for model, look in looks.items():
@@ -64,14 +58,7 @@ def pairs_figure(
             curve = forces[taken](speeds)
             wide = 2.0 * error(speeds)
             ax.plot(speeds, curve, color=colour, lw=1.8)
-            ax.fill_between(
-                speeds,
-                curve - wide,
-                curve + wide,
-                color=colour,
-                alpha=0.25,
-                lw=0.0,
-            )
+            ax.fill_between(speeds, curve - wide, curve + wide, color=colour, alpha=0.25, lw=0.0)
         ax.set_xlabel("speed (rad/s or m/s)")
         ax.set_ylabel("torque (N·m or N)")
         ax.set_title(title)
@@ -88,9 +75,5 @@ def _looks(models: Iterable[str], taken: str, colours: Sequence[str]) -> dict[st
             continue
         place = len(looks)
         dashes = style.DASHES[(place + 1) % len(style.DASHES)]
-        looks[model] = {
-            "color": colours[place],
-            "lw": 1.2,
-            "ls": dashes,
-        }
+        looks[model] = {"color": colours[place], "lw": 1.2, "ls": dashes}
     return looks

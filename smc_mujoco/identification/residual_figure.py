@@ -49,13 +49,7 @@ def residual_figure(
     with style.page():
         height = pages.head_height(style.FULL_WIDTH, handles) + ROW_HEIGHT * len(measured)
         page = pages.blank(style.FULL_WIDTH, height)
-        axes = page.subplots(
-            len(measured),
-            2,
-            squeeze=False,
-            sharex=True,
-            width_ratios=SHARES,
-        )
+        axes = page.subplots(len(measured), 2, squeeze=False, sharex=True, width_ratios=SHARES)
         shown = next(iter(fits.values()))  # what tables call the columns
         rows = zip(axes, measured.items(), shown, strict=True)
         for (left, right), (name, values), column in rows:
@@ -99,11 +93,7 @@ def looks_of(twins: Sequence[str]) -> dict[str, Fields]:
     looks = {}
     for k, colour in enumerate(style.spread(len(twins))):
         width = TWIN_WIDTH if k == 0 else 0.7 * TWIN_WIDTH
-        looks[twins[k]] = {
-            "color": colour,
-            "lw": width,
-            "zorder": 3.0 - 0.1 * k,
-        }
+        looks[twins[k]] = {"color": colour, "lw": width, "zorder": 3.0 - 0.1 * k}
     return looks
 
 

@@ -141,7 +141,7 @@ class Sensitivity(Tables, SobolResult):
         if any(axis.total.high > first.total.low for axis in others):
             return "open, as intervals overlap (give more points)"
         share = _percent(first.total)
-        return f"{in_words(first.name)}, {share.text} % ({share.below} %) with others"
+        return f"{in_words(first.name)}, {share.text} % ({share.below} %), alone and with others"
 
     @property
     def tables(self) -> list[Tabular]:

@@ -73,9 +73,8 @@ def check_clock(s: Any) -> None:
             f"and {s.samples * s.steps:.3g} physics steps: give a shorter duration or longer "
             f"periods (at most {MAX_VALUES:.0e} values and {MAX_STEPS:.0e} steps)"
         )
-    times = {"jump": s.jump and s.jump.time, "fault": s.fault and s.fault.at}
-    for name, time in times.items():
-        if time is not None and time >= s.duration:
+    for name, time in event_times(s.jump, s.fault).items():
+        if time >= s.duration:
             raise ScenarioError(
                 f"{name} at {time:g} s comes after the end of the run at {s.duration:g} s: give an "
                 "earlier time"
@@ -84,6 +83,16 @@ def check_clock(s: Any) -> None:
     for sensor in s.sensors:
         sensor.check(s.physics_step)
     s.clock.check(s.control_period, s.physics_step)
+
+
+def event_times(jump: Any, fault: Any) -> dict[str, float]:
+    """Return when a run changes for good, s, by the name of the field."""
+    times = {}
+    if jump:
+        times["jump"] = jump.time
+    if fault:
+        times["fault"] = fault.at
+    return times
 
 
 def check_signals(s: Any) -> None:

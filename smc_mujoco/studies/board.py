@@ -20,7 +20,7 @@ from smc_mujoco.analysis.step_halving import APART, RANGE, UNTRIED
 from smc_mujoco.common.aliases import Names, Numbers, Pair
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
-from smc_mujoco.common.text import LEAST, capital, counted, every, joined, number
+from smc_mujoco.common.text import LEAST_PRINTED, capital, counted, every, joined, number
 from smc_mujoco.control.source import Source, in_words, kinds
 from smc_mujoco.draw import style
 from smc_mujoco.metrics.catalogue import CATALOGUE
@@ -529,7 +529,7 @@ def spread(interval: Interval, metric: str) -> str:
     """
     if math.isnan(interval.low) or math.isinf(interval.low):
         return ""
-    if interval.low > 0.0 and interval.high < LEAST:
+    if interval.low > 0.0 and interval.high < LEAST_PRINTED:
         return ""
     return f"{size(interval.low, metric)}–{size(interval.high, metric)}"
 

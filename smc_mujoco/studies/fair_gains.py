@@ -52,6 +52,7 @@ from smc_mujoco.simulation.grid import (
 from smc_mujoco.simulation.grid import case as run_of_grid
 from smc_mujoco.simulation.law_checks import blind
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.scenario_checks import event_times
 from smc_mujoco.simulation.workers import Workers
 from smc_mujoco.studies.leaderboard import Holdout
 from smc_mujoco.studies.study import REPEATED_SEEDS, study
@@ -511,14 +512,10 @@ def candidate_of(default: Component, tuned: result.Tuned) -> Candidate:
 
 def _check_events(name: str, fields: Mapping[str, Any], duration: float) -> None:
     """Raise ScenarioError if a condition's jump or fault comes after the end of a search's runs."""
-    times = []
-    if fields.get("jump"):
-        times.append(fields["jump"].time)
-    if fields.get("fault"):
-        times.append(fields["fault"].at)
-    if times and max(times) >= duration:
-        raise ScenarioError(
-            f"condition {name!r} changes at {max(times):g} s, and runs that judge gains end at "
-            f"{duration:.3g} s, two thirds of the duration: give an earlier time, or a duration "
-            f"above {max(times) / SEARCHED:.3g} s"
-        )
+    for field, time in event_times(fields.get("jump"), fields.get("fault")).items():
+        if time >= duration:
+            raise ScenarioError(
+                f"condition {name!r} has its {field} at {time:g} s, and runs that judge gains end "
+                f"at {duration:.3g} s, two thirds of the duration: give an earlier time, or a "
+                f"duration above {time / SEARCHED:.3g} s"
+            )

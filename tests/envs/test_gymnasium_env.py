@@ -5,6 +5,7 @@ are found.
 import copy
 import dataclasses
 import pickle
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -23,6 +24,7 @@ gymnasium = pytest.importorskip(
 
 from mujoco.batch import Batch, SimulationError  # noqa: E402
 
+from smc_mujoco.envs.episode import FIELDS  # noqa: E402
 from smc_mujoco.envs.gymnasium_env import PlantEnv  # noqa: E402
 from smc_mujoco.envs.vector_env import BatchEnv  # noqa: E402
 
@@ -30,6 +32,11 @@ PENDULUM = dataclasses.replace(smc.plant("inverted_pendulum"), x0=(0.2,))
 
 
 @pytest.mark.quick
+def test_the_docstring_of_an_environment_lists_its_fields():
+    for name in FIELDS:
+        assert re.search(rf"\b{name}\b", PlantEnv.__init__.__doc__), name
+
+
 def test_films_of_an_environment_run_at_the_rate_of_its_controller():
     slow = PlantEnv("duffing", changes={"control_period": 0.02})
     assert slow.metadata["render_fps"] == 50

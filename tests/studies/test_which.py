@@ -458,5 +458,5 @@ def test_a_law_with_few_shipped_sets_is_said_not_to_be_told_from_others(tmp_path
 def test_an_event_after_the_runs_that_judge_gains_is_refused_before_them(refused):
     late = smc.condition("late", fault=smc.Fault(2.5))
     fields = {"laws": ["pid", "adrc"], "minutes": 1}
-    said = "condition 'late' changes at 2.5 s", "a duration above 3.75 s"
+    said = "condition 'late' has its fault at 2.5 s", "a duration above 3.75 s"
     refused(lambda: smc.which("duffing", late, duration=3.0, **fields), *said)
