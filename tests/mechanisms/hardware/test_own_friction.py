@@ -338,6 +338,7 @@ def falling(y, p, memory):
 @pytest.mark.parametrize("v0", [1.0, -1.0])
 def test_a_level_that_becomes_negative_ends_a_run_in_both_directions(v0):
     failure = cart(friction=falling(), v0=v0).failure
+    assert failure is not None
     assert "friction falling" in failure
     assert "it is negative: return a level of 0 or more" in failure
 
