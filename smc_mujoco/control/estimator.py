@@ -59,7 +59,7 @@ def estimator(name: str, /, **gains: float) -> Estimator:
     """Return the estimator `name` with these gains. An unknown name or a gain out of range is a
     ScenarioError.
 
-        smc.run(smc.Scenario(plant="duffing", law=smc.law("pid"), velocity=smc.estimator("levant")))
+        smc.run(smc.Scenario(plant="duffing", law="pid", velocity=smc.estimator("levant")))
 
     Returns:
       An Estimator, for `velocity` of a Scenario.

@@ -97,7 +97,7 @@ def figure(
     """Draw traces of one plant: x, u, s and a disturbance over time, the phase portrait (of the
     error where the reference moves), |x - r|, and a close-up of the end of u.
 
-        trace = smc.run(smc.Scenario(plant="duffing", law=smc.law("pid"), duration=1.0))
+        trace = smc.run(smc.Scenario(plant="duffing", law="pid", duration=1.0))
         smc.figure(trace, "duffing.svg")
 
     x, u and s are drawn until all comes to rest, |x - r| over the whole run on a logarithmic axis.

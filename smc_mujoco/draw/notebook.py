@@ -25,7 +25,7 @@ def show(
 ) -> None:
     """Show a film of traces, or a figure, in a notebook's cell.
 
-        smc.show(smc.run(smc.Scenario(plant="duffing", law=smc.law("pid"))))
+        smc.show(smc.run(smc.Scenario(plant="duffing", law="pid")))
 
     A figure at the end of a cell shows itself; `show` is for several in a cell.
 

@@ -207,7 +207,7 @@ def sensitivity(
 ) -> Sensitivity:
     """Find which uncertainties explain a law's score, and where its runs fail.
 
-        scenario = smc.Scenario(plant="duffing", law=smc.law("pid"), duration=1.0)
+        scenario = smc.Scenario(plant="duffing", law="pid", duration=1.0)
         within = smc.Uncertainty(mass=(0.8, 1.2), delay=(0.0, 2e-3))
         print(smc.sensitivity(scenario, within, points=8))
 

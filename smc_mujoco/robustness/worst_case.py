@@ -206,7 +206,7 @@ def worst_case(
 ) -> WorstCase:
     """Search for the worst run of a scenario within a class of uncertainty, and return it.
 
-        scenario = smc.Scenario(plant="duffing", law=smc.law("pid"), duration=1.0)
+        scenario = smc.Scenario(plant="duffing", law="pid", duration=1.0)
         print(smc.worst_case(scenario, within=smc.Uncertainty(disturbance=0.5), budget=8))
 
     Where there are very many runs the fast engine makes most of them. The worst run that is

@@ -15,7 +15,7 @@ from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.source import DEFAULT
 from smc_mujoco.mechanisms.hardware.friction import LuGre
 from smc_mujoco.mechanisms.layout import channel_names, loaded
-from smc_mujoco.simulation.signals import Constant
+from smc_mujoco.simulation.signals import Constant, Step
 
 LOST_SHARE = 0.05  # of a duration that is no whole number of periods, before it is told; chosen
 MAX_LATENESS = 0.3  # stiffness times step over damping of bristles; chosen: joints rest 20 % off
@@ -52,6 +52,23 @@ def _unreachable_goals(s: Any) -> Iterator[str]:
             yield (
                 f"the reference of {s.plant.name} has {met}, so that it is not reached: give "
                 "another reference or more room, unless it is to lean there"
+            )
+
+
+def _speed_of_nothing(s: Any) -> Iterator[str]:
+    """Yield a sentence about each position that stands for the reference of a speed loop."""
+    if s.tracks != "speed":
+        return
+    rest = s.plant.rest or (0.0,) * s.plant.driven
+    for i, signal in enumerate(s.references):
+        if not isinstance(signal, Constant | Step):
+            continue
+        amplitude = signal.parameters()["amplitude"]
+        if amplitude != rest[i]:
+            yield (
+                f"the reference of channel {i} is a position that stays at {amplitude:g}, which "
+                "asks a speed loop for the speed 0: for that speed give "
+                f"smc.signals.Ramp({amplitude:g})"
             )
 
 
@@ -126,6 +143,7 @@ def of_values(s: Any) -> Iterator[str]:
     yield from _broken_period(s)
     yield from _doubtful_units(s)
     yield from _unreachable_goals(s)
+    yield from _speed_of_nothing(s)
     yield from _degrees(s)
     yield from _weak_motors(s)
 

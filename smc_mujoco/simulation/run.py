@@ -98,7 +98,7 @@ def run(
 ) -> Trace | list[Trace]:
     """Run one scenario or many.
 
-        trace = smc.run(smc.Scenario(plant="duffing", law=smc.law("pid"), duration=1.0))
+        trace = smc.run(smc.Scenario(plant="duffing", law="pid", duration=1.0))
         print(trace.t.shape, trace.x.shape, trace.u.shape)
 
     Args:

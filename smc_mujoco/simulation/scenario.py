@@ -140,8 +140,9 @@ class Scenario:
 
     Warns:
       ScenarioWarning: a start or a reference that may be in degrees, a delay in ms, a mismatch in
-        percent; LuGre bristles that are too stiff for the physics step; or a DCMotor that cannot
-        hold a joint where it starts, though a force of u_max could.
+        percent; a position as the reference of a speed loop; LuGre bristles that are too stiff for
+        the physics step; or a DCMotor that cannot hold a joint where it starts, though a force of
+        u_max could.
     """
 
     # other names of fields -> the field, for the error that an unknown field raises

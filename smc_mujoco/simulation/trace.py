@@ -459,7 +459,7 @@ def from_log(scenario: Scenario, log: Array, failed_step: int, failure: str | No
 def load(path: AnyPath) -> Trace:
     """Return the trace in a file that `Trace.save` wrote.
 
-        smc.run(smc.Scenario(plant="duffing", law=smc.law("pid"), duration=1.0)).save("run.npz")
+        smc.run(smc.Scenario(plant="duffing", law="pid", duration=1.0)).save("run.npz")
         trace = smc.load("run.npz")
 
     Returns:

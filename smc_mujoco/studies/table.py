@@ -279,7 +279,9 @@ class Table:
             return self.data.to_pandas()
 
     def rows(self) -> list[Fields]:
-        """Return every row as column -> value."""
+        """Return a dict for each row, column -> value: None for null, math.inf for "never", and
+        JSON columns as text.
+        """
         return self.data.to_pylist()
 
     def column(self, name: str) -> np.ndarray:

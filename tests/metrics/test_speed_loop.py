@@ -74,6 +74,12 @@ def test_channels_of_several_joints_track_their_own_speeds():
     assert smc.score(trace)["ultimate_bound"] == pytest.approx(off.max())
 
 
+@pytest.mark.parametrize("reference", [smc.Constant(3.0), smc.Step(3.0)])
+def test_a_position_that_stands_still_as_a_speed_is_questioned(reference):
+    with pytest.warns(smc.errors.ScenarioWarning, match=r"the speed 0: .*Ramp\(3\)"):
+        smc.Scenario(plant="duffing", law="pid", reference=reference, tracks="speed")
+
+
 def test_tuning_refuses_a_speed_that_its_objective_would_not_see():
     fast = smc.condition("fast", tracks="speed", reference=smc.signals.Ramp(1.0))
     with pytest.raises(smc.ScenarioError, match="'fast' tracks a speed"):

@@ -168,7 +168,7 @@ def film(
     """Film traces of one plant, from t = 0 to the end of the longest, and return the path of the
     file.
 
-        trace = smc.run(smc.Scenario(plant="duffing", law=smc.law("pid"), duration=1.0))
+        trace = smc.run(smc.Scenario(plant="duffing", law="pid", duration=1.0))
         smc.film(trace, "duffing.png", at=0.5)
 
     Fast motion and blows are shown in slow motion, and rest is shown faster. The clock tells the
