@@ -9,6 +9,7 @@ without their endings, so that "installation" finds "install"; words of one or t
     "some than that the their them then there these this to too two up use used using want was way we were what when " +
     "where which who why will with without work works would you your").split(" "));
   const ENDINGS = [
+    [/(?<=[a-z](?:ch|sh|ss|x))es$/, ""],
     [/(?<=[a-z]{2}[^us])s$/, ""],
     [/(?<=[a-z]{4})(?:i[sz]e[drs]?|i[sz]ing|i[sz]ation|ation|(?<=[a-z]{5})ity|ness)$/, ""],
     [/(?<=[a-z]{2}ct)ion$/, ""],
