@@ -23,7 +23,7 @@ import dataclasses
 import math
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from smc_mujoco.analysis import linear_theory as theory
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns
 from smc_mujoco.analysis.tuning import search_space
+from smc_mujoco.common.aliases import AnyPath
 from smc_mujoco.common.constraints import Boolean, Called, constrained
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find
@@ -49,6 +50,9 @@ from smc_mujoco.simulation.grid import START_CURE, Starts, case, listed, listed_
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, Fault, Impulse, Noise
 from smc_mujoco.simulation.trace import Trace, warn_of_broken
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 TOLERATED_ERROR = 0.05  # of the scale: the audit's threshold for an ultimate bound
 REST_SHARE = CATALOGUE["rest_share"]  # which must be below it
@@ -300,7 +304,9 @@ MARGIN_KINDS: dict[str, MarginKind] = {
         size=_size_of_force,
         theory=_tolerated_force,
     ),
-    "mass": MarginKind(label="mass", unit="1", levels=MASS_RATIOS, put=_with_mass, none=1.0),
+    "mass": MarginKind(
+        label="mass, of the nominal", unit="1", levels=MASS_RATIOS, put=_with_mass, none=1.0
+    ),
     "blow": MarginKind(
         label="blow at half time, on every driven joint",
         unit="{u} s",
@@ -369,6 +375,20 @@ class Margin:
         return f"{'≥ ' if self.open else ''}{number(self.value)}"
 
 
+class Margins(list[Margin]):
+    """Margins of laws on plants, which can be drawn."""
+
+    def figure(self, path: AnyPath | None = None, **options: Any) -> "Figure":
+        """Draw them as bars, in a panel for each plant and kind, and return the figure; arguments
+        `path`, `title`, `size`, `format` and `fig` as in `smc.figure`.
+
+            smc.margins("duffing", "pid", kinds="delay", quick=True).figure("margins.svg")
+        """
+        from smc_mujoco.robustness import margins_figure
+
+        return margins_figure.draw(self, path, **options)
+
+
 @constrained
 def margins(
     plants: str | Plant | Sequence[str | Plant] = tuple(sets.STUDY),
@@ -381,7 +401,7 @@ def margins(
     condition: str | Condition = "nominal",
     starts: Starts | None = None,
     device: Device = "cpu",
-) -> list[Margin]:
+) -> Margins:
     """Return the margins of laws on plants: plant by plant, law by law, kind by kind.
 
         for margin in smc.margins("duffing", "classical", kinds="delay", quick=True):
@@ -407,8 +427,8 @@ def margins(
         MuJoCo's.
 
     Returns:
-      A list of `Margin`: `value` in `unit`, nan where even the unchanged run fails; `text` says it
-      in words.
+      `Margins`, a list of `Margin`: `value` in `unit`, nan where even the unchanged run fails;
+      `text` says it in words. Its `figure("margins.svg")` draws them.
 
     Raises:
       ScenarioError: an unknown plant, law, kind, set or condition, or a plant that starts at 0.
@@ -436,7 +456,7 @@ def margins_of(
     threads: int | None = None,
     report: Report = lambda done, whole: None,
     device: str = "cpu",
-) -> list[Margin]:
+) -> Margins:
     """Return the margins of any scenarios, as `margins` does; the resolution is FINE or COARSE."""
     cells = Cells(bases, kinds, resolution, report)
     # a coarse search by MuJoCo takes less time than compiling its law for the fast engine
@@ -455,7 +475,7 @@ def margins_of(
             again[i] = cells.begin(i)
     find_boundaries(again, lambda tried: cells.tolerated(tried, runs.by_mujoco))
     warn_of_broken(runs.broken)
-    margins = []
+    margins = Margins()
     for i, ((base, kind), search) in enumerate(zip(cells.pairs, cells.searches, strict=True)):
         margin = Margin(
             plant=base.plant.name,

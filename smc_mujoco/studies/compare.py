@@ -25,6 +25,7 @@ from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Template, gains_text
 from smc_mujoco.control.law import Law, catalogue, suits
 from smc_mujoco.control.properties import suitable
+from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
@@ -191,7 +192,7 @@ class Compared(Tables):
             lambda file, size: self.plot(file, self._metrics, size=size, format="svg"), about
         )
         laws = dict.fromkeys(itertools.chain.from_iterable(self.gains.values()))
-        title = f"{joined([*laws])} on {joined([*self.gains])}"
+        title = f"{joined([*map(style.law_name, laws)])} on {joined(self._plant_names)}"
         parts: list[str] = [figure]
         for table in self.tables:
             parts.append(table._repr_html_())
@@ -234,6 +235,15 @@ class Compared(Tables):
                     "best": entry.rank.best,
                     "winner": board.winner == entry.law,
                 }
+
+    @property
+    def _plant_names(self) -> list[str]:
+        """The names of the plants in pictures."""
+        first_rows = {}
+        for row, plant in enumerate(self.table.column("plant").tolist()):
+            first_rows.setdefault(plant, row)
+        runs = map(self.table.scenario, first_rows.values())
+        return [style.plant_name(scenario.plant) for scenario in runs]
 
     @property
     def _metrics(self) -> list[str]:

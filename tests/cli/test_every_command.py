@@ -69,7 +69,7 @@ CALLS = {
     "margins --quick": ["robustness.margins.margins"],
     "margins duffing --law pid --kind delay,mass --gains default --quick --device cuda --condition noise --x0 "
     "0.4 "
-    "--json m.json --threads 2": ["robustness.margins.margins"],
+    "--figure m --json m.json --threads 2": ["robustness.margins.margins"],
     "worst duffing": ["robustness.worst_case.worst_case"],
     "worst duffing --law pid --disturbance 2 "
     "--bound slope=3,position_noise=0.01,delay=0:0.01,mass=0.7:1.3,alpha=0.8:1.2 "
@@ -169,7 +169,7 @@ PRINTED = [  # command lines that are run to their ends
     "list --need continuous,one-gain --json l.json",
     "list classical --json l.json",
     "show one.npz --export csv,mat --json s.json",
-    "margins duffing --law classical,pid --kind delay --quick --json m.json",
+    "margins duffing --law classical,pid --kind delay --quick --figure m.pdf --json m.json",
     (
         "worst duffing --law classical --budget 3 --duration 0.2 --gains default --figure w.pdf "
         "--json w.json"

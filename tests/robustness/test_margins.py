@@ -316,3 +316,55 @@ def test_a_blow_comes_at_half_time_in_shares_of_the_momentum_that_u_stops_in_its
         (level, BASE.duration / 2),
         (-level, BASE.duration / 2),
     ]
+
+
+# the figure
+
+
+def a_margin(**changes):
+    usual = {"plant": "duffing", "law": "pid", "kind": "delay", "value": 0.02, "unit": "s"}
+    usual |= {"resolution": 0.004, "searched": 0.5, "theory": None}
+    return margins.Margin(**usual | changes)
+
+
+DRAWN = [
+    a_margin(theory=0.03),
+    a_margin(law="classical", value=0.05, resolution=0.0, searched=0.05, theory=math.inf),
+    a_margin(law="adaptive", value=math.nan, resolution=0.0, theory=0.04),
+    a_margin(kind="mass", value=4.0, unit="1", resolution=0.5, searched=64.0),
+]
+
+
+def test_a_bar_ends_at_the_margin_and_a_line_at_what_is_not_tolerated():
+    delay, mass, *others = margins.Margins(DRAWN).figure().axes
+    assert others == []
+    assert delay.get_xlabel() == "input delay (ms)"
+    assert [label.get_text() for label in delay.get_yticklabels()] == [
+        "PID",
+        "Classical",
+        "Adaptive",
+    ]
+    assert [bar.get_width() for bar in delay.patches] == pytest.approx([20.0, 50.0, 0.0])
+    lines = [line[:, 0].tolist() for line in delay.collections[0].get_segments()]
+    assert lines == [pytest.approx([20.0, 24.0]), [50.0, 50.0], [0.0, 0.0]]
+    assert [text.get_text() for text in delay.texts] == ["20.0", "≥ 50.0", "fails at 0"]
+    limits = delay.lines[-1].get_xdata()
+    np.testing.assert_allclose(limits, [30.0, np.nan, np.nan])
+    (bar,) = mass.patches
+    assert (bar.get_x(), bar.get_x() + bar.get_width()) == (1.0, 4.0)
+    assert mass.get_xlabel() == "mass, of the nominal"
+
+
+def test_each_plant_has_its_own_panels_in_its_own_units():
+    other = a_margin(plant="inverted_pendulum", kind="disturbance", unit="N m", value=2.0)
+    page = margins.Margins([a_margin(kind="disturbance", unit="N"), other]).figure()
+    first, second = page.axes
+    titles = first.get_title(loc="left"), second.get_title(loc="left")
+    assert titles == ("Duffing oscillator", "Inverted pendulum")
+    assert first.get_xlabel().endswith("(mN)")
+    assert second.get_xlabel().endswith("(N·m)")
+
+
+def test_a_figure_of_no_margins_is_refused():
+    with pytest.raises(smc.ScenarioError, match="no margins to draw: give at least one"):
+        margins.Margins().figure()

@@ -125,6 +125,8 @@ def test_its_page_has_every_median_and_verdict_and_needs_no_other_file(found, tm
     file = found.to_html(tmp_path / "page.html")
     text = file.read_text(encoding="utf-8")
     assert "default-src 'none'" in text
+    (title,) = re.findall("<h1>(.*?)</h1>", text)
+    assert title == "my_law, Classical and PID on Duffing oscillator and Inverted pendulum"
     assert {at[:5] for at in re.findall(r' (?:src|srcset|href)="([^"]*)"', text)} == {"data:"}
     for table in found.tables:
         for cell in (cell for row in table.rows for cell in row if isinstance(cell, Cell)):

@@ -140,6 +140,7 @@ def margins(
     quick: Quick = False,
     condition: options.Condition = "nominal",
     x0: options.X0 = None,
+    figure: Annotated[Path | None, options.picture("the margins")] = None,
     json: options.Json = None,
     threads: options.Threads = None,
     device: options.Device = "cpu",
@@ -161,12 +162,14 @@ def margins(
         from smc_mujoco.cli import tables
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
+        from smc_mujoco.draw.page import files
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.robustness.margins import KINDS
         from smc_mujoco.robustness.margins import margins as search
         from smc_mujoco.simulation.conditions import PLANTS
 
     terminal = Terminal(json)
+    options.check_files(None, *files(figure))
     usual = QUICK_MARGINS if quick else {"plants": PLANTS, "laws": gain_sets.LAWS, "kinds": KINDS}
     machines = list(map(as_plant, options.plants(plants, usual["plants"])))
     chosen = options.laws(law, usual["laws"])
@@ -190,6 +193,9 @@ def margins(
     words = [counted(len(results), "margin"), sources, f"{terminal.seconds:.0f} s"]
     terminal.note(", ".join(filter(None, words)), "dim", wrap=True)
     terminal.finish(list(map(dataclasses.asdict, results)))
+    if figure:
+        results.figure(figure)
+        terminal.wrote(*files(figure))
 
 
 def _sources(machines: "Sequence[Machine]", laws: "Sequence[Law | str]", gains: str) -> str:

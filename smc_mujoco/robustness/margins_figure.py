@@ -1,0 +1,132 @@
+"""Margins as bars: a panel for each kind and plant, a bar for each law.
+
+A bar begins at the level without any effect, such as the nominal mass, and ends at the largest
+level that is tolerated. The line beyond it ends at the smallest level
+known not to be. A bar whose number has "≥" ends where the search did, and has no line.
+"""
+
+import math
+import os
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.patches import Patch
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.text import number
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import style
+from smc_mujoco.draw.page import Handle, Size
+from smc_mujoco.robustness.margins import MARGIN_KINDS, Margin
+
+ROW_HEIGHT = 0.3  # inches on a full page, of a law
+AROUND = 0.95  # the same, of a panel's ticks, label and title
+ACROSS = 3  # panels side by side, at most
+NUMBER_ROOM = 1.35  # of the longest bar: the number beside it has room
+THEORY = {"marker": "D", "mfc": style.PAPER, "mec": style.INK, "lw": 0.0}
+
+
+def draw(
+    found: Sequence[Margin],
+    path: str | os.PathLike[str] | None = None,
+    title: str | None = None,
+    size: Size = None,
+    format: str | None = None,
+    fig: Figure | SubFigure | None = None,
+) -> Figure:
+    """Draw margins; arguments as in `figure`."""
+    if not found:
+        raise ScenarioError("no margins to draw: give at least one")
+    paths = pages.files(path, format)
+    width, height = pages.measure(size, fig)
+    plants = list(dict.fromkeys(margin.plant for margin in found))
+    kinds = list(dict.fromkeys(margin.kind for margin in found))
+    across = 1 if width < pages.NARROW else min(ACROSS, len(kinds))
+    down = math.ceil(len(kinds) / across)
+    with style.page(width):
+        key = _key(found)
+        rows = _most_laws(found)
+        tall = style.points(AROUND + ROW_HEIGHT * rows) * down * len(plants)
+        page = pages.blank(width, height or pages.head_height(width, key) + tall, fig)
+        axes = page.subplots(down * len(plants), across, squeeze=False)
+        for plant, of_plant in zip(plants, np.split(axes, len(plants)), strict=True):
+            if len(plants) > 1:
+                of_plant[0, 0].set_title(style.plant_name(plant), parse_math=False)
+            for ax, kind in zip(of_plant.flat, kinds, strict=False):
+                here = [one for one in found if (one.plant, one.kind) == (plant, kind)]
+                _panel(ax, here, named=ax in of_plant[:, 0])
+            for ax in of_plant.flat[len(kinds) :]:
+                ax.set_axis_off()
+        about = f"Margins: {style.heading(plants)}"
+        pages.set_head(page, width, style.titled(title, about), key)
+        pages.space_ticks(page)
+        return pages.write(page, paths)
+
+
+def _most_laws(found: Sequence[Margin]) -> int:
+    """Return the largest number of bars of a panel."""
+    counts: dict[tuple[str, str], int] = {}
+    for margin in found:
+        panel = margin.plant, margin.kind
+        counts[panel] = counts.get(panel, 0) + 1
+    return max(counts.values())
+
+
+def _key(found: Sequence[Margin]) -> list[Handle]:
+    """Return the entries of the legend."""
+    key: list[Handle] = [Patch(facecolor=style.MUTED, label="tolerated")]
+    if any(margin.resolution for margin in found):
+        words = "not known, up to the first level not tolerated"
+        key.append(pages.entry(words, style.INK, lw=style.points(1.5)))
+    if any(math.isfinite(_limit(margin)) for margin in found):
+        key.append(pages.entry("limit by linear theory", style.INK, **THEORY))
+    return key
+
+
+def _limit(margin: Margin) -> float:
+    """Return the limit by linear theory, NaN without one, or where the unchanged run fails."""
+    if margin.theory is None or math.isnan(margin.value):
+        return math.nan
+    return margin.theory if math.isfinite(margin.theory) else math.nan
+
+
+def _panel(ax: Axes, margins: Sequence[Margin], named: bool) -> None:
+    """Draw margins of one kind on one plant, the first at the top; laws are written beside them if
+    `named`.
+    """
+    kind = MARGIN_KINDS[margins[0].kind]
+    values = np.array([margin.value for margin in margins])
+    ends = np.nan_to_num(values, nan=kind.none)
+    beyond = ends + np.array([margin.resolution for margin in margins])
+    limits = np.array([_limit(margin) for margin in margins])
+    reached = np.fmax(beyond, limits)
+    longest = float(reached.max()) - kind.none
+    unit = margins[0].unit
+    factor = 1.0
+    if unit != "1":
+        factor, unit = style.prefixed(kind.none + longest, unit)
+    rows = np.arange(len(margins))
+    colours = style.law_colours([margin.law for margin in margins])
+    start = factor * kind.none
+    ax.barh(rows, factor * ends - start, 0.6, left=start, color=colours)
+    ax.axvline(start, color=style.MUTED, lw=style.points(0.8))
+    ax.hlines(rows, factor * ends, factor * beyond, color=style.INK, lw=style.points(1.5))
+    ax.plot(factor * limits, rows, ms=style.points(5), **THEORY)
+    for row, margin, end in zip(rows, margins, factor * reached, strict=True):
+        words = margin.text
+        if not math.isnan(margin.value):
+            words = f"{'≥ ' * margin.open}{number(factor * margin.value)}"
+        beside = {"xytext": (style.points(7), 0), "textcoords": "offset points"}
+        look = {"va": "center", "color": style.INK, "fontsize": style.points(9.5)}
+        ax.annotate(words, (end, row), **beside, **look)
+    room = NUMBER_ROOM * factor * longest
+    ax.set_xlim(0.0, start + (room or 1.0))
+    ax.set_ylim(len(rows) - 0.5, -0.5)
+    unit = unit.replace(" ", "·")
+    ax.set_xlabel(kind.label if unit == "1" else f"{kind.label} ({unit})")
+    names = style.distinct([style.law_name(margin.law) for margin in margins])
+    ax.set_yticks(rows, names if named else [""] * len(rows), parse_math=False)
+    ax.grid(visible=False, axis="y")
+    ax.tick_params(axis="y", length=0)
