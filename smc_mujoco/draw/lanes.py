@@ -11,7 +11,7 @@ from smc_mujoco.common.aliases import Fields
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import band
 from smc_mujoco.draw.panels import SINGLE, Panel, mark, over_time
-from smc_mujoco.draw.quantities import limits
+from smc_mujoco.draw.quantities import PEAKS, limits
 from smc_mujoco.metrics.conventions import (
     last_exit,
     scale,
@@ -26,6 +26,7 @@ LANE_GAP = 0.25  # letters between a row, and how far u swings
 END_SHARE = 0.1  # of the run: its end, over which a row says how far u swings
 MAX_SWITCHES = 20  # of a u that shares its axes with others
 SMOOTH_SHARE = 0.02  # of a panel's range: a swing below it is none
+FILM_RANGE = 1e-5  # of the largest error: below a film smaller ones are off the panel; chosen
 ROW_FILLED = 0.82  # part of a trace's row that its axes fill
 
 
@@ -86,6 +87,9 @@ def below_film(
         bands = laned or not crowded(panel)
         drawn += over_time(row.axes, row.panel, row.colours, panel.traces, bands, names)
         drawn += settled(row.axes, row.panel, row.colours)
+        if panel.quantity in PEAKS:
+            low, high = row.axes.get_ylim()
+            row.axes.set_ylim(max(low, FILM_RANGE * high), high)
         if laned:
             tell_swing(row.axes, row.panel.traces[0], row.colours[0])
     return found, drawn

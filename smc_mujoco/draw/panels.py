@@ -282,7 +282,8 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
     group with its u; of arms the tip's, with the force of its contact or the largest u.
 
     The motion is x; of several channels it is the largest error. A free body whose reference goes
-    somewhere has a map of the paths in place of the error of its attitude.
+    somewhere, or whose attitude stays in its settling band, has a map of the paths in place of the
+    error of its attitude.
     """
     plant = traces[0].scenario.plant
     first = over_groups(traces, "tip")
@@ -303,9 +304,16 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
             motions += by_channel(place)
         elif place.group.driven or not many:
             motions.append(place._replace(quantity="settling") if many or first else place)
-    if plant.pose and any(np.ptp(trace.r[:, :3], axis=0).any() for trace in traces):
+    moving = any(np.ptp(trace.r[:, :3], axis=0).any() for trace in traces)
+    if plant.pose and (moving or all(map(stays_settled, motions[1].traces))):
         motions[1:] = [motions[0]._replace(quantity="path")]
     return [*first, *motions, *controls][:2]
+
+
+def stays_settled(trace: Trace) -> bool:
+    """Return whether no channel of a trace ever leaves its settling band."""
+    band = settling_band(trace.scenario, scale(trace))
+    return bool((np.abs(trace.x - trace.r) <= band).all())
 
 
 def meaning(panels: Sequence[Panel]) -> dict[str, str]:

@@ -63,7 +63,7 @@ MAX_THICKNESS = 0.25  # of the shaft of a short arrow, of its length
 MIN_LEVER = 1e-6  # m: a body centred on its hinge has no arc for an arrow
 FLIGHT_LENGTH = 1.3  # at a free body, in radii of its largest part
 FLIGHT_THICKNESS = 0.07
-FLIGHT_DISTANCE = 0.6  # of an arrow, from the middle of a free body to it
+FLIGHT_DISTANCE = 0.9  # of the longest arrow, from the middle of a free body to the arrow over it
 BLOW_DISTANCE = 1.1  # of an arrow, from the foot of that of a blow to the middle of its body
 MAX_BLOW = 3.0  # of the longest arrow: a stronger blow's is no longer
 COMMAND_OPACITY = 0.45  # of a command's arrow beside that of the drive's force
@@ -415,15 +415,18 @@ def blows(trace: Trace, start: float, stop: float) -> list[tuple[str, Array]]:
     return found
 
 
-def straight(model: mujoco.MjModel, data: mujoco.MjData, body: str | int, force: Array) -> Array:
-    """Return the line of a force's arrow, (40, 3) m: out of a free body, whose number is given; or,
-    of a blow on a body of a name, to its middle.
+def straight(
+    model: mujoco.MjModel, data: mujoco.MjData, body: str | int, force: Array, longest: float
+) -> Array:
+    """Return the line of a force's arrow, (40, 3) m, the longest one as given, m: over a free body,
+    whose number is given; or, of a blow on a body of a name, to its middle.
     """
     along = np.linspace(0.0, 1.0, 40)[:, None] * force
     if isinstance(body, str):
         names = [model.body(i).name.removeprefix("m/") for i in range(model.nbody)]
         return data.xipos[names.index(body)] + along - BLOW_DISTANCE * force
-    return data.xpos[body] + along + FLIGHT_DISTANCE * force
+    over = np.array([0.0, 0.0, FLIGHT_DISTANCE * longest + 0.5 * abs(force[2])])
+    return data.xpos[body] + over + along - 0.5 * force
 
 
 def path(
@@ -437,7 +440,7 @@ def path(
         unit = MAX_SWEEP * mount.radius or mount.unit
         width = BENT_WIDTH * mount.radius or mount.thick
         force = min(arrow.high, MAX_BLOW) * arrow.way
-        return straight(model, data, arrow.body or owner, unit * force), width
+        return straight(model, data, arrow.body or owner, unit * force, unit), width
     low, high = np.clip((arrow.low, arrow.high), -1.0, 1.0)
     along = np.linspace(low, high, 40)[:, None]  # of the longest
     if mount.radius:

@@ -130,12 +130,14 @@ def layout(
     points: Array,
     turn: Array,
     may_be_beside: bool = True,
+    words: float = 0.0,
 ) -> tuple[Array, Array, View]:
     """Return the tiles of so many machines in a room of the film and those of their labels, (count,
     4) px each, and the view of points (m, 3) m in each tile.
 
     They are in as many rows, with labels below or beside them, as make the machines largest that
-    have labels which are read well. `may_be_beside` allows labels beside machines.
+    have labels which are read well. `may_be_beside` allows labels beside machines. The top of each
+    tile has room for words of that height, px, which lie over no machine.
     """
     layouts = []
     sides = (False, True) if may_be_beside else (False,)
@@ -155,8 +157,9 @@ def layout(
             left, foot = 0, math.ceil(min(down, (1.0 - MIN_HEIGHT) * tall))
         size = (wide - left, tall - foot)
         edge = TILE_EDGE * size[1]
-        head = min(HEAD_ROOM * (room.right - room.left), 0.5 * size[1])
-        inside = Room(edge, max(edge, head), size[0] - edge, size[1] - edge)
+        head = HEAD_ROOM * (room.right - room.left)
+        top = min(max(edge, head, words), 0.5 * size[1])
+        inside = Room(edge, top, size[0] - edge, size[1] - edge)
         place = fit(points, turn, size, inside)
         view = View(size, turn, place)
         merit = fits, read * magnification(view, points)

@@ -66,7 +66,7 @@ class Canvas:
         self, picture: Array, add: Callable[[mujoco.MjvScene], None], width: float
     ) -> Array:
         """Return a picture with the outline, of a width in px, of the white shapes that `add` adds
-        to a scene; read-only.
+        to a scene; read-only. An outline that would be cut is not drawn.
         """
         shown = self.renderer.scene
         shown.ngeom = 0
@@ -78,6 +78,9 @@ class Canvas:
         shown.flags[FOG] = shown.flags[SKY] = 0
         seen = Image.fromarray(self.renderer.render()[..., 0])  # white shapes on black
         shown.flags[:] = flags
+        x0, y0, x1, y1 = seen.getbbox() or (0, 0, 0, 0)
+        if x0 == 0 or y0 == 0 or x1 == seen.width or y1 == seen.height:
+            return picture
         thick = 2 * max(1, round(width)) + 1
         edge = ImageChops.subtract(seen.filter(ImageFilter.MaxFilter(thick)), seen)
         image = Image.fromarray(picture)

@@ -32,7 +32,15 @@ from smc_mujoco.draw.film import arrows, camera, pace, shared_picture
 from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.draw.film.pace import FilmClock
 from smc_mujoco.draw.film.puppet import Course, Puppet
-from smc_mujoco.draw.film.sheet import Moment, Sheet, head_lines, label_sizes, room_of
+from smc_mujoco.draw.film.sheet import (
+    STATE_HEIGHT,
+    Moment,
+    Sheet,
+    head_lines,
+    label_sizes,
+    letters,
+    room_of,
+)
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.draw.film.track import MachineTrack
 from smc_mujoco.draw.film.video import encoder, mediapy
@@ -412,11 +420,12 @@ def placement(
         points = np.concatenate(reaches)
     sizes = functools.partial(label_sizes, names, size)
     room = room_of(size, lines)
-    tiles, labels, view = camera.layout(len(tracks), room, sizes, points, turn)
+    words = STATE_HEIGHT * letters(size) if any(track.speaks for track in tracks) else 0.0
+    tiles, labels, view = camera.layout(len(tracks), room, sizes, points, turn, words=words)
     lanes = shared_picture.places(puppets, turn)
     if lanes is not None:
         every = np.concatenate([points + place for place in lanes])
-        shared = shared_picture.layout(len(tracks), room, sizes, every, turn)
+        shared = shared_picture.layout(len(tracks), room, sizes, every, turn, words)
         if camera.magnification(shared[2], every) > camera.magnification(view, points):
             tiles, labels, view = shared
             points = every

@@ -19,9 +19,11 @@ PAST_LINE = 2.2  # points, width of a path that is flown
 
 def plane(traces: Sequence[Trace]) -> Array:
     """Return the two of the axes x, y and z along which the references of free bodies vary most,
-    (2,).
+    (2,); where these stand still, the bodies themselves.
     """
     goals = np.concatenate([trace.r for trace in traces])
+    if not np.ptp(goals, axis=0).any():
+        goals = np.concatenate([trace.x for trace in traces])
     sides = np.ptp(goals, axis=0)
     order = np.argsort(-sides, kind="stable")
     widest = order[:2]
@@ -67,6 +69,8 @@ def draw_map(
         width = style.points(panels.LINE)
         artists += ax.plot(*places, color=colour, lw=width, **look)
         goal = {"color": style.INK, "lw": style.points(0.8), "ls": panels.DASHES, "zorder": 3}
+        if not np.ptp(trace.r[:, axes], axis=0).any():  # it stands still
+            goal |= {"marker": "+", "ms": style.points(9)}
         ax.plot(*trace.r[:, axes].T, **goal)
         wide = {"color": colour, "lw": style.points(PAST_LINE), "animated": True}
         (past,) = ax.plot([], [], **wide)

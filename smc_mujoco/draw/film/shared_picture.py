@@ -53,7 +53,7 @@ def moved(puppet: Puppet) -> Array:
 
 
 def layout(
-    count: int, room: camera.Room, sizes: camera.Sizes, points: Array, turn: Array
+    count: int, room: camera.Room, sizes: camera.Sizes, points: Array, turn: Array, words: float
 ) -> tuple[Array, Array, camera.View]:
     """Return as `camera.layout` the tiles, which are the parts of one picture, and the labels below
     it.
@@ -63,7 +63,7 @@ def layout(
         labels, read = sizes(allowed / count)
         return labels * (count, 1.0), read
 
-    tiles, labels, view = camera.layout(1, room, of_all, points, turn, may_be_beside=False)
+    tiles, labels, view = camera.layout(1, room, of_all, points, turn, False, words)
     return across(tiles[0], count), across(labels[0], count), view
 
 

@@ -44,6 +44,8 @@ INSET, MARKED_INSET = 0.3, 0.9  # letters, of that line without and with marks, 
 LEAST_TITLE = 0.75  # of the size of letters, of a long title, and of long labels
 TIME_TICKS = 5  # at most
 SIDES = ("left", "right")  # of the first and the last tick's words, so that they stay on the page
+STATE_PLACE = 0.3  # letters, of what is said of a machine, from the corner of its tile
+STATE_HEIGHT = 1.5  # letters, from the top of a tile to below what is said there
 FUTURE_LINE = 0.4  # opacity of what is still to come
 FUTURE_BAND = 0.12
 EVENT_TIME = 0.6  # s of the film over which words on what has ended fade; chosen
@@ -193,7 +195,7 @@ class Sheet:
             self.write_head(one_line(style.titled(title, runs.head)), key, lines, order)
             self.write_labels(labels)
             rim = withStroke(linewidth=style.points(3), foreground=style.PAPER)
-            corners = tiles[:, :2] + 0.3 * self.letters
+            corners = tiles[:, :2] + STATE_PLACE * self.letters
             look = {"va": "top", "weight": "bold", "path_effects": [rim]}
             self.says = [self.write(*corner, **look) for corner in corners.tolist()]
             future, self.moving, self.flights = self.draw_panels()

@@ -18,6 +18,8 @@ from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.run import poses
 from smc_mujoco.simulation.trace import Trace
 
+SAID_TIMES = 1000  # of a run, at which it is asked whether something is said of it; chosen
+
 
 class Motion(NamedTuple):
     """Poses of a mechanism, (times, nq), at times in s."""
@@ -34,7 +36,8 @@ class Motion(NamedTuple):
 class MachineTrack:
     """A trace at the frames of a film's clock; an arm has no arrows but those of its tip.
 
-    `framing` are its arrows at the times `grid`, s, of the whole run, which set the place of all.
+    `framing` are its arrows at the times `grid`, s, of the whole run, which set the place of all,
+    and `speaks` is whether something is said of it in the run.
     """
 
     def __init__(
@@ -58,6 +61,8 @@ class MachineTrack:
         self.drawn = arrows.frames(trace, edges, self.holds, sizes, colour)
         self.framing = arrows.frames(trace, grid, np.zeros(len(grid)), sizes, colour)
         self.states = states.timeline(trace, times, clock.played)
+        some = trace.t[:: 1 + len(trace.t) // SAID_TIMES]
+        self.speaks = any(states.timeline(trace, some, clock.played))
         for k, state in enumerate(self.states):
             if state and state.force:
                 self.drawn[k] = arrows.without_number(self.drawn[k])
