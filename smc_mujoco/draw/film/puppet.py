@@ -68,13 +68,15 @@ def within(boxes: Array, low: Array, high: Array) -> Array:
 
 class Course(NamedTuple):
     """Where a trace takes a machine, its reference and what else moves: the corners of their boxes,
-    m, at some times.
+    m, at some times. `rest` are the links of a robot that falls or drives, besides those that its
+    channels move, such as all but the forearm of a humanoid whose elbow is driven.
     """
 
     times: list[float]  # s
     places: list[Array]
     goals: list[Array]
     others: list[Array]
+    rest: list[Array]  # of a machine that its driven joints do not carry
 
     @property
     def reached(self) -> Array:
@@ -253,9 +255,13 @@ class Puppet:
         falling = np.array(falling_parts)
         loose = ~links & ~plane & ~world.still(model) & ~falling
         roots = model.body_rootid[model.geom_bodyid]
-        beside = np.isin(roots, roots[links]) & self.floats
-        body = links | (loose & beside)
-        course = Course([], [], [], [])
+        rest = loose & np.isin(roots, roots[links]) & self.floats
+        body = links
+        if self.carried(self.corners(track, trace.x[0, : self.shown], 0.0), links, rest):
+            body = links | rest
+            rest = np.zeros_like(rest)
+        loose &= ~rest
+        course = Course([], [], [], [], [])
         for share in np.linspace(0.0, 1.0, POSES) ** 2:  # most of the motion is early
             last = len(trace.t) - 1
             sample = round(share * last)
@@ -271,7 +277,16 @@ class Puppet:
             body_corners = corners[body].reshape(-1, 3)
             course.places.append(body_corners)
             course.others.append(corners[loose])
+            course.rest.append(corners[rest])
         return course
+
+    def carried(self, corners: Array, links: Array, rest: Array) -> bool:
+        """Return whether the geoms `links`, (geoms,), carry the `rest` of a machine, as wheels and
+        legs do: they are at its foot. `corners` are of all geoms at the start, (geoms, 8, 3) m.
+        """
+        low = corners[links | rest, :, 2].min()
+        high = corners[links | rest, :, 2].max()
+        return bool(corners[links, :, 2].min() <= low + FLOOR_SHARE * (high - low))
 
     def travels(self, course: Course) -> bool:
         """Return whether a machine that nothing holds in place goes so far that the camera follows
@@ -325,6 +340,11 @@ class Puppet:
             for part, at in zip([*course.places, *curves], places, strict=True):
                 relative.append(part - at)
             points = np.concatenate(relative)
+            around = (0.5 * MOST_HEIGHT - 0.5) * np.ptp(points, axis=0).max()
+            ends = points.min(axis=0) - around, points.max(axis=0) + around
+            moved = zip(course.rest, places, strict=False)
+            rest = np.concatenate([boxes - at for boxes, at in moved])
+            points = np.concatenate([points, within(rest, *ends).reshape(-1, 3)])
             every_place = np.concatenate(course.places)
             lowest = float(every_place[:, 2].min())
             height = max(0.0, -lowest)
@@ -396,7 +416,8 @@ class Puppet:
 
     def loose(self, courses: Sequence[Course], little: float) -> tuple[Array, Array]:
         """Return the boxes of what moves loosely on all machines, over its course, and of what
-        moves less than `little`, m, where it begins: (boxes, 8, 3) m each.
+        moves less than `little`, m, where it begins, with the `rest` of machines, over its course:
+        (boxes, 8, 3) m each.
         """
         moving = []
         calm = []
@@ -404,7 +425,7 @@ class Puppet:
             places = np.stack(course.others)
             way = np.ptp(places, axis=0).max(axis=(1, 2))
             moving.append(places[:, way >= little].reshape(-1, 8, 3))
-            calm.append(places[0, way < little])
+            calm += [places[0, way < little], *course.rest]
         return np.concatenate(moving), np.concatenate(calm)
 
     def lines(

@@ -1,8 +1,9 @@
 """The direction from which a film looks at a user's machine.
 
 It looks across the planes in which the driven hinges turn, and across the lines of driven slides,
-from a side on which other parts hide little of what moves. It depends on the model and on the pose
-in which runs begin by default, so all films of a machine have it.
+from a side on which other parts hide little of what moves, and other things little of the machine.
+It depends on the model and on the pose in which runs begin by default, so all films of a machine
+have it.
 """
 
 import copy
@@ -19,6 +20,7 @@ FRONT = 90.0  # the azimuth that is taken where others show as much
 AZIMUTHS = np.arange(0.0, 360.0, 15.0)
 LOWEST = -12.0  # from a little above, so that the floor is seen
 ELEVATIONS = (LOWEST, -30.0, -50.0, -70.0)
+REST_SHARE = 0.5  # by which a view is worse that hides the whole machine but not what moves
 ENOUGH = 0.5  # of the motion: a camera of the model that shows less is not taken
 DRAWN = (np.arange(6) < world.DRAWN_GROUPS).astype(np.uint8)  # groups of geoms
 INSIDE = 0.5  # of a geom's box, from its middle to the corners at which one looks
@@ -43,6 +45,9 @@ def view(
         share = motion * visible(model, data, links, own)
         if share >= ENOUGH:
             return own
+    roots = model.body_rootid[model.geom_bodyid]
+    drawn = model.geom_group < world.DRAWN_GROUPS
+    whole = np.flatnonzero(np.isin(roots, roots[links]) & drawn & (model.geom_type != world.PLANE))
     rated = []
     for azimuth, elevation in itertools.product(AZIMUTHS.tolist(), ELEVATIONS):
         angles = azimuth, elevation
@@ -54,6 +59,9 @@ def view(
         if -motion <= most:  # no part that hides it can make it better
             break
         share = -motion * visible(model, data, links, angles)
+        if share > most:  # else the rest of the machine cannot make it better
+            hidden = 1.0 - visible(model, data, whole, angles)
+            share *= 1.0 - REST_SHARE * hidden
         if share > most:
             most = share
             best = angles
