@@ -73,6 +73,7 @@ WHOLE_LABELS = {  # quantity, one number a sample -> what an axis says
 SINGLE = ("spread", *WHOLE_LABELS)  # one number a sample, whatever the number of channels
 UNBANDED = ("x", "e", *SINGLE)  # drawn sample by sample, without a mean over time
 NO_SURFACE = ("baseline", "predictive", "feedback", "linear")  # families of laws without an s
+BETWEEN_DECADES = ((3.0,), (2.0, 5.0), (2.0, 3.0, 4.0, 5.0, 6.0, 8.0))
 DASHES = (0, (4, 4))  # of a reference's line
 REFERENCE = "reference"  # id of a reference's lines
 
@@ -457,14 +458,20 @@ def set_logarithmic(ax: Axes, heights: Pair) -> None:
 
 
 def number_decades(axis: Axis, ends: Pair) -> None:
-    """Number the decades of a logarithmic axis between its ends; with fewer than two of them, a
-    number between them too.
+    """Number the decades of a logarithmic axis between its ends; with fewer than two of them,
+    numbers between them too, so that there are two.
     """
     first, last = np.log10(ends)
     if math.floor(last) > math.ceil(first):
         axis.set_minor_formatter(NullFormatter())
         return
-    axis.set_minor_locator(LogLocator(subs=(3.0,)))
+    decades = 10.0 ** np.arange(math.floor(first), math.ceil(last) + 1)
+    between: tuple[float, ...] = ()
+    for between in BETWEEN_DECADES:
+        numbers = np.outer(decades, [1.0, *between])
+        if np.sum((numbers >= min(ends)) & (numbers <= max(ends))) > 1:
+            break
+    axis.set_minor_locator(LogLocator(subs=between))
     numbers = FuncFormatter(lambda value, _: style.short(value))
     axis.set_major_formatter(numbers)
     axis.set_minor_formatter(numbers)

@@ -69,3 +69,16 @@ def test_an_outline_is_a_line_and_covers_nothing():
         shown.arrange(np.array([0.0]))
         there = changed(shown.render(), alone) > 20
     assert 50 < outline.sum() < 0.3 * there.sum()
+
+
+def test_an_outline_that_the_picture_s_edge_would_cut_is_not_drawn():
+    with stage("inverted_pendulum") as shown:
+        edge = shown.project(np.zeros((1, 3)))[0, 0]
+        metre = shown.project(shown.turn[:, :1].T)[0, 0] - edge
+        for beyond, drawn in ((-60.0, True), (0.0, False)):  # px of the rod from the left edge
+            shown.model.cam_pos[shown.camera] += (edge + beyond) / metre * shown.turn[:, 0]
+            shown.arrange(np.array([0.6]))
+            alone = shown.render()
+            shown.arrange(np.array([0.6]), goal=np.array([0.0]))
+            assert (changed(shown.render(), alone).max() > 50) == drawn
+            shown.model.cam_pos[shown.camera] -= (edge + beyond) / metre * shown.turn[:, 0]

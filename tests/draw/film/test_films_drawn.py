@@ -15,9 +15,9 @@ from PIL import Image
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl, progress
-from smc_mujoco.draw import states, style
+from smc_mujoco.draw import panels, states, style
 from smc_mujoco.draw.figure import DrawnRuns
-from smc_mujoco.draw.film import arrows, film
+from smc_mujoco.draw.film import arrows, film, flight, world
 from smc_mujoco.draw.film.sheet import Moment, Sheet, head_lines, label_sizes, room_of
 from smc_mujoco.draw.states import State
 
@@ -132,6 +132,30 @@ def test_the_front_rotors_of_a_drone_have_the_colour_of_its_law_and_stay_transpa
             own = np.array(style.rgb("#0072B2")) / 255
             assert (np.abs(shade[:3] - own).max() < 0.01) == is_own
             assert 0.0 < shade[3] < 1.0
+
+
+@pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+def test_the_wind_on_a_drone_has_its_arrow_over_it_and_its_path_a_map():
+    drone = smc.plant("quadrotor")
+    wind = smc.signals.Wind(4.0, time=0.1, width=0.4)
+    trace = smc.run(
+        smc.Scenario(plant=drone, law="geometric", x0=drone.rest, disturbance=wind, duration=0.4)
+    )
+    error, path = panels.strip([trace])
+    assert (error.quantity, path.quantity) == ("settling", "path")
+    assert flight.plane(path.traces).tolist() == [0, 2]
+    yaw = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.5])
+    turned = dataclasses.replace(trace, x=trace.x + yaw)
+    assert [panel.quantity for panel in panels.strip([turned])] == ["settling", "settling"]
+    with staged(trace, SIZE) as stage:
+        stage.arrange(trace.x[-1])
+        stage.forward()
+        for way in np.eye(3):
+            arrow = arrows.Arrow(0.0, 1.0, arrows.WHITE, way=way)
+            line, _ = arrows.path(stage.model, stage.data, stage.mounts[0], arrow)
+            drawn = stage.project(line)[:, 1].max()
+            tops = world.boxes(stage.model, stage.data)[stage.links].max(axis=1)
+            assert drawn < stage.project(tops)[:, 1].min()
 
 
 def test_panels_are_uncovered_up_to_the_clock_with_a_dot_where_each_run_is():

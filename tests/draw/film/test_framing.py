@@ -14,7 +14,7 @@ from helpers.sketch import made
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film import arrows, camera, film, puppet, track, world
+from smc_mujoco.draw.film import arrows, camera, film, puppet, sheet, track, world
 from smc_mujoco.draw.film.pace import FilmClock
 from smc_mujoco.simulation import model as models
 
@@ -191,6 +191,50 @@ def test_five_machines_keep_room_above_their_words():
     assert len(tiles) == len(labels) == 5
     assert tiles[:, 1].min() >= 54
     assert labels[:, 3].max() <= 342
+
+
+@pytest.mark.parametrize("speaks", [True, False])
+def test_words_of_a_machine_lie_over_neither_it_nor_its_arrows(speaks, monkeypatch):
+    """A pendulum leans on a peg, or swings freely."""
+    traces = two("inverted_pendulum", contact="peg" if speaks else ())
+    with filmed(traces, monkeypatch) as (_, placed):
+        size, turn, place = placed.view
+        seen = camera.project(placed.points, turn, place, size)
+        said = sheet.STATE_HEIGHT * sheet.letters(SIZE)
+        assert (seen[:, 1].min() >= said - 1e-6) == speaks
+
+
+def robot(driven):
+    """A robot on a free base whose arm, 0.3 m long, turns at a height of 1.5 m, or whose wheel."""
+    arm, wheel = (
+        f'''<body pos="{place}"><joint name="{name}" axis="0 1 0"/>
+        <geom type="{kind}" size="{size}" {way} mass=".3"/></body>'''
+        for name, place, kind, size, way in (
+            ("elbow", "0 .1 1.5", "capsule", ".03", 'fromto="0 0 0 .3 0 0"'),
+            ("wheel", "0 .1 .1", "cylinder", ".1 .02", 'euler="90 0 0"'),
+        )
+    )
+    return f"""<mujoco model="robot"><worldbody><geom type="plane" size="0 0 .1"/>
+      <body><freejoint/><geom type="capsule" size=".06" fromto="0 0 .1 0 0 1.7"
+      mass="9"/>{arm}{wheel}</body></worldbody>
+      <actuator><motor joint="{driven}" ctrlrange="-9 9"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize(("driven", "carried"), [("elbow", False), ("wheel", True)])
+def test_all_of_a_robot_counts_only_if_its_driven_joint_carries_it(driven, carried, monkeypatch):
+    plant = smc.plant_from(robot(driven), [driven])
+    traces = [smc.run(smc.Scenario(plant=plant, law=smc.law("pid"), duration=0.2, x0=0.3))]
+    with filmed(traces, monkeypatch) as (stages, _):
+        shown = stages[0]
+        boxes = world.boxes(shown.model, shown.data)
+        seen = shown.project(boxes[shown.links].reshape(-1, 3))
+        assert (seen > 0.0).all()
+        assert (seen < shown.size).all()
+        share = np.ptp(seen, axis=0).max() / shown.size[1]
+        assert (share > 0.4) == (not carried)
+        trunk = ~world.still(shown.model) & (shown.model.geom_type != world.PLANE)
+        whole = shown.project(boxes[trunk].reshape(-1, 3))
+        assert (np.ptp(whole[:, 1]) <= shown.size[1]) == carried
 
 
 def test_labels_are_beside_machines_that_are_far_wider_than_high():

@@ -76,6 +76,14 @@ def test_the_camera_is_where_no_other_part_is_in_front(side):
     assert ahead[1] > 0.9
 
 
+def test_nothing_else_hides_the_rest_of_the_machine():
+    """A table before the column, which hides nothing of the forearm."""
+    table = '<body name="table"><geom type="box" size=".8 .3 .35" pos="0 -1 .35"/></body>'
+    text = ARM.format(axis="0 1 0", kind="hinge", plate="", camera=table)
+    ahead, _ = way(smc.plant_from(text, ["elbow"], others="held"))
+    assert ahead[1] < -0.9
+
+
 def test_the_model_s_camera_is_taken_if_it_shows_the_motion():
     across = '<camera pos="0 3 1" xyaxes="-1 0 0 0 0 1"/>'
     along = '<camera pos="3 0 1" xyaxes="0 1 0 0 0 1"/>'
