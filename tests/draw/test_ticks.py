@@ -6,7 +6,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from smc_mujoco.draw import page as pages
-from smc_mujoco.draw import style
+from smc_mujoco.draw import panels, style
 
 pytestmark = pytest.mark.quick
 
@@ -48,3 +48,18 @@ def test_ticks_that_were_set_and_logarithmic_axes_stay():
     pages.space_ticks(page)
     assert one.get_xticks() == pytest.approx([0.1, 0.2])
     assert other.get_xticks() == pytest.approx(before)
+
+
+@pytest.mark.parametrize(
+    "ends", [(1e-6, 1e3), (0.9, 13.0), (0.0016, 0.0056), (0.016, 0.024), (40.0, 70.0)]
+)
+def test_a_logarithmic_axis_has_two_numbers_at_least(ends):
+    page = Figure(figsize=(3.0, 1.0))
+    ax = page.add_axes((0.1, 0.4, 0.8, 0.5), xscale="log", xlim=ends)
+    panels.number_decades(ax.xaxis, ends)
+    page.draw_without_rendering()
+    shown = []
+    for label in ax.get_xticklabels(which="both"):
+        if label.get_text() and ends[0] <= label.get_position()[0] <= ends[1]:
+            shown.append(label)
+    assert len(shown) >= 2
