@@ -63,7 +63,9 @@ def layout(
         labels, read = sizes(allowed / count)
         return labels * (count, 1.0), read
 
-    tiles, labels, view = camera.layout(1, room, of_all, points, turn, False, words)
+    tiles, labels, view = camera.layout(
+        1, room, of_all, points, turn, may_be_beside=False, words=words
+    )
     return across(tiles[0], count), across(labels[0], count), view
 
 
