@@ -386,7 +386,15 @@ class Margins(list[Margin]):
         """
         from smc_mujoco.robustness import margins_figure
 
-        return margins_figure.draw(self, path, **options)
+        bars = []
+        for margin in self:
+            kind = MARGIN_KINDS[margin.kind]
+            about = margin.plant, margin.law, kind.label, margin.unit, kind.none
+            limit = math.nan
+            if margin.theory is not None and not math.isnan(margin.value):
+                limit = margin.theory if margin.theory < math.inf else math.nan
+            bars.append(margins_figure.Bar(*about, margin.value, margin.resolution, limit))
+        return margins_figure.draw(bars, path, **options)
 
 
 @constrained

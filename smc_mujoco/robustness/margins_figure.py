@@ -8,6 +8,7 @@ known not to be. A bar whose number has "≥" ends where the search did, and has
 import math
 import os
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,7 +20,6 @@ from smc_mujoco.common.text import number
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Handle, Size
-from smc_mujoco.robustness.margins import MARGIN_KINDS, Margin
 
 ROW_HEIGHT = 0.3  # inches on a full page, of a law
 AROUND = 0.95  # the same, of a panel's ticks, label and title
@@ -28,8 +28,32 @@ NUMBER_ROOM = 1.35  # of the longest bar: the number beside it has room
 THEORY = {"marker": "D", "mfc": style.PAPER, "mec": style.INK, "lw": 0.0}
 
 
+class Bar(NamedTuple):
+    """A margin as it is drawn: of a law on a plant, both by their names."""
+
+    plant: str
+    law: str
+    kind: str  # in words
+    unit: str
+    start: float  # the level without any effect
+    value: float  # NaN where the unchanged run fails
+    resolution: float  # up to the first level that is not tolerated; 0 if all are
+    limit: float  # by linear theory; NaN without one
+
+    @property
+    def beyond(self) -> float:
+        """The smallest level known not to be tolerated."""
+        return (self.start if math.isnan(self.value) else self.value) + self.resolution
+
+    def text(self, factor: float) -> str:
+        """Return what is written beside the bar, where values are multiplied by a factor."""
+        if math.isnan(self.value):
+            return f"fails at {self.start:g}"
+        return f"{'' if self.resolution else '≥ '}{number(factor * self.value)}"
+
+
 def draw(
-    found: Sequence[Margin],
+    found: Sequence[Bar],
     path: str | os.PathLike[str] | None = None,
     title: str | None = None,
     size: Size = None,
@@ -41,8 +65,8 @@ def draw(
         raise ScenarioError("no margins to draw: give at least one")
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
-    plants = list(dict.fromkeys(margin.plant for margin in found))
-    kinds = list(dict.fromkeys(margin.kind for margin in found))
+    plants = list(dict.fromkeys(bar.plant for bar in found))
+    kinds = list(dict.fromkeys(bar.kind for bar in found))
     across = 1 if width < pages.NARROW else min(ACROSS, len(kinds))
     down = math.ceil(len(kinds) / across)
     with style.page(width):
@@ -65,68 +89,57 @@ def draw(
         return pages.write(page, paths)
 
 
-def _most_laws(found: Sequence[Margin]) -> int:
+def _most_laws(found: Sequence[Bar]) -> int:
     """Return the largest number of bars of a panel."""
     counts: dict[tuple[str, str], int] = {}
-    for margin in found:
-        panel = margin.plant, margin.kind
+    for bar in found:
+        panel = bar.plant, bar.kind
         counts[panel] = counts.get(panel, 0) + 1
     return max(counts.values())
 
 
-def _key(found: Sequence[Margin]) -> list[Handle]:
+def _key(found: Sequence[Bar]) -> list[Handle]:
     """Return the entries of the legend."""
     key: list[Handle] = [Patch(facecolor=style.MUTED, label="tolerated")]
-    if any(margin.resolution for margin in found):
+    if any(bar.resolution for bar in found):
         words = "not known, up to the first level not tolerated"
         key.append(pages.entry(words, style.INK, lw=style.points(1.5)))
-    if any(math.isfinite(_limit(margin)) for margin in found):
+    if any(math.isfinite(bar.limit) for bar in found):
         key.append(pages.entry("limit by linear theory", style.INK, **THEORY))
     return key
 
 
-def _limit(margin: Margin) -> float:
-    """Return the limit by linear theory, NaN without one, or where the unchanged run fails."""
-    if margin.theory is None or math.isnan(margin.value):
-        return math.nan
-    return margin.theory if math.isfinite(margin.theory) else math.nan
-
-
-def _panel(ax: Axes, margins: Sequence[Margin], named: bool) -> None:
+def _panel(ax: Axes, bars: Sequence[Bar], named: bool) -> None:
     """Draw margins of one kind on one plant, the first at the top; laws are written beside them if
     `named`.
     """
-    kind = MARGIN_KINDS[margins[0].kind]
-    values = np.array([margin.value for margin in margins])
-    ends = np.nan_to_num(values, nan=kind.none)
-    beyond = ends + np.array([margin.resolution for margin in margins])
-    limits = np.array([_limit(margin) for margin in margins])
+    start = bars[0].start
+    ends = np.array([start if math.isnan(bar.value) else bar.value for bar in bars])
+    beyond = np.array([bar.beyond for bar in bars])
+    limits = np.array([bar.limit for bar in bars])
     reached = np.fmax(beyond, limits)
-    longest = float(reached.max()) - kind.none
-    unit = margins[0].unit
+    longest = float(reached.max()) - start
+    unit = bars[0].unit
     factor = 1.0
     if unit != "1":
-        factor, unit = style.prefixed(kind.none + longest, unit)
-    rows = np.arange(len(margins))
-    colours = style.law_colours([margin.law for margin in margins])
-    start = factor * kind.none
+        factor, unit = style.prefixed(start + longest, unit)
+    rows = np.arange(len(bars))
+    colours = style.law_colours([bar.law for bar in bars])
+    start *= factor
     ax.barh(rows, factor * ends - start, 0.6, left=start, color=colours)
     ax.axvline(start, color=style.MUTED, lw=style.points(0.8))
     ax.hlines(rows, factor * ends, factor * beyond, color=style.INK, lw=style.points(1.5))
     ax.plot(factor * limits, rows, ms=style.points(5), **THEORY)
-    for row, margin, end in zip(rows, margins, factor * reached, strict=True):
-        words = margin.text
-        if not math.isnan(margin.value):
-            words = f"{'≥ ' * margin.open}{number(factor * margin.value)}"
+    for row, bar, end in zip(rows, bars, factor * reached, strict=True):
         beside = {"xytext": (style.points(7), 0), "textcoords": "offset points"}
         look = {"va": "center", "color": style.INK, "fontsize": style.points(9.5)}
-        ax.annotate(words, (end, row), **beside, **look)
+        ax.annotate(bar.text(factor), (end, row), **beside, **look)
     room = NUMBER_ROOM * factor * longest
     ax.set_xlim(0.0, start + (room or 1.0))
     ax.set_ylim(len(rows) - 0.5, -0.5)
     unit = unit.replace(" ", "·")
-    ax.set_xlabel(kind.label if unit == "1" else f"{kind.label} ({unit})")
-    names = style.distinct([style.law_name(margin.law) for margin in margins])
+    ax.set_xlabel(bars[0].kind if unit == "1" else f"{bars[0].kind} ({unit})")
+    names = style.distinct([style.law_name(bar.law) for bar in bars])
     ax.set_yticks(rows, names if named else [""] * len(rows), parse_math=False)
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)
