@@ -393,7 +393,7 @@ class Margins(list[Margin]):
             limit = math.nan
             if margin.theory is not None and not math.isnan(margin.value):
                 limit = margin.theory if margin.theory < math.inf else math.nan
-            bars.append(margins_figure.Bar(*about, margin.value, margin.resolution, limit))
+            bars.append(margins_figure.MarginBar(*about, margin.value, margin.resolution, limit))
         return margins_figure.draw(bars, path, **options)
 
 

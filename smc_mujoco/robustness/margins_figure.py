@@ -28,7 +28,7 @@ NUMBER_ROOM = 1.35  # of the longest bar: the number beside it has room
 THEORY = {"marker": "D", "mfc": style.PAPER, "mec": style.INK, "lw": 0.0}
 
 
-class Bar(NamedTuple):
+class MarginBar(NamedTuple):
     """A margin as it is drawn: of a law on a plant, both by their names."""
 
     plant: str
@@ -53,7 +53,7 @@ class Bar(NamedTuple):
 
 
 def draw(
-    found: Sequence[Bar],
+    found: Sequence[MarginBar],
     path: str | os.PathLike[str] | None = None,
     title: str | None = None,
     size: Size = None,
@@ -89,7 +89,7 @@ def draw(
         return pages.write(page, paths)
 
 
-def _most_laws(found: Sequence[Bar]) -> int:
+def _most_laws(found: Sequence[MarginBar]) -> int:
     """Return the largest number of bars of a panel."""
     counts: dict[tuple[str, str], int] = {}
     for bar in found:
@@ -98,7 +98,7 @@ def _most_laws(found: Sequence[Bar]) -> int:
     return max(counts.values())
 
 
-def _key(found: Sequence[Bar]) -> list[Handle]:
+def _key(found: Sequence[MarginBar]) -> list[Handle]:
     """Return the entries of the legend."""
     key: list[Handle] = [Patch(facecolor=style.MUTED, label="tolerated")]
     if any(bar.resolution for bar in found):
@@ -109,7 +109,7 @@ def _key(found: Sequence[Bar]) -> list[Handle]:
     return key
 
 
-def _panel(ax: Axes, bars: Sequence[Bar], named: bool) -> None:
+def _panel(ax: Axes, bars: Sequence[MarginBar], named: bool) -> None:
     """Draw margins of one kind on one plant, the first at the top; laws are written beside them if
     `named`.
     """
