@@ -11,7 +11,7 @@ from smc_mujoco.common.aliases import Fields
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import band
 from smc_mujoco.draw.panels import SINGLE, Panel, mark, over_time
-from smc_mujoco.draw.quantities import PEAKS, limits
+from smc_mujoco.draw.quantities import MARGIN, PEAKS, limits, span, usual
 from smc_mujoco.metrics.conventions import (
     last_exit,
     scale,
@@ -90,6 +90,8 @@ def below_film(
         if panel.quantity in PEAKS:
             low, high = row.axes.get_ylim()
             row.axes.set_ylim(max(low, FILM_RANGE * high), high)
+        if panel.quantity == "largest":
+            cut_peak(row.axes, row.panel)
         if laned:
             tell_swing(row.axes, row.panel.traces[0], row.colours[0])
     return found, drawn
@@ -109,6 +111,23 @@ def in_lanes(panel: Panel) -> bool:
         changes = np.abs(steps)
         switches.append(np.sum(changes > least))
     return max(switches) > MAX_SWITCHES or crowded(panel, 0)
+
+
+def cut_peak(ax: Axes, panel: Panel) -> None:
+    """Fit the vertical range to the largest |u| that lasts, where there is a brief one of over
+    twice it, such as at the start, and say how large that is; not where other words are.
+    """
+    peak = span(panel.traces, "largest")[1]
+    lasting = usual(panel.traces, "largest")
+    if 0.0 < lasting < peak and not ax.texts:
+        air = MARGIN * lasting
+        ax.set_ylim(-air, lasting + 2.0 * air)
+        words = f"up to {style.short(peak)} {style.units(panel.group)['u']}"
+        size = style.points(9.0)
+        place: Fields = {"xytext": (-0.5 * size, -0.4 * size), "textcoords": "offset points"}
+        look: Fields = {"ha": "right", "va": "top", "fontsize": size, "color": style.INK}
+        look["bbox"] = {"fc": style.PAPER, "ec": "none", "pad": 0.1 * size}
+        ax.annotate(words, (1.0, 1.0), xycoords="axes fraction", **place, **look)
 
 
 def settled(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Artist]:

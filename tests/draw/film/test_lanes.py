@@ -10,6 +10,7 @@ import pytest
 from helpers.films import picture, sheet
 from helpers.runs import at_defaults
 from helpers.sketch import made
+from matplotlib.figure import Figure
 
 import smc_mujoco as smc
 from smc_mujoco.draw import lanes, panels, style
@@ -99,3 +100,16 @@ def test_the_cursor_passes_behind_words():
             assert found[rows].sum() < 0.5 * (rows.stop - rows.start)
             hidden += 1
     assert hidden
+
+
+@pytest.mark.parametrize(("peak", "top", "said"), [(9.0, 1.16, ["up to 9 N"]), (1.5, 7.0, [])])
+def test_a_brief_peak_is_told_and_leaves_room_for_what_lasts(peak, top, said):
+    trace = swinging("classical", 1.0)
+    u = np.abs(trace.u)
+    u[5] = peak
+    (group,) = style.split([trace])
+    panel = panels.Panel("largest", group, [dataclasses.replace(trace, u=u)])
+    ax = Figure().add_subplot(ylim=(0.0, 7.0))
+    lanes.cut_peak(ax, panel)
+    assert ax.get_ylim()[1] == pytest.approx(top)
+    assert [words.get_text() for words in ax.texts] == said
