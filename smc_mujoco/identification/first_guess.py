@@ -36,6 +36,8 @@ from smc_mujoco.mechanisms.plant import degrees_hint
 # least squares, one after the other, in which parameters of a plant of the library may be no
 # linear factors of forces; chosen
 PASSES = 6
+WEIGHINGS = 4  # least squares with the noise of each joint by the one before; chosen
+LEAST_NOISE = 1e-9  # of the forces, of a joint without noise
 LARGEST_FACTOR = 10.0  # of a pass, for a parameter that cannot be negative; chosen
 DELAY_STEP = 1e-3  # s, between delays that are tried; chosen
 # of the largest speed, below which a joint's direction counts in part; chosen
@@ -117,8 +119,7 @@ def _guessed(
             gains.append(-moved)
         full = np.hstack([A, np.concatenate(gains)])
         b = np.concatenate(targets)
-        found = _solved(full, b)
-        left = float(np.sum((b - full @ found) ** 2))
+        found, left = _weighted(full, b, rig.plant.n)
         if best is None or left < best[0]:
             best = left, late, found
     assert best is not None
@@ -158,6 +159,22 @@ def _commanded(log: Forces, k: int, gained: Sequence[int]) -> tuple[Array, Array
         moved[:, j] = alone.ravel()
         every[:, i] = 0.0
     return every.ravel(), moved
+
+
+def _weighted(A: Array, b: Array, n: int) -> tuple[Array, float]:
+    """Return the most likely x of A x = b + noise, whose rows are those of n joints in turn, each
+    with a noise of its own, and the logarithm of these noises' product.
+
+    A joint that nearly rests, or shakes under a noisy command, would else decide the delay of all.
+    """
+    sizes = np.ones(n)
+    found = np.zeros(A.shape[1])
+    for _ in range(WEIGHINGS):
+        weights = np.tile(1.0 / sizes, len(b) // n)
+        found = _solved(A * weights[:, None], b * weights)
+        left = (b - A @ found).reshape(-1, n)
+        sizes = np.maximum(np.sqrt(np.mean(left**2, axis=0)), LEAST_NOISE * np.std(b))
+    return found, float(np.sum(np.log(sizes)))
 
 
 def _solved(A: Array, b: Array) -> Array:

@@ -12,14 +12,16 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.identification.least_squares import least_squares
+from smc_mujoco.identification.paths import DELAY
 from smc_mujoco.identification.replays import PARTS, Point, Replays, Slopes, cost
 from smc_mujoco.identification.standard_errors import jackknife
 
 START_DECADES = 2.0  # by which a quantity of a further start may differ from the rig's own; chosen
 CANDIDATES = 8  # further starts that are drawn for each one that is refined; chosen
 DAMPINGS = 0.0, 1e-2, 1.0, 1e3  # of steps that are tried in turn, relative to the curvature; chosen
-# of its linear move by which a piece's starting state is moved in trials; chosen
-SHARES = 0.3, 1.0
+# of its linear move by which a piece's starting state is moved in trials; chosen. 0 keeps a state
+# that dry friction holds, which any move might spoil
+SHARES = 0.0, 0.3, 1.0
 TRIALS = len(SHARES) + 1  # points that a step tries with each damping
 # scales of a state at the start, by which it may differ from the measured one; chosen
 MAX_STATE = 100.0
@@ -27,12 +29,17 @@ MAX_STATE = 100.0
 KICKS = -4.0, 4.0
 # percent: fit of a piece beyond which it is not fitted from there; chosen
 GOOD_PIECE = 99.5
+MIN_SIZE = 1e-300  # in place of the size 0 of slopes
 MAX_FACTOR = 10.0  # by which a step may change a quantity that cannot be negative; chosen
 NEGLIGIBLE_VALUE = 1e-4  # of its scale: below it such a quantity may become 0; chosen
 # relative changes of the cost at which a search ends, if what it reaches is the solution, if more
 # steps follow, and with extrapolated replays, which cost six times as much; chosen
 COST_TOLERANCE, SMALL_CHANGE, LAST_CHANGE = 1e-5, 0.01, 0.1
 KEPT_PROMISE = 0.5  # of the decrease that derivatives promise: less calls for damping; chosen
+# s, by which other delays differ that are tried; chosen: with a command that jumps at each sample
+# derivatives by the delay hold for about a sample
+DELAY_MOVES = -8e-3, -4e-3, -2e-3, -1e-3, 1e-3, 2e-3, 4e-3, 8e-3
+MOST_DELAYS = 3  # from which a search starts anew; chosen
 ROUGH_STEPS = 8  # steps from each start before the best is chosen; chosen
 CORRECTED_STEPS = 3  # steps after the first halving of the physics step; chosen
 MAX_HALVINGS = 5  # of the physics step in corrected replays; chosen
@@ -44,13 +51,23 @@ def search(
     replays: Replays, first: Slopes, starts: int, seed: int, most: int, tolerance: float
 ) -> Slopes:
     """Return the slopes at the least squares near the best of several starts, that of the `first`
-    slopes before others.
+    slopes before others. A delay starts where it leaves least.
 
     Further starts, of which the random ones have a `seed`, are only tried while none fits well.
     `most`: largest number of steps from the best start. `tolerance`: as of `refine`.
     """
+    if (other := _other_delay(replays, first, LAST_CHANGE)) is not None:
+        first = replays.slopes(other)
     if starts == 1:
-        return refine(replays, first, most, tolerance)
+        best = refine(replays, first, most, tolerance)
+        for _ in range(MOST_DELAYS):
+            if (other := _other_delay(replays, best, SMALL_CHANGE)) is None:
+                break
+            tried = refine(replays, replays.slopes(other), most, tolerance)
+            if tried.cost >= best.cost:
+                break
+            best = tried
+        return best
     reached = [refine(replays, first, min(most, ROUGH_STEPS), tolerance)]
     if reached[-1].fit < GOOD_FIT:
         for point in _random(replays, starts - 1, seed):
@@ -60,6 +77,36 @@ def search(
                 break
     best = min(reached, key=lambda slopes: slopes.cost)
     return refine(replays, best, most, tolerance)
+
+
+def _other_delay(replays: Replays, slopes: Slopes, share: float) -> Point | None:
+    """Return the point with the delay that leaves least of what no number can cause, by the slopes;
+    None if no other leaves less by that share of it.
+    """
+    if DELAY not in replays.names:
+        return None
+    k = replays.names.index(DELAY)
+    J = slopes.freed_slopes
+    basis, _ = np.linalg.qr(J / np.maximum(np.linalg.norm(J, axis=0), MIN_SIZE))
+
+    def left(rows: list[Array]) -> float:
+        freed = np.concatenate(slopes.freed(rows))
+        return cost([freed - basis @ (basis.T @ freed)])
+
+    best, least = slopes.point, (1.0 - share) * left(slopes.residuals)
+    while True:
+        points = []
+        for move in DELAY_MOVES:
+            values = best.values.copy()
+            values[k] = np.clip(
+                values[k] + move / replays.scales[k], replays.low[k], replays.high[k]
+            )
+            points.append(Point(values, best.states))
+        lefts = list(map(left, replays.residuals(points)))
+        if min(lefts) >= least:
+            return None if best is slopes.point else best
+        least = min(lefts)
+        best = points[lefts.index(least)]
 
 
 def _random(replays: Replays, count: int, seed: int) -> list[Point]:
@@ -269,8 +316,6 @@ def _variants(replays: Replays, slopes: Slopes, values: Array) -> list[Point]:
     if not len(replays.free):
         return moved[-1:]
     moved.append(replays.at_rest(moved[-1]))
-    if not len(values):  # then pieces have nothing in common, and each may stay
-        moved.append(slopes.point)
     return moved
 
 

@@ -12,6 +12,7 @@ from scipy.signal import butter, freqz
 
 import smc_mujoco as smc
 from smc_mujoco.identification import (
+    first_guess,
     gauss_newton,
     inverse_dynamics,
     records,
@@ -117,6 +118,46 @@ class Bent(Curve):
                 columns.append(
                     {"y": bent + 300.0 * step * (curves(T[part])[:, 0] + np.sqrt(T[part]))}
                 )
+            every.append(columns)
+        return every
+
+
+class Jumpy(Curve):
+    """A curve whose second quantity is a delay of a command that jumps at each sample: within a
+    sample of it the slopes by the delay say little of how far it is off. `stuck`: its second piece
+    fails at every other state but that of the start.
+    """
+
+    def __init__(self, start, stuck=False):
+        super().__init__(start=start)
+        self.names = ["a", "input_delay"]
+        self.scales = np.array([1.0, 1e-3])
+        self.low = np.zeros(2)
+        self.high = np.array([80.0, 50.0])
+        self.stuck = stuck
+        noise = np.random.default_rng(3).normal(size=600)
+        self.command = lambda late: np.interp(T * 400.0 + 100.0 - 2.0 * late, np.arange(600), noise)
+        self.pieces = [
+            Piece(
+                0,
+                None,
+                0,
+                {"y": 2.0 * np.sin(9.0 * T[part]) + self.command(3.0)[part]},
+                {"y": SPREAD},
+                np.ones(1),
+            )
+            for part in self.parts
+        ]
+
+    def _replayed(self, rigs, points, fields):
+        every = []
+        for one in points:
+            a, late = one.values
+            y = a * np.sin(9.0 * T) + self.command(late)
+            columns = []
+            for k, part in enumerate(self.parts):
+                fails = self.stuck and k == 1 and one.states[k, 0] != 0.0
+                columns.append({"y": y[part] + one.states[k] + 1e3 * fails})
             every.append(columns)
         return every
 
@@ -228,6 +269,37 @@ def test_a_search_reaches_least_squares_and_tries_no_rival_of_a_good_start():
     none = gauss_newton.refine(curve, curve.slopes(curve.start), 0)
     assert none.point is not found.point
     np.testing.assert_array_equal(none.point.values, curve.start.values)
+
+
+@pytest.mark.parametrize("late", [1.0, 5.0, 12.0])
+def test_a_delay_is_found_from_samples_away_although_its_slopes_say_little(late):
+    curve = Jumpy((1.0, late))
+    first = curve.slopes(curve.start)
+    stalled = gauss_newton.refine(curve, first, 30)
+    assert abs(stalled.point.values[1] - 3.0) > 0.3
+    found = gauss_newton.search(curve, first, 1, 0, 30, 1e-5)
+    np.testing.assert_allclose(found.point.values, [2.0, 3.0], atol=1e-3)
+    assert gauss_newton._other_delay(curve, found, 0.01) is None
+
+
+def test_a_piece_whose_start_may_not_move_does_not_stop_the_others():
+    curve = Jumpy((1.0, 3.2), stuck=True)
+    found = gauss_newton.refine(curve, curve.slopes(curve.start), 30)
+    np.testing.assert_allclose(found.point.values, [2.0, 3.0], atol=1e-3)
+    assert found.point.states[1] == 0.0
+
+
+def test_a_joint_that_shakes_does_not_decide_the_start_of_what_a_calm_one_tells():
+    random = np.random.default_rng(2)
+    A = random.normal(size=(400, 2))
+    A[0::2, 0] = 0.0  # the first number is that of the second joint, which is calm
+    b = A @ [1.5, -2.0] + random.normal(size=400) * np.tile([5.0, 1e-3], 200)
+    found, left = first_guess._weighted(A, b, 2)
+    np.testing.assert_allclose(found, [1.5, -2.0], atol=1e-3)
+    rests = np.sqrt(np.mean((b - A @ found).reshape(-1, 2) ** 2, axis=0))
+    assert left == pytest.approx(np.log(rests).sum(), rel=1e-3)
+    exact, _ = first_guess._weighted(A, A @ [1.5, -2.0], 2)
+    np.testing.assert_allclose(exact, [1.5, -2.0], atol=1e-9)
 
 
 def test_further_starts_are_the_best_of_many_within_ranges_and_two_decades():
