@@ -7,6 +7,7 @@ by more than a factor of ten.
 
 import copy
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -39,7 +40,10 @@ KEPT_PROMISE = 0.5  # of the decrease that derivatives promise: less calls for d
 # s, by which other delays differ that are tried; chosen: with a command that jumps at each sample
 # derivatives by the delay hold for about a sample
 DELAY_MOVES = -8e-3, -4e-3, -2e-3, -1e-3, 1e-3, 2e-3, 4e-3, 8e-3
+LEAST_DELAY_MOVE = 2.5e-4  # s, at the solution; chosen
+BETTER = 3.0  # deviations of noise, by which another delay must fit better there; chosen
 MOST_DELAYS = 3  # from which a search starts anew; chosen
+MOST_SLOPES = 3  # of which all but the first are of extrapolated replays; chosen
 ROUGH_STEPS = 8  # steps from each start before the best is chosen; chosen
 CORRECTED_STEPS = 3  # steps after the first halving of the physics step; chosen
 MAX_HALVINGS = 5  # of the physics step in corrected replays; chosen
@@ -79,9 +83,11 @@ def search(
     return refine(replays, best, most, tolerance)
 
 
-def _other_delay(replays: Replays, slopes: Slopes, share: float) -> Point | None:
+def _other_delay(
+    replays: Replays, slopes: Slopes, share: float, moves: Sequence[float] | Array = DELAY_MOVES
+) -> Point | None:
     """Return the point with the delay that leaves least of what no number can cause, by the slopes;
-    None if no other leaves less by that share of it.
+    None if no other leaves less by that share of it. `moves`: between delays, s.
     """
     if DELAY not in replays.names:
         return None
@@ -96,7 +102,7 @@ def _other_delay(replays: Replays, slopes: Slopes, share: float) -> Point | None
     best, least = slopes.point, (1.0 - share) * left(slopes.residuals)
     while True:
         points = []
-        for move in DELAY_MOVES:
+        for move in moves:
             values = best.values.copy()
             values[k] = np.clip(
                 values[k] + move / replays.scales[k], replays.low[k], replays.high[k]
@@ -138,9 +144,9 @@ def extrapolated(replays: Replays, slopes: Slopes, most: int = 0) -> tuple[Slope
     Errors by steps h are of first order, so 2 x(h/2) - x(h) has none of them. What it changes from
     h to h/2 is what it may be off: the most of that at the slopes and at the solution. If the
     replays with steps h fit better, as they fit a log of a simulation with such steps, their
-    solution is returned, and what shorter steps would change. After at most `most` steps, of which
-    extrapolated ones keep the derivatives of the slopes, the last one follows from derivatives
-    alone.
+    solution is returned, and what shorter steps would change. After some steps, at most `most` with
+    the same derivatives, the last one follows from derivatives alone. Extrapolated steps keep those
+    of the slopes, unless they promise much more than the replays keep.
     """
     if not replays.free.size:  # records of simulated runs have the same steps
         return refine(replays, slopes, most), np.zeros(len(slopes.point.values))
@@ -149,18 +155,39 @@ def extrapolated(replays: Replays, slopes: Slopes, most: int = 0) -> tuple[Slope
         return _solved(replays, refine(replays, slopes, most)), _moves(slopes, by_half)
     moved = _moves(slopes, by_quarter)
     replays.limit = True
-    for _ in range(most):
-        after = _best_step(replays, ends)
-        enough = after.cost >= (1.0 - LAST_CHANGE) * ends.cost
-        ends = min(after, ends, key=lambda slopes: slopes.cost)
-        if enough:
+    for _ in range(MOST_SLOPES if most else 0):
+        ends = _settled(replays, ends, most)
+        if _solved(replays, ends).cost >= (1.0 - LAST_CHANGE) * ends.cost:
             break
+        ends = replays.slopes(ends.point)  # longer steps err by too much
+    share = BETTER**2 / sum(map(len, ends.residuals))
+    fine = LEAST_DELAY_MOVE * np.array([-2.0, -1.0, 1.0, 2.0])
+    other = _other_delay(replays, ends, share, fine) if most else None
+    if other is not None:  # then derivatives by the delay do not hold over such a move
+        (rows,) = replays.residuals([other])
+        ends = dataclasses.replace(ends, point=other, residuals=rows)
     replays.limit = False
     if most:
         (full,) = replays.residuals([ends.point])
         ends, _, by_quarter = _without_steps(replays, ends, full)
         moved = np.maximum(moved, _moves(slopes, by_quarter))
+    if other is not None:
+        k = replays.names.index(DELAY)
+        moved[k] = max(moved[k], LEAST_DELAY_MOVE / replays.scales[k])
     return _solved(replays, ends), moved
+
+
+def _settled(replays: Replays, slopes: Slopes, most: int) -> Slopes:
+    """Return what at most `most` steps with the derivatives of slopes reach, until one gains
+    little.
+    """
+    for _ in range(most):
+        after = _best_step(replays, slopes)
+        enough = after.cost >= (1.0 - LAST_CHANGE) * slopes.cost
+        slopes = min(after, slopes, key=lambda slopes: slopes.cost)
+        if enough:
+            break
+    return slopes
 
 
 def _without_steps(

@@ -282,6 +282,18 @@ def test_a_delay_is_found_from_samples_away_although_its_slopes_say_little(late)
     assert gauss_newton._other_delay(curve, found, 0.01) is None
 
 
+def test_the_last_delay_is_the_one_that_fits_and_its_error_has_the_move():
+    curve = Jumpy((2.0, 2.4))
+    first = curve.slopes(curve.start)
+    assert abs(gauss_newton._solved(curve, first).point.values[1] - 3.0) > 0.2
+    found, moved = gauss_newton.extrapolated(curve, first, 1)
+    assert abs(found.point.values[1] - 3.0) < 0.1
+    assert moved[1] >= 0.25
+    there = curve.slopes(Point(np.array([2.0, 3.0]), curve.start.states))
+    found, moved = gauss_newton.extrapolated(curve, there, 1)
+    assert moved[1] < 1e-6
+
+
 def test_a_piece_whose_start_may_not_move_does_not_stop_the_others():
     curve = Jumpy((1.0, 3.2), stuck=True)
     found = gauss_newton.refine(curve, curve.slopes(curve.start), 30)
