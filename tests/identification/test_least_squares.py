@@ -161,6 +161,9 @@ class Jumpy(Curve):
             every.append(columns)
         return every
 
+    def at_rest(self, point):
+        return Point(point.values, 0.0 * point.states + 1.0)
+
 
 class Held(Curve):
     """Pieces without quantities, each an offset, whose states up to 2 change nothing."""
