@@ -33,9 +33,10 @@ def estimator_function(
 
         @smc.estimator_function(gains={"tau": 0.01}, memory=2)
         def filtered(y, gains, memory):
-            memory[0] += (y.x - memory[0]) * y.h / gains.tau
+            memory[0] += (y.x - memory[0]) * y.dt / gains.tau
             return (y.x - memory[0]) / gains.tau
 
+    `y` has x, the measured position, v, the measured velocity, and dt, the control period.
     Arguments as of `law_function`: gains, memory, positive, nonnegative, conditions and label.
 
     Returns:

@@ -112,15 +112,13 @@ def law(
     return law.sourced(source.SHIPPED if search else source.STUDY, search)
 
 
-def shipped_gains_notice(plant: Plant, law: Component) -> str:
-    """Return a sentence on a law that was given by its name, and has shipped gains."""
-    gains = gains_text(law.gains)
-    text = (
-        f"law {law.name!r} by its name alone has its shipped gains on {plant.name}, {gains}: give "
-        f"smc.law({law.name!r}, plant={plant.name!r}) to say so, smc.law({law.name!r}) for its "
-        "defaults"
+def default_gains_warning(plant: Plant, law: Component) -> str:
+    """Return a sentence on a law that was given by its name, and has no gains for a plant."""
+    return (
+        f"law {law.name!r} has no gains for this run on {plant.name}, and its defaults act, "
+        f"{gains_text(law.gains)}: tune it, as smc.tune(plant, {law.name!r}) does, or give "
+        f"smc.law({law.name!r}, ...), without gains to say that you want the defaults"
     )
-    return f"{text}; {doubt}" if (doubt := other_parameters_warning(plant)) else text
 
 
 def other_parameters_warning(plant: Plant, gains: str = "tuned") -> str:

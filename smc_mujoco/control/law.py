@@ -134,8 +134,9 @@ def law_function(
 
     `y` is the measurement of one joint: y.e = x - r is the error, rad or m, y.de = v - r' its rate,
     y.x and y.v position and velocity, y.dt the control period, and more, see
-    `help(smc_mujoco.control.measurement)`. `smc.exchange.law_from_control` has r - x for an error.
-    A helper that the law calls needs @numba.njit above its def, or the law runs in slow Python.
+    `help("smc_mujoco.control.measurement")`. `smc.exchange.law_from_control` has r - x for an
+    error. A helper that the law calls needs @numba.njit above its def, or the law runs in slow
+    Python.
 
     Args:
       gains: name -> default value, or a Gain with unit and range, which `smc.tune` needs. Gain and
@@ -149,7 +150,7 @@ def law_function(
       advice: the same for conditions that only warn.
       plants: names of the plants that the law is for, or "a free body". Default: all plants.
       requires_model: whether the law needs the nominal model. A scenario then gives it by default.
-      label: name in figures and tables. Default: the function's name.
+      label: name in figures of traces; tables have the function's. Default: the function's name.
       short: name in two or three letters. Default: initials.
       colour: "#RRGGBB". Default: a colour of a palette, always the same.
       linear_part: a `smc_mujoco.control.component.LinearPart`, of laws linear near s = 0.

@@ -53,7 +53,8 @@ def surface(name: str, /, **gains: float) -> Surface:
     """Return the surface `name` with these gains. An unknown name or a gain out of range is a
     ScenarioError.
 
-        smc.Scenario(plant="duffing", law="super_twisting", surface=smc.surface("linear", c=3.0))
+        line = smc.surface("linear", c=3.0)
+        smc.Scenario(plant="duffing", law=smc.law("super_twisting"), surface=line)
 
     Returns:
       A Surface, for `surface` of a Scenario.

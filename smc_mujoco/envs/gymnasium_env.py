@@ -5,8 +5,8 @@
 An observation is one array of positions and velocities, and for `track` also r, r', r''. An action
 is the command of the driven channels, divided by their limits. An episode is truncated at the
 scenario's duration, and terminated if the plant diverges. The
-info has "time", s since the start, and "error", the e of the task in each channel. The module
-`tasks` describes tasks and rewards; `vector_env` has many copies of a plant in one batch.
+info has "time", s since the start, and "error", the e of the task in each channel. Tasks and
+rewards: `help("smc_mujoco.envs.tasks")`. `smc.envs.vector` has many copies of a plant in one batch.
 """
 
 from typing import Any

@@ -139,7 +139,7 @@ class Identified:
             correlation = self.correlations[i, j]
             if abs(correlation) > MAX_CORRELATION:
                 notes.append(
-                    f"{first} and {second} cannot be told apart (correlation {correlation:.3f})"
+                    f"{first} and {second} are hardly told apart (correlation {correlation:.3f})"
                 )
         for name, value in self.values.items():
             quantity = self.rig.quantities[name]
@@ -314,7 +314,7 @@ def identify(
         a data frame, columns by name, or traces. Of a trace x is what its encoder reads, with the
         noise; in a file of `Trace.export` it is the true position. A log has t in s, and x (rad or
         m) and u (in the unit of the machine's command) of the joint, or x_JOINT and u_JOINT of
-        each.
+        each. u is held from its row to the next: of a log of fewer rows give the mean between them.
       names: paths of the numbers: "shoulder.damping", .frictionloss,
         .armature, .stiffness, .gain, .offset, .zero, "input_delay", "m", "friction.elbow.kc". None:
         the rig's `free`. No start is needed: it comes from least squares of forces.
@@ -328,7 +328,7 @@ def identify(
         one, and the best of random ones, which differ from it by up to a factor of 100.
       seed: of these starts. The same seed gives the same result.
       most: largest number of steps of the search.
-      progress: whether to show a progress bar.
+      progress: whether to show a progress bar: a search may take minutes.
 
     Returns:
       An Identified, which prints as a table: `values` and `errors` by name in SI units, `notes` on
@@ -338,7 +338,7 @@ def identify(
     Raises:
       ScenarioError: an unknown path, which lists what there is; a log without a column, too slow,
         without motion, in degrees, or too short; nothing in the logs depends on a number, or two
-        cannot be told apart.
+        have the same effect on them.
     """
     listed = None if names is None else named_once(names)
     twin, data = _read(machine, logs, listed, columns, condition)

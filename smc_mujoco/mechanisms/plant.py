@@ -486,7 +486,8 @@ def plant(name: str, *, set: Any = None, **parameters: float) -> Plant:
 
 
 def plants() -> list[str]:
-    """List the names that `plant` knows.
+    """List the names that `plant` knows. `smc-mujoco list duffing` says what one is: its equation,
+    in SI units, and its parameters.
 
         smc.plants()
 

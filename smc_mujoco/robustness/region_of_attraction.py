@@ -141,7 +141,8 @@ def basin(
       device: of the fast engine, "cpu" or "cuda".
 
     Returns:
-      A `Basin`: `outcome` of every initial state, `share` of those that converge, and `save(path)`.
+      A `Basin`: `outcome` of every initial state, `share` of those that converge, and
+        `save("basin.json")`.
 
     Raises:
       ScenarioError: an unknown plant, law, set or condition, a condition whose reference moves, an

@@ -99,14 +99,20 @@ def laws(name: str, value: Laws | None, s: Any) -> Law:
 
 def _of_plant(value: Any, s: Any) -> Law:
     """Return a law. One given by its name has the gains that are shipped for the plant, if there
-    are some and the scenario has the model, the surface and the goal for which they were tuned.
+    are some and the scenario has the model, the surface and the goal for which they were tuned;
+    else its defaults, with a warning.
     """
     chosen = law(value)
+    if value != chosen.name or not chosen.gains:
+        return chosen
     model = "nominal" if chosen.requires_model else "none"
     as_tuned = s.model in (None, model) and s.surface is None and s.tracks == "position"
-    if value == chosen.name and as_tuned and gain_sets.in_set(s.plant, chosen.name, "tuned"):
-        chosen = gain_sets.law(s.plant, chosen.name)
-        warn_once(gain_sets.shipped_gains_notice(s.plant, chosen))
+    if as_tuned and gain_sets.in_set(s.plant, chosen.name, "tuned"):
+        warn_once(gain_sets.other_parameters_warning(s.plant))
+        return gain_sets.law(s.plant, chosen.name)
+    # defaults of a law of many joints are rates, which hold for any machine
+    if not (chosen.plants or chosen.joint):
+        warn_once(gain_sets.default_gains_warning(s.plant, chosen))
     return chosen
 
 

@@ -216,7 +216,7 @@ def condition(name: str, **fields: Any) -> Condition:
     one condition a line, as `Identified.save` writes it. They take the names of
     the suite's conditions, too, such as noise, sine, step, delay_10ms, light, heavy, jump_hard,
     period_20ms, friction, coulomb, stiction, lag_20ms, dc_motor, backlash, encoder, contact and
-    fault; `list(smc_mujoco.simulation.conditions.NAMED)` has all.
+    fault; `smc-mujoco list` has all.
 
     Args:
       name: its name in tables and figures; not a name of the suite.

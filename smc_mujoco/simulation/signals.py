@@ -672,7 +672,8 @@ class Fault:
 
     Each gives `gain` times its command plus `bias`, N m, N or the unit of u; or, if `stuck`, what
     it was told last. The law does not know. Drives come after it: behind a Lag the force follows.
-    `on` is the name of the one joint, or of the one thruster, that fails; default: all do.
+    `on` is the name of the one joint, or of the one thruster, that fails; default: all do. The keys
+    of `smc.metrics.joint_scores(trace)` are the joints' names.
     """
 
     at: Natural

@@ -65,6 +65,8 @@ def leaderboard(
     Only cells (plant, condition, seed) that every law of the group has are compared. A failed run
     is inf in all metrics. For two laws, a seed in which both repeat their results of an earlier
     seed is not counted. Runs that share one of several sets of gains of a law are one sample. A
+    condition of its own for each machine of an ensemble adds none: give each seed its `mismatch`,
+    and all the same `Scenario.named`. Fewer seeds than a verdict needs are told. A
     metric that does not apply to a group has no board for it.
 
     Args:

@@ -44,11 +44,12 @@ def score(
 
     - settling_time in s from t = 0, also if the reference steps later; rise_time in s, from 10 % to
       90 % of the way; overshoot in % of the scale, the larger of the first error and r's range;
-    - peak (of x), steady_error, ultimate_bound, rms_error in rad or m; iae, ise, itae;
+    - peak (of x), rms_error, ultimate_bound (largest |e| in the last fifth) and steady_error (|mean
+      of e| there, which an oscillation leaves small), in rad or m; iae, ise, itae;
     - max_u, tv (sum of |changes of u|), tv_rate, energy (integral of u^2) of the command;
     - chattering_amplitude of s, and chattering_frequency in Hz.
 
-    `smc.score(trace)` has all names, and `help(smc_mujoco.metrics.catalogue)` all definitions.
+    `smc.score(trace)` has all names, and `help("smc_mujoco.metrics.catalogue")` all definitions.
 
     Args:
       runs: a Trace; or any number of scenarios, also from a generator.

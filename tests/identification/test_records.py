@@ -184,7 +184,7 @@ OPEN = {"twin": PENDULUM}  # its loop is not closed
 @pytest.mark.parametrize(
     ("quiet", "loud", "note"),
     [
-        ({"correlation": 0.979}, {"correlation": -0.981}, "mass and viscous cannot be told apart"),
+        ({"correlation": 0.979}, {"correlation": -0.981}, "mass and viscous are hardly told apart"),
         (
             {"values": FREE | {"mass": 1.001}},
             {"values": FREE | {"mass": 1.0}},

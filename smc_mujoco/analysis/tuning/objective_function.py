@@ -107,8 +107,8 @@ def objective(
 
     Returns:
       A callable. It takes a sequence of gains in the order of its `bounds`, and returns J in s^2.
-      `bounds` is a dict, gain -> lowest and highest value; `law(gains)` is the law with these
-      gains.
+      `bounds` is a dict, gain -> lowest and highest value, which `tune` may leave by a decade;
+      `law(gains)` is the law with these gains.
 
     Raises:
       ScenarioError: a law without gains to search, a gain of unknown unit whose default is not

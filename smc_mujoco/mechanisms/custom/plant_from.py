@@ -86,7 +86,7 @@ def plant_from(
     """Make a plant of an MJCF or URDF model.
 
         arm = smc.plant_from("arm.xml", {"elbow": smc.Channel(x0=0.3)})
-        trace = smc.run(smc.Scenario(plant=arm, law="pid", duration=1.0))
+        trace = smc.run(smc.Scenario(plant=arm, law=smc.law("pid", kp=20.0), duration=1.0))
 
     Args:
       path: of an MJCF or URDF file; or the model itself: its text, an MjSpec as it is now, or a
