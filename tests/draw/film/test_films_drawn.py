@@ -152,8 +152,9 @@ def test_the_wind_on_a_drone_has_its_arrow_over_it_and_its_path_a_map():
         stage.forward()
         for way in np.eye(3):
             arrow = arrows.Arrow(0.0, 1.0, arrows.WHITE, way=way)
-            line, _ = arrows.path(stage.model, stage.data, stage.mounts[0], arrow)
-            drawn = stage.project(line)[:, 1].max()
+            found = arrows.path(stage.model, stage.data, stage.mounts[0], arrow)
+            assert found
+            drawn = stage.project(found[0])[:, 1].max()
             tops = world.boxes(stage.model, stage.data)[stage.links].max(axis=1)
             assert drawn < stage.project(tops)[:, 1].min()
 
