@@ -6,6 +6,7 @@ import contextlib
 import functools
 import hashlib
 import json
+from typing import Any
 
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import Fields
@@ -13,7 +14,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import to_json
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import scenario_json
-from smc_mujoco.simulation.codes import Hashes, code_hashes
+from smc_mujoco.simulation.codes import PACKAGE, Hashes, code_hashes
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, find_condition
 from smc_mujoco.simulation.force_bounds import U_MAX
 from smc_mujoco.simulation.scenario import Scenario
@@ -55,15 +56,30 @@ def description(scenario: Scenario) -> Fields:
 def key(scenario: Scenario, data: Fields | None = None, plants: Hashes | None = None) -> str:
     """Return a hash, 32 hex digits, of all that determines a run: scenario, code, versions.
 
-    `plants` is a cache.
+    A user's code counts, and not the name of its module: the same file is `__main__` as a script,
+    and has another name where it is imported. `plants` is a cache.
     """
     data = data or description(scenario)
     if scenario.condition in NAMED:  # the name adds nothing to the fields
         data = data | {"condition": None}
     codes = code_hashes(scenario, {} if plants is None else plants)
     package = fingerprint.package(*UNRELATED)
-    text = to_json([data, codes, package], sort_keys=True)
+    text = to_json([_without_modules(data), codes, package], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def _without_modules(data: Any) -> Any:
+    """Return plain data without the names of modules that are not of this package."""
+    if isinstance(data, list | tuple):
+        return list(map(_without_modules, data))
+    if not isinstance(data, dict):
+        return data
+    kept = {}
+    for name, value in data.items():
+        # a gain may be called so, too
+        of_user = name == "module" and isinstance(value, str) and not value.startswith(PACKAGE)
+        kept[name] = None if of_user else _without_modules(value)
+    return kept
 
 
 def portable_key(scenario: Scenario) -> str:

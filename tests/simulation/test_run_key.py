@@ -102,10 +102,15 @@ class Push(smc.Signal):
 
 
 def written(
-    law="-gains.k * helper(y.e)", helper="GAIN * x", constant="2.0", signal="p.amplitude", before=""
+    law="-gains.k * helper(y.e)",
+    helper="GAIN * x",
+    constant="2.0",
+    signal="p.amplitude",
+    before="",
+    module="written",
 ) -> str:
     """The key of a run under a law of the user's."""
-    space: dict = {"__name__": "written"}
+    space: dict = {"__name__": module}
     text = before + LAW.format(
         law=law,
         helper=helper,
@@ -129,6 +134,21 @@ def written(
 )
 def test_an_edited_law_is_another_run(edit):
     assert written() != written(**edit)
+
+
+def test_a_script_that_is_imported_has_the_same_runs():
+    assert written(module="__main__") == written() != written(module="__main__", helper="x")
+
+
+def test_a_gain_and_a_module_of_this_package_count_by_whatever_name():
+    @smc.law_function(gains={"module": 1.0})
+    def mine(y, gains, memory):
+        return -gains.module * y.e, y.e
+
+    assert key(scenario(mine(module=1.0))) != key(scenario(mine(module=2.0)))
+    ours = scenario_json.describe(scenario(smc.law("classical")))
+    other = ours | {"law": ours["law"] | {"module": "smc_mujoco.control.laws.adaptive"}}
+    assert key(scenario(smc.law("classical")), ours) != key(scenario(smc.law("classical")), other)
 
 
 def test_every_law_of_a_mixture_decides_the_key():

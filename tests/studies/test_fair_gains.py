@@ -4,6 +4,8 @@ again.
 
 import dataclasses
 import functools
+import importlib
+import runpy
 import types
 from pathlib import Path
 
@@ -13,6 +15,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.control import from_text
 from smc_mujoco.control.law import all_laws, catalogue, law_function
 from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
 from smc_mujoco.simulation.conditions import NAMED, find_condition
@@ -71,6 +74,48 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(tmp_pa
         assert found.law.source.kind == "tuned here"
         assert found.remark == ""
     assert len(tuned) == 1
+
+
+LAW_FILE = """
+import math
+import numba
+import smc_mujoco as smc
+from smc_mujoco.control.units import FORCE, RATE, Gain
+
+@numba.njit
+def root(s):
+    return math.copysign(math.sqrt(abs(s)), s)
+
+@smc.law_function(gains={"lam": Gain(6.0, FORCE), "k1": Gain(3.0, RATE)})
+def root_sliding(y, gains, memory):
+    s = y.de + gains.k1 * y.e
+    return -gains.lam * root(s), s
+"""
+
+
+def test_a_law_has_its_gains_and_runs_whichever_way_its_file_is_reached(tmp_path, monkeypatch):
+    """As a script, by its name on the command line, and by an import; until a helper changes."""
+    monkeypatch.chdir(tmp_path)
+    Path("root_law.py").write_text(LAW_FILE)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(fair_gains, "Objective", functools.partial(Objective, duration=0.5))
+
+    def files(law) -> list[Path]:
+        options = {"seeds": 1, "searches": 1, "budget": 8, "duration": 0.5}
+        smc.compare([law], "duffing", "nominal", out="out", progress=False, **options)
+        return sorted(path for path in Path("out").rglob("*") if path.is_file())
+
+    first = files(runpy.run_path("root_law.py", run_name="__main__")["root_sliding"])
+    (named,) = from_text.laws("root_law.py")
+    assert files(named) == first
+    (gains,) = Path("out/gains").glob("*.json")
+    gains.unlink()  # the file of the search is enough
+    again = files(importlib.import_module("root_law").root_sliding)
+    assert {path.parent for path in {*again} ^ {*first}} == {gains.parent}
+    Path("root_law.py").write_text(LAW_FILE.replace("sqrt(abs(s))", "tanh(abs(s))"))
+    changed = files(runpy.run_path("root_law.py", run_name="__main__")["root_sliding"])
+    new = {path.parent.name for path in {*changed} - {*first}}
+    assert new == {"gains", "searches", "parts", "unseen"}
 
 
 def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_differs(

@@ -88,7 +88,7 @@ from smc_mujoco.mechanisms.custom.scales import falls
 from smc_mujoco.mechanisms.layout import driven_names
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.conventions import leans
-from smc_mujoco.simulation import coerce, scenario_json
+from smc_mujoco.simulation import coerce, run_key
 from smc_mujoco.simulation.codes import code_hashes
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.force_bounds import default_u_max
@@ -317,7 +317,7 @@ class TuningTask(NamedTuple):
         """Return the file of search i in a folder."""
         first, *_ = self.cases(i)
         depends = (
-            scenario_json.describe(first),
+            run_key.key(first),
             self.goal.describe(),
             self.codes(),
             self.budget,
