@@ -100,8 +100,8 @@ def sets_friction_solref(model: mujoco.MjModel, dof: int) -> bool:
 
 
 def softness_warnings(label: str, made: Plant) -> list[str]:
-    """Return warnings: a sentence on joint limits, contacts and equality constraints that give way
-    to a blow of 1 rad/s (m/s) by more than MAX_GIVE, and one on dry friction that creeps.
+    """Return warnings: a sentence each on contacts, joint limits and equality constraints that give
+    way to a blow of 1 rad/s (m/s) by more than MAX_GIVE, and one on dry friction that creeps.
     """
     model = copy.copy(loaded(made))
     model.opt.timestep = TEST_STEP
@@ -109,27 +109,30 @@ def softness_warnings(label: str, made: Plant) -> list[str]:
     mujoco.mj_forward(model, data)
     if model.opt.disableflags & FLAGS.mjDSBL_CONSTRAINT.value:
         return []
-    sentences = []
-    if parts := _giving(model, data):
-        sentences.append(
-            f"{label} gives way if it is hit at 1 rad/s or 1 m/s: {', '.join(parts)}; a smaller "
-            "first number of the option in brackets makes it harder"
-        )
+    sentences = _giving(label, model, data)
     if not (made.smooth or model.opt.noslip_iterations):  # which hold dry friction exactly
         sentences += _creeping(label, model, data)
     return sentences
 
 
-def _giving(model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
-    """Return where a model gives way by more than MAX_GIVE, and how far, in mrad (mm).
+def _giving(label: str, model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
+    """Return a sentence on each kind of constraint that gives way by more than MAX_GIVE.
 
     A soft constraint is a spring of frequency w and damping ratio z. A blow of speed v deflects it
     by v/w/(1 + (e - 1) z) within 4 %, and at rest an acceleration a by (1 - d) a/w^2, with its
     impedance d. Here a is that of the weight at the start.
     """
-    parts = []
+    sentences = []
+    turns = "mrad (mm)", "rad/s (m/s)"
 
-    def tell(where: str, solref: Array, solimp: Array, load: float | Array) -> None:
+    def tell(
+        kind: str,
+        option: str,
+        units: tuple[str, str],
+        solref: Array,
+        solimp: Array,
+        load: float | Array,
+    ) -> None:
         first, second = solref.T
         # a time constant and a damping ratio, or a stiffness and a damping, both negative
         roots = np.sqrt(np.abs(first))
@@ -141,25 +144,29 @@ def _giving(model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:
         loose = 1.0 - solimp[:, 1]
         rest = np.max(loose * load / w**2, initial=0.0)
         if blow > MAX_GIVE:
-            weight = f", and {1e3 * rest:.1g} under its weight" if rest > MIN_GIVE else ""
-            parts.append(f"by {1e3 * blow:.2g} {where}{weight}")
+            way, speed = units
+            weight = f", and by {1e3 * rest:.1g} {way} under the weight" if rest > MIN_GIVE else ""
+            sentences.append(
+                f"{kind} of {label} give way by {1e3 * blow:.2g} {way} if hit at 1 {speed}"
+                f"{weight}: a smaller first number of {option} makes them harder"
+            )
 
     off = model.opt.disableflags
     gravity = float(np.linalg.norm(model.opt.gravity))
+    if touches(model):
+        touching = (model.geom_contype > 0) | (model.geom_conaffinity > 0)
+        geoms = model.geom_solref[touching], model.geom_solimp[touching]
+        tell("contacts", "solref", ("mm", "m/s"), *geoms, gravity)
     limited = np.flatnonzero(model.jnt_limited)
     if not off & FLAGS.mjDSBL_LIMIT.value:
         pushed = np.abs(data.qacc_smooth[model.jnt_dofadr[limited]])
         limits = model.jnt_solref[limited], model.jnt_solimp[limited]
-        tell("mrad or mm at joint limits (solreflimit)", *limits, pushed)
-    if touches(model):
-        touching = (model.geom_contype > 0) | (model.geom_conaffinity > 0)
-        geoms = model.geom_solref[touching], model.geom_solimp[touching]
-        tell("mm at contacts (solref)", *geoms, gravity)
+        tell("joint limits", "solreflimit", turns, *limits, pushed)
     if not off & FLAGS.mjDSBL_EQUALITY.value:
         held = model.eq_active0 > 0
         ties = model.eq_solref[held], model.eq_solimp[held]
-        tell("mrad or mm at equality constraints (solref)", *ties, gravity)
-    return parts
+        tell("equality constraints", "solref", turns, *ties, gravity)
+    return sentences
 
 
 def _creeping(label: str, model: mujoco.MjModel, data: mujoco.MjData) -> list[str]:

@@ -43,7 +43,7 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom import mjcf, urdf
 from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs, is_free, joints_of
-from smc_mujoco.mechanisms.custom.clearance import DEPTH, overlap
+from smc_mujoco.mechanisms.custom.clearance import DEPTH, TOUCH, overlap
 from smc_mujoco.mechanisms.custom.mjcf import ModelSource
 from smc_mujoco.mechanisms.custom.model_constraints import (
     default_friction,
@@ -53,9 +53,10 @@ from smc_mujoco.mechanisms.custom.model_constraints import (
 )
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.custom.others import OTHERS, limp, ties
-from smc_mujoco.mechanisms.custom.scales import rises
+from smc_mujoco.mechanisms.custom.scales import free_base, rises
 from smc_mujoco.mechanisms.custom.user_model import UserFields, UserModel
 from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
+from smc_mujoco.mechanisms.layout import loaded
 from smc_mujoco.mechanisms.plant import Plant, catalogue, check_ranges, degrees_hint
 
 if TYPE_CHECKING:
@@ -123,9 +124,9 @@ def plant_from(
     Warns:
       ScenarioWarning: a range in degrees that may be meant in rad; what u is where the file's
         actuator takes no force, and an ideal motor in a file without actuators; what is changed in
-        a URDF; constraints that give way, or dry friction that creeps; a joint drawn outside its
-        range; motors that nothing commands, without `others`; equality constraints that are left
-        out.
+        a URDF; constraints that give way, or dry friction that creeps; parts that overlap by 1 to 5
+        mm at the start or the goal of a fixed machine; a joint drawn outside its range; motors that
+        nothing commands, without `others`; equality constraints that are left out.
 
     A scenario may have model="nominal" if every joint that moves with the channels is a channel or
     a partner, and no equality constraint acts; `plant.unmodelled` says why not. Films show the
@@ -213,23 +214,29 @@ def _doubts_of_others(
 
 
 def _overlaps(label: str, made: Plant, of_urdf: bool) -> list[str]:
-    """Return a sentence on a start inside something from which the robot rises. Raise ScenarioError
-    for a start or a goal inside something from which it does not.
+    """Return a sentence on a start inside something from which the robot rises, or on a start or a
+    goal where something presses. Raise ScenarioError for one inside something from which the robot
+    does not rise.
     """
     deep = {}
+    pressed = {}
+    stands = free_base(loaded(made))  # on feet, which are soft
     for what, x in (("start", made.x0), ("goal", made.origin)):
         found = overlap(made, x)
         if found.depth > DEPTH:
             deep[what] = found
-    if not deep:
+        elif found.depth > TOUCH and not stands:
+            pressed[what] = found
+    if not deep and not pressed:
         return []
-    if all(rises(made, x) for x in dict.fromkeys((made.x0, made.origin))):
+    if deep and all(rises(made, x) for x in dict.fromkeys((made.x0, made.origin))):
         what, inside = next(iter(deep.items()))
         return [
             f"the {what} of {label} has {inside}: it rises from there and stands, so its first "
             "moments are of that; give a keyframe that stands on the ground"
         ]
-    what, inside = deep.popitem()  # the goal's, if it has one: another x0 does not help there
+    # the goal's, if it has one: another x0 does not help there
+    what, inside = (deep or pressed).popitem()
     if what == "start":
         cure = "another x0"
     elif of_urdf:
@@ -240,7 +247,13 @@ def _overlaps(label: str, made: Plant, of_urdf: bool) -> list[str]:
             "a keyframe in which they do not touch, or <exclude "
             f'body1="{first}" body2="{second}"/> in the <contact> of the file'
         )
-    raise ScenarioError(f"the {what} of {label} has {inside}: give {cure}")
+    if inside.depth > DEPTH:
+        raise ScenarioError(f"the {what} of {label} has {inside}: give {cure}")
+    first, second = map(repr, inside.geoms)
+    return [
+        f"at the {what} of {label}, {first} and {second} overlap by {1e3 * inside.depth:.1f} mm, "
+        f"so contact pushes them apart: give {cure}, unless you want this"
+    ]
 
 
 def _plant(

@@ -91,12 +91,12 @@ def at_goal(plant: Plant) -> AtGoal:
             D[:, j] -= sign * _forces(model, data) / STEP
             data.qvel[:] = 0.0
     strayed = 0.0
-    if base := _free_base(model):
+    if base := free_base(model):
         load, strayed = _held(model, data, base, load, M)
     return AtGoal(M, D, K, dofs, load, model.dof_frictionloss[dofs], strayed)
 
 
-def _free_base(model: mujoco.MjModel) -> int:
+def free_base(model: mujoco.MjModel) -> int:
     """Return the body that carries the first channel and moves in two ways or more, none of them
     driven; 0 if there is none.
     """
@@ -157,7 +157,7 @@ def rises(plant: Plant, x: Floats) -> bool:
     and then has nothing inside it. How deep its feet stand in the ground is their softness.
     """
     model, data = _at(plant, x)
-    if not (base := _free_base(model)):
+    if not (base := free_base(model)):
         return False
     M = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, M)
@@ -184,7 +184,7 @@ def tips_over(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
     """Return whether a base that the law does not read lies more than 60 degrees from its initial
     pose.
     """
-    base = _free_base(model)
+    base = free_base(model)
     if not (base and model.opt.gravity.any()) or base in model.jnt_bodyid[joint_ids(model)]:
         return False
     first = mujoco.MjData(model)

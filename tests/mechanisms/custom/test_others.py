@@ -478,6 +478,18 @@ def test_a_goal_inside_something_is_refused_and_each_cure_works(cure):
             smc.plant_from(text, inside, keyframe=key)
 
 
+@pytest.mark.parametrize(("where", "depth"), [("goal", 3.4), ("start", 1.5)])
+def test_parts_that_overlap_a_little_are_told_before_any_run(where, depth):
+    """An arm that does not stand on feet, which may lie this deep."""
+    text = BLOCK.format(more=CLEAR["a keyframe"]).replace(
+        "0 0 0 .39", f"0 0 0 {0.33 + 1e-3 * depth}"
+    )
+    rod = {"j": smc.Channel(x0=0.0)} if where == "start" else ["j"]
+    said = f"at the {where} of .*'arm' and 'wall' overlap by {depth} mm, so contact"
+    with pytest.warns(ScenarioWarning, match=said):
+        smc.plant_from(text, rod, keyframe=None if where == "goal" else "home")
+
+
 # a leg that stands on its floor; with a ski its knee can go nowhere
 LEG = """<mujoco model="leg"><worldbody><geom name="floor" type="plane" size="5 5 .1"/>
 <body pos="0 0 .606"><geom type="box" size=".05 .05 .02" mass="5"/><body name="shank" pos="0 0 -.3">

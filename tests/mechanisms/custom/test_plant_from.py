@@ -703,7 +703,7 @@ def test_an_actuator_that_is_no_motor_is_called_what_it_is(element):
     assert smc.plant_from(text, {"j": smc.Channel(motor=True)}).driven == 1
 
 
-@pytest.mark.filterwarnings("always:.* gives way")
+@pytest.mark.filterwarnings("always:.* give way by")
 @pytest.mark.parametrize("solref", [".02 1", ".04 .5", "-900 -60"])
 def test_a_warning_says_how_far_an_equality_gives_way(solref):
     text = f"""<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="j" type="slide"
@@ -716,7 +716,7 @@ def test_a_warning_says_how_far_an_equality_gives_way(solref):
     assert 1e-3 * told == pytest.approx(trace.x.max(), rel=0.15)
 
 
-@pytest.mark.filterwarnings("default:.* gives way")
+@pytest.mark.filterwarnings("default:.* give way by")
 @pytest.mark.parametrize("solref", [".02 1", ".03 .5", ".01 2", "-2500 -100"])
 @pytest.mark.parametrize("speed", [1.0, 4.0])
 def test_a_warning_says_how_far_a_limit_gives_way_before_the_run(solref, speed):
@@ -732,6 +732,21 @@ def test_a_warning_says_how_far_a_limit_gives_way_before_the_run(solref, speed):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         smc.plant_from(hard, ["j"])
+
+
+@pytest.mark.filterwarnings("always:.* give way by")
+def test_contacts_and_limits_that_give_way_have_a_plain_sentence_each():
+    text = f"""<mujoco model="two"><worldbody><geom name="post" size=".05" pos="0 2 0"/><body>
+      <joint name="j" type="slide" axis="1 0 0" range="-.5 .4" limited="true"/>{LINK.format(0.3, 0.5)}
+      </body></worldbody><actuator><motor joint="j"/></actuator></mujoco>"""
+    with pytest.warns(smc.errors.ScenarioWarning, match="give way by") as caught:
+        smc.plant_from(text.replace('contype="0"', ""), ["j"])
+    assert [str(one.message) for one in caught if "give way" in str(one.message)] == [
+        "contacts of the text of model 'two' give way by 7.4 mm if hit at 1 m/s, and by 0.2 mm under "
+        "the weight: a smaller first number of solref makes them harder",
+        "joint limits of the text of model 'two' give way by 7.4 mrad (mm) if hit at 1 rad/s (m/s): "
+        "a smaller first number of solreflimit makes them harder",
+    ]
 
 
 def test_a_motor_moves_a_joint_whatever_groups_the_file_turns_off(arm):
