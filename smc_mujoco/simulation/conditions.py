@@ -316,6 +316,11 @@ def applicable(names: Iterable[str], plants: Sequence[Plant], duration: float) -
 def parse(text: str) -> Condition:
     """Return the condition that a text describes, such as "worn gear: friction=Coulomb(0.05)"."""
     name, _, fields = text.partition(":")
+    if set(",+") & set(name):
+        raise ScenarioError(
+            f"condition {shown(text)} has a comma or a + before its colon: a condition of your own "
+            "needs its own --condition, in Python its own text"
+        )
     try:
         values = read_fields(fields)
     except SyntaxError:

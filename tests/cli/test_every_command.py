@@ -444,6 +444,14 @@ def test_the_examples_of_a_command_have_options_that_it_takes(name):
     } <= taken
 
 
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_the_help_of_a_command_is_cut_nowhere(name, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit):
+        main.main([name, "--help"])
+    assert "…" not in capsys.readouterr().out
+
+
 def test_every_command_that_prints_tables_takes_json():
     without = {
         name for name, (_, command) in COMMANDS.items() if "--json" not in parameters(command)

@@ -132,6 +132,11 @@ def test_a_text_that_is_none_is_one_sentence(refused):
         refused(lambda text=text: find_condition(text))
 
 
+def test_a_condition_of_your_own_needs_its_own_option(refused):
+    for text in ("friction,noise,worn: friction=Coulomb(0.3)", "noise+worn: input_delay=0.01"):
+        refused(lambda text=text: find_condition(text), "needs its own --condition")
+
+
 def test_a_file_holds_a_condition_a_line(tmp_path, refused):
     path = tmp_path / "conditions.txt"
     path.write_text(f"# of the workshop\n\n{WORN}\nnoise + coulomb\n")

@@ -85,6 +85,9 @@ def tune(
     search is kept in the folder FILE-searches, from which a stopped command resumes.
 
     Example: smc-mujoco tune duffing --law observer_free --out duffing.json
+
+    Example: smc-mujoco tune arm.xml:elbow --law pid --condition "mine:
+    friction=my_parts.py:stribeck(static=0.3)"
     """
     with delay_signals():
         from smc_mujoco.analysis.tuning import search
@@ -127,7 +130,8 @@ Quick = Annotated[
     bool,
     typer.Option(
         "--quick",
-        help="Shorter runs and coarser results. By default of 2 plants, 4 laws and 2 kinds.",
+        help="Shorter runs and coarser results. Takes 2 plants, 4 laws and 2 kinds of margin "
+        "unless you name them.",
     ),
 ]
 

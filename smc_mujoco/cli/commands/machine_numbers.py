@@ -31,7 +31,7 @@ Paths = Annotated[
     typer.Option(
         "--for",
         metavar="PATH,...",
-        help="Numbers to find, such as shoulder.damping,elbow.frictionloss,input_delay,m; "
+        help="Numbers to find, such as shoulder.damping,input_delay,m; "
         "default: those that a rig's records determine.",
     ),
 ]

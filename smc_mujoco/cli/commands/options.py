@@ -38,9 +38,8 @@ def conditions_by_default(default: str) -> Any:
         metavar="NAME|TEXT|FILE",
         autocompletion=CONDITIONS,
         help="Conditions from `smc-mujoco list`, separated by commas; noise+encoder joins two. "
-        'Your own: "worn gear: friction=Coulomb(0.05)", with a part of your own file "mine: '
-        'friction=my_parts.py:stribeck(static=0.3)", or a file with one on each line. '
-        f"May be repeated. Default: {default}.",
+        'One of your own needs a --condition of its own: "worn gear: friction=Coulomb(0.05)" or '
+        f"a file with one on each line. May be repeated. Default: {default}.",
         show_default=False,
     )
 

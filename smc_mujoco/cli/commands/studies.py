@@ -99,8 +99,8 @@ def which(
 
     Example: smc-mujoco which duffing --condition noise,coulomb --need calm,fast
 
-    Example: smc-mujoco which arm.xml:shoulder --x0 0.5 --condition "worn:
-    sensor=Encoder(counts=4096)" --need accurate
+    Example: smc-mujoco which arm.xml:shoulder --x0 0.5 --condition noise,friction --condition
+    "worn: friction=Coulomb(0.05), sensor=Encoder(counts=4096)" --need accurate
     """
     began = time.monotonic()
     with delay_signals():
@@ -295,8 +295,8 @@ def compare(
     Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition
     friction,encoder
 
-    Example: smc-mujoco compare arm.xml:shoulder --x0 0.5 --law pid,classical --figure arm --latex
-    arm.tex
+    Example: smc-mujoco compare arm.xml:shoulder --x0 0.5 --law pid,classical --condition noise
+    --condition "mine: friction=my_parts.py:stribeck(static=0.3)" --figure arm --latex arm.tex
     """
     with delay_signals():
         from smc_mujoco.common.files import with_ending
