@@ -114,6 +114,7 @@ class Effect(NamedTuple):
     samples: int  # number of units
     sets: bool  # whether the units are sets of gains; otherwise they are seeds
     below: bool = False  # whether the law is below the floor and the rival is not
+    relevant: float = RELEVANT  # share of a value that is
 
 
 class Comparison:
@@ -372,6 +373,7 @@ class Comparison:
             samples=int(self.samples[block, a, b]),
             sets=bool(self.sets[[a, b], block].max() > 1),
             below=below,
+            relevant=self.relevant,
         )
 
     def visible(self, block: int, law: str, rival: str) -> float:

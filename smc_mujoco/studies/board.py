@@ -27,7 +27,7 @@ from smc_mujoco.metrics.catalogue import CATALOGUE
 
 LABELS = {SETTLES: "share of settled runs", OBJECTIVE: "J on unseen runs"}
 MIN_TIMES = 1.03  # least lead of a law below the floor that is printed; chosen
-MAX_LEAD = 0.995  # that is resolved; a larger one is called none
+MAX_LEAD = 0.995  # that may be said to show; chosen
 LEVEL_WORDS = f"are level within {100 * LEVEL_SHARE:g} %"
 # as far as these runs go: a share's interval is wider than 10 %
 SAME_RUNS = "settle in the same runs"
@@ -100,9 +100,8 @@ class Lead(NamedTuple):
         floor".
         """
         share = f"{self.effect.ahead} of {self.effect.samples}"
-        ahead = f"and it is ahead in {share} runs"
-        if self.effect.sets:
-            ahead = f"and it is ahead with {share} sets of gains"
+        units = "sets of gains" if self.effect.sets else "runs"
+        ahead = f"and it is ahead {'with' if self.effect.sets else 'in'} {share} {units}"
         if self.lacking:
             return f"defined in every run, while {self.rival} has none in {self.lacking}, {ahead}"
         if self.floor:
@@ -112,7 +111,12 @@ class Lead(NamedTuple):
             text = f"below the floor of {self.floor}, and {self.rival}'s is at least"
             return f"{text} {number(least)} times the floor"
         ratio, low, high = map(number, self.effect[:3])
-        return f"{ratio} times {self.rival}'s ({low} to {high}), {ahead}"
+        text = f"{ratio} times {self.rival}'s ({low} to {high})"
+        if not self.effect.ahead:
+            none = f"in none of {self.effect.samples} {units}"
+            least = f"the {100 * self.effect.relevant:g} % that counts"
+            return f"{text}, but {none} lower by more than {least}"
+        return f"{text}, {ahead}"
 
 
 @keyword_dataclass
@@ -358,10 +362,7 @@ class Board(Tables):
                 seen.append(block.resolves)
         if not seen:
             return f"{names} are statistically indistinguishable"
-        least = "no lead"
-        if max(seen) < MAX_LEAD:
-            least = f"a lead of {100 * max(seen):.2g} %"
-        return f"{names} are statistically indistinguishable; the runs resolve {least}"
+        return f"{names} are statistically indistinguishable; {hidden(max(seen))}"
 
     @property
     def barred(self) -> list[str]:
@@ -506,6 +507,13 @@ class Boards(Tables, list[Board]):
         tabulars = [_table(name, boards) for name, boards in groups.items()]
         notes = *tabulars[-1].notes, *self.remarks, key(self, repr(tabulars))
         return [*tabulars[:-1], dataclasses.replace(tabulars[-1], notes=notes)]
+
+
+def hidden(lead: float) -> str:
+    """Return that a smaller lead than the least visible one, a share, may have stayed unseen."""
+    if lead < MAX_LEAD:
+        return f"a lead below {100 * lead:.2g} % might not show"
+    return "even the largest lead might not show"
 
 
 def _is_or_are(things: Sequence[str]) -> str:

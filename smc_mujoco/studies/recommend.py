@@ -7,6 +7,7 @@ that settle, and the margins are of these gains, too, on runs of their own. Unde
 have twice the usual physics step, where that fits.
 """
 
+import dataclasses
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -24,6 +25,7 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.custom.scales import at_goal
+from smc_mujoco.mechanisms.layout import driven_names
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.robustness.margins import COARSE, Margin, margins_of
 from smc_mujoco.simulation import coerce
@@ -67,7 +69,8 @@ def recommend(
     goal = trial.asked_goal(plant)
     entrants, left_out = _entrants(trial, plant, laws)
     table_work = sum(_coarse(trial, plant, "none", one).work for one in trial.conditions)
-    margins_work = TRIED * len(KINDS) * _coarse(trial, plant, "none", trial.conditions[0]).work
+    kinds = len(KINDS) + 1  # friction from two sides
+    margins_work = TRIED * kinds * _coarse(trial, plant, "none", trial.conditions[0]).work
     clock.unit = _work_of_judgement(plant, goal)
     few = min(seeds, FEWEST_SEEDS)
     clock.table, clock.choice = few * table_work, AFTER * clock.unit
@@ -82,7 +85,7 @@ def recommend(
     table = trial.run({plant.name: candidates}, made, coarse=True)
     settled = _settled(table)
     least = {law: _least_share(settled[law]) for law in chosen}
-    order = in_order(least, fixed, raced.winner)
+    order = in_order({law: settled[law] for law in chosen}, fixed, raced.winner)
     boards = leaderboard(table, metrics, BY, defaults=True, relevant=relevant)
     if not boards:
         raise ScenarioError(f"no need has a number in any run on {plant.name}: ask for others")
@@ -90,7 +93,9 @@ def recommend(
     first = ordered[0]
     weighs, no_law = _weighed(trial, plant, first, goal, clock)
     base = _base_of_margins(trial, plant, first)
+    helped = helped_joints(base)
     margins, untried = _margins(trial, base, clock)
+    opposed = _opposed(trial, base, helped, clock)
     return RaceRecommendation(
         table=table,
         leaderboard=boards,
@@ -105,7 +110,8 @@ def recommend(
         margins=margins,
         beside=str(base.condition),
         untried=untried,
-        helped=_is_helped(base),
+        helped=[driven_names(plant)[i] for i in helped],
+        opposed=opposed,
         seeds=seeds,
         worst_run=_worst_run(table, first.name),
         tuned=tuned.get(first.name),
@@ -160,14 +166,18 @@ def _entrants(trial: Trial, plant: Plant, laws: Laws) -> tuple[list[Entrant], di
     return entrants, left_out
 
 
-def in_order(
-    settled: Mapping[str, float], fixed: Comparison | None, winner: str | None
-) -> list[str]:
-    """Return the laws, the one to use first: those that settle reliably, given the least share of
-    each, and among them the one that runs name where sets of gains name no winner.
+def in_order(settled: Settled, fixed: Comparison | None, winner: str | None) -> list[str]:
+    """Return the laws, the one to use first: those that settle reliably, then those that settle in
+    some run, and among equals the one that runs name where sets of gains name no winner.
     """
     better = fixed.winners[0] if fixed and not winner else None
-    return sorted(settled, key=lambda law: (settled[law] < RELIABLE, law != better))
+
+    def place(law: str) -> tuple[bool, bool, bool]:
+        of_law = settled[law]
+        never = not any(done for done, _ in of_law.values())
+        return _least_share(of_law) < RELIABLE, never, law != better
+
+    return sorted(settled, key=place)
 
 
 def _chosen(
@@ -322,16 +332,34 @@ def _margins(trial: Trial, base: Scenario, clock: AnswerTime) -> tuple[list[Marg
     return found, [*kinds[len(found) :]]
 
 
-def _is_helped(base: Scenario) -> bool:
-    """Return whether what a joint of a user's model carries pushes it from the start of a run to
-    its goal.
+def helped_joints(base: Scenario) -> list[int]:
+    """Return the driven channels of a user's model that what they carry pushes from the start of a
+    run to the goal.
     """
     plant = base.plant
     if not plant.is_user_model or plant.pose:
-        return False
+        return []
     apart = np.subtract(base.resolved.x0, plant.origin)[: plant.driven]
     helps = at_goal(plant).load * np.sign(apart)
-    return bool(np.any(helps > LIGHT * default_u_max(plant)))
+    return np.flatnonzero(helps > LIGHT * default_u_max(plant)).tolist()
+
+
+def _opposed(
+    trial: Trial, base: Scenario, helped: Sequence[int], clock: AnswerTime
+) -> Margin | None:
+    """Return the margin of friction beside a run that starts with the `helped` channels as far on
+    the other side of their goal; None if there are none, no time, or no room there.
+    """
+    if not helped or clock.work_left < TRIED * base.work:
+        return None
+    x0 = np.array(base.resolved.x0)
+    x0[helped] = 2.0 * np.array(base.plant.origin)[helped] - x0[helped]
+    try:
+        other = dataclasses.replace(base, x0=tuple(x0.tolist()))
+    except ScenarioError:  # beyond a limit, or inside something
+        return None
+    with bar("margin from the other side", shown=trial.progress) as drawn:
+        return margins_of([other], ["friction"], COARSE, trial.threads, drawn.reached)[0]
 
 
 def _work_of_judgement(plant: Plant, goal: Objective) -> float:

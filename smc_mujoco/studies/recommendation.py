@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from smc_mujoco.analysis.ranking import Comparison
@@ -13,12 +13,13 @@ from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import capital, counted, joined, number, span
 from smc_mujoco.control.component import Component, gains_text
+from smc_mujoco.mechanisms.layout import driven_names
 from smc_mujoco.metrics.conventions import leans
 from smc_mujoco.robustness.margins import Margin
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.board import MAX_LEAD, MEDIANS, Boards, Lead, heading, size
+from smc_mujoco.studies.board import MEDIANS, Boards, Lead, heading, hidden, size
 from smc_mujoco.studies.race import FIRST, LOOKS, Race, needed
 from smc_mujoco.studies.table import Table
 
@@ -159,7 +160,10 @@ class RaceRecommendation(Recommendation):
     margins: Sequence[Margin]  # of the first law with its gains
     beside: str  # name of the condition beside which they are; "nominal" for none
     untried: Sequence[str]  # kinds of margins for which there was no time
-    helped: bool  # whether a load pushes the joint from the start of their runs to its goal
+    # the joints that their load pushes from the start of these runs to the goal
+    helped: Sequence[str]
+    # of friction, in runs that start on the other side of these; None if there are none
+    opposed: Margin | None
     seeds: int  # from which each law was to run in each condition, if the time allowed it
     worst_run: Scenario  # of the first law in the condition where it fares worst
     tuned: Tuned | None  # the searches for the gains of the first law; None if they were known
@@ -177,7 +181,7 @@ class RaceRecommendation(Recommendation):
         lines = [f"Use: {self._name}"]
         searched = any(one.task or one.count > 1 for one in self.race.entrants.values())
         if searched and self.race.comparison:
-            lines.append(f"However tuned: {self._however}")
+            lines.append(f"Over all sets of gains: {self._over_sets}")
         if self.fixed:
             lines.append(f"With these gains: {self._with_these}")
         elif len(self.laws) > 1:
@@ -204,17 +208,32 @@ class RaceRecommendation(Recommendation):
 
     @property
     def _name(self) -> str:
+        done, of = self._settled_runs([self.law.name])
+        if not done:
+            done, of = self._settled_runs(self.settled)  # its own come first
+            searched = " that was searched" if self.race.unsearched else ""
+            return f"none: no law{searched} settled in any of {of} runs"
         words = [self.law.name]
         if len(self.laws) > 1 and not self.fixed and not self.race.winner:
             words.append("the first so far, not tested against the others")
         if self.race.unsearched:
             words.append("of the laws that were searched")
         if self.settles[self.law.name] < RELIABLE:
-            words.append("which does not settle reliably in every condition")
+            words.append(f"which settled in {done} of {of} runs")
         return ", ".join(words)
 
+    def _settled_runs(self, laws: Iterable[str]) -> tuple[int, int]:
+        """Return in how many runs these laws settle, and how many they have, in all conditions."""
+        settled = 0
+        runs = 0
+        for law in laws:
+            for done, of in self.settled[law].values():
+                settled += done
+                runs += of
+        return settled, runs
+
     @property
-    def _however(self) -> str:
+    def _over_sets(self) -> str:
         """What the sets of gains say of the laws."""
         race, comparison = self.race, self.race.comparison
         assert comparison is not None
@@ -254,10 +273,7 @@ class RaceRecommendation(Recommendation):
         first, *others = _ranked(comparison, race.running)
         sets = needed(comparison)
         seen = max(comparison.visible(0, first, other) for other in others)
-        resolved = "no lead"
-        if seen < MAX_LEAD:
-            resolved = f"a lead of {100.0 * seen:.2g} %"
-        text = f"{race.looked} sets resolve {resolved}"
+        text = f"with {race.looked} sets {hidden(seen)}"
         if math.isinf(sets):
             return f"{text}, and the laws are too close for more sets to tell them apart"
         if race.stopped and sets <= LOOKS[-1]:
@@ -319,15 +335,16 @@ class RaceRecommendation(Recommendation):
             return late or "not tried, as runs start at the goal"
         parts = []
         for margin in self.margins:
-            unit = "times" if margin.unit == "1" else margin.unit
-            level = f"{margin.text} {unit}".strip().replace("≥", "at least")
-            if margin.unit == self.worst_run.efforts[0]:
-                level += f" (u reaches {number(max(self.worst_run.limits))} {unit})"
             if math.isnan(margin.value):
                 return (
                     "nothing more: without changes the error does not end below 5 % of its "
                     "initial value"
                 )
+            level = _level(margin)
+            if self.helped and margin.kind == "friction":
+                level += f" from the start and {self._from_other_side}"
+            if margin.unit == self.worst_run.efforts[0]:
+                level += f" ({self._reach})"
             parts.append(f"{margin.kind} {level}")
         where = "without these conditions" if self.beside == "nominal" else f"under {self.beside}"
         text = f"{joined(parts)}, one at a time and {where}: in {self.worst_run.duration:g} s "
@@ -335,11 +352,36 @@ class RaceRecommendation(Recommendation):
         if self.beside != "nominal":
             text += ". Delay and mass include those of the condition, friction and blows are on top"
         if self.helped:
+            names = joined(self.helped)
             text += (
-                ". What the joint carries pushes it to its goal in these runs; from the other side "
-                "less friction stops it"
+                f". What {names} {'carries' if len(self.helped) == 1 else 'carry'} pushes to the "
+                "goal from the start, and away from it on the other side"
             )
         return f"{text}; {late}" if late else text
+
+    @property
+    def _from_other_side(self) -> str:
+        """How much friction is tolerated where the load pushes away from the goal."""
+        if self.opposed is None:
+            return "not tried from the other side"
+        if math.isnan(self.opposed.value):
+            return "none from the other side"
+        return f"{_level(self.opposed)} from the other side"
+
+    @property
+    def _reach(self) -> str:
+        """The bounds on u, of the channels where it has the unit of the first."""
+        run = self.worst_run
+        unit = run.efforts[0]
+        joints: dict[str, list[str]] = {}
+        for name, limit, effort in zip(
+            driven_names(run.plant), run.limits, run.efforts, strict=False
+        ):
+            if effort == unit:
+                joints.setdefault(f"{number(limit)} {unit}", []).append(name)
+        if len(joints) == 1:
+            return f"u reaches {next(iter(joints))}"
+        return f"u reaches {joined(f'{most} at {joined(at)}' for most, at in joints.items())}"
 
     @property
     def tables(self) -> list[Tabular]:
@@ -391,6 +433,12 @@ class RaceRecommendation(Recommendation):
                 "the conditions."
             ],
         )
+
+
+def _level(margin: Margin) -> str:
+    """Return the level of a margin with its unit, such as "at least 8.75 N m"."""
+    unit = "times" if margin.unit == "1" else margin.unit
+    return f"{margin.text} {unit}".strip().replace("≥", "at least")
 
 
 def _cost(J: float) -> str:

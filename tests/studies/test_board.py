@@ -189,7 +189,7 @@ def test_only_what_no_law_beats_is_marked(boards):
     assert blind[0].too_few == ""
     assert len(blind[0].best) == 3
     assert not any(map(any, marked(blind)))
-    assert "the runs resolve no lead" in repr(blind)
+    assert "even the largest lead might not show" in repr(blind)
     some = made()  # the first median is known within a factor of 10, the others within 1.2
     random = np.random.default_rng(3)
     some.columns["itae"] = np.exp(np.repeat([2.5, 0.1, 0.1], 20) * random.normal(size=60))
@@ -376,6 +376,11 @@ def test_the_result_names_the_winner_its_least_lead_and_the_conditions(pair):
     lead = Lead("a", "b", Effect(0.85, 0.8, 0.9, 5, 8, True))
     assert (
         lead.words == "0.850 times b's (0.800 to 0.900), and it is ahead with 5 of 8 sets of gains"
+    )
+    level = Lead("a", "b", Effect(0.992, 0.99, 0.993, 0, 8, False))
+    assert level.words == (
+        "0.992 times b's (0.990 to 0.993), but in none of 8 runs lower by more than the 3 % that "
+        "counts"
     )
 
 

@@ -282,14 +282,17 @@ def test_runs_that_cannot_have_twice_the_step_keep_theirs(fields):
 
 
 def test_the_law_to_use_is_the_one_that_runs_name_where_sets_name_none():
-    """It must settle, too."""
+    """It must settle, too, and one that settles in no run comes after one that does in some."""
     runs = 1.0 + 0.01 * np.sin(np.arange(12))
     fixed = Comparison({"a": [2.0 * runs], "b": [runs]})
     assert fixed.winners == ["b"]
-    for settled, winner, order in (
-        ({"a": 1.0, "b": 1.0}, None, ["b", "a"]),
-        ({"a": 1.0, "b": 1.0}, "a", ["a", "b"]),
-        ({"a": 1.0, "b": 0.1}, None, ["a", "b"]),
+    for of_a, of_b, winner, order in (
+        (10, 10, None, ["b", "a"]),
+        (10, 10, "a", ["a", "b"]),
+        (10, 1, None, ["a", "b"]),
+        (2, 1, None, ["b", "a"]),
+        (1, 0, None, ["a", "b"]),
     ):
+        settled = {"a": {"noise": (of_a, 10)}, "b": {"noise": (of_b, 10)}}
         assert in_order(settled, fixed, winner) == order
-    assert in_order({"a": 1.0}, None, None) == ["a"]
+    assert in_order({"a": {"noise": (10, 10)}}, None, None) == ["a"]

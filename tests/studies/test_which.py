@@ -5,6 +5,7 @@ import json
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,10 +20,11 @@ from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.properties import searched
+from smc_mujoco.robustness import margins
 from smc_mujoco.studies import race, recommend
 from smc_mujoco.studies import recommendation as recommendation_module
 from smc_mujoco.studies import which as module
-from smc_mujoco.studies.answer_time import FEWEST_SEEDS
+from smc_mujoco.studies.answer_time import FEWEST_SEEDS, AnswerTime
 from smc_mujoco.studies.board import Boards
 
 FAST = smc.law("observer_free", lam=6.0, k1=2.0)
@@ -164,7 +166,14 @@ def raced(tmp_path_factory):
 def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(raced):
     _, recommendation, _ = raced
     lines = dict(line.split(": ", 1) for line in recommendation.answer)
-    verdicts = ["Use", "However tuned", "With these gains", "Its J", "Its scores", "Without a law"]
+    verdicts = [
+        "Use",
+        "Over all sets of gains",
+        "With these gains",
+        "Its J",
+        "Its scores",
+        "Without a law",
+    ]
     assert [*lines][:9] == [*verdicts, "Added", "Settles", "Tolerates"]
     assert lines["Added"].startswith("noise, of 0.01 m in positions and 0.05 m/s in veloc")
     shares = [float(share) for share in re.findall(r"(\d+) % \w+", lines["Its J"])]
@@ -243,6 +252,11 @@ def test_the_needs_are_those_of_the_tables_and_margins_at_the_end_of_their_searc
     assert f"friction at least {number(most.value)} N (u reaches 9.00 N)" in widest._margins
 
 
+MIXED = """<mujoco model="mixed"><worldbody>
+<body><joint name="a" type="slide" axis="1 0 0"/><geom size=".1" mass="2" contype="0"/></body>
+<body pos="0 1 0"><joint name="b" type="slide" axis="1 0 0"/><geom size=".1" mass="2" contype="0"/>
+</body></worldbody><actuator><motor joint="a" ctrlrange="-9 9"/>
+<position joint="b" kp="50" kv="20" ctrlrange="-1 1"/></actuator></mujoco>"""
 HANGING = """<mujoco model="lift"><worldbody><body><joint name="z" type="slide" axis="0 0 1"/>
 <geom size=".1" mass="2" contype="0"/></body></worldbody><actuator>
 <motor joint="z" ctrlrange="-40 40"/></actuator></mujoco>"""
@@ -251,12 +265,44 @@ HANGING = """<mujoco model="lift"><worldbody><body><joint name="z" type="slide" 
 def test_margins_from_the_side_from_which_gravity_helps_say_so(raced):
     _, recommendation, _ = raced
     lift = smc.plant_from(HANGING, ["z"])
-    for x0, helped in ((0.1, True), (-0.1, False)):
-        assert recommend._is_helped(smc.Scenario(plant=lift, law="none", x0=x0)) == helped
+    for x0, helped in ((0.1, [0]), (-0.1, [])):
+        assert recommend.helped_joints(smc.Scenario(plant=lift, law="none", x0=x0)) == helped
     assert not recommendation.helped
-    said = "What the joint carries pushes it to its goal"
+    friction = recommendation.margins[1]
+    said = "What the slide carries pushes to the goal from the start"
+    for value, words in ((2.0, "2.00 N from the other side"), (math.nan, "none from the other")):
+        other = dataclasses.replace(friction, value=value)
+        told = dataclasses.replace(recommendation, helped=["the slide"], opposed=other)._margins
+        assert f"friction {friction.text} N from the start and {words}" in told
+        assert said in told
     assert said not in recommendation._margins
-    assert said in dataclasses.replace(recommendation, helped=True)._margins
+    late = dataclasses.replace(recommendation, helped=["the slide"])._margins
+    assert "from the start and not tried from the other side (u reaches 9.00 N)" in late
+
+
+def test_from_the_other_side_gravity_pushes_away_and_less_friction_is_tolerated():
+    """With 2 kg: from above 40 N and the weight fight friction, from below 40 N less the weight."""
+    lift = smc.plant_from(HANGING, ["z"])
+    law = smc.law("classical", c=6.0, k=38.0)
+    base = smc.Scenario(plant=lift, law=law, x0=0.1, duration=2.0)
+    trial = SimpleNamespace(progress=False, threads=1)
+    clock = AnswerTime()
+    opposed = recommend._opposed(trial, base, [0], clock)  # pyright: ignore[reportArgumentType]
+    (helped,) = margins.margins_of([base], ["friction"], margins.COARSE)
+    assert opposed is not None
+    assert 15.0 < opposed.value < 40.0 - 2.0 * 9.81 < helped.value
+    assert recommend._opposed(trial, base, [], clock) is None  # pyright: ignore[reportArgumentType]
+    clock = AnswerTime(ends=0.0, pace=1.0)
+    assert recommend._opposed(trial, base, [0], clock) is None  # pyright: ignore[reportArgumentType]
+
+
+def test_where_motors_differ_the_bound_on_u_is_said_of_each_joint(raced):
+    _, recommendation, _ = raced
+    text = MIXED.replace("<position", "<motor").replace('kp="50" kv="20" ', "")
+    pair = smc.plant_from(text, ["a", "b"])
+    run = smc.Scenario(plant=pair, law="pid")
+    told = dataclasses.replace(recommendation, worst_run=run)._margins
+    assert "(u reaches 9.00 N at a and 1.00 N at b)" in told
 
 
 def test_where_runs_fail_there_is_no_ratio_of_J():
@@ -309,15 +355,17 @@ def test_laws_for_which_there_is_no_time_are_named_and_the_clock_may_end_a_race_
     assert {len(one.values) for one in short.race.entrants.values()} == {1}
     late = "Not searched: observer_free, as the time was over; the same call goes on with them"
     assert late in short.answer
-    assert "of the laws that were searched" in short.answer[0]
+    assert short.answer[0] == "Use: none: no law that was searched settled in any of 8 runs"
+    settling = dataclasses.replace(short, settled={short.law.name: {"noise": (1, 4)}})
+    assert "of the laws that were searched" in settling.answer[0]
     few = dataclasses.replace(
         recommendation, race=recommendation.race._replace(sets=1, stopped=True)
     )
-    (however,) = (line for line in few.answer if line.startswith("However tuned"))
-    assert "open; there was time for 1 set of gains of each law" in however
-    assert "not even the first 3" in however
-    assert "7 can name a winner" in however
-    assert re.search(r"goes on from there if it is given about \d+ more minute", however)
+    (over_sets,) = (line for line in few.answer if line.startswith("Over all sets of gains"))
+    assert "open; there was time for 1 set of gains of each law" in over_sets
+    assert "not even the first 3" in over_sets
+    assert "7 can name a winner" in over_sets
+    assert re.search(r"goes on from there if it is given about \d+ more minute", over_sets)
 
 
 def test_a_law_that_does_not_settle_is_not_recommended_without_saying_where(raced):
@@ -329,20 +377,15 @@ def test_a_law_that_does_not_settle_is_not_recommended_without_saying_where(race
         settled={name: {"coulomb": (2, 4)}},
     )
     lines = dict(line.split(": ", 1) for line in rare.answer)
-    assert lines["Use"] == f"{name}, which does not settle reliably in every condition"
+    assert lines["Use"] == f"{name}, which settled in 2 of 4 runs"
     assert lines["Settles"] == "not reliably: in 2 of 4 runs under coulomb"
+    never = dataclasses.replace(rare, settled={name: {"coulomb": (0, 4), "noise": (0, 4)}})
+    assert never.answer[0] == "Use: none: no law settled in any of 8 runs"
     pushed = dataclasses.replace(
         recommendation.worst_run, disturbance=smc.Constant(20.0)
     )  # u_max is 9
     weak = dataclasses.replace(rare, worst_run=pushed)
     assert weak._where.startswith(f"{lines['Settles']}; u stays at its bound in the worst run: ")
-
-
-MIXED = """<mujoco model="mixed"><worldbody>
-<body><joint name="a" type="slide" axis="1 0 0"/><geom size=".1" mass="2" contype="0"/></body>
-<body pos="0 1 0"><joint name="b" type="slide" axis="1 0 0"/><geom size=".1" mass="2" contype="0"/>
-</body></worldbody><actuator><motor joint="a" ctrlrange="-9 9"/>
-<position joint="b" kp="50" kv="20" ctrlrange="-1 1"/></actuator></mujoco>"""
 
 
 def test_where_u_has_two_units_a_need_or_a_metric_of_u_says_so(tmp_path):
@@ -450,9 +493,9 @@ def test_a_law_with_few_shipped_sets_is_said_not_to_be_told_from_others(tmp_path
     found = smc.which("duffing", "noise", laws=laws, out=tmp_path, seeds=2, minutes=5, duration=1.5)
     counts = {name: one.count for name, one in found.race.entrants.items()}
     assert counts["fixed_time"] < race.LOOKS[0] < counts["pid"]
-    (however,) = (line for line in found.answer if line.startswith("However tuned"))
-    assert "fixed_time cannot be told from others, with fewer than 7 sets" in however
-    assert "fixed_time's" not in however
+    (over_sets,) = (line for line in found.answer if line.startswith("Over all sets of gains"))
+    assert "fixed_time cannot be told from others, with fewer than 7 sets" in over_sets
+    assert "fixed_time's" not in over_sets
 
 
 def test_an_event_after_the_runs_that_judge_gains_is_refused_before_them(refused):
