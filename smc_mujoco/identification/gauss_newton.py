@@ -48,6 +48,10 @@ ROUGH_STEPS = 8  # steps from each start before the best is chosen; chosen
 CORRECTED_STEPS = 3  # steps after the first halving of the physics step; chosen
 MAX_HALVINGS = 5  # of the physics step in corrected replays; chosen
 NEGLIGIBLE_MOVE = 0.5  # of a standard error, by which a halving may move a quantity; chosen
+# of what halved steps change in an extrapolation: what is then left. Where errors of steps h, h/2
+# and h/4 are random, in proportion to the step, 2 x(h/4) - x(h/2) errs by sqrt(1/2) of those of h,
+# and its change from 2 x(h/2) - x(h) is sqrt(7/2) of them; where they are smooth, 1/3 is left
+LEFT_BY_STEPS = 7.0**-0.5
 GOOD_FIT = 97.0  # percent: fit of the pieces beyond which a start needs no rival; chosen
 
 
@@ -141,19 +145,19 @@ def extrapolated(replays: Replays, slopes: Slopes, most: int = 0) -> tuple[Slope
     """Return the solution near slopes for replays whose steps are extrapolated to 0, and about how
     far it is off by them, (p,).
 
-    Errors by steps h are of first order, so 2 x(h/2) - x(h) has none of them. What it changes from
-    h to h/2 is what it may be off: the most of that at the slopes and at the solution. If the
-    replays with steps h fit better, as they fit a log of a simulation with such steps, their
-    solution is returned, and what shorter steps would change. After some steps, at most `most` with
-    the same derivatives, the last one follows from derivatives alone. Extrapolated steps keep those
-    of the slopes, unless they promise much more than the replays keep.
+    Errors by steps h are of first order, so 2 x(h/2) - x(h) has none of them. It may be off by the
+    share LEFT_BY_STEPS of what it changes from h to h/2: the most of that at the slopes and at the
+    solution. If the replays with steps h fit better, as they fit a log of a simulation with such
+    steps, their solution is returned, and what shorter steps would change. After some steps, at
+    most `most` with the same derivatives, the last one follows from derivatives alone. Extrapolated
+    steps keep those of the slopes, unless they promise much more than the replays keep.
     """
     if not replays.free.size:  # records of simulated runs have the same steps
         return refine(replays, slopes, most), np.zeros(len(slopes.point.values))
     ends, by_half, by_quarter = _without_steps(replays, slopes, slopes.residuals)
     if _solved(replays, slopes).cost < _solved(replays, ends).cost:
         return _solved(replays, refine(replays, slopes, most)), _moves(slopes, by_half)
-    moved = _moves(slopes, by_quarter)
+    moved = LEFT_BY_STEPS * _moves(slopes, by_quarter)
     replays.limit = True
     for _ in range(MOST_SLOPES if most else 0):
         ends = _settled(replays, ends, most)
@@ -170,7 +174,7 @@ def extrapolated(replays: Replays, slopes: Slopes, most: int = 0) -> tuple[Slope
     if most:
         (full,) = replays.residuals([ends.point])
         ends, _, by_quarter = _without_steps(replays, ends, full)
-        moved = np.maximum(moved, _moves(slopes, by_quarter))
+        moved = np.maximum(moved, LEFT_BY_STEPS * _moves(slopes, by_quarter))
     if other is not None:
         k = replays.names.index(DELAY)
         moved[k] = max(moved[k], LEAST_DELAY_MOVE / replays.scales[k])

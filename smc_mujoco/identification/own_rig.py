@@ -62,6 +62,18 @@ class LogPart(RecordPart):
     before: int = 0  # commands before the start
     period: float = 0.0  # s, between commands
 
+    def held(self, longest: float) -> "LogPart":
+        """Return the part with as few commands for each sample as periods up to `longest` take."""
+        sample = self.period * self.stride
+        times = math.ceil(sample / longest - 1e-9)
+        return dataclasses.replace(
+            self,
+            u=np.repeat(self.u[:: self.stride], times, axis=0),
+            before=self.before // self.stride * times,
+            period=sample / times,
+            stride=times,
+        )
+
 
 @keyword_dataclass
 class OwnRig(Rig):

@@ -552,21 +552,27 @@ def _defaults(s: Scenario) -> dict[str, Any]:
     """Return the defaults of the fields that are None, and the law with what it takes from the
     plant.
     """
-    x0 = s.plant.x0
-    if "bobs" in kinds(s.contact):  # pendulums in a row must not start beyond each other
-        x0 = tuple(sorted(x0))
+    # each is made only where it is missing: steps and bounds take most of a scenario's time
     defaults = {
-        "model": "nominal" if s.law.requires_model else "none",
-        "physics_step": s.control_period / integration.default_steps(s),
-        "u_max": force_bounds.default_bound(s),
-        "x0": x0,
-        "v0": (0.0,) * s.plant.n,
-        "reference": coerce.suggested_reference(s.plant),
-        "velocity": estimator("measured" if s.sensor is None else "filtered_difference"),
-        "integrator": integration.default_integrator(s),
+        "model": lambda: "nominal" if s.law.requires_model else "none",
+        "physics_step": lambda: s.control_period / integration.default_steps(s),
+        "u_max": lambda: force_bounds.default_bound(s),
+        "x0": lambda: _start(s),
+        "v0": lambda: (0.0,) * s.plant.n,
+        "reference": lambda: coerce.suggested_reference(s.plant),
+        "velocity": lambda: estimator("measured" if s.sensor is None else "filtered_difference"),
+        "integrator": lambda: integration.default_integrator(s),
     }
     missing = {}
-    for name, value in defaults.items():
+    for name, default in defaults.items():
         if getattr(s, name) is None:
-            missing[name] = value
+            missing[name] = default()
     return missing | {"law": nominal_gains.at_plant(s.law, s.plant)}
+
+
+def _start(s: Scenario) -> tuple[float, ...]:
+    """Return the positions at which a run begins by default."""
+    x0 = s.plant.x0
+    if "bobs" in kinds(s.contact):  # pendulums in a row must not start beyond each other
+        return tuple(sorted(x0))
+    return x0

@@ -89,7 +89,7 @@ CALLS = {
         "analysis.chattering.chattering"
     ],
     "excitation arm.xml --for m,input_delay --u-max 5 --v-max 2 --amplitude 0.3 --duration 4 "
-    "--rate 250 --noise 0.0001 --counts 8192 --out m.csv --json e.json": [
+    "--rate 250 --noise 0.0001 --counts 8192 --figure f --out m.csv --json e.json": [
         "identification.excitation.excitation"
     ],
     "export pid.c": ["exchange.c.export_c.law_to_c"],

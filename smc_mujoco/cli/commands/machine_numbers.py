@@ -97,6 +97,9 @@ LogNoise = Annotated[
 LogCounts = Annotated[
     float, typer.Option(help="Counts of the encoders, per revolution or per metre; inf for none.")
 ]
+MotionsFigure = Annotated[
+    Path | None, options.picture("the motions and the expected errors of each")
+]
 MotionFile = Annotated[
     Path | None, typer.Option(help="CSV file of the best motion: t, and r or r_JOINT.")
 ]
@@ -224,6 +227,7 @@ def excitation(
     rate: Rate = 500.0,
     noise: LogNoise = 2e-4,
     counts: LogCounts = 4096,
+    figure: MotionsFigure = None,
     out: MotionFile = None,
     json: options.Json = None,
 ) -> None:
@@ -237,7 +241,7 @@ def excitation(
     Example: smc-mujoco excitation arm.xml:shoulder --for shoulder.damping,input_delay --out m.csv
     """
     terminal = Terminal(json)
-    options.check_files(None, out and with_ending(out, ".csv"))
+    options.check_files(None, figure, out and with_ending(out, ".csv"))
     with delay_signals():
         from smc_mujoco.identification import excitation as exciting
 
@@ -253,6 +257,8 @@ def excitation(
         counts=counts,
     )
     terminal.note(str(motions), wrap=True)
+    if figure:
+        terminal.wrote(*motions.figure(figure))
     if out:
         terminal.wrote(motions.save(out))
         logged = ["t"]
