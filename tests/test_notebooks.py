@@ -43,12 +43,16 @@ SAID = {
         assert amplitudes[0].max() < 1e-4 < amplitudes[2].max() < 0.1 < amplitudes[1].max()
         assert max(smc.score(trace)["ultimate_bound"] for trace in noisy) < 0.002
         for check, right, wrong in (
-            (check_offset, [0.0216], [0.0205, 0.03]),
+            (check_offset, [0.0216, np.float32(0.0216)], [0.0205, -0.0216]),
             (check_load, [1.576], [1.3, 2.0]),
             (check_width, [2.0], [0.5, 4.0]),
         ):
-            assert [check(answer)[:5] for answer in right] == ["Right"]
+            assert {check(answer)[:5] for answer in right} == {"Right"}
             assert [check(answer)[:7] for answer in wrong] == ["Not yet"] * 2
+        for check in (check_load, check_width):
+            assert {check(answer)[:5] for answer in (None, -1.0, 0.0, float("nan"))} == {"Write"}
+        boundary_layer = smc.law("boundary_layer", plant=PLANT).gains
+        assert (boundary_layer["k"], boundary_layer["c"]) == (17.96, 15.43)
         told = " ".join(str(compared).split())
         assert "J on unseen runs of inverted_pendulum: no winner; pid and super_twisting" in told
         assert "ITAE on inverted_pendulum under nominal: pid wins" in told
