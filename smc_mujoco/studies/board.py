@@ -55,6 +55,8 @@ MARKS = {
     "below ": "Values below the floor count as equal. For an error, the floor is 1e-4 of its "
     "initial value; late in the run it is at least half an encoder count, and at least the noise. "
     f"For u and its variation per second, it is {100 * MIN_COMMAND_SHARE:g} % of u_max.",
+    "may pass ": "'may pass': the median is below the floor, but it rises at the end of runs, or "
+    "with half the physics step, so that it need not stay there.",
     "at half": "'at half the step': the median with half the physics step, if it differs by more "
     f"than {APART}; {RANGE}.",
 }
@@ -148,6 +150,7 @@ class Block:
     sets: int  # smallest number of sets of gains of a law that has several; 1 if none has
     given: bool  # whether a law has one set of gains
     few: Mapping[str, int]  # laws that are not ranked, as they have so few sets of gains or runs
+    rising: Names = ()  # laws whose median is below the floor, but need not stay there
     # the laws with default gains, over which no other law is named the winner
     untuned: Names = ()
 
@@ -599,6 +602,9 @@ def _cell(board: Board, entry: BoardEntry) -> Cell:
     for block in board.blocks:
         if entry.law in block.below:
             below.append(f"below {block.floor}")
+            break
+        if block.floor and entry.law in block.rising:
+            below.append(f"may pass {block.floor}")
             break
     alarms = [board.failures(entry)]
     changes = []

@@ -322,6 +322,8 @@ def _block(
     without = comparison.without_value[:, at].tolist()
     lacking = dict(zip(comparison.laws, without, strict=True))
     best = comparison.best[:, at]
+    below = comparison.below[:, at]
+    low = comparison.centres[:, at] <= comparison.floors[at]
     units = comparison.units[:, at]
     away = comparison.away[:, at].any(axis=1)
     few = ~comparison.ranked[:, at]
@@ -343,7 +345,8 @@ def _block(
         medians=medians,
         lacking=lacking,
         best=tuple(laws[best].tolist()),
-        below=tuple(laws[comparison.below[:, at]].tolist()),
+        below=tuple(laws[below].tolist()),
+        rising=tuple(laws[low & ~below].tolist()),
         floor=floor,
         away=tuple(laws[away].tolist()),
         worse=tuple(laws[comparison.worse[:, at]].tolist()),

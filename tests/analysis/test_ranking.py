@@ -756,6 +756,19 @@ def test_laws_below_the_floor_are_not_ranked_and_a_lead_over_it_is_a_least_one(
             assert law not in block.worse
 
 
+def test_a_median_below_the_floor_that_rises_says_that_it_may_pass_it():
+    """By 4 with the last fifth of a run, so by 1024 in five further ones."""
+    least = paired_runs.floor(FINE, "ultimate_bound")
+    scores = {law: least * twelve(0.01, spread=0.005, seed=i) for i, law in enumerate("ab")}
+    rows = np.array([run_key.row(FINE)["scenario"]] * 24)
+    rises = np.array(['{"ultimate_bound": 1.0}'] * 12 + ['{"ultimate_bound": 4.0}'] * 12)
+    table = table_of(scores, "ultimate_bound", scenario=rows, trends=rises)
+    (shown,) = leaderboard(table, ["ultimate_bound"]).tables
+    said = {row[0].text: row[1].below.splitlines()[-1] for row in shown.rows}
+    assert said == {"a": "below 0.00015 m", "b": "may pass 0.00015 m"}
+    assert "'may pass': the median is below the floor, but" in shown.notes[-1]
+
+
 def test_a_lead_over_the_floor_is_printed_only_where_the_test_sees_it():
     """Of twins about the floor one is below it and the other is not, by chance."""
     low = np.where(np.arange(12) < 7, 0.9, 1.9)[None]
