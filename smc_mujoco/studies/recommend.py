@@ -323,7 +323,7 @@ def _margins(trial: Trial, base: Scenario, clock: AnswerTime) -> tuple[list[Marg
     kinds = KINDS_OF_POSES if plant.pose else KINDS
     found: list[Margin] = []
     for some in (kinds[:2], kinds[2:]):
-        tried = some[: int(min(len(some), clock.work_left / (TRIED * base.work)))]
+        tried = some[: int(min(len(some), clock.margins_left / (TRIED * base.work)))]
         if tried:
             with bar(f"margins of {joined(tried)}", shown=trial.progress) as drawn:
                 found += margins_of([base], tried, COARSE, trial.threads, drawn.reached)
@@ -350,7 +350,7 @@ def _opposed(
     """Return the margin of friction beside a run that starts with the `helped` channels as far on
     the other side of their goal; None if there are none, no time, or no room there.
     """
-    if not helped or clock.work_left < TRIED * base.work:
+    if not helped or clock.margins_left < TRIED * base.work:
         return None
     x0 = np.array(base.resolved.x0)
     x0[helped] = 2.0 * np.array(base.plant.origin)[helped] - x0[helped]

@@ -32,7 +32,7 @@ from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import Starts, listed, listed_laws
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.workers import Workers
-from smc_mujoco.studies.answer_time import AnswerTime
+from smc_mujoco.studies.answer_time import FILMED, FILMED_SHARE, AnswerTime
 from smc_mujoco.studies.compare import DrawSeed
 from smc_mujoco.studies.fair_gains import Laws, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import leaderboard
@@ -93,13 +93,13 @@ def which(
         that no law of a joint can be judged.
       minutes: how long the whole may take. Then laws race: their gains are searched under the
         conditions asked for and noise, a quarter as long, in turn over the laws until one has the
-        lowest J, at most 12 sets a law. The race leaves time for the tables and the margins, which
-        are shorter where there is little. Laws for whose first set there is no time are in
-        `race.unsearched`. The clock may change which laws, sets, runs and margins there are, and
-        with them the answer; with the same ones it is the same to the last bit. After a stop, the
-        same call goes on with the sets that the folder has. The `RaceRecommendation` that comes
-        back has the `margins` of the first law and its `worst_run`, too. Default: a whole
-        comparison, which no clock stops.
+        lowest J, at most 12 sets a law. The race leaves time for the tables, the margins and a
+        film, which are shorter where there is little; margins go before a film. Laws for whose
+        first set there is no time are in `race.unsearched`. The clock may change which laws, sets,
+        runs and margins there are, and with them the answer; with the same ones it is the same to
+        the last bit. After a stop, the same call goes on with the sets that the folder has. The
+        `RaceRecommendation` that comes back has the `margins` of the first law and its `worst_run`,
+        too. Default: a whole comparison, which no clock stops.
       starts, relevant, threads, progress, seed, device, executor: as in `compare`.
 
     Returns:
@@ -138,7 +138,8 @@ def which(
     trial.check({machine.name: chosen})
     compared = _with_values(trial.case(machine, "none", trial.conditions[0]), asked)
     if minutes:
-        clock = AnswerTime(began + 60.0 * minutes)
+        spare = 60.0 * min(FILMED, FILMED_SHARE * minutes)
+        clock = AnswerTime(began + 60.0 * minutes - spare, spare)
         return recommend(trial, machine, chosen, compared, seeds or RACE_SEEDS, clock, relevant)
     count = seeds or SEEDS
     candidates = trial.candidates({machine.name: chosen}, count)

@@ -4,6 +4,7 @@ import dataclasses
 import json
 import math
 import re
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,6 +16,7 @@ from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.tuning import quick_search, search
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST
 from smc_mujoco.cli import main
+from smc_mujoco.cli.commands import studies
 from smc_mujoco.common.text import number
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
@@ -296,6 +298,20 @@ def test_from_the_other_side_gravity_pushes_away_and_less_friction_is_tolerated(
     assert recommend._opposed(trial, base, [0], clock) is None  # pyright: ignore[reportArgumentType]
 
 
+def test_margins_go_before_the_film():
+    lift = smc.plant_from(HANGING, ["z"])
+    law = smc.law("classical", c=6.0, k=38.0)
+    base = smc.Scenario(plant=lift, law=law, x0=-0.1, duration=1.5)
+    trial = SimpleNamespace(progress=False, threads=1)
+    pace = 14.0 / (recommend.TRIED * base.work)  # a kind takes 14 s
+    for spare, tried in ((30.0, ["delay", "friction"]), (0.0, [])):
+        clock = AnswerTime(time.monotonic(), spare, pace=pace)
+        assert clock.work_left == 0.0
+        found, untried = recommend._margins(trial, base, clock)  # pyright: ignore[reportArgumentType]
+        assert [one.kind for one in found][:2] == tried
+        assert [*tried, *untried][:2] == ["delay", "friction"]
+
+
 def test_where_motors_differ_the_bound_on_u_is_said_of_each_joint(raced):
     _, recommendation, _ = raced
     text = MIXED.replace("<position", "<motor").replace('kp="50" kv="20" ', "")
@@ -343,6 +359,12 @@ def test_without_time_there_is_an_answer_of_the_sets_that_there_are_without_marg
     assert f"Tolerates: {late}" in short.answer
     some = dataclasses.replace(short, margins=recommendation.margins[:2], untried=["mass", "blow"])
     assert some._margins.endswith("; mass and blow not tried, as the time was over")
+    told = studies._margins_command(some, "m.xml:slide", ["noise,coulomb"], "-0.1", Path("there"))
+    assert told == (
+        "There was no time for margins of mass and blow. This makes them: smc-mujoco margins "
+        "m.xml:slide --law there/recommended.json --kind mass,blow --quick --condition coulomb "
+        "--x0=-0.1"
+    )
 
 
 def test_laws_for_which_there_is_no_time_are_named_and_the_clock_may_end_a_race_at_once(

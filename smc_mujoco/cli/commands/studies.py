@@ -1,5 +1,6 @@
 """smc-mujoco compare, which: questions that many runs of many laws answer."""
 
+import shlex
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,15 +12,13 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_signals
-from smc_mujoco.common.text import counted
+from smc_mujoco.common.text import counted, joined
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
     from smc_mujoco.studies.recommendation import RaceRecommendation
     from smc_mujoco.studies.table import Table
 
-FILMED = 0.5  # minutes that are for the figure and the film, and
-FILMED_SHARE = 0.2  # the largest share that they take of the minutes; chosen
 # pictures a second of the film; the largest is enough to follow a run, the smallest to see it
 MAX_FPS, MIN_FPS = 15.0, 2.0
 MADE = 0.8  # of the time that is left, in which they must be made: then they are written; chosen
@@ -128,11 +127,13 @@ def which(
         device=device,
         executor=executor,
         falling=falling,
-        minutes=whole and whole - film * min(FILMED, FILMED_SHARE * whole),
+        minutes=whole,
     )
     terminal.print(recommendation)
     if isinstance(recommendation, RaceRecommendation):
         _save(recommendation, out, terminal)
+        if recommendation.untried:
+            terminal.note(_margins_command(recommendation, plant, condition, x0, out), wrap=True)
         if film and whole:
             _film(recommendation, out, began + 60.0 * whole, terminal)
     _finish(recommendation.table, out, terminal)
@@ -148,6 +149,29 @@ def _save(recommendation: "RaceRecommendation", out: Path, terminal: Terminal) -
         terminal.note(f"To use {recommendation.law.name} with these gains, give --law {file}")
     figure.figure([recommendation.worst_trace], out / "worst_run")
     terminal.wrote(*page.files(out / "worst_run"))
+
+
+def _margins_command(
+    recommendation: "RaceRecommendation",
+    plant: str,
+    condition: list[str] | None,
+    x0: str | None,
+    out: Path,
+) -> str:
+    """Return which margins were left out, and the command that makes them."""
+    law = str(recommendation.law)
+    if recommendation.tuned:
+        law = str(out / "recommended.json")
+    words = ["smc-mujoco", "margins", plant, "--law", law]
+    words += ["--kind", ",".join(recommendation.untried), "--quick"]
+    if recommendation.beside != "nominal":
+        for one in options.conditions(condition):
+            if one.name == recommendation.beside:
+                words += ["--condition", str(one)]
+    if x0:
+        words += [f"--x0={x0}"]
+    late = joined(recommendation.untried)
+    return f"There was no time for margins of {late}. This makes them: {shlex.join(words)}"
 
 
 def _film(recommendation: "RaceRecommendation", out: Path, ends: float, terminal: Terminal) -> None:
