@@ -557,6 +557,16 @@ def test_a_robot_that_rises_from_its_floor_is_taken_and_told(mode, x0, foot):
         smc.plant_from(text, knee, keyframe="home", others="locked")
 
 
+def test_feet_that_stand_a_little_deep_are_not_told_of():
+    """3 mm. The base that is locked there is pressed on."""
+    legs = "".join(DOGS_LEG.format(i=i, x=x, y=y) for i, (x, y) in enumerate(CORNERS))
+    text = DOG.format(legs=legs, motors="").replace(".182", ".197")
+    knee = {"k0": smc.Channel(motor=True)}
+    smc.plant_from(text, knee, keyframe="home", others="file")  # warns of nothing
+    with pytest.warns(ScenarioWarning, match=r"'floor' and 'foot\d' overlap by 3.0 mm"):
+        smc.plant_from(text, knee, keyframe="home", others="locked")
+
+
 @pytest.mark.parametrize("mode", ["file", "locked"])
 @pytest.mark.parametrize("parent", ["plate", "mid"])
 def test_a_link_of_a_urdf_may_touch_all_but_the_one_that_carries_it(tmp_path, parent, mode):
