@@ -17,7 +17,7 @@ import secrets
 import sys
 import time
 from collections import namedtuple
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any, NamedTuple
@@ -34,6 +34,7 @@ from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.files import own, replacing
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.common.rebuild import helpers, names_in, rebuild, values_in
+from smc_mujoco.common.text import joined
 
 # For compiled code alone: without wrappers for Python, which take half the time to compile.
 not_inlined = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
@@ -109,6 +110,10 @@ NUMBERS = Numbers()
 
 class NotCompilable(Exception):
     """A function cannot be compiled, and is called in Python. The message says why."""
+
+
+class CallsPlain(NotCompilable):
+    """It calls a function that is not compiled, the first of which the message names."""
 
 
 def always(value: Any) -> Callable:
@@ -367,6 +372,8 @@ def _in_thread(work: Callable, *arguments: Any) -> None:
             with _compiling():
                 work(*arguments)
         except Exception as error:  # numba raises many types
+            if plain := PLAIN_HELPER.search(COLOURS.sub("", str(error))):
+                raise CallsPlain(_cure([plain[1]])) from None
             raise NotCompilable(reason(error)) from None
 
     attended([compiling], bool)
@@ -577,8 +584,6 @@ def reason(error: Exception) -> str:
     """Return the line of a compiler's error that says what is wrong, printable even if it quotes a
     user's text.
     """
-    if plain := PLAIN_HELPER.search(COLOURS.sub("", str(error))):
-        return f"it calls {plain[1]}, a plain function: put @numba.njit on {plain[1]}"
     first = ""
     for line in map(str.strip, COLOURS.sub("", str(error)).splitlines()):
         if line.strip(" ^~."):
@@ -587,6 +592,32 @@ def reason(error: Exception) -> str:
                 first = line
                 break
     return printable((first or type(error).__name__).removeprefix("TypingError: "))
+
+
+def calls_plain(function: Any) -> str:
+    """Return the plain functions that a function calls, also by others, with the cure; "" if it
+    names none.
+    """
+    names: dict[str, None] = {}
+    left = [function]
+    seen = []
+    while left:
+        caller = left.pop(0)
+        if not isinstance(caller, FunctionType) or caller in seen:
+            continue
+        seen.append(caller)
+        left += helpers(caller)
+        for value in values_in(caller):
+            if isinstance(value, FunctionType) and not value.__module__.startswith("smc_mujoco."):
+                names[value.__name__] = None
+                left.append(value)
+    return _cure([*names]) if names else ""
+
+
+def _cure(names: Sequence[str]) -> str:
+    """Return that these plain functions are called, with the cure."""
+    what = "a plain function" if len(names) == 1 else "plain functions"
+    return f"it calls {joined(names)}, {what}: put @numba.njit on {joined(names)}"
 
 
 # Raises out of bounds and at division by zero. Without wrappers for Python, which would take half

@@ -24,11 +24,13 @@ from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import (
     AtAddress,
+    CallsPlain,
     CompiledFunction,
     Key,
     NotCompilable,
     Uncompiled,
     attempting,
+    calls_plain,
     checked,
     compile_for,
     floats,
@@ -321,6 +323,9 @@ def _compile(
     """Return what a compiler makes of these arguments. Its errors begin with the name."""
     try:
         made = compiler(*arguments)
+    except CallsPlain as error:  # numba says the first of them
+        every = calls_plain(arguments[0]) or error
+        raise NotCompilable(f"{name} does not compile: {every}") from None
     except NotCompilable as error:
         raise NotCompilable(f"{name} does not compile: {error}") from None
     except TypeError:

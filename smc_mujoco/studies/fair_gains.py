@@ -35,7 +35,7 @@ from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import counted, joined
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.control.law import all_laws, catalogue
+from smc_mujoco.control.law import all_laws, catalogue, checked_name
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.robustness.uncertainty import Uncertainty
@@ -208,11 +208,11 @@ class Trial(NamedTuple):
         return run_of_grid(plant, law, condition, self.duration, seed=seed, starts=self.starts)
 
     def check(self, laws: Mapping[str, Laws]) -> None:
-        """Refuse, before gains are searched, two things of one name, and conditions in which
-        nothing moves.
+        """Refuse, before gains are searched, two things of one name, your law with the name of a
+        law of the library, and conditions in which nothing moves.
         """
         for of_plant in laws.values():
-            components = list(map(coerce.law, of_plant))
+            components = [checked_name(coerce.law(law)) for law in of_plant]
             check_names(self.plants, components, self.conditions)
             for named in (self.plants, components, self.conditions):
                 names = set()

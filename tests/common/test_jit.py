@@ -16,6 +16,7 @@ from numba.core.codegen import CPUCodeLibrary, RuntimeLinker
 import smc_mujoco as smc
 from smc_mujoco.common import numba_internals as internals
 from smc_mujoco.common.jit import NotCompilable, Numbers, _complete, jit, reason
+from smc_mujoco.control.law import sgn
 from smc_mujoco.simulation.cfunctions import compile_component
 
 pytestmark = pytest.mark.quick
@@ -145,13 +146,22 @@ def test_what_compiled_code_does_not_check_is_called_in_python(law, words):
         jit(law)
 
 
-def test_a_plain_helper_of_a_law_is_named_with_its_cure():
+def test_the_plain_helpers_of_a_law_are_named_with_their_cure():
     def inner(x):
         return x
 
+    def outer(x):
+        return inner(x)
+
+    @njit
+    def middle(x):
+        return outer(x)
+
     for law, name in (
-        (lambda y, gains, memory: (plain_helper(y.x), 0.0), "plain_helper"),
-        (lambda y, gains, memory: (inner(y.x), 0.0), "inner"),
+        (lambda y, gains, memory: (plain_helper(y.x), 0.0), "plain_helper$"),
+        (lambda y, gains, memory: (inner(y.x), 0.0), "inner$"),
+        (lambda y, gains, memory: (plain_helper(inner(y.x)), 0.0), "plain_helper and inner$"),
+        (lambda y, gains, memory: (middle(sgn(y.x)), 0.0), "outer and inner$"),
     ):
         with pytest.raises(NotCompilable, match=f"put @numba.njit on {name}"):
             compile_component(smc.law_function(law)())

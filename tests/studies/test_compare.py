@@ -44,6 +44,11 @@ def plain_law(y, gains, memory):
     return -gains.lam * math.tanh(s), s
 
 
+@smc.law_function(gains={"lam": 4.0, "k1": 3.0})
+def terminal(y, gains, memory):
+    return -gains.lam * np.sign(y.de + gains.k1 * y.e), y.e
+
+
 @pytest.fixture(scope="module", autouse=True)
 def searched_shortly():
     """Search gains by runs of 0.5 s."""
@@ -314,6 +319,7 @@ def test_laws_that_nobody_named_come_with_gains_on_a_plant_where_any_do():
 REFUSED = [
     (([my_law], "duffing", "noisy"), {}, "did you mean 'noise'"),
     (([my_law, my_law(lam=2.0)], "duffing"), {}, "two laws have the name 'my_law'"),
+    (([terminal], "duffing"), {}, "'terminal' has the name of a law of the library: rename"),
     ((["pid", "pid"], "duffing"), {}, "'pid' is there twice: give it once"),
     (([my_law], ["duffing", "duffing"]), {}, "'duffing' is there twice"),
     (([my_law], "duffing", ["noise", "noise"]), {}, "'noise' is there twice"),

@@ -83,6 +83,7 @@ from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.common.version import versions
 from smc_mujoco.control.component import Component, Template, unit_cure
+from smc_mujoco.control.law import checked_name
 from smc_mujoco.mechanisms.custom import clearance
 from smc_mujoco.mechanisms.custom.scales import falls
 from smc_mujoco.mechanisms.layout import driven_names
@@ -168,8 +169,8 @@ def tune(
 
     Raises:
       ScenarioError: a gain of unknown unit whose default is not positive, a plant without scales,
-        an argument out of range, or a law whose own code fails in every run, with its own gains and
-        with those of a whole search.
+        an argument out of range, your law with the name of a law of the library, or a law whose
+        own code fails in every run, with its own gains and with those of a whole search.
 
     Warns:
       ScenarioWarning: a gain of unknown unit, which is searched about its default; the law's
@@ -185,7 +186,8 @@ def tune(
         if value is not None:
             given[name] = value
     goal = dataclasses.replace(goal, **given)
-    task = task_of(plant, coerce.law(law), goal, budget, seed, threads, outside_theorem)
+    own = checked_name(coerce.law(law))
+    task = task_of(plant, own, goal, budget, seed, threads, outside_theorem)
     task = task._replace(device=device, quick=quick)
     if why := falls(task.plant):
         _warn(why)
