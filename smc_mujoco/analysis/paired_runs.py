@@ -415,6 +415,16 @@ def without_floor(metric: str) -> str:
     return f"no floor is known for a metric in {entry.unit!r}, so any difference counts"
 
 
+def labels(table: RunColumns) -> dict[str, str]:
+    """Return law -> its label, of the laws whose scenarios the table knows and that state one."""
+    found = {}
+    for scenario in getattr(table, "known", {}).values():
+        template = scenario.law.template
+        if template and template.label:
+            found[scenario.law.name] = template.label
+    return found
+
+
 def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
     """Return q, the smallest value of a metric that matters in a problem, whatever the law; 0 where
     it is not known, see `without_floor`.

@@ -189,20 +189,21 @@ class Tabular:
         }
 
     def to_latex(self) -> str:
-        """Return a tabular, which needs the package booktabs, below comments with the title and the
-        notes; the lines `under` the table are in print.
+        """Return a tabular, which needs the package booktabs, below comments with the notes; the
+        title and the lines `under` the table are in print.
 
         Words in cells of numbers become letters, which a line under the table explains.
         """
         marks: dict[str, str] = {}
         lines = []
-        for text in (self.title, *self.notes, "needs booktabs"):
-            if text:
-                lines.append(f"% {text}".replace("\n", " "))  # or what follows were no comment
+        for text in (*self.notes, "needs booktabs"):
+            lines.append(f"% {text}".replace("\n", " "))  # or what follows were no comment
         lines += [
             f"\\begin{{tabular}}{{{'l' * self.left}{'r' * (len(self.headings) - self.left)}}}",
             "\\toprule",
         ]
+        for text in _wrapped(self.title, PLAIN_WIDTH).splitlines():
+            lines.append(self._tex_words(text))
         lines += [_tex_line(map(tex, self.headings)), "\\midrule"]
         for row in self.rows:
             names = map(_tex_cell, row[: self.left])
@@ -215,9 +216,13 @@ class Tabular:
         for words, mark in marks.items():
             meanings.append(f"{mark}: {words}".replace(" ", NO_BREAK))
         for text in (*_wrapped("; ".join(meanings), PLAIN_WIDTH).splitlines(), *self.under):
-            wide = f"\\multicolumn{{{len(self.headings)}}}{{l}}"
-            lines.append(_tex_line([f"{wide}{{\\footnotesize {tex(text)}}}"]))
+            lines.append(self._tex_words(text))
         return "\n".join([*lines, "\\end{tabular}\n"])
+
+    def _tex_words(self, text: str) -> str:
+        """Return a line of words as wide as the table."""
+        wide = f"\\multicolumn{{{len(self.headings)}}}{{l}}"
+        return _tex_line([f"{wide}{{\\footnotesize {tex(text)}}}"])
 
 
 class Tables:

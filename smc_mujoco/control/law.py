@@ -150,7 +150,7 @@ def law_function(
       advice: the same for conditions that only warn.
       plants: names of the plants that the law is for, or "a free body". Default: all plants.
       requires_model: whether the law needs the nominal model. A scenario then gives it by default.
-      label: name in figures of traces; tables have the function's. Default: the function's name.
+      label: name in figures and LaTeX; other tables have the function's, which is the default.
       short: name in two or three letters. Default: initials.
       colour: "#RRGGBB". Default: a colour of a palette, always the same.
       linear_part: a `smc_mujoco.control.component.LinearPart`, of laws linear near s = 0.

@@ -15,7 +15,9 @@ from smc_mujoco.analysis.paired_runs import (
     RunColumns,
     by_row,
     check_table,
+    floor,
     groups,
+    labels,
     scenarios,
     sources,
     unit_of_u,
@@ -62,7 +64,7 @@ def plot(
     share one of several sets of gains are one sample. There is a column of panels per metric and a
     row per plant; on narrow pages one column. A hollow dot at the right edge, under "never" or "not
     arrived", is a law whose median run fails, does not settle, or has not arrived. Sizes below 1e-9
-    are arrows at it.
+    are arrows at it. Values below the floor, which count as equal, are on grey.
 
     Args:
       table: a study's runs, as `smc.Table.read` returns them.
@@ -119,6 +121,7 @@ class Dots(NamedTuple):
     intervals: dict[Cell, Interval]
     won: set[Cell]  # those with a ring
     logarithmic: set[str]  # metrics whose axis is, on all plants
+    floors: dict[tuple[str, str, str], float]  # metric, plant, condition -> its floor
     units: dict[str, tuple[str, str]]  # plant -> units of positions and of commands
     labels: dict[str, Plant | str]  # plant -> what pictures call it
     heading: str  # plants and conditions in words
@@ -157,30 +160,31 @@ def _dots(table: RunColumns, metrics: Sequence[str], winners: Collection[Cell]) 
                 on_plant.append(name)
         conditions_of[plant] = on_plant
     units = {}
-    labels = {}
+    plant_labels: dict[str, Plant | str] = {}
     for group in groups(table, GROUPS[:1]):
         plant = group.name["plant"]
         runs = scenarios(table, group)
         units[plant] = unit_of_x(plant, runs), unit_of_u(runs)
-        labels[plant] = plant
+        plant_labels[plant] = plant
         for scenario in runs:
             if scenario:
-                labels[plant] = scenario.plant
+                plant_labels[plant] = scenario.plant
                 break
     logarithmic = set()
     for name in metrics:
         if _differs_much(intervals, name):
             logarithmic.add(name)
-    heading = style.heading([*labels.values()], conditions, short=len(plants) > 1)
+    heading = style.heading([*plant_labels.values()], conditions, short=len(plants) > 1)
     return Dots(
         metrics=list(metrics),
         conditions=conditions_of,
-        looks=_looks(laws),
+        looks=_looks(laws, labels(table)),
         intervals=intervals,
         won=intervals.keys() & set(winners),
         logarithmic=logarithmic,
+        floors=_floors(table, metrics),
         units=units,
-        labels=labels,
+        labels=plant_labels,
         heading=heading,
     )
 
@@ -215,12 +219,13 @@ def _distinct(table: RunColumns, column: str) -> list[str]:
     return list(dict.fromkeys(table.column(column).tolist()))
 
 
-def _looks(laws: Sequence[str]) -> dict[str, Fields]:
-    """Return law -> the colour and the mark of its dots."""
+def _looks(laws: Sequence[str], named: Mapping[str, str]) -> dict[str, Fields]:
+    """Return law -> its label, and the colour and the mark of its dots."""
     looks = {}
     marks = itertools.cycle(style.MARKS)
     for law, colour in zip(laws, style.law_colours(laws), strict=True):
-        looks[law] = {"color": colour, "marker": next(marks), "mec": "none"}
+        label = named.get(law) or style.law_name(law)
+        looks[law] = {"label": label, "color": colour, "marker": next(marks), "mec": "none"}
     return looks
 
 
@@ -239,8 +244,29 @@ def _draw_plant(row: Array, dots: Dots, plant: str, named: bool) -> None:
                     rings.append(cell[2:])
         decades = name in dots.logarithmic
         _panel(ax, of_panel, dots.conditions[plant], dots.looks, name, rings, decades)
+        floors = [dots.floors[name, plant, condition] for condition in dots.conditions[plant]]
+        _shade(ax, floors, len(dots.looks) + 1)
         ax.set_xlabel(_label(name, *dots.units[plant]))
         ax.tick_params(labelleft=named or ax is row[0])
+
+
+def _floors(table: RunColumns, metrics: Sequence[str]) -> dict[tuple[str, str, str], float]:
+    """Return (metric, plant, condition) -> the floor, below which values count as equal."""
+    floors = {}
+    for group in groups(table, GROUPS):
+        (scenario,) = scenarios(table, group)
+        for name in metrics:
+            floors[name, *group.blocks[0]] = floor(scenario, name)
+    return floors
+
+
+def _shade(ax: Axes, floors: Sequence[float], height: int) -> None:
+    """Shade the values below the floor of each condition, in a block of `height` lines."""
+    left, right = ax.get_xlim()
+    for j, least in enumerate(floors):
+        lines = [j * height - 1, (j + 1) * height - 1]
+        ax.fill_betweenx(lines, left, max(left, least), color=style.BAND, lw=0.0, zorder=0)
+    ax.set_xlim(left, right)
 
 
 def _intervals(table: RunColumns, metrics: Sequence[str]) -> dict[Cell, Interval]:
@@ -277,14 +303,16 @@ def _key(table: RunColumns, dots: Dots) -> tuple[list[Handle], str]:
     key: list[Handle] = []
     line: Fields = {"lw": style.points(1.5)}
     gains, shared = pages.gain_sources([known.get(law, ()) for law in dots.looks])
-    for (law, look), source in zip(dots.looks.items(), gains, strict=True):
-        label = style.law_name(law) + source
+    for look, source in zip(dots.looks.values(), gains, strict=True):
+        label = look["label"] + source
         sample = pages.entry(label, look["color"], marker=look["marker"], mec="none", **line)
         key.append(sample)
     label = "95 % interval"
     if min(interval.n for interval in intervals) < MIN_INTERVAL_SAMPLES:
         label += f" (range if under {MIN_INTERVAL_SAMPLES} samples)"
     key.append(pages.entry(label, **line))
+    if any(interval.low < dots.floors[cell[:3]] for cell, interval in dots.intervals.items()):
+        key.append(pages.entry("below the floor", style.BAND))
     if dots.won:
         ring = pages.entry("winner", style.INK, lw=0.0, **RING)
         key.append(ring)
@@ -326,7 +354,8 @@ def _panel(
     for j in range(1, len(conditions)):
         ax.axhline(j * height - 1, color=style.RULE, lw=style.points(0.8))
     if len(conditions) == 1:
-        ax.set_yticks(range(len(looks)), map(style.law_name, looks), parse_math=False)
+        names = [look["label"] for look in looks.values()]
+        ax.set_yticks(range(len(looks)), names, parse_math=False)
     else:
         places = np.arange(len(conditions))
         middles = height * (places + 0.5) - 1

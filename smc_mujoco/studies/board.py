@@ -46,10 +46,10 @@ MARKS = {
     "shipped": "Shipped gains come with the package.",
     "ITAE": "ITAE is the integral of time times absolute error.",
     "TV rate": "TV rate is the total variation of u per second, in the last fifth of a run.",
-    "strong=True": "A star or bold type marks the laws of which one is the best, with "
-    f"{100 * LEVEL:g} % confidence in each column and condition: no other is better, all their "
-    "runs have arrived, and their samples are enough. Unless a law wins, a median whose interval "
-    "spans more than a factor of 4 is not marked.",
+    "strong=True": "A star or bold type marks the winner, or where no law wins those that may be "
+    f"the best: no other law is shown to be better, with {100 * LEVEL:g} % confidence in each "
+    "column and condition, all their runs have arrived, and their samples are enough. Unless a "
+    "law wins, a median whose interval spans more than a factor of 4 is not marked.",
     "": "A run has arrived if, in its last fifth, the error stays within 10 % of its initial value "
     "or within 5 times the sensor's resolution.",
     "below ": "Values below the floor count as equal. For an error, the floor is 1e-4 of its "
@@ -65,7 +65,8 @@ LAST = "never", "fails", "not arrived"  # words in place of a value
 # A word in a table's cells -> what LaTeX prints below the table about it.
 UNDER = {
     "": f"Median [{100 * LEVEL:g} % interval].",
-    "strong=True": f"Bold: one of these is the best, with {100 * LEVEL:g} % confidence.",
+    "strong=True": "Bold: may be the best: no other law is shown to be better "
+    f"({100 * LEVEL:g} % confidence).",
     "below ": "Below a floor: too small to be resolved; such laws are not ranked.",
     "at half": "At half the step: the median with half the physics step.",
 }
@@ -465,6 +466,7 @@ class Boards(Tables, list[Board]):
     untouched: Sequence[str] = ()
     # why metrics have no board, shown if none has
     absent: Sequence[str] = ()
+    labels: Mapping[str, str] = {}  # law -> what LaTeX calls it
 
     @property
     def remarks(self) -> list[str]:
@@ -507,7 +509,7 @@ class Boards(Tables, list[Board]):
             groups.setdefault(board.about, []).append(board)
         if not groups:
             return [Tabular(headings=["no boards: no metric applies"], rows=[], notes=self.absent)]
-        tabulars = [_table(name, boards) for name, boards in groups.items()]
+        tabulars = [_table(name, boards, self.labels) for name, boards in groups.items()]
         notes = *tabulars[-1].notes, *self.remarks, key(self, repr(tabulars))
         return [*tabulars[:-1], dataclasses.replace(tabulars[-1], notes=notes)]
 
@@ -555,8 +557,8 @@ def heading(board: Board) -> str:
     return in_unit.heading(board.x)
 
 
-def _table(name: str, boards: Sequence[Board]) -> Tabular:
-    """Return the table of one group of runs.
+def _table(name: str, boards: Sequence[Board], labels: Mapping[str, str]) -> Tabular:
+    """Return the table of one group of runs, with `Boards.labels`.
 
     Laws stand by place in the first metric, then in the next ones.
     """
@@ -570,7 +572,8 @@ def _table(name: str, boards: Sequence[Board]) -> Tabular:
     rows = []
     for law in sorted(places, key=lambda law: (places[law], law)):
         name_cell = Cell(law, kinds(sources_of[law]), colour=style.law_colour(law))
-        rows.append([name_cell._replace(label=style.law_name(law)), *cells[law]])
+        label = labels.get(law) or style.law_name(law)
+        rows.append([name_cell._replace(label=label), *cells[law]])
     largest = max(boards, key=lambda board: len(board.blocks))
     if len(largest.blocks) == 1:
         name = f"{largest.group['plant']}, {largest.blocks[0].condition}"
@@ -586,6 +589,8 @@ def _table(name: str, boards: Sequence[Board]) -> Tabular:
             under.append(text)
     if _few(boards):
         under.insert(1, FEW)
+    if UNDER["strong=True"] in under:
+        under += _wins(boards, labels)
     return Tabular(
         headings=["law", *map(heading, boards)],
         rows=rows,
@@ -593,6 +598,18 @@ def _table(name: str, boards: Sequence[Board]) -> Tabular:
         notes=_verdicts(boards),
         under=under,
     )
+
+
+def _wins(boards: Sequence[Board], labels: Mapping[str, str]) -> list[str]:
+    """Return which law wins in which metrics; one sentence where none does."""
+    won: dict[str, list[str]] = {}
+    for board in boards:
+        if board.winner:
+            won.setdefault(board.winner, []).append(board.label)
+    sentences = []
+    for law, metrics in won.items():
+        sentences.append(f"{labels.get(law) or style.law_name(law)} wins: {joined(metrics)}.")
+    return sentences or ["No law wins."]
 
 
 def _cell(board: Board, entry: BoardEntry) -> Cell:

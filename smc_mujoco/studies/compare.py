@@ -20,7 +20,7 @@ from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, s
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import replacing
 from smc_mujoco.common.tabular import Tables, Tabular
-from smc_mujoco.common.text import joined, number
+from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Template, gains_text
 from smc_mujoco.control.law import Law, catalogue, suits
@@ -53,7 +53,8 @@ MAX_BLOCKS = 12
 MAX_SEED = 10**6
 DrawSeed = Annotated[int, Whole(low=0, high=MAX_SEED)]
 TIMES = "Computing time of each compiled law per sample, on this computer"
-TIME_HEADINGS = "plant", "law", "relative to pid", "median (s)", "99 % quantile (s)"
+TIME_HEADINGS = "plant", "law", "relative time", "median (s)", "99 % quantile (s)"
+TIME_NOTE = "Relative to the law pid on the same measurements. All times vary with the load."
 GAINS = "plant", "law", "gains", "sets", "best set"
 BEST_SET = (
     "Run i uses set i; after the last set, runs begin with the first again. The best set has the "
@@ -142,10 +143,11 @@ class Compared(Tables):
                     notes = [BEST_SET, *notes]
                 gains.append((plant, law.name, law.source.words, f"{len(sets)}", gains_text(best)))
             for name, time in self.times.get(plant, {}).items():
-                of_law = map(number, (time.ratio, time.median, time.high))
+                of_law = map(_rough, (time.ratio, time.median, time.high))
                 times.append((plant, name, *of_law))
         if times:
-            tables.append(Tabular(headings=TIME_HEADINGS, rows=times, title=TIMES, left=2))
+            about = {"headings": TIME_HEADINGS, "title": TIMES, "notes": [TIME_NOTE]}
+            tables.append(Tabular(rows=times, left=2, **about))
         return [*tables, Tabular(headings=GAINS, rows=gains, title="Gains", notes=notes, left=5)]
 
     @property
@@ -158,8 +160,8 @@ class Compared(Tables):
         return tables
 
     def to_latex(self, path: AnyPath | None = None) -> str:
-        """Return a LaTeX tabular for each plant in each condition, below comments with the
-        verdicts; needs booktabs.
+        """Return a LaTeX tabular for each plant in each condition, which its first line names,
+        below comments with the verdicts; needs booktabs.
 
         Args:
           path: of a file to which it is written too.
@@ -413,6 +415,11 @@ def compare(
         worst=worst_cases,
         times=_times(trial, candidates),
     )
+
+
+def _rough(value: float) -> str:
+    """Return a number to one digit: those of repeated calls differ by tens of percent."""
+    return f"{float(f'{value:.0e}'):g}".replace("e-0", "e-")
 
 
 def _leave_out_failed(holdout: Mapping[str, Holdout], table: Table) -> None:

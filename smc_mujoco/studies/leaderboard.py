@@ -94,6 +94,7 @@ def leaderboard(
     boards = Boards()
     boards.failures = paired_runs.failures(table)
     boards.untouched = paired_runs.untouched(table)
+    boards.labels = paired_runs.labels(table)
     ranked = []
     for group in paired_runs.groups(table, by):
         sources = paired_runs.sources(table, group.rows[group.rows >= 0])

@@ -13,7 +13,9 @@ from helpers.tables import MadeTable
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+import smc_mujoco as smc
 from smc_mujoco.analysis.bootstrap import Interval
+from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.analysis.ranking import Effect
 from smc_mujoco.common.tabular import TEX, plain
 from smc_mujoco.draw import dot_plot
@@ -113,8 +115,9 @@ def test_html_and_latex_have_the_numbers_of_the_text(boards):
     text = plain(boards, 200)
     html = cells_of_html(boards)
     latex = {}
-    for line in boards.to_latex().partition("bottomrule")[0].splitlines():
-        if line.endswith(r"\\") and not line.startswith("law"):
+    inside = boards.to_latex().partition("midrule")[2].partition("bottomrule")[0]
+    for line in inside.splitlines():
+        if line.endswith(r"\\"):
             name, *rest = re.split(r"(?<!\\) & ", line[:-3])
             latex[name] = rest
     assert list(html) == ["third", EVIL, "second"]
@@ -137,7 +140,10 @@ def test_html_and_latex_have_the_numbers_of_the_text(boards):
     assert re.fullmatch(r"[34]\.\de-7", table.rows[0][1].text)  # 4e-7 times 0.9 to 1.1
     assert table.rows[0][1].below.startswith(spread(boards[0].entries[0].interval, "itae"))
     below = table.to_latex().partition("bottomrule")[2]
-    assert below.count("multicolumn") == 2
+    assert below.count("multicolumn") == 3
+    assert "third wins: ITAE." in below
+    (few,) = leaderboard(made(seeds=3), metrics=["itae"]).tables
+    assert "wins" not in few.to_latex().partition("bottomrule")[2]
     assert table.rows[2][2][:2] == ("100", "84–100")
 
 
@@ -235,6 +241,36 @@ def test_a_plot_has_a_ring_around_each_winner_and_no_other_dot():
     assert len(rings[0]) == 2
     assert min(of_third) <= min(rings[0]) <= max(rings[0]) <= max(of_third)
     assert rings[1] == []
+
+
+def test_a_law_has_its_label_in_latex_and_plots_and_values_below_the_floor_are_shaded(tmp_path):
+    @smc.law_function(gains={"k": 20.0}, label="Root sliding")
+    def root_sliding(y, gains, memory):
+        return -gains.k * y.e - 5.0 * y.de, y.e
+
+    plant = "inverted_pendulum"
+    runs = smc.grid(plant, [root_sliding, "pid"], ["nominal", "noise"], 2, duration=1.5)
+    table = smc.study(runs, tmp_path)
+    boards = leaderboard(table, ["ultimate_bound"], by=("plant", "condition"))
+    latex = boards.to_latex()
+    for condition in ("nominal", "noise"):
+        assert (
+            rf"\multicolumn{{2}}{{l}}{{\footnotesize inverted\_pendulum, {condition}: 2 seeds"
+            in latex
+        )
+    assert "Root sliding [default] &" in latex
+    assert "root_sliding" in repr(boards)
+    drawn = dot_plot.plot(table.select(condition="nominal"), metrics=["ultimate_bound"])
+    (ax,) = drawn.axes
+    assert [text.get_text() for text in ax.get_yticklabels()] == ["Root sliding", "PID"]
+    (ax,) = dot_plot.plot(table, metrics=["ultimate_bound"]).axes
+    left, _ = ax.get_xlim()
+    floors = []
+    for condition in ("nominal", "noise"):
+        floors.append(floor(table.select(condition=condition).scenario(0), "ultimate_bound"))
+    ends = [shade.get_datalim(ax.transData).x1 for shade in ax.collections]
+    assert ends == pytest.approx([max(left, floors[0]), max(left, floors[1])])
+    assert left < floors[1]
 
 
 def test_a_name_is_no_formula_in_a_plot_and_no_command_in_latex():

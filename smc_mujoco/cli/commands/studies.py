@@ -400,7 +400,7 @@ def _pictures(figure: Path | None) -> list[Path]:
 def _finish(table: "Table", out: Path, terminal: Terminal) -> None:
     """Print the number of runs and the file with all of them, and end the command."""
     failed = len(table) - table.data["failure"].null_count
-    runs = f"{counted(len(table), 'run')}, {failed} failed"
+    runs = f"{counted(len(table), 'run')}, {failed} broke off"
     terminal.note(f"{runs}, {terminal.seconds:.0f} s")
     terminal.wrote(out / "results.parquet")
     terminal.finish()
