@@ -28,6 +28,7 @@ from smc_mujoco.metrics.catalogue import CATALOGUE
 LABELS = {SETTLES: "share of settled runs", OBJECTIVE: "J on unseen runs"}
 MIN_TIMES = 1.03  # least lead of a law below the floor that is printed; chosen
 MAX_LEAD = 0.995  # that may be said to show; chosen
+MAX_NAMED = 8  # conditions that a verdict names; chosen
 LEVEL_WORDS = f"are level within {100 * LEVEL_SHARE:g} %"
 # as far as these runs go: a share's interval is wider than 10 %
 SAME_RUNS = "settle in the same runs"
@@ -196,7 +197,8 @@ class Block:
             parts.append(counted(self.runs, "distinct run"))
         if self.sets > 1:
             least = "at least " if self.samples > self.sets else ""
-            parts.append(f"{least}{self.sets} sets of gains")
+            one = " (one for some laws)" if self.given else ""
+            parts.append(f"{least}{self.sets} sets of gains{one}")
         return ", ".join(parts)
 
 
@@ -271,7 +273,7 @@ class Board(Tables):
         """The plant and the conditions in words, such as " on duffing under noise"."""
         if self.metric == OBJECTIVE:
             return f" of {self.group['plant']}"
-        conditions = joined([block.condition for block in self.blocks])
+        conditions = _conditions([block.condition for block in self.blocks])
         return f" on {self.group['plant']} under {conditions}"
 
     @property
@@ -316,8 +318,9 @@ class Board(Tables):
             return f"{self.winner} wins{where}{given}"
         results = []
         for law in filter(self.wins, self._laws):
-            lost = joined(self.losses(law)) or "none"
-            results.append(f"{law} wins under {joined(self.wins(law))} and loses under {lost}")
+            lost = _conditions(self.losses(law)) or "none"
+            won = _conditions(self.wins(law))
+            results.append(f"{law} wins under {won} and loses under {lost}")
         return f"no law wins{where}; {'; '.join(results)}{given}"
 
     @property
@@ -421,7 +424,7 @@ class Board(Tables):
         if max(block.runs for block in self.blocks) < least:
             cures.append(f"seeds={least}")
         if not cures or any(1 < block.sets < least for block in self.blocks):
-            cures.append(f"searches={least} in compare")
+            cures.append(f"in compare searches={least}")
         return joined(cures)
 
     def _counted(self, count: int) -> str:
@@ -519,6 +522,11 @@ def hidden(lead: float) -> str:
     if lead < MAX_LEAD:
         return f"a lead below {100 * lead:.2g} % might not show"
     return "even the largest lead might not show"
+
+
+def _conditions(names: Sequence[str]) -> str:
+    """Return conditions in words; the number of many, as those of an ensemble."""
+    return joined(names) if len(names) <= MAX_NAMED else f"{len(names)} conditions"
 
 
 def _is_or_are(things: Sequence[str]) -> str:

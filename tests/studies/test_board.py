@@ -358,7 +358,7 @@ RESULTS = {  # changes of both blocks -> the result
     "all fail": (LOST | {"away": LAWS}, "every law has runs that fail"),
     "few sets": (
         {"ahead": None, "samples": 3, "sets": 3},
-        "3 sets of gains cannot rank 3 laws here; 7 can (searches=7 in compare)",
+        "3 sets of gains cannot rank 3 laws here; 7 can (in compare searches=7)",
     ),
     "few runs": (
         {"ahead": None, "samples": 4, "runs": 4},
@@ -366,7 +366,7 @@ RESULTS = {  # changes of both blocks -> the result
     ),
     "few runs of few sets": (
         {"ahead": None, "samples": 3, "runs": 4, "sets": 3},
-        "3 sets of gains cannot rank 3 laws here; 7 can (seeds=7 and searches=7 in compare)",
+        "3 sets of gains cannot rank 3 laws here; 7 can (seeds=7 and in compare searches=7)",
     ),
     "few runs of many sets": (
         {"ahead": None, "samples": 4, "runs": 4, "sets": 12},
@@ -409,6 +409,8 @@ def test_the_result_names_the_winner_its_least_lead_and_the_conditions(pair):
     split = dataclasses.replace(pair, blocks=(first, turned)).result
     assert "third wins under nominal and loses under noise" in split
     assert "second wins under noise and loses under nominal" in split
+    many = dataclasses.replace(pair, blocks=(*[first] * 9, turned)).result
+    assert "third wins under 9 conditions and loses under noise" in many
     lead = Lead("a", "b", Effect(0.85, 0.8, 0.9, 5, 8, True))
     assert (
         lead.words == "0.850 times b's (0.800 to 0.900), and it is ahead with 5 of 8 sets of gains"
@@ -427,11 +429,21 @@ def test_a_law_that_is_not_ranked_is_named_with_the_cure_beside_the_winner_of_th
     result = dataclasses.replace(pair, blocks=tuple(blocks)).result
     assert result.startswith("third wins in both conditions")
     assert result.endswith(
-        "; second (3 sets of gains) is not ranked, which needs 7 (searches=7 in compare)"
+        "; second (3 sets of gains) is not ranked, which needs 7 (in compare searches=7)"
     )
 
 
 def test_a_heading_says_if_some_laws_have_more_sets_of_gains(boards):
     block = dataclasses.replace(boards[0].blocks[0], seeds=8, runs=8, samples=7, sets=7)
+    assert block.given
+    assert block.sample == "8 seeds, 7 sets of gains (one for some laws)"
+    block = dataclasses.replace(block, given=False)
     assert block.sample == "8 seeds, 7 sets of gains"
     assert dataclasses.replace(block, sets=3).sample == "8 seeds, at least 3 sets of gains"
+
+
+def test_a_verdict_counts_more_conditions_than_eight():
+    for count, words in ((8, "c0, c1, c2, c3, c4, c5, c6 and c7"), (9, "9 conditions")):
+        table = made(2, tuple(f"c{i}" for i in range(count)))
+        (board,) = leaderboard(table, ["itae"])
+        assert f" under {words}: " in board.verdict
