@@ -428,9 +428,12 @@ class Board(Tables):
         return joined(cures)
 
     def _counted(self, count: int) -> str:
-        """Return a number of samples, such as "3 sets of gains"."""
+        """Return a number of samples, such as "3 sets of gains"; runs are those of laws with one
+        set.
+        """
         if any(block.sets > 1 for block in self.blocks):
-            return f"{counted(count, 'set')} of gains"
+            runs = " or runs" if any(block.given for block in self.blocks) else ""
+            return f"{counted(count, 'set')} of gains{runs}"
         return counted(count, "run")
 
     @property

@@ -616,3 +616,11 @@ def test_it_warns_if_all_gains_tried_chatter_too_much():
             searches=1,
         )
     assert tuned.objective > 2.0 * FAILURE_COST
+
+
+def test_a_law_with_the_name_of_one_of_the_library_is_refused_before_any_search(refused):
+    @smc.law_function(gains={"k": 1.0})
+    def terminal(y, gains, memory):
+        return -gains.k * y.e, y.e
+
+    refused(lambda: tune("duffing", terminal), "'terminal' has the name of a law of the library")
