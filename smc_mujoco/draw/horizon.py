@@ -8,6 +8,7 @@ import numpy as np
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import arrays_within, end
 from smc_mujoco.draw.quantities import span
+from smc_mujoco.metrics.conventions import last_exit, scale, settling_band
 from smc_mujoco.simulation.trace import Trace
 
 REST_BAND = 0.02  # of a panel's height: an x that stays within it rests; chosen
@@ -18,7 +19,7 @@ MAX_ZOOMED = 0.5
 
 def horizon(traces: Sequence[Trace]) -> float:
     """Return the time that panels of x, u and s show, s: the whole run, or the first part if all
-    rest after it.
+    rest after it, and have settled if they ever do.
 
     Nothing changes or disturbs the plant after that part, and no reference moves.
     """
@@ -35,6 +36,9 @@ def horizon(traces: Sequence[Trace]) -> float:
             acted = pushed | led
             times = trace.t[moved | (acted & group.driven)]
             last = max(last, *times[-1:], trace.diverged_at or 0.0)
+            settled = settles_at(trace)
+            if group.driven and np.isfinite(settled):
+                last = max(last, settled)
             if trace.scenario.jump:
                 last = max(last, trace.scenario.jump.time)
             if trace.scenario.fault:
@@ -42,6 +46,13 @@ def horizon(traces: Sequence[Trace]) -> float:
     if 0.0 < ZOOM * last < MAX_ZOOMED * whole:
         return ZOOM * last
     return whole
+
+
+def settles_at(trace: Trace) -> float:
+    """Return when all channels of a trace of one group have settled for good, s; inf for never."""
+    misses = trace.x - trace.r
+    error = np.abs(misses).max(axis=1)
+    return last_exit(trace.t, error, settling_band(trace.scenario, scale(trace)))
 
 
 def until(trace: Trace, time: float) -> Trace:

@@ -10,13 +10,9 @@ from matplotlib.axes import Axes
 from smc_mujoco.common.aliases import Fields
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import band
+from smc_mujoco.draw.horizon import settles_at
 from smc_mujoco.draw.panels import SINGLE, Panel, mark, over_time
 from smc_mujoco.draw.quantities import MARGIN, PEAKS, limits, span, usual
-from smc_mujoco.metrics.conventions import (
-    last_exit,
-    scale,
-    settling_band,
-)
 from smc_mujoco.simulation.trace import Trace
 
 MIN_WIDE_BAND = 0.2  # mean height of a wide band, of a panel's; chosen
@@ -139,10 +135,7 @@ def settled(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Artist]:
         return marks
     look: Fields = {"ms": style.points(6), "mec": style.PAPER, "mew": style.points(0.5)}
     for trace, colour in zip(panel.traces, colours, strict=True):
-        misses = trace.x - trace.r
-        error = np.abs(misses).max(axis=1)
-        band = settling_band(trace.scenario, scale(trace))
-        time = last_exit(trace.t, error, band)
+        time = settles_at(trace)
         if trace.diverged_at is None and 0.0 < time < min(trace.t[-1], ax.get_xlim()[1]):
             mean = trace.x.mean(axis=1)
             y = float(np.interp(time, trace.t, mean))

@@ -283,6 +283,15 @@ def test_runs_whose_peaks_differ_by_3_percent_do_not_agree(one, panel, share):
     assert ("a and b agree" in words) is (abs(share - 1.0) < 0.01)
 
 
+def test_panels_over_time_do_not_end_before_each_run_has_settled(one):
+    """What is left of the second run's error is little beside the first's, but not of its own."""
+    runs = []
+    for size, rate in ((4.0, 30.0), (0.4, 10.0)):
+        x = size * np.exp(-rate * one.t)[:, None]
+        runs.append(dataclasses.replace(one, x=x, r=0.0 * one.r, d=0.0 * one.d))
+    assert horizon.horizon(runs) == pytest.approx(1.3 * np.log(50.0) / 10.0, abs=2e-3)
+
+
 def test_panels_over_time_end_where_all_rest_and_never_before_something_happens(one):
     at = int(0.2 * len(one.t))
     still = dataclasses.replace(

@@ -15,6 +15,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.constraints import Number, constrained
 from smc_mujoco.draw import states, style
@@ -113,7 +114,8 @@ def _rests_at_the_end(run: Trace) -> bool:
 
 def close_up(traces: Sequence[Trace], fps: float) -> FilmClock | None:
     """Return the last periods of runs in which a film shows nothing moving: those that chatter
-    about one place, rattle in a backlash or stick. None of others.
+    about one place, rattle in a backlash or stick. None of others, and none of deflections below
+    the floor of errors in tables.
     """
     runs = [trace for trace in traces if trace.diverged_at is None]
     scenario = traces[0].scenario
@@ -136,10 +138,14 @@ def close_up(traces: Sequence[Trace], fps: float) -> FilmClock | None:
     stop = float(largest.t[-1])
     start = stop - PERIODS / frequency
     deflections = []
+    matters = False
     for run in runs:
         x = run.x[run.t >= start]
-        away = np.abs(x - x.mean(axis=0)) / sizes
-        deflections.append(float(away.max()))
+        away = np.abs(x - x.mean(axis=0))
+        matters |= bool(away.max() > floor(run.scenario, "ultimate_bound"))
+        deflections.append(float((away / sizes).max()))
+    if not matters:
+        return None
     factor = rounded(1.0 / max(*deflections, 1e-12))
     if factor < MIN_FACTOR:
         return None

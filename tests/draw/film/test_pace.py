@@ -125,6 +125,7 @@ CLOSE = {  # what runs do -> their motion over time, parts, and whether a close-
     ),
     "motion that is seen": (lambda t: 0.2 * np.sin(TURN * t), {}, False),
     "rest": (lambda t: 0.0 * t, {}, False),
+    "chatter below the floor": (lambda t: 2e-5 * np.sin(TURN * t), {}, False),
 }
 TURN = 2.0 * np.pi * 20.0  # rad/s
 
