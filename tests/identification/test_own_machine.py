@@ -666,9 +666,9 @@ def test_a_servo_plays_a_motion_as_its_set_point_and_its_log_tells_the_expected_
 
 
 @pytest.mark.slow
-def test_expected_errors_are_those_that_a_log_of_the_motion_tells():
-    """Within a factor of 2, fixed before; of a log by the other simulation, whose controller tracks
-    the motion.
+def test_expected_errors_are_those_that_logs_of_the_motion_tell():
+    """Within a factor of 2, fixed before; in the median of three logs by the other simulation,
+    whose controller tracks the motion. What one log tells is chance in part.
     """
     arm = smc.plant_from(ONE, ["j1"])
     advice = smc.design.excitation(arm, list(TRUTH), guess=TRUTH, u_max=20.0, duration=6.0)
@@ -679,10 +679,13 @@ def test_expected_errors_are_those_that_a_log_of_the_motion_tells():
     def reference(time):
         return np.array([np.interp(time, t, r)]), np.array([np.interp(time, t, dr)])
 
-    run = log(ONE, TRUTH, reference, 40.0, 3.0, duration=6.0)
-    found = smc.identify(arm, run, list(TRUTH))
-    for name, error in found.errors.items():
-        assert 0.5 < error / motion.errors[name] < 2.0, name
+    told = []
+    for seed in range(3):
+        run = log(ONE, TRUTH, reference, 40.0, 3.0, duration=6.0, seed=seed)
+        told.append(smc.identify(arm, run, list(TRUTH)).errors)
+    for name, expected in motion.errors.items():
+        typical = np.median([errors[name] for errors in told])
+        assert 0.5 < typical / expected < 2.0, name
 
 
 def test_the_command_takes_joints_from_a_log_and_writes_a_figure_and_a_condition(run, tmp_path):
