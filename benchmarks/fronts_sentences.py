@@ -494,7 +494,8 @@ def in_readme(points: Sequence[dict]) -> str:
     """Return what README says of the points that were not drawn."""
     quiet, noisy, *smooth = tallies([point for point in points if point["draw"] is None])
     return (
-        "A case counts where both sides have gains for its J. "
+        "A case is a plant, a period, a load and a J; it counts where both sides have gains with "
+        "that J. "
         f"In {noisy['all']} cases with sensor noise, super-twisting leads the best of its rivals "
         f"`adrc`, `pd_observer`, `hodob` and `pid` in {leads(noisy)} and trails it in "
         f"{noisy['contradicted']}. In {quiet['all']} cases without noise it leads in "

@@ -125,7 +125,7 @@ def _left_out(source: mjcf.ModelSource, seen: Sequence[str], given: dict) -> dic
     if "keyframe" not in given and (keyframe := usual_keyframe(spec)):
         taken["keyframe"] = keyframe
         _say(
-            f"{source.label} starts and ends in its keyframe {keyframe!r}: @{keyframe} after the "
+            f"the goal of {source.label} is its keyframe {keyframe!r}: @{keyframe} after the "
             "joints says so without this line, and @ alone takes the pose of the file"
         )
     elif "keyframe" not in given and [key.name for key in spec.keys] == [""]:

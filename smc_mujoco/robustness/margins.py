@@ -421,7 +421,8 @@ def margins(
       plants, laws: names, or your own plants and laws, one or several.
       kinds: one or several of "delay", "disturbance", "friction", "mass", "noise"; and of "blow",
         at half time, "jitter" and "missed", of the controller's clock, and "loss", the share of its
-        gain that an actuator has lost from the start on, which are left out by default. All
+        gain that an actuator has lost from the start on, which are left out by default. The unit of
+        shares, and of the factor on the mass, is "1". All
         actuators lose it, or the one that the condition's fault is on.
       gains: set of gains, one of `gain_sets.SETS`, or "default".
       quick: whether to make runs of 5 s and search to within 5 control periods or 10 %, for a first

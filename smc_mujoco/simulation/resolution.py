@@ -71,8 +71,9 @@ def _of_motion(trace: Any) -> Iterator[str]:
     name = trace.scenario.plant.name
     if np.any(trace.holding[_last(trace)]):
         yield (
-            f"u of {name} chatters while dry friction, limits or contacts act on its joints: how "
-            f"far it then is from its goal depends on the physics step, at any step; {cure}"
+            f"u of {name} chatters while dry friction, limits or contacts act on its joints, and "
+            "the error that remains depends on the physics step, however short that is; in Python "
+            f"{cure}"
         )
     elif coupled(trace.scenario.plant):
         yield (

@@ -50,7 +50,8 @@ MARKS = {
     "strong=True": "A star or bold type marks the winner, or where no law wins those that may be "
     f"the best: no other law is shown to be better, with {100 * LEVEL:g} % confidence in each "
     "column and condition, all their runs have arrived, and their samples are enough. Unless a "
-    "law wins, a median whose interval spans more than a factor of 4 is not marked.",
+    "law wins, a median whose interval spans more than a factor of 4 is not marked, unless it is "
+    "below the floor.",
     "": "A run has arrived if, in its last fifth, the error stays within 10 % of its initial value "
     "or within 5 times the sensor's resolution.",
     "below ": "Values below the floor count as equal. For an error, the floor is 1e-4 of its "
@@ -100,8 +101,8 @@ class Lead(NamedTuple):
     @property
     def words(self) -> str:
         """What is said of the law's value, such as "0.88 times pid's (0.84 to 0.92), and it is
-        ahead in 24 of 24 runs"; "below the floor of 0.01 rad, and pid's is at least 1.3 times the
-        floor".
+        ahead in 24 of 24 runs"; "below the floor of 0.01 rad, and in the median pid's is at least
+        1.3 times the floor, and it is ahead in 20 of 24 runs".
         """
         share = f"{self.effect.ahead} of {self.effect.samples}"
         units = "sets of gains" if self.effect.sets else "runs"
@@ -112,8 +113,8 @@ class Lead(NamedTuple):
             least = 1.0 / self.effect.high
             if least < MIN_TIMES:
                 return f"below the floor of {self.floor}, unlike {self.rival}'s"
-            text = f"below the floor of {self.floor}, and {self.rival}'s is at least"
-            return f"{text} {number(least)} times the floor"
+            text = f"below the floor of {self.floor}, and in the median {self.rival}'s is at least"
+            return f"{text} {number(least)} times the floor, {ahead}"
         ratio, low, high = map(number, self.effect[:3])
         text = f"{ratio} times {self.rival}'s ({low} to {high})"
         if not self.effect.ahead:

@@ -337,8 +337,10 @@ def compare(
       gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
       searches: independent searches of a tuning. Laws with fewer shipped sets of gains are tuned
         too; of laws with more, that many sets run. Default: 12, or 7 if quick, from which few
-        verdicts follow but that on J, and shipped sets as they are.
-      budget: largest number of sets of gains that a search tries, for each gain.
+        verdicts follow but that on J, and shipped sets as they are. From fewer than seven, or as
+        few seeds, hardly any follow; the answer says how many it takes.
+      budget: largest number of sets of gains that a search tries, for each gain. Shipped gains had
+        64; with less, a remark says that a law may trail by its search.
       quick: shorter runs and fewer searches; by default three plants and three conditions. On a
         plant for which no law has shipped gains, the searches are those of `which` within minutes,
         under the conditions asked for.

@@ -354,8 +354,8 @@ class RaceRecommendation(Recommendation):
         if self.helped:
             names = joined(self.helped)
             text += (
-                f". What {names} {'carries' if len(self.helped) == 1 else 'carry'} pushes to the "
-                "goal from the start, and away from it on the other side"
+                f". Gravity or a spring pushes {names} to the goal from the start, and away from "
+                "it on the other side"
             )
         return f"{text}; {late}" if late else text
 
@@ -380,8 +380,8 @@ class RaceRecommendation(Recommendation):
             if effort == unit:
                 joints.setdefault(f"{number(limit)} {unit}", []).append(name)
         if len(joints) == 1:
-            return f"u reaches {next(iter(joints))}"
-        return f"u reaches {joined(f'{most} at {joined(at)}' for most, at in joints.items())}"
+            return f"|u| at most {next(iter(joints))}"
+        return f"|u| at most {joined(f'{most} at {joined(at)}' for most, at in joints.items())}"
 
     @property
     def tables(self) -> list[Tabular]:

@@ -44,8 +44,10 @@ def score(
 
     - settling_time in s from t = 0, also if the reference steps later; rise_time in s, from 10 % to
       90 % of the way; overshoot in % of the scale, the larger of the first error and r's range;
-    - peak (of x), rms_error, ultimate_bound (largest |e| in the last fifth) and steady_error (|mean
-      of e| there, which an oscillation leaves small), in rad or m; iae, ise, itae;
+    - in rad or m: peak (of x), rms_error (of e, from a quarter of the run on), ultimate_bound
+      (largest |e| in the last fifth) and steady_error (|mean of e| there, which an oscillation
+      leaves small); iae, ise, itae (of the whole run). The largest |e| of a run has no name: it is
+      `np.abs(trace.x - trace.r).max()`;
     - max_u, tv (sum of |changes of u|), tv_rate, energy (integral of u^2) of the command;
     - chattering_amplitude of s, and chattering_frequency in Hz.
 

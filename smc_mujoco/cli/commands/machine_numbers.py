@@ -126,9 +126,9 @@ def identify(
     and u (N m or N) of the joint, or x_JOINT and u_JOINT of each. You need no first guess.
 
     Numbers are named JOINT.damping, .frictionloss, .armature, .stiffness, .gain, .offset and
-    .zero, input_delay, m and grav, and of a part that --condition gives FIELD.NAME, as
-    friction.coulomb. The table has each number with its standard error. Notes below it say what the
-    logs cannot determine.
+    .zero, input_delay, m and grav. A number of a part that --condition gives is named FIELD.NAME,
+    such as friction.coulomb. The table has each number with its standard error. Notes below it say
+    what the logs cannot determine.
 
     Pairs of speed (rad/s or m/s) and torque (N m or N) are of one joint in the order of time. The
     torque is what friction alone needs: measured, less gravity and inertia.
@@ -241,10 +241,11 @@ def excitation(
     Example: smc-mujoco excitation arm.xml:shoulder --for shoulder.damping,input_delay --out m.csv
     """
     terminal = Terminal(json)
-    options.check_files(None, figure, out and with_ending(out, ".csv"))
     with delay_signals():
+        from smc_mujoco.draw.page import files
         from smc_mujoco.identification import excitation as exciting
 
+    options.check_files(None, *files(figure), out and with_ending(out, ".csv"))
     motions = exciting.excitation(
         machine,
         options.names(names),

@@ -205,8 +205,8 @@ X0 = Annotated[
     typer.Option(
         "--x0",
         metavar="FLOAT[,FLOAT...]",
-        help="Initial position, rad or m: one number for all channels, or one for each, such as "
-        "0.3,-0.2; default: the plant's.",
+        help="Initial position of the joints, rad or m, not counted from the goal: one number for "
+        "all channels, or one for each, such as 0.3,-0.2; default: the plant's.",
     ),
 ]
 
