@@ -9,8 +9,8 @@ LEAST_PRINTED = 1e-9  # smaller numbers are not printed digit by digit
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Return a number to `digits` significant digits; "never" for inf, "none" for NaN, "<1e-9" if
-    it is that small.
+    """Return a number to `digits` significant digits, at most two before an exponent; "never" for
+    inf, "none" for NaN, "<1e-9" if it is that small.
     """
     if math.isnan(value):
         return "none"
@@ -22,7 +22,7 @@ def number(value: float, digits: int = 3) -> str:
         return "0"
     if 1e-3 <= abs(value) < 1e5:
         return f"{value:.{max(0, digits - 1 - math.floor(math.log10(abs(value))))}f}"
-    mantissa, exponent = f"{value:.1e}".split("e")
+    mantissa, exponent = f"{value:.{min(digits, 2) - 1}e}".split("e")
     return f"{mantissa}e{int(exponent)}"
 
 

@@ -113,11 +113,11 @@ def law(
 
 
 def default_gains_warning(plant: Plant, law: Component) -> str:
-    """Return a sentence on a law that was given by its name, and has no gains for a plant."""
+    """Return a sentence on a law that was given by its name, and has no gains for a run."""
     return (
-        f"law {law.name!r} has no gains for this run on {plant.name}, and its defaults act, "
-        f"{gains_text(law.gains)}: tune it, as smc.tune(plant, {law.name!r}) does, or give "
-        f"smc.law({law.name!r}, ...), without gains to say that you want the defaults"
+        f"law {law.name!r} runs on {plant.name} with its default gains, {gains_text(law.gains)}, "
+        f"as none are shipped for such a run: tune it with smc.tune(plant, {law.name!r}), or give "
+        f"smc.law({law.name!r}) to say that you want the defaults"
     )
 
 

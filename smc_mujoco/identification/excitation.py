@@ -77,6 +77,7 @@ INTEGRATOR = "implicitfast"  # of friction that gives way: errors need no more; 
 # Typical numbers where the model has 0: of the bound on u, of a joint's inertia, s; chosen
 FRICTION_SHARE, ARMATURE_SHARE, TYPICAL_DELAY = 0.03, 0.2, 0.004
 Counts = Annotated[float, Whole(low=2, high=2**32, infinite=True)]
+CHANCE = 4.0  # by which the noise of a log alone moved the errors that it told
 SLOW = 0.02  # of the largest speed of a joint: below it the joint counts as at rest; chosen
 FORCE_STRIDE = 10  # samples between those whose forces are computed; chosen
 HOLD, RAMP = 0.6, 0.15  # s, of a stair
@@ -139,7 +140,9 @@ class Excitation:
         return tuple(f"r{end}" for end in column_ends(self.plant)[: self.plant.driven])
 
     def __str__(self) -> str:
-        """Return a line for each motion, why the last is last, and what was assumed."""
+        """Return a line for each motion, why the last is last, what an order is worth, and what was
+        assumed.
+        """
         lines = []
         for motion in self.motions:
             errors = []
@@ -158,7 +161,8 @@ class Excitation:
         )
         if second:
             why += f"; {first} and {second} are told apart worst (correlation {correlation:.2f})"
-        return "\n".join([*lines, why, self.assumed])
+        doubt = f"an order by less than a factor of {CHANCE:g} may be chance"
+        return "\n".join([*lines, f"{why}; {doubt}", self.assumed])
 
     def about(self) -> Fields:
         """Return what a log of each motion would tell as JSON data, best first."""
@@ -226,8 +230,8 @@ def excitation(
       writes the CSV to play, and `figure` draws them. It prints what was assumed: give your own
       noise, counts, rate and guess, because the errors follow them. On ten drawn machines
       `identify` told .55 to 2.1 times the expected errors of a chirp in a stable loop; on one more,
-      of other motions, .29 to 4.8 times. The noise of a log alone moves told errors by up to 4.4
-      times, so motions that differ by less than a factor of 4 are not ranked.
+      of other motions, .29 to 4.8 times. The noise of a log alone moved told errors by up to 4.4
+      times, so an order by less than a factor of 4 may be chance.
 
     Raises:
       ScenarioError: as `smc.identify` of paths; no motion that the machine can follow.

@@ -42,8 +42,8 @@ KEPT_PROMISE = 0.5  # of the decrease that derivatives promise: less calls for d
 DELAY_MOVES = -8e-3, -4e-3, -2e-3, -1e-3, 1e-3, 2e-3, 4e-3, 8e-3
 LEAST_DELAY_MOVE = 2.5e-4  # s, at the solution; chosen
 BETTER = 3.0  # deviations of noise, by which another delay must fit better there; chosen
-MOST_DELAYS = 3  # from which a search starts anew; chosen
-MOST_SLOPES = 3  # of which all but the first are of extrapolated replays; chosen
+MOST_DELAYS = 3  # other delays, at most, from which a search starts again; chosen
+MOST_SLOPES = 3  # how often slopes are taken near the solution, at most; chosen
 ROUGH_STEPS = 8  # steps from each start before the best is chosen; chosen
 CORRECTED_STEPS = 3  # steps after the first halving of the physics step; chosen
 MAX_HALVINGS = 5  # of the physics step in corrected replays; chosen
@@ -148,9 +148,9 @@ def extrapolated(replays: Replays, slopes: Slopes, most: int = 0) -> tuple[Slope
     Errors by steps h are of first order, so 2 x(h/2) - x(h) has none of them. It may be off by the
     share LEFT_BY_STEPS of what it changes from h to h/2: the most of that at the slopes and at the
     solution. If the replays with steps h fit better, as they fit a log of a simulation with such
-    steps, their solution is returned, and what shorter steps would change. After some steps, at
-    most `most` with the same derivatives, the last one follows from derivatives alone. Extrapolated
-    steps keep those of the slopes, unless they promise much more than the replays keep.
+    steps, their solution is returned, and what shorter steps would change. Else at most `most`
+    steps keep the derivatives of the slopes; where these promise much more than the replays keep,
+    they are taken anew. The last step follows from derivatives alone.
     """
     if not replays.free.size:  # records of simulated runs have the same steps
         return refine(replays, slopes, most), np.zeros(len(slopes.point.values))

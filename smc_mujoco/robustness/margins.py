@@ -411,8 +411,8 @@ def margins(
     device: Device = "cpu",
 ) -> Margins:
     """Return the largest level of each kind that laws tolerate, plant by plant, law by law, kind by
-    kind. A run of 10 s tolerates a level if it does not fail and |x - r| ends within 5 % of
-    where it began.
+    kind. A run of 10 s tolerates a level if it does not fail and its error ends below 5 % of its
+    initial value.
 
         for margin in smc.margins("duffing", "classical", kinds="delay", quick=True):
             print(margin.kind, margin.text, margin.unit)
@@ -421,9 +421,9 @@ def margins(
       plants, laws: names, or your own plants and laws, one or several.
       kinds: one or several of "delay", "disturbance", "friction", "mass", "noise"; and of "blow",
         at half time, "jitter" and "missed", of the controller's clock, and "loss", the share of its
-        gain that an actuator has lost from the start on, which are left out by default. The unit of
-        shares, and of the factor on the mass, is "1". All
-        actuators lose it, or the one that the condition's fault is on.
+        gain that an actuator has lost from the start on, which are left out by default. All
+        actuators lose it, or the one that the condition's fault is on. Shares, and the factor on
+        the mass, have the unit "1".
       gains: set of gains, one of `gain_sets.SETS`, or "default".
       quick: whether to make runs of 5 s and search to within 5 control periods or 10 %, for a first
         look.

@@ -55,7 +55,7 @@ def _unreachable_goals(s: Any) -> Iterator[str]:
             )
 
 
-def _speed_of_nothing(s: Any) -> Iterator[str]:
+def _positions_for_speeds(s: Any) -> Iterator[str]:
     """Yield a sentence about each position that stands for the reference of a speed loop."""
     if s.tracks != "speed":
         return
@@ -143,7 +143,7 @@ def of_values(s: Any) -> Iterator[str]:
     yield from _broken_period(s)
     yield from _doubtful_units(s)
     yield from _unreachable_goals(s)
-    yield from _speed_of_nothing(s)
+    yield from _positions_for_speeds(s)
     yield from _degrees(s)
     yield from _weak_motors(s)
 

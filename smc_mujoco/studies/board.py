@@ -49,9 +49,9 @@ MARKS = {
     "TV rate": "TV rate is the total variation of u per second, in the last fifth of a run.",
     "strong=True": "A star or bold type marks the winner, or where no law wins those that may be "
     f"the best: no other law is shown to be better, with {100 * LEVEL:g} % confidence in each "
-    "column and condition, all their runs have arrived, and their samples are enough. Unless a "
-    "law wins, a median whose interval spans more than a factor of 4 is not marked, unless it is "
-    "below the floor.",
+    "column and condition, all their runs have arrived, and their samples are enough. Where no "
+    "law wins, a median is not marked if its interval reaches beyond 4 times its lower end and 4 "
+    "times the floor.",
     "": "A run has arrived if, in its last fifth, the error stays within 10 % of its initial value "
     "or within 5 times the sensor's resolution.",
     "below ": "Values below the floor count as equal. For an error, the floor is 1e-4 of its "
@@ -101,8 +101,8 @@ class Lead(NamedTuple):
     @property
     def words(self) -> str:
         """What is said of the law's value, such as "0.88 times pid's (0.84 to 0.92), and it is
-        ahead in 24 of 24 runs"; "below the floor of 0.01 rad, and in the median pid's is at least
-        1.3 times the floor, and it is ahead in 20 of 24 runs".
+        ahead in 24 of 24 runs"; "below the floor of 0.01 rad, and it is ahead in 20 of 24 runs; in
+        the median pid's is at least 1.3 times it".
         """
         share = f"{self.effect.ahead} of {self.effect.samples}"
         units = "sets of gains" if self.effect.sets else "runs"
@@ -113,8 +113,8 @@ class Lead(NamedTuple):
             least = 1.0 / self.effect.high
             if least < MIN_TIMES:
                 return f"below the floor of {self.floor}, unlike {self.rival}'s"
-            text = f"below the floor of {self.floor}, and in the median {self.rival}'s is at least"
-            return f"{text} {number(least)} times the floor, {ahead}"
+            text = f"below the floor of {self.floor}, {ahead}"
+            return f"{text}; in the median {self.rival}'s is at least {number(least)} times it"
         ratio, low, high = map(number, self.effect[:3])
         text = f"{ratio} times {self.rival}'s ({low} to {high})"
         if not self.effect.ahead:
@@ -425,7 +425,7 @@ class Board(Tables):
         if max(block.runs for block in self.blocks) < least:
             cures.append(f"seeds={least}")
         if not cures or any(1 < block.sets < least for block in self.blocks):
-            cures.append(f"in compare searches={least}")
+            cures.append(f"searches={least} of compare")
         return joined(cures)
 
     def _counted(self, count: int) -> str:
@@ -522,7 +522,7 @@ class Boards(Tables, list[Board]):
 
 
 def hidden(lead: float) -> str:
-    """Return that a smaller lead than the least visible one, a share, may have stayed unseen."""
+    """Return a sentence: the least lead that samples show, a share, and that less may be unseen."""
     if lead < MAX_LEAD:
         return f"a lead below {100 * lead:.2g} % might not show"
     return "even the largest lead might not show"

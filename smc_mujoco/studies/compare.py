@@ -20,7 +20,7 @@ from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, s
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import replacing
 from smc_mujoco.common.tabular import Tables, Tabular
-from smc_mujoco.common.text import joined
+from smc_mujoco.common.text import joined, number
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Template, gains_text
 from smc_mujoco.control.law import Law, catalogue, suits
@@ -143,7 +143,8 @@ class Compared(Tables):
                     notes = [BEST_SET, *notes]
                 gains.append((plant, law.name, law.source.words, f"{len(sets)}", gains_text(best)))
             for name, time in self.times.get(plant, {}).items():
-                of_law = map(_rough, (time.ratio, time.median, time.high))
+                # to a digit: those of repeated calls differ by tens of percent
+                of_law = [number(value, 1) for value in (time.ratio, time.median, time.high)]
                 times.append((plant, name, *of_law))
         if times:
             about = {"headings": TIME_HEADINGS, "title": TIMES, "notes": [TIME_NOTE]}
@@ -337,10 +338,10 @@ def compare(
       gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
       searches: independent searches of a tuning. Laws with fewer shipped sets of gains are tuned
         too; of laws with more, that many sets run. Default: 12, or 7 if quick, from which few
-        verdicts follow but that on J, and shipped sets as they are. From fewer than seven, or as
-        few seeds, hardly any follow; the answer says how many it takes.
-      budget: largest number of sets of gains that a search tries, for each gain. Shipped gains had
-        64; with less, a remark says that a law may trail by its search.
+        verdicts follow but that on J, and shipped sets as they are. With fewer than seven
+        searches or seeds hardly any law can win; the answer says how many it takes.
+      budget: largest number of sets of gains that a search tries, for each gain. With less than the
+        default, a remark says that a law may trail because of its search.
       quick: shorter runs and fewer searches; by default three plants and three conditions. On a
         plant for which no law has shipped gains, the searches are those of `which` within minutes,
         under the conditions asked for.
@@ -417,11 +418,6 @@ def compare(
         worst=worst_cases,
         times=_times(trial, candidates),
     )
-
-
-def _rough(value: float) -> str:
-    """Return a number to one digit: those of repeated calls differ by tens of percent."""
-    return f"{float(f'{value:.0e}'):g}".replace("e-0", "e-")
 
 
 def _leave_out_failed(holdout: Mapping[str, Holdout], table: Table) -> None:

@@ -402,9 +402,9 @@ class Trial(NamedTuple):
         found = candidate_of(default, tuned)
         if rule.quick or rule.budget >= BUDGET:
             return found
-        less = f"searched with {rule.budget} sets a gain, shipped gains with {BUDGET}"
-        remark = f"{less}, so where it trails, its search may be why"
-        return found._replace(remark="; ".join(filter(None, (found.remark, remark))))
+        less = f"at most {rule.budget} sets were tried for each gain, where {BUDGET} are usual"
+        remarks = found.remark, f"{less}: where it trails, its search may be why"
+        return found._replace(remark="; ".join(filter(None, remarks)))
 
     def run(
         self,

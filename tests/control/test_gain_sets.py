@@ -73,7 +73,7 @@ def test_a_law_by_its_name_alone_has_its_shipped_gains_or_says_that_it_has_its_d
     # tuned without a model, without a surface, for positions
     for fields in ({"model": "nominal"}, {"surface": "linear(c=3)"}, {"tracks": "speed"}):
         with pytest.warns(
-            ScenarioWarning, match="'classical' has no gains for this run on duffing"
+            ScenarioWarning, match="'classical' runs on duffing with its default gains"
         ):
             made = smc.Scenario(plant="duffing", law="classical", **fields).law
         assert made.gains == smc.law("classical").gains

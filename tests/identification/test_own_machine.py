@@ -619,7 +619,7 @@ def shares(told, expected):
 
 
 @pytest.mark.slow
-def test_expected_errors_of_two_joints_are_those_that_a_log_of_the_motion_tells():
+def test_expected_errors_of_two_joints_are_of_the_size_that_a_log_tells():
     """Within a factor of 5, of the best motion; of a log by the other simulation. With other noise
     the same motion's log tells errors that are up to 4.4 times as large, as the page says, so that
     the factor of 2 that was asked for cannot be held.

@@ -358,7 +358,7 @@ RESULTS = {  # changes of both blocks -> the result
     "all fail": (LOST | {"away": LAWS}, "every law has runs that fail"),
     "few sets": (
         {"ahead": None, "samples": 3, "sets": 3, "given": False},
-        "3 sets of gains cannot rank 3 laws here; 7 can (in compare searches=7)",
+        "3 sets of gains cannot rank 3 laws here; 7 can (searches=7 of compare)",
     ),
     "few runs": (
         {"ahead": None, "samples": 4, "runs": 4},
@@ -366,7 +366,7 @@ RESULTS = {  # changes of both blocks -> the result
     ),
     "few runs of few sets": (
         {"ahead": None, "samples": 3, "runs": 4, "sets": 3},
-        "3 sets of gains or runs cannot rank 3 laws here; 7 can (seeds=7 and in compare searches=7)",
+        "3 sets of gains or runs cannot rank 3 laws here; 7 can (seeds=7 and searches=7 of compare)",
     ),
     "few runs of many sets": (
         {"ahead": None, "samples": 4, "runs": 4, "sets": 12},
@@ -429,7 +429,7 @@ def test_a_law_that_is_not_ranked_is_named_with_the_cure_beside_the_winner_of_th
     result = dataclasses.replace(pair, blocks=tuple(blocks)).result
     assert result.startswith("third wins in both conditions")
     assert result.endswith(
-        "; second (3 sets of gains or runs) is not ranked, which needs 7 (in compare searches=7)"
+        "; second (3 sets of gains or runs) is not ranked, which needs 7 (searches=7 of compare)"
     )
 
 

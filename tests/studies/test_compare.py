@@ -406,7 +406,3 @@ def test_conditions_are_names_with_commas_or_one_text(refused):
         names.append(condition.name)
     assert names == ["noise", "sine", "worn", "encoder"]
     refused(lambda: options.conditions(["noise,worn: friction=Coulomb(0.05)"]))
-
-
-def test_times_have_one_digit_as_repeated_calls_differ():
-    assert list(map(compare._rough, (0.424, 1.01, 12.3, 3.6e-9))) == ["0.4", "1", "10", "4e-9"]

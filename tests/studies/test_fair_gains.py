@@ -72,7 +72,7 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(tmp_pa
             dict(zip(("kp", "kd"), one.gains, strict=True)) for one in tuned[0].sets
         ]
         assert found.law.source.kind == "tuned here"
-        assert found.remark.startswith("searched with 8 sets a gain, shipped gains with 64,")
+        assert found.remark.startswith("at most 8 sets were tried for each gain, where 64")
     assert len(tuned) == 1
 
 

@@ -196,10 +196,10 @@ def margins(
     sources = _sources(machines, chosen, gains)
     words = [counted(len(results), "margin"), sources, f"{terminal.seconds:.0f} s"]
     terminal.note(", ".join(filter(None, words)), "dim", wrap=True)
-    terminal.finish(list(map(dataclasses.asdict, results)))
     if figure:
         results.figure(figure)
         terminal.wrote(*files(figure))
+    terminal.finish(list(map(dataclasses.asdict, results)))
 
 
 def _sources(machines: "Sequence[Machine]", laws: "Sequence[Law | str]", gains: str) -> str:

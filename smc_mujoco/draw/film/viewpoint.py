@@ -20,7 +20,7 @@ FRONT = 90.0  # the azimuth that is taken where others show as much
 AZIMUTHS = np.arange(0.0, 360.0, 15.0)
 LOWEST = -12.0  # from a little above, so that the floor is seen
 ELEVATIONS = (LOWEST, -30.0, -50.0, -70.0)
-REST_SHARE = 0.5  # by which a view is worse that hides the whole machine but not what moves
+HIDDEN_WEIGHT = 0.5  # by which a view is worse that hides the whole machine but not what moves
 ENOUGH = 0.5  # of the motion: a camera of the model that shows less is not taken
 DRAWN = (np.arange(6) < world.DRAWN_GROUPS).astype(np.uint8)  # groups of geoms
 INSIDE = 0.5  # of a geom's box, from its middle to the corners at which one looks
@@ -61,7 +61,7 @@ def view(
         share = -motion * visible(model, data, links, angles)
         if share > most:  # else the rest of the machine cannot make it better
             hidden = 1.0 - visible(model, data, whole, angles)
-            share *= 1.0 - REST_SHARE * hidden
+            share *= 1.0 - HIDDEN_WEIGHT * hidden
         if share > most:
             most = share
             best = angles
