@@ -31,7 +31,9 @@ def plane(traces: Sequence[Trace]) -> Array:
 
 
 class Flight(NamedTuple):
-    """A run on a map: its path until now and its dot, with times in s and places, (2, m)."""
+    """A run on a map: its path until now and its dot, with times in s and places, (2, m), in the
+    map's unit.
+    """
 
     past: Line2D
     dot: Line2D
@@ -42,18 +44,19 @@ class Flight(NamedTuple):
 def draw_map(
     ax: Axes, panel: panels.Panel, colours: Sequence[str]
 ) -> tuple[list[Artist], list[Flight]]:
-    """Draw the paths of free bodies and of their references in `plane`, to one scale, with a title,
-    and return the artists of the traces, and what moves.
+    """Draw the paths of free bodies and of their references in `plane`, to one scale, with a title
+    that has the unit, and return the artists of the traces, and what moves.
     """
     axes = plane(panel.traces)
     letters = np.array(["x", "y", "z"])
     across, along = letters[axes]
-    ax.set_title(f"{along} over {across} (m)", fontweight="normal")
     goals = [trace.r for trace in panel.traces]
     flown = quantities.lasting(panel.traces, "x")
-    seen = np.concatenate([*flown, *goals])
-    low = seen[:, axes].min(axis=0)
-    high = seen[:, axes].max(axis=0)
+    seen = np.concatenate([*flown, *goals])[:, axes]
+    factor, unit = style.prefixed(float(np.ptp(seen, axis=0).max()), "m")
+    ax.set_title(f"{along} over {across} ({unit})", fontweight="normal")
+    low = factor * seen.min(axis=0)
+    high = factor * seen.max(axis=0)
     sides = np.array(ax.get_window_extent().size)
     scale = ((high - low) / sides).max()
     half = (0.5 + quantities.MARGIN) * scale * sides
@@ -65,13 +68,13 @@ def draw_map(
     looks = style.looks(panel.traces)
     rows = zip(panel.traces, colours, looks, strict=True)
     for trace, colour, look in reversed(list(rows)):
-        places = trace.x[:, axes].T
+        places = factor * trace.x[:, axes].T
         width = style.points(panels.LINE)
         artists += ax.plot(*places, color=colour, lw=width, **look)
         goal = {"color": style.INK, "lw": style.points(0.8), "ls": panels.DASHES, "zorder": 3}
         if not np.ptp(trace.r[:, axes], axis=0).any():  # it stands still
             goal |= {"marker": "+", "ms": style.points(9)}
-        ax.plot(*trace.r[:, axes].T, **goal)
+        ax.plot(*(factor * trace.r[:, axes].T), **goal)
         wide = {"color": colour, "lw": style.points(PAST_LINE), "animated": True}
         (past,) = ax.plot([], [], **wide)
         dot = panels.dot(ax, colour)
