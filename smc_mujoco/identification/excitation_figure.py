@@ -64,7 +64,7 @@ def excitation_figure(
         axes[-1, 1].xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axes[-1, 1].xaxis.set_minor_formatter(NullFormatter())
         axes[-1, 1].set_xlabel("expected error (% of the number)")
-        title = "What to record: expected errors of each motion, best first"
+        title = "What to record: expected errors of each motion, least first"
         pages.set_head(page, style.FULL_WIDTH, title, handles)
         pages.write(page, paths)
     return paths

@@ -43,7 +43,7 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom import mjcf, urdf
 from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs, is_free, joints_of
-from smc_mujoco.mechanisms.custom.clearance import DEPTH, TOUCH, overlap
+from smc_mujoco.mechanisms.custom.clearance import DEPTH, TOUCH, Overlap, overlap
 from smc_mujoco.mechanisms.custom.mjcf import ModelSource
 from smc_mujoco.mechanisms.custom.model_constraints import (
     default_friction,
@@ -218,42 +218,44 @@ def _overlaps(label: str, made: Plant, of_urdf: bool) -> list[str]:
     goal where something presses. Raise ScenarioError for one inside something from which the robot
     does not rise.
     """
-    deep = {}
-    pressed = {}
-    stands = free_base(loaded(made))  # on feet, which are soft
-    for what, x in (("start", made.x0), ("goal", made.origin)):
-        found = overlap(made, x)
-        if found.depth > DEPTH:
-            deep[what] = found
-        elif found.depth > TOUCH and not stands:
-            pressed[what] = found
-    if not deep and not pressed:
-        return []
+    # the goal first: another x0 does not help there
+    found = {"goal": overlap(made, made.origin), "start": overlap(made, made.x0)}
+    deep = [what for what, inside in found.items() if inside.depth > DEPTH]
     if deep and all(rises(made, x) for x in dict.fromkeys((made.x0, made.origin))):
-        what, inside = next(iter(deep.items()))
+        what = deep[-1]
         return [
-            f"the {what} of {label} has {inside}: it rises from there and stands, so its first "
-            "moments are of that; give a keyframe that stands on the ground"
+            f"the {what} of {label} has {found[what]}: it rises from there and stands, so its "
+            "first moments are of that; give a keyframe that stands on the ground"
         ]
-    # the goal's, if it has one: another x0 does not help there
-    what, inside = (deep or pressed).popitem()
+    if deep:
+        what = deep[0]
+        cure = _cure_of_overlap(what, found[what], of_urdf)
+        raise ScenarioError(f"the {what} of {label} has {found[what]}: give {cure}")
+    if free_base(loaded(made)):  # on feet, which are soft
+        return []
+    for what, inside in found.items():
+        if inside.depth > TOUCH:
+            first, second = map(repr, inside.geoms)
+            cure = _cure_of_overlap(what, inside, of_urdf)
+            return [
+                f"at the {what} of {label}, {first} and {second} overlap by "
+                f"{1e3 * inside.depth:.1f} mm, so contact pushes them apart: give {cure}, unless "
+                "you want this"
+            ]
+    return []
+
+
+def _cure_of_overlap(what: str, inside: Overlap, of_urdf: bool) -> str:
+    """Return what to give so that nothing overlaps at the "start" or the "goal"."""
     if what == "start":
-        cure = "another x0"
-    elif of_urdf:
-        cure = "one of these links no <collision> in the file"
-    else:
-        first, second = (name or "GIVE-IT-A-NAME" for name in inside.bodies)
-        cure = (
-            "a keyframe in which they do not touch, or <exclude "
-            f'body1="{first}" body2="{second}"/> in the <contact> of the file'
-        )
-    if inside.depth > DEPTH:
-        raise ScenarioError(f"the {what} of {label} has {inside}: give {cure}")
-    first, second = map(repr, inside.geoms)
-    return [
-        f"at the {what} of {label}, {first} and {second} overlap by {1e3 * inside.depth:.1f} mm, "
-        f"so contact pushes them apart: give {cure}, unless you want this"
-    ]
+        return "another x0"
+    if of_urdf:
+        return "one of these links no <collision> in the file"
+    first, second = (name or "GIVE-IT-A-NAME" for name in inside.bodies)
+    return (
+        "a keyframe in which they do not touch, or <exclude "
+        f'body1="{first}" body2="{second}"/> in the <contact> of the file'
+    )
 
 
 def _plant(

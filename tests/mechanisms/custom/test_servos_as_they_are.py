@@ -442,7 +442,7 @@ def test_default_gains_before_a_servo_are_told_when_they_run():
     with pytest.warns(ScenarioWarning, match=words):
         run(law="pid", **fields)
     with warnings.catch_warnings():
-        warnings.filterwarnings("error", ".*default gains")
+        warnings.filterwarnings("error", ".*default gains of pid are for a force")
         run(law=smc.law("pid", kp=0.5, ki=0.0, kd=0.0), **fields)
         run(law=on_set_point(), **fields)
         run(law="pid", **fields | {"plant": smc.plant_from(HOBBY % MINE, ["j"])})
