@@ -28,7 +28,7 @@ from smc_mujoco.identification.least_squares import least_squares
 from smc_mujoco.identification.own_rig import OwnRig, moves
 from smc_mujoco.identification.paths import DELAY, MAX_DELAY, slope, steady_force
 from smc_mujoco.identification.records import Columns, Record, stacked, step_of
-from smc_mujoco.mechanisms.custom.joint_numbers import KINDS
+from smc_mujoco.mechanisms.custom.model_numbers import KINDS, PAYLOAD
 from smc_mujoco.mechanisms.hardware.part import Friction
 from smc_mujoco.mechanisms.layout import channel_names, driven_names
 from smc_mujoco.mechanisms.plant import degrees_hint
@@ -224,7 +224,15 @@ def _is_linear(rig: OwnRig, name: str) -> bool:
         return isinstance(part, Friction) and place.name in part.forces
     joint, _, kind = name.rpartition(".")
     of_joint = joint in channel_names(rig.plant) and kind in (*KINDS, "offset")
-    return of_joint or (name in rig.plant.parameters and not joint)
+    return of_joint or _of_inertia(rig, name)
+
+
+def _of_inertia(rig: OwnRig, name: str) -> bool:
+    """Return whether a quantity is a parameter of which the forces of a rigid motion depend: one
+    of the plant's own, or a payload.
+    """
+    owner, _, kind = name.rpartition(".")
+    return name in rig.plant.parameters and (not owner or kind == PAYLOAD)
 
 
 def forces(rig: OwnRig, record: Record, delays: Sequence[float]) -> Forces:
@@ -245,7 +253,7 @@ def forces(rig: OwnRig, record: Record, delays: Sequence[float]) -> Forces:
     rigid = plain + _of_parts(rig, filtered, v)
     slopes = []
     for name in linear(rig):
-        if name in rig.plant.parameters and "." not in name:
+        if _of_inertia(rig, name):
             step = SHIFT * abs(base[name]) or SHIFT
             shifted = inertial(base | {name: base[name] + step})
             slopes.append(((shifted - plain) / step).ravel())

@@ -316,9 +316,9 @@ def identify(
         m) and u (in the unit of the machine's command) of the joint, or x_JOINT and u_JOINT of
         each. u is held from its row to the next: of a log of fewer rows give the mean between them.
         The time grows with rows and names: 4 s at 1 kHz of two joints take a minute or two.
-      names: paths of the numbers: "shoulder.damping", .frictionloss,
-        .armature, .stiffness, .gain, .offset, .zero, "input_delay", "m", "friction.elbow.kc". None:
-        the rig's `free`. No start is needed: it comes from least squares of forces.
+      names: paths of the numbers: "shoulder.damping", .frictionloss, .armature, .stiffness, .gain,
+        .offset, .zero, "input_delay", "hand.payload" of a body, "m", "friction.elbow.kc". None: the
+        rig's `free`. No start is needed: it comes from least squares of forces.
       held_out: a log that is not used, to check the numbers on.
       columns: our name of a column -> that of the logs.
       condition: what your own machine has beside its model: a condition or its text, such as

@@ -5,6 +5,7 @@ its search starts and within which range.
     shoulder.gain, .offset    force = gain u + offset, from the recorded command of its motor
     shoulder.zero             what its encoder reads at 0, rad or m
     input_delay               s, from a recorded command to its force
+    hand.payload              kg, a point mass at the centre of mass of a body of the model
     m, grav                   parameters of the plant
     friction.elbow.kc         a number of a part of the scenario: FIELD.JOINT.NAME, or FIELD.NAME
 
@@ -22,7 +23,7 @@ import numpy as np
 from smc_mujoco.common.constraints import of_fields
 from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
 from smc_mujoco.identification.rig import Quantity
-from smc_mujoco.mechanisms.custom.joint_numbers import joint_numbers, with_joint_numbers
+from smc_mujoco.mechanisms.custom.model_numbers import model_numbers, with_model_numbers
 from smc_mujoco.mechanisms.hardware.moments import JointState
 from smc_mujoco.mechanisms.hardware.part import Friction, Part
 from smc_mujoco.mechanisms.layout import channel_names, driven_names
@@ -50,7 +51,7 @@ NATURAL = frozenset(("b", "bq", "b1", "b2", "cf", "cfq", "cf1", "cf2", "delta", 
 class Paths(NamedTuple):
     """The numbers that names stand for."""
 
-    plant: Plant  # with the numbers of its joints among its parameters
+    plant: Plant  # with those of its joints and bodies among its parameters
     quantities: dict[str, Quantity]
     parts: dict[str, PartNumber]  # those of parts
 
@@ -74,7 +75,7 @@ def resolved(base: Scenario, names: Sequence[str]) -> Paths:
       ScenarioError: there is no such number, or it is not given in the scenario.
     """
     plant = base.plant
-    of_joints = joint_numbers(plant)
+    of_joints = model_numbers(plant)
     quantities: dict[str, Quantity] = {}
     places: dict[str, PartNumber] = {}
     for name in names:
@@ -92,13 +93,13 @@ def resolved(base: Scenario, names: Sequence[str]) -> Paths:
             places[name], quantities[name] = _of_part(base, name)
         else:
             raise unknown(f"number of {plant.name}", name, known_paths(base))
-    return Paths(with_joint_numbers(plant, of_joints.keys() & quantities), quantities, places)
+    return Paths(with_model_numbers(plant, of_joints.keys() & quantities), quantities, places)
 
 
 def known_paths(base: Scenario) -> list[str]:
     """Return every path to a number of a scenario."""
     plant = base.plant
-    paths = [*plant.parameters, DELAY, *joint_numbers(plant)]
+    paths = [*plant.parameters, DELAY, *model_numbers(plant)]
     for joint in driven_names(plant):
         paths += [f"{joint}.gain", f"{joint}.offset"]
     paths += [f"{joint}.zero" for joint in channel_names(plant)]
@@ -114,7 +115,7 @@ def usual_paths(base: Scenario) -> list[str]:
     kinds = ["armature"]
     if not paths:
         kinds = ["damping", "frictionloss", "armature"]
-    of_joints = joint_numbers(plant)
+    of_joints = model_numbers(plant)
     for joint in driven_names(plant):
         for kind in kinds:
             if f"{joint}.{kind}" in of_joints:

@@ -26,6 +26,7 @@ from smc_mujoco.common.constraints import Natural, Positive, constrain, suggesti
 from smc_mujoco.common.data import frozen_data, keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.mechanisms.custom.model_numbers import dotted, with_model_numbers
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
@@ -71,7 +72,8 @@ class Uncertainty:
         period. The scenario's seed decides which samples are late.
       mass: lowest and highest factor on the plant's mass.
       parameters: name -> lowest and highest factor on other parameters of the plant, or what is
-        added to one of `plant.added`: {"payload": (0.0, 2.0)}.
+        added to one of `plant.added`: {"payload": (0.0, 2.0)}. Your own model has those of a
+        mismatch: {"elbow.damping": (0.5, 2.0), "hand.payload": (0.0, 2.0)}.
       friction: lowest and highest dry friction of the driven joints, N or N m, beside the
         scenario's own; `friction_scale` leaves it out.
       friction_scale: lowest and highest factor on the friction of the scenario and on the dry
@@ -229,6 +231,7 @@ class Members:
     """
 
     def __init__(self, scenarios: Sequence[Scenario], within: Uncertainty):
+        scenarios = [_with_numbers(one, within) for one in scenarios]
         scenario = scenarios[0]
         count = len(scenarios)
         self.scenario = scenario
@@ -443,6 +446,14 @@ class RunConstant:
             except ScenarioError as error:
                 named = self.name.partition(" ")[0]
                 raise ScenarioError(f"Uncertainty's {named} of {value:g}: {error}") from None
+
+
+def _with_numbers(scenario: Scenario, within: Uncertainty) -> Scenario:
+    """Return the scenario with the numbers of joints and bodies that may differ among the
+    parameters of its plant.
+    """
+    plant = with_model_numbers(scenario.plant, dotted(within.parameters))
+    return dataclasses.replace(scenario, plant=plant)
 
 
 def _check_class(scenario: Scenario, within: Uncertainty) -> None:

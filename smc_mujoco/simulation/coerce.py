@@ -21,7 +21,7 @@ from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import catalogue as surfaces
-from smc_mujoco.mechanisms.custom.joint_numbers import dotted, joint_numbers, with_joint_numbers
+from smc_mujoco.mechanisms.custom.model_numbers import dotted, model_numbers, with_model_numbers
 from smc_mujoco.mechanisms.hardware.contact import Contact, Obstacle, kinds
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
@@ -59,8 +59,8 @@ Sensors = SomeByJoint[Encoder]
 
 
 def plant(name: str, value: object, s: Any) -> Plant:
-    """Return a plant, from itself or its name. Numbers of its joints that the scenario changes are
-    among its parameters.
+    """Return a plant, from itself or its name. Numbers of its joints and bodies that the scenario
+    changes are among its parameters.
     """
     machine = as_plant(value)
     given = vars(s)
@@ -70,11 +70,11 @@ def plant(name: str, value: object, s: Any) -> Plant:
     if isinstance(mismatch, Mapping):
         changed += dotted(mismatch)
     if isinstance(jump, Jump):
-        numbers = joint_numbers(machine)
+        numbers = model_numbers(machine)
         for path in dotted(jump.of_plant):
             if path in numbers:
                 changed.append(path)
-    return with_joint_numbers(machine, changed)
+    return with_model_numbers(machine, changed)
 
 
 def law(value: Law | Template | str) -> Law:

@@ -17,7 +17,7 @@ from smc_mujoco.control import component_json as components
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.surface import catalogue as surfaces
-from smc_mujoco.mechanisms.custom.joint_numbers import dotted, with_joint_numbers
+from smc_mujoco.mechanisms.custom.model_numbers import dotted, with_model_numbers
 from smc_mujoco.mechanisms.custom.plant_from import restored
 from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
 from smc_mujoco.mechanisms.hardware.part import Friction, Part
@@ -164,7 +164,7 @@ def _restore_plant(data: dict) -> Plant:
     module = plant.pop("module")
     if mjcf := plant.pop("mjcf", None):
         del plant["n"]
-        restored_plant = with_joint_numbers(restored(mjcf, name), dotted(plant))
+        restored_plant = with_model_numbers(restored(mjcf, name), dotted(plant))
         return dataclasses.replace(restored_plant, parameters=plant)
     if module != find_plant(name).build.__module__:
         raise ScenarioError(

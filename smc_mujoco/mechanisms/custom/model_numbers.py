@@ -1,9 +1,11 @@
-"""Numbers of the joints of a user's model, such as shoulder.damping, as parameters of its plant.
+"""Numbers of the joints and bodies of a user's model, such as shoulder.damping, as parameters of
+its plant.
 
     Scenario(plant=arm, mismatch={"shoulder.damping": 1.5, "elbow.armature": 0.02})
+    Scenario(plant=arm, mismatch={"hand.payload": 0.5})  # kg, at the hand's centre of mass
 
 A mismatch or a jump multiplies such a number. One that is 0 in the model it adds, in the number's
-unit.
+unit. A payload is a point mass.
 """
 
 import dataclasses
@@ -18,7 +20,7 @@ from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import unknown
 from smc_mujoco.mechanisms.custom.model_constraints import SOFT_SOLREF, sets_friction_solref
 from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF
-from smc_mujoco.mechanisms.layout import all_joints, loaded
+from smc_mujoco.mechanisms.layout import OWN, ROTOR, all_joints, loaded
 from smc_mujoco.mechanisms.plant import Field, Plant, Values
 
 SLIDE = mujoco.mjtJoint.mjJNT_SLIDE.value
@@ -40,17 +42,22 @@ KINDS = {
 }
 
 
-class JointNumber(NamedTuple):
-    """A number of a joint."""
+PAYLOAD = "payload"  # kg, of a body
 
-    joint: str
+
+class ModelNumber(NamedTuple):
+    """A number of a joint or a body."""
+
+    owner: str
     kind: str
     value: float  # in the model
     unit: str
 
 
-def joint_numbers(plant: Plant) -> dict[str, JointNumber]:
-    """Return JOINT.KIND -> the number, for all joints of a user's model; empty for other plants."""
+def model_numbers(plant: Plant) -> dict[str, ModelNumber]:
+    """Return JOINT.KIND and BODY.payload -> the number, for all joints and moving bodies of a
+    user's model; empty for other plants.
+    """
     if not plant.is_user_model:
         return {}
     model = loaded(plant)
@@ -61,17 +68,21 @@ def joint_numbers(plant: Plant) -> dict[str, JointNumber]:
             values = getattr(model, kind.field)[_place(model, joint, name)]
             value = float(np.ravel(values)[0])
             unit = kind.slide if slides else kind.hinge
-            found[f"{joint}.{name}"] = JointNumber(joint, name, value, unit)
+            found[f"{joint}.{name}"] = ModelNumber(joint, name, value, unit)
+    for i in range(model.nbody):
+        body = model.body(i).name
+        if body and model.body_weldid[i] and not body.startswith((ROTOR, OWN)):
+            found[f"{body}.{PAYLOAD}"] = ModelNumber(body, PAYLOAD, 0.0, "kg")
     return found
 
 
-def with_joint_numbers(plant: Plant, names: Iterable[str]) -> Plant:
-    """Return the plant with numbers of its joints among its parameters.
+def with_model_numbers(plant: Plant, names: Iterable[str]) -> Plant:
+    """Return the plant with numbers of its joints and bodies among its parameters.
 
     Raises:
-      ScenarioError: no joint of the model has a number of this name.
+      ScenarioError: no joint or body of the model has a number of this name.
     """
-    known = joint_numbers(plant)
+    known = model_numbers(plant)
     added = {}
     for name in names:
         if name in plant.parameters:
@@ -81,8 +92,8 @@ def with_joint_numbers(plant: Plant, names: Iterable[str]) -> Plant:
         added[name] = known[name]
     if not added:
         return plant
-    of_joints = tuple((one.joint, one.kind) for one in added.values())
-    fields = JointFields(plant.fields, of_joints)
+    owned = tuple((one.owner, one.kind) for one in added.values())
+    fields = NumberFields(plant.fields, owned)
     nominal = plant.nominal
     if plant.by_mujoco:
         nominal = dataclasses.replace(nominal, fields=fields)
@@ -94,7 +105,7 @@ def with_joint_numbers(plant: Plant, names: Iterable[str]) -> Plant:
         if not one.value:
             absent[name] = one.unit
         if one.kind == "frictionloss":
-            rubbing.append(one.joint)
+            rubbing.append(one.owner)
     # only MuJoCo's constraints are as soft as the file says
     model = loaded(plant)
     soft = any(
@@ -112,17 +123,20 @@ def with_joint_numbers(plant: Plant, names: Iterable[str]) -> Plant:
 
 
 @frozen_data
-class JointFields:
-    """Plant.fields of a plant with numbers of joints among its parameters."""
+class NumberFields:
+    """Plant.fields of a plant with numbers of joints and bodies among its parameters."""
 
     inner: Callable[[mujoco.MjModel, Values], Iterator[Field]]
-    numbers: tuple[tuple[str, str], ...]  # joint and kind of each
+    numbers: tuple[tuple[str, str], ...]  # joint or body, and kind, of each
 
     def __call__(self, model: mujoco.MjModel, p: Values) -> Iterator[Field]:
         yield from self.inner(model, p)
-        for joint, kind in self.numbers:
-            at = _place(model, joint, kind)
-            value = vars(p)[f"{joint}.{kind}"]
+        for owner, kind in self.numbers:
+            value = vars(p)[f"{owner}.{kind}"]
+            if kind == PAYLOAD:
+                yield Field("body_mass", model.body(owner).id, value, adds=True)
+                continue
+            at = _place(model, owner, kind)
             yield Field(KINDS[kind].field, at, value)
             # dry friction that the model does not have yet is as hard as Coulomb's
             if kind == "frictionloss" and tuple(model.dof_solref[at]) == SOFT_SOLREF:
@@ -138,5 +152,5 @@ def _place(model: mujoco.MjModel, joint: str, kind: str) -> int:
 
 
 def dotted(names: Iterable[str]) -> Names:
-    """Return those of the names that may be numbers of joints."""
+    """Return those of the names that may be numbers of joints or bodies."""
     return tuple(name for name in names if "." in str(name))
