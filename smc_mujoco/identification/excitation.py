@@ -205,7 +205,7 @@ def excitation(
     noise: Natural = 2e-4,
     counts: Counts = 4096,
 ) -> Excitation:
-    """Recommend a motion to record, from which numbers of a machine can be told apart.
+    """Recommend a motion to record, from which a machine's parameters can be told apart.
 
         arm = "arm.xml:elbow+held"
         print(smc.design.excitation(arm, ["elbow.damping"], u_max=5.0, duration=2.0))

@@ -298,7 +298,7 @@ def identify(
     most: Count = 30,
     progress: bool = False,
 ) -> Identified:
-    """Find numbers of a machine from logs: friction, armature, delay, masses and more.
+    """Estimate a machine's parameters from logs: friction, armature, delay, masses and more.
 
         arm = smc.plant_from("arm.xml", ["elbow"])
         push = smc.Sine(1.5, 4.0)
@@ -321,7 +321,7 @@ def identify(
         rig's `free`. No start is needed: it comes from least squares of forces.
       held_out: a log that is not used, to check the numbers on.
       columns: our name of a column -> that of the logs.
-      condition: what your own machine has beside its model: a condition or its text, such as
+      condition: effects that the model lacks: a condition or its text, such as
         "mine: friction=LuGre(0.3, 0.4, 0.1)", whose numbers `names` may find; as in a Scenario.
       corrected: whether to correct open loops for the errors of the simulation's steps, in several
         times the time. Without it replays are extrapolated to steps of 0.

@@ -308,7 +308,7 @@ MARGIN_KINDS: dict[str, MarginKind] = {
         label="mass, of the nominal", unit="1", levels=MASS_RATIOS, put=_with_mass, none=1.0
     ),
     "blow": MarginKind(
-        label="blow at half time, on every driven joint",
+        label="blow halfway through the run, on every driven joint",
         unit="{u} s",
         levels=BLOWS,
         put=_with_blow,
@@ -420,10 +420,10 @@ def margins(
     Args:
       plants, laws: names, or your own plants and laws, one or several.
       kinds: one or several of "delay", "disturbance", "friction", "mass", "noise"; and of "blow",
-        at half time, "jitter" and "missed", of the controller's clock, and "loss", the share of its
-        gain that an actuator has lost from the start on, which are left out by default. All
-        actuators lose it, or the one that the condition's fault is on. Shares, and the factor on
-        the mass, have the unit "1".
+        halfway through the run, "jitter" and "missed", of the controller's clock, and "loss", the
+        fraction of its gain that an actuator has lost from the start on, which are left out by
+        default. All actuators lose it, or the one that the condition's fault is on. Shares, and the
+        factor on the mass, have the unit "1".
       gains: set of gains, one of `gain_sets.SETS`, or "default".
       quick: whether to make runs of 5 s and search to within 5 control periods or 10 %, for a first
         look.

@@ -309,7 +309,7 @@ def compare(
     executor: Workers | None = None,
 ) -> Compared:
     """Compare laws on plants in conditions, with gains by one rule for all, and say which is better
-    and how certain that is.
+    and how certain the answer is.
 
         compared = smc.compare(["pid", "adrc"], "duffing", "friction", seeds=3, out="compared")
         print(compared)

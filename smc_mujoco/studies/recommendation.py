@@ -1,4 +1,4 @@
-"""A recommendation: which law to use on a plant, its gains, and how certain that is, in words."""
+"""A recommendation: which law to use on a plant, its gains, and how certain the choice is."""
 
 import dataclasses
 import math

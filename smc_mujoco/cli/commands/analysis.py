@@ -49,7 +49,11 @@ Objective = Annotated[
 ]
 Budget = Annotated[
     int,
-    typer.Option(min=1, help="Number of sets of gains that a search may try, per gain."),
+    typer.Option(
+        min=1,
+        help="How many sets of gains a search may try, for each gain to be tuned: 64 allows 128 "
+        "for a law with two gains.",
+    ),
 ]
 Out = Annotated[
     Path | None,
@@ -77,12 +81,13 @@ def tune(
 ) -> None:
     """Tune a law for a plant, by a rule that is the same for every law.
 
-    Each gain is searched over the same number of decades about a scale that follows from its unit
-    and the plant. The objective is time-weighted error plus weighted variation of u, summed over
-    runs of 5 s in seven conditions: nominal, noise, delay, a sine and a constant disturbance, 30 %
-    more and 30 % less mass. Each search has its own start, noise and initial states, so the spread
-    of their results shows how much is chance. The same seed gives the same gains. With --out each
-    search is kept in the folder FILE-searches, from which a stopped command resumes.
+    Each gain is searched over at least three decades around a value that follows from its unit and
+    the plant. The objective is time-weighted error plus weighted variation of u, summed over runs
+    of 5 s in seven conditions: nominal, noise, delay, a sine and a constant disturbance, 30 % more
+    and 30 % less mass. Each search begins with its own gains, and has its own initial states and
+    noise, so the spread of the results shows how much is chance. The same seed gives the same
+    gains. With --out each search is kept in the folder FILE-searches, from which a stopped command
+    resumes.
 
     Example: smc-mujoco tune duffing --law observer_free --out duffing.json
 
@@ -154,11 +159,11 @@ def margins(
 
     The delay of the command is in s; a constant disturbance and dry friction are in N or N m. Mass
     is a multiple of the nominal mass. Noise is the standard deviation of the position sensor, in
-    rad or m; if that is 1 mrad, the velocity sensor has 5 mrad/s. A blow comes at half time; its
-    momentum is in N s or N m s. Jitter is a share of the control period. Missed is the share of
-    samples that are missed. Loss is the share of its force that each actuator loses. For laws that
-    can be linearised, the column "theory" has the stability limit of the linear loop. A law may
-    tolerate more, with a small sustained oscillation.
+    rad or m; the velocity sensor has five times that number, in rad/s or m/s. A blow comes halfway
+    through the run; its momentum is in N s or N m s. Jitter is a share of the control period.
+    Missed is the share of samples that are missed. Loss is the fraction of its force that each
+    actuator loses. For laws that can be linearised, the column "theory" has the stability limit of
+    the linear loop. A law may tolerate more, with a small sustained oscillation.
 
     Example: smc-mujoco margins duffing --law observer_free,classical --kind delay
     """

@@ -1,4 +1,4 @@
-"""smc-mujoco identify and excitation: a machine's numbers from its logs, and what to record."""
+"""smc-mujoco identify and excitation: a machine's parameters from its logs, and what to record."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -31,7 +31,7 @@ Paths = Annotated[
     typer.Option(
         "--for",
         metavar="PATH,...",
-        help="Numbers to find, such as shoulder.damping,input_delay,m; "
+        help="Parameters to find, such as shoulder.damping,input_delay,m; "
         "default: those that a rig's records determine.",
     ),
 ]
@@ -44,15 +44,18 @@ PairsFile = Annotated[
 ]
 HeldOut = Annotated[
     Path | None,
-    typer.Option(help="A log, or pairs, to check the numbers on; it is not used to find them."),
+    typer.Option(help="A log, or pairs, to check the result on; it is not used to find it."),
 ]
 FoundFigure = Annotated[
-    Path | None, options.picture("prediction over log, residuals and friction; or the pairs")
+    Path | None,
+    options.picture(
+        "the log with the prediction, the residuals and the friction (with --pairs, the pairs)"
+    ),
 ]
 FoundFile = Annotated[
     Path | None,
     typer.Option(
-        help="Also write the numbers as a condition, FILE.txt, for --condition of other commands."
+        help="Also write the result as a condition, FILE.txt, for --condition of other commands."
     ),
 ]
 Beside = Annotated[
@@ -60,9 +63,9 @@ Beside = Annotated[
     typer.Option(
         "--condition",
         metavar="NAME|TEXT|FILE",
-        help="What the machine has beside its model, with numbers to find, such as "
-        '"mine: friction=LuGre(0.3, 0.4, 0.1)" or "mine: friction=my_parts.py:stribeck()", or a '
-        "file with it.",
+        help="Effects that the model lacks, such as friction, whose parameters are to be found: "
+        '"mine: friction=LuGre(0.3, 0.4, 0.1)", "mine: friction=my_parts.py:stribeck()", or a '
+        "file with one such line.",
     ),
 ]
 Corrected = Annotated[
@@ -74,7 +77,7 @@ Starts = Annotated[
         min=1, help="How many starting points the search may try, if the first fits badly."
     ),
 ]
-StartsSeed = Annotated[int, typer.Option(min=0, help="Seed of these starts.")]
+StartsSeed = Annotated[int, typer.Option(min=0, help="Seed of these starting points.")]
 ModelJoints = Annotated[
     str, typer.Argument(metavar="MACHINE", help="FILE.xml:joint+joint, or a plant by its name.")
 ]
@@ -120,18 +123,20 @@ def identify(
     seed: StartsSeed = 0,
     json: options.Json = None,
 ) -> None:
-    """Find numbers of a machine from its logs: friction, armature, delay, masses, with errors.
+    """Estimate a machine's parameters from its logs: friction, armature, delay, masses and more.
 
     A log may come from any controller, at 40 Hz or more. It has columns t in s, and x (rad or m)
     and u (N m or N) of the joint, or x_JOINT and u_JOINT of each. You need no first guess.
 
-    Numbers are named JOINT.damping, .frictionloss, .armature, .stiffness, .gain, .offset and
-    .zero, input_delay, m and grav. A number of a part that --condition gives is named FIELD.NAME,
-    such as friction.coulomb. The table has each number with its standard error. Notes below it say
-    what the logs cannot determine.
+    Parameters of a joint are named JOINT.damping, .frictionloss, .armature, .stiffness, .gain,
+    .offset and .zero. The delay from command to force is input_delay. A plant's own parameters have
+    their names, such as m (mass) and grav (gravity). Parameters of a part that --condition adds are
+    named FIELD.NAME, such as friction.coulomb. The table has each parameter with its standard
+    error. Notes below it say what the logs cannot determine.
 
-    Pairs of speed (rad/s or m/s) and torque (N m or N) are of one joint in the order of time. The
-    torque is what friction alone needs: measured, less gravity and inertia.
+    With --pairs you need no machine: give the speed (rad/s or m/s) and torque (N m or N) of one
+    joint, in time order. The torque must be that of friction alone, so subtract gravity and inertia
+    from the measured torque first.
 
     Example: smc-mujoco identify arm.xml run1.csv run2.csv --for shoulder.damping,input_delay
 
@@ -231,10 +236,10 @@ def excitation(
     out: MotionFile = None,
     json: options.Json = None,
 ) -> None:
-    """Recommend a motion to record, from which numbers of a machine can be told apart.
+    """Recommend a motion to record, from which a machine's parameters can be told apart.
 
     It compares chirps, sines and staircases within the bounds on the model: how large the error of
-    each number will be, and which two are hardest to tell apart. Play the best one under any
+    each parameter will be, and which two are hardest to tell apart. Play the best one under any
     controller that tracks it stably, and record t, and x and u of each joint, for `smc-mujoco
     identify`.
 

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 COMMA = re.compile(r",(?![^(]*\))")  # a comma outside brackets
 GAINS_HELP = (
-    "Your own gains: pid(kp=50,ki=50,kd=8). Your own file: my_law.py, my_laws.py:name, gains.json "
-    "of `smc-mujoco tune --out`, or my_law.py(gains.json)."
+    "Your own gains: pid(kp=50,ki=50,kd=8). Your own file: my_law.py, my_laws.py:name, a "
+    "gains.json written by `smc-mujoco tune --out`, or my_law.py(gains.json)."
 )
 
 
@@ -27,7 +27,7 @@ def picture(contents: str) -> Any:
     """Return an option for the file of a figure that shows `contents`."""
     return typer.Option(
         metavar="PICTURE",
-        help=f"Also draw {contents}: a PDF if PICTURE ends in .pdf, otherwise .svg and .png.",
+        help=f"Also draw {contents}, as a PDF if PICTURE ends in .pdf, otherwise as .svg and .png.",
     )
 
 
@@ -38,8 +38,9 @@ def conditions_by_default(default: str) -> Any:
         metavar="NAME|TEXT|FILE",
         autocompletion=CONDITIONS,
         help="Conditions from `smc-mujoco list`, separated by commas; noise+encoder joins two. "
-        'One of your own needs a --condition of its own: "worn gear: friction=Coulomb(0.05)" or '
-        f"a file with one on each line. May be repeated. Default: {default}.",
+        "Give each condition of your own in a separate --condition: "
+        '"worn gear: friction=Coulomb(0.05)" or a file with one condition on each line. '
+        f"May be repeated. Default: {default}.",
         show_default=False,
     )
 
@@ -81,7 +82,7 @@ Condition = Annotated[
         metavar="NAME|TEXT|FILE",
         autocompletion=CONDITIONS,
         help='The condition of all runs: encoder, noise+encoder, "worn gear: '
-        'friction=Coulomb(0.05)", or a file with one.',
+        'friction=Coulomb(0.05)" or a file with one.',
     ),
 ]
 Defaults = Annotated[
@@ -127,7 +128,9 @@ LawToTune = Annotated[
         "--law",
         metavar="LAW|FILE",
         autocompletion=LAWS,
-        help="As pid or pid(kp=50,ki=50,kd=8), or a file with a law.",
+        help="A law, such as pid, or a file that defines one. Gains in brackets, such as "
+        "pid(kp=50,ki=50,kd=8), are not held: the result is only compared with them. A gain of 0 "
+        "stays 0.",
     ),
 ]
 Laws = Annotated[
@@ -158,10 +161,10 @@ PlantName = Annotated[
         autocompletion=PLANTS,
         help="A plant from `smc-mujoco list`, or joints of your own .xml or .urdf, such as "
         "arm.xml:shoulder+elbow.\n\n"
-        "- The goal is the keyframe home, or the only one of the file. Add @NAME for another one, "
-        "or @ for the pose as drawn: arm.xml:elbow@up.\n\n"
-        "- Motors hold the other joints. Add +locked to weld them, or +file to leave those with "
-        "motors free.\n\n"
+        "- The goal is the keyframe named home, or the file's only keyframe if it has a name. Add "
+        "@NAME for another one, as arm.xml:elbow@up, or @ alone for the pose as drawn.\n\n"
+        "- Motors hold the other joints in place. Add +locked to weld these joints, or +file to "
+        "let them move unless a servo holds them.\n\n"
         "- Brackets after a joint hold its options. elbow(u_max=9,x0=0.2) sets the bound on u and "
         "the start. (motor) puts an ideal motor in place of the file's actuator. (servo) and "
         "(servo=false) say what the actuator is. (partner=pole) names a passive joint. A joint "
@@ -205,8 +208,8 @@ X0 = Annotated[
     typer.Option(
         "--x0",
         metavar="FLOAT[,FLOAT...]",
-        help="Initial position of the joints, rad or m, not counted from the goal: one number for "
-        "all channels, or one for each, such as 0.3,-0.2; default: the plant's.",
+        help="Initial joint positions, rad or m, absolute and not relative to the goal: one number "
+        "for all joints, or one for each, such as 0.3,-0.2; default: the plant's.",
     ),
 ]
 

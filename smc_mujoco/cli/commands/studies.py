@@ -30,10 +30,11 @@ Needs = Annotated[
     str,
     typer.Option(
         "--need",
-        help="What to compare, separated by commas: fast (settling time), accurate (ultimate "
+        help="The scores to compare, separated by commas: fast (settling time), accurate (ultimate "
         "bound), on-track (ITAE), calm (TV rate of u), gentle (largest u), frugal (integral of "
-        "u^2), no-overshoot. Any name of `smc-mujoco list --need`, such as no-velocity, is a "
-        "property that the law must have.",
+        "u^2), no-overshoot. With --minutes or --quick they are only shown: the laws are compared "
+        "by J. Any name of `smc-mujoco list --need`, such as no-velocity, is a property that the "
+        "law must have.",
     ),
 ]
 WhichCondition = Annotated[
@@ -57,9 +58,9 @@ Falling = Annotated[
 Minutes = Annotated[
     float | None,
     typer.Option(
-        help="Answer within so many minutes, with a film, or with a picture where the time is too "
-        "short for one. Laws race under the conditions asked for, until one has the lowest J. "
-        "Laws that there was no time to search are named."
+        help="Answer within so many minutes, with a film, or a picture if there is no time for a "
+        "film. Laws are tuned and compared under the conditions asked for, until one is shown to "
+        "have the lowest J. Laws that could not be tuned in time are listed."
     ),
 ]
 Film = Annotated[
@@ -93,8 +94,9 @@ def which(
 
     All laws that suit the plant are compared by the rules of `compare`, with the package's gains
     or with gains that are tuned now. On a model of your own, tuning takes minutes for each law.
-    --quick takes ten minutes for all at most: it also writes the gains, a figure and a film of the
-    worst run. --law names the laws to try. A stopped command resumes when you start it again.
+    --quick takes at most ten minutes for all laws together. It also writes the gains, a figure and
+    a film of the worst run. --law names the laws to try. A stopped command resumes when you start
+    it again.
 
     Example: smc-mujoco which duffing --condition noise,coulomb --need calm,fast
 
@@ -231,7 +233,10 @@ Condition = Annotated[
 Seeds = Annotated[
     int, typer.Option(min=1, help="Runs of each law on each plant in each condition.")
 ]
-Tune = Annotated[bool, typer.Option(help="Whether to tune laws that have no gains for a plant.")]
+Tune = Annotated[
+    bool,
+    typer.Option(help="Whether to tune laws for which neither you nor the package gives gains."),
+]
 Searches = Annotated[
     int | None,
     typer.Option(
@@ -303,14 +308,17 @@ def compare(
     device: options.Device = "cpu",
     executor: options.Executor = None,
 ) -> None:
-    """Compare control laws on plants in conditions. Tune laws that have no gains, run every law,
-    and report which law is best and how certain that is.
+    """Compare control laws on plants in conditions. Tune laws where needed, run every law, and
+    report which law is best and how certain the answer is.
 
-    Gains that you give in brackets are kept. Any other law, including one from your own file, uses
-    the package's gains for the plant. If there are none, it is tuned by the rule that found the
-    package's gains, which takes seconds to minutes for each law and plant. A stopped command
-    resumes when you start it again. Without --law, the usual laws that suit the plant are
-    compared; --law all compares every general-purpose law.
+    Gains that you give in brackets are used as they are. Otherwise a law of the package uses the
+    gains that are shipped for the plant. If there are none, or if the law is from your own file,
+    it is tuned by the rule that found the shipped gains. This takes seconds to minutes for each
+    law and plant. The default values in your file are used only with --gains default, with
+    --no-tune, or if the law cannot be tuned.
+
+    A stopped command resumes when you start it again. Without --law, the usual laws that suit the
+    plant are compared; --law all compares every general-purpose law.
 
     A rig is a real machine whose parameters were identified. With --rig, its parameter sets replace
     plants and conditions. Laws use the rig's own gains; with --searches, they are tuned on the
