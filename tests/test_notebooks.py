@@ -44,13 +44,17 @@ SAID = {
         assert max(smc.score(trace)["ultimate_bound"] for trace in noisy) < 0.002
         for check, right, wrong in (
             (check_offset, [0.0216, np.float32(0.0216)], [0.0205, -0.0216]),
-            (check_load, [1.576], [1.3, 2.0]),
+            (check_load, [1.576], [1.3, 6.0]),
             (check_width, [2.0], [0.5, 4.0]),
         ):
             assert {check(answer)[:5] for answer in right} == {"Right"}
             assert [check(answer)[:7] for answer in wrong] == ["Not yet"] * 2
         for check in (check_load, check_width):
             assert {check(answer)[:5] for answer in (None, -1.0, 0.0, float("nan"))} == {"Write"}
+        assert "in degrees?" in check_offset(np.degrees(0.0216))
+        assert "between 0 and 10" in check_load(11.0) and "on average" in check_load(6.0)
+        at_bound = [abs(trace.u) >= 6.0 for trace in starts]
+        assert at_bound[0][0] and not at_bound[0][100:].any() and not at_bound[2].any()
         boundary_layer = smc.law("boundary_layer", plant=PLANT).gains
         assert (boundary_layer["k"], boundary_layer["c"]) == (17.96, 15.43)
         told = " ".join(str(compared).split())

@@ -1,4 +1,6 @@
-"""Progress of work that takes more than two seconds: a bar on a terminal, lines elsewhere."""
+"""Progress of work that takes more than two seconds: a bar on a terminal, a line that vanishes in a
+notebook, lines elsewhere.
+"""
 
 import contextlib
 import math
@@ -112,7 +114,8 @@ def bar(
 ) -> Iterator[Bar]:
     """Show a bar while the block lasts.
 
-    If stderr is no terminal, print a line each ten seconds instead.
+    If stderr is no terminal, print a line each ten seconds instead; in a notebook the next replaces
+    it, and nothing of it stays.
 
     `whole` is None if `reached` sets it; if `counted`, the bar has "3/60" instead of a percentage.
     """
@@ -122,7 +125,10 @@ def bar(
     from rich.console import Console
 
     console = Console(stderr=True)
-    if console.is_terminal and not console.is_jupyter:
+    if console.is_jupyter:
+        with _in_notebook() as draw:
+            yield Bar(what, whole, counted, draw, LINE_PERIOD, LINE_PERIOD)
+    elif console.is_terminal:
         with _on_terminal(what, whole, counted, console) as draw:
             yield Bar(what, whole, counted, draw)
     else:
@@ -151,6 +157,27 @@ def _on_terminal(
         yield lambda bar: drawn.update(
             task, completed=bar.done, total=bar.whole, description=bar.what, left=bar.left
         )
+
+
+@contextlib.contextmanager
+def _in_notebook() -> Iterator[Callable[[Bar], None]]:
+    """Yield what draws a bar in an output of the cell, which is left empty."""
+    from IPython.display import DisplayHandle
+
+    output = DisplayHandle()
+    shown = False
+
+    def draw(bar: object) -> None:
+        nonlocal shown
+        write = output.update if shown else output.display
+        shown = True
+        write({"text/plain": str(bar)}, raw=True)
+
+    try:
+        yield draw
+    finally:
+        if shown:
+            draw("")
 
 
 def summed(report: Report, done: float, whole: float) -> Callable[[float], None]:

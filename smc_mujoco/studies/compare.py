@@ -144,7 +144,7 @@ class Compared(Tables):
                 gains.append((plant, law.name, law.source.words, f"{len(sets)}", gains_text(best)))
             for name, time in self.times.get(plant, {}).items():
                 # to a digit: those of repeated calls differ by tens of percent
-                of_law = [number(value, 1) for value in (time.ratio, time.median, time.high)]
+                of_law = [number(value, 2) for value in (time.ratio, time.median, time.high)]
                 times.append((plant, name, *of_law))
         if times:
             about = {"headings": TIME_HEADINGS, "title": TIMES, "notes": [TIME_NOTE]}

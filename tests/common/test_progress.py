@@ -1,4 +1,4 @@
-"""Progress in a notebook: a bar in the cell, without a warning, and nothing left of it."""
+"""Progress: a bar on a terminal, lines in a log, and in a notebook a line of which nothing stays."""
 
 from unittest.mock import MagicMock, call
 
@@ -49,6 +49,25 @@ def test_a_log_gets_a_line_each_ten_seconds(monkeypatch, capsys):
     assert out == ""
     assert err.splitlines()[:2] == ["duffing, 25 %, 30 s left", "duffing, 50 %, 20 s left"]
     assert len(err.splitlines()) == 4
+
+
+def test_a_notebook_s_line_is_replaced_by_the_next_and_leaves_nothing(monkeypatch, capsys):
+    now = [0.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
+    monkeypatch.setattr("IPython.display.DisplayHandle", handle := MagicMock())
+    with progress.bar("film", 4.0):
+        pass
+    assert handle.return_value.mock_calls == []
+    with progress.bar("film", 40.0) as bar:
+        for _ in range(29):
+            now[0] += 1.0
+            bar.advance(1.0)
+    lines = "film, 25 %, 30 s left", "film, 50 %, 20 s left", ""
+    first, *later = [{"text/plain": line} for line in lines]
+    shown = [call.display(first, raw=True), *(call.update(line, raw=True) for line in later)]
+    assert handle.return_value.mock_calls == shown
+    assert capsys.readouterr() == ("", "")
 
 
 def test_the_time_left_is_the_median_of_pieces_that_were_not_read_from_a_file(monkeypatch):
