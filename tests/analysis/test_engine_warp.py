@@ -134,7 +134,7 @@ def on_card(monkeypatch):
 
 
 def test_own_machines_are_scored_in_worlds_and_the_rest_by_mujoco(on_card):
-    alike = cases_of(hinge(), "pid", ("noise",), 0.1, seeds=3)
+    alike = cases_of(hinge(), "pid", (), 0.1, seeds=3)
     jump = smc.Scenario(
         plant=hinge(), law=smc.law("pid"), duration=0.1, jump=smc.Jump(0.05, {"m": 2.0})
     )

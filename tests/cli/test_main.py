@@ -25,6 +25,7 @@ from smc_mujoco.cli import run_scene as show
 from smc_mujoco.cli.commands import options, studies
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
+from smc_mujoco.draw.film import pace
 from smc_mujoco.metrics.catalogue import metrics, score
 from smc_mujoco.simulation import run as runs
 
@@ -641,7 +642,9 @@ def test_x0_is_one_number_or_one_for_each_channel():
 
 
 @pytest.mark.skipif(gl.missing() is not None, reason="no OpenGL")
-def test_a_film_of_an_answer_has_as_many_pictures_as_its_time_allows(tmp_path):
+def test_a_film_of_an_answer_has_as_many_pictures_as_its_time_allows(tmp_path, monkeypatch):
+    clock = pace.clock
+    monkeypatch.setattr(pace, "clock", lambda traces, fps, speed: clock(traces, fps, 1.0))
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
     scenario = smc.Scenario(plant="duffing", law=smc.law("pid"), duration=0.5)
     recommendation = types.SimpleNamespace(worst_trace=smc.run(scenario))

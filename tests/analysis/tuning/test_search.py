@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.tuning import search, search_space, stages
+from smc_mujoco.analysis.tuning import equation, search, search_space, stages
 from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective
 from smc_mujoco.analysis.tuning.result import compare, load_tuned
@@ -41,6 +41,12 @@ def found():
         objective=SHORT,
         searches=3,
     )
+
+
+@pytest.fixture
+def by_mujoco(monkeypatch):
+    """All runs are MuJoCo's: an equation is compiled for seconds, for each law."""
+    monkeypatch.setattr(equation, "key_of", lambda case, device: None)
 
 
 # searches
@@ -337,6 +343,7 @@ def test_a_gain_over_another_is_searched_as_far_as_a_force():
     assert gains["k"] == pytest.approx(6.0 * 10**2.5 * gains["b"], rel=1e-3) or gains["k"] == 1e5
 
 
+@pytest.mark.usefixtures("by_mujoco")
 def test_gains_without_units_are_searched_about_their_defaults_with_a_warning():
     with pytest.warns(
         smc.errors.ScenarioWarning, match=r"gains .* of failing have no unit.*Gain\("
@@ -389,9 +396,12 @@ def narrow(y, gains, memory):
 CONSTRAINED = ("quasi_continuous", "twisting", "conditioned_super_twisting", narrow)
 
 
+SETS = [("twisting", "duffing")]  # by the equation; the others by MuJoCo
+SETS += [(law, "double_pendulum") for law in CONSTRAINED]
+
+
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("law", CONSTRAINED, ids=str)
-@pytest.mark.parametrize("plant", ["duffing", "double_pendulum"])  # by the equation, by MuJoCo
+@pytest.mark.parametrize(("law", "plant"), SETS, ids=str)
 def test_every_set_that_a_search_evaluates_holds_the_theorem_unless_the_user_lifts_it(
     law, plant, monkeypatch
 ):
@@ -435,6 +445,7 @@ def test_every_set_that_a_search_evaluates_holds_the_theorem_unless_the_user_lif
     assert any(missed())
 
 
+@pytest.mark.usefixtures("by_mujoco")
 def test_a_theorem_that_no_gains_of_the_search_hold_is_refused(refused):
     with pytest.warns(smc.errors.GainWarning):
         law = smc.law("terminal", p=0.3)  # held
@@ -506,6 +517,7 @@ def test_a_tuning_is_saved_and_read_back_as_it_was(found, tmp_path):
 # bad input
 
 
+@pytest.mark.usefixtures("by_mujoco")
 @pytest.mark.filterwarnings("ignore:.* no unit")
 def test_a_law_that_fails_later_is_refused_if_no_gains_mend_it(refused):
     def made(limit):
@@ -539,7 +551,7 @@ def test_a_law_that_fails_later_is_refused_if_no_gains_mend_it(refused):
 
 
 WORSE = (
-    r"no set of gains tried for classical on duffing is better than the law's own, with an "
+    r"no set of gains tried for observer_free on duffing is better than the law's own, with an "
     r"objective of \S+ s² instead "
     r"of \S+ s²: give a larger budget"
 )
@@ -548,7 +560,7 @@ WORSE = (
 def test_warns_if_and_only_if_the_laws_own_gains_are_better():
     first = tune(
         "duffing",
-        smc.law("classical", k=0.5),
+        smc.law("observer_free", lam=0.5),
         objective=SHORT,
         searches=1,
     )
@@ -601,7 +613,7 @@ def test_gains_are_tuned_within_a_bound_on_predicted_chattering():
     assert "predicted chattering of s <= 0.0001" in str(bound.definition)
 
 
-@pytest.mark.usefixtures("coarse_grid")
+@pytest.mark.usefixtures("coarse_grid", "by_mujoco")
 @pytest.mark.filterwarnings("ignore:no set of gains")
 def test_it_warns_if_all_gains_tried_chatter_too_much():
     with pytest.warns(
