@@ -40,8 +40,9 @@ NOTE = (
 )
 SCORE_NOTE = f"{NOTE}. The smallest value is shown, with the largest in brackets; {RANGE}"
 UNTRIED = (
-    "these runs were not repeated at half the physics step, which may change values by more than "
-    f"{100.0 * MAX_CHANGE:g} % if there are friction, contacts or other parts, or without RK4"
+    "these runs were not repeated with half the physics step. With friction, contacts or other "
+    "parts, or an integrator other than RK4, halving it may change values by more than "
+    f"{100.0 * MAX_CHANGE:g} %"
 )
 
 

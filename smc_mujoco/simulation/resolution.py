@@ -67,7 +67,7 @@ def _of_motion(trace: Any) -> Iterator[str]:
     """
     if not switches(trace):
         return
-    cure = "smc.accuracy.step_halving([trace]) repeats it at shorter steps"
+    cure = "smc.accuracy.step_halving([trace]) repeats the run at shorter steps"
     name = trace.scenario.plant.name
     if np.any(trace.holding[_last(trace)]):
         yield (
@@ -77,8 +77,8 @@ def _of_motion(trace: Any) -> Iterator[str]:
         )
     elif coupled(trace.scenario.plant):
         yield (
-            f"u of {name} chatters on joints that move together: a change in the last digit may "
-            f"change its ultimate bound by some percent, at any physics step; {cure}"
+            f"u of {name} chatters on coupled joints, so rounding errors alone may change the "
+            f"ultimate bound by a few percent, at any physics step; in Python {cure}"
         )
 
 

@@ -43,20 +43,21 @@ MEDIANS = (
 # A word in tables -> what their key says about it.
 MARKS = {
     "J (": "Tuning minimises J (time-weighted relative error plus weighted variation of u); the "
-    "table's J is from other runs.",
+    "table's J is from separate runs, which tuning has not seen.",
     "shipped": "Shipped gains come with the package.",
     "ITAE": "ITAE is the integral of time times absolute error.",
     "TV rate": "TV rate is the total variation of u per second, in the last fifth of a run.",
-    "strong=True": "A star or bold type marks the winner, or where no law wins those that may be "
-    f"the best: no other law is shown to be better, with {100 * LEVEL:g} % confidence in each "
-    "column and condition, all their runs have arrived, and their samples are enough. Where no "
-    "law wins, a median is not marked if its interval reaches beyond 4 times its lower end and 4 "
-    "times the floor.",
+    "strong=True": "A star or bold type marks the winner. If no law wins, it marks every law that "
+    f"may be the best: no other law is shown to be better, with {100 * LEVEL:g} % confidence in "
+    "each column and condition, all its runs have arrived, and it has enough samples. Then a law "
+    "is not marked if its interval is too wide: its upper end is above 4 times its lower end, and "
+    "above 4 times the floor.",
     "": "A run has arrived if, in its last fifth, the error stays within 10 % of its initial value "
     "or within 5 times the sensor's resolution.",
-    "below ": "Values below the floor count as equal. For an error, the floor is 1e-4 of its "
-    "initial value; late in the run it is at least half an encoder count, and at least the noise. "
-    f"For u and its variation per second, it is {100 * MIN_COMMAND_SHARE:g} % of u_max.",
+    "below ": "Values below the floor count as equal. Beside a law below the floor, no law above "
+    "it is marked. For an error, the floor is 1e-4 of its initial value. For errors late in the "
+    "run, it is also at least half an encoder count and at least the noise. For u and its "
+    f"variation per second, it is {100 * MIN_COMMAND_SHARE:g} % of u_max.",
     "may pass ": "'may pass': the median is below the floor, but it rises at the end of runs, or "
     "with half the physics step, so that it need not stay there.",
     "at half": "'at half the step': the median with half the physics step, if it differs by more "
@@ -69,7 +70,7 @@ UNDER = {
     "": f"Median [{100 * LEVEL:g} % interval].",
     "strong=True": "Bold: may be the best: no other law is shown to be better "
     f"({100 * LEVEL:g} % confidence).",
-    "below ": "Below a floor: too small to be resolved; such laws are not ranked.",
+    "below ": "Below a floor: too small to be resolved; such values count as equal.",
     "at half": "At half the step: the median with half the physics step.",
 }
 
@@ -182,7 +183,7 @@ class Block:
         names = joined(low)
         if len(low) == len(self.medians) == 2:
             names = "both"
-        return f"{names} are below the floor of {self.floor}, so they are not ranked"
+        return f"{names} are below the floor of {self.floor} and count as equal"
 
     @property
     def all_settle_or_none(self) -> bool:
@@ -675,10 +676,10 @@ def key(boards: Sequence[Board], tables: str) -> str:
     parts.append(
         "A winner is better than every other law in a paired test. In each metric by itself, the "
         f"probability of any wrong winner is at most {100 * (1 - LEVEL):g} %, over all conditions "
-        "of the table; over several metrics together it may be as large as their sum. A verdict "
-        "gives the winner's least lead over its rivals: the ratio in paired runs with a "
-        f"{100 * LEVEL:g} % interval. "
-        "It differs from the ratio of the medians. A law is ahead if it is better by more than "
+        "of the table; over several metrics together it may be as large as the sum of these "
+        "probabilities. A verdict gives the winner's least lead over its rivals: the ratio in "
+        f"paired runs with a {100 * LEVEL:g} % interval. It differs from the ratio of the medians. "
+        "A law is ahead if it is better by more than "
         f"{100 * boards[0].relevant:g} % of the larger value."
     )
     if any(board.by_step for board in boards):

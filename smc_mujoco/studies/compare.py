@@ -54,10 +54,13 @@ MAX_SEED = 10**6
 DrawSeed = Annotated[int, Whole(low=0, high=MAX_SEED)]
 TIMES = "Computing time of each compiled law per sample, on this computer"
 TIME_HEADINGS = "plant", "law", "relative time", "median (s)", "99 % quantile (s)"
-TIME_NOTE = "Relative to the law pid on the same measurements. All times vary with the load."
+TIME_NOTE = (
+    "Relative to the law pid on the same measurements. All times depend on how busy the computer "
+    "is."
+)
 GAINS = "plant", "law", "gains", "sets", "best set"
 BEST_SET = (
-    "Run i uses set i; after the last set, runs begin with the first again. The best set has the "
+    "Run i uses set i. After the last set, the sets repeat from the first. The best set has the "
     "lowest J. `smc-mujoco list LAW` has the units of a law's gains."
 )
 
@@ -314,10 +317,11 @@ def compare(
         compared = smc.compare(["pid", "adrc"], "duffing", "friction", seeds=3, out="compared")
         print(compared)
 
-    A law whose gains you gave keeps them. Any other law has those that come with the package for
-    the plant, or is tuned by one rule, yours too: run i has the gains that search i found, so
-    twelve searches are twelve answers to "what do I get if I tune it?". The folder keeps each
-    search and each run: after a kill, the same call resumes there.
+    A law whose gains you gave keeps them. Otherwise a law of the package has the gains that are
+    shipped for the plant. If there are none, or if the law is your own, it is tuned by the rule
+    that found the shipped gains. Run i has the gains that search i found, so twelve searches are
+    twelve answers to "what do I get if I tune it?". The folder keeps each search and each run:
+    after a kill, the same call resumes there.
 
     Args:
       laws: names, or your own laws. Default: the usual ones, of these the ones
@@ -328,7 +332,8 @@ def compare(
       seeds: runs of a law on each plant in each condition; each has another start and other noise,
         the same for every law, and the gains of the next search. With more seeds than searches,
         runs take these in turn.
-      tune: whether to tune laws without gains for a plant; otherwise they run with their defaults.
+      tune: whether to tune laws for which neither you nor the package gives gains; otherwise they
+        run with their defaults.
       worst: whether to search the worst case of each law on each plant too; or the class in which
         to search it.
       out: folder for gains and runs.

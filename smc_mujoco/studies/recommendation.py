@@ -133,15 +133,16 @@ class NoLaw(NamedTuple):
         """How it does, and in which conditions the experiment shows no need of a law."""
         held = "u = 0, at which the servo holds the goal" if self.holds else "u = 0"
         every = self.runs * len(self.settled)
-        text = f"with {held}, {sum(self.settled.values())} of {every} runs settle "
-        text += f"({self.settled_by_law} with the law), and "
+        each = f", {self.runs} in each condition" if len(self.settled) > 1 else ""
+        text = f"of {counted(every, 'separate run')}{each}, {sum(self.settled.values())} settle "
+        text += f"with {held}, and {self.settled_by_law} with the law. "
         if math.isnan(self.times):
-            text += "some runs fail, so J is not compared"
+            text += "Some runs fail, so J is not compared"
         else:
-            text += f"J is {number(self.times)} times the law's"
+            text += f"Without the law, J is {number(self.times)} times as high"
         needless = [name for name, count in self.settled.items() if count == self.runs]
         if needless:
-            text += f". All of them settle under {joined(needless)}"
+            text += f". With u = 0 all runs settle under {joined(needless)}"
         return text
 
 
@@ -183,9 +184,9 @@ class RaceRecommendation(Recommendation):
         if searched and self.race.comparison:
             lines.append(f"Over all sets of gains: {self._over_sets}")
         if self.fixed:
-            lines.append(f"With these gains: {self._with_these}")
+            lines.append(f"With the gains below: {self._with_these}")
         elif len(self.laws) > 1:
-            lines.append("With these gains: not tried, as the time was over")
+            lines.append("With the gains below: not tried, as the time was over")
         if len(self.weighs) > 1:
             lines.append(f"Its J: {self._weighs}")
         lines.append(f"Its scores: {self._needs}")
@@ -195,8 +196,8 @@ class RaceRecommendation(Recommendation):
             lines.append(f"Added: {self.added}")
         lines += [f"Settles: {self._where}", f"Tolerates: {self._margins}"]
         for name, share in self.race.dropped.items():
-            least = f"its lowest J was {number(share)} times the highest of the law that led"
-            lines.append(f"Dropped after {FIRST} sets, not tested: {name}; {least}")
+            least = f"its best J was {number(share)} times the leader's worst J"
+            lines.append(f"Dropped after {FIRST} sets of gains, without a test: {name}; {least}")
         if self.race.unsearched:
             late = f"{joined(self.race.unsearched)}, as the time was over"
             lines.append(f"Not searched: {late}; the same call goes on with them")
@@ -261,9 +262,8 @@ class RaceRecommendation(Recommendation):
         """What runs say of the laws with the gains printed, which may not be all that raced."""
         names = [one.name for one in self.laws]
         text = _verdict(self.fixed, names)  # pyright: ignore[reportArgumentType]
-        if len(names) < len(self.race.entrants):
-            return f"of {joined(names)}, {text}"
-        return text
+        of_some = f" of {joined(names)}" if len(names) < len(self.race.entrants) else ""
+        return f"on separate runs{of_some}, {text}"
 
     @property
     def _takes(self) -> str:
@@ -295,8 +295,8 @@ class RaceRecommendation(Recommendation):
         least = runs
         for done, _ in found.values():
             least = min(least, done)
-        share = f"all {runs}" if least == runs else f"at least {least} of {runs}"
-        return f"in {share} unseen runs in {_each(len(found))}"
+        share = "all" if least == runs else f"at least {least}"
+        return f"in {share} of another {runs} runs in {_each(len(found))}"
 
     @property
     def _weighs(self) -> str:
@@ -323,7 +323,7 @@ class RaceRecommendation(Recommendation):
             low, high = size(min(medians), metric), size(max(medians), metric)
             few = f" in {len(medians)} of {count} conditions" if len(medians) < count else ""
             parts.append(f"{headings[metric]} {span(low, high) or low}{few}")
-        over = ", the medians by condition" if count > 1 else ""
+        over = ", range of the medians over the conditions" if count > 1 else ""
         return f"{joined(parts)}{over}"
 
     @property
@@ -346,11 +346,11 @@ class RaceRecommendation(Recommendation):
             if margin.unit == self.worst_run.efforts[0]:
                 level += f" ({self._reach})"
             parts.append(f"{margin.kind} {level}")
-        where = "without these conditions" if self.beside == "nominal" else f"under {self.beside}"
-        text = f"{joined(parts)}, one at a time and {where}: in {self.worst_run.duration:g} s "
-        text += "the error still ends below 5 % of its initial value"
+        where = "without the conditions" if self.beside == "nominal" else f"under {self.beside}"
+        text = f"each alone and {where}, {joined(parts)}. At these levels the error after "
+        text += f"{self.worst_run.duration:g} s is still below 5 % of its initial value"
         if self.beside != "nominal":
-            text += ". Delay and mass include those of the condition, friction and blows are on top"
+            text += ". Delay and mass include those of the condition; friction and blows are added"
         if self.helped:
             names = joined(self.helped)
             text += (
@@ -406,7 +406,7 @@ class RaceRecommendation(Recommendation):
                 f"{' and of the next one' if self.race.winner else ''}."
             )
         notes.append(
-            f"{MEDIANS} Nothing in these tables is tested; the tests stand below. "
+            f"{MEDIANS} These tables show no significance tests; those are below. "
             f"{capital(UNTRIED)}."
         )
         last = shown.pop()
@@ -424,13 +424,13 @@ class RaceRecommendation(Recommendation):
             cell = Cell(middle, span(_cost(values[0]), _cost(values[-1])))
             rows.append([name, cell, f"{len(values)}"])
         return Tabular(
-            headings=["law", "J (s^2)", "runs"],
+            headings=["law", "J (s^2)", "groups of runs"],
             rows=rows,
             title=f"J {self.judged}",
             notes=[
-                "Median and range over sets of gains, each on unseen runs of its own. J is the "
-                "time-weighted relative error plus the weighted variation of u, added up over "
-                "the conditions."
+                "Median and range over groups of runs that tuning has not seen. Each group is run "
+                "with the law's next set of gains, or with its only one. J is the time-weighted "
+                "relative error plus the weighted variation of u, added up over the conditions."
             ],
         )
 

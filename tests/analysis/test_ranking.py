@@ -711,8 +711,8 @@ SHOWN = [
     (FINE, "0.00015 m"),
 ]
 BELOW = [  # factors of q of laws a, b and c, the winner, and what is said
-    ((0.3, 0.9), None, "both are below the floor of {q}, so they are not ranked"),
-    ((0.5, 0.6, 3.0), None, "a and b are below the floor of {q}, so they are not ranked"),
+    ((0.3, 0.9), None, "both are below the floor of {q} and count as equal"),
+    ((0.5, 0.6, 3.0), None, "a and b are below the floor of {q} and count as equal"),
     ((0.5, 1.01), None, "a is below the floor of {q}, unlike b's"),
     (
         (0.5, 4.0, 5.0),
@@ -743,7 +743,7 @@ def test_laws_below_the_floor_are_not_ranked_and_a_lead_over_it_is_a_least_one(
     if "both" in words:  # and in another condition neither is
         two = {law: np.vstack([scores[law], 9.0 * scores["a"]]) for law in "ab"}
         table = table_of(two, "ultimate_bound", scenario=np.tile(rows, 2))
-        both = f"both are below the floor of {q} under c0, so they"
+        both = f"both are below the floor of {q} under c0 and count"
         assert both in leaderboard(table, ["ultimate_bound"])[0].result
     cells = {}
     for row in board.tables[0].rows:

@@ -62,7 +62,7 @@ def test_compare_prints_the_medians_and_the_counts_of_its_table(printed):
     rows = parquet.read_table("there/results.parquet").to_pylist()
     failed = sum(one["failure"] is not None for one in rows)
     assert failed == 3
-    assert re.search(rf"^{len(rows)} runs, {failed} broke off,", out, re.MULTILINE)
+    assert re.search(rf"^{len(rows)} runs, {failed} stopped early,", out, re.MULTILINE)
     of_runs = out[out.index("duffing, nominal") :]
     for law in ("classical", "pid"):
         its = [one for one in rows if one["law"] == law]

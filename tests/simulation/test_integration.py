@@ -162,7 +162,7 @@ def test_coulomb_is_frictionloss_on_joints_that_move_together(law):
         ({"joint": RANGE}, ""),
         ({"joint": RANGE, "friction": PARTS}, ""),
         ({"joint": RANGE, "noise": smc.Noise(position=1e-4)}, ""),
-        ({"joint": RANGE, "law": "super_twisting"}, "joints that move together"),
+        ({"joint": RANGE, "law": "super_twisting"}, "coupled joints"),
         ({"joint": RANGE, "law": "super_twisting", "friction": PARTS}, "dry friction"),
         ({"joint": RANGE, "friction": LuGre(0.3, 0.4, 0.1, 300.0)}, "LuGre acts once"),
         ({"joint": RANGE, "actuator": smc.Backlash(0.01, 0.01)}, "Backlash acts once"),

@@ -356,7 +356,7 @@ def test_one_command_runs_tables_and_draws(tmp_path, monkeypatch, capsys):
         main.main(words)
     assert end.value.code in (0, None)
     printed = capsys.readouterr().out
-    assert "16 runs, 0 broke off" in printed
+    assert "16 runs, 0 stopped early" in printed
     table = smc.Table.read("results")
     assert set(table.column("condition")) == {"friction", "worn"}
     assert set(table.column("seed")) == {2_000_000, 2_000_001}

@@ -199,7 +199,7 @@ def _film(recommendation: "RaceRecommendation", out: Path, ends: float, terminal
             fps = min(fps, fps * fit / len(frames))
         if fps >= MIN_FPS:
             terminal.wrote(films.film(run, out / "worst_run.mp4", fps=fps))
-            terminal.note(f"The film has {fps:.2g} pictures a second.")
+            terminal.note(f"The film has {fps:.2g} frames per second.")
         else:
             file = out / "worst_run_machine.png"
             terminal.wrote(films.film(run, file, at=_worst_time(recommendation.worst_trace)))
@@ -314,8 +314,8 @@ def compare(
     Gains that you give in brackets are used as they are. Otherwise a law of the package uses the
     gains that are shipped for the plant. If there are none, or if the law is from your own file,
     it is tuned by the rule that found the shipped gains. This takes seconds to minutes for each
-    law and plant. The default values in your file are used only with --gains default, with
-    --no-tune, or if the law cannot be tuned.
+    law and plant. The default values in your file are used only if you give --gains or --no-tune,
+    or if the law cannot be tuned.
 
     A stopped command resumes when you start it again. Without --law, the usual laws that suit the
     plant are compared; --law all compares every general-purpose law.
@@ -408,7 +408,7 @@ def _pictures(figure: Path | None) -> list[Path]:
 def _finish(table: "Table", out: Path, terminal: Terminal) -> None:
     """Print the number of runs and the file with all of them, and end the command."""
     failed = len(table) - table.data["failure"].null_count
-    runs = f"{counted(len(table), 'run')}, {failed} broke off"
+    runs = f"{counted(len(table), 'run')}, {failed} stopped early"
     terminal.note(f"{runs}, {terminal.seconds:.0f} s")
     terminal.wrote(out / "results.parquet")
     terminal.finish()
