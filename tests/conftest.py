@@ -126,6 +126,12 @@ def coarse_grid(monkeypatch):
 
 
 @pytest.fixture
+def by_mujoco(monkeypatch):
+    """Tune by runs of MuJoCo: the equation of each law would be compiled for 5 s."""
+    monkeypatch.setattr("smc_mujoco.analysis.tuning.equation.key_of", lambda case, device: None)
+
+
+@pytest.fixture
 def present_objects_frozen():
     """Exclude the present objects from a test's own `gc.collect`, which takes half a second with
     them.

@@ -45,6 +45,7 @@ def test_laws_are_tuned_from_the_starts_of_the_packages_gains_where_these_are_co
     assert asked == [Objective().starts, other, other]
 
 
+@pytest.mark.usefixtures("by_mujoco")
 def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(tmp_path, monkeypatch):
     gains = {"kp": Gain(0.01, FORCE_PER_POSITION), "kd": Gain(0.01, FORCE_PER_SPEED)}
 
@@ -93,6 +94,7 @@ def root_sliding(y, gains, memory):
 """
 
 
+@pytest.mark.usefixtures("by_mujoco")
 def test_a_law_has_its_gains_and_runs_whichever_way_its_file_is_reached(tmp_path, monkeypatch):
     """As a script, by its name on the command line, and by an import; until a helper changes."""
     monkeypatch.chdir(tmp_path)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.tuning import equation, search, search_space, stages
+from smc_mujoco.analysis.tuning import search, search_space, stages
 from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective
 from smc_mujoco.analysis.tuning.result import compare, load_tuned
@@ -41,12 +41,6 @@ def found():
         objective=SHORT,
         searches=3,
     )
-
-
-@pytest.fixture
-def by_mujoco(monkeypatch):
-    """All runs are MuJoCo's: an equation is compiled for seconds, for each law."""
-    monkeypatch.setattr(equation, "key_of", lambda case, device: None)
 
 
 # searches

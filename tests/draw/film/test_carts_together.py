@@ -122,7 +122,9 @@ def test_in_one_picture_of_several_machines_words_say_their_order(monkeypatch):
         return page
 
     monkeypatch.setattr(film, "Sheet", kept)
-    runs = smc.run(list(smc.paper.comparison("duffing", duration=0.1).values()))
+    runs = []
+    for law in ("classical", "adaptive"):
+        runs.append(smc.run(smc.Scenario(plant="duffing", law=smc.law(law), duration=0.1)))
     for shown in (runs, runs[:1]):
         next(iter(film.Frames(shown, size=SIZE, at=0.05)))
     assert "back to front" in keys[0]
