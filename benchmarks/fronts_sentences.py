@@ -494,17 +494,17 @@ def in_readme(points: Sequence[dict]) -> str:
     """Return what README says of the points that were not drawn."""
     quiet, noisy, *smooth = tallies([point for point in points if point["draw"] is None])
     return (
-        "A case is a plant, a period, a load and a J; it counts where both sides have gains with "
-        "that J. "
-        f"In {noisy['all']} cases with sensor noise, super-twisting leads the best of its rivals "
-        f"`adrc`, `pd_observer`, `hodob` and `pid` in {leads(noisy)} and trails it in "
-        f"{noisy['contradicted']}. In {quiet['all']} cases without noise it leads in "
-        f"{leads(quiet)} and trails in {quiet['contradicted']}; in {quiet['not ranked']} the "
-        "errors are below a ten-thousandth of the start, or near it, and are not ranked. In "
+        "A case is one plant, period, load and J, with or without sensor noise. It counts only if "
+        "both sides have gains with at most that J. "
+        f"There are {noisy['all']} cases with sensor noise: super-twisting leads the best of its "
+        f"rivals `adrc`, `pd_observer`, `hodob` and `pid` in {leads(noisy)} and trails it in "
+        f"{noisy['contradicted']}. There are {quiet['all']} cases without noise: it leads in "
+        f"{leads(quiet)}, trails in {quiet['contradicted']}, and in {quiet['not ranked']} the "
+        "errors are too small to rank, below or near a ten-thousandth of the initial error. In "
         f"{noisy['not settled'] + quiet['not settled']} of these {noisy['all'] + quiet['all']} "
-        "cases the runs do not determine an error, and no lead is counted. Smooth first-order "
-        "sliding has gains in more cases: with noise and without, it leads the best rival in "
-        f"{sum(map(leads, smooth))} of {sum(its['all'] for its in smooth)} and trails in "
+        "cases the runs scatter too much to determine an error, and no lead is counted. Smooth "
+        f"first-order sliding has such gains in {sum(its['all'] for its in smooth)} cases, with "
+        f"noise or without: it leads the best rival in {sum(map(leads, smooth))} and trails it in "
         f"{sum(its['contradicted'] for its in smooth)}."
     )
 

@@ -202,7 +202,7 @@ def test_readme_s_cost_of_a_law_is_that_of_the_benchmark():
         for how in ("RK4", "Euler")
     ]
     added = [f"{100.0 * (measured[case] - 1.0):.0f}" for case in cases]
-    sentence = r"compiled law adds (\d+) % .* RK4 and (\d+) % under Euler, .* (\d+) % and (\d+) %"
+    sentence = r"compiled law adds (\d+) % .* RK4 and (\d+) % under Euler; .* (\d+) % and (\d+) %"
     assert [*re.findall(sentence, " ".join(README.split()))[0]] == added
 
 

@@ -79,9 +79,10 @@ def which(
     Args:
       plant: a name, a Plant, or your own MJCF and its joints, as "arm.xml:shoulder,elbow".
       conditions: names, texts or Conditions, see `condition`. Default: nominal, noise and sine.
-      needs: what to compare: "fast", "accurate" (at the end), "on-track" (on the way), "calm",
-        "gentle", "frugal", "no-overshoot"; by default fast, accurate and calm. And what every law
-        must have: "continuous" and the other names of `smc_mujoco.control.properties.PROPERTIES`.
+      needs: the scores to compare: "fast", "accurate" (at the end), "on-track" (on the way),
+        "calm", "gentle", "frugal", "no-overshoot"; by default fast, accurate and calm. With
+        minutes they are only shown: the laws are compared by J. And what every law must have:
+        "continuous" and the other names of `smc_mujoco.control.properties.PROPERTIES`.
       laws: the laws to compare, by name or with your own gains. Default: all that suit.
       seeds: runs of a law in each condition, each with another start and other noise. Default: 24,
         or 14 with minutes.
