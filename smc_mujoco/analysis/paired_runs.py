@@ -19,13 +19,14 @@ from smc_mujoco.control.source import Source, restore
 from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.metrics.conventions import groups as channel_groups
-from smc_mujoco.metrics.conventions import resolution
+from smc_mujoco.metrics.conventions import resolution, settles_in_time
 from smc_mujoco.simulation.scenario import Scenario
 
 MIN_COMMAND_SHARE = 1e-3  # of the bound on u: smaller values of u matter on no machine; chosen
 EPS = 1e-4  # of the start: smaller errors are not told apart, as gains have four digits; chosen
 ROUNDING = 1e-9  # in SI units: smaller metrics count as 0 where results are compared
-SETTLES = "settles"  # a name used like a metric's: whether the settling time is finite
+# a name used like a metric's: whether a run settles before its last part, see `settles_in_time`
+SETTLES = "settles"
 OBJECTIVE = "objective"  # a name used like a metric's: J on instances that no search has seen
 UNITS = {metric.name: metric.unit for metric in metrics()}  # of what boards compare
 UNITS |= {SETTLES: "", OBJECTIVE: "s^2"}
@@ -36,8 +37,8 @@ OTHER_ENTRIES = ("model", "versions")
 
 
 class RunColumns(Protocol):
-    """A table with a row per run and columns plant, law, condition, seed, failure, diverged_at,
-    arrived, touched, and every metric.
+    """A table with a row per run and columns plant, law, condition, seed, duration, failure,
+    diverged_at, arrived, touched, and every metric.
     """
 
     def column(self, name: str) -> Array:
@@ -69,9 +70,9 @@ def values(table: RunColumns, metric: str) -> Array:
     """Return a metric by row: inf for a failed run, and for one that has not arrived unless the
     metric is an error; NaN where it does not apply.
 
-    "settles" is 0.0 for a run that settles, else 1.0. A metric does not apply to a plant if no
-    successful run has it. A limit cycle that a run does not have counts as one of amplitude 0, see
-    `Metric.absent`.
+    "settles" is 0.0 for a run that settles in time, else 1.0. A metric does not apply to a plant if
+    no successful run has it. A limit cycle that a run does not have counts as one of amplitude 0,
+    see `Metric.absent`.
     """
     name = _column(metric)
     scores = np.array(table.column(name), float)
@@ -85,7 +86,7 @@ def values(table: RunColumns, metric: str) -> Array:
         lost = lost | ~has_arrived(table)
     scores[lost] = np.inf
     scores[np.isin(plants, list(lacking))] = np.nan
-    return _settled(scores) if metric == SETTLES else scores
+    return _missed(scores, table) if metric == SETTLES else scores
 
 
 def _column(metric: str) -> str:
@@ -103,14 +104,15 @@ def by_row(table: RunColumns, metric: str) -> ByRow:
     halves[np.isnan(whole)] = np.nan
     trends = _from_json(table, "trends", name, np.nan)
     if metric == SETTLES:
-        halves = _settled(halves)
+        halves = _missed(halves, table)
         trends[:] = np.nan
     return ByRow(whole, halves, trends, has_arrived(table).astype(float))
 
 
-def _settled(times: Array) -> Array:
-    """Return 0.0 for a time, 1.0 for never, NaN for none."""
-    return np.where(np.isnan(times), np.nan, np.isinf(times))
+def _missed(times: Array, table: RunColumns) -> Array:
+    """Return by row 0.0 for a run that settles in time, else 1.0; NaN for no settling time."""
+    durations = np.asarray(table.column("duration"), float)
+    return np.where(np.isnan(times), np.nan, ~settles_in_time(times, durations))
 
 
 def _from_json(table: RunColumns, column: str, name: str, absent: float) -> Array:

@@ -36,6 +36,9 @@ project:
   of the largest |r'|.
 - tracked: with tracks="speed" of the scenario, x and r stand for x' and r' in all of this, and
   units of x for those of a speed.
+- settled in time: settled before the last part. An oscillation that leaves the band again and again
+  may be within it when the run ends, and then has a settling time. "settles" counts the runs that
+  settle in time.
 - last part: the last 20 % of the run, the samples with t >= t0 + 0.8 (tK - t0), at least one.
 - approach: the part of one channel's run towards one reference. It begins at t[0], and again at
   each sample at which r has jumped by more than the settling band; the side it comes from is the
@@ -70,7 +73,7 @@ from smc_mujoco.common.errors import ScenarioError, has, shown
 from smc_mujoco.common.text import first_paragraph, joined, number
 from smc_mujoco.mechanisms.custom.scales import falls
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
-from smc_mujoco.metrics.fold import Fold, first_sample
+from smc_mujoco.metrics.fold import LAST_PART, Fold, first_sample
 from smc_mujoco.simulation.python_functions import evaluate
 
 if TYPE_CHECKING:
@@ -477,6 +480,13 @@ def leans(trace: Trace) -> bool:
 def last_part(trace: Trace) -> slice:
     """Return the samples of the last part."""
     return slice(first_sample("late", trace.t), None)
+
+
+def settles_in_time(time: Any, duration: Any) -> Any:
+    """Return whether runs of these durations, s, settle before their last part: an oscillation that
+    leaves the band again and again may be within it at the end. Arrays, or numbers.
+    """
+    return time <= (1.0 - LAST_PART) * duration
 
 
 def travels(trace: Trace) -> bool:

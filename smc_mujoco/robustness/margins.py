@@ -45,6 +45,7 @@ from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.robustness.uncertainty import JITTER_SHARES, with_friction, with_jitter
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import DURATION, Condition
+from smc_mujoco.simulation.doubts import constant_goal
 from smc_mujoco.simulation.force_bounds import default_u_max
 from smc_mujoco.simulation.grid import START_CURE, Starts, case, listed, listed_laws
 from smc_mujoco.simulation.scenario import Scenario
@@ -443,7 +444,8 @@ def margins(
       tolerated. Its `figure("margins.svg")` draws them.
 
     Raises:
-      ScenarioError: an unknown plant, law, kind, set or condition, or a plant that starts at 0.
+      ScenarioError: an unknown plant, law, kind, set or condition, or runs that start at their
+        goal: the one run of a margin begins in the middle of the starts, without their `by`.
     """
     if isinstance(plants, Scenario):
         raise ScenarioError("margins are of plants and laws, not of a scenario: give their names")
@@ -453,9 +455,10 @@ def margins(
         for law in listed_laws(laws):
             bases.append(case(plant, law, condition, duration, gains, starts=starts))
     for base in bases:
-        if not any(base.resolved.x0):
+        if base.resolved.x0 == constant_goal(base):
             raise ScenarioError(
-                f"{base.plant.name} starts at 0, and margins need an initial error: {START_CURE}"
+                f"{base.plant.name} starts at its goal, and margins need an initial error: "
+                f"{START_CURE}"
             )
     resolution = COARSE if quick else FINE
     return margins_of(bases, listed("kinds", kinds), resolution, threads, report, device)

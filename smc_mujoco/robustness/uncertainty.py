@@ -26,7 +26,7 @@ from smc_mujoco.common.constraints import Natural, Positive, constrain, suggesti
 from smc_mujoco.common.data import frozen_data, keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.mechanisms.custom.model_numbers import dotted, with_model_numbers
+from smc_mujoco.mechanisms.custom.model_numbers import dotted, model_numbers, with_model_numbers
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
@@ -134,23 +134,28 @@ class Uncertainty:
 
     def words(self, plant: Plant) -> str:
         """Return the bounds that were given as text, such as "disturbance 2 N, mass 0.7 to 1.3"."""
-        x = plant.units[0]
-        force = EFFORT[x]
-        units = {"disturbance": force, "slope": f"{force}/s", "friction": force}
-        units |= {"position_noise": x, "velocity_noise": f"{x}/s", "encoder": "counts"}
-        units |= dict.fromkeys(("hold", "delay", "jitter"), "s")
         given = {}
         for field in dataclasses.fields(self):
             if getattr(self, field.name) != field.default:
                 given[field.name] = getattr(self, field.name)
         given |= given.pop("parameters", {})
-        parts = []
-        for name, bound in given.items():
-            ends = bound if isinstance(bound, tuple) else (bound,)
-            width = " to ".join(f"{end:g}" for end in ends)
-            words = f"{name.replace('_', ' ')} {width} {units.get(name, '')}"
-            parts.append(words.strip())
-        return ", ".join(parts)
+        return words_of(given, plant)
+
+
+def words_of(given: Mapping[str, float | Pair], plant: Plant) -> str:
+    """Return numbers or bounds by name as text, such as "disturbance 2 N, mass 0.7 to 1.3"."""
+    x = plant.units[0]
+    force = EFFORT[x]
+    units = {"disturbance": force, "slope": f"{force}/s", "friction": force}
+    units |= {"position_noise": x, "velocity_noise": f"{x}/s", "encoder": "counts"}
+    units |= dict.fromkeys(("hold", "delay", "jitter"), "s")
+    parts = []
+    for name, bound in given.items():
+        ends = bound if isinstance(bound, tuple) else (bound,)
+        width = " to ".join(f"{end:.4g}" for end in ends)
+        words = f"{name.replace('_', ' ')} {width} {units.get(name, '')}"
+        parts.append(words.strip())
+    return ", ".join(parts)
 
 
 def default_class(scenario: Scenario) -> Uncertainty:
@@ -603,8 +608,14 @@ def with_friction(scenario: Scenario, level: float) -> Scenario:
 
 
 def dry_frictions(plant: Plant) -> list[str]:
-    """Return the names of the plant's dry frictions that are not 0."""
-    return [name for name in plant.dry if plant.parameters[name]]
+    """Return the names of the dry frictions of a plant, or of the joints of a user's model, that
+    are not 0.
+    """
+    names = [name for name in plant.dry if plant.parameters[name]]
+    for name, one in model_numbers(plant).items():
+        if one.kind == "frictionloss" and one.value:
+            names.append(name)
+    return names
 
 
 def _with_friction_scale(scenario: Scenario, factor: float) -> Scenario:

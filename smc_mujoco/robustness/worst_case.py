@@ -18,6 +18,7 @@ import numpy as np
 
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns, worth_compiling
+from smc_mujoco.common.aliases import Numbers
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.constraints import Seed, Whole, constrained
 from smc_mujoco.common.data import attributes
@@ -34,6 +35,7 @@ from smc_mujoco.robustness.uncertainty import (
     default_class,
     dry_frictions,
     outside,
+    words_of,
 )
 from smc_mujoco.robustness.worst_case_search import WorstCaseSearch
 from smc_mujoco.simulation import run_key, scenario_json
@@ -75,6 +77,8 @@ class WorstCase(Tables):
     seed: int  # of the search
     checked: str = ""  # how far the fast engine's scores are from MuJoCo's
     sets: int = 1  # number of sets of the machine's parameters that the adversary chose from
+    # what is constant in the worst run, and may differ in the class: name -> number
+    constants: Numbers = dataclasses.field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"WorstCase({self})"
@@ -82,8 +86,13 @@ class WorstCase(Tables):
     def __str__(self) -> str:
         s = self.nominal
         label = CATALOGUE[self.metric].label
-        found = f"{label} {self.words}, median of random members {self.with_unit(self.median)}"
-        words = "; ".join(filter(None, (found, self.class_words, self.checked)))
+        found = f"{label} {self.words}"
+        if self.constants:
+            found += f" with {words_of(self.constants, s.plant)}"
+        drawn = f"median of random members {self.with_unit(self.median)}"
+        words = "; ".join(
+            filter(None, (found, drawn, f"searched: {self.class_words}", self.checked))
+        )
         return f"{s.law.name} on {s.plant.name}: {words}"
 
     @property
@@ -116,7 +125,7 @@ class WorstCase(Tables):
     def about(self) -> dict[str, Any]:
         """Return it as JSON data, with the scenario as in a trace's file."""
         names = "value", "median", "unit", "found_by", "tried", "metric", "outside", "seed", "sets"
-        return attributes(self, (*names, "checked")) | {
+        return attributes(self, (*names, "checked", "constants")) | {
             "within": dataclasses.asdict(self.within),
             "scenario": scenario_json.describe(self.scenario),
         }
@@ -283,6 +292,10 @@ def _worst_of(
         if one.by_mujoco:
             known.append(one)
     worst = max(known, key=lambda tried: tried.key)
+    constants = {}
+    for constant, share in zip(members.constants, worst.member.shares.tolist(), strict=True):
+        if constant.name != "set":  # the worst run's scenario is of it
+            constants[constant.name] = constant.value(share)
     drawn = [tried.key[0] for tried in drawing.tried]
     return WorstCase(
         value=float(worst.key[0]),
@@ -298,6 +311,7 @@ def _worst_of(
         seed=seed,
         checked=checked,
         sets=len(scenarios),
+        constants=constants,
     )
 
 

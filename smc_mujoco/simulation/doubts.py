@@ -42,17 +42,25 @@ def _doubtful_units(s: Any) -> Iterator[str]:
 
 def _unreachable_goals(s: Any) -> Iterator[str]:
     """Yield a sentence about each obstacle that a constant reference runs into."""
-    constant = all(isinstance(signal, Constant) for signal in s.references)
-    if not constant or s.law.name == "none":
+    goal = constant_goal(s)
+    if goal is None or s.law.name == "none":
         return
-    goal = [signal.parameters()["amplitude"] for signal in s.references]
-    goal += s.plant.goal or s.plant.origin[s.plant.driven :]
     for part in s.contact:
         if met := part.meets(s.plant, goal):
             yield (
                 f"the reference of {s.plant.name} has {met}, so that it is not reached: give "
                 "another reference or more room, unless it is to lean there"
             )
+
+
+def constant_goal(s: Any) -> tuple[float, ...] | None:
+    """Return where a constant reference wants each channel, and where the others rest; None for
+    another reference.
+    """
+    if not all(isinstance(signal, Constant) for signal in s.references):
+        return None
+    wanted = tuple(signal.parameters()["amplitude"] for signal in s.references)
+    return wanted + tuple(s.plant.goal or s.plant.origin[s.plant.driven :])
 
 
 def _positions_for_speeds(s: Any) -> Iterator[str]:

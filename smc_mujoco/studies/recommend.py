@@ -294,11 +294,12 @@ def _worst_run(table: Table, law: str) -> Scenario:
     the fewest runs, or latest.
     """
     times = values(table, "settling_time")
+    missed = values(table, SETTLES)
     own = table.column("law") == law
     worst, rank = 0, (-1.0, -1.0)
     for condition in dict.fromkeys(table.column("condition").tolist()):
         rows = np.flatnonzero(own & (table.column("condition") == condition))
-        late = float(np.isinf(times[rows]).mean()), float(np.median(times[rows]))
+        late = float(missed[rows].mean()), float(np.median(times[rows]))
         if late > rank:
             worst, rank = int(rows[np.argmax(times[rows])]), late
     return table.scenario(worst)

@@ -543,6 +543,7 @@ def study(seeds: int = 20) -> MadeTable:
         condition=condition,
         seed=seed,
         law=law,
+        duration=np.full(len(values), 1e3),
         settling_time=np.where(lost, NAN, np.where(never, INF, values)),
         failure=np.where(lost, "left the world", None),
         diverged_at=np.where(lost, 1.0, NAN),
@@ -849,3 +850,11 @@ def test_a_law_is_not_told_from_the_best_by_its_own_samples_alone():
     assert not Comparison(scores, sets=sets).best.any()
     beside = Comparison(scores | {"other": [1.01 * spread[::-1]]}, sets=sets | {"other": [many]})
     assert beside.best[:, 0].tolist() == [False, True, True]
+
+
+def test_a_run_that_is_within_its_band_at_its_end_alone_has_not_settled_in_time():
+    """An oscillation a little beyond the band has settling times near the end of the runs."""
+    times = np.array([[0.5, 1.59, 1.61, 1.96, math.inf, math.nan]])
+    table = table_of({"a": times}, "settling_time", duration=np.full(6, 2.0))
+    expected = [0.0, 0.0, 1.0, 1.0, 1.0, math.nan]
+    np.testing.assert_array_equal(paired_runs.values(table, "settles"), expected)

@@ -28,7 +28,7 @@ class MadeTable:
 
     def __init__(self, **columns):
         rows = len(columns["law"])
-        self.columns = {"seed": np.arange(rows)}
+        self.columns = {"seed": np.arange(rows), "duration": np.full(rows, 10.0)}
         for name in (*CATALOGUE, "diverged_at"):
             self.columns[name] = np.full(rows, math.nan)
         for name, text in TEXTS.items():

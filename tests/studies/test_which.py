@@ -33,7 +33,7 @@ FAST = smc.law("observer_free", lam=6.0, k1=2.0)
 SLOW = smc.law("observer_free", lam=6.0, k1=5.0).named("slow")
 IDLE = smc.law("none").named("idle")
 COMMON = {
-    "duration": 2.5,
+    "duration": 3.0,
     "seeds": 16,
     "conditions": ["nominal", "noise"],
 }
@@ -497,6 +497,7 @@ class Columns:
         fine = np.full(len(rows), None), np.full(len(rows), math.nan), np.full(len(rows), True)
         named = dict(zip(("failure", "diverged_at", "arrived"), fine, strict=True))
         named |= {"law": law, "condition": condition, "settling_time": time}
+        named["duration"] = np.full(len(rows), 2.0)
         return named.get(name, np.full(len(rows), "mass"))
 
     def scenario(self, row):

@@ -39,6 +39,7 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.rotation import pose_errors
 from smc_mujoco.metrics import catalogue as metrics
+from smc_mujoco.metrics.conventions import settles_in_time
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, Condition
 from smc_mujoco.simulation.grid import (
     GRID_SEEDS,
@@ -309,10 +310,10 @@ def weighed(
 
 
 def _settles(trace: Trace) -> bool:
-    """Return whether a run does not fail and settles."""
+    """Return whether a run does not fail and settles in time."""
     if trace.failure is not None or trace.diverged_at is not None:
         return False
-    return bool(np.isfinite(metrics.settling_time(trace)))
+    return bool(settles_in_time(metrics.settling_time(trace), trace.scenario.duration))
 
 
 def _unseen(
