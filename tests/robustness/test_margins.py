@@ -286,6 +286,19 @@ def test_levels_of_time_are_multiples_of_the_shortest_that_a_run_can_have():
         assert search.resolution(0.0) % least == pytest.approx(0.0)
 
 
+def test_an_error_of_ones_own_machine_is_from_its_goal():
+    text = """<mujoco model="mass"><worldbody><body><joint name="slide" type="slide" axis="1 0 0"/>
+    <geom size=".1" mass="1" contype="0" conaffinity="0"/></body></worldbody><actuator>
+    <motor joint="slide" ctrlrange="-6 6"/></actuator></mujoco>"""
+    law = smc.law("pid", kp=200.0, ki=0.0, kd=25.0)
+    away = smc.plant_from(text, {"slide": smc.Channel(reference=smc.Constant(0.3))})
+    (margin,) = smc.margins(away, law, ["delay"], starts=smc.starts(x0=0.0), quick=True)
+    assert margin.value > 0.0
+    for x0, plant in ((0.3, away), (0.0, smc.plant_from(text, ["slide"]))):
+        with pytest.raises(smc.ScenarioError, match="mass starts at its goal, and margins need"):
+            smc.margins(plant, law, ["delay"], starts=smc.starts(x0=x0, by=0.2), quick=True)
+
+
 @pytest.mark.parametrize("size", [1e-3, 50.0])
 def test_levels_of_force_are_shares_of_the_bound_of_ones_own_machine(size):
     def mass(size):

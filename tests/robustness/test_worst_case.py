@@ -254,6 +254,15 @@ def test_the_class_where_none_is_given_is_what_the_machine_leaves_open():
     assert own == smc.Uncertainty(parameters=arm.uncertain, friction_scale=(0.5, 1.5))
     assert own.disturbance == 0.0
     assert own.parameters["payload"] == (0.0, 2.0)
+    text = """<mujoco model="rubs"><worldbody><body><joint name="slide" type="slide" axis="1 0 0"
+    frictionloss=".2"/><geom size=".1" mass="1" contype="0" conaffinity="0"/></body></worldbody>
+    <actuator><motor joint="slide" ctrlrange="-6 6"/></actuator></mujoco>"""
+    own = smc.Scenario(plant=smc.plant_from(text, ["slide"]), law="none", x0=0.1)
+    rubbing = default_class(own)
+    assert rubbing == smc.Uncertainty(disturbance=1.0, friction_scale=(0.5, 1.5))
+    members = Members([own], rubbing)
+    (lost,) = members.with_constants(np.array([0.0])).mismatch.items()
+    assert lost == ("slide.frictionloss", 0.5)
     # its u is a voltage: the force is that of the motor at rest under 10 V
     assert default_class(AXIS.scenario("none")).disturbance == pytest.approx(
         10.0 * AXIS.values["force_per_volt"] / 6

@@ -70,7 +70,9 @@ def test_an_adversary_chooses_a_payload_and_a_friction_of_an_own_model(arm):
     base = smc.Scenario(plant=arm, **RUN)
     worst = smc.worst_case(base, within=smc.Uncertainty(parameters=ranges), budget=8)
     for name, (low, high) in ranges.items():
-        assert low <= worst.scenario.mismatch[name] <= high
+        assert low <= worst.constants[name] == worst.scenario.mismatch[name] <= high
+    carried = worst.constants["hand.payload"]
+    assert f" with hand.payload {carried:.4g}, bend.damping " in str(worst)
 
 
 def test_a_payload_is_found_from_a_log(arm):
