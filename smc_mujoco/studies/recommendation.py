@@ -289,14 +289,15 @@ class RaceRecommendation(Recommendation):
             if done < RELIABLE * of:
                 rare.append(f"{done} of {of} runs under {name}")
         if rare:
-            text = f"not reliably: in {joined(rare)}"
+            text = f"not reliably before the last fifth of a run: in {joined(rare)}"
             return f"{text}; {LEANS}" if leans(self.worst_trace) else text
         runs = next(iter(found.values()))[1]
         least = runs
         for done, _ in found.values():
             least = min(least, done)
         share = "all" if least == runs else f"at least {least}"
-        return f"in {share} of another {runs} runs in {_each(len(found))}"
+        each = _each(len(found))
+        return f"in {share} of another {runs} runs in {each}, before the last fifth of a run"
 
     @property
     def _weighs(self) -> str:

@@ -403,7 +403,9 @@ def test_a_law_that_does_not_settle_is_not_recommended_without_saying_where(race
     )
     lines = dict(line.split(": ", 1) for line in rare.answer)
     assert lines["Use"] == f"{name}, which settled in 2 of 4 runs"
-    assert lines["Settles"] == "not reliably: in 2 of 4 runs under coulomb"
+    assert lines["Settles"] == (
+        "not reliably before the last fifth of a run: in 2 of 4 runs under coulomb"
+    )
     never = dataclasses.replace(rare, settled={name: {"coulomb": (0, 4), "noise": (0, 4)}})
     assert never.answer[0] == "Use: none: no law settled in any of 8 runs"
     pushed = dataclasses.replace(
