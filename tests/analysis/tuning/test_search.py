@@ -390,7 +390,8 @@ def narrow(y, gains, memory):
 CONSTRAINED = ("quasi_continuous", "twisting", "conditioned_super_twisting", narrow)
 
 
-SETS = [("twisting", "duffing")]  # by the equation; the others by MuJoCo
+# by the equation; the others by MuJoCo
+SETS = [pytest.param("twisting", "duffing", marks=pytest.mark.slow)]
 SETS += [(law, "double_pendulum") for law in CONSTRAINED]
 
 
