@@ -340,7 +340,7 @@ def starts(x0: str | None) -> "Starts | None":
         values = [float(text) for text in x0.split(",")]
     except ValueError:
         raise ScenarioError(
-            f"--x0 is {x0!r}: give a number, or one for each channel, such as 0.3,-0.2"
+            f"--x0 is {x0!r}: give a number, or one for each joint, such as 0.3,-0.2"
         ) from None
     return grid.starts(values[0] if len(values) == 1 else values)
 
