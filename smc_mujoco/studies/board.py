@@ -573,14 +573,16 @@ def heading(board: Board) -> str:
 def _table(name: str, boards: Sequence[Board], labels: Mapping[str, str]) -> Tabular:
     """Return the table of one group of runs, with `Boards.labels`.
 
-    Laws stand by place in the first metric, then in the next ones.
+    Laws stand by place in the first metric, those of one place by their median in it, then by the
+    next ones.
     """
     sources_of = sources(boards)
-    places: dict[str, list[float]] = {}
+    places: dict[str, list[Pair]] = {}
     cells: dict[str, list[Cell | str]] = {}
     for i, board in enumerate(boards):
         for entry in board.entries:
-            places.setdefault(entry.law, []).append(entry.rank.place)
+            standing = entry.rank.place, entry.interval.median
+            places.setdefault(entry.law, []).append(standing)
             cells.setdefault(entry.law, [""] * len(boards))[i] = _cell(board, entry)
     rows = []
     for law in sorted(places, key=lambda law: (places[law], law)):

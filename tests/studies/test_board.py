@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from helpers.tables import MadeTable
+from helpers.tables import MadeTable, table_of
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -72,6 +72,12 @@ def cells_of_html(boards: Boards) -> dict[str, list[str]]:
 def test_laws_stand_by_place_in_the_first_metric_then_in_the_next(first, laws):
     (table,) = leaderboard(made(), metrics=(first, "itae")).tables
     assert [row[0].text for row in table.rows] == laws
+
+
+def test_laws_that_share_a_place_stand_by_their_median():
+    scores = {"b": 1.0 + 0.01 * np.ones((1, 12)), "a": 1.0 + 0.02 * np.ones((1, 12))}
+    (table,) = leaderboard(table_of(scores), metrics=["itae"]).tables
+    assert [row[0].text for row in table.rows] == ["b", "a"]
 
 
 def test_the_last_table_says_how_laws_failed():
