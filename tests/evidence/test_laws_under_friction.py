@@ -60,7 +60,7 @@ def test_a_level_buys_the_least_error_of_the_sets_that_it_affords():
     assert friction.on_front(sets).tolist() == [0, 2]
 
 
-@pytest.mark.quick
+@pytest.mark.slow
 def test_compensation_at_the_measured_speed_costs_what_it_moves_at_rest():
     """On the reference u rests with or without it, so one R is told of both."""
     bench = friction.Bench(JOINTS["rail"], "pd")
@@ -72,6 +72,19 @@ def test_compensation_at_the_measured_speed_costs_what_it_moves_at_rest():
     measured = by_case[Case("coulomb30", "sine", 1.0, "speed")]
     assert measured > 2.0 * plain
     assert by_case[Case("coulomb30", "sine", 0.7, "speed")] < measured
+
+
+def test_cases_with_compensation_at_the_measured_speed_have_the_rates_of_calm_runs():
+    bench = friction.Bench(JOINTS["rail"], "pd")
+
+    def sums(group, gains):
+        size = 2e-3 if group is bench.calm else 1e-3
+        return np.full((len(gains), len(group.rows), len(friction.SUMS)), size)
+
+    bench.sums = sums
+    its = bench.judged(np.ones((1, len(bench.box) + 1)))
+    for case, rate in zip(bench.cases, its.rates[0] * bench.one.bound, strict=True):
+        assert rate == pytest.approx(2e-3 if case.on == "speed" else 1e-3)
 
 
 def test_a_narrow_slope_is_super_twistings_sign_and_a_square_wave_costs_its_jumps():
