@@ -66,11 +66,11 @@ def test_a_blow_reaches_the_stops_whatever_u_does(name, more):
         way = math.copysign(1.0, blow.impulse)
         laws.append(resists(kp=kp, kd=kd, load=load, bound=bound, way=way, at=TIME))
     made = conditions.condition("hit", **given)
-    runs = [case(plant, by_channel(laws), made, 2.0 * TIME, seed=seed) for seed in range(3)]
+    runs = [case(plant, by_channel(laws), made, TIME + 0.5, seed=seed) for seed in range(2)]
     (stopped,) = given["contact"].limits.items()
     joint = channel_names(plant).index(stopped[0])
     for trace in smc.run(runs):
         assert trace.failure is None
         beyond = np.clip(trace.x[:, joint], *stopped[1]) != trace.x[:, joint]
         assert not beyond[trace.t < TIME].any()
-        assert beyond[(trace.t >= TIME) & (trace.t < TIME + 0.5)].any()
+        assert beyond[trace.t >= TIME].any()
