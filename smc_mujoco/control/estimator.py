@@ -62,6 +62,10 @@ def estimator(name: str, /, **gains: float) -> Estimator:
 
         smc.run(smc.Scenario(plant="duffing", law="pid", velocity=smc.estimator("levant")))
 
+    `print(smc.estimator("levant").template.doc)` shows its equation, what its gains mean, their
+    units, and how to choose them. The defaults are for the library's plants: on your own machine
+    choose your own. `smc.laws(kind="estimator")` has the names.
+
     Returns:
       An Estimator, for `velocity` of a Scenario.
     """

@@ -57,6 +57,8 @@ def law(
         smc.law("pid", plant="duffing")  # the gains that searches found for this plant
 
     `smc.law(...).named("slow")` gives it another name, and `smc.law("pid").gains` are its gains.
+    `print(smc.law("pid").template.doc)` shows a law's equation, and what its gains mean, with their
+    units.
 
     Args:
       text: the name of a law of the library, such as "pid"; a name with gains, such as

@@ -291,7 +291,8 @@ def laws(plant: Plant | str | None = None, kind: str = "law") -> list[str]:
         velocities.
 
     Returns:
-      Names, in alphabetical order, which `smc.law` takes.
+      Names, in alphabetical order, which `smc.law` takes. `print(smc.law(name).template.doc)` shows
+      a law's equation and the units of its gains.
 
     Raises:
       ScenarioError: another kind, a plant with another kind than "law", or an unknown plant.

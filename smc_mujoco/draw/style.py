@@ -67,6 +67,7 @@ DASHES = [
     (0, (3, 1)),
 ]
 MAX_VALUES = 8  # numbers of a label
+MAX_LETTERS = 50  # of what a label says of one field; chosen
 MIN_DISTANCE = 15.0  # colours closer than this are mistaken for each other, see `distance`; chosen
 LIGHTEST = 61.0  # lightness in CIELAB: up to it lines have a contrast of 3 : 1 to paper
 DARKEST = 21.0  # of a ramp
@@ -415,11 +416,19 @@ def differences(trace: Trace, others: Sequence[Trace]) -> str:
     for name, words in _settings(trace).items():
         runs = same if name in CONDITION_FIELDS else alike
         if any(_settings(run).get(name) != words for run in runs):
-            parts.append(words)
+            parts.append(_few(words))
     for name, words in _parameters(trace).items():
         if any(_parameters(run)[name] != words for run in others):
             parts.append(f"plant's {words}" if name in scenario.law.gains else words)
     return ", ".join(parts)
+
+
+def _few(words: str) -> str:
+    """Return what a label says of a field, without its last items if it is long."""
+    if len(words) <= MAX_LETTERS:
+        return words
+    kept, _, _ = words[: MAX_LETTERS + 1].rpartition(",")
+    return kept or words
 
 
 def _as_words(values: Mapping[str, Any]) -> dict[str, str]:

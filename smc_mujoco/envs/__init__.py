@@ -3,8 +3,10 @@
     environment = smc.envs.gym.PlantEnv("duffing", "track", {"control_period": 0.01})
     observation, info = environment.reset(seed=0)
 
-The plant is a name, or your own machine from `smc.plant_from`. The task is "regulate", "track",
-"swing_up" or "synchronise". The same by gymnasium's own call, for the plants with a name:
+`smc.envs.gym`, `vector` and `suite` are short for smc_mujoco.envs.gymnasium_env, vector_env and
+dm_control_env, by which names `import` finds them. The plant is a name, or your own machine from
+`smc.plant_from`. The task is "regulate", "track", "swing_up" or "synchronise". The same by
+gymnasium's own call, for the plants with a name:
 
     gymnasium.make("smc_mujoco:smc/Duffing-v0", task="track")
 """

@@ -43,7 +43,11 @@ def observation_space(setting: Setting) -> spaces.Box:
 
 
 class PlantEnv(Episode, gymnasium.Env):
-    """One plant with a task. It has the attributes of an Episode too."""
+    """One plant with a task. It has the attributes of an Episode too.
+
+    Its arguments are those of `__init__`; `changes` are fields of the scenario, such as
+    {"control_period": 0.01, "u_max": 4.0}.
+    """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 1000}  # noqa: RUF012  # as gymnasium has it
     flies = False  # whether it is for free bodies

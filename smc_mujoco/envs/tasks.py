@@ -14,7 +14,8 @@ in [0, 1], where rms is taken over the channels. T is dm_control's tolerance abo
 
 Of an arm such as `panda`, whose rest is a pose, x and the spread of starts count from this pose,
 and r is a reference for each joint. An arm is neither swung up nor synchronised. If joints have
-ranges, starts also lie within these.
+ranges, starts also lie within these. Your own model with its x0 at the goal has in place of x0 the
+start beside the goal that `smc.starts` describes.
 """
 
 import dataclasses

@@ -108,8 +108,9 @@ class Identified:
     """The numbers of a machine that were found from logs, and how well they fit.
 
     Fits are those of `Rig.fit`, in an open loop with short steps; for `fits` the states at the
-    starts are found too. In an open loop an arm under gravity leaves its log however good its
-    numbers are. Then the fits of pieces of 1 s tell more.
+    starts are found too. An arm under gravity that is replayed in an open loop leaves its log after
+    a while even with good numbers, as small errors grow. Then `by_pieces`, the fits of pieces of 1
+    s, tell more.
     """
 
     rig: Rig  # with the values found

@@ -211,11 +211,11 @@ def tip_scores(trace: Trace, force: Positive | None = None) -> dict[str, float]:
 
     Returns:
       max_error, rms_error, last_error, m: the distance of the tip from where the references want
-        it. With a contact
-      whose forces `contacts` knows, over the last 80 % of the run: mean_force, N; force_error, by
-      which it exceeds the wanted force, % of that; force_ripple, the force's standard deviation, N;
-      touching, the share of the time in contact, %; and depth, the deepest penetration in the whole
-      run, m.
+      it, the first two over the whole run, from t = 0, unlike rms_error of `smc.score`. With a
+      contact whose forces `contacts` knows, over the last 80 % of the run: mean_force, N;
+      force_error, by which it exceeds the wanted force, % of that; force_ripple, the force's
+      standard deviation, N; touching, the share of the time in contact, %; and depth, the deepest
+      penetration in the whole run, m.
 
     Raises:
       ScenarioError: the plant has no tip, or the run failed.

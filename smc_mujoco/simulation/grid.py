@@ -177,8 +177,9 @@ def starts(
 
     Args:
       x0: the middle of all starts, rad or m: one number for all channels, or one for each. Default:
-        the plant's x0. Where that is the goal of your own model, its driven joints start beside it
-        without `by`: by 0.3 rad (m), or 0.6 of the way to a limit of their range.
+        the plant's x0. If your own model has its x0 at its goal, and `by` is 0, its driven joints
+        start beside the goal: at most 0.3 rad (m) from it, at most 0.6 of the way to a limit of
+        their range, and nearer where they would touch something.
       spread: how far starts lie to either side of the middle, as a fraction of it, 0 or more; of a
         free body in m and rad.
       by: a distance that is added to it, rad or m, 0 or more; for a plant that rests at 0.

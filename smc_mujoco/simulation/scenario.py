@@ -82,10 +82,11 @@ class Scenario:
         with friction (without `exact_friction`), contact, a mechanism or a plant that is not
         `smooth`, half of that with a Backlash, else up to 1 ms; always up to a quarter of the
         clock's jitter, and as fine as the oscillation of an ElasticJoint needs. On your own model
-        only friction needs 0.25 ms, a contact 0.5 ms; fast poles and hard constraints need as much,
-        see docs/accuracy.md. Where 1 ms holds, a drive whose force changes within a control period
-        may lower it, to a quarter of that period or half of the drive's time constant, whichever is
-        longer.
+        only friction needs 0.25 ms, a contact 0.5 ms; fast poles and hard constraints may need as
+        much. `trace.unresolved` says what a step cannot resolve, and `smc.accuracy.step_halving`
+        repeats runs with half of it. Where 1 ms holds, a drive whose force changes within a control
+        period may lower it, to a quarter of that period or half of the drive's time constant,
+        whichever is longer.
       u_max: bound on |u|, N or N m; may be infinite. Default: 6; of your own model the limit of the
         strongest motor, or what a joint without a limit needs: twice its load, (60/s^2 M + 8/s D)
         times its way, and 1.5 times its dry friction. A motor's own limit holds too: see `limits`.
@@ -99,7 +100,8 @@ class Scenario:
         the command of a recorded experiment (with the law "none"). None: nothing is added.
       disturbance: d(t) on every driven channel: one signal, or several to be added, or None. On one
         joint acts a Fault's bias, on a body a Push.
-      noise: measurement noise, or None.
+      noise: measurement noise, or None. With an Encoder it is added to the position before that is
+        rounded to counts.
       input_delay: s; a whole number of physics steps. Before the first command arrives, u is 0.
       clock: the controller's Clock: its samples may come late or be missed. None: all are on time.
       velocity: an Estimator of the velocity that the law sees, or the name of one. Default:

@@ -47,6 +47,20 @@ class Signal:
     """Base of all signals, which checks that every parameter is a finite number, within the
     constraint of its type.
 
+    Your own r(t) or d(t) is `smc.signals.TimeSeries(times, values)`, or `Held`, of your numbers; or
+    a frozen dataclass with a function of time, which is compiled, and returns the value and its
+    first two derivatives (0 will do for a disturbance):
+
+        @dataclasses.dataclass(frozen=True)
+        class Decay(smc.Signal):
+            amplitude: float = 1.0
+
+            @staticmethod
+            def value(t, p):
+                return p.amplitude * math.exp(-t), 0.0, 0.0
+
+        smc.run(smc.Scenario(plant="duffing", law="pid", disturbance=Decay(0.5), duration=1.0))
+
     If the class attribute `cartesian` is true, the signal is a force on bodies, N, not on joints: a
     `Push` on one body, or else a horizontal force on the body of each channel.
     """
@@ -825,7 +839,11 @@ class Clock:
 
 @frozen_data
 class Sum(Signal):
-    """The sum of constants, sines, steps, ramps and moves of minimum jerk."""
+    """The sum of constants, sines, steps, ramps and moves of minimum jerk, as `+` makes it.
+
+    Disturbances of any kind are added where a scenario gets a tuple: disturbance=(first, second). A
+    reference of other kinds is your own `smc.Signal`.
+    """
 
     signals: tuple[Signal, ...]
 

@@ -63,12 +63,12 @@ def leaderboard(
         print(smc.leaderboard(table, ["itae"]))
 
     Only cells (plant, condition, seed) that every law of the group has are compared. A failed run
-    is inf in all metrics. For two laws, a seed in which both repeat their results of an earlier
-    seed is not counted. Runs that share one of several sets of gains of a law are one sample. For
-    an ensemble of machines give each seed a `mismatch` of its own, and name all these runs alike
-    with `Scenario.named`: a condition for each machine adds no sample. Where the seeds are too few
-    for a verdict, the board says how many it takes. A metric that does not apply to a group has no
-    board for it.
+    is inf in all metrics. Of two laws, a seed that gives both the same results as an earlier seed
+    tells nothing new, and is not counted. Runs that share one of several sets of gains of a law are
+    one sample. For an ensemble of machines give each seed a `mismatch` of its own, and name all
+    these runs alike with `Scenario.named`: a condition for each machine adds no sample. Where the
+    seeds are too few for a verdict, the board says how many it takes. A metric that does not apply
+    to a group has no board for it.
 
     Args:
       table: a study's runs, as `smc.Table.read` returns them.

@@ -38,6 +38,10 @@ def score(
 
         print(smc.score(smc.grid("duffing", "pid", seeds=100, duration=1.0), ["itae"]))
 
+    Of several channels, integrals of errors and of u are sums, and every other metric is of the
+    worst one. `smc.metrics.joint_scores` has each joint by itself, and
+    `help("smc_mujoco.metrics.conventions")` all conventions.
+
     Metrics that compare channels are for networks only. For a cart with a pole, times and
     percentages of the motion are the worse of the two; metrics with a unit of length are the
     cart's. Some of the metrics:

@@ -289,3 +289,31 @@ def test_savitzky_golay_is_scipy_s_filter_at_the_last_point(window, degree):
         np.testing.assert_allclose(
             out[order - 1, -200:], expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max()
         )
+
+
+LIGHT_ARM = """<mujoco><worldbody>
+<body><joint name="up" axis="0 1 0" damping="0.1" armature="0.01"/>
+<geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03" mass="1"/>
+<body pos="0.3 0 0"><joint name="fore" axis="0 1 0" damping="0.1" armature="0.01"/>
+<geom type="capsule" fromto="0 0 0 0.25 0 0" size="0.025" mass="0.6"/></body></body>
+</worldbody><actuator><motor joint="up" ctrlrange="-20 20"/>
+<motor joint="fore" ctrlrange="-8 8"/></actuator></mujoco>"""
+
+
+def test_levant_needs_an_L_above_the_jerk_of_the_machine_as_its_page_says():
+    """The default is for the library's plants; on a light arm the loop diverges."""
+    arm = smc.plant_from(LIGHT_ARM, ["up", "fore"])
+    pid = smc.law("pid", kp=60.0, ki=20.0, kd=3.0)
+
+    def late_error(velocity):
+        fields = {"plant": arm, "law": pid, "x0": 0.3, "velocity": velocity}
+        trace = smc.run(smc.Scenario(**fields, duration=5.0))
+        return trace, smc.score(trace)["ultimate_bound"]
+
+    measured, least = late_error("measured")
+    jerk = abs(np.diff(measured.v, 2, axis=0)).max() / H**2
+    acceleration = abs(np.diff(measured.v, axis=0)).max() / H
+    assert 4800.0 < jerk < 2e5
+    assert late_error("levant")[1] > 1.0
+    for chosen in ({"L": 2.0 * jerk}, {"L": 2.0 * acceleration, "order": 1}):
+        assert late_error(smc.estimator("levant", **chosen))[1] < 2.0 * least, chosen

@@ -1,5 +1,6 @@
 """The colours of laws are told apart, by every eye: measured, not looked at."""
 
+import dataclasses
 import itertools
 import random
 
@@ -131,6 +132,15 @@ def test_labels_tell_runs_of_one_law_apart_by_the_parameters_of_their_plants():
     )
     assert style.labels(smc.run([runs[0], heavy]), None) == ["PID: M = 1", "Classical: M = 1.3"]
     assert style.distinct(["PID: k = 1", "LQR"]) == ["PID: k = 1", "LQR"]
+
+
+def test_a_label_leaves_out_the_last_items_of_a_long_field():
+    """With all of them, the machines of a small still have little room."""
+    plain = smc.Scenario(plant="duffing", law="pid", duration=0.01)
+    late = smc.signals.TimeSeries((0.0, 2.0, 2.5, 5.0), (0.0, 0.0, 0.01, 0.01))
+    read = dataclasses.replace(plain, noise=smc.Noise(position=0.0002, position_error=late))
+    labels = style.labels(smc.run([plain, read]), None)
+    assert labels == ["PID: no noise", "PID: noise position 0.0002, position error Time series"]
 
 
 def test_contrasts_are_those_of_wcag():

@@ -146,9 +146,12 @@ def tune(
 
     Args:
       plant, law: names, or your own plant and law. No search starts from the law's gains;
-        `Tuned.before` is their objective. Gains declared with `held=True` keep their value.
+        `Tuned.before` is their objective. Gains declared with `held=True` keep their value. One
+        number of each gain is found for all joints. No search finds gains by joint; a plant with
+        one of them as its only channel, and others="held", is tuned for that joint alone.
       budget: largest number of sets of gains that a search evaluates for each gain, each in one run
-        per condition.
+        per condition. Not counted are the law's own gains, and sets that MuJoCo repeats after the
+        fast engine or, if quick, after coarse runs.
       seed: seed of the searches, and of initial states and noise, which differ between searches; at
         most 10^9.
       objective: an Objective, "balanced", or "tracking", without a cost of the variation of u.
@@ -164,8 +167,9 @@ def tune(
         see `quick_search`, for which 16 evaluations a gain are enough.
 
     Returns:
-      A `Tuned`: `law` has the gains of the least J, `sets` the best gains of each search,
-      `save(path)` writes a file that every command reads.
+      A `Tuned`: `law` has the gains of the least J that was found, which the law's own gains may
+      beat: then a warning says so, and `before` is less than `objective`. `sets` has the best gains
+      of each search, and `save(path)` writes a file that every command reads.
 
     Raises:
       ScenarioError: a gain of unknown unit whose default is not positive, a plant without scales,

@@ -16,6 +16,12 @@ from -U to U, 2 g U / tau, for U = 6, g = 8 of the study's lightest plants and t
 of its realistic conditions. A smaller L fails on rougher signals, a larger one amplifies noise. At
 a control period of 20 ms the error O(L h^2) is several units, so choose a smaller L there. If the
 acceleration is used, L should be little above the plant's own largest jerk.
+
+On your own machine the default may be far too small: a light arm with strong motors has jerks of
+1e5 rad/s^3. Then the estimate leaves the velocity for good, and the loop may diverge without any
+noise. Run it with the measured velocity first. With h the control period, choose L above the
+largest jerk, abs(np.diff(trace.v, 2, axis=0)).max() / h**2; or order = 1 and L above the largest
+acceleration, abs(np.diff(trace.v, axis=0)).max() / h.
 Gains: L, bound on the derivative of order n + 1 [m/s^(n+1)]; order, n.
 Sources: A. Levant, "Robust exact differentiation via sliding mode technique", Automatica 34(3):379,
 1998 (n = 1); A. Levant, "Higher-order sliding modes, differentiation and output-feedback control",

@@ -180,19 +180,20 @@ def film(
         smc.film(trace, "duffing.png", at=0.5)
 
     Fast motion and blows are shown in slow motion, and rest is shown faster. The clock tells the
-    speed.
+    speed. The progress of writing is shown on stderr: as a bar on a terminal, elsewhere as a line
+    each ten seconds.
 
     Args:
       traces: several, or a single one.
       path: its ending tells what is written: .mp4, a film; .webp, an animated picture that web
         pages show as an image; .png, the picture at the time `at`. None writes nothing, and returns
         the pictures for other packages, `Frames`.
-      labels: one a trace; default: the laws' labels.
+      labels: one a trace; default: the laws' labels, with what differs between runs of one law.
       title: default: the plant's name, and the condition if all traces have one.
       size: width and height in px, even. Default: 1280 x 720, and 800 x 450 for .webp and `Frames`.
       fps: frames a second; default: 30, and 20 for .webp.
-      speed: of playback, such as 1 for real time or 0.25; default: what suits the motion, see
-        pace.py.
+      speed: of playback, such as 1 for real time or 0.25; default: 1, 1/2, 1/4 or 1/8
+        by how fast things move, 1/8 at blows, and 4 where all rests.
       camera: name of a camera of the model, or (azimuth, elevation) in degrees as of MuJoCo's free
         camera. It gives the direction of the view, and the camera is as near as it can see all
         machines. Default: the plant's own `look`. For your own model: its first camera that does

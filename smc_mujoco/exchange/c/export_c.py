@@ -51,14 +51,16 @@ def law_to_c(
       numbers: "double", "float", or, only for the paper's law observer_free, "q15": words of 16
         bits.
       joints: the number of joints for which a law of many joints is written. Default: the number of
-        a gain's values.
+        a gain's values. A law of one channel is written once for all; if its gains differ by
+        channel, write one file for each channel i, of law.of_channel(i).
 
     Returns:
       The text of the file.
 
     Raises:
-      ScenarioError: no such law or type of numbers, no number of joints, or the law uses Python
-        that cannot be translated, which the error quotes.
+      ScenarioError: no such law or type of numbers, no number of joints, a law of one channel whose
+        gains differ by channel, or a law that uses Python that cannot be translated, which the
+        error quotes.
     """
     find("type of numbers", numbers, NUMBER_BYTES)
     plant = compensate = None

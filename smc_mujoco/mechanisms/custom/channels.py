@@ -82,8 +82,8 @@ class Channel:
       x0, partner_x0: initial positions of the joint and of its partner, rad or m; None: those of
         the keyframe, or of the model.
       law, u_max, reference: defaults for this channel, of scenarios that leave them out; values as
-        in a Scenario. Give every channel a law, or no channel. None: the default bound, and rest at
-        0.
+        in a Scenario. If one channel has a law here, all need one. None: the default bound, and
+        rest at 0.
     """
 
     motor: Boolean = False

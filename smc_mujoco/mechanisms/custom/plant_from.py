@@ -128,6 +128,9 @@ def plant_from(
         mm at the start or the goal of a fixed machine; a joint drawn outside its range; motors that
         nothing commands, without `others`; equality constraints that are left out.
 
+    Dry friction of the file (frictionloss) is made as hard as `smc.Coulomb`, harder than MuJoCo's
+    default, which creeps, unless the file gives its solreffriction.
+
     A scenario may have model="nominal" if every joint that moves with the channels is a channel or
     a partner, and no equality constraint acts; `plant.unmodelled` says why not. Films show the
     model in its own colours; those of several laws are mixed with the laws' colours.
