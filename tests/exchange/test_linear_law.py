@@ -150,6 +150,7 @@ def test_its_c_gives_the_same_bits(tmp_path):
     assert half.u[0, 0] == first.u[0, 0] / 2
 
 
+@pytest.mark.usefixtures("by_mujoco")
 def test_it_is_tuned_pickled_and_told_apart():
     law: Any = smc.exchange.law_from_control(LEAD)
     assert pickle.loads(pickle.dumps(law)) == law != smc.exchange.law_from_control(2 * LEAD)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from analysis.test_engine import SINE, check
+from analysis.test_engine import FEW, SINE, check
 from common.test_children import ENDS, assert_none_outlives
 from exchange.helpers.compiler import needs_compiler
 from helpers import reference
@@ -438,4 +438,4 @@ def test_the_engine_calls_a_law_in_c_as_mujoco_does(tmp_path):
     path = tmp_path / "mine.c"
     path.write_text(smc.exchange.law_to_c("boundary_layer"))
     noisy = {"noise": smc.Noise(1e-4, 5e-4), "disturbance": SINE, "input_delay": 2e-3}
-    check("duffing", smc.law_from(path), {"plain": {}, "noise": noisy}, duration=2.0)
+    check("duffing", smc.law_from(path), {"plain": {}, "noise": noisy}, duration=2.0, of=FEW)
