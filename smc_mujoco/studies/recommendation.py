@@ -221,7 +221,28 @@ class RaceRecommendation(Recommendation):
             words.append("of the laws that were searched")
         if self.settles[self.law.name] < RELIABLE:
             words.append(f"which settled in {done} of {of} runs")
+        ahead = self._lowest
+        if ahead and ahead != self.law.name:
+            name, done, of = self._least_settled(ahead)
+            words.append(
+                f"as {ahead}, whose J is lower, settled in {done} of {of} runs under {name}"
+            )
         return ", ".join(words)
+
+    @property
+    def _lowest(self) -> str | None:
+        """The law that wins by J, over sets of gains or else with these; None if none does."""
+        if self.fixed and not self.race.winner:
+            return self.fixed.winners[0]
+        return self.race.winner
+
+    def _least_settled(self, law: str) -> tuple[str, int, int]:
+        """Return the condition in which a law settles in the smallest share of its runs, in how
+        many of them, and how many there are.
+        """
+        found = self.settled[law]
+        name = min(found, key=lambda name: found[name][0] / found[name][1])
+        return name, *found[name]
 
     def _settled_runs(self, laws: Iterable[str]) -> tuple[int, int]:
         """Return in how many runs these laws settle, and how many they have, in all conditions."""

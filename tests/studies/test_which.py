@@ -408,6 +408,13 @@ def test_a_law_that_does_not_settle_is_not_recommended_without_saying_where(race
     )
     never = dataclasses.replace(rare, settled={name: {"coulomb": (0, 4), "noise": (0, 4)}})
     assert never.answer[0] == "Use: none: no law settled in any of 8 runs"
+    winner = recommendation._lowest
+    others = tuple(law for law in recommendation.laws if law.name != winner)
+    runs = {others[0].name: {"noise": (4, 4)}, winner: {"coulomb": (4, 4), "noise": (1, 4)}}
+    fields = {"laws": others, "settled": runs, "settles": {others[0].name: 1.0}}
+    behind = dataclasses.replace(recommendation, **fields)
+    reason = f"as {winner}, whose J is lower, settled in 1 of 4 runs under noise"
+    assert behind.answer[0] == f"Use: {others[0].name}, {reason}"
     pushed = dataclasses.replace(
         recommendation.worst_run, disturbance=smc.Constant(20.0)
     )  # u_max is 9
