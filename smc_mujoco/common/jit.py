@@ -448,6 +448,14 @@ def _load_numba() -> None:
                 linalg.ensure_blas = ensure_blas
 
 
+def cache_folder() -> Path:
+    """Return the folder of compiled functions."""
+    if folder := getattr(numba.config, "CACHE_DIR", ""):
+        return Path(folder)
+    kept = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    return Path(kept, "smc_mujoco", "numba")
+
+
 class Cache:
     """A compiled function on disk, in place of numba's own cache.
 
@@ -458,11 +466,7 @@ class Cache:
 
     def __init__(self, key: Key):
         self.key = key
-        if folder := getattr(numba.config, "CACHE_DIR", ""):
-            self.folder = Path(folder)
-        else:
-            kept = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-            self.folder = Path(kept, "smc_mujoco", "numba")
+        self.folder = cache_folder()
 
     def load_overload(self, signature: Any, target: Any) -> Any:
         """Return numba's result for a signature, or None."""

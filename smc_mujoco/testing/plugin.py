@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 __tracebackhide__ = True  # pytest hides the frames of a module that has it
 EXAMPLE = '@pytest.mark.smc(plants=["duffing"], conditions=["nominal", "noise"])'
+COMPILES = "smc_mujoco compiles its code, once on a computer, so the first test is slow"
 GOLDEN = "smc_golden"  # property of a test's report: the golden file that it wrote
 
 
@@ -137,6 +138,7 @@ def step_response(
     from smc_mujoco.testing.response import respond
 
     ledger = request.config.stash.setdefault(LEDGER, Ledger([], tmp_path_factory.getbasetemp()))
+    _tell_of_compiling(request.config)
 
     @without_frames
     def run(plant, law, step, condition="nominal", **fields) -> StepResponse:
@@ -144,6 +146,18 @@ def step_response(
         return ledger.responses[-1]
 
     return run
+
+
+def _tell_of_compiling(config: pytest.Config) -> None:
+    """Print why the first test is slow, where nothing is compiled yet."""
+    from smc_mujoco.common.jit import cache_folder
+
+    reporter = config.pluginmanager.get_plugin("terminalreporter")
+    capture = config.pluginmanager.get_plugin("capturemanager")
+    if not (reporter and capture) or any(cache_folder().glob("*.code")):
+        return
+    with capture.global_and_fixture_disabled():
+        reporter.write_line(COMPILES)
 
 
 @pytest.fixture

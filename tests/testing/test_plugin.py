@@ -16,10 +16,11 @@ from pathlib import Path
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.common import gl
+from smc_mujoco.common import gl, jit
 from smc_mujoco.draw import figure as figures
 from smc_mujoco.testing import golden
 from smc_mujoco.testing.limits import bound
+from smc_mujoco.testing.plugin import COMPILES
 from smc_mujoco.testing.response import respond
 
 ROOT = Path(__file__).parents[2]
@@ -81,6 +82,19 @@ def session(pytester, undrawn):
         return done.stdout.str()
 
     return run
+
+
+# the first test on a computer
+
+
+def test_the_first_test_says_why_it_is_slow_only_where_nothing_is_compiled(
+    session, monkeypatch, tmp_path
+):
+    monkeypatch.setattr(jit, "cache_folder", lambda: tmp_path)
+    text = "def test_a(step_response): pass\ndef test_b(step_response): pass"
+    assert session(text, passed=2).count(COMPILES) == 1
+    tmp_path.joinpath("law.code").touch()
+    assert COMPILES not in session(text, passed=2)
 
 
 # pass and fail
