@@ -261,11 +261,12 @@ def _floors(table: RunColumns, metrics: Sequence[str]) -> dict[tuple[str, str, s
 
 
 def _shade(ax: Axes, floors: Sequence[float], height: int) -> None:
-    """Shade the values below the floor of each condition, in a block of `height` lines."""
+    """Shade the values from 0 to the floor of each condition, in a block of `height` lines."""
     left, right = ax.get_xlim()
+    start = max(left, 0.0)
     for j, least in enumerate(floors):
         lines = [j * height - 1, (j + 1) * height - 1]
-        ax.fill_betweenx(lines, left, max(left, least), color=style.BAND, lw=0.0, zorder=0)
+        ax.fill_betweenx(lines, start, max(start, least), color=style.BAND, lw=0.0, zorder=0)
     ax.set_xlim(left, right)
 
 

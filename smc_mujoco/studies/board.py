@@ -42,9 +42,12 @@ MEDIANS = (
 )
 # A word in tables -> what their key says about it.
 MARKS = {
-    "J (": "Tuning minimises J (time-weighted relative error plus weighted variation of u); the "
-    "table's J is from separate runs, which tuning has not seen.",
+    "J (": "Tuning minimises J, summed over conditions: ITAE over the initial error, plus "
+    "0.001 s^3 times the variation of u over u_max and the duration. The table's J is from "
+    "separate runs, which tuning has not seen.",
     "shipped": "Shipped gains come with the package.",
+    "settling time": "Settling time is when the error enters its band to stay: 2 % of its initial "
+    "value, or of the reference's range if that is larger.",
     "ITAE": "ITAE is the integral of time times absolute error.",
     "TV rate": "TV rate is the total variation of u per second, in the last fifth of a run.",
     "strong=True": "A star or bold type marks the winner. If no law wins, it marks every law that "

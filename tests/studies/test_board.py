@@ -279,6 +279,23 @@ def test_a_law_has_its_label_in_latex_and_plots_and_values_below_the_floor_are_s
     assert left < floors[1]
 
 
+def test_latex_says_in_a_comment_what_the_settling_band_is():
+    latex = leaderboard(made(), ["settling_time"]).to_latex()
+    (comment,) = re.findall("^%.*Settling time.*$", latex, re.MULTILINE)
+    assert "2 % of its initial value" in comment
+    assert "Settling time" not in leaderboard(made(), ["itae"]).to_latex()
+
+
+def test_the_shade_below_the_floor_begins_at_0_on_a_linear_axis():
+    table = made()
+    table.columns["tv_rate"] = np.repeat([30.0, 20.0, 0.0], 20)
+    (ax,) = dot_plot.plot(table, metrics=["tv_rate"]).axes
+    assert ax.get_xscale() == "linear"
+    assert ax.get_xlim()[0] < 0.0
+    (shade,) = ax.collections
+    assert shade.get_datalim(ax.transData).x0 == 0.0
+
+
 def test_a_name_is_no_formula_in_a_plot_and_no_command_in_latex():
     """One ended in matplotlib's ValueError, another lost its dollars."""
     table = made(conditions=("nominal\n\\end{document}", "noise"))
