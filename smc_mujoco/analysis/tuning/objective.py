@@ -121,7 +121,7 @@ class Objective:
         conditions = ", ".join(condition.name for condition in self.conditions)
         bound = ""
         if self.u_max is not None:
-            bound += f", |u| <= {self.u_max:g}"
+            bound += f", u_max = {self.u_max:g}"
         if self.chattering is not None:
             bound += f", predicted chattering of s <= {self.chattering:g}"
         return (

@@ -151,6 +151,11 @@ def _save(recommendation: "RaceRecommendation", out: Path, terminal: Terminal) -
         terminal.note(f"To use {recommendation.law.name} with these gains, give --law {file}")
     figure.figure([recommendation.worst_trace], out / "worst_run")
     terminal.wrote(*page.files(out / "worst_run"))
+    terminal.note(
+        f"Its worst run, under {recommendation.worst_run.condition}, is the one that settles last, "
+        "or never, in the condition in which the fewest settle, or the latest.",
+        wrap=True,
+    )
 
 
 def _margins_command(
