@@ -384,6 +384,7 @@ class Rows:
         nothing = ("failure", "half_step", "trends", "search", "touched")
         empty |= dict.fromkeys(nothing, np.full(n, None, object))
         empty["diverged_at"] = np.full(n, np.nan)
+        empty["duration"] = np.full(n, 10.0)
         empty["arrived"] = np.array([row[2] not in self.away for row in self.rows])
         if name in empty:
             return empty[name]
