@@ -560,7 +560,7 @@ def _told(rig: OwnRig, names: list[str], trace: Trace) -> dict[str, Any]:
     solved, by_steps = gauss_newton.extrapolated(replays, slopes)
     may_lack = lack_of_fit(solved, presliding(replays, solved, INTEGRATOR))
     by_model = np.hypot(by_steps, may_lack.moved)
-    errors, correlations, _ = statistics(replays, solved, by_model)
+    errors, correlations = statistics(replays, solved, by_model)
     for name, error in errors.items():
         if math.isnan(error):
             errors[name] = math.inf

@@ -58,6 +58,7 @@ from smc_mujoco.identification.standard_errors import (
     MAX_CORRELATION,
     between,
     check_told_apart,
+    independent,
     statistics,
 )
 from smc_mujoco.mechanisms.custom import mjcf
@@ -124,7 +125,8 @@ class Identified:
         tuple[Record, Record, Array], ...
     ]  # predicted columns, measured ones, and their times
     evaluations: int  # how many parameter sets were simulated
-    independent: float  # how many samples of the residuals are independent of each other
+    # how many samples of the residuals, without what the model lacks, are independent of each other
+    independent: float
     by_pieces: tuple[Numbers, ...] = ()  # fit of the pieces of each log; empty in a closed loop
     scatter: Numbers = dataclasses.field(default_factory=dict)  # of values between logs, if several
     held_out: HeldOutFit | None = None  # of the log that was kept aside
@@ -362,7 +364,7 @@ def identify(
         )
         lacking = _lacking(replays, slopes)
         by_model = np.hypot(by_steps, lacking.moved)
-        errors, correlations, independent = statistics(replays, slopes, by_model)
+        errors, correlations = statistics(replays, slopes, by_model)
     values = replays.values(slopes.point)
     fitted = twin.with_values(values, "identified from records")
     states = _starting_states(fitted, data, replays, slopes.point)
@@ -383,7 +385,7 @@ def identify(
         fits_before=tuple(fits_before),
         predictions=tuple(fitted.predictions(data, states=states, **steps)),
         evaluations=replays.evaluations,
-        independent=independent,
+        independent=independent(lacking.slopes),
         by_pieces=() if replays.whole else tuple(fits_by_pieces(replays, slopes)),
         scatter=scatter,
         held_out=None if held_out is None else check(fitted, held_out, columns),

@@ -44,11 +44,8 @@ MIN_POWER = 1e-300  # in place of the power 0 of residuals that are all 0
 SINGULAR_RATIO = 1e-6
 
 
-def statistics(
-    replays: Replays, slopes: Slopes, by_model: Array
-) -> tuple[dict[str, float], Array, float]:
-    """Return the standard error of each quantity, their correlations (p, p), and `independent`, at
-    the solution.
+def statistics(replays: Replays, slopes: Slopes, by_model: Array) -> tuple[dict[str, float], Array]:
+    """Return the standard error of each quantity and their correlations (p, p), at the solution.
 
     `by_model`: errors of the quantities that the simulation's steps and what the model lacks
     cause, in their scales, (p,).
@@ -70,7 +67,7 @@ def statistics(
         deviation = np.maximum(deviation, _fed_back(replays, slopes.point, J))
     deviation = np.hypot(deviation, by_model)
     errors = dict(zip(names, (deviation * replays.scales).tolist(), strict=True))
-    return errors, correlations, count
+    return errors, correlations
 
 
 def check_told_apart(replays: Replays, slopes: Slopes) -> None:

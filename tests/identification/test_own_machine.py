@@ -24,7 +24,7 @@ from smc_mujoco.cli.main import app
 from smc_mujoco.errors import ScenarioWarning
 from smc_mujoco.identification.first_guess import first_guess
 from smc_mujoco.identification.friction_figure import curve_error, friction, measured_friction
-from smc_mujoco.identification.identify import check
+from smc_mujoco.identification.identify import SLOW, check
 from smc_mujoco.identification.own_rig import condition_fields, own_rig
 from smc_mujoco.mechanisms.hardware.servos import ServoFriction
 from smc_mujoco.simulation.conditions import from_file
@@ -80,6 +80,23 @@ def test_numbers_that_a_motion_tells_apart_are_no_pair_however_few_residuals_rem
     assert not [note for note in told.notes if "told apart" in note]
 
 
+def test_slow_residuals_that_nothing_explains_are_told(arm):
+    """A force that the log lacks."""
+    run = smc.run(
+        smc.Scenario(
+            plant=arm,
+            law=smc.law("pid", kp=20.0, ki=0.0, kd=1.5),
+            reference=smc.Sine(0.5, 2.5) + smc.Sine(0.3, 7.0),
+            disturbance=smc.Sine(0.3, 1.7),
+            noise=smc.Noise(2e-4),
+            control_period=2e-3,
+            duration=3.0,
+            u_max=20.0,
+        )
+    )
+    assert SLOW in smc.identify(arm, run, ["j1.armature", "j1.damping"]).notes
+
+
 @pytest.mark.slow
 def test_friction_that_gives_way_before_it_slides_is_told_and_in_the_errors():
     """A user's log of MuJoCo alone, whose default dry friction creeps: an armature 6 % off had an
@@ -107,6 +124,7 @@ def test_friction_that_gives_way_before_it_slides_is_told_and_in_the_errors():
     )
     for run, way in ((creeping, "MuJoCo's default does"), (bending, "bristles that bend by")):
         found = smc.identify(machine, run, names)
+        assert SLOW not in found.notes  # what is slow in the residuals is told, and in the errors
         shares = []
         for name in names:
             off = abs(found.values[name] - TRUTH[name])
