@@ -348,8 +348,9 @@ def compare(
       budget: largest number of sets of gains that a search tries, for each gain. With less than the
         default, a remark says that a law may trail because of its search.
       quick: runs of 3 s and seven searches, unless you give other numbers; by default three plants
-        and three conditions. On a plant for which no law has shipped gains, the searches are those
-        of `which` within minutes, under the conditions asked for.
+        and three conditions, which take some minutes of processor time. On a plant for which no law
+        has shipped gains, the searches are those of `which` within minutes, under the conditions
+        asked for.
       threads, progress: as in `run`.
       seed: another one draws other instances, starts and noise. The files are the same in every
         call, with any number of threads.
