@@ -31,15 +31,15 @@ PERSONAL = {  # calls that need a person, a paper of one's own, another package'
 }
 
 
-def functions():
-    """Address -> function, of every public function."""
+def everything():
+    """Address -> function, class or module, of all that is public."""
     found = {}
     for name in smc.__all__:
         found[f"smc.{name}"] = getattr(smc, name)
     for room in ROOMS:
         for name in getattr(smc, room).__all__:
             found[f"smc.{room}.{name}"] = getattr(getattr(smc, room), name)
-    return {name: made for name, made in found.items() if inspect.isfunction(made)}
+    return found
 
 
 def example(function) -> str:
@@ -48,7 +48,8 @@ def example(function) -> str:
     return "\n".join(map(textwrap.dedent, blocks))
 
 
-PUBLIC = functions()
+EVERYTHING = everything()
+PUBLIC = {name: made for name, made in EVERYTHING.items() if inspect.isfunction(made)}
 
 
 @pytest.mark.parametrize("name", PUBLIC)
@@ -57,6 +58,23 @@ def test_a_function_says_what_comes_back(name):
     annotation = inspect.signature(PUBLIC[name]).return_annotation
     assert said is not None
     assert annotation in (None, "None") or "\nReturns:\n" in said
+
+
+def test_help_sends_nobody_to_a_file_of_the_checkout():
+    files = re.compile(r"\b(?:docs|tests|benchmarks)/|\b(?:see|in) \w+\.py\b")
+    found = {name: files.findall(inspect.getdoc(made) or "") for name, made in EVERYTHING.items()}
+    assert not {name: names for name, names in found.items() if names}
+
+
+@pytest.mark.parametrize("kind", ["law", "joint", "surface", "estimator"])
+def test_the_page_of_a_component_names_its_gains_as_help_says(kind):
+    """`print(smc.law(name).template.doc)` is where `help` sends."""
+    made = {"surface": smc.surface, "estimator": smc.estimator}.get(kind, smc.law)
+    for name in smc.laws(kind=kind):
+        one = made(name)
+        assert one.template is not None
+        for gain in one.gains:
+            assert re.search(rf"\b{gain}\b", one.template.doc), (name, gain)
 
 
 def test_calls_that_no_test_runs_are_those_that_need_the_reader():
