@@ -21,6 +21,7 @@ fromto="0 0 0 .3 0 0" size=".02" mass=".6"/></body>"""
 ARM = {"kind": "hinge", "axis": "1 0", "tip": ".3 0 0", "size": 0.02, "mass": 0.5, "joint": ""}
 ARM |= {"bound": 20, "more": "", "motors": ""}
 K = '<motor joint="k" ctrlrange="-9 9"/>'
+LIFTED = {"axis": "-1 0"}  # gravity pulls from the stop to the start
 BUILT = {
     "calf": ({"joint": 'range="-1 1" damping=".1"', "tip": "0 0 -.4", "bound": 10}, ["j"], None),
     "chain": ({"more": LINK.format(joint=""), "motors": K}, ["j", "k"], None),
@@ -31,6 +32,10 @@ BUILT = {
               | {"bound": 0.05}, ["j"], None),
     "boom": ({"tip": "7 0 0", "size": 0.1, "mass": 100, "bound": 9000}, ["j"], None),
     "spring": ({"joint": 'stiffness="30" damping="2" frictionloss=".5"'}, ["j"], None),
+    # what holds each back besides u: a spring, the load and damping that are large beside the bound
+    "stiff": ({"joint": 'stiffness="120" damping="1"', "bound": 2} | LIFTED, ["j"], None),
+    "loaded": ({"bound": 0.8} | LIFTED, ["j"], None),
+    "viscous": ({"joint": 'damping="1.5"', "bound": 0.8} | LIFTED, ["j"], None),
     "at its end": ({"joint": 'range="0 2"'}, ["j"], None),
 }  # fmt: skip
 TIME = 1.5  # s, of the blow
