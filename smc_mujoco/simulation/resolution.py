@@ -72,8 +72,8 @@ def _of_motion(trace: Any) -> Iterator[str]:
     if np.any(trace.holding[_last(trace)]):
         yield (
             f"u of {name} chatters while dry friction, limits or contacts act on its joints, and "
-            "the error that remains depends on the physics step, however short that is; in Python "
-            f"{cure}"
+            "the remaining error depends on the physics step, however short the step is; in "
+            f"Python {cure}"
         )
     elif coupled(trace.scenario.plant):
         yield (

@@ -40,26 +40,27 @@ MEDIANS = (
     f"A cell has a median and its {100 * LEVEL:g} % interval. If a law has several sets of gains, "
     "runs with the same set count as one sample."
 )
+BELOW = "'below': the median is below the floor, and values below the floor count as equal."
 # A word in tables -> what their key says about it.
 MARKS = {
-    "J (": "Tuning minimises J, summed over conditions: ITAE over the initial error, plus "
-    "0.001 s^3 times the variation of u over u_max and the duration. The table's J is from "
-    "separate runs, which tuning has not seen.",
+    "J (": "Tuning minimises J, summed over conditions: ITAE divided by the initial error, "
+    "plus 0.001 s^3 times the variation of u divided by u_max and by the duration. The table's J "
+    "is from separate runs, which tuning has not seen.",
     "shipped": "Shipped gains come with the package.",
     "settling time": "Settling time is when the error enters its band to stay: 2 % of its initial "
     "value, or of the reference's range if that is larger.",
     "ITAE": "ITAE is the integral of time times absolute error.",
     "TV rate": "TV rate is the total variation of u per second, in the last fifth of a run.",
     "strong=True": "A star or bold type marks the winner. If no law wins, it marks every law that "
-    f"may be the best: no other law is shown to be better, with {100 * LEVEL:g} % confidence in "
-    "each column and condition, all its runs have arrived, and it has enough samples. Then a law "
-    "is not marked if its interval is too wide: its upper end is above 4 times its lower end, and "
-    "above 4 times the floor.",
+    "may be the best. Such a law meets three conditions: no other law is shown to be better "
+    f"({100 * LEVEL:g} % confidence in each column and condition), all its own runs have arrived, "
+    "and it has enough samples. Even so, a law is not marked if its interval is too wide: the "
+    "upper end is more than 4 times the lower end and more than 4 times the floor.",
     "": "A run has arrived if, in its last fifth, the error stays within 10 % of its initial value "
     "or within 5 times the sensor's resolution.",
-    "below ": "Values below the floor count as equal. Beside a law below the floor, no law above "
-    "it is marked. For an error, the floor is 1e-4 of its initial value. For errors late in the "
-    "run, it is also at least half an encoder count and at least the noise. For u and its "
+    "below ": f"{BELOW} If a law below the floor may be the best, no law above the floor is "
+    "marked. For an error, the floor is 1e-4 of its initial value. For errors late in the run, it "
+    "is also at least half an encoder count and at least the noise. For u and its "
     f"variation per second, it is {100 * MIN_COMMAND_SHARE:g} % of u_max.",
     "may pass ": "'may pass': the median is below the floor, but it rises at the end of runs, or "
     "with half the physics step, so that it need not stay there.",
@@ -521,7 +522,7 @@ class Boards(Tables, list[Board]):
         if not groups:
             return [Tabular(headings=["no boards: no metric applies"], rows=[], notes=self.absent)]
         tabulars = [_table(name, boards, self.labels) for name, boards in groups.items()]
-        notes = *tabulars[-1].notes, *self.remarks, key(self, repr(tabulars))
+        notes = *tabulars[-1].notes, *self.remarks, *key(self, repr(tabulars))
         return [*tabulars[:-1], dataclasses.replace(tabulars[-1], notes=notes)]
 
 
@@ -664,8 +665,8 @@ def _few(boards: Sequence[Board]) -> bool:
     return False
 
 
-def key(boards: Sequence[Board], tables: str) -> str:
-    """Return what the cells of these tables show."""
+def key(boards: Sequence[Board], tables: str) -> list[str]:
+    """Return what the cells of these tables show, in paragraphs."""
     parts = [MEDIANS]
     if _few(boards):
         parts.append(FEW)
@@ -691,7 +692,7 @@ def key(boards: Sequence[Board], tables: str) -> str:
         parts.append(f"{capital(UNTRIED)}.")
     if gains := in_words(sources(boards)):
         parts.append(f"{capital(gains)}.")
-    return " ".join(parts)
+    return parts
 
 
 def sources(boards: Iterable[Board]) -> dict[str, list[Source]]:

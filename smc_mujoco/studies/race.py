@@ -34,6 +34,7 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.files import writable
 from smc_mujoco.common.progress import Bar, bar
+from smc_mujoco.common.text import joined
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.workers import called, opened
@@ -177,6 +178,8 @@ def race(
                 dropped = hopeless(values)
                 for name in dropped:
                     del running[name]
+                if dropped:
+                    shown.says(f"{joined(dropped)} dropped: set of gains")
             if k + 1 in LOOKS:
                 comparison, looked = judged(running, goal, relevant), k + 1
                 if comparison is None or comparison.winners[0] or needed(comparison) > WITHIN:

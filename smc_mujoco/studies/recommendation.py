@@ -19,7 +19,7 @@ from smc_mujoco.robustness.margins import Margin
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.board import MEDIANS, Boards, Lead, heading, hidden, size
+from smc_mujoco.studies.board import BELOW, MEDIANS, Boards, Lead, heading, hidden, size
 from smc_mujoco.studies.race import FIRST, LOOKS, Race, needed
 from smc_mujoco.studies.table import Table
 
@@ -27,6 +27,13 @@ LEANS = (
     "u stays at its bound in the worst run: it leans on something, or needs more force, so give "
     "another goal or start, or a larger u_max if the motor gives more"
 )
+TOLERATED = {  # kind of a margin -> what is tolerated, at a level
+    "delay": "a delay of {}",
+    "friction": "friction of {}",
+    "disturbance": "a constant disturbance of {}",
+    "mass": "a mass of {} the nominal one",
+    "blow": "a blow of {}",
+}
 RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
 
 
@@ -133,9 +140,10 @@ class NoLaw(NamedTuple):
         """How it does, and in which conditions the experiment shows no need of a law."""
         held = "u = 0, at which the servo holds the goal" if self.holds else "u = 0"
         every = self.runs * len(self.settled)
-        each = f", {self.runs} in each condition" if len(self.settled) > 1 else ""
-        text = f"of {counted(every, 'separate run')}{each}, {sum(self.settled.values())} settle "
-        text += f"with {held}, and {self.settled_by_law} with the law. "
+        each = f" ({self.runs} in each condition)" if len(self.settled) > 1 else ""
+        without = _some(sum(self.settled.values()), every)
+        text = f"with {held}, {without} of {counted(every, 'separate run')} settle{each}; "
+        text += f"with the law, {_some(self.settled_by_law, every)} do. "
         if math.isnan(self.times):
             text += "Some runs fail, so J is not compared"
         else:
@@ -188,8 +196,8 @@ class RaceRecommendation(Recommendation):
         elif len(self.laws) > 1:
             lines.append("With the gains below: not tried, as the time was over")
         if len(self.weighs) > 1:
-            lines.append(f"Its J: {self._weighs}")
-        lines.append(f"Its scores: {self._needs}")
+            lines.append(f"J of {self.law.name}: {self._weighs}")
+        lines.append(f"Scores of {self.law.name}: {self._needs}")
         if self.law.name != "none":
             lines.append(f"Without a law: {self.no_law.words}")
         if self.added:
@@ -221,13 +229,13 @@ class RaceRecommendation(Recommendation):
             words.append("of the laws that were searched")
         if self.settles[self.law.name] < RELIABLE:
             words.append(f"which settled in {done} of {of} runs")
+        text = ", ".join(words)
         ahead = self._lowest
         if ahead and ahead != self.law.name:
             name, done, of = self._least_settled(ahead)
-            words.append(
-                f"as {ahead}, whose J is lower, settled in {done} of {of} runs under {name}"
-            )
-        return ", ".join(words)
+            only = f"settled in only {done} of {of} runs under {name}"
+            text += f". {ahead} has the lower J, but {only}"
+        return text
 
     @property
     def _lowest(self) -> str | None:
@@ -297,9 +305,10 @@ class RaceRecommendation(Recommendation):
         text = f"with {race.looked} sets {hidden(seen)}"
         if math.isinf(sets):
             return f"{text}, and the laws are too close for more sets to tell them apart"
+        decide = f"about {sets:.0f} sets would decide"
         if race.stopped and sets <= LOOKS[-1]:
-            return f"{text}; about {sets:.0f} would decide, and the same call goes on with them"
-        return f"{text}; if the lead stays as it is, about {sets:.0f} would decide"
+            return f"{text}; {decide}, and the same call goes on with them"
+        return f"{text}; if the lead stays as it is, {decide}"
 
     @property
     def _where(self) -> str:
@@ -316,9 +325,9 @@ class RaceRecommendation(Recommendation):
         least = runs
         for done, _ in found.values():
             least = min(least, done)
-        share = "all" if least == runs else f"at least {least}"
-        each = _each(len(found))
-        return f"in {share} of another {runs} runs in {each}, before the last fifth of a run"
+        share = "all" if least == runs else f"at least {least} of"
+        each = f"each of the {len(found)} conditions" if len(found) > 1 else "its condition"
+        return f"in {share} {runs} further runs under {each}, before the last fifth of the run"
 
     @property
     def _weighs(self) -> str:
@@ -326,7 +335,7 @@ class RaceRecommendation(Recommendation):
         order = sorted(self.weighs, key=lambda name: -self.weighs[name])
         parts = []
         for name in order:
-            parts.append(f"{100.0 * self.weighs[name]:.0f} % {name}")
+            parts.append(f"{100.0 * self.weighs[name]:.0f} % from {name}")
         return joined(parts)
 
     @property
@@ -367,9 +376,9 @@ class RaceRecommendation(Recommendation):
                 level += f" from the start and {self._from_other_side}"
             if margin.unit == self.worst_run.efforts[0]:
                 level += f" ({self._reach})"
-            parts.append(f"{margin.kind} {level}")
-        where = "without the conditions" if self.beside == "nominal" else f"under {self.beside}"
-        text = f"each alone and {where}, {joined(parts)}. At these levels the error after "
+            parts.append(TOLERATED[margin.kind].format(level))
+        where = "to the nominal plant" if self.beside == "nominal" else f"under {self.beside}"
+        text = f"each applied alone, {where}: {joined(parts)}. At these levels the error after "
         text += f"{self.worst_run.duration:g} s is still below 5 % of its initial value"
         if self.beside != "nominal":
             text += ". Delay and mass include those of the condition; friction and blows are added"
@@ -431,6 +440,8 @@ class RaceRecommendation(Recommendation):
             f"{MEDIANS} These tables show no significance tests; those are below. "
             f"{capital(UNTRIED)}."
         )
+        if "below " in str(shown):
+            notes.append(BELOW)
         last = shown.pop()
         return [*shown, dataclasses.replace(last, notes=[*notes, "", *self.answer])]
 
@@ -450,9 +461,10 @@ class RaceRecommendation(Recommendation):
             rows=rows,
             title=f"J {self.judged}",
             notes=[
-                "Median and range over groups of runs that tuning has not seen. Each group is run "
-                "with the law's next set of gains, or with its only one. J is the time-weighted "
-                "relative error plus the weighted variation of u, added up over the conditions."
+                "Median and range over groups of runs that tuning has not seen. Each group uses "
+                "the law's next set of gains, and after the last set the first again. J is the "
+                "time-weighted relative error plus the weighted variation of u, added up over the "
+                "conditions."
             ],
         )
 
@@ -468,8 +480,9 @@ def _cost(J: float) -> str:
     return number(J) if J < FAILURE_COST else "fails"
 
 
-def _each(count: int) -> str:
-    return "its condition" if count == 1 else f"each of {count} conditions"
+def _some(count: int, every: int) -> str:
+    """Return a number of things in words: "all", "none", or the number."""
+    return {every: "all", 0: "none"}.get(count, f"{count}")
 
 
 def _unmarked(cell: Cell | str) -> Cell | str:
@@ -500,7 +513,7 @@ def _verdict(comparison: Comparison, order: Sequence[str]) -> str:
     winner = comparison.winners[0]
     names = _ranked(comparison, order)
     if not names:
-        return "open: no law has sets or runs enough"
+        return "open, as no law has enough sets or runs"
     first = winner or names[0]
     effects = {}
     for law in names:
@@ -516,4 +529,5 @@ def _verdict(comparison: Comparison, order: Sequence[str]) -> str:
     best = [law for law in names if not beaten[law]]
     if len(best) == 1:
         return f"{best[0]} is undefeated, but does not beat every rival; its J is {lead}"
-    return f"open: {joined(best)} may have the lowest J; {first}'s is {lead}"
+    either = f"either {best[0]} or {best[1]}" if len(best) == 2 else f"any of {joined(best)}"
+    return f"open, as {either} may have the lowest J; {first}'s is {lead}"

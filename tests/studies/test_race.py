@@ -170,20 +170,24 @@ def test_a_race_that_stops_between_its_looks_keeps_what_the_first_look_said(run,
 def test_the_bar_never_shows_more_sets_than_are_to_be_made(run, monkeypatch):
     """Beyond the first look, and after a law was dropped."""
     shares = []
+    bars = []
 
     class Recorded(Bar):
         def reached(self, done, whole):
             super().reached(done, whole)
             shares.append((done, whole))
 
-    monkeypatch.setattr(
-        module, "bar", lambda *given, **named: contextlib.nullcontext(Recorded(whole=given[1]))
-    )
+    def recorded(*given, **named):
+        bars.append(Recorded(*given[:2]))
+        return contextlib.nullcontext(bars[-1])
+
+    monkeypatch.setattr(module, "bar", recorded)
     monkeypatch.setattr(module, "WITHIN", math.inf)
     raced = run({"a": 0.0, "b": 0.0, "c": 99.0})
     assert (raced.sets, [*raced.dropped]) == (12, ["c"])
     assert all(done <= whole for done, whole in shares)
     assert shares[-1] == (24, 24)
+    assert str(bars[0]).startswith("c dropped: set of gains")
 
 
 def test_a_race_leaves_the_time_that_the_runs_after_it_take(run, now):

@@ -172,13 +172,13 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
         "Use",
         "Over all sets of gains",
         "With the gains below",
-        "Its J",
-        "Its scores",
+        f"J of {recommendation.law.name}",
+        f"Scores of {recommendation.law.name}",
         "Without a law",
     ]
     assert [*lines][:9] == [*verdicts, "Added", "Settles", "Tolerates"]
     assert lines["Added"].startswith("noise, of 0.01 m in positions and 0.05 m/s in veloc")
-    shares = [float(share) for share in re.findall(r"(\d+) % \w+", lines["Its J"])]
+    shares = [float(share) for share in re.findall(r"(\d+) % from \w+", lines[verdicts[3]])]
     assert sum(shares) == pytest.approx(100.0, abs=1.0)
     assert shares == sorted(shares, reverse=True)
     assert recommendation.weighs.keys() == {"coulomb", "noise"}
@@ -199,7 +199,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     assert len(recommendation.table) == 4 * len(recommendation.laws)
     text = str(recommendation)
     assert "mass under coulomb: 4 seeds" in text
-    assert lines["Tolerates"].startswith("each alone and under coulomb, delay ")
+    assert lines["Tolerates"].startswith("each applied alone, under coulomb: a delay of ")
     assert "At these levels the error after 1.5 s is still below 5 %" in lines["Tolerates"]
     assert "mass include those of the condition; friction and blows are" in lines["Tolerates"]
     (left,) = recommendation.race.entrants.keys() - {*compared}
@@ -218,11 +218,12 @@ def test_the_answer_says_how_the_plant_does_without_a_law_and_where_it_needs_non
     assert (without.runs, without.settled) == (4, {"coulomb": 0, "noise": 0})
     assert without.times > 2.0
     assert not without.holds
-    said = "of 8 separate runs, 4 in each condition, 0 settle with u = 0, and "
+    said = "with u = 0, none of 8 separate runs settle (4 in each condition); with the law, "
     assert without.words.startswith(said)
     assert without.words.endswith(f"Without the law, J is {number(without.times)} times as high")
     held = without._replace(holds=True, settled={"coulomb": 4, "noise": 1}, times=math.nan)
-    assert "5 settle with u = 0, at which the servo holds the goal, and" in held.words
+    said = "with u = 0, at which the servo holds the goal, 5 of 8 separate runs settle (4 in each"
+    assert held.words.startswith(said)
     assert held.words.endswith(
         "Some runs fail, so J is not compared. With u = 0 all runs settle under coulomb"
     )
@@ -236,7 +237,7 @@ def test_the_needs_are_those_of_the_tables_and_margins_at_the_end_of_their_searc
     bound = np.median(
         recommendation.table.select(law=recommendation.law.name).column("ultimate_bound")
     )
-    assert f"ultimate bound (m) {number(bound)}" in lines["Its scores"]
+    assert f"ultimate bound (m) {number(bound)}" in lines[f"Scores of {recommendation.law.name}"]
     board = recommendation.leaderboard[1]
     entries = []
     for entry in board.entries:
@@ -254,7 +255,7 @@ def test_the_needs_are_those_of_the_tables_and_margins_at_the_end_of_their_searc
     friction = recommendation.margins[1]
     most = dataclasses.replace(friction, value=friction.searched)
     widest = dataclasses.replace(recommendation, margins=[most])
-    assert f"friction at least {number(most.value)} N (|u| at most 9.00 N)" in widest._margins
+    assert f"friction of at least {number(most.value)} N (|u| at most 9.00 N)" in widest._margins
 
 
 MIXED = """<mujoco model="mixed"><worldbody>
@@ -278,7 +279,7 @@ def test_margins_from_the_side_from_which_gravity_helps_say_so(raced):
     for value, words in ((2.0, "2.00 N from the other side"), (math.nan, "none from the other")):
         other = dataclasses.replace(friction, value=value)
         told = dataclasses.replace(recommendation, helped=["the slide"], opposed=other)._margins
-        assert f"friction {friction.text} N from the start and {words}" in told
+        assert f"friction of {friction.text} N from the start and {words}" in told
         assert said in told
     assert said not in recommendation._margins
     late = dataclasses.replace(recommendation, helped=["the slide"])._margins
@@ -413,8 +414,8 @@ def test_a_law_that_does_not_settle_is_not_recommended_without_saying_where(race
     runs = {others[0].name: {"noise": (4, 4)}, winner: {"coulomb": (4, 4), "noise": (1, 4)}}
     fields = {"laws": others, "settled": runs, "settles": {others[0].name: 1.0}}
     behind = dataclasses.replace(recommendation, **fields)
-    reason = f"as {winner}, whose J is lower, settled in 1 of 4 runs under noise"
-    assert behind.answer[0] == f"Use: {others[0].name}, {reason}"
+    reason = f"{winner} has the lower J, but settled in only 1 of 4 runs under noise"
+    assert behind.answer[0] == f"Use: {others[0].name}. {reason}"
     pushed = dataclasses.replace(
         recommendation.worst_run, disturbance=smc.Constant(20.0)
     )  # u_max is 9
@@ -446,7 +447,7 @@ def test_the_page_has_the_numbers_of_the_code():
         f"had {min(medians):.2f} to {max(medians):.2f} times the J of whole searches, the worst "
         f"{max(row['worst'] for row in found):.2f} times",
         f"`--quick` is `--minutes {module.QUICK_MINUTES:g}`",
-        f"in how many of another {module.RACE_SEEDS} runs",
+        f"in how many of {module.RACE_SEEDS} further runs",
         f"fewer than {100 * recommendation_module.RELIABLE:g} %",
         f"{quick_search.BUDGET} evaluations a gain",
         f"after {race.LOOKS[0]} sets the laws are compared",
