@@ -494,8 +494,9 @@ def in_readme(points: Sequence[dict]) -> str:
     """Return what README says of the points that were not drawn."""
     quiet, noisy, *smooth = tallies([point for point in points if point["draw"] is None])
     return (
-        "A case is one plant, period, load and J, with or without sensor noise. It counts only if "
-        "both sides have gains with at most that J. "
+        "A case is one plant, period, load and J, with or without sensor noise. A case is "
+        "included only if, in both searches, the sliding law and at least one rival have gains "
+        "with at most that J. "
         f"There are {noisy['all']} cases with sensor noise: super-twisting leads the best of its "
         f"rivals `adrc`, `pd_observer`, `hodob` and `pid` in {leads(noisy)} and trails it in "
         f"{noisy['contradicted']}. There are {quiet['all']} cases without noise: it leads in "
@@ -503,8 +504,8 @@ def in_readme(points: Sequence[dict]) -> str:
         "errors are too small to rank, below or near a ten-thousandth of the initial error. In "
         f"{noisy['not settled'] + quiet['not settled']} of these {noisy['all'] + quiet['all']} "
         "cases the runs scatter too much to determine an error, and no lead is counted. Smooth "
-        f"first-order sliding has such gains in {sum(its['all'] for its in smooth)} cases, with "
-        f"noise or without: it leads the best rival in {sum(map(leads, smooth))} and trails it in "
+        f"first-order sliding has {sum(its['all'] for its in smooth)} cases of its own, with noise "
+        f"or without: it leads the best rival in {sum(map(leads, smooth))} and trails it in "
         f"{sum(its['contradicted'] for its in smooth)}."
     )
 

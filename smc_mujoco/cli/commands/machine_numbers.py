@@ -32,7 +32,8 @@ Paths = Annotated[
         "--for",
         metavar="PATH,...",
         help="Parameters to find, such as shoulder.damping,input_delay,m; "
-        "default: those that a rig's records determine.",
+        "default: for a rig, those that its own records determine; a machine that is no rig has "
+        "no default.",
     ),
 ]
 PairsFile = Annotated[
@@ -129,10 +130,10 @@ def identify(
     and u (N m or N) of the joint, or x_JOINT and u_JOINT of each. You need no first guess.
 
     Parameters of a joint are named JOINT.damping, .frictionloss, .armature, .stiffness, .gain,
-    .offset and .zero. The delay from command to force is input_delay. A plant's own parameters have
-    their names, such as m (mass) and grav (gravity). Parameters of a part that --condition adds are
-    named FIELD.NAME, such as friction.coulomb. The table has each parameter with its standard
-    error. Notes below it say what the logs cannot determine.
+    .offset and .zero. The delay from command to force is input_delay. A plant's own parameters keep
+    the names that they have in the plant, such as m (mass) and grav (gravity). Parameters of a part
+    that --condition adds are named FIELD.NAME, such as friction.coulomb. The table has each
+    parameter with its standard error. Notes below it say what the logs cannot determine.
 
     With --pairs you need no machine: give the speed (rad/s or m/s) and torque (N m or N) of one
     joint, in time order. The torque must be that of friction alone, so subtract gravity and inertia

@@ -72,7 +72,8 @@ Columns = Annotated[
     str | None,
     typer.Option(
         metavar="NAME=COLUMN,...",
-        help="Columns whose names differ from the rig's, as theta=arm_angle.",
+        help="Columns that have other names in your file, as EXPECTED=YOURS: theta=arm_angle reads "
+        "theta from arm_angle.",
     ),
 ]
 Condition = Annotated[
@@ -129,8 +130,8 @@ LawToTune = Annotated[
         metavar="LAW|FILE",
         autocompletion=LAWS,
         help="A law, such as pid, or a file that defines one. Gains in brackets, such as "
-        "pid(kp=50,ki=50,kd=8), are not held: the result is only compared with them. A gain of 0 "
-        "stays 0.",
+        "pid(kp=50,ki=50,kd=8), do not fix anything: they are a baseline that the tuned gains are "
+        "compared with. The exception is a gain of 0, which stays 0.",
     ),
 ]
 Laws = Annotated[
@@ -161,8 +162,9 @@ PlantName = Annotated[
         autocompletion=PLANTS,
         help="A plant from `smc-mujoco list`, or joints of your own .xml or .urdf, such as "
         "arm.xml:shoulder+elbow.\n\n"
-        "- The goal is the keyframe named home, or the file's only keyframe if it has a name. Add "
-        "@NAME for another one, as arm.xml:elbow@up, or @ alone for the pose as drawn.\n\n"
+        "- The goal is the keyframe named home, or the file's only keyframe if it has a name, or "
+        "otherwise the pose as drawn. Add @NAME for another keyframe, as arm.xml:elbow@up, or @ "
+        "alone for the pose as drawn.\n\n"
         "- Motors hold the other joints in place. Add +locked to weld these joints, or +file to "
         "let them move unless a servo holds them.\n\n"
         "- Brackets after a joint hold its options. elbow(u_max=9,x0=0.2) sets the bound on u and "

@@ -53,7 +53,10 @@ WhichQuick = Annotated[
     bool, typer.Option("--quick", help="Answer within ten minutes, as --minutes 10 does.")
 ]
 Falling = Annotated[
-    bool, typer.Option("--falling", help="Do not stop where the base of your model falls.")
+    bool,
+    typer.Option(
+        "--falling", help="Go on even if the base of your model falls while its joints are held."
+    ),
 ]
 Minutes = Annotated[
     float | None,
@@ -92,11 +95,11 @@ def which(
     """Recommend a law for a plant. Report its gains, the second-best law, and how certain the
     choice is.
 
-    All laws that suit the plant are compared by the rules of `compare`, with the package's gains
-    or with gains that are tuned now. On a model of your own, tuning takes minutes for each law.
-    --quick takes at most ten minutes for all laws together. It also writes the gains, a figure and
-    a film of the worst run. --law names the laws to try. A stopped command resumes when you start
-    it again.
+    All laws that suit the plant are compared by the same rules as in smc-mujoco compare, with the
+    package's gains or with gains that are tuned now. On a model of your own, tuning takes minutes
+    for each law. --quick takes at most ten minutes for all laws together. With --quick or --minutes
+    it also writes the gains, a figure and a film of the worst run. --law names the laws to try. A
+    stopped command resumes when you start it again.
 
     Example: smc-mujoco which duffing --condition noise,coulomb --need calm,fast
 
@@ -152,8 +155,10 @@ def _save(recommendation: "RaceRecommendation", out: Path, terminal: Terminal) -
     figure.figure([recommendation.worst_trace], out / "worst_run")
     terminal.wrote(*page.files(out / "worst_run"))
     terminal.note(
-        f"Its worst run, under {recommendation.worst_run.condition}, is the one that settles last, "
-        "or never, in the condition in which the fewest settle, or the latest.",
+        f"The figure shows the worst run of {recommendation.law.name}. It is under "
+        f"{recommendation.worst_run.condition}, the condition in which the fewest runs settle. If "
+        "conditions are equal in that, it is the one in which runs settle latest. Of the runs "
+        "there, this one settles last or never.",
         wrap=True,
     )
 
