@@ -139,8 +139,9 @@ def law_function(
     Python.
 
     Args:
-      gains: name -> default value, or a Gain with unit and range, which `smc.tune` needs. Gain and
-        units, such as FORCE and RATE, are in `smc_mujoco.control.units`.
+      gains: name -> default value, or a Gain with unit and range, which `smc.tune` needs, such as
+        Gain(4.0, RATE, positive=True) for the slope of a surface. Gain and the units are in
+        `smc_mujoco.control.units`, whose docstring lists them.
       memory: floats of memory per channel. Default: 8.
       positive, nonnegative: names of gains that must be above 0, or at least 0, as a Gain can say.
       relative_degree: of the sliding variable that the law needs: 1, the default, 2 or 3 (of e).

@@ -2,6 +2,11 @@
 
     @law_function(gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)})
 
+The units are FORCE, POSITION, TIME, RATE, RATE2, SPEED, ACCELERATION, INERTIA, FORCE_RATE,
+FORCE_PER_POSITION, FORCE_PER_SPEED, FORCE_PER_ROOT, SPEED_PER_ROOT and INPUT_GAIN; a plain number
+has Unit(). The slope c of a surface has the unit RATE. SLOPE, ASSUMED_B and AHEAD_B are whole
+gains, {"c": SLOPE}, and other names in capitals are sets of gains of the library's laws.
+
 A unit is a product of powers of force F, position X and time T. Tuning derives the bounds of each
 gain from its unit and from F, X and T of the plant (`smc_mujoco.analysis.tuning.search_space`).
 Tests use the units to check that a law behaves the same in every system of units.

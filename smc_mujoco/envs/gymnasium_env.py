@@ -45,8 +45,11 @@ def observation_space(setting: Setting) -> spaces.Box:
 class PlantEnv(Episode, gymnasium.Env):
     """One plant with a task. It has the attributes of an Episode too.
 
-    Its arguments are those of `__init__`; `changes` are fields of the scenario, such as
-    {"control_period": 0.01, "u_max": 4.0}.
+    Args:
+      plant, task: a plant or its name, and "regulate" or another of `smc.envs.tasks`.
+      changes: fields of the scenario, such as {"control_period": 0.01, "u_max": 4.0}, see
+        `__init__`.
+      render_mode: "rgb_array" for pictures by `render`, or None.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 1000}  # noqa: RUF012  # as gymnasium has it

@@ -420,7 +420,8 @@ def margins(
 
     Args:
       plants, laws: names, or your own plants and laws, one or several.
-      kinds: one or several of "delay", "disturbance", "friction", "mass", "noise"; and of "blow",
+      kinds: one or several of "delay", "disturbance" (a constant force on every driven joint, with
+        either sign), "friction" (dry), "mass", "noise" (of positions and speeds); and of "blow",
         halfway through the run, "jitter" and "missed", of the controller's clock, and "loss", the
         fraction of its gain that an actuator has lost from the start on, which are left out by
         default. All actuators lose it, or the one that the condition's fault is on. Shares, and the

@@ -61,12 +61,22 @@ FIRST_MEMBERS = 2  # the worst random members, from which the search begins
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class WorstCase(Tables):
-    """The worst run of a scenario that was found within a class."""
+    """The worst run of a scenario that was found within a class.
 
-    value: float  # the metric of the worst run; inf if it failed
-    median: float  # the metric's median over as many random members as the search had runs
-    unit: str  # of both
-    scenario: Scenario  # the worst run, an ordinary scenario that gives this value to the last bit
+    Attributes:
+      value: the metric of the worst run; inf if it failed.
+      median: the metric's median over as many random members as the search had runs.
+      unit: of both.
+      scenario: the worst run, an ordinary scenario that gives this value to the last bit. Its
+        `disturbance` has the force that was found.
+      constants: name -> what is constant in it, and may differ in the class, such as "mass".
+      outside: why the theorem of the law does not cover the class; "" if nothing is known.
+    """
+
+    value: float
+    median: float
+    unit: str
+    scenario: Scenario
     found_by: str  # the strategy that made the member, or the one of which it is a variation
     tried: int  # number of runs, half of them of random members
     nominal: Scenario  # the scenario that was given
@@ -87,8 +97,11 @@ class WorstCase(Tables):
         s = self.nominal
         label = CATALOGUE[self.metric].label
         found = f"{label} {self.words}"
-        if self.constants:
-            found += f" with {words_of(self.constants, s.plant)}"
+        having = [words_of(self.constants, s.plant)]
+        if self.within.disturbance:
+            having.append("the force that was found")
+        if having := ", ".join(filter(None, having)):
+            found += f" with {having}"
         drawn = f"median of random members {self.with_unit(self.median)}"
         words = "; ".join(
             filter(None, (found, drawn, f"searched: {self.class_words}", self.checked))

@@ -24,6 +24,7 @@ from smc_mujoco.common.text import LEAST_PRINTED, capital, counted, every, joine
 from smc_mujoco.control.source import Source, in_words, kinds
 from smc_mujoco.draw import style
 from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.metrics.conventions import Metric
 
 LABELS = {SETTLES: "share of settled runs", OBJECTIVE: "J on unseen runs"}
 MIN_TIMES = 1.03  # least lead of a law below the floor that is printed; chosen
@@ -570,8 +571,19 @@ def heading(board: Board) -> str:
         return "settled runs (%)"
     if board.metric == OBJECTIVE:
         return "J (s^2)"
-    in_unit = dataclasses.replace(CATALOGUE[board.metric], unit=board.unit)  # in V for voltages
-    return in_unit.heading(board.x)
+    return _in_unit(board).heading(board.x)
+
+
+def unit_of(board: Board) -> str:
+    """Return the unit of a board's medians; "" for a share, or where positions have none."""
+    if board.metric not in CATALOGUE or not board.x:
+        return "" if "{" in board.unit else board.unit
+    return _in_unit(board).unit_for(board.x)
+
+
+def _in_unit(board: Board) -> Metric:
+    """Return the metric of a board, in the board's unit: in V for voltages."""
+    return dataclasses.replace(CATALOGUE[board.metric], unit=board.unit)
 
 
 def _table(name: str, boards: Sequence[Board], labels: Mapping[str, str]) -> Tabular:

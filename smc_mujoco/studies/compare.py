@@ -36,7 +36,7 @@ from smc_mujoco.simulation.grid import Starts, case, listed, listed_laws
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.simulation.workers import Workers
-from smc_mujoco.studies.board import Boards
+from smc_mujoco.studies.board import Boards, unit_of
 from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, Holdout, leaderboard, objective_boards
 from smc_mujoco.studies.race import LOOKS
@@ -212,7 +212,8 @@ class Compared(Tables):
 
         Its columns are plant, condition, law, gains (their source), metric, unit, median, low and
         high (the interval), failed (runs without a value), runs, best (whether no law is better)
-        and winner. All runs are in `table.data.to_pandas()`.
+        and winner. The metric "objective" is J on unseen runs, over all conditions together; its
+        condition is "". All runs are in `table.data.to_pandas()`.
 
         Raises:
           MissingPackageError: pandas is not installed.
@@ -232,7 +233,7 @@ class Compared(Tables):
                     "law": entry.law,
                     "gains": source.kinds(entry.sources),
                     "metric": board.metric,
-                    "unit": board.unit,
+                    "unit": unit_of(board),
                     "median": entry.interval.median,
                     "low": entry.interval.low,
                     "high": entry.interval.high,

@@ -117,6 +117,7 @@ def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
     frame = frame[(frame["metric"] == "itae") & (frame["law"] == "pid")]
     (row,) = frame.query("plant == 'duffing' and condition == 'encoder'").itertuples()
     (entry,) = [entry for entry in boards[3].entries if entry.law == "pid"]
+    assert row.unit == "m s^2"
     assert (row.median, row.low, row.high, row.gains) == (*entry.interval[:3], "yours")
     assert "PID [yours] &" in found.to_latex()
     assert found.to_latex().count(r"\begin{tabular}") == 6  # J on each plant, too
