@@ -200,6 +200,10 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     text = str(recommendation)
     assert "mass under coulomb: 4 seeds" in text
     assert lines["Tolerates"].startswith("each applied alone, under coulomb: a delay of ")
+    assert " times the nominal one and a blow of " in lines["Tolerates"]
+    kinds = {*recommend.KINDS, *recommend.KINDS_OF_POSES}
+    assert kinds == recommendation_module.TOLERATED.keys()
+    assert recommendation_module.BELOW in " ".join(text.split())
     assert "At these levels the error after 1.5 s is still below 5 %" in lines["Tolerates"]
     assert "mass include those of the condition; friction and blows are" in lines["Tolerates"]
     (left,) = recommendation.race.entrants.keys() - {*compared}
@@ -219,7 +223,8 @@ def test_the_answer_says_how_the_plant_does_without_a_law_and_where_it_needs_non
     assert without.times > 2.0
     assert not without.holds
     said = "with u = 0, none of 8 separate runs settle (4 in each condition); with the law, "
-    assert without.words.startswith(said)
+    for count, words in ((0, "none"), (3, "3"), (8, "all")):
+        assert without._replace(settled_by_law=count).words.startswith(f"{said}{words} do. ")
     assert without.words.endswith(f"Without the law, J is {number(without.times)} times as high")
     held = without._replace(holds=True, settled={"coulomb": 4, "noise": 1}, times=math.nan)
     said = "with u = 0, at which the servo holds the goal, 5 of 8 separate runs settle (4 in each"
@@ -333,6 +338,15 @@ def test_where_runs_fail_there_is_no_ratio_of_J():
     assert "lower than b's in 8 of 8 runs, of which 0 of a and 8 of b fail" in found
     assert "times" not in found
     assert [*map(recommendation_module._cost, (0.3, 1e9))] == ["0.300", "fails"]
+
+
+def test_laws_that_may_have_the_lowest_J_are_all_named():
+    J = {law: np.array([0.3, 0.5, 0.2, 0.4, 0.6, 0.3, 0.5]) for law in "abc"}
+    said = recommendation_module._verdict(Comparison(J), ["a", "b", "c"])
+    assert said.startswith("open, as any of a, b and c may have the lowest J; a's is ")
+    del J["c"]
+    said = recommendation_module._verdict(Comparison(J), ["a", "b"])
+    assert said.startswith("open, as either a or b may have the lowest J; a's is ")
 
 
 def test_a_race_that_is_asked_for_again_gives_the_same_answer_from_its_folder(raced, monkeypatch):
