@@ -149,8 +149,8 @@ def extrapolated(replays: Replays, slopes: Slopes, most: int = 0) -> tuple[Slope
     share LEFT_BY_STEPS of what it changes from h to h/2: the most of that at the slopes and at the
     solution. If the replays with steps h fit better, as they fit a log of a simulation with such
     steps, their solution is returned, and what shorter steps would change. Else at most `most`
-    steps keep the derivatives of the slopes; where these promise much more than the replays keep,
-    they are taken anew. The last step follows from derivatives alone.
+    steps use the derivatives of the slopes. If these promise much more than the replays keep, new
+    derivatives are computed. The last step is not replayed.
     """
     if not replays.free.size:  # records of simulated runs have the same steps
         return refine(replays, slopes, most), np.zeros(len(slopes.point.values))

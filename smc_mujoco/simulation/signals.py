@@ -649,10 +649,9 @@ class Jump:
 
     `factors` has names with the factors that multiply them: parameters of the plant, numbers of a
     model's joints and bodies ("elbow.damping", "hand.payload"), and paths to numbers of parts,
-    FIELD.JOINT.NAME or FIELD.NAME.
-    For parameters in `plant.added`, such as the payload of an arm of the library, and for numbers
-    that are 0, it has terms, which are added. Your own model has "mass", of all bodies at once,
-    "grav", and numbers of its joints and bodies.
+    FIELD.JOINT.NAME or FIELD.NAME. For parameters in `plant.added`, such as the payload of an arm
+    of the library, and for numbers that are 0, it has terms, which are added. Your own model has
+    "mass", of all bodies at once, "grav", and numbers of its joints and bodies.
 
     What a part keeps, such as the bend of bristles, stays as it is. The law and its bound on u do
     not know of the change. The u of a DCMotor by torque is its stall torque after it, too.

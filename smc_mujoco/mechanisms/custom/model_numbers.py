@@ -40,8 +40,6 @@ KINDS = {
     "armature": JointField("dof_armature", "kg m^2", "kg"),
     "stiffness": JointField("jnt_stiffness", "N m/rad", "N/m"),
 }
-
-
 PAYLOAD = "payload"  # kg, of a body
 
 
