@@ -146,7 +146,7 @@ class Compared(Tables):
                     notes = [BEST_SET, *notes]
                 gains.append((plant, law.name, law.source.words, f"{len(sets)}", gains_text(best)))
             for name, time in self.times.get(plant, {}).items():
-                # to a digit: those of repeated calls differ by tens of percent
+                # to two digits: those of repeated calls differ by tens of percent
                 of_law = [number(value, 2) for value in (time.ratio, time.median, time.high)]
                 times.append((plant, name, *of_law))
         if times:
@@ -319,8 +319,8 @@ def compare(
         print(compared)
 
     A law whose gains you gave keeps them. Otherwise a law of the package has the gains that are
-    shipped for the plant. If there are none, or if the law is your own, it is tuned by the rule
-    that found the shipped gains. Run i has the gains that search i found, so twelve searches are
+    shipped for the plant. If there are none, or if the law is your own, it is tuned by
+    one rule, the same for all. Run i has the gains that search i found, so twelve searches are
     twelve answers to "what do I get if I tune it?". The folder keeps each search and each run:
     after a kill, the same call resumes there.
 

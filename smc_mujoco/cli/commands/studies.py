@@ -323,7 +323,7 @@ def compare(
 
     Gains that you give in brackets are used as they are. Otherwise a law of the package uses the
     gains that are shipped for the plant. If there are none, or if the law is from your own file,
-    it is tuned by the rule that found the shipped gains. This takes seconds to minutes for each
+    it is tuned by one rule, the same for all laws. This takes seconds to minutes for each
     law and plant. The default values in your file are used only if you give --gains or --no-tune,
     or if the law cannot be tuned.
 
