@@ -94,7 +94,7 @@ class ExcitingMotion:
       condition: number of the scaled slopes of the log.
       errors: quantity -> expected standard error, in its unit.
       values: quantity -> the number that it has in the simulation.
-      largest_u, largest_v: of all joints.
+      largest_u, largest_v: of all joints, N m or N, and rad/s or m/s.
       worst_pair: the two quantities that are told apart worst, and the correlation of their errors.
       rest: share of the time at which every joint is below 2 % of its largest speed.
     """
@@ -143,6 +143,10 @@ class Excitation:
         """Return a line for each motion, why the last is last, what an order is worth, and what was
         assumed.
         """
+        driven = self.plant.driven
+        # the largest value is that of any joint: a machine with hinges and slides has two units
+        effort = " or ".join(dict.fromkeys(self.plant.efforts[:driven]))
+        speed = " or ".join(f"{unit}/s" for unit in dict.fromkeys(self.plant.units[:driven]))
         lines = []
         for motion in self.motions:
             errors = []
@@ -150,8 +154,8 @@ class Excitation:
                 errors.append(f"{name} {100.0 * motion.share(name):.2g} %")
             lines.append(
                 f"{motion.name}: condition number {motion.condition:.3g}; expected errors "
-                f"{', '.join(errors)}; |u| up to {motion.largest_u:.3g}, |v| up to "
-                f"{motion.largest_v:.3g}"
+                f"{', '.join(errors)}; |u| up to {motion.largest_u:.3g} {effort}, |v| up to "
+                f"{motion.largest_v:.3g} {speed}"
             )
         best, last = self.motions[0], self.motions[-1]
         first, second, correlation = last.worst_pair

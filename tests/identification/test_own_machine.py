@@ -569,6 +569,7 @@ def test_a_chirp_is_recommended_and_a_staircase_is_last_because_it_rests(arm, tm
     assert last.rest > 0.4
     assert {*last.worst_pair[:2]} == {*names}
     assert "staircase is last: its errors are" in str(advice)
+    assert re.search(r"\|u\| up to [.\d]+ N m, \|v\| up to [.\d]+ rad/s$", str(advice), re.M)
     for motion in advice.motions:
         assert motion.largest_u <= 5.0
         assert np.abs(np.gradient(motion.positions[0], motion.times)).max() <= 4.0
