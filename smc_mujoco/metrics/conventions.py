@@ -73,7 +73,7 @@ from smc_mujoco.common.errors import ScenarioError, has, shown
 from smc_mujoco.common.text import first_paragraph, joined, number
 from smc_mujoco.mechanisms.custom.scales import falls
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
-from smc_mujoco.metrics.fold import LAST_PART, Fold, first_sample
+from smc_mujoco.metrics.fold import LAST_PART, ROUNDING, Fold, first_sample
 from smc_mujoco.simulation.python_functions import evaluate
 
 if TYPE_CHECKING:
@@ -486,7 +486,7 @@ def settles_in_time(time: Any, duration: Any) -> Any:
     """Return whether runs of these durations, s, settle before their last part: an oscillation that
     leaves the band again and again may be within it at the end. Arrays, or numbers.
     """
-    return time <= (1.0 - LAST_PART) * duration
+    return time <= (1.0 - LAST_PART * (1.0 - ROUNDING)) * duration
 
 
 def travels(trace: Trace) -> bool:

@@ -236,7 +236,8 @@ class Members:
     """
 
     def __init__(self, scenarios: Sequence[Scenario], within: Uncertainty):
-        scenarios = [_with_numbers(one, within) for one in scenarios]
+        if dotted(within.parameters):
+            scenarios = [_with_numbers(one, within) for one in scenarios]
         scenario = scenarios[0]
         count = len(scenarios)
         self.scenario = scenario

@@ -69,25 +69,33 @@ class WorstCase(Tables):
       unit: of both.
       scenario: the worst run, an ordinary scenario that gives this value to the last bit. Its
         `disturbance` has the force that was found.
-      constants: name -> what is constant in it, and may differ in the class, such as "mass".
-      outside: why the theorem of the law does not cover the class; "" if nothing is known.
+      found_by: the strategy that made the member, or the one of which it is a variation.
+      tried: number of runs, half of them of random members.
+      nominal: the scenario that was given.
+      within: the class.
+      metric: its name.
+      outside: why the theorem of the law does not cover the class; "" if nothing is known against
+        it.
+      seed: of the search.
+      checked: how far the fast engine's scores are from MuJoCo's.
+      sets: number of sets of the machine's parameters that the adversary chose from.
+      constants: name -> number: what is constant in the worst run, and may differ in the class,
+        such as "mass".
     """
 
     value: float
     median: float
     unit: str
     scenario: Scenario
-    found_by: str  # the strategy that made the member, or the one of which it is a variation
-    tried: int  # number of runs, half of them of random members
-    nominal: Scenario  # the scenario that was given
-    within: Uncertainty  # the class
-    metric: str  # its name
-    # why the theorem of the law does not cover the class; "" if nothing is known against it
+    found_by: str
+    tried: int
+    nominal: Scenario
+    within: Uncertainty
+    metric: str
     outside: str
-    seed: int  # of the search
-    checked: str = ""  # how far the fast engine's scores are from MuJoCo's
-    sets: int = 1  # number of sets of the machine's parameters that the adversary chose from
-    # what is constant in the worst run, and may differ in the class: name -> number
+    seed: int
+    checked: str = ""
+    sets: int = 1
     constants: Numbers = dataclasses.field(default_factory=dict)
 
     def __repr__(self) -> str:

@@ -30,6 +30,7 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.robustness.margins import COARSE, Margin, margins_of
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition
+from smc_mujoco.simulation.doubts import constant_goal
 from smc_mujoco.simulation.force_bounds import default_u_max
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.scenario import Scenario
@@ -318,10 +319,9 @@ def _margins(trial: Trial, base: Scenario, clock: AnswerTime) -> tuple[list[Marg
     """Return what the law of a run tolerates beside it, and the kinds for which there is no time;
     none of either where it starts at its goal.
     """
-    plant = base.plant
-    if not math.dist(base.resolved.x0, plant.origin):
+    if base.resolved.x0 == constant_goal(base):
         return [], []
-    kinds = KINDS_OF_POSES if plant.pose else KINDS
+    kinds = KINDS_OF_POSES if base.plant.pose else KINDS
     found: list[Margin] = []
     for some in (kinds[:2], kinds[2:]):
         tried = some[: int(min(len(some), clock.margins_left / (TRIED * base.work)))]
