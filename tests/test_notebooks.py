@@ -52,6 +52,7 @@ SAID = {
         for check in (check_load, check_width):
             assert {check(answer)[:5] for answer in (None, -1.0, 0.0, float("nan"))} == {"Write"}
         assert "in degrees?" in check_offset(np.degrees(0.0216))
+        assert "in mrad?" in check_offset(21.6)
         assert "between 0 and 10" in check_load(11.0) and "on average" in check_load(6.0)
         at_bound = [abs(trace.u) >= 6.0 for trace in starts]
         assert at_bound[0][0] and not at_bound[0][100:].any() and not at_bound[2].any()

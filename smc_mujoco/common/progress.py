@@ -207,7 +207,7 @@ def counter(runs: int, steps: int, shown: bool) -> Iterator[Callable[[int], None
         complete = runs * done / steps if steps else 0.0
         rate = complete / spent if spent else 0.0
         drawn.says(
-            f"{math.floor(complete + 1e-9)} of {runs} runs and repeats, {rate:.3g} per second",
+            f"{math.floor(complete + 1e-9)} of {runs} simulations, {rate:.3g} per second",
             count,
         )
 

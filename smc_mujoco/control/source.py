@@ -38,9 +38,11 @@ def spread_in_words(searches: int, spread: float) -> str:
     """Return how far J of searches differ: "12 searches, whose J differ by up to 4.1 %"."""
     if searches == 1:
         return "1 search"
-    if spread < 1.0:
-        return f"{searches} searches, whose J differ by up to {100.0 * spread:.2g} %"
-    return f"{searches} searches, whose J differ by up to {1.0 + spread:.2g} times"
+    return f"{searches} searches, whose J differ by up to {_apart(spread)}"
+
+
+def _apart(spread: float) -> str:
+    return f"{100.0 * spread:.2g} %" if spread < 1.0 else f"{1.0 + spread:.2g} times"
 
 
 @keyword_dataclass
@@ -62,6 +64,11 @@ class GainSearch:
         if self.about_defaults:
             return f"{name} about the defaults"
         return name
+
+    @property
+    def apart(self) -> str:
+        """How far J of the searches differ, such as "4.1 %"; "" for one search."""
+        return _apart(self.spread) if self.searches > 1 else ""
 
     def __str__(self) -> str:
         spread = spread_in_words(self.searches, self.spread)

@@ -38,33 +38,39 @@ FEW = (
     f"below {100 * LEVEL:g} %."
 )
 MEDIANS = (
-    f"A cell has a median and its {100 * LEVEL:g} % interval. If a law has several sets of gains, "
-    "runs with the same set count as one sample."
+    "A cell has a median, or for settled runs their share, and its "
+    f"{100 * LEVEL:g} % interval. If a law has several sets of gains, runs with the same set count "
+    "as one sample."
 )
-BELOW = "'below': the median is below the floor, and values below the floor count as equal."
+BELOW = (
+    "'below': the median is below the number beside it, the floor. Values below the floor count as "
+    "equal."
+)
 # A word in tables -> what their key says about it.
 MARKS = {
     "J (": "Tuning minimises J, summed over conditions: ITAE divided by the initial error, "
     "plus 0.001 s^3 times the variation of u divided by u_max and by the duration. The table's J "
     "is from separate runs, which tuning has not seen.",
     "shipped": "Shipped gains come with the package.",
+    "settled runs": "A run counts as settled if it settles before its last fifth.",
     "settling time": "Settling time is when the error enters its band to stay: 2 % of its initial "
     "value, or of the reference's range if that is larger.",
     "ITAE": "ITAE is the integral of time times absolute error.",
     "TV rate": "TV rate is the total variation of u per second, in the last fifth of a run.",
     "strong=True": "A star or bold type marks the winner. If no law wins, it marks every law that "
-    "may be the best. Such a law meets three conditions: no other law is shown to be better "
+    "may be the best. Such a law meets three requirements: no other law is shown to be better "
     f"({100 * LEVEL:g} % confidence in each column and condition), all its own runs have arrived, "
     "and it has enough samples. Even so, a law is not marked if its interval is too wide: the "
-    "upper end is more than 4 times the lower end and more than 4 times the floor.",
+    "upper end is more than 4 times the lower end and more than 4 times the floor, below which "
+    "values count as equal.",
     "": "A run has arrived if, in its last fifth, the error stays within 10 % of its initial value "
     "or within 5 times the sensor's resolution.",
     "below ": f"{BELOW} If a law below the floor may be the best, no law above the floor is "
     "marked. For an error, the floor is 1e-4 of its initial value. For errors late in the run, it "
     "is also at least half an encoder count and at least the noise. For u and its "
     f"variation per second, it is {100 * MIN_COMMAND_SHARE:g} % of u_max.",
-    "may pass ": "'may pass': the median is below the floor, but it rises at the end of runs, or "
-    "with half the physics step, so that it need not stay there.",
+    "may exceed ": "'may exceed': the median is below the floor, but it rises at the end of runs, "
+    "or with half the physics step, so that it need not stay there.",
     "at half": "'at half the step': the median with half the physics step, if it differs by more "
     f"than {APART}; {RANGE}.",
 }
@@ -652,7 +658,7 @@ def _cell(board: Board, entry: BoardEntry) -> Cell:
             below.append(f"below {block.floor}")
             break
         if block.floor and entry.law in block.rising:
-            below.append(f"may pass {block.floor}")
+            below.append(f"may exceed {block.floor}")
             break
     alarms = [board.failures(entry)]
     changes = []

@@ -58,10 +58,12 @@ TIME_NOTE = (
     "Relative to the law pid on the same measurements. All times depend on how busy the computer "
     "is."
 )
-GAINS = "plant", "law", "gains", "sets", "best set"
+GAINS = "plant", "law", "gains", "sets", "J differ by", "best set"
 BEST_SET = (
     "Run i uses set i. After the last set, the sets repeat from the first. The best set has the "
-    "lowest J. `smc-mujoco list LAW` has the units of a law's gains."
+    "lowest J that its search saw; J of the sets differ by up to the share shown. Tables show the "
+    "median over all sets, and traces are of the first. `smc-mujoco list LAW` has the units of a "
+    "law's gains."
 )
 
 
@@ -95,7 +97,8 @@ class Compared(Tables):
     @cached_property
     def traces(self) -> list[Trace]:
         """The traces of the first seed: of each plant, in each condition, of each law; computed
-        when first used.
+        when first used. A law has the gains of its first search there, `trace.scenario.law.gains`,
+        and not those of `gains`.
 
         A figure has one plant: `smc.figure([t for t in compared.traces if t.scenario.plant.name ==
         "duffing" and t.scenario.condition == "friction"])`.
@@ -144,7 +147,9 @@ class Compared(Tables):
                         best[k] = v
                 if len(sets) > 1 and BEST_SET not in notes:
                     notes = [BEST_SET, *notes]
-                gains.append((plant, law.name, law.source.words, f"{len(sets)}", gains_text(best)))
+                apart = law.source.search.apart if law.source.search else ""
+                of_law = law.source.words, f"{len(sets)}", apart, gains_text(best)
+                gains.append((plant, law.name, *of_law))
             for name, time in self.times.get(plant, {}).items():
                 # to two digits: those of repeated calls differ by tens of percent
                 of_law = [number(value, 2) for value in (time.ratio, time.median, time.high)]
@@ -152,7 +157,7 @@ class Compared(Tables):
         if times:
             about = {"headings": TIME_HEADINGS, "title": TIMES, "notes": [TIME_NOTE]}
             tables.append(Tabular(rows=times, left=2, **about))
-        return [*tables, Tabular(headings=GAINS, rows=gains, title="Gains", notes=notes, left=5)]
+        return [*tables, Tabular(headings=GAINS, rows=gains, title="Gains", notes=notes, left=6)]
 
     @property
     def _without_times(self) -> list[Tabular]:

@@ -508,11 +508,11 @@ def candidate_of(default: Component, tuned: result.Tuned) -> Candidate:
         with_gains = dataclasses.replace(default, gains=gains)
         sets.append(with_gains.sourced(found.kind, found.search))
     best = dataclasses.replace(default, gains=tuned.law.gains).sourced(found.kind, found.search)
-    remark = ""
+    remarks = search_space.edges_in_words(tuned.gains, tuned.at_bound)
     if names := list(search_space.without_unit(default)):
         given = f"no unit is given for {joined(names)}"
-        remark = f"{given}, so the search is centred on their defaults"
-    return Candidate(best, tuple(sets), remark)
+        remarks.append(f"{given}, so the search is centred on their defaults")
+    return Candidate(best, tuple(sets), "; ".join(remarks))
 
 
 def _check_events(name: str, fields: Mapping[str, Any], duration: float) -> None:

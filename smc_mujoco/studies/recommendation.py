@@ -19,7 +19,7 @@ from smc_mujoco.robustness.margins import Margin
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.board import BELOW, MEDIANS, Boards, Lead, heading, hidden, size
+from smc_mujoco.studies.board import BELOW, MARKS, MEDIANS, Boards, Lead, heading, hidden, size
 from smc_mujoco.studies.race import FIRST, LOOKS, Race, needed
 from smc_mujoco.studies.table import Table
 
@@ -142,7 +142,7 @@ class NoLaw(NamedTuple):
         every = self.runs * len(self.settled)
         each = f" ({self.runs} in each condition)" if len(self.settled) > 1 else ""
         without = _some(sum(self.settled.values()), every)
-        text = f"with {held}, {without} of {counted(every, 'separate run')} settle{each}; "
+        text = f"with {held}, {without} of {counted(every, 'separate run')}{each} settle; "
         text += f"with the law, {_some(self.settled_by_law, every)} do. "
         if math.isnan(self.times):
             text += "Some runs fail, so J is not compared"
@@ -233,8 +233,10 @@ class RaceRecommendation(Recommendation):
         ahead = self._lowest
         if ahead and ahead != self.law.name:
             name, done, of = self._least_settled(ahead)
-            only = f"settled in only {done} of {of} runs under {name}"
-            text += f". {ahead} has the lower J, but {only}"
+            text += (
+                f". {ahead} has the lower J, but under {name} only {done} of its {of} runs settled "
+                "before the last fifth of the run"
+            )
         return text
 
     @property
@@ -243,6 +245,23 @@ class RaceRecommendation(Recommendation):
         if self.fixed and not self.race.winner:
             return self.fixed.winners[0]
         return self.race.winner
+
+    @property
+    def worst_condition(self) -> str:
+        """Why the worst run is under its condition, as `recommend` chooses it; "" if there is no
+        other.
+        """
+        found = self.settled[self.law.name]
+        if len(found) == 1:
+            return ""
+        shares = [done / of for done, of in found.values()]
+        if shares.count(min(shares)) == 1:
+            return ", the condition in which the fewest of its runs settle"
+        if min(shares) == max(shares):
+            return ", the condition in which its runs settle latest"
+        return (
+            ". Of the conditions in which the fewest of its runs settle, they settle latest there"
+        )
 
     def _least_settled(self, law: str) -> tuple[str, int, int]:
         """Return the condition in which a law settles in the smallest share of its runs, in how
@@ -378,7 +397,7 @@ class RaceRecommendation(Recommendation):
                 level += f" ({self._reach})"
             parts.append(TOLERATED[margin.kind].format(level))
         where = "to the nominal plant" if self.beside == "nominal" else f"under {self.beside}"
-        text = f"each applied alone, {where}: {joined(parts)}. At these levels the error after "
+        text = f"{joined(parts)}. Each is applied alone, {where}. At these levels the error after "
         text += f"{self.worst_run.duration:g} s is still below 5 % of its initial value"
         if self.beside != "nominal":
             text += ". Delay and mass include those of the condition; friction and blows are added"
@@ -433,15 +452,16 @@ class RaceRecommendation(Recommendation):
         missing = [law for law in self.race.running if law not in self.settled]
         if missing:
             notes.append(
-                f"No runs of {joined(missing)}: these are of the laws that may be the best"
-                f"{' and of the next one' if self.race.winner else ''}."
+                f"The tables by condition leave out {joined(missing)}: they show only the laws "
+                f"that may be the best{' and the next one' if self.race.winner else ''}."
             )
         notes.append(
             f"{MEDIANS} These tables show no significance tests; those are below. "
             f"{capital(UNTRIED)}."
         )
-        if "below " in str(shown):
-            notes.append(BELOW)
+        for word, meaning in (("below ", BELOW), ("may exceed ", MARKS["may exceed "])):
+            if word in str(shown):
+                notes.append(meaning)
         last = shown.pop()
         return [*shown, dataclasses.replace(last, notes=[*notes, "", *self.answer])]
 
@@ -461,10 +481,10 @@ class RaceRecommendation(Recommendation):
             rows=rows,
             title=f"J {self.judged}",
             notes=[
-                "Median and range over groups of runs that tuning has not seen. Each group uses "
-                "the law's next set of gains, and after the last set the first again. J is the "
-                "time-weighted relative error plus the weighted variation of u, added up over the "
-                "conditions."
+                "Median and range over groups of runs that tuning has not seen. The first group "
+                "uses the law's first set of gains, the second group the second set, and so on; "
+                "after the last set the first comes again. J is the time-weighted relative error "
+                "plus the weighted variation of u, added up over the conditions."
             ],
         )
 

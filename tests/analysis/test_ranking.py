@@ -767,8 +767,8 @@ def test_a_median_below_the_floor_that_rises_says_that_it_may_pass_it():
     table = table_of(scores, "ultimate_bound", scenario=rows, trends=rises)
     (shown,) = leaderboard(table, ["ultimate_bound"]).tables
     said = {row[0].text: row[1].below.splitlines()[-1] for row in shown.rows}
-    assert said == {"a": "below 0.00015 m", "b": "may pass 0.00015 m"}
-    assert "'may pass': the median is below the floor, but" in " ".join(shown.notes)
+    assert said == {"a": "below 0.00015 m", "b": "may exceed 0.00015 m"}
+    assert "'may exceed': the median is below the floor, but" in " ".join(shown.notes)
 
 
 def test_a_lead_over_the_floor_is_printed_only_where_the_test_sees_it():

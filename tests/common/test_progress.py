@@ -101,9 +101,9 @@ def test_a_count_is_of_whole_runs_and_of_runs_a_second(monkeypatch):
     with progress.counter(0, 0, shown=True):
         pass
     assert said == [
-        "0 of 8 runs and repeats, 0 per second",
-        "2 of 8 runs and repeats, 0.625 per second",
-        "0 of 0 runs and repeats, 0 per second",
+        "0 of 8 simulations, 0 per second",
+        "2 of 8 simulations, 0.625 per second",
+        "0 of 0 simulations, 0 per second",
     ]
 
 

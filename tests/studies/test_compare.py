@@ -2,6 +2,7 @@
 folder.
 """
 
+import dataclasses
 import functools
 import math
 import os
@@ -16,6 +17,7 @@ from helpers.browser import browser
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.analysis.tuning.result import load_tuned
 from smc_mujoco.cli import main
 from smc_mujoco.cli.commands import options
 from smc_mujoco.common import html
@@ -88,7 +90,20 @@ def test_every_law_has_given_shipped_or_tuned_gains_and_its_table_says_which(fou
     gains = found.tables[-1]
     rows = [(plant, law, kind) for plant in PLANTS for law, kind in wanted.items()]
     assert [row[:3] for row in gains.rows] == rows
-    assert "kp=20" in gains.rows[2][4]
+    assert "kp=20" in gains.rows[2][5]
+    searches = found.gains["duffing"]["my_law"].source.search
+    assert gains.rows[0][4] == searches.apart != ""  # as `tune` says it
+    assert gains.rows[2][4] == ""  # of given gains
+
+
+def test_a_gain_at_the_end_of_its_box_is_named_as_tune_names_it(found, folder):
+    (file,) = (folder / "gains").glob("duffing-my_law*.json")
+    tuned = load_tuned(file)
+    assert fair_gains.candidate_of(my_law(), tuned).remark == ""
+    lam = tuned.gains["lam"]
+    at_its_end = dataclasses.replace(tuned, searched=tuned.searched | {"lam": (lam, 100.0 * lam)})
+    (words,) = [note for note in at_its_end.tables[0].notes if "end of its box" in note]
+    assert fair_gains.candidate_of(my_law(), at_its_end).remark == words
 
 
 def test_runs_use_every_set_of_gains_in_turn(found):

@@ -199,7 +199,8 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     assert len(recommendation.table) == 4 * len(recommendation.laws)
     text = str(recommendation)
     assert "mass under coulomb: 4 seeds" in text
-    assert lines["Tolerates"].startswith("each applied alone, under coulomb: a delay of ")
+    assert lines["Tolerates"].startswith("a delay of ")
+    assert ". Each is applied alone, under coulomb. At these levels" in lines["Tolerates"]
     assert " times the nominal one and a blow of " in lines["Tolerates"]
     kinds = {*recommend.KINDS, *recommend.KINDS_OF_POSES}
     assert kinds == recommendation_module.TOLERATED.keys()
@@ -210,7 +211,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     assert f"{left} left out" not in text  # of a law that was dropped a line below says so
     kept = dataclasses.replace(recommendation, race=recommendation.race._replace(dropped={}))
     words = " ".join(str(kept).split())
-    assert f"No runs of {left}: these are of the laws that may be the best." in words
+    assert f"leave out {left}: they show only the laws that may be the best." in words
     assert "too few" not in text
     assert "J over coulomb and noise on mass" in text
     assert "*" not in text
@@ -222,12 +223,12 @@ def test_the_answer_says_how_the_plant_does_without_a_law_and_where_it_needs_non
     assert (without.runs, without.settled) == (4, {"coulomb": 0, "noise": 0})
     assert without.times > 2.0
     assert not without.holds
-    said = "with u = 0, none of 8 separate runs settle (4 in each condition); with the law, "
+    said = "with u = 0, none of 8 separate runs (4 in each condition) settle; with the law, "
     for count, words in ((0, "none"), (3, "3"), (8, "all")):
         assert without._replace(settled_by_law=count).words.startswith(f"{said}{words} do. ")
     assert without.words.endswith(f"Without the law, J is {number(without.times)} times as high")
     held = without._replace(holds=True, settled={"coulomb": 4, "noise": 1}, times=math.nan)
-    said = "with u = 0, at which the servo holds the goal, 5 of 8 separate runs settle (4 in each"
+    said = "with u = 0, at which the servo holds the goal, 5 of 8 separate runs (4 in each"
     assert held.words.startswith(said)
     assert held.words.endswith(
         "Some runs fail, so J is not compared. With u = 0 all runs settle under coulomb"
@@ -428,8 +429,17 @@ def test_a_law_that_does_not_settle_is_not_recommended_without_saying_where(race
     runs = {others[0].name: {"noise": (4, 4)}, winner: {"coulomb": (4, 4), "noise": (1, 4)}}
     fields = {"laws": others, "settled": runs, "settles": {others[0].name: 1.0}}
     behind = dataclasses.replace(recommendation, **fields)
-    reason = f"{winner} has the lower J, but settled in only 1 of 4 runs under noise"
-    assert behind.answer[0] == f"Use: {others[0].name}. {reason}"
+    reason = f"{winner} has the lower J, but under noise only 1 of its 4 runs settled before the "
+    assert behind.answer[0] == f"Use: {others[0].name}. {reason}last fifth of the run"
+    assert recommendation.worst_condition == ""  # the only one
+    for counts, why in (
+        ((4, 4), ", the condition in which its runs settle latest"),
+        ((3, 4), ", the condition in which the fewest of its runs settle"),
+        ((3, 4, 3), ". Of the conditions in which the fewest of its runs settle, they settle"),
+    ):
+        runs = {f"condition {i}": (count, 4) for i, count in enumerate(counts)}
+        several = dataclasses.replace(recommendation, settled={name: runs})
+        assert several.worst_condition.startswith(why)
     pushed = dataclasses.replace(
         recommendation.worst_run, disturbance=smc.Constant(20.0)
     )  # u_max is 9

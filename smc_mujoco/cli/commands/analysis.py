@@ -157,7 +157,7 @@ def margins(
     """Find the largest delay, friction, noise and so on that a law tolerates: the error must still
     end below 5 % of its initial value.
 
-    The delay of the command is in s; a constant disturbance and dry friction are in N or N m. Mass
+    The delay of u is in s; a constant disturbance and dry friction are in N or N m. Mass
     is a multiple of the nominal mass. Noise is the standard deviation of the position sensor, in
     rad or m; the velocity sensor has five times that number, in rad/s or m/s. A blow comes halfway
     through the run; its momentum is in N s or N m s. Jitter is a share of the control period.

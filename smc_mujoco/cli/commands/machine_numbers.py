@@ -30,7 +30,7 @@ Paths = Annotated[
     str | None,
     typer.Option(
         "--for",
-        metavar="PATH,...",
+        metavar="NAME,...",
         help="Parameters to find, such as shoulder.damping,input_delay,m; "
         "default: for a rig, those that its own records determine; a machine that is no rig has "
         "no default.",
@@ -45,7 +45,7 @@ PairsFile = Annotated[
 ]
 HeldOut = Annotated[
     Path | None,
-    typer.Option(help="A log, or pairs, to check the result on; it is not used to find it."),
+    typer.Option(help="A log, or pairs, to check the result on; they are not used to find it."),
 ]
 FoundFigure = Annotated[
     Path | None,
@@ -130,10 +130,12 @@ def identify(
     and u (N m or N) of the joint, or x_JOINT and u_JOINT of each. You need no first guess.
 
     Parameters of a joint are named JOINT.damping, .frictionloss, .armature, .stiffness, .gain,
-    .offset and .zero. The delay from command to force is input_delay. A plant's own parameters keep
-    the names that they have in the plant, such as m (mass) and grav (gravity). Parameters of a part
-    that --condition adds are named FIELD.NAME, such as friction.coulomb. The table has each
-    parameter with its standard error. Notes below it say what the logs cannot determine.
+    .offset and .zero: the force is gain u + offset, and zero is what the encoder reads at 0. The
+    delay from command to force is input_delay. A plant's own parameters keep the names that they
+    have in the plant, such as m (mass) and grav (gravity); m of your own model is the mass of all
+    that moves, in kg. Parameters of a part that --condition adds are named FIELD.NAME, such as
+    friction.coulomb. The table that it prints has each parameter with its standard error. Notes
+    below it say what the logs cannot determine.
 
     With --pairs you need no machine: give the speed (rad/s or m/s) and torque (N m or N) of one
     joint, in time order. The torque must be that of friction alone, so subtract gravity and inertia

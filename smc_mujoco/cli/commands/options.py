@@ -72,8 +72,8 @@ Columns = Annotated[
     str | None,
     typer.Option(
         metavar="NAME=COLUMN,...",
-        help="Columns that have other names in your file, as EXPECTED=YOURS: theta=arm_angle reads "
-        "theta from arm_angle.",
+        help="Columns that have other names in your file, as EXPECTED=YOURS: x=arm_angle reads x "
+        "from the column arm_angle.",
     ),
 ]
 Condition = Annotated[
@@ -162,15 +162,16 @@ PlantName = Annotated[
         autocompletion=PLANTS,
         help="A plant from `smc-mujoco list`, or joints of your own .xml or .urdf, such as "
         "arm.xml:shoulder+elbow.\n\n"
-        "- The goal is the keyframe named home, or the file's only keyframe if it has a name, or "
-        "otherwise the pose as drawn. Add @NAME for another keyframe, as arm.xml:elbow@up, or @ "
-        "alone for the pose as drawn.\n\n"
+        "- The goal is the keyframe named home, or a named keyframe that is the file's only one, "
+        "or otherwise the pose that the file draws (qpos0). Add @NAME for another keyframe, as "
+        "arm.xml:elbow@up, or @ alone for the pose that the file draws.\n\n"
         "- Motors hold the other joints in place. Add +locked to weld these joints, or +file to "
         "let them move unless a servo holds them.\n\n"
         "- Brackets after a joint hold its options. elbow(u_max=9,x0=0.2) sets the bound on u and "
         "the start. (motor) puts an ideal motor in place of the file's actuator. (servo) and "
-        "(servo=false) say what the actuator is. (partner=pole) names a passive joint. A joint "
-        "with (measured) is read, not driven.",
+        "(servo=false) say what the actuator is. (partner=pole) names a passive joint, such as the "
+        "pole on a cart, whose position and velocity the law also reads. A joint with (measured) "
+        "is read, not driven.",
     ),
 ]
 Quick = Annotated[

@@ -33,8 +33,8 @@ Needs = Annotated[
         help="The scores to compare, separated by commas: fast (settling time), accurate (ultimate "
         "bound), on-track (ITAE), calm (TV rate of u), gentle (largest u), frugal (integral of "
         "u^2), no-overshoot. With --minutes or --quick they are only shown: the laws are compared "
-        "by J. Any name of `smc-mujoco list --need`, such as no-velocity, is a property that the "
-        "law must have.",
+        "by J. You can also name properties that the law must have, such as no-velocity; "
+        "`smc-mujoco list --help` lists them under --need.",
     ),
 ]
 WhichCondition = Annotated[
@@ -155,10 +155,9 @@ def _save(recommendation: "RaceRecommendation", out: Path, terminal: Terminal) -
     figure.figure([recommendation.worst_trace], out / "worst_run")
     terminal.wrote(*page.files(out / "worst_run"))
     terminal.note(
-        f"The figure shows the worst run of {recommendation.law.name}. It is under "
-        f"{recommendation.worst_run.condition}, the condition in which the fewest runs settle. If "
-        "conditions are equal in that, it is the one in which runs settle latest. Of the runs "
-        "there, this one settles last or never.",
+        f"The figure shows a run of {recommendation.law.name} under "
+        f"{recommendation.worst_run.condition}{recommendation.worst_condition}. Of its runs there, "
+        "this one settles last or never.",
         wrap=True,
     )
 
@@ -263,7 +262,7 @@ Metrics = Annotated[
     str | None,
     typer.Option(
         "--metric",
-        help="What to compare, separated by commas: scores that `smc-mujoco show` lists, or "
+        help="What to compare, separated by commas: any scores listed by `smc-mujoco show`, or "
         '"settles", the share of settled runs. Default: settles, settling_time, '
         "ultimate_bound, itae, tv_rate.",
     ),
@@ -324,8 +323,8 @@ def compare(
     Gains that you give in brackets are used as they are. Otherwise a law of the package uses the
     gains that are shipped for the plant. If there are none, or if the law is from your own file,
     it is tuned by one rule, the same for all laws. This takes seconds to minutes for each
-    law and plant. The default values in your file are used only if you give --gains or --no-tune,
-    or if the law cannot be tuned.
+    law and plant. The default values in your file are used only if you give --no-tune or --gains
+    with a set other than tuned, or if the law cannot be tuned.
 
     A stopped command resumes when you start it again. Without --law, the usual laws that suit the
     plant are compared; --law all compares every general-purpose law.
