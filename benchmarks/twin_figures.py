@@ -213,6 +213,7 @@ def twins_figure(rows: Sequence[TwinFigure], path: str | Path) -> list[Path]:
             handles.append(Line2D([], [], label=use, **mark))
         cross = Line2D([], [], color=style.MUTED, marker="x", ls="", label="published numbers")
         handles.append(cross)
+        handles.append(Line2D([], [], color=style.INK, lw=1.0, label="the twin's range"))
         height = pages.head_height(PHONE_WIDTH, handles) + ROW * place + 0.6
         page = pages.blank(PHONE_WIDTH, height)
         ax = page.subplots()

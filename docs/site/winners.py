@@ -13,6 +13,7 @@ from smc_mujoco.analysis.ranking import LEVEL_SHARE, RELEVANT, Comparison
 FILE = Path(__file__).parents[1] / "winners.svg"
 UNITS = 12
 WIDTH = 4.6  # inches: letters are read on a phone
+BLUE = "#0072B2"  # of runs
 NUMBER = 3  # of the draw; any shows the same four verdicts
 
 
@@ -49,12 +50,13 @@ def draw(file: Path = FILE) -> None:
     """Draw a row for each comparison and a dot for each unit, at its lead."""
     import matplotlib
     from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
 
-    from smc_mujoco.draw import style
+    from smc_mujoco.draw import page, style
 
     with style.page(WIDTH):
         matplotlib.rcParams["svg.hashsalt"] = "winners"
-        figure = Figure(figsize=(WIDTH, 3.2), layout="constrained")
+        figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
         ax = figure.subplots()
         ax.axvspan(-100 * LEVEL_SHARE, 100 * LEVEL_SHARE, color=style.GRID, lw=0)
         ax.axvline(100 * RELEVANT, color=style.INK, ls="--", lw=1)
@@ -65,11 +67,19 @@ def draw(file: Path = FILE) -> None:
             rows = np.full(UNITS, -row) + np.linspace(-0.22, 0.22, UNITS)
             ax.hlines(rows, 100 * charged, 100 * as_run, color=style.MUTED, lw=1)
             ax.plot(100 * as_run, rows, "o", ms=3, mfc="none", color=style.MUTED)
-            ax.plot(100 * charged, rows, "o", ms=3, color="#0072B2")
+            ax.plot(100 * charged, rows, "o", ms=3, color=BLUE)
             ax.text(-65, -row + 0.3, name, va="bottom", color=style.MUTED)
             ax.text(66, -row + 0.3, verdict(comparison), va="bottom", ha="right", weight="bold")
         ax.set(xlim=(-67, 67), ylim=(-3.4, 0.8), yticks=[], xlabel="lead of A over B in a run (%)")
         ax.set_xticks([-50, -25, 0, 25, 50])
+        look = {"ls": "", "marker": "o", "ms": 3}
+        key = [
+            page.entry("a run", BLUE, **look),
+            page.entry("the run before half the step counts", mfc="none", **look),
+            page.entry("least lead of a winner", style.INK, ls="--", lw=1),
+            Patch(color=style.GRID, label=f"level: within {100 * LEVEL_SHARE:.0f} %"),
+        ]
+        figure.legend(handles=key, loc="outside lower center", ncols=2)
         ax.spines["left"].set_visible(False)
         figure.savefig(file, metadata={"Date": None, "Creator": None})
 
