@@ -4,10 +4,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.patches import Patch
 
 import smc_mujoco as smc
 from benchmarks.friction import LAWS, RATES, Case, Told, law_of
 from benchmarks.friction_plants import joints
+from smc_mujoco.draw import page, style
 
 JOINTS = ("rail", "geared")
 FRICTION = "coulomb30"  # of the reversals
@@ -61,17 +63,31 @@ def of_rest(ax, points: Sequence[dict], joint: str, colours: dict[str, str]) -> 
         gains = list(point["gains"].values())
         trace = smc.run(told.scenario(gains, Case("stribeck"), 1, length=LASTS))
         late = trace.t >= SHOWN
-        ax.plot(trace.t[late], trace.e[late, 0] / one.count, color=colours[law], lw=1.0)
+        look = {"color": colours[law], "ls": style.DASHES[RESTS.index(law)]}
+        ax.plot(trace.t[late], trace.e[late, 0] / one.count, lw=1.0, **look)
+
+
+def key(colours: dict[str, str]) -> list[page.Handle]:
+    """Return the legend's entries: laws of the runs to rest, then marks of the reversals."""
+    handles: list[page.Handle] = []
+    for law, dashes in zip(RESTS, style.DASHES, strict=False):
+        handles.append(page.entry(name_of(law), colours[law], lw=1.5, ls=dashes))
+    low, high, _ = RATES
+    dot = {"marker": "o", "ms": 5, "ls": ""}
+    handles.append(page.entry(f"no compensation, R {low:g}", mfc=style.PAPER, **dot))
+    handles.append(page.entry(f"no compensation, R {high:g}", **dot))
+    handles.append(page.entry(f"right compensation, R {low:g}", marker="D", ms=4, ls=""))
+    handles.append(page.entry("30 % too small to too large", lw=4, alpha=0.35))
+    handles.append(Patch(color=style.BAND, label="below one count"))
+    return handles
 
 
 def draw(points: Sequence[dict], path: Path) -> None:
     """Draw the figure: a column a joint."""
-    from smc_mujoco.draw import page, style
-
     known = [law for law in LAWS if law != "pd"]
     by_law = {"pd": style.MUTED} | dict(zip(known, style.law_colours(known), strict=True))
     with style.page(WIDTH):
-        handles = [page.entry(name_of(law), by_law[law], lw=1.5) for law in RESTS]
+        handles = key(by_law)
         head = page.head_height(WIDTH, handles)
         figure = page.blank(WIDTH, HEIGHT + head, None)
         panels = figure.subplots(2, len(JOINTS), squeeze=False, height_ratios=(1.5, 1.0))
@@ -88,11 +104,9 @@ def draw(points: Sequence[dict], path: Path) -> None:
             below.set_title("to rest, Stribeck, gains by J", weight="normal")
         panels[1][0].set_ylabel("error (counts)")
         page.set_head(figure, WIDTH, "Laws under friction", handles)
-        page.write(figure, page.files(path))
+        page.write(figure, page.files(path, "svg"))
 
 
 def name_of(law: str) -> str:
     """Return the name of a law in the figure."""
-    from smc_mujoco.draw import style
-
     return "PD" if law == "pd" else style.law_name(law)
