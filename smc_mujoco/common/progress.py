@@ -40,6 +40,7 @@ class Bar:
         self.done = 0.0
         self.pieces: list[float] = []  # s that each finished piece took
         self.end: float | None = None  # s, when the last piece is expected to end
+        self.latest = math.inf  # s, when the work is stopped
         self.start = time.monotonic()
         self.due = self.start + delay  # s, of the next drawing
 
@@ -90,7 +91,7 @@ class Bar:
             seconds = (now - self.start) * (1.0 / self.share - 1.0)
         else:
             return ""
-        return f"{length(seconds)} left"
+        return f"{length(min(seconds, max(0.0, self.latest - now)))} left"
 
     def __str__(self) -> str:
         if not self.whole:

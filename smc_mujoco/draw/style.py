@@ -418,7 +418,8 @@ def differences(trace: Trace, others: Sequence[Trace]) -> str:
         if any(_settings(run).get(name) != words for run in runs):
             parts.append(_few(words))
     for name, words in _parameters(trace).items():
-        if any(_parameters(run)[name] != words for run in others):
+        # a payload is a parameter only where a mismatch names it
+        if any(_parameters(run).get(name) != words for run in others):
             parts.append(f"plant's {words}" if name in scenario.law.gains else words)
     return ", ".join(parts)
 

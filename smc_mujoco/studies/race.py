@@ -111,7 +111,7 @@ class Race(NamedTuple):
     sets: int  # of each law that was not dropped
     looked: int  # at how many of them the comparison looks: a third look would have no error left
     stopped: bool  # whether the time was over before a winner or the last look
-    seconds: float  # that a set of each law takes together
+    seconds: float  # that a set of each law takes together; 0 if none was searched in this call
 
     @property
     def running(self) -> list[str]:
@@ -129,7 +129,7 @@ class Race(NamedTuple):
         """The winner; without one, the laws than which no other is better."""
         if self.winner:
             return [self.winner]
-        if self.comparison is None:
+        if self.comparison is None or self.sets < LOOKS[0]:  # too few for a lead to count
             return self.running
         beaten = dict(zip(self.comparison.laws, self.comparison.worse[:, 0], strict=True))
         return [law for law in self.running if not beaten[law]]
@@ -152,18 +152,20 @@ def race(
     comparison, looked = None, 0
     stopped = False
     begin = time.monotonic()
+    kept = _kept(trial, [(one, 0, 0) for one in entrants if one.task])
     with bar("set of gains", LOOKS[0] * len(entrants), trial.progress, counted=True) as shown:
         everyone = _first_sets(trial, plant, entrants, goal, clock, shown)
         running = dict(everyone)
         # s that a law took in each round
-        rounds = [(time.monotonic() - begin) / len(running)]
+        rounds = [] if kept else [(time.monotonic() - begin) / len(running)]
         for k in range(1, LOOKS[-1]):
             _expect(shown, k, len(running))
             start = time.monotonic()
             pieces = [(one, k, 0) for one in running.values() if one.task]
             count = len(running)
             over = start + count * _expected(rounds) > clock.race_ends(count)
-            kept = pieces and all(_file(trial, *piece).read() for piece in pieces)
+            kept = _kept(trial, pieces)
+            shown.latest = clock.race_ends(count)
             if over and not kept:
                 stopped = True
                 break
@@ -172,7 +174,8 @@ def race(
                 shown.advance(1.0)
             _again(trial, list(running.values()))
             clock.judged(*_judge(trial, plant, list(running.values()), goal, k + 1))
-            rounds.append((time.monotonic() - start) / len(running))
+            if not kept:
+                rounds.append((time.monotonic() - start) / len(running))
             if k + 1 == FIRST:
                 values = {name: one.values for name, one in running.items()}
                 dropped = hopeless(values)
@@ -229,7 +232,7 @@ def _expected(rounds: Sequence[float]) -> float:
     """Return how long a further set of a law takes, s: as the longest of those after the first,
     which compiles, too.
     """
-    return max(rounds[1:] or rounds)
+    return max(rounds[1:] or rounds, default=0.0)
 
 
 def _expect(shown: Bar, done: int, laws: int) -> None:
@@ -320,6 +323,11 @@ def compared(
         rivals=1,
         looks=looks,
     )
+
+
+def _kept(trial: Trial, pieces: Sequence[tuple[Entrant, int, int]]) -> bool:
+    """Return whether there are searches, and the folder has them all."""
+    return bool(pieces) and all(_file(trial, *piece).read() for piece in pieces)
 
 
 def _file(trial: Trial, one: Entrant, k: int, draw: int):

@@ -269,8 +269,9 @@ def _weighed(
     return dict(zip(names, parts, strict=True)), NoLaw(
         times=math.nan if failed.any() else float(np.median(ratios)),
         runs=len(instances),
+        duration=goal.duration,
         settled=without,
-        settled_by_law=int(settled.sum()),
+        settled_by_law=dict(zip(names, settled.sum(axis=0).tolist(), strict=True)),
         holds=case.efforts[0] == plant.unit,
     )
 

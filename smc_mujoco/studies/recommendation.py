@@ -131,8 +131,9 @@ class NoLaw(NamedTuple):
 
     times: float  # its J over that of the first law, median over instances; NaN where runs fail
     runs: int  # in each condition
+    duration: float  # of a run, s
     settled: Mapping[str, int]  # condition -> the number of its runs that settle
-    settled_by_law: int  # the number of all runs that settle under the first law
+    settled_by_law: Mapping[str, int]  # the same under the first law
     holds: bool  # whether u = 0 is the goal of a servo, which then holds it
 
     @property
@@ -142,8 +143,11 @@ class NoLaw(NamedTuple):
         every = self.runs * len(self.settled)
         each = f" ({self.runs} in each condition)" if len(self.settled) > 1 else ""
         without = _some(sum(self.settled.values()), every)
-        text = f"with {held}, {without} of {counted(every, 'separate run')}{each} settle; "
-        text += f"with the law, {_some(self.settled_by_law, every)} do. "
+        of_law = self.settled_by_law
+        late = [name for name, count in of_law.items() if count < self.runs]
+        where = f", not all under {joined(late)}" if 0 < len(late) < len(of_law) else ""
+        text = f"with {held}, {without} of {counted(every, 'separate run')} of {self.duration:g} s"
+        text += f"{each} settle; with the law, {_some(sum(of_law.values()), every)} do{where}. "
         if math.isnan(self.times):
             text += "Some runs fail, so J is not compared"
         else:
@@ -227,6 +231,8 @@ class RaceRecommendation(Recommendation):
             words.append("the first so far, not tested against the others")
         if self.race.unsearched:
             words.append("of the laws that were searched")
+        if self.race.sets < LOOKS[0] and len(self.race.running) > 1 and not self.race.winner:
+            words.append(f"after {counted(self.race.sets, 'set')} of gains, so more may change it")
         if self.settles[self.law.name] < RELIABLE:
             words.append(f"which settled in {done} of {of} runs")
         text = ", ".join(words)
@@ -287,14 +293,17 @@ class RaceRecommendation(Recommendation):
         race, comparison = self.race, self.race.comparison
         assert comparison is not None
         if race.sets < LOOKS[0] and not race.winner:
-            more = math.ceil((LOOKS[0] - race.sets) * race.seconds / 60.0)
+            more = "more minutes"
+            if race.seconds:
+                minutes = math.ceil((LOOKS[0] - race.sets) * race.seconds / 60.0)
+                more = f"more minutes: the missing sets take about {minutes} at this speed"
             short = ""
             if race.sets < FIRST:
                 short = f", not even the first {FIRST}"
             return (
-                f"open; there was time for {counted(race.sets, 'set')} of gains of each "
-                f"law{short}, and {LOOKS[0]} can name a winner; the same call goes on from there "
-                f"if it is given about {counted(more, 'more minute')}"
+                f"open between {joined(race.running)}; there was time for "
+                f"{counted(race.sets, 'set')} of gains of each law{short}, and {LOOKS[0]} can name "
+                f"a winner; the same call goes on from there if it is given {more}"
             )
         text = _verdict(comparison, race.running)
         ranked = _ranked(comparison, race.running)
@@ -399,6 +408,9 @@ class RaceRecommendation(Recommendation):
         where = "to the nominal plant" if self.beside == "nominal" else f"under {self.beside}"
         text = f"{joined(parts)}. Each is applied alone, {where}. At these levels the error after "
         text += f"{self.worst_run.duration:g} s is still below 5 % of its initial value"
+        if not all(margin.open for margin in self.margins):
+            text += ", at those after 'not' it is above"
+        text += ". Such a run need not settle"
         if self.beside != "nominal":
             text += ". Delay and mass include those of the condition; friction and blows are added"
         if self.helped:
@@ -490,9 +502,12 @@ class RaceRecommendation(Recommendation):
 
 
 def _level(margin: Margin) -> str:
-    """Return the level of a margin with its unit, such as "at least 8.75 N m"."""
+    """Return the level of a margin with its unit, such as "at least 8.75 N m", or "8 (not 9) N m"
+    with the least level that is not tolerated.
+    """
     unit = "times" if margin.unit == "1" else margin.unit
-    return f"{margin.text} {unit}".strip().replace("≥", "at least")
+    beyond = f" (not {number(margin.value + margin.resolution)})" if not margin.open else ""
+    return f"{margin.text}{beyond} {unit}".strip().replace("≥", "at least")
 
 
 def _cost(J: float) -> str:

@@ -17,7 +17,7 @@ from smc_mujoco.analysis.tuning import quick_search, search
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST
 from smc_mujoco.cli import main
 from smc_mujoco.cli.commands import studies
-from smc_mujoco.common.text import number
+from smc_mujoco.common.text import joined, number
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import catalogue
@@ -221,14 +221,20 @@ def test_the_answer_says_how_the_plant_does_without_a_law_and_where_it_needs_non
     _, recommendation, _ = raced
     without = recommendation.no_law
     assert (without.runs, without.settled) == (4, {"coulomb": 0, "noise": 0})
+    assert without.duration == 1.0
     assert without.times > 2.0
     assert not without.holds
-    said = "with u = 0, none of 8 separate runs (4 in each condition) settle; with the law, "
-    for count, words in ((0, "none"), (3, "3"), (8, "all")):
-        assert without._replace(settled_by_law=count).words.startswith(f"{said}{words} do. ")
+    said = "with u = 0, none of 8 separate runs of 1 s (4 in each condition) settle; with the law, "
+    for counts, words in (
+        ((0, 0), "none do. "),
+        ((3, 4), "7 do, not all under coulomb. "),
+        ((4, 4), "all do. "),
+    ):
+        of_law = dict(zip(("coulomb", "noise"), counts, strict=True))
+        assert without._replace(settled_by_law=of_law).words.startswith(f"{said}{words}")
     assert without.words.endswith(f"Without the law, J is {number(without.times)} times as high")
     held = without._replace(holds=True, settled={"coulomb": 4, "noise": 1}, times=math.nan)
-    said = "with u = 0, at which the servo holds the goal, 5 of 8 separate runs (4 in each"
+    said = "with u = 0, at which the servo holds the goal, 5 of 8 separate runs of 1 s (4 "
     assert held.words.startswith(said)
     assert held.words.endswith(
         "Some runs fail, so J is not compared. With u = 0 all runs settle under coulomb"
@@ -282,10 +288,13 @@ def test_margins_from_the_side_from_which_gravity_helps_say_so(raced):
     assert not recommendation.helped
     friction = recommendation.margins[1]
     said = "Gravity or a spring pushes the slide to the goal from the start"
-    for value, words in ((2.0, "2.00 N from the other side"), (math.nan, "none from the other")):
+    for value, words in (
+        (2.0, "2.00 (not 2.14) N from the other side"),
+        (math.nan, "none from the other"),
+    ):
         other = dataclasses.replace(friction, value=value)
         told = dataclasses.replace(recommendation, helped=["the slide"], opposed=other)._margins
-        assert f"friction of {friction.text} N from the start and {words}" in told
+        assert f"friction of 1.69 (not 1.83) N from the start and {words}" in told
         assert said in told
     assert said not in recommendation._margins
     late = dataclasses.replace(recommendation, helped=["the slide"])._margins
@@ -403,10 +412,15 @@ def test_laws_for_which_there_is_no_time_are_named_and_the_clock_may_end_a_race_
         recommendation, race=recommendation.race._replace(sets=1, stopped=True)
     )
     (over_sets,) = (line for line in few.answer if line.startswith("Over all sets of gains"))
-    assert "open; there was time for 1 set of gains of each law" in over_sets
+    assert "; there was time for 1 set of gains of each law" in over_sets
     assert "not even the first 3" in over_sets
     assert "7 can name a winner" in over_sets
-    assert re.search(r"goes on from there if it is given about \d+ more minute", over_sets)
+    assert f"open between {joined(few.race.running)}; " in over_sets
+    assert "after 1 set of gains, so more may change it" in few.answer[0]
+    assert re.search(r"if it is given more minutes: the missing sets take about \d+ at", over_sets)
+    kept = few.race._replace(seconds=0.0)  # no set was searched in this call
+    unknown = dataclasses.replace(few, race=kept).answer[1]
+    assert unknown.endswith("goes on from there if it is given more minutes")
 
 
 def test_a_law_that_does_not_settle_is_not_recommended_without_saying_where(raced):

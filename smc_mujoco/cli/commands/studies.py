@@ -114,6 +114,12 @@ def which(
 
     terminal = Terminal(json)
     whole = QUICK_MINUTES if quick and minutes is None else minutes
+    if film and whole:
+        from smc_mujoco.draw.film.film import missing
+
+        if why := missing():
+            terminal.note(f"{why}; with it, the same command makes the film, also later", wrap=True)
+            film = False
     recommendation = recommend(
         plant,
         options.conditions(condition) or None,

@@ -154,7 +154,7 @@ class Wall(OfBody):
     Attributes:
       body: its name.
       direction: from the body to the wall, in the axes of the world, (3,), of any length.
-      gap: m, from the body at the plant's start to the wall, greater than 0.
+      gap: m, from the body to the wall at the plant's own x0, wherever runs start; greater than 0.
       size: m, side of the slab that shows it, greater than 0.
       restitution: ratio of the speeds after and before a blow, 0 .. 0.98.
     """

@@ -9,6 +9,7 @@ import pytest
 from helpers.machine_logs import log, sines
 
 import smc_mujoco as smc
+from smc_mujoco.draw import style
 
 FREE = 'contype="0" conaffinity="0"'
 ARM = f"""<mujoco model="carrier"><compiler angle="radian"/><worldbody><body name="upper">
@@ -81,3 +82,12 @@ def test_a_payload_is_found_from_a_log(arm):
     found = smc.identify(arm, run, ["hand.payload"])
     off = abs(found.values["hand.payload"] - 0.4)
     assert off < max(2.0 * found.errors["hand.payload"], 1e-3)
+
+
+def test_figures_tell_a_run_with_a_payload_from_one_without(arm):
+    cases = {"empty": {}, "loaded": {"hand.payload": 0.4}, "heavy": {"mass": 1.2}}
+    runs = [smc.Scenario(plant=arm, mismatch=mismatch, **RUN) for mismatch in cases.values()]
+    empty, loaded, heavy = smc.run(runs)
+    told = [style.differences(trace, [empty, loaded]) for trace in (empty, loaded)]
+    assert told == ["", "hand.payload = 0.4"]
+    assert "hand.payload = 0.4" in style.differences(loaded, [loaded, heavy])
