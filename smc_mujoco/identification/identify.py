@@ -320,8 +320,9 @@ def identify(
         each. u is held from its row to the next: of a log of fewer rows give the mean between them.
         The time grows with rows and names: 4 s at 1 kHz of two joints take a minute or two.
       names: paths of the numbers: "shoulder.damping", .frictionloss, .armature, .stiffness, .gain,
-        .offset, .zero, "input_delay", "hand.payload" of a body, "m", "friction.elbow.kc". None: the
-        rig's `free`. No start is needed: it comes from least squares of forces.
+        .offset, .zero, "input_delay", "hand.payload" of a body, "friction.elbow.kc", and "m" in kg,
+        the mass of all that moves, where mismatches have "mass". None: the rig's `free`. No start
+        is needed: it comes from least squares of forces.
       held_out: a log that is not used, to check the numbers on.
       columns: our name of a column -> that of the logs.
       condition: effects that the model lacks: a condition or its text, such as

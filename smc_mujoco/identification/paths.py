@@ -6,7 +6,8 @@ its search starts and within which range.
     shoulder.zero             what its encoder reads at 0, rad or m
     input_delay               s, from a recorded command to its force
     hand.payload              kg, a point mass at the centre of mass of a body of the model
-    m, grav                   parameters of the plant
+    m, grav                   kg and m/s^2: the mass of all that moves, and gravity; or other
+                              parameters of a plant of the library
     friction.elbow.kc         a number of a part of the scenario: FIELD.JOINT.NAME, or FIELD.NAME
 
 Dry friction with another level in each direction is frictionloss and offset: the levels are
@@ -24,6 +25,7 @@ from smc_mujoco.common.constraints import of_fields
 from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
 from smc_mujoco.identification.rig import Quantity
 from smc_mujoco.mechanisms.custom.model_numbers import model_numbers, with_model_numbers
+from smc_mujoco.mechanisms.custom.plant_from import PARAMETER_UNITS
 from smc_mujoco.mechanisms.hardware.moments import JointState
 from smc_mujoco.mechanisms.hardware.part import Friction, Part
 from smc_mujoco.mechanisms.layout import channel_names, driven_names
@@ -86,7 +88,8 @@ def resolved(base: Scenario, names: Sequence[str]) -> Paths:
             least = _open(plant.constraint(name).low)
             if name in NATURAL:
                 least = 0.0
-            quantities[name] = Quantity(plant.parameters[name], "", "the plant", least)
+            unit = PARAMETER_UNITS[name] if plant.is_user_model else ""
+            quantities[name] = Quantity(plant.parameters[name], unit, "the plant", least)
         elif quantity := _of_signals(base, str(name)):
             quantities[name] = quantity
         elif is_path(str(name)):

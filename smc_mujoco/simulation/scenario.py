@@ -67,10 +67,11 @@ class Scenario:
     Attributes:
       plant: a Plant or the name of one.
       law: a Law (`smc.law(name, **gains)` or your own), or the name of one. A name has the gains
-        that are shipped for the plant, or else the law's defaults; `smc.law(name)` always has the
-        defaults. To give each driven channel its own, give a list in the channels' order, or a
-        mapping from the joints' names; u_max and reference take these forms, too. Default of all
-        three: what the plant's channels suggest, see `smc.Channel`.
+        that are shipped for the plant, or else the law's defaults, which suit no machine of your
+        own: tune them first. `smc.law(name)` always has the defaults. To give each driven channel
+        its own, give a list in the channels' order, or a mapping from the joints' names; u_max and
+        reference take these forms, too. Default of all three: what the plant's channels suggest,
+        see `smc.Channel`.
       model: what the law may know of the plant: "none", or its "nominal" f and g, for x'' = f + g
         u. Default: "nominal" for a law that requires it, else "none". "true" is for controls, as no
         controller knows it: f and g of the true parameters, with the forces of disturbances,

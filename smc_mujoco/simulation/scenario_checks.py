@@ -205,7 +205,10 @@ def check_obstacles(s: Any) -> None:
             )
     for part in s.contact:
         if met := part.meets(s.plant, s.x0):
-            raise ScenarioError(f"x0 of {s.plant.name} has {met}: give another x0, or more room")
+            raise ScenarioError(
+                f"x0 of {s.plant.name} has {met}: give another x0, or a contact with more room, of "
+                "your own if a condition names it"
+            )
 
 
 def check_names(s: Any) -> None:

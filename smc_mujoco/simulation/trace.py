@@ -221,7 +221,7 @@ class Trace:
         """Return the arrays by channel: t, x, v, ... for one channel, t, x0, x1, ..., v0, ... for
         several.
 
-        Those of your own model have the names of its joints: x_shoulder, x_elbow, ...
+        Several of your own model have the names of its joints: x_shoulder, x_elbow, ...
         """
         ends = column_ends(self.scenario.plant)
         found = {"t": self.t}

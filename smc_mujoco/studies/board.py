@@ -30,6 +30,7 @@ LABELS = {SETTLES: "share of settled runs", OBJECTIVE: "J on unseen runs"}
 MIN_TIMES = 1.03  # least lead of a law below the floor that is printed; chosen
 MAX_LEAD = 0.995  # that may be said to show; chosen
 MAX_NAMED = 8  # conditions that a verdict names; chosen
+ALONE = "is not shown to beat every rival, and none is shown to beat it"
 LEVEL_WORDS = f"are level within {100 * LEVEL_SHARE:g} %"
 # as far as these runs go: a share's interval is wider than 10 %
 SAME_RUNS = "settle in the same runs"
@@ -367,10 +368,10 @@ class Board(Tables):
         """
         for block in self.blocks:
             if block.lead and block.lead.floor:
-                undefeated = f"{joined(self.best)} {_is_or_are(self.best)} undefeated"
-                return f"{undefeated}; the value of {block.lead.law} is {block.lead.words}"
+                none = f"no law is shown to be better than {joined(self.best)}"
+                return f"{none}; the value of {block.lead.law} is {block.lead.words}"
         if len(self.best) == 1:
-            return f"{self.best[0]} is undefeated, but does not beat every rival"
+            return f"{self.best[0]} {ALONE}"
         names = joined(self.best)
         if len(self.best) == len(self.entries):
             names = "both laws" if len(self.entries) == 2 else "all laws"

@@ -55,8 +55,9 @@ DrawSeed = Annotated[int, Whole(low=0, high=MAX_SEED)]
 TIMES = "Computing time of each compiled law per sample, on this computer"
 TIME_HEADINGS = "plant", "law", "relative time", "median (s)", "99 % quantile (s)"
 TIME_NOTE = (
-    "Relative to the law pid on the same measurements. All times depend on how busy the computer "
-    "is."
+    "Relative to the law pid, timed in turn with each law on the same measurements, so it is not "
+    "the ratio of two medians of the table. How far that of pid is from 1 shows how little such "
+    "times say: all depend on how busy the computer is."
 )
 GAINS = "plant", "law", "gains", "sets", "J differ by", "best set"
 BEST_SET = (

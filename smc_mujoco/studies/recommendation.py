@@ -19,7 +19,17 @@ from smc_mujoco.robustness.margins import Margin
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.board import BELOW, MARKS, MEDIANS, Boards, Lead, heading, hidden, size
+from smc_mujoco.studies.board import (
+    ALONE,
+    BELOW,
+    MARKS,
+    MEDIANS,
+    Boards,
+    Lead,
+    heading,
+    hidden,
+    size,
+)
 from smc_mujoco.studies.race import FIRST, LOOKS, Race, needed
 from smc_mujoco.studies.table import Table
 
@@ -563,6 +573,6 @@ def _verdict(comparison: Comparison, order: Sequence[str]) -> str:
     beaten = dict(zip(comparison.laws, comparison.worse[:, 0], strict=True))
     best = [law for law in names if not beaten[law]]
     if len(best) == 1:
-        return f"{best[0]} is undefeated, but does not beat every rival; its J is {lead}"
+        return f"open: {best[0]} {ALONE}; its J is {lead}"
     either = f"either {best[0]} or {best[1]}" if len(best) == 2 else f"any of {joined(best)}"
     return f"open, as {either} may have the lowest J; {first}'s is {lead}"

@@ -52,10 +52,12 @@ def score(
       (largest |e| in the last fifth) and steady_error (|mean of e| there, which an oscillation
       leaves small); iae, ise, itae (of the whole run). The largest |e| of a run has no name: it is
       `np.abs(trace.x - trace.r).max()`;
-    - max_u, tv (sum of |changes of u|), tv_rate, energy (integral of u^2) of the command;
+    - of the command u, in N m or N: max_u, tv (sum of |changes of u|), tv_rate (per second) and
+      energy (integral of u^2, times s);
     - chattering_amplitude of s, and chattering_frequency in Hz.
 
-    `smc.score(trace)` has all names, and `help("smc_mujoco.metrics.catalogue")` all definitions.
+    `smc.score(trace)` has all names, and `help("smc_mujoco.metrics.catalogue")` all definitions and
+    units.
 
     Args:
       runs: a Trace; or any number of scenarios, also from a generator.

@@ -240,7 +240,10 @@ def study(
             every[name] = scenario
     missing = {name: scenario for name, scenario in every.items() if name not in store.where}
     if progress and (done := len(every) - len(missing)):
-        print(f"{done} of {len(every)} runs are in {printable(str(store.parts))}", file=sys.stderr)
+        print(
+            f"{done} of {len(every)} simulations are in {printable(str(store.parts))}",
+            file=sys.stderr,
+        )
     _compute(missing, store, plants, threads, progress, executor)
     changes = {name: run_key.source(s) for name, s in by_key.items()}
     for name, scores in _half_step_scores(repeated, store).items():

@@ -165,6 +165,8 @@ def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(tmp_path, monke
         law=FAST,
         sets=sets,
         bounds=FAST.gains,
+        gains=FAST.gains,
+        at_bound={},
     )
     monkeypatch.setattr(fair_gains, "cached", lambda *rest: tuned)
     default = smc.law("observer_free")

@@ -203,7 +203,7 @@ def test_a_study_says_how_many_runs_were_there(tmp_path, capsys):
     study(small(seeds=2), tmp_path, progress=True)
     assert capsys.readouterr().err == ""
     study(small(seeds=3), tmp_path, progress=True)
-    assert capsys.readouterr().err == f"8 of 12 runs are in {tmp_path / 'parts'}\n"
+    assert capsys.readouterr().err == f"8 of 12 simulations are in {tmp_path / 'parts'}\n"
 
 
 def test_a_larger_grid_takes_over_what_is_there(tmp_path, ran):

@@ -65,6 +65,7 @@ if TYPE_CHECKING:
 WITHOUT_MODEL = "give model='none' and a law that reads no model"
 SET_POINT = f"u is the set-point of a servo, and a nominal u is a force: {WITHOUT_MODEL}"
 EMPTY_NAMES = "scene", "model", "robot"  # of files, or their first words: they say nothing
+PARAMETER_UNITS = {"m": "kg", "grav": "m/s^2"}
 UNNAMED_MODEL = "mujoco_model"  # MuJoCo's name of a model without one, as `_name` writes it
 # dynamics of an actuator whose state changes even at ctrl = 0
 UNMEASURED = {

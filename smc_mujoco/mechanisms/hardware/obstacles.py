@@ -106,7 +106,8 @@ class Stops(Obstacle):
         for name, (low, high) in self.limits.items():
             place = qpos[model.joint(name).qposadr[0]]
             if not low < place < high:
-                return f"joint {name!r} at {place:g}, and its stops are at {low:g} and {high:g}"
+                stops = f"the Stops of contact are at {low:g} and {high:g}"
+                return f"joint {name!r} at {place:g}, and {stops}"
         return ""
 
 
