@@ -11,9 +11,10 @@ left.
 
 import io
 import itertools
+import math
 import re
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.common import html
@@ -27,7 +28,13 @@ PLAIN_WIDTH = 80  # characters of a line of plain text
 NAME_WIDTH = 20  # characters of a name before it is broken
 HEADING_WIDTH = 8  # characters of a heading at least
 NARROW_WIDTH = 12  # characters of a line below a number where space is short
+# In LaTeX: characters between two columns; letters of words in the width of a character; least
+# letters in a line of words, about the width of a column of a paper
+TEX_GAP = 2
+TEX_LETTERS = 1.15
+TEX_WIDTH = 60
 MAX_HTML_ROWS = 40
+NEEDS = r"needs booktabs; \small\setlength{\tabcolsep}{2pt} before it makes it narrower"
 NO_BREAK = "\N{NO-BREAK SPACE}"
 # A character -> as LaTeX writes it, with any engine.
 TEX = {c: f"\\{c}" for c in "&%$#_{}"} | {c: f"${c}$" for c in "<>|"}
@@ -70,7 +77,8 @@ class Tabular:
     title: str = ""
     notes: Sequence[str] = ()  # paragraphs below the table
     left: int = 1  # columns of names, which are aligned to the left
-    under: Sequence[str] = ()  # lines that LaTeX prints below the table: what its cells mean
+    label: str = ""  # what LaTeX prints instead of the title
+    under: Sequence[str] = ()  # sentences that LaTeX prints below the table: what its cells mean
 
     def __str__(self) -> str:
         return plain(self)
@@ -160,9 +168,12 @@ class Tabular:
                 for line in lines.splitlines():
                     text.append(f"\n{line}{pad}", style)
             texts.append(text)
-        width = max([HEADING_WIDTH, *map(_width, texts)])
+        return [Text(self._heading(i, max(map(_width, texts), default=0))), *texts]
+
+    def _heading(self, i: int, width: int) -> str:
+        """Return a heading on lines as wide as the cells of its column; a unit stays whole."""
         whole = re.sub(r"\(.*\)", lambda unit: unit[0].replace(" ", NO_BREAK), self.headings[i])
-        return [Text(_wrapped(whole, width)), *texts]
+        return _wrapped(whole, max(HEADING_WIDTH, width))
 
     def _repr_html_(self) -> str:
         lines = [list(map(_html, row)) for row in self.rows]
@@ -190,39 +201,66 @@ class Tabular:
 
     def to_latex(self) -> str:
         """Return a tabular, which needs the package booktabs, below comments with the notes; the
-        title and the lines `under` the table are in print.
+        title and the sentences `under` the table are in print.
 
-        Words in cells of numbers become letters, which a line under the table explains.
+        What stands below a number is in a further line of its row. Words below numbers become
+        letters, which a line under the table explains.
         """
-        marks: dict[str, str] = {}
         lines = []
-        for text in (*self.notes, "needs booktabs"):
+        for text in (*self.notes, NEEDS):
             lines.append(f"% {text}".replace("\n", " "))  # or what follows were no comment
+        marks = self._marks()
+        width = 0
+        heads = []
+        columns = []
+        for i in range(len(self.headings)):
+            letters = marks if i >= self.left else {}
+            cells = [_cell(row[i]) for row in self.rows]
+            widest = max((_tex_width(cell, letters) for cell in cells), default=0)
+            head = self._heading(i, widest).splitlines()
+            width += max([widest, *map(len, head)]) + TEX_GAP
+            heads.append([*map(tex, head)][::-1])
+            columns.append([_tex_cell(cell, letters) for cell in cells])
+        width = max(math.floor(TEX_LETTERS * width), TEX_WIDTH)
         lines += [
             f"\\begin{{tabular}}{{{'l' * self.left}{'r' * (len(self.headings) - self.left)}}}",
             "\\toprule",
+            *self._tex_words(self.label or self.title, width),
+            *_tex_lines(heads)[::-1],  # their last lines are level
+            "\\midrule",
         ]
-        for text in _wrapped(self.title, PLAIN_WIDTH).splitlines():
-            lines.append(self._tex_words(text))
-        lines += [_tex_line(map(tex, self.headings)), "\\midrule"]
-        for row in self.rows:
-            names = map(_tex_cell, row[: self.left])
-            cells = [*names]
-            for value in row[self.left :]:
-                cells.append(_tex_cell(value, marks))
-            lines.append(_tex_line(cells))
+        rows = [_tex_lines(cells) for cells in zip(*columns, strict=True)]
+        space = ["\\addlinespace"] if max(map(len, rows), default=0) > 1 else []
+        for row in rows[:1]:
+            lines += row
+        for row in rows[1:]:
+            lines += space + row
         lines.append("\\bottomrule")
         meanings = []
         for words, mark in marks.items():
             meanings.append(f"{mark}: {words}".replace(" ", NO_BREAK))
-        for text in (*_wrapped("; ".join(meanings), PLAIN_WIDTH).splitlines(), *self.under):
-            lines.append(self._tex_words(text))
+        for text in ("; ".join(meanings), " ".join(self.under)):
+            lines += self._tex_words(text, width)
         return "\n".join([*lines, "\\end{tabular}\n"])
 
-    def _tex_words(self, text: str) -> str:
-        """Return a line of words as wide as the table."""
+    def _marks(self) -> dict[str, str]:
+        """Return words below numbers -> the letter that LaTeX prints instead."""
+        marks: dict[str, str] = {}
+        for row in self.rows:
+            for value in row[self.left :]:
+                for line in _below(_cell(value)):
+                    if " " in line:
+                        again, letter = divmod(len(marks), 26)
+                        marks.setdefault(line, chr(ord("a") + letter) * (1 + again))
+        return marks
+
+    def _tex_words(self, text: str, width: int) -> list[str]:
+        """Return lines of words of a width, over all columns."""
         wide = f"\\multicolumn{{{len(self.headings)}}}{{l}}"
-        return _tex_line([f"{wide}{{\\footnotesize {tex(text)}}}"])
+        lines = []
+        for line in _wrapped(text.replace(" %", f"{NO_BREAK}%"), width).splitlines():
+            lines.append(f"{wide}{{\\footnotesize {tex(line)}}} \\\\")
+        return lines
 
 
 class Tables:
@@ -349,48 +387,60 @@ def _html(cell: Cell | str) -> str:
     """Return a cell as HTML, with the lines below in smaller letters."""
     cell = _cell(cell)
     text = html.strong(cell.text) if cell.strong else html.text(cell.text)
-    lines = [*cell.below.splitlines(), *cell.alarm.splitlines()]
-    if below := "<br>".join(map(html.text, lines)):
+    if below := "<br>".join(map(html.text, _below(cell))):
         return html.Html(f'{text}<br><small style="white-space:nowrap">{below}</small>')
     return text
 
 
-def _tex_line(cells: Iterable[str]) -> str:
-    return f"{' & '.join(cells)} \\\\"
+def _below(cell: Cell) -> list[str]:
+    """Return the lines below a cell's text."""
+    return [*cell.below.splitlines(), *cell.alarm.splitlines()]
 
 
-def _tex_cell(cell: Cell | str, marks: dict[str, str] | None = None) -> str:
-    """Return a cell as LaTeX, with the lines below in brackets beside it; with `marks`, those of
-    several words as letters, which it adds to them.
-    """
-    cell = _cell(cell)
+def _tex_lines(cells: Iterable[Sequence[str]]) -> list[str]:
+    """Return the lines of a row, from those of its cells."""
+    lines = []
+    for parts in itertools.zip_longest(*cells, fillvalue=""):
+        lines.append(f"{' & '.join(parts)} \\\\")
+    return lines
+
+
+def _tex_width(cell: Cell, marks: Mapping[str, str]) -> int:
+    """Return the characters of the longest line of `_tex_cell`."""
+    lines = [line for line in _below(cell) if line not in marks]
+    return max(map(len, (cell.label or cell.text, *lines)))
+
+
+def _tex_cell(cell: Cell, marks: Mapping[str, str]) -> list[str]:
+    """Return the lines of a cell as LaTeX, those of `marks` as letters beside its text."""
     text = tex(cell.label or cell.text)
     if cell.strong:
-        text = f"\\textbf{{{text}}}"
+        bold = "\\boldmath" if "$" in text else ""
+        text = f"\\textbf{{{bold}{text}}}"
     below = []
     letters = []
-    for line in (*cell.below.splitlines(), *cell.alarm.splitlines()):
-        if marks is None or " " not in line:
-            below.append(line)
+    for line in _below(cell):
+        if line in marks:
+            letters.append(marks[line])
         else:
-            again, letter = divmod(len(marks), 26)
-            letters.append(marks.setdefault(line, chr(ord("a") + letter) * (1 + again)))
-    if below:
-        text += f" [{tex(', '.join(below))}]"
+            below.append(f"\\footnotesize {tex(line)}")
     if letters:
         text += f"$^{{{','.join(letters)}}}$"
-    return text
+    return [text, *below]
 
 
 def tex(text: str) -> str:
-    """Return text with LaTeX's special characters escaped, and powers, Greek letters and dashes in
-    its notation.
+    """Return text with LaTeX's special characters escaped, and numbers with exponents, powers,
+    Greek letters and dashes in its notation.
     """
 
     def written(match: re.Match[str]) -> str:
-        if match[2]:
-            return TEX.get(match[2], match[2])
-        return f"$^{{{match[1]}}}$"
+        if match["number"]:
+            return f"${match['number']}\\cdot10^{{{match['power']}}}$"
+        if match["raised"]:
+            return f"$^{{{match['raised']}}}$"
+        return TEX.get(match["letter"], match["letter"])
 
-    text = re.sub(r"([\d.]+)e(-?\d+)", r"\1·10^\2", text)
-    return re.sub(r"\^(-?\d+)|(.)", written, text)
+    return re.sub(
+        r"(?P<number>[<-]?[\d.]+)e(?P<power>-?\d+)|\^(?P<raised>-?\d+)|(?P<letter>.)", written, text
+    )

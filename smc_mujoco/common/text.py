@@ -22,7 +22,27 @@ def number(value: float, digits: int = 3) -> str:
         return "0"
     if 1e-3 <= abs(value) < 1e5:
         return f"{value:.{max(0, digits - 1 - math.floor(math.log10(abs(value))))}f}"
-    mantissa, exponent = f"{value:.{min(digits, 2) - 1}e}".split("e")
+    return _with_exponent(value, min(digits, 2))
+
+
+def in_one_notation(values: Iterable[float]) -> list[str]:
+    """Return each number as `number` does; all with an exponent if one of them has one, but for 0,
+    "never", "none" and "<1e-9".
+    """
+    numbers = {}
+    texts = []
+    for i, value in enumerate(values):
+        texts.append(number(value))
+        if texts[i][-1].isdigit() and abs(value) >= LEAST_PRINTED:
+            numbers[i] = value
+    if any("e" in texts[i] for i in numbers):
+        for i, value in numbers.items():
+            texts[i] = _with_exponent(value, 2)
+    return texts
+
+
+def _with_exponent(value: float, digits: int) -> str:
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     return f"{mantissa}e{int(exponent)}"
 
 

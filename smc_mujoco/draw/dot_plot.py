@@ -360,8 +360,7 @@ def _panel(
     else:
         places = np.arange(len(conditions))
         middles = height * (places + 0.5) - 1
-        names = np.char.replace(conditions, "_", " ")
-        ax.set_yticks(middles, names, parse_math=False)
+        ax.set_yticks(middles, list(map(style.condition_name, conditions)), parse_math=False)
     ax.set_ylim(len(conditions) * height - 1, -1)
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)

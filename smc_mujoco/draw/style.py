@@ -731,8 +731,13 @@ def heading(
     found = dict.fromkeys(plant_name(plant, short) for plant in plants)
     names = list(found)
     if len(set(conditions)) == 1 and conditions[0] != "nominal":
-        names.append(conditions[0].replace("_", " "))
+        names.append(condition_name(conditions[0]))
     return ", ".join(names)
+
+
+def condition_name(condition: str) -> str:
+    """Return a condition as pictures and LaTeX name it."""
+    return condition.replace("_", " ")
 
 
 def prefixed(largest: float, unit: str) -> tuple[float, str]:

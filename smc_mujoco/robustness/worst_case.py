@@ -172,12 +172,15 @@ class WorstCases(Tables, list[WorstCase]):
     @property
     def title(self) -> str:
         """Plant, metric, number of runs and class."""
+        return self._title(self[0].nominal.plant.name)
+
+    def _title(self, plant: str) -> str:
         first = self[0]
         metric = CATALOGUE[first.metric].label
         if first.unit:
             metric += f" in {first.unit}"
         within = f"worst of {first.tried} runs, bounds: {first.class_words}"
-        return f"{first.nominal.plant.name}: {metric}, {within}"
+        return f"{plant}: {metric}, {within}"
 
     @property
     def tables(self) -> list[Tabular]:
@@ -187,12 +190,15 @@ class WorstCases(Tables, list[WorstCase]):
         by_median = sorted(self, key=lambda case: case.median)
         rows = []
         for case in self:
-            law = Cell(case.nominal.law.name, colour=law_colour(case.nominal.law.name))
+            law = case.nominal.law
+            name = Cell(law.name, colour=law_colour(law.name), label=law_name(law))
             place = str(by_median.index(case) + 1)
             rows.append(
-                [law, case.shown(case.value), case.shown(case.median), place, case.found_by]
+                [name, case.shown(case.value), case.shown(case.median), place, case.found_by]
             )
-        return [Tabular(headings=HEADINGS, rows=rows, title=self.title, notes=self.notes)]
+        label = self._title(plant_name(self[0].nominal.plant))
+        about = {"title": self.title, "label": label, "notes": self.notes}
+        return [Tabular(headings=HEADINGS, rows=rows, **about)]
 
     @property
     def notes(self) -> list[str]:

@@ -5,7 +5,7 @@ and intervals.
 import dataclasses
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from smc_mujoco.analysis.bootstrap import LEVEL, MIN_INTERVAL_SAMPLES, Interval
@@ -20,9 +20,18 @@ from smc_mujoco.analysis.step_halving import APART, RANGE, UNTRIED
 from smc_mujoco.common.aliases import Names, Numbers, Pair
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
-from smc_mujoco.common.text import LEAST_PRINTED, capital, counted, every, joined, number
+from smc_mujoco.common.text import (
+    LEAST_PRINTED,
+    capital,
+    counted,
+    every,
+    in_one_notation,
+    joined,
+    number,
+)
 from smc_mujoco.control.source import Source, in_words, kinds
 from smc_mujoco.draw import style
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.metrics.conventions import Metric
 
@@ -47,17 +56,23 @@ BELOW = (
     "'below': the median is below the number beside it, the floor. Values below the floor count as "
     "equal."
 )
-# A word in tables -> what their key says about it.
-MARKS = {
+# A word in tables -> its meaning, which their key says, and LaTeX below the table.
+MEANINGS = {
     "J (": "Tuning minimises J, summed over conditions: ITAE divided by the initial error, "
     "plus 0.001 s^3 times the variation of u divided by u_max and by the duration. The table's J "
     "is from separate runs, which tuning has not seen.",
     "shipped": "Shipped gains come with the package.",
+    "tuned here": "Gains tuned here come from the user's own searches.",
     "settled runs": "A run counts as settled if it settles before its last fifth.",
     "settling time": "Settling time is when the error enters its band to stay: 2 % of its initial "
     "value, or of the reference's range if that is larger.",
+    "ultimate bound": "The ultimate bound is the largest absolute error of any channel in the last "
+    "fifth of a run.",
     "ITAE": "ITAE is the integral of time times absolute error.",
     "TV rate": "TV rate is the total variation of u per second, in the last fifth of a run.",
+}
+# A word in tables -> what their key says about it.
+MARKS = MEANINGS | {
     "strong=True": "A star or bold type marks the winner. If no law wins, it marks every law that "
     "may be the best. Such a law meets three requirements: no other law is shown to be better "
     f"({100 * LEVEL:g} % confidence in each column and condition), all its own runs have arrived, "
@@ -77,12 +92,16 @@ MARKS = {
 }
 LAST = "never", "fails", "not arrived"  # words in place of a value
 
-# A word in a table's cells -> what LaTeX prints below the table about it.
+# A word in a table's headings and cells -> what LaTeX prints below the table about it.
 UNDER = {
-    "": f"Median [{100 * LEVEL:g} % interval].",
+    "": f"Below each median, or share, is its {100 * LEVEL:g} % interval.",
+    **MEANINGS,
+    "default": "Default gains are those of the law's own file.",
+    "yours": "Gains marked yours were given by the user.",
     "strong=True": "Bold: may be the best: no other law is shown to be better "
     f"({100 * LEVEL:g} % confidence).",
     "below ": "Below a floor: too small to be resolved; such values count as equal.",
+    "may exceed ": "May exceed a floor: the median is below it, but need not stay there.",
     "at half": "At half the step: the median with half the physics step.",
 }
 
@@ -487,6 +506,7 @@ class Boards(Tables, list[Board]):
     # why metrics have no board, shown if none has
     absent: Sequence[str] = ()
     labels: Mapping[str, str] = {}  # law -> what LaTeX calls it
+    plants: Mapping[str, Plant] = {}  # by name
 
     @property
     def remarks(self) -> list[str]:
@@ -529,7 +549,7 @@ class Boards(Tables, list[Board]):
             groups.setdefault(board.about, []).append(board)
         if not groups:
             return [Tabular(headings=["no boards: no metric applies"], rows=[], notes=self.absent)]
-        tabulars = [_table(name, boards, self.labels) for name, boards in groups.items()]
+        tabulars = [_table(boards, self.labels, self.plants) for boards in groups.values()]
         notes = *tabulars[-1].notes, *self.remarks, *key(self, repr(tabulars))
         return [*tabulars[:-1], dataclasses.replace(tabulars[-1], notes=notes)]
 
@@ -561,15 +581,24 @@ def size(value: float, metric: str) -> str:
     return CATALOGUE[metric].text(value)
 
 
-def spread(interval: Interval, metric: str) -> str:
-    """Return the ends of an interval, rounded like its median; "" if they are not known, both
-    infinite, or both below 1e-9, which the median says.
+def sizes(values: Sequence[float], metric: str) -> list[str]:
+    """Return numbers of one cell as text, each as `size` does, in one notation."""
+    texts = []
+    for value, text in zip(values, in_one_notation(values), strict=True):
+        other = metric == SETTLES or not math.isfinite(value)
+        texts.append(size(value, metric) if other else text)
+    return texts
+
+
+def spread(interval: Interval, low: str, high: str) -> str:
+    """Return the ends of an interval, from their texts; "" if they are not known, both infinite, or
+    both below 1e-9, which the median says.
     """
     if math.isnan(interval.low) or math.isinf(interval.low):
         return ""
     if interval.low > 0.0 and interval.high < LEAST_PRINTED:
         return ""
-    return f"{size(interval.low, metric)}–{size(interval.high, metric)}"
+    return f"{low}–{high}"
 
 
 def heading(board: Board) -> str:
@@ -593,8 +622,10 @@ def _in_unit(board: Board) -> Metric:
     return dataclasses.replace(CATALOGUE[board.metric], unit=board.unit)
 
 
-def _table(name: str, boards: Sequence[Board], labels: Mapping[str, str]) -> Tabular:
-    """Return the table of one group of runs, with `Boards.labels`.
+def _table(
+    boards: Sequence[Board], labels: Mapping[str, str], plants: Mapping[str, Plant]
+) -> Tabular:
+    """Return the table of one group of runs, with `Boards.labels` and `Boards.plants`.
 
     Laws stand by place in the first metric, those of one place by their median in it, then by the
     next ones.
@@ -613,14 +644,9 @@ def _table(name: str, boards: Sequence[Board], labels: Mapping[str, str]) -> Tab
         label = labels.get(law) or style.law_name(law)
         rows.append([name_cell._replace(label=label), *cells[law]])
     largest = max(boards, key=lambda board: len(board.blocks))
-    if len(largest.blocks) == 1:
-        name = f"{largest.group['plant']}, {largest.blocks[0].condition}"
-    if largest.summed:
-        name += f" under {joined(largest.summed)}"
-    samples = {}
-    for block in largest.blocks:
-        samples[block.sample] = None
-    words = str([*itertools.chain(*cells.values())])
+    plant = largest.group["plant"]
+    headings = ["law", *map(heading, boards)]
+    words = str([headings, rows])
     under = []
     for word, text in UNDER.items():
         if word in words:
@@ -630,12 +656,26 @@ def _table(name: str, boards: Sequence[Board], labels: Mapping[str, str]) -> Tab
     if UNDER["strong=True"] in under:
         under += _wins(boards, labels)
     return Tabular(
-        headings=["law", *map(heading, boards)],
+        headings=headings,
         rows=rows,
-        title=f"{name}: {'; '.join(samples)}",
+        title=_title(largest, plant),
+        label=_title(largest, style.plant_name(plants.get(plant, plant)), style.condition_name),
         notes=_verdicts(boards),
         under=under,
     )
+
+
+def _title(board: Board, plant: str, named: Callable[[str], str] = str) -> str:
+    """Return what the runs of a board have in common, and the samples; `named` has the name of a
+    condition.
+    """
+    about = plant
+    if len(board.blocks) == 1:
+        about += f", {named(board.blocks[0].condition)}"
+    if board.summed:
+        about += f" under {joined(map(named, board.summed))}"
+    samples = dict.fromkeys(block.sample for block in board.blocks)
+    return f"{about}: {'; '.join(samples)}"
 
 
 def _wins(boards: Sequence[Board], labels: Mapping[str, str]) -> list[str]:
@@ -652,8 +692,14 @@ def _wins(boards: Sequence[Board], labels: Mapping[str, str]) -> list[str]:
 
 def _cell(board: Board, entry: BoardEntry) -> Cell:
     """Return a law's median, strong if the law may be the best in every block."""
-    median = size(entry.interval.median, board.metric)
-    below = [spread(entry.interval, board.metric)]
+    interval = entry.interval
+    changes = []
+    for block in board.blocks:
+        if entry.law in block.by_step:
+            changes.append(block.by_step[entry.law])
+    numbers = [interval.median, interval.low, interval.high, *itertools.chain(*changes[:1])]
+    median, low, high, *step = sizes(numbers, board.metric)
+    below = [spread(interval, low, high)]
     for block in board.blocks:
         if entry.law in block.below:
             below.append(f"below {block.floor}")
@@ -662,13 +708,9 @@ def _cell(board: Board, entry: BoardEntry) -> Cell:
             below.append(f"may exceed {block.floor}")
             break
     alarms = [board.failures(entry)]
-    changes = []
-    for block in board.blocks:
-        if entry.law in block.by_step:
-            changes.append(block.by_step[entry.law])
-    for before, after in changes[:1]:
-        step = f"becomes {size(after, board.metric)} at half the step"
-        alarms.append(f"{size(before, board.metric)} {step}")
+    if step:
+        before, after = step
+        alarms.append(f"{before} becomes {after} at half the step")
     says = entry.law == board.winner or not entry.vague
     best = entry.rank.best and says and median != "" and not board.barred
     lines = "\n".join(filter(None, below))

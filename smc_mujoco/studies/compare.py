@@ -173,6 +173,8 @@ class Compared(Tables):
         """Return a LaTeX tabular for each plant in each condition, which its first line names,
         below comments with the verdicts; needs booktabs.
 
+        Five metrics are wider than a column of text: put them into table*, or compare fewer.
+
         Args:
           path: of a file to which it is written too.
         """

@@ -96,10 +96,14 @@ def leaderboard(
     boards.failures = paired_runs.failures(table)
     boards.untouched = paired_runs.untouched(table)
     boards.labels = paired_runs.labels(table)
+    boards.plants = plants = {}
     ranked = []
     for group in paired_runs.groups(table, by):
         sources = paired_runs.sources(table, group.rows[group.rows >= 0])
-        ranked.append(RankedGroup(group, paired_runs.scenarios(table, group), sources))
+        ran = paired_runs.scenarios(table, group)
+        for scenario in filter(None, ran):
+            plants[scenario.plant.name] = scenario.plant
+        ranked.append(RankedGroup(group, ran, sources))
     boards.commands = _commands(ranked)
     by_metric = {}
     for metric in dict.fromkeys(metrics):

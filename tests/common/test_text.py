@@ -9,7 +9,7 @@ import pytest
 
 from smc_mujoco.common import tabular
 from smc_mujoco.common.tabular import Cell, Tabular
-from smc_mujoco.common.text import number
+from smc_mujoco.common.text import in_one_notation, number
 
 pytestmark = pytest.mark.quick
 
@@ -31,6 +31,7 @@ NUMBERS = {  # value -> with three digits, with one
 LONG = "a_name_that_is_longer than_twenty"
 TABLE = Tabular(
     title="Laws & gains",
+    label="Laws & their gains",
     headings=["law", "gains", "ITAE (m s^2)", "bound (m)", "time until it rests (s)"],
     rows=[
         [
@@ -41,7 +42,7 @@ TABLE = Tabular(
             Cell("never", alarm="2 of 9 fail"),
         ],
         [
-            Cell(LONG, colour="red"),
+            Cell(LONG, "2 of 9 fail", colour="red"),
             "",
             Cell("2.5", "2.25–12.75"),
             Cell("−4 ± 1", "a\nb"),
@@ -49,7 +50,10 @@ TABLE = Tabular(
         ],
     ],
     notes=["A note.", "Another."],
-    under=["A word: 5 %."],
+    under=[
+        "A word: 5 %.",
+        "A sentence, which goes on in the next line, as the table is wide as 9 %.",
+    ],
     left=2,
 )
 
@@ -57,6 +61,19 @@ TABLE = Tabular(
 @pytest.mark.parametrize("value", NUMBERS)
 def test_a_number_has_as_many_digits_as_are_asked_for(value):
     assert (number(value), number(value, 1)) == NUMBERS[value]
+
+
+@pytest.mark.parametrize(
+    ("values", "texts"),
+    [
+        ([8.7e-4, 3.3e-5, 0.00207], ["8.7e-4", "3.3e-5", "2.1e-3"]),
+        ([98765.0, -0.5, 1.2e5], ["9.9e4", "-5.0e-1", "1.2e5"]),
+        ([3e-5, 0.0, 1e-10, math.inf, math.nan], ["3.0e-5", "0", "<1e-9", "never", "none"]),
+        ([0.5, 1e-10, math.inf], ["0.500", "<1e-9", "never"]),
+    ],
+)
+def test_numbers_that_stand_together_have_one_notation(values, texts):
+    assert in_one_notation(values) == texts
 
 
 @pytest.mark.parametrize("width", [80, 44])
@@ -93,6 +110,12 @@ def test_a_table_for_notebooks_and_for_latex_has_all_its_words(snapshot):
     long = Tabular(headings=["a"], rows=[["b"]] * 41)
     assert long._repr_html_().count("<tr>") == 1 + 40 + 1
     assert "and 1 more" in long._repr_html_()
+    assert "addlinespace" not in long.to_latex()
+
+
+@pytest.mark.parametrize("number", ["4.9", "<1", "-3"])
+def test_a_number_with_an_exponent_is_one_formula(number):
+    assert tabular.tex(f"k={number}e-8–2e5") == rf"k=${number}\cdot10^{{-8}}$--$2\cdot10^{{5}}$"
 
 
 def test_every_character_that_latex_reads_is_written_out():

@@ -20,7 +20,7 @@ from smc_mujoco.analysis.ranking import Effect
 from smc_mujoco.common.tabular import TEX, plain
 from smc_mujoco.draw import dot_plot
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.studies.board import Board, Boards, Lead, size, spread
+from smc_mujoco.studies.board import UNDER, Board, Boards, Lead, size, sizes, spread
 from smc_mujoco.studies.leaderboard import leaderboard
 
 pytestmark = pytest.mark.quick
@@ -121,11 +121,14 @@ def test_html_and_latex_have_the_numbers_of_the_text(boards):
     text = plain(boards, 200)
     html = cells_of_html(boards)
     latex = {}
-    inside = boards.to_latex().partition("midrule")[2].partition("bottomrule")[0]
-    for line in inside.splitlines():
-        if line.endswith(r"\\"):
-            name, *rest = re.split(r"(?<!\\) & ", line[:-3])
-            latex[name] = rest
+    inside = boards.to_latex().partition("midrule")[2].partition(r"\bottomrule")[0]
+    for row in inside.split(r"\addlinespace"):
+        lines = []
+        for line in row.strip().splitlines():
+            lines.append(re.split(r"(?<!\\) & ", line.removesuffix(r" \\")))
+        name, *rest = zip(*lines, strict=True)
+        latex[name[0]] = rest
+        assert name[1] == r"\footnotesize yours"
     assert list(html) == ["third", EVIL, "second"]
     escaped = r"50 \% \& $<$b$>$x\_1\textasciicircum{}\{2\}$<$/b$>$ \textbackslash{} $\lambda$ = 2"
     assert list(latex)[1].startswith(escaped)
@@ -141,12 +144,11 @@ def test_html_and_latex_have_the_numbers_of_the_text(boards):
             assert " ".join([cell.text, interval]) in shown
             for number in (cell.text, interval):
                 assert re.search(rf"(?<![\d.]){re.escape(number)}[* \n]", text), number
-                power = re.sub(r"e(-\d)", r"$\\cdot$10$^{\1}$", number.replace("–", "--"))
-                assert power in tex
+            for number, line in zip((cell.text, interval), tex, strict=True):
+                power = re.sub(r"([\d.]+)e(-\d)", r"$\1\\cdot10^{\2}$", number)
+                assert power.replace("–", "--") in line
     assert re.fullmatch(r"[34]\.\de-7", table.rows[0][1].text)  # 4e-7 times 0.9 to 1.1
-    assert table.rows[0][1].below.startswith(spread(boards[0].entries[0].interval, "itae"))
     below = table.to_latex().partition("bottomrule")[2]
-    assert below.count("multicolumn") == 3
     assert "third wins: ITAE." in below
     (few,) = leaderboard(made(seeds=3), metrics=["itae"]).tables
     assert "wins" not in few.to_latex().partition("bottomrule")[2]
@@ -161,11 +163,12 @@ def test_a_printed_median_lies_in_its_printed_interval(values):
         return float(text.replace("never", "inf").replace("<1e-9", "0"))
 
     low, median, high = values
-    ends = spread(Interval(median, low, high, 20), "settling_time").split("–")
+    texts = sizes(values, "settling_time")
+    ends = spread(Interval(median, low, high, 20), texts[0], texts[2]).split("–")
     if any(ends):
-        assert number(ends[0]) <= number(size(median, "settling_time")) <= number(ends[1])
+        assert number(ends[0]) <= number(texts[1]) <= number(ends[1])
     else:
-        assert low == math.inf or size(high, "settling_time") == "<1e-9"
+        assert low == math.inf or texts[2] == "<1e-9"
     assert ends != ["<1e-9", "<1e-9"]
 
 
@@ -181,7 +184,20 @@ DIGITS = [  # value, metric, text
 
 @pytest.mark.parametrize(("value", "metric", "text"), DIGITS)
 def test_a_number_of_a_board_has_three_digits(value, metric, text):
-    assert size(value, metric) == text
+    assert [size(value, metric)] == sizes([value], metric) == [text]
+
+
+def test_a_cell_has_one_notation():
+    table = made()
+    table.columns["itae"][:20] = np.geomspace(3e-5, 4e-3, 20)
+    halves = np.full(60, None, object)
+    halves[:20] = '{"itae": 0.01}'
+    table.columns["half_step"] = halves
+    cells = {row[0].text: row[1] for row in leaderboard(table, ["itae"]).tables[0].rows}
+    cell = cells[EVIL]
+    assert re.fullmatch(r"\d\.\de-4", cell.text)
+    assert re.fullmatch(r"\d\.\de-4–\d\.\de-3", cell.below)
+    assert cell.alarm == f"{cell.text} becomes 1.0e-2 at half the step"
 
 
 def test_only_what_no_law_beats_is_marked(boards):
@@ -254,17 +270,14 @@ def test_a_law_has_its_label_in_latex_and_plots_and_values_below_the_floor_are_s
     def root_sliding(y, gains, memory):
         return -gains.k * y.e - 5.0 * y.de, y.e
 
-    plant = "inverted_pendulum"
+    plant = dataclasses.replace(smc.plant("inverted_pendulum"), label="My rod")
     runs = smc.grid(plant, [root_sliding, "pid"], ["nominal", "noise"], 2, duration=1.5)
     table = smc.study(runs, tmp_path)
     boards = leaderboard(table, ["ultimate_bound"], by=("plant", "condition"))
     latex = boards.to_latex()
     for condition in ("nominal", "noise"):
-        assert (
-            rf"\multicolumn{{2}}{{l}}{{\footnotesize inverted\_pendulum, {condition}: 2 seeds"
-            in latex
-        )
-    assert "Root sliding [default] &" in latex
+        assert rf"\multicolumn{{2}}{{l}}{{\footnotesize My rod, {condition}: 2 seeds" in latex
+    assert "\nRoot sliding &" in latex
     assert "root_sliding" in repr(boards)
     drawn = dot_plot.plot(table.select(condition="nominal"), metrics=["ultimate_bound"])
     (ax,) = drawn.axes
@@ -279,11 +292,33 @@ def test_a_law_has_its_label_in_latex_and_plots_and_values_below_the_floor_are_s
     assert left < floors[1]
 
 
-def test_latex_says_in_a_comment_what_the_settling_band_is():
-    latex = leaderboard(made(), ["settling_time"]).to_latex()
-    (comment,) = re.findall("^%.*Settling time.*$", latex, re.MULTILINE)
-    assert "2 % of its initial value" in comment
-    assert "Settling time" not in leaderboard(made(), ["itae"]).to_latex()
+def test_a_title_in_latex_has_words_and_one_of_a_terminal_has_names():
+    table = made(conditions=("delay_10ms",))
+    table.columns["plant"] = np.full(60, "inverted_pendulum")
+    (board,) = leaderboard(table, ["itae"])
+    (summed,) = Boards([dataclasses.replace(board, summed=("noise", "light_load"))]).tables
+    assert summed.title == "inverted_pendulum, delay_10ms under noise and light_load: 20 seeds"
+    assert summed.label == "Inverted pendulum, delay 10ms under noise and light load: 20 seeds"
+
+
+@pytest.mark.parametrize(
+    ("metric", "heading"),
+    [
+        ("settles", "settled runs"),
+        ("settling_time", "settling time"),
+        ("ultimate_bound", "ultimate bound"),
+        ("itae", "ITAE"),
+        ("tv_rate", "TV rate"),
+    ],
+)
+def test_latex_says_in_print_what_its_own_columns_are(metric, heading):
+    (table,) = leaderboard(made(), [metric]).tables
+    metrics = "settled runs", "settling time", "ultimate bound", "ITAE", "TV rate"
+    said = [name for name in metrics if UNDER[name] in table.under]
+    assert said == [heading]
+    printed = table.to_latex().partition("bottomrule")[2].replace(r"\%", "%")
+    words = printed.replace("} \\\\\n\\multicolumn{2}{l}{\\footnotesize ", " ")
+    assert UNDER[heading] in words
 
 
 def test_the_shade_below_the_floor_begins_at_0_on_a_linear_axis():

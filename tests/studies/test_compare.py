@@ -26,6 +26,7 @@ from smc_mujoco.control import gain_sets
 from smc_mujoco.control.units import FORCE, RATE, Gain
 from smc_mujoco.robustness import worst_case
 from smc_mujoco.studies import batches, compare, fair_gains
+from smc_mujoco.studies.board import UNDER
 from smc_mujoco.studies.leaderboard import METRICS, Holdout
 
 SHORT = {"duration": 0.5, "budget": 16, "progress": False}
@@ -134,7 +135,10 @@ def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
     (entry,) = [entry for entry in boards[3].entries if entry.law == "pid"]
     assert row.unit == "m s^2"
     assert (row.median, row.low, row.high, row.gains) == (*entry.interval[:3], "yours")
-    assert "PID [yours] &" in found.to_latex()
+    last = found.leaderboard.tables[-1]
+    rows = last.to_latex().partition("\nPID & ")[2].splitlines()
+    assert rows[1].startswith(r"\footnotesize yours & ")
+    assert {UNDER["shipped"], UNDER["tuned here"]} <= set(last.under)
     assert found.to_latex().count(r"\begin{tabular}") == 6  # J on each plant, too
     assert found._repr_html_().count("<table") == 8  # times, and gains
     assert len(found.plot().axes) == 10  # of all five metrics, on both plants
@@ -398,6 +402,8 @@ def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatc
         assert smc.score(smc.run(case.scenario))["rms_error"] == case.value >= case.median
     (table,) = [table for table in made.tables if "worst of 16 runs" in table.title]
     assert table.to_latex() in made.to_latex()
+    assert "\nPID & " in table.to_latex()
+    assert table.label == table.title.replace("duffing:", "Duffing oscillator:") != table.title
     monkeypatch.setattr(worst_case, "worst_case", None)
     again = smc.compare(
         laws,

@@ -8,6 +8,7 @@ import smc_mujoco as smc
 from smc_mujoco.cli import main
 from smc_mujoco.control import gain_sets
 from smc_mujoco.simulation import run_key
+from smc_mujoco.studies.board import UNDER
 
 FAST, SLOW = (
     smc.law("observer_free", lam=6.0, k1=k1).named(name)
@@ -58,7 +59,10 @@ def test_boards_print_the_sources(folder):
         words = " ".join(printed.split())  # lines of a terminal may end anywhere
         assert "default for slow" in words
         assert "yours for fast" in words
-    assert "slow [default] &" in boards.to_latex()
+    _, _, row = boards.to_latex().partition("\nslow & ")
+    assert row.splitlines()[1].startswith(r"\footnotesize default & ")
+    for sentence in (UNDER["default"], UNDER["yours"]):
+        assert sentence in boards.tables[0].under
 
 
 def test_equal_gains_are_one_run_and_the_table_has_the_source_of_this_study(folder):

@@ -274,7 +274,12 @@ Metrics = Annotated[
     ),
 ]
 Latex = Annotated[
-    Path | None, typer.Option(metavar="FILE.tex", help="Also write the tables as LaTeX.")
+    Path | None,
+    typer.Option(
+        metavar="FILE.tex",
+        help="Also write the tables as LaTeX. Five metrics are wider than a column of text: put "
+        "them into table*, or compare fewer.",
+    ),
 ]
 Rig = Annotated[
     str | None,
