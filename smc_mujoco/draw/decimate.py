@@ -19,7 +19,6 @@ MEAN_SHARE = 0.01  # of the run, over which a mean is taken, see `window`
 MIN_MEAN = 40  # samples of it at least
 MIN_MOVE = 2e-3  # of the largest value: smaller steps between samples do not count as moves
 MIN_REVERSALS = 6  # in a row are chattering, if each follows within a quarter of a window
-TREND_SHARE = 0.5  # of the variance along a straight line, above which y moves and does not chatter
 COLUMNS = 360  # of pixels of a panel: traces of more samples are drawn as means and ranges
 MAX_GAP = 0.02  # s: shorter gaps between parts that switch are closed, or they look like a fence
 LINE_PARTS = 250  # of a line, of which each keeps its smallest and its largest value
@@ -85,26 +84,30 @@ def windows(t: Array, y: Array, edges: Array) -> Envelope:
 
 def band(t: Array, y: Array) -> tuple[Array, Array, Array]:
     """Return times with the least and largest y (K+1, n) about them, without gaps up to MAX_GAP
-    between swings.
+    between swings, and without such a gap before the end.
 
-    There are at most COLUMNS windows, of equally many samples each.
+    There are at most COLUMNS windows, of equally many samples each but for the last; each sample of
+    a short y is one.
     """
     from scipy.ndimage import grey_closing, grey_opening
 
     count = len(t) - 1
-    if count <= COLUMNS:
-        low = y.min(axis=1)
-        high = y.max(axis=1)
-        return t, low, high
-    edges = t[:: 2 * -(-count // (2 * COLUMNS))]
-    ends = edges if edges[-1] == t[-1] else np.append(edges, t[-1])
-    e = windows(t, y, ends)
-    low = e.low.min(axis=1)
-    high = e.high.max(axis=1)
-    size = 1 + int(MAX_GAP / (e.t[1] - e.t[0]))
-    lower = grey_opening(low, size, mode="nearest")
-    upper = grey_closing(high, size, mode="nearest")
-    return e.t, lower, upper
+    at = t
+    low = y.min(axis=1)
+    high = y.max(axis=1)
+    if count > COLUMNS:
+        edges = t[:: 2 * -(-count // (2 * COLUMNS))].copy()
+        edges[-1] = t[-1]
+        e = windows(t, y, edges)
+        at = e.t
+        low = e.low.min(axis=1)
+        high = e.high.max(axis=1)
+    size = int(np.searchsorted(at - at[0], MAX_GAP, side="right"))
+    lower = np.pad(low, (0, size), "minimum", stat_length=size)
+    upper = np.pad(high, (0, size), "maximum", stat_length=size)
+    lower = grey_opening(lower, size, mode="nearest")
+    upper = grey_closing(upper, size, mode="nearest")
+    return at, lower[: len(at)], upper[: len(at)]
 
 
 def window(trace: Trace) -> int:
@@ -174,23 +177,26 @@ def smooth(y: Array, width: int) -> Array:
 
     The weights result from averaging twice over half the width, which suppresses a periodic signal
     far better than one average. Within half a width of the ends of a part the value is that of the
-    nearest whole triangle; where y moves there, as a noisy one does before it settles, it is that
-    of the longest triangle about the sample. In a part shorter than the width the triangle is as
-    long as the part.
+    nearest whole triangle. Where that leaves the range of y within a quarter of the width, y moves
+    rather than chatters: there it is that of the longest triangle about the sample. In a part
+    shorter than the width the triangle is as long as the part.
     """
-    line = y.astype(float)
-    for part in chattering_parts(y, width):
-        from scipy.signal import detrend
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+    line = y.astype(float)
+    around = 2 * (width // 4) + 1
+    low = minimum_filter1d(line, around, mode="nearest")
+    high = maximum_filter1d(line, around, mode="nearest")
+    for part in chattering_parts(y, width):
         middle = (part.stop - part.start + 1) // 2
         half = min(width // 2, middle)
         smoothed = triangular_mean(line[part], half)
         means = np.pad(smoothed, half - 1, "edge")
-        for values, mean in ((line[part], means), (line[part][::-1], means[::-1])):  # from each end
-            start = values[: 2 * half - 1]
-            rest = detrend(start).var()
-            moves = rest < (1.0 - TREND_SHARE) * start.var()
-            if not moves:
+        off = (means < low[part]) | (means > high[part])
+        from_start = line[part], means, off
+        from_end = [each[::-1] for each in from_start]
+        for values, mean, leaves in (from_start, from_end):
+            if not leaves[: half - 1].any():
                 continue
             for k in range(1, half):
                 mean[k - 1] = triangular_mean(values[: 2 * k - 1], k)[0]
@@ -210,10 +216,13 @@ def running_mean(y: Array, width: int) -> Array:
 
 
 def line(t: Array, y: Array, width: int) -> tuple[Array, Array]:
-    """Return times and values of a curve for y (K+1,): smoothed where it chatters, in few points
-    that keep extremes.
+    """Return times and values of a curve for y (K+1,): smoothed where it chatters, but within its
+    `band`, in few points that keep extremes.
     """
-    y = smooth(y, width)
+    smoothed = smooth(y, width)
+    at, low, high = band(t, y[:, None])
+    within = np.clip(smoothed, np.interp(t, at, low), np.interp(t, at, high))
+    y = np.where(smoothed == y, y, within)
     size = -(-len(t) // LINE_PARTS)
     starts = np.arange(0, len(t), size)
     missing = len(starts) * size - len(y)

@@ -11,7 +11,7 @@ from smc_mujoco.common.aliases import Fields
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import band
 from smc_mujoco.draw.horizon import settles_at
-from smc_mujoco.draw.panels import SINGLE, Panel, mark, over_time
+from smc_mujoco.draw.panels import SINGLE, Panel, mark, over_time, smoothed
 from smc_mujoco.draw.quantities import MARGIN, PEAKS, limits, span, usual
 from smc_mujoco.simulation.trace import Trace
 
@@ -182,7 +182,7 @@ def crowded(panel: Panel, allowed: int = MAX_BANDS) -> bool:
         return False
     low, high = limits(panel.traces, "u")
     wide = 0
-    for trace in panel.traces:
+    for trace in filter(smoothed, panel.traces):
         _, least, most = band(trace.t, trace.u)
         width = float(np.mean(most - least))
         wide += width > MIN_WIDE_BAND * (high - low)

@@ -335,7 +335,7 @@ def meaning(panels: Sequence[Panel]) -> dict[str, str]:
     if banded and (over or n > 1):
         words["band"] = f"range of {', '.join(banded).replace('force', 'delivered')}"
     if over:
-        words["line"] = f"mean over {1e3 * over:.3g} ms where it chatters"
+        words["line"] = f"mean over up to {1e3 * over:.3g} ms where it chatters"
     if n > 1:
         shown = min(n, MAX_DRAWN_CHANNELS)
         words["thin lines"] = f"the {n} channels" if shown == n else f"{shown} of {n} channels"
@@ -426,7 +426,7 @@ def over_time(
             continue
         y = QUANTITIES[name](trace)
         look |= {"color": colour, "drawstyle": steps(trace, name)}
-        if bands and name not in UNBANDED:
+        if bands and name not in UNBANDED and (smoothed(trace) or y.shape[1] > 1):
             edges = band(trace.t, y)
             filled = ax.fill_between(*edges, color=colour, alpha=0.22, lw=0)
             artists.append(filled)
