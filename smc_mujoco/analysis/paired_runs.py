@@ -27,6 +27,7 @@ EPS = 1e-4  # of the start: smaller errors are not told apart, as gains have fou
 ROUNDING = 1e-9  # in SI units: smaller metrics count as 0 where results are compared
 # a name used like a metric's: whether a run settles before its last part, see `settles_in_time`
 SETTLES = "settles"
+SETTLED = "settled runs (%)"  # what tables and figures call it
 OBJECTIVE = "objective"  # a name used like a metric's: J on instances that no search has seen
 UNITS = {metric.name: metric.unit for metric in metrics()}  # of what boards compare
 UNITS |= {SETTLES: "", OBJECTIVE: "s^2"}

@@ -5,6 +5,7 @@ All text but `Html` is escaped.
 
 import base64
 import html
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -120,7 +121,8 @@ def picture(draw: Callable[[Path, str | None], object], about: str) -> Html:
       about: what it shows, for those who do not see it.
     """
     sources = []
-    with scratch() as folder:
+    with scratch() as folder, warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "size=.* makes the figure")  # a phone's page scrolls
         for size in ("ieee-column", None):
             draw(folder / "picture.svg", size)
             data = base64.b64encode((folder / "picture.svg").read_bytes()).decode()

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure, SubFigure
 from smc_mujoco.analysis.bootstrap import MIN_INTERVAL_SAMPLES, Interval, median_of, share_interval
 from smc_mujoco.analysis.paired_runs import (
     GROUPS,
+    SETTLED,
     SETTLES,
     RunColumns,
     by_row,
@@ -25,7 +26,7 @@ from smc_mujoco.analysis.paired_runs import (
 )
 from smc_mujoco.analysis.ranking import linked
 from smc_mujoco.common.aliases import AnyPath, Array, Fields
-from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
+from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown, warn_once
 from smc_mujoco.common.text import number
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
@@ -68,7 +69,7 @@ def plot(
 
     Args:
       table: a study's runs, as `smc.Table.read` returns them.
-      metrics: names of metrics, or "settles" for the share of runs that settle.
+      metrics: names of metrics, or "settles" for the settled runs in %.
       path, title, size, format, fig: as in `figure`.
       winners: (metric, plant, condition, law) of dots that get a ring; `compare`'s plot has those
         of its verdicts.
@@ -94,7 +95,16 @@ def plot(
         tall = WORDS_HEIGHT + LINE_HEIGHT * dots.lines
         heights = np.repeat(tall, len(dots.metrics) // across)
         space = pages.head_height(width, key) + style.points(0.6)
-        page = pages.blank(width, height or space + style.points(heights.sum()), fig)
+        usual = space + style.points(heights.sum())
+        if isinstance(size, str) and height is None and usual > pages.MAX_HEIGHT:
+            cure = "fewer plants or conditions"
+            if across == 1:
+                cure = 'size="ieee-page", or fewer metrics, plants or conditions'
+            warn_once(
+                f'size="{size}" makes the figure {usual:.1f} in high, and a journal\'s page holds '
+                f"{pages.MAX_HEIGHT:g} in: take {cure}"
+            )
+        page = pages.blank(width, height or usual, fig)
         axes = page.subplots(len(heights), across, squeeze=False, height_ratios=heights.tolist())
         by_plant = axes.reshape(len(dots.conditions), -1)
         for plant, high, row in zip(dots.conditions, tall, by_plant, strict=True):
@@ -197,7 +207,7 @@ def _finite(intervals: Iterable[Interval]) -> Array:
 
 def _differs_much(intervals: Mapping[Cell, Interval], metric: str) -> bool:
     """Return whether the values of a metric differ so much on one plant that its axis is
-    logarithmic; that of the share of runs that settle never is.
+    logarithmic; that of the settled runs never is.
     """
     if metric == SETTLES:
         return False
@@ -271,8 +281,8 @@ def _shade(ax: Axes, floors: Sequence[float], height: int) -> None:
 
 
 def _intervals(table: RunColumns, metrics: Sequence[str]) -> dict[Cell, Interval]:
-    """Return (metric, plant, condition, law) -> the median, or the share of runs that settle, with
-    its interval.
+    """Return (metric, plant, condition, law) -> the median, or the settled runs in %, with its
+    interval.
     """
     of_metric = {metric: by_row(table, metric) for metric in metrics}
     intervals = {}
@@ -283,13 +293,14 @@ def _intervals(table: RunColumns, metrics: Sequence[str]) -> dict[Cell, Interval
                 units = linked(*scores.sets[law])
                 interval = median_of(of_law, units)
                 if metric == SETTLES:
-                    share = float((of_law == 0.0).mean())
-                    interval = share_interval(share, interval.n)
+                    settled = float((of_law == 0.0).mean())
+                    share = share_interval(settled, interval.n)
+                    median, low, high = (100.0 * np.array(share[:3])).tolist()
                 else:
                     sizes = np.array(interval[:3])
                     sizes[(sizes > 0.0) & (sizes < MIN_SIZE)] = MIN_SIZE
                     median, low, high = sizes.tolist()
-                    interval = Interval(median, low, high, interval.n)
+                interval = Interval(median, low, high, interval.n)
                 intervals[metric, *group.blocks[0], law] = interval
     return intervals
 
@@ -394,9 +405,7 @@ def _label(metric: str, x: str, u: str) -> str:
     """Return the label of a panel with the metric's unit where positions are in x and commands in
     u, on two lines.
     """
-    if metric == SETTLES:
-        return "share of runs\nthat settle"
-    heading = CATALOGUE[metric].heading(x, u)
+    heading = SETTLED if metric == SETTLES else CATALOGUE[metric].heading(x, u)
     words, bracket, unit = heading.partition(" (")
     folded = bracket.replace(" ", "\n")
     squared = unit.replace("^2", "²")

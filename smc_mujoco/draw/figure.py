@@ -16,7 +16,7 @@ from smc_mujoco.control.source import by_words
 from smc_mujoco.draw import dark, horizon, lanes, quantities, style
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
-from smc_mujoco.draw.decimate import end, finite
+from smc_mujoco.draw.decimate import end, finite, window
 from smc_mujoco.draw.page import Handle, Size
 from smc_mujoco.draw.panels import Panel
 from smc_mujoco.mechanisms.layout import channel_names
@@ -39,7 +39,6 @@ SIDE_PANELS = {"phase": 1.5, "settling": 1.0, "end": 1.0}  # panel -> its relati
 PANEL_NAMES = {name: name for name in (*TIME_PANELS, "channels", *SIDE_PANELS)}
 BLOCK_WIDTHS = (1.4, 1.0, 1.0)  # relative: of panels over time, of single controls, of those beside
 ROW_HEIGHT = 1.5  # inches on a full page, height of a panel over time
-MAX_COLUMN = 9.0  # inches, of a figure in a journal's column, which is 9.25 high
 MAX_WORST = 3  # channels of a robot that are drawn, those with the largest errors
 LINE_ROW, LINES_ROW = 0.37, 0.45  # relative height of a row with one line, and with several
 END_TIME = "time before the end (ms)"
@@ -118,9 +117,9 @@ def figure(
         "contact", "s", "channels" (e and u of the channels with the largest errors, three at most),
         "phase", "settling" (|x - r|), "end" (close-up of u). Default: those that suit the plant and
         the size.
-      size: "ieee-column" (3.5 in wide, without the key of lines and bands, which is for its
-        caption), "ieee-page" (7.16 in), "slide" (13.3 x 7.5 in, three panels, large letters), or
-        (width, height) in inches. Default: 8.8 in wide.
+      size: "ieee-column" (3.5 in wide, with a note in place of the key of lines and bands, which
+        is for its caption), "ieee-page" (7.16 in), "slide" (13.3 x 7.5 in, three panels, large
+        letters), or (width, height) in inches. Default: 8.8 in wide.
       format: "svg", "png" or "pdf", of the file.
       fig: Figure or SubFigure to draw into; default: a new one.
       ax: axes to draw one panel into, by default "x", in your own style; `ax.legend()` then names
@@ -193,6 +192,7 @@ def _composed_page(
     heights = blocks.heights
     rows_of_all = sum(map(len, heights))
     tall = height or _usual_height(width, space, rows, rows_of_all)
+    noted = narrow and tall < pages.MAX_HEIGHT  # a full column has no room
     page = pages.blank(width, tall, fig)
     inches = page.bbox.height / page.dpi
     free = 72 * (inches - space - 0.4)  # points
@@ -203,7 +203,7 @@ def _composed_page(
         room = (pitch * np.array(heights[k])).tolist()
         words = drawing.titles(panels, room)
         titled = list(zip(panels, words, strict=True))
-        _draw_over_time(page, cells[k], titled, runs, k == 0)
+        _draw_over_time(page, cells[k], titled, runs, k == 0, noted)
     _draw_beside(page, cells[2], blocks.beside, blocks.places, runs)
     head = style.titled(title, runs.head)
     pages.set_head(page, width, head, handles, gains)
@@ -250,7 +250,8 @@ def _blocks(runs: DrawnRuns, chosen: Sequence[str]) -> Blocks:
     """Return the chosen panels of traces."""
     early = []
     for trace in runs.traces:
-        shortened = horizon.until(trace, runs.span[0])
+        beyond = 0.5 * window(trace) * trace.scenario.control_period  # means reach over the edge
+        shortened = horizon.until(trace, runs.span[0] + beyond)
         early.append(shortened)
     left: list[Panel] = []
     right: list[Panel] = []
@@ -301,7 +302,7 @@ def _usual_height(width: float, space: float, rows: float, panels: int) -> float
     tall = space + row * rows + 0.5
     if width < pages.NARROW:
         wanted = space + row * panels + 0.5
-        return min(tall, max(MAX_COLUMN, wanted))
+        return min(tall, max(pages.MAX_HEIGHT, wanted))
     return max(0.5625 * width, tall)
 
 
@@ -381,10 +382,12 @@ def _draw_over_time(
     overview: Sequence[tuple[Panel, str]],
     runs: DrawnRuns,
     named: bool,
+    noted: bool,
 ) -> None:
     """Draw panels over time with their labels in the cells of a column.
 
-    If `named`, changes are named above the first.
+    If `named`, changes are named above the first. If `noted`, a note above the first u tells its
+    line and band, unless changes are named there.
     """
     frames: list[Axes] = []
     axes: list[Axes] = []
@@ -392,6 +395,10 @@ def _draw_over_time(
         above = axes[0] if axes else None
         frame, rows = _rows(page, cell, panel, runs, above)
         frame.set_ylabel(words)
+        if noted and panel.quantity == "u" and (axes or not runs.marks):
+            noted = False
+            if drawing.mean_window(panel.traces):
+                drawing.note(frame, "band: range; line: mean where it chatters")
         frames.append(frame)
         for ax, part, colours in rows:
             axes.append(ax)
@@ -567,7 +574,7 @@ def _draw_side(ax: Axes, name: str, place: Panel, runs: DrawnRuns) -> None:
         panel = place._replace(quantity="settling")
         drawing.over_time(ax, panel, runs.colours, names=runs.names)
         width = 1e3 * quantities.peak_window(panel.traces)
-        words = f"time (s)\nthe largest in the last {width:.3g} ms"
+        words = f"time (s)\nlargest over the preceding {width:.3g} ms"
         ax.set(xlabel=words, ylabel=panel.label, xlim=(0.0, runs.span[1]))
 
 

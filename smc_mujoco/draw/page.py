@@ -43,6 +43,7 @@ NAMED = {
     "ieee-page": (7.16, None),
     "slide": (style.SLIDE_WIDTH, 7.5),
 }  # inches
+MAX_HEIGHT = 9.0  # inches, of a figure in a journal, whose columns are 9.25 high
 SIDE_RANGE = (2.0, 100.0)  # inches, shortest and longest
 NARROW = 6.0  # inches: narrower pages have one column of panels
 TEXT_SIZE = 11.0  # points on a full page

@@ -12,6 +12,7 @@ from smc_mujoco.analysis.bootstrap import LEVEL, MIN_INTERVAL_SAMPLES, Interval
 from smc_mujoco.analysis.paired_runs import (
     MIN_COMMAND_SHARE,
     OBJECTIVE,
+    SETTLED,
     SETTLES,
     without_floor,
 )
@@ -604,7 +605,7 @@ def spread(interval: Interval, low: str, high: str) -> str:
 def heading(board: Board) -> str:
     """Return a metric's label with its unit, if that is known."""
     if board.metric == SETTLES:
-        return "settled runs (%)"
+        return SETTLED
     if board.metric == OBJECTIVE:
         return "J (s^2)"
     return _in_unit(board).heading(board.x)

@@ -280,8 +280,8 @@ class Compared(Tables):
 
         Args:
           path, options: path, title, size, format and fig of `smc.figure`.
-          metrics: names of metrics. Default: those compared, the first five, or three on a page
-            narrower than 6 in; a ScenarioWarning names the others.
+          metrics: names of metrics. Default: five of those compared, or three on a page narrower
+            than 6 in, first those in which a law wins; a ScenarioWarning names the others.
         """
         from smc_mujoco.draw import dot_plot, page
 
@@ -289,8 +289,10 @@ class Compared(Tables):
         if not names:
             width, _ = page.measure(options.get("size"), options.get("fig"))
             most = 3 if width < page.NARROW else 5
-            names = self._metrics[:most]
-            if others := self._metrics[most:]:
+            won = {cell[0] for cell in self.leaderboard.winners}
+            first = sorted(self._metrics, key=lambda name: name not in won)[:most]
+            names = [name for name in self._metrics if name in first]
+            if others := [name for name in self._metrics if name not in first]:
                 warn_once(f"plot leaves out {joined(others)}: draw the rest with metrics={others}")
         return dot_plot.plot(self.table, path, names, winners=self.leaderboard.winners, **options)
 

@@ -6,6 +6,7 @@ import dataclasses
 import itertools
 import json
 import re
+import warnings
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -317,11 +318,26 @@ def test_panels_over_time_end_where_all_rest_and_never_before_something_happens(
     assert settling.get_xlim()[1] == pytest.approx(whole)
 
 
+@pytest.mark.parametrize("size", [PAGE, COLUMN])
+def test_a_column_tells_of_its_band_and_mean_above_the_first_control_that_chatters(size, one):
+    def notes(trace):
+        page = figure([trace], size=size, panels=["x", "u", "s"])
+        return [ax.get_title(loc="right") for ax in page.axes]
+
+    words = "band: range; line: mean where it chatters" if size == COLUMN else ""
+    assert notes(one) == ["", words, ""]
+    assert notes(calm(one)) == ["", "", ""]
+    jump = dataclasses.replace(one.scenario, jump=smc.Jump(0.5, {"mass": 2.0}))
+    page = figure([dataclasses.replace(one, scenario=jump)], size=size, panels=["u"])
+    assert page.axes[0].get_title(loc="right") == ""  # where the change is named
+
+
 def test_the_error_is_the_largest_within_its_window_on_a_logarithmic_axis(one):
     ax = figure([one], panels=["settling"]).axes[0]
     assert ax.get_yscale() == "log"
     t, y = curves(ax)[0].get_data()
     width = quantities.peak_window([one])
+    assert ax.get_xlabel() == f"time (s)\nlargest over the preceding {1e3 * width:.3g} ms"
     e = np.abs(one.x - one.r)[:, 0]
     for time, value in zip(t[::17], y[::17], strict=True):
         ago = time - one.t
@@ -408,6 +424,7 @@ class Rows:
         COLUMN,
     ],
 )
+@pytest.mark.filterwarnings("ignore:size=.* makes the figure")
 def test_a_board_has_a_dot_and_an_interval_for_each_law_and_condition(size, monkeypatch):
     page = smc.plot(
         Rows(),
@@ -430,6 +447,20 @@ def test_a_board_has_a_dot_and_an_interval_for_each_law_and_condition(size, monk
     assert grid.ncols == (1 if size == COLUMN else 3)
     with pytest.raises(smc.ScenarioError, match="unknown metric 'itaee': did you mean 'itae'"):
         smc.plot(Rows(), metrics=["itaee"])
+
+
+def test_a_board_that_is_higher_than_a_page_warns_with_a_cure():
+    words = (
+        r'size="ieee-column" makes the figure 11\.8 in high, and a journal\'s page holds 9 in: '
+        r'take size="ieee-page", or fewer metrics, plants or conditions'
+    )
+    with pytest.warns(smc.errors.ScenarioWarning, match=words):
+        page = smc.plot(Rows(), size=COLUMN)
+    assert page.get_figheight() == pytest.approx(11.8, abs=0.05)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert smc.plot(Rows(), size=COLUMN, metrics=["itae"]).get_figheight() < 9.0
+        assert smc.plot(Rows(), size=PAGE).get_figheight() < 9.0
 
 
 @pytest.mark.parametrize("size", [None, COLUMN])
@@ -470,7 +501,8 @@ def test_marks_of_a_board_are_medians_by_law_from_above_and_a_law_that_never_set
     assert (fills == {style.PAPER.lower()}) == (size is not None)
     dots = [dot for dot in settles.lines if dot.get_marker() in ("o", "s", "D")]
     shares = {float(np.array(dot.get_xdata())[0]) for dot in dots}
-    assert shares == {0.0 if size else 1.0}
+    assert shares == {0.0 if size else 100.0}
+    assert settles.get_xlabel() == "settled runs\n(%)"  # as in the tables
 
 
 def test_the_ticks_of_a_board_are_apart_in_a_column():

@@ -146,6 +146,20 @@ def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
     assert len(found.traces) == 12
 
 
+@pytest.mark.filterwarnings("ignore:size=.* makes the figure")
+def test_a_plot_that_has_no_room_for_all_metrics_keeps_those_in_which_a_law_wins(
+    found, monkeypatch
+):
+    wins = [("tv_rate", "duffing", "encoder", "pid")]
+    monkeypatch.setattr(type(found.leaderboard), "winners", wins)
+    with pytest.warns(
+        smc.errors.ScenarioWarning, match="plot leaves out ultimate_bound and itae: "
+    ):
+        page = found.plot(size="ieee-column")
+    names = [ax.get_xlabel().partition("\n")[0] for ax in page.axes[:3]]
+    assert names == ["settled runs", "settling time", "TV rate"]
+
+
 def test_its_page_has_every_median_and_verdict_and_needs_no_other_file(found, tmp_path):
     file = found.to_html(tmp_path / "page.html")
     text = file.read_text(encoding="utf-8")
