@@ -1,5 +1,6 @@
 """Figures: x, u and s of several runs over time with their phase portrait."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -101,11 +102,12 @@ def figure(
 
     x, u and s are drawn until all comes to rest, |x - r| over the whole run on a logarithmic axis.
     Each run of a network has a row with a line for each channel, and there is the spread max x -
-    min x. Of several joints there are e and u of those with the largest errors. Joints without an
-    actuator, and channels in another unit, have their own panels. Realistic mechanisms have panels
-    of the actuator's force and of the reaction of friction and contacts, arms of their tip. The end
-    of a failed run and the instant at which a plant changes are marked. Words say which curves
-    agree, and so hide each other. The figure's `get_label()` and its files say what lines mean.
+    min x. Several runs of a free body have such rows of u. Of several joints there are e and u of
+    those with the largest errors. Joints without an actuator, and channels in another unit, have
+    their own panels. Realistic mechanisms have panels of the actuator's force and of the reaction
+    of friction and contacts, arms of their tip. The end of a failed run and the instant at which a
+    plant changes are marked. Words say which curves agree, and so hide each other. The figure's
+    `get_label()` and its files say what lines mean.
 
     Args:
       traces: one or several traces.
@@ -172,7 +174,7 @@ def _composed_page(
     width, height = size
     blocks = _blocks(runs, chosen)
     handles, gains = pages.run_handles(runs.traces, runs.names, runs.colours)
-    key = _key([*blocks.left, *blocks.right])
+    key = _key([*blocks.left, *blocks.right], runs.events)
     if blocks.left_out:
         entry = pages.entry(blocks.left_out, lw=0)
         key.append(entry)
@@ -230,7 +232,7 @@ class Blocks(NamedTuple):
             high = SIDE_PANELS[name]
             if name == "end":
                 controls = self.places[0]._replace(quantity="u")
-                if lanes.in_lanes(controls):
+                if lanes.end_in_lanes(controls):
                     high = max(high, LINE_ROW * len(controls.traces))
             beside.append(high)
         left = list(map(_height, self.left))
@@ -307,9 +309,13 @@ def _usual_height(width: float, space: float, rows: float, panels: int) -> float
 
 
 def _controls(errors: Sequence[Panel], traces: Sequence[Trace]) -> list[Panel]:
-    """Return the panels of u of the channels of these errors; of a free body, of its actuators."""
+    """Return the panels of u of the channels of these errors; of a free body, of its actuators, of
+    several runs all in one.
+    """
     if traces[0].scenario.plant.pose:
-        return drawing.actuators(traces)
+        panels = drawing.actuators(traces)
+        several = len(traces) > 1 and len(panels) > 1
+        return drawing.together(panels) if several else panels
     controls = []
     for error in errors:
         if error.group.driven:
@@ -536,7 +542,7 @@ def _draw_beside(
     for cell, name in zip(cells, column, strict=True):
         place = next(portraits) if name == "phase" else places[0]
         controls = place._replace(quantity="u")
-        if name == "end" and lanes.in_lanes(controls):
+        if name == "end" and lanes.end_in_lanes(controls):
             _draw_ends(page, cell, controls, runs)
         else:
             _draw_side(page.add_subplot(cell), name, place, runs)
@@ -578,8 +584,8 @@ def _draw_side(ax: Axes, name: str, place: Panel, runs: DrawnRuns) -> None:
         ax.set(xlabel=words, ylabel=panel.label, xlim=(0.0, runs.span[1]))
 
 
-def _key(shown: Sequence[Panel]) -> list[Handle]:
-    """Return a legend's entries for the reference, and for lines and bands."""
+def _key(shown: Sequence[Panel], events: Sequence[style.Event]) -> list[Handle]:
+    """Return a legend's entries for the reference, for lines and bands, and for what happens."""
     handles: list[Handle] = []
     thin = style.points(drawing.LIGHT_LINE)
     for panel in shown:
@@ -600,4 +606,8 @@ def _key(shown: Sequence[Panel]) -> list[Handle]:
             handles.append(pages.entry(label, lw=width))
         else:
             handles.append(pages.entry(label, lw=thin))
+    if events:
+        kinds = dict.fromkeys("blow" if math.isfinite(e.stop) else "change" for e in events)
+        label = f"dots: {' or '.join(kinds)}"
+        handles.append(pages.entry(label, style.INK, lw=thin, ls=drawing.DOTS))
     return handles

@@ -7,11 +7,19 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from smc_mujoco.common.aliases import Fields
+from smc_mujoco.common.aliases import Array, Fields
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import band
 from smc_mujoco.draw.horizon import settles_at
-from smc_mujoco.draw.panels import SINGLE, Panel, mark, over_time, smoothed
+from smc_mujoco.draw.panels import (
+    MIN_CLOSE_UP,
+    SINGLE,
+    Panel,
+    close_up_begin,
+    mark,
+    over_time,
+    smoothed,
+)
 from smc_mujoco.draw.quantities import MARGIN, PEAKS, limits, span, usual
 from smc_mujoco.simulation.trace import Trace
 
@@ -101,12 +109,32 @@ def in_lanes(panel: Panel) -> bool:
         return False
     ends = limits(panel.traces, "u")
     least = MIN_WIDE_BAND * np.ptp(ends)
-    switches = []
-    for trace in panel.traces:
-        steps = np.diff(trace.u, axis=0)
-        changes = np.abs(steps)
-        switches.append(np.sum(changes > least))
-    return max(switches) > MAX_SWITCHES or crowded(panel, 0)
+    return switches_often([trace.u for trace in panel.traces], least) or crowded(panel, 0)
+
+
+def end_in_lanes(panel: Panel) -> bool:
+    """Return whether each run's u has its own row in a close-up of its end, where smaller switching
+    hides the others, too.
+    """
+    if in_lanes(panel):
+        return True
+    begin = close_up_begin(panel.traces)
+    parts = [trace.u[trace.t >= begin - 1e-9, :1] for trace in panel.traces]
+    ends = np.concatenate(parts)
+    if len(parts) < 2 or not len(ends):
+        return False
+    largest = max(map(abs, span(panel.traces, "u")))
+    height = max(float(np.ptp(ends)), MIN_CLOSE_UP * largest)
+    return switches_often(parts, MIN_WIDE_BAND * height)
+
+
+def switches_often(controls: Sequence[Array], least: float) -> bool:
+    """Return whether one of several u (K+1, n) has over MAX_SWITCHES steps larger than `least`."""
+    counts = []
+    for u in controls:
+        steps = np.diff(u, axis=0)
+        counts.append(np.sum(np.abs(steps) > least))
+    return max(counts) > MAX_SWITCHES
 
 
 def cut_peak(ax: Axes, panel: Panel) -> None:

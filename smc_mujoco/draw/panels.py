@@ -75,6 +75,7 @@ UNBANDED = ("x", "e", *SINGLE)  # drawn sample by sample, without a mean over ti
 NO_SURFACE = ("baseline", "predictive", "feedback", "linear")  # families of laws without an s
 BETWEEN_DECADES = ((3.0,), (2.0, 5.0), (2.0, 3.0, 4.0, 5.0, 6.0, 8.0))
 DASHES = (0, (4, 4))  # of a reference's line
+DOTS = (0, (2, 2))  # of the upright line at which something happens
 REFERENCE = "reference"  # id of a reference's lines
 
 
@@ -278,6 +279,17 @@ def actuators(traces: Sequence[Trace]) -> list[Panel]:
     return panels
 
 
+def together(panels: Sequence[Panel]) -> list[Panel]:
+    """Return one panel of u that has the channels of all these panels, which share their runs."""
+    runs = []
+    for traces in zip(*(panel.traces for panel in panels), strict=True):
+        u = np.hstack([trace.u for trace in traces])
+        runs.append(dataclasses.replace(traces[0], u=u))
+    channels = tuple(panel.group.channels[0] for panel in panels)
+    group = dataclasses.replace(panels[0].group, channels=channels)
+    return [Panel("u", group, runs)]
+
+
 def strip(traces: Sequence[Trace]) -> list[Panel]:
     """Return the two panels below a film: the motion of the first two groups of channels, or of one
     group with its u; of arms the tip's, with the force of its contact or the largest u.
@@ -322,11 +334,14 @@ def meaning(panels: Sequence[Panel]) -> dict[str, str]:
     words.
     """
     n = 1
+    kind = "channels"
     banded = []
     over = 0.0
     for panel in panels:
-        if panel.quantity not in SINGLE:
+        if panel.quantity not in SINGLE and parted(panel):
             n = max(n, len(panel.group.channels))
+            if panel.traces[0].scenario.plant.pose and panel.quantity == "u":
+                kind = "actuators"
         if panel.quantity not in (*UNBANDED, *banded):
             banded.append(panel.quantity)
         if panel.quantity == "u":
@@ -338,10 +353,16 @@ def meaning(panels: Sequence[Panel]) -> dict[str, str]:
         words["line"] = f"mean over up to {1e3 * over:.3g} ms where it chatters"
     if n > 1:
         shown = min(n, MAX_DRAWN_CHANNELS)
-        words["thin lines"] = f"the {n} channels" if shown == n else f"{shown} of {n} channels"
+        words["thin lines"] = f"the {n} {kind}" if shown == n else f"{shown} of {n} {kind}"
         if any(panel.quantity == "x" for panel in panels):
             words["thin lines"] += ", the slowest thick"
     return words
+
+
+def parted(panel: Panel) -> bool:
+    """Return whether the channels of a panel's runs ever differ."""
+    spreads = [np.ptp(QUANTITIES[panel.quantity](trace), axis=1) for trace in panel.traces]
+    return any(np.nan_to_num(spread).any() for spread in spreads)
 
 
 def titles(panels: Sequence[Panel], heights: Sequence[float]) -> list[str]:
@@ -588,8 +609,7 @@ def mark(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
     room = ax.get_window_extent().width * 72 / ax.figure.dpi  # points
     ends: list[float] = []  # of the words in each row above the axes, in points
     for time, change in sorted(changes.items()):
-        dashes = (0, (2, 2))
-        ax.axvline(time, color=style.INK, lw=style.points(0.9), ls=dashes, zorder=1.5)
+        ax.axvline(time, color=style.INK, lw=style.points(0.9), ls=DOTS, zorder=1.5)
         if not named:
             continue
         words = style.cropped(change, room, size)
@@ -643,9 +663,8 @@ def last_samples(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
     run.
     """
     stop = end(panel.traces)
+    begin = close_up_begin(panel.traces)
     set_numbers(ax.yaxis, panel)
-    shown = LAST_SAMPLES * panel.traces[0].scenario.control_period
-    begin = max(0.0, stop - shown)
     ends = []
     looks = style.looks(panel.traces)
     rows = zip(panel.traces, colours, looks, strict=True)
@@ -672,10 +691,17 @@ def last_samples(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
     ax.set_xlim(1e3 * (begin - stop), 0.0)
 
 
-def dot(ax: Axes, colour: str) -> Line2D:
-    """Add to axes the dot of a run."""
-    look: Fields = {"mec": style.PAPER, "mew": style.points(0.6), "ms": style.points(5.0)}
-    (found,) = ax.plot([], [], "o", color=colour, zorder=6, clip_on=False, animated=True, **look)
+def close_up_begin(traces: Sequence[Trace]) -> float:
+    """Return the time, s, from which a close-up shows the last samples of the longest run."""
+    shown = LAST_SAMPLES * traces[0].scenario.control_period
+    return max(0.0, end(traces) - shown)
+
+
+def dot(ax: Axes, colour: str, look: Data) -> Line2D:
+    """Add to axes the dot of a run, or the mark of its line's look."""
+    mark = look.get("marker", "o")
+    rim: Fields = {"mec": style.PAPER, "mew": style.points(0.6), "ms": style.points(5.0)}
+    (found,) = ax.plot([], [], mark, color=colour, zorder=6, clip_on=False, animated=True, **rim)
     return found
 
 

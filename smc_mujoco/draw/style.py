@@ -70,6 +70,7 @@ MAX_VALUES = 8  # numbers of a label
 MAX_LETTERS = 50  # of what a label says of one field; chosen
 MIN_DISTANCE = 15.0  # colours closer than this are mistaken for each other, see `distance`; chosen
 LIGHTEST = 61.0  # lightness in CIELAB: up to it lines have a contrast of 3 : 1 to paper
+LIGHTEST_RUN = 54.0  # of a law's runs: three are apart from each other and from failed ones
 DARKEST = 21.0  # of a ramp
 RAMP_ON_DARK = (90.0, 56.0)  # its ends on a dark page, to which all of it has a contrast of 4.5 : 1
 # linear sRGB -> as it looks with all cones, no red, no green, no blue ones (Machado et al.)
@@ -204,8 +205,17 @@ def law_colour(law: Component | str) -> str:
 
 
 def trace_colours(traces: Sequence[Trace]) -> list[str]:
-    """Return one colour per trace, that of its law."""
-    return law_colours([trace.scenario.law for trace in traces])
+    """Return one colour per trace, that of its law; of a law's several runs shades of it, from
+    light to dark.
+    """
+    colours = law_colours([trace.scenario.law for trace in traces])
+    found = []
+    for i, colour in enumerate(colours):
+        shades = [colour]
+        if colours.count(colour) > 1:
+            shades = ramp(colour, colours.count(colour), LIGHTEST_RUN)
+        found.append(shades[colours[:i].count(colour)])
+    return found
 
 
 def law_colours(laws: Sequence[Component | str]) -> list[str]:
@@ -215,7 +225,7 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
     mistaken for a law that is before it in the palette, wherever they stand, gets the colour
     farthest from all: any 12 laws are then 13.7 apart, 24 are 9.6. Laws that are not of the
     library, whose colours say nothing, come after them. A law that runs several times has one
-    colour, and lines and marks tell its runs apart, see `looks`.
+    colour here.
     """
     names = [_template(law)[1] for law in laws]
     everyone = range(len(laws))

@@ -570,10 +570,32 @@ def test_a_free_body_has_the_errors_that_count_and_the_forces_of_its_actuators()
     assert [panel.label for panel in shown] == [f"actuator {i} u (N)" for i in (1, 2, 3, 4)]
     for i, panel in enumerate(shown):
         np.testing.assert_array_equal(panel.traces[0].u, traces[0].applied[:, i : i + 1])
-    drawn = " ".join(ax.get_ylabel() for ax in figure(traces).axes)
+    drawn = " ".join(ax.get_ylabel() for ax in figure(traces[0]).axes)
     assert sorted(map("".join, re.findall(r"actuator (\d)|\bu (\d)", drawn))) == [
         "1",
         "2",
         "3",
         "4",
     ]
+    page = figure(traces)
+    (together,) = [ax for ax in page.axes if ax.get_ylabel() == "control u (N)"]
+    for row, trace in zip(together.child_axes, traces, strict=True):
+        assert [len(line.get_ydata()) for line in row.lines] == [len(trace.t)] * 4
+        for i, line in enumerate(row.lines):
+            np.testing.assert_array_equal(line.get_ydata(), trace.applied[:, i])
+    off = [dataclasses.replace(trace, applied=0.0 * trace.applied) for trace in traces]
+    assert not [ax for ax in figure(off).axes if " u " in ax.get_ylabel()]
+    assert "thin lines: the 4 actuators" in str(page.get_label())
+
+
+def test_the_key_names_single_channels_only_where_they_differ():
+    alike = arm()
+    d = np.zeros_like(alike[0].d)
+    d[20:40] = 5.0
+    alike = [dataclasses.replace(trace, d=d) for trace in alike]
+    assert d.shape[1] > 1
+    assert "thin lines" not in str(figure(alike).get_label())
+    d = d.copy()
+    d[20:40, 1] = 4.0
+    apart = [dataclasses.replace(trace, d=d) for trace in alike]
+    assert "thin lines: the" in str(figure(apart).get_label())

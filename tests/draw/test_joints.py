@@ -40,6 +40,7 @@ def test_a_blow_and_a_payload_are_marked_and_named(trace):
     shown = page.axes[:4]
     assert shown[3].get_ylabel().startswith("tip off its path")
     assert [text.get_text() for ax in shown for text in ax.texts] == ["blow of 50 N for 20 ms"]
+    assert page.get_label().endswith("dots: blow")
     for ax in shown:
         assert [0.1, 0.1] in [list(line.get_xdata()) for line in ax.lines]
     push = smc.signals.Push(

@@ -1,5 +1,6 @@
 """The colours of laws are told apart, by every eye: measured, not looked at."""
 
+import colorsys
 import dataclasses
 import itertools
 import random
@@ -95,14 +96,21 @@ def test_a_users_laws_take_other_colours_than_the_librarys_which_keep_theirs():
     assert least(style.law_colours(mine[:8])) > style.MIN_DISTANCE
 
 
-def test_runs_of_one_law_have_its_colour_and_lines_and_marks_tell_them_apart_as_all_runs():
+def test_runs_of_one_law_have_shades_of_its_colour_and_lines_and_marks_tell_them_apart():
     """Friction of 0, 0.005 and 0.02 was magenta, brown and green, then five reds."""
     runs = []
     for law in ("classical", "pid", "classical", "adaptive", "classical"):
         runs.append(made(smc.Scenario(plant="duffing", law=at_defaults(law), duration=0.1)))
     colours = style.trace_colours(runs)
-    assert colours[0] == colours[2] == colours[4] == style.law_colour("classical")
-    assert len(set(colours)) == 3
+    assert colours[1] == style.law_colour("pid")
+    assert colours[3] == style.law_colour("adaptive")
+    shades = colours[::2]
+    hues = [colorsys.rgb_to_hls(*style.rgb(shade))[0] for shade in shades]
+    (own, *_) = colorsys.rgb_to_hls(*style.rgb(style.law_colour("classical")))
+    assert hues == pytest.approx([own] * 3, abs=0.01)
+    light = [style.luminance(shade) for shade in shades]
+    assert light == sorted(light, reverse=True)
+    assert least([*shades, style.FAILED]) > style.MIN_DISTANCE
     looks = style.looks(runs)
     assert len({str(look["ls"]) for look in looks}) == len(runs)
     marks = [look.get("marker") for look in looks]

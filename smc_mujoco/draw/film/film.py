@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, overload
 
 import numpy as np
+from matplotlib import rc_context
 from PIL import Image
 
 from smc_mujoco.common import errors, extras, gl
@@ -296,7 +297,8 @@ def _checked_size(size: Iterable[int]) -> tuple[int, int]:
 
 def pictures(frames: Frames) -> Generator[Array]:
     """Yield the pictures of a film at the times of its clock, each (height, width, 3) uint8."""
-    runs = DrawnRuns.of(frames.traces, frames.labels)
+    with rc_context({"axes.facecolor": style.PAPER}):  # whatever the caller's page
+        runs = DrawnRuns.of(frames.traces, frames.labels)
     size = _checked_size(frames.size)
     if len(runs.traces) > MAX_MACHINES:
         raise ScenarioError(f"{len(runs.traces)} machines in one film: show at most {MAX_MACHINES}")

@@ -77,7 +77,7 @@ def draw_map(
         ax.plot(*(factor * trace.r[:, axes].T), **goal)
         wide = {"color": colour, "lw": style.points(PAST_LINE), "animated": True}
         (past,) = ax.plot([], [], **wide)
-        dot = panels.dot(ax, colour)
+        dot = panels.dot(ax, colour, look)
         flight = Flight(past, dot, trace.t, places)
         flights.append(flight)
     return artists, flights

@@ -57,6 +57,12 @@ def test_labels_stay_below_their_tiles_on_as_many_lines_as_were_measured(wide):
 def test_runs_of_one_law_have_their_marks_and_ticks_stay_on_the_page():
     page = sheet([machine("duffing"), machine("duffing", input_delay=0.01)])
     assert [line.get_marker() for line in page.page.artists] == ["o", "s"]
+    for line, (_, _, _, foot) in zip(page.page.artists, page.tiles, strict=True):
+        middle = page.size[1] * (1.0 - line.get_ydata()[0])
+        half = 0.5 * line.get_markersize() / 72 * page.page.dpi
+        assert foot <= middle - np.sqrt(2.0) * half, "a diamond is not cut"
+    for one in page.moving:
+        assert [dot.get_marker() for dot, *_ in one.dots] == ["s", "o"]
     for one in page.moving:
         for label in one.axes.get_xticklabels():
             box = label.get_window_extent()
