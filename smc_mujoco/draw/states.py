@@ -1,11 +1,11 @@
 """States of a machine over time: whether it sticks, hits or touches something, and where it lies in
 its backlash.
 
-A state is shown for MIN_STATE_TIME of the film at least, whatever its speed: a blow of 5 ms fades
-over that time, and rest is shown only if it lasts so long. `metrics.conventions.at_rest` defines
-rest, and `metrics.touching` contact. The flank of a backlash is the sign of the joint's reaction.
-Friction and contacts are in the reaction too: with them the flank is the sign of the actuator's
-force, which does not tell when a rotor is in play.
+A state is shown for MIN_STATE_TIME of the film at least, whatever its speed: a hit of 5 ms fades
+over that time, and so does a blow; rest is shown only if it lasts so long.
+`metrics.conventions.at_rest` defines rest, and `metrics.touching` contact. The flank of a backlash
+is the sign of the joint's reaction. Friction and contacts are in the reaction too: with them the
+flank is the sign of the actuator's force, which does not tell when a rotor is in play.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,10 +23,11 @@ from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.touching import in_contact, shapes
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.signals import Impulse
 from smc_mujoco.simulation.trace import Trace
 
 MIN_STATE_TIME = 0.15  # s of a film, chosen: nine frames at 60 fps, long enough to read a word
-HIT_TIME = 0.1  # s of the run: a contact that lasts longer is no hit; chosen
+HIT_TIME = 0.1  # s of the run: what lasts longer is no hit or blow; chosen
 SIDES = {-1: "left flank", 0: "in play", 1: "right flank", 2: "rattles"}
 
 
@@ -53,6 +54,7 @@ def timeline(
     shown = played(trace.t) if played else trace.t
     gap = backlash_gap(trace.scenario)
     hits = contacts(trace, shown)
+    struck = blows(trace, shown)
     resting = []
     for on in at_rest(trace).T:
         resting.append(~extended(~on, shown, MIN_STATE_TIME))
@@ -78,7 +80,9 @@ def timeline(
             states.append(end)
         elif hits[k]:
             states.append(hits[k])
-        elif plant.pose and (said := off_place(trace, k)):
+        elif struck[k]:
+            states.append(struck[k])
+        elif said := off_place(trace, k):
             states.append(said)
         elif words:
             colour = style.INK if sticks.any() else style.MUTED
@@ -89,9 +93,14 @@ def timeline(
 
 
 def off_place(trace: Trace, k: int) -> State | None:
-    """Return how far a free body is off its place at a sample: what pictures of a flight hide."""
-    away = 1e3 * float(np.linalg.norm(trace.x[k, :3] - trace.r[k, :3]))
-    if not away >= 1.0:
+    """Return how far a free body, or a robot with a measured base, is off its place at a sample:
+    what a camera that follows it hides. None of other machines.
+    """
+    plant = trace.scenario.plant
+    first = 0 if plant.pose else plant.base
+    place = slice(first, first + 3)
+    away = 1e3 * float(np.linalg.norm(trace.x[k, place] - trace.r[k, place]))
+    if first < 0 or not away >= 1.0:
         return None
     if away >= 1e3:  # fewer letters, in a narrow tile
         return State(f"{style.short(1e-3 * away)} m off", style.INK)
@@ -109,38 +118,56 @@ def contacts(trace: Trace, shown: Array) -> list[State | None]:
     """Return what is said of contact at each sample, whose times in the film are `shown`, s: "hit,
     280 N·m", with the largest force of the hit, which fades; "contact" of one that lasts.
     """
-    touch = in_contact(trace)
-    any_touch = touch.any(axis=1)
-    on: Array = np.asarray(any_touch)
+    words = "hit", "contact"
+    return told(trace, shown, in_contact(trace), trace.reaction, words, style.REACTION)
+
+
+def blows(trace: Trace, shown: Array) -> list[State | None]:
+    """Return what is said of impulses at each sample, as `contacts` does: "blow, 200 N·m"."""
+    struck = np.zeros(trace.d.shape, bool)
+    for signal in trace.scenario.disturbance:
+        if isinstance(signal, Impulse):
+            during = (trace.t >= signal.time - 1e-9) & (trace.t < signal.time + signal.width)
+            struck |= during[:, None] & (np.nan_to_num(trace.d) != 0.0)
+    return told(trace, shown, struck, trace.d, ("blow", ""), style.DISTURBANCE)
+
+
+def told(
+    trace: Trace, shown: Array, acts: Array, forces: Array, words: tuple[str, str], colour: str
+) -> list[State | None]:
+    """Return what is said at each sample, whose times in the film are `shown`, s, of forces,
+    (K + 1, n), while they act on channels, (K + 1, n): the first of two words with the largest
+    force, which fades, where they are brief; else the second, or nothing if that is "".
+    """
+    on: Array = np.asarray(acts.any(axis=1))
     said: list[State | None] = [None] * len(on)
     held = extended(on, shown, MIN_STATE_TIME)
     changes = np.diff(held.astype(int), prepend=0, append=0)
     edges = np.flatnonzero(changes)
     for first, stop in edges.reshape(-1, 2).tolist():
         during = np.flatnonzero(on[first:stop]) + first
-        words = "contact"
         brief = bool(trace.t[during[-1]] - trace.t[during[0]] <= HIT_TIME)
+        now = words[1]
         if brief:
-            words = f"hit, {hit_size(trace, touch, during)}"
+            now = f"{words[0]}, {largest(trace, acts[during], forces[during])}"
+        if not now:
+            continue
         last = during[0]
         for k in range(first, stop):
             last = k if on[k] else last
             passed = shown[k] - shown[last]
             fade = 1.0 - passed / MIN_STATE_TIME
             opacity = min(1.0, max(0.0, float(fade)))
-            said[k] = State(words, style.REACTION, opacity, brief)
+            said[k] = State(now, colour, opacity, brief)
     return said
 
 
-def hit_size(trace: Trace, touch: Array, during: Array) -> str:
-    """Return the largest reaction at samples of a hit, of the channels that touch, with its
-    unit.
+def largest(trace: Trace, acts: Array, forces: Array) -> str:
+    """Return the largest of forces at some samples, (m, n), of the channels on which they act, with
+    its unit.
     """
-    reaction = np.nan_to_num(trace.reaction[during])
-    reactions = np.abs(reaction)
-    sizes = reactions.max(axis=0)
-    touched = touch[during].any(axis=0)
-    sizes = np.where(touched, sizes, 0.0)
+    sizes = np.abs(np.nan_to_num(forces)).max(axis=0)
+    sizes = np.where(acts.any(axis=0), sizes, 0.0)
     channel = int(sizes.argmax())
     for group in conventions.groups(trace.scenario):
         if channel in group.channels:

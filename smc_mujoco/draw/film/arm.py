@@ -67,18 +67,21 @@ class Overlay:
         lately = (self.times >= since) & (self.times <= time)
         until = self.path[lately]
         self.trail(image, until, self.stage.track.colour, PATH_WIDTH)
+        stamped: list[arrows.Stamped] = []
         if self.forces is not None:
             size = float(np.linalg.norm(self.forces[frame]))
             if size > 0.5:
                 at = self.stage.find(self.trace.scenario.plant.tip)
                 behind = at - self.newton * self.forces[frame]
-                self.arrow(image, at, behind, size, "")
+                stamped += self.arrow(image, at, behind, size, "")
         start = self.edges[frame] - self.stage.track.holds[frame]
         for body, peak in arrows.blows(self.trace, start, time):
             size = float(np.linalg.norm(peak))
             place = self.stage.find(body) - BLOW_DISTANCE * peak / size
             tail = place - self.newton * peak
-            self.arrow(image, tail, place, size, body)
+            stamped += self.arrow(image, tail, place, size, body)
+        taken = [*self.stage.words, *arrows.boxes(stamped, self.scale)]
+        arrows.write_numbers(image, stamped, self.scale, taken)
         return np.asarray(image)
 
     def trail(
@@ -105,9 +108,12 @@ class Overlay:
         shrunk = mask.reduce(fine)
         image.paste(style.rgb(colour), (0, 0), shrunk)
 
-    def arrow(self, image: Image.Image, tail: Array, tip: Array, force: float, hits: str) -> None:
+    def arrow(
+        self, image: Image.Image, tail: Array, tip: Array, force: float, hits: str
+    ) -> list[arrows.Stamped]:
         """Draw the arrow of a force, N, between two points, (3,) m: of a contact, or of a blow that
-        `hits` a body. It is cut at the edge of the picture.
+        `hits` a body. It is cut at the edge of the picture. Returns it, or nothing if it points at
+        the camera.
         """
         ends = np.array([tail, tip])
         line = self.stage.project(ends)
@@ -124,13 +130,12 @@ class Overlay:
         colour = style.DISTURBANCE if hits else style.REACTION
         words = f"{force:.0f} N"
         shade = arrows.rgba(colour)
-        arrow = arrows.Arrow(0.0, share, shade, body=hits, words=words)
-        if np.linalg.norm(way) > 1.0:
-            points = np.linspace(line[0], line[1], 40)
-            width = SHAFT_WIDTH * self.scale
-            rim = round(arrows.RIM * self.scale)
-            arrows.stamp(image, points, width, arrow, self.scale, rim, share < 1.0)
-            arrows.write(image, arrow, points, self.scale, {})
+        arrow = arrows.Arrow(0.0, share, shade, body=hits, cut=share < 1.0, words=words)
+        if np.linalg.norm(way) <= 1.0:
+            return []
+        points = np.linspace(line[0], line[1], 40)
+        width = SHAFT_WIDTH * self.scale
+        return [arrows.stamp(image, points, width, arrow, round(arrows.RIM * self.scale))]
 
 
 def overlays(stages: Sequence[Stage]) -> list[Overlay]:

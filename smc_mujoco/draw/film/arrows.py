@@ -55,6 +55,7 @@ BENT_DISTANCE = 0.35  # to the next one
 BENT_RAISE = 0.5  # by which the middle of a bent arrow is higher than the direction to the camera
 HEAD_WIDTH = 2.25  # half the width of a head, in shafts
 HEAD_LENGTH = 2.2  # in half widths
+HEAD, CUT_HEAD = 0.7, 0.5  # longest head, of its arrow, and of one with a break mark in its shaft
 SUPERSAMPLING = 3  # pixels of a flat arrow for each of the picture, in both directions
 CHAIN_FACTOR = 1.6  # arrows of several pendulums are longer: they are seen from the side
 NETWORK_LENGTH = 0.72  # of the way between the outer pivots of a network, of its one arrow
@@ -68,14 +69,14 @@ BLOW_DISTANCE = 1.1  # of an arrow, from the foot of that of a blow to the middl
 MAX_BLOW = 3.0  # of the longest arrow: a stronger blow's is no longer
 COMMAND_OPACITY = 0.45  # of a command's arrow beside that of the drive's force
 CUT = 1.02  # of the longest arrow: a longer one is cut, and has its number
-BREAK = 0.45  # of a cut arrow, where its break mark is
 LETTERS = 36.0  # px of a film of full size, of the number at an arrow, as of all its letters
 SMALL_LETTERS = 27.0  # px, of one that has no room else
+GAP = 4.0  # px of a film of full size, around a number
+PLACES = 12  # in each direction, at which room for a number is looked for
 MIN_BAR = 0.1  # of the longest arrow: smaller ranges have no bar
 
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
-Numbers = dict[tuple[str, tuple[int, ...]], Array]  # words and colour of a number -> its box, px
 
 
 class Arrow(NamedTuple):
@@ -89,7 +90,16 @@ class Arrow(NamedTuple):
     head: bool = True
     way: Array | None = None  # of a force on a body, (3,), in the axes of the world
     body: str = ""  # which a blow hits
-    words: str = ""  # its value, of one that is cut
+    cut: bool = False  # it is longer than fits
+    words: str = ""  # its value, where that is written beside it
+
+
+class Stamped(NamedTuple):
+    """An arrow on a picture: its line and its outline, (points, 2) px each."""
+
+    arrow: Arrow
+    line: Array
+    edge: Array
 
 
 class Drawn(NamedTuple):
@@ -259,9 +269,10 @@ def along(force: Array, scale: Scale, body: str) -> Arrow:
     """Return the arrow of a force in space, (3,) N, on a body; "" for a free body."""
     size = float(np.linalg.norm(force))
     length = size / scale.longest
-    words = f"{style.short(size)} N" if length > MAX_BLOW else ""
+    cut = length > MAX_BLOW
+    words = f"{style.short(size)} N" if cut else ""
     shade = rgba(style.DISTURBANCE)
-    return Arrow(0.0, length, shade, way=force / size, body=body, words=words)
+    return Arrow(0.0, length, shade, way=force / size, body=body, cut=cut, words=words)
 
 
 def rgba(colour: str, opacity: float = 1.0) -> tuple[float, ...]:
@@ -325,10 +336,11 @@ def arrows(
     for layer, (name, longest, shade, size) in enumerate(layers):
         low, mean, high = (float(part[frame, channel]) / longest for part in loads[name][1:])
         words = ""
-        if abs(mean) > CUT:
+        cut = abs(mean) > CUT
+        if cut:
             unit = scale.units[name in ("disturbance", "reaction", "force")]
             words = f"{style.short(abs(mean) * longest)} {unit}"
-        drawn.append(Arrow(0.0, mean, shade, layer, size, words=words))
+        drawn.append(Arrow(0.0, mean, shade, layer, size, cut=cut, words=words))
         if layer == 0 and scale.control and high - low > MIN_BAR:
             drawn.append(Arrow(low, high, rgba(colour, 0.4), head=False))
     visible = []
@@ -368,11 +380,11 @@ def frames(
     return found
 
 
-def without_number(drawn: Drawn) -> Drawn:
-    """Return the arrows without the number of the reaction: the words on a hit have it."""
+def without_numbers(drawn: Drawn, colour: str) -> Drawn:
+    """Return the arrows without the numbers in a colour: the words on a hit or a blow have them."""
     kept = []
     for channel, arrow in drawn.arrows:
-        told = arrow.rgba == rgba(style.REACTION)
+        told = arrow.rgba == rgba(colour)
         kept.append((channel, arrow._replace(words="") if told else arrow))
     return drawn._replace(arrows=kept)
 
@@ -490,14 +502,14 @@ def path(
     return place + start * out + reach * along * way, arrow.size * width
 
 
-def outline(line: Array, width: float, head: bool = True) -> Array:
+def outline(line: Array, width: float, head: bool = True, longest: float = HEAD) -> Array:
     """Return the outline, (points, 2) px, of an arrow along a line (m, 2) px whose shaft is `width`
-    px wide.
+    px wide, with a head of at most a share of its length.
     """
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     way = np.append(0.0, steps.cumsum())
     width = min(width, MAX_THICKNESS * way[-1])
-    long = min(HEAD_LENGTH * HEAD_WIDTH * width, 0.7 * way[-1]) * head
+    long = min(HEAD_LENGTH * HEAD_WIDTH * width, longest * way[-1]) * head
     at = np.linspace(0.0, way[-1] - long, len(line))
     rows = []
     for part in line.T:
@@ -512,26 +524,18 @@ def outline(line: Array, width: float, head: bool = True) -> Array:
     return np.concatenate([shaft + across, tip, back])
 
 
-def stamp(
-    image: Image.Image,
-    line: Array,
-    width: float,
-    arrow: Arrow,
-    scale: float,
-    rim: int = 0,
-    cut: bool = True,
-) -> None:
-    """Draw an arrow along a line, (m, 2) px, of a film `scale` times as large as a full one, with a
-    break mark if it has a number and is cut.
-    """
-    paint(image, outline(line, width, arrow.head), arrow.rgba, rim)
-    if arrow.words and cut:
-        k = round(BREAK * len(line))
-        way = line[k] - line[k - 1]
-        way = width * way / max(np.linalg.norm(way), 1e-9)
-        across = way[::-1] * (-0.9, 0.9) + 0.3 * way
-        corners = [across + 0.3 * way, across - 0.3 * way, -across - 0.3 * way, 0.3 * way - across]
-        paint(image, line[k] + np.array(corners), WHITE)
+def stamp(image: Image.Image, line: Array, width: float, arrow: Arrow, rim: int = 0) -> Stamped:
+    """Draw an arrow along a line, (m, 2) px, with a break mark if it is cut."""
+    edge = outline(line, width, arrow.head, CUT_HEAD if arrow.cut else HEAD)
+    paint(image, edge, arrow.rgba, rim)
+    if arrow.cut:
+        k = len(line) // 2  # of the shaft, whose other side is the outline's end
+        sides = edge[[k, -1 - k]]
+        across = 0.9 * (sides[0] - sides[1])
+        way = np.array([across[1], -across[0]]) / 3.0
+        corners = [across + 2 * way, across, -across - 2 * way, -across]
+        paint(image, sides.mean(axis=0) + np.array(corners), WHITE)
+    return Stamped(arrow, line, edge)
 
 
 def bytes_of(rgba: Sequence[float]) -> tuple[int, ...]:
@@ -539,44 +543,71 @@ def bytes_of(rgba: Sequence[float]) -> tuple[int, ...]:
     return tuple(round(255 * part) for part in rgba[:3])
 
 
-def write(image: Image.Image, arrow: Arrow, line: Array, scale: float, said: Numbers) -> None:
-    """Write the number of an arrow along a line, (m, 2) px, where there is room in the picture:
-    beyond its free end, over the arrow or beside a steep one, or before its other end; else below
-    it.
+def boxes(stamped: Sequence[Stamped], scale: float) -> list[Array]:
+    """Return boxes, (2, 2) px each, that cover arrows on a picture, with a gap for numbers."""
+    around = np.array([[-GAP], [GAP]]) * scale
+    return [point + around for one in stamped for point in one.edge]
 
-    Nothing is written over another number, and none twice in a colour: `said` has the numbers of
-    the picture and their boxes, (2, 2) px, and gets this one.
+
+def write_numbers(
+    image: Image.Image, stamped: Sequence[Stamped], scale: float, taken: list[Array]
+) -> None:
+    """Write the numbers of arrows, each once in a colour, in a film `scale` times as large as a
+    full one. None is written over the boxes `taken`, (2, 2) px each, which get those of the
+    numbers.
     """
-    words = arrow.words
+    said = set()
+    for arrow, line, _ in stamped:
+        key = arrow.words, arrow.rgba
+        if arrow.words and key not in said:
+            said.add(key)
+            write(image, arrow, line, scale, taken)
+
+
+def write(image: Image.Image, arrow: Arrow, line: Array, scale: float, taken: list[Array]) -> None:
+    """Write the number of an arrow along a line, (m, 2) px, where there is room in the picture:
+    beyond its free end, over the arrow or beside a steep one, or before its other end; else where
+    room is nearest to it.
+    """
     ends = (line[0], line[-1]) if arrow.body else (line[-1], line[0])
-    colour = bytes_of(arrow.rgba)
-    key = words, colour
-    if not words or key in said:
-        return
-    for size, count in ((LETTERS, 3), (SMALL_LETTERS, 4)):  # below it, only small ones
+    for size in (LETTERS, SMALL_LETTERS):
         high = size * scale
-        half = np.array([style.width(words, high, bold=True), high]) / 2 + 2 * scale
+        half = np.array([style.width(arrow.words, high, bold=True), high]) / 2 + GAP * scale
         most = np.array(image.size) - half
-        for place in number_places(ends, half, most, 6 * scale)[:count]:
+        places = number_places(ends, half, most, 6 * scale)
+        if size == SMALL_LETTERS:
+            places += nearest_places(ends, half, most)
+        for place in places:
             inside = (place >= half).all() and (place <= most).all()
             box = np.array([place - half, place + half])
-            if inside and is_apart(box, said):
-                said[key] = box
+            if inside and is_apart(box, taken):
+                taken.append(box)
                 rim = {"stroke_width": round(2 * scale), "stroke_fill": style.PAPER}
                 letters = style.font(high, True)
                 at = tuple(place.tolist())
-                ImageDraw.Draw(image).text(at, words, colour, letters, anchor="mm", **rim)
+                colour = bytes_of(arrow.rgba)
+                ImageDraw.Draw(image).text(at, arrow.words, colour, letters, anchor="mm", **rim)
                 return
 
 
-def is_apart(box: Array, said: Numbers) -> bool:
-    """Return whether a box, (2, 2) px, overlaps that of no number."""
-    for old in said.values():
-        left = (box[1] <= old[0]).any()
-        right = (box[0] >= old[1]).any()
-        if not left and not right:
-            return False
-    return True
+def is_apart(box: Array, taken: Sequence[Array]) -> bool:
+    """Return whether a box, (2, 2) px, overlaps none of those that are taken."""
+    if not taken:
+        return True
+    others = np.array(taken)
+    beyond = (box[1] <= others[:, 0]) | (box[0] >= others[:, 1])
+    return bool(beyond.any(axis=1).all())
+
+
+def nearest_places(ends: tuple[Array, Array], half: Array, most: Array) -> list[Array]:
+    """Return places all over a picture, px, the nearest to the middle of an arrow first; `half` and
+    `most` as of `number_places`.
+    """
+    across = np.linspace(half[0], most[0], PLACES)
+    down = np.linspace(half[1], most[1], PLACES)
+    places = np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2)
+    away = np.linalg.norm(places - (ends[0] + ends[1]) / 2, axis=1)
+    return list(places[away.argsort(kind="stable")])
 
 
 def number_places(ends: tuple[Array, Array], half: Array, most: Array, gap: float) -> list[Array]:
@@ -593,7 +624,7 @@ def number_places(ends: tuple[Array, Array], half: Array, most: Array, gap: floa
     beside = middle + reach if steep else middle - apart
     within = np.maximum(half, most)
     beside[0] = np.clip(beside[0], half[0], within[0])
-    return [free + reach, beside, other - reach, (middle + apart).clip(half, within)]
+    return [free + reach, beside, other - reach]
 
 
 def paint(image: Image.Image, edge: Array, rgba: Sequence[float], rim: int = 0) -> None:

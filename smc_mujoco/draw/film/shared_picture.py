@@ -10,9 +10,10 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
+from PIL import Image
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.draw.film import camera, world
+from smc_mujoco.draw.film import arrows, camera, world
 from smc_mujoco.draw.film.puppet import Puppet
 from smc_mujoco.draw.film.stage import OUTLINE, Stage
 
@@ -112,7 +113,15 @@ def shots(stages: Sequence[Stage], frame: int, time: float) -> list[Array]:
 
     picture = first.canvas.draw(add)
     picture = first.canvas.outlined(picture, add_outlines, OUTLINE * first.scale)
-    for stage, arrows in zip(stages, drawn, strict=True):
-        picture = stage.with_arrows(picture, arrows)
-    whole = np.array([0, 0, picture.shape[1], picture.shape[0]])
-    return [picture[:, left:right] for left, _, right, _ in across(whole, len(stages)).tolist()]
+    image = Image.fromarray(picture)
+    stamped = [stage.stamped(image, own) for stage, own in zip(stages, drawn, strict=True)]
+    parts = across(np.array([0, 0, *image.size]), len(stages))
+    taken = [
+        box + part[:2] for stage, part in zip(stages, parts, strict=True) for box in stage.words
+    ]
+    for own in stamped:
+        taken += arrows.boxes(own, first.scale)
+    for own in stamped:
+        arrows.write_numbers(image, own, first.scale, taken)
+    picture = np.asarray(image)
+    return [picture[:, left:right] for left, _, right, _ in parts.tolist()]

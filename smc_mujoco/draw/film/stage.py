@@ -17,6 +17,7 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.film import arrows, camera, world
 from smc_mujoco.draw.film.canvas import Canvas
 from smc_mujoco.draw.film.puppet import Puppet, moved_bodies
+from smc_mujoco.draw.film.sheet import STATE_HEIGHT, STATE_PLACE
 from smc_mujoco.draw.film.track import MachineTrack
 
 LAW_SHARE = 0.75  # of the law's colour in a user's model, where several laws are shown; chosen
@@ -60,6 +61,7 @@ class Stage:
         self.data = mujoco.MjData(self.model)
         self.goal = mujoco.MjData(self.model)
         self.aimed = False
+        self.words: list[Array] = []  # the box, (2, 2) px, of what is said of the machine
         material = self.model.geom_matid
         painted = self.model.mat_rgba[material]
         stated = (material >= 0)[:, None]
@@ -186,6 +188,11 @@ class Stage:
         """
         track = self.track
         failed = track.failed(time)
+        self.words = []
+        if state := track.states[frame]:
+            high = arrows.LETTERS * self.scale
+            wide = STATE_PLACE * high + style.width(state.words, high, bold=True)
+            self.words.append(np.array([(0.0, 0.0), (wide, STATE_HEIGHT * high)]))
         goal = None if failed else track.r[frame]
         self.arrange(track.x[frame], track.ahead[frame], time, goal)
         self.look(frame)
@@ -204,28 +211,27 @@ class Stage:
         self.forward()
         picture = self.canvas.draw(lambda shown: None)
         picture = self.canvas.outlined(picture, self.add_outline, OUTLINE * self.scale)
-        return self.with_arrows(picture, drawn)
-
-    def with_arrows(self, picture: Array, drawn: Sequence[tuple[int, arrows.Arrow]]) -> Array:
-        """Return a picture with arrows, given as (channel, arrow), over it; read-only."""
-        if not drawn:
-            return picture
         image = Image.fromarray(picture)
-        lines = []
-        for i, arrow in sorted(drawn, key=lambda item: item[1].head):  # bars are behind arrows
-            line = self.draw_arrow(image, self.mounts[i], arrow)
-            lines.append((arrow, line))
-        said: arrows.Numbers = {}
-        for arrow, line in lines:  # over all arrows
-            if line is not None:
-                arrows.write(image, arrow, line, self.scale, said)
+        stamped = self.stamped(image, drawn)
+        taken = [*self.words, *arrows.boxes(stamped, self.scale)]
+        arrows.write_numbers(image, stamped, self.scale, taken)
         return np.asarray(image)
+
+    def stamped(
+        self, image: Image.Image, drawn: Sequence[tuple[int, arrows.Arrow]]
+    ) -> list[arrows.Stamped]:
+        """Draw arrows, given as (channel, arrow), over a picture; return those that are seen."""
+        found = []
+        for i, arrow in sorted(drawn, key=lambda item: item[1].head):  # bars are behind arrows
+            if one := self.draw_arrow(image, self.mounts[i], arrow):
+                found.append(one)
+        return found
 
     def draw_arrow(
         self, image: Image.Image, mount: arrows.Mount, arrow: arrows.Arrow
-    ) -> Array | None:
-        """Draw an arrow over the picture and return its line, (m, 2) px; nothing, None, if it has
-        no place or points at the camera.
+    ) -> arrows.Stamped | None:
+        """Draw an arrow over the picture and return it; nothing, None, if it has no place or points
+        at the camera.
         """
         found = arrows.path(self.model, self.data, mount, arrow)
         if not found:
@@ -239,14 +245,11 @@ class Stage:
         across = self.project(np.array([points[0], beside]))
         least = arrows.MIN_SHAFT * self.scale * arrow.size
         thick = max(float(np.ptp(across[:, 1])), least)
-        rim = 0
-        if mount.radius and not arrow.body:  # it lies over a link of its colour
+        if mount.radius and not arrow.body:
             anchor = self.project(self.data.xanchor[[mount.joint]])[0]
             leader = [*anchor.tolist(), *line[0].tolist()]
             ImageDraw.Draw(image).line(leader, style.INK, max(1, round(self.scale)))
-            rim = round(arrows.RIM * self.scale)
-        arrows.stamp(image, line, thick, arrow, self.scale, rim)
-        return line
+        return arrows.stamp(image, line, thick, arrow, round(arrows.RIM * self.scale))
 
     def project(self, points: Array) -> Array:
         """Return where points (m, 3) m are in the picture, (m, 2) px."""

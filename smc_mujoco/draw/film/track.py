@@ -65,7 +65,7 @@ class MachineTrack:
         self.speaks = any(states.timeline(trace, some, clock.played))
         for k, state in enumerate(self.states):
             if state and state.force:
-                self.drawn[k] = arrows.without_number(self.drawn[k])
+                self.drawn[k] = arrows.without_numbers(self.drawn[k], state.colour)
         self.x = sampled(trace, trace.x[:, :n], times)
         self.r = sampled(trace, trace.r[:, :n], times)
         self.ahead = leads(trace, times, edges)[:, :n]

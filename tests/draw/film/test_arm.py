@@ -52,6 +52,7 @@ def overlay(trace, edges=EDGES, body=(9.0, 0.0, 9.0), hold=0.15):
         followed=None,
         project=project,
         scale=1.0,
+        words=[],
         find=lambda name: np.array(body),
     )
     return arm.overlays([stage])[0]

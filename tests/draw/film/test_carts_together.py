@@ -1,6 +1,7 @@
 """Carts on one picture, labels that are whole, and words of what pictures hide: measured."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -87,20 +88,28 @@ def test_a_number_at_an_arrow_hides_nothing_where_there_is_room_beside_it():
     image = Image.new("RGB", (180, 170), style.PAPER)
     line = np.linspace((100.0, 25.0), (150.0, 25.0), 40)
     arrow = arrows.Arrow(0.0, 1.0, arrows.rgba(style.DISTURBANCE), words="180 N·m")
-    arrows.stamp(image, line, 6.0, arrow, 0.625)
-    arrows.write(image, arrow, line, 0.625, {})
+    drawn = [arrows.stamp(image, line, 6.0, arrow)]
+    arrows.write_numbers(image, drawn, 0.625, arrows.boxes(drawn, 0.625))
     dark = np.asarray(image).min(axis=2) < 128
     assert not dark[45:].any()
     assert dark[:, :95].any()
     assert dark[20:30, 130:150].any()
 
 
-def test_a_free_body_s_picture_says_how_far_it_is_off_its_place():
+@pytest.mark.parametrize("drives", [False, True])
+def test_a_picture_says_how_far_what_the_camera_follows_is_off_its_place(drives):
+    """A robot that rolled away for ever looked the stillest of three."""
     drone = smc.plant("quadrotor")
     run = smc.run(smc.Scenario(plant=drone, law="geometric", x0=drone.rest, duration=0.05))
+    first = 0
+    if drives:
+        robot = Path(__file__).parents[3] / "models" / "two_wheels.xml"
+        plant = smc.plant_from(robot, ["left", "right"], measured=["base"])
+        run = smc.run(smc.Scenario(plant=plant, law="none", duration=0.03))
+        first = plant.base
     assert states.timeline(run, np.array([0.01])) == [None]
     moved = run.x.copy()
-    moved[:, 0] += 0.123
+    moved[:, first] += 0.123
     (said,) = states.timeline(dataclasses.replace(run, x=moved), np.array([0.02]))
     assert said is not None
     assert said.words == "120 mm off"

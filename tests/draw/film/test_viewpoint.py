@@ -1,7 +1,5 @@
 """A film of a user's machine looks across what its driven joints do, from a free side, and near."""
 
-import itertools
-
 import numpy as np
 import pytest
 from helpers.films import staged
@@ -143,7 +141,7 @@ def test_a_chart_keeps_the_unit_of_a_joint_with_a_long_name():
 def test_an_arrow_s_number_hides_neither_the_arrow_nor_what_it_is_at(free, other, place):
     image = Image.new("RGB", (200, 100), "white")
     arrow = arrows.Arrow(0.0, 1.0, (0.0, 0.0, 0.0, 1.0), words="20 N")
-    arrows.write(image, arrow, np.array([other, free]), 0.5, {})
+    arrows.write(image, arrow, np.array([other, free]), 0.5, [])
     y, x = np.nonzero(np.asarray(image)[..., 0] < 128)
     if place == "beyond":
         assert x.min() > free[0]
@@ -158,14 +156,22 @@ def test_an_arrow_s_number_hides_neither_the_arrow_nor_what_it_is_at(free, other
 def test_numbers_of_arrows_are_apart_and_none_is_written_twice():
     """Two wheels have four arrows so close that their numbers hid each other."""
     image = Image.new("RGB", (300, 200), "white")
-    said = {}
+    drawn = []
     black = (0.0, 0.0, 0.0, 1.0)
     for words, x in (("2.4 N", 150.0), ("2.4 N", 160.0), ("1.3 N", 152.0), ("9 N", 155.0)):
         arrow = arrows.Arrow(0.0, 1.0, black, words=words)
-        count = len(said)
-        before = np.asarray(image)
-        arrows.write(image, arrow, np.array([(x - 40.0, 100.0), (x, 100.0)]), 0.5, said)
-        assert (np.asarray(image) != before).any() == (len(said) > count)
-    assert [words for words, _ in said] == ["2.4 N", "1.3 N", "9 N"]
-    for one, other in itertools.combinations(said.values(), 2):
-        assert (one[0] >= other[1]).any() or (one[1] <= other[0]).any()
+        line = np.linspace((x - 40.0, 100.0), (x, 100.0), 40)
+        drawn.append(arrows.stamp(image, line, 4.0, arrow))
+    taken = arrows.boxes(drawn, 0.5)
+    before = np.asarray(image).copy()
+    arrows.write_numbers(image, drawn, 0.5, taken)
+    numbers = taken[sum(len(one.edge) for one in drawn) :]
+    assert len(numbers) == 3
+    changed = (np.asarray(image) != before).any(axis=2)
+    for number in numbers:
+        left, top, right, bottom = number.astype(int).ravel()
+        assert changed[top:bottom, left:right].any()
+    for k, number in enumerate(numbers):
+        others = [*taken[:-3], *numbers[:k]]
+        assert arrows.is_apart(number, others)
+        assert not arrows.is_apart(number, [*others, number])

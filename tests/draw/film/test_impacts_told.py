@@ -1,0 +1,99 @@
+"""Blows and hits in words, and arrows that are longer than fits: broken, with their numbers."""
+
+import numpy as np
+import pytest
+from helpers.films import staged
+from PIL import Image
+
+import smc_mujoco as smc
+from smc_mujoco.common import gl
+from smc_mujoco.draw import states, style
+from smc_mujoco.draw.film import arrows, film, pace
+
+renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
+RED = (1.0, 0.0, 0.0, 1.0)
+
+
+def struck(width):
+    """A pendulum at rest that 2 N m s hit at 0.1 s, and that then hits a stop."""
+    return smc.run(
+        smc.Scenario(
+            plant="inverted_pendulum",
+            law=smc.law("classical"),
+            x0=0.0,
+            contact=smc.hardware.Contact("stops", restitution=0.8),
+            disturbance=smc.signals.Impulse(2.0, time=0.1, width=width),
+            duration=0.6,
+        )
+    )
+
+
+@pytest.fixture(scope="module")
+def run():
+    return struck(0.01)
+
+
+def test_a_blow_is_told_with_its_peak_from_its_start_and_fades(run):
+    times = np.arange(0.0, 0.6, 1e-3)
+    said = {}
+    for time, state in zip(times, states.timeline(run, times), strict=True):
+        if state and state.words == "blow, 200 N·m":
+            said[round(float(time), 3)] = state
+    first, *_, last = said
+    assert first == 0.1
+    assert last >= 0.1 + 0.01 + 0.05
+    opacities = [state.opacity for state in said.values()]
+    assert opacities[0] == 1.0
+    assert opacities == sorted(opacities, reverse=True)
+    assert opacities[-1] < 0.8
+    assert all(state.colour == style.DISTURBANCE and state.force for state in said.values())
+
+
+def test_an_impulse_that_lasts_is_no_blow():
+    told = states.timeline(struck(0.2), np.arange(0.1, 0.3, 1e-2))
+    assert not any(state.words.startswith("blow") for state in told if state)
+
+
+def test_an_arrow_is_broken_if_it_is_cut_and_its_number_is_told(run):
+    runs = film.DrawnRuns.of([run], None)
+    clock = pace.clock([run], 30.0)
+    (track,) = film.tracks_at(clock, runs, arrows.scales([run]))
+    broken = {style.DISTURBANCE: 0, style.REACTION: 0}
+    for drawn, state in zip(track.drawn, track.states, strict=True):
+        for _, arrow in drawn.arrows:
+            assert arrow.cut == (abs(arrow.high) > arrows.CUT)
+            for colour in broken:
+                if arrow.cut and arrow.rgba == arrows.rgba(colour):
+                    broken[colour] += 1
+                    assert state.colour == colour  # the number is in its words
+                    assert arrow.words == ""
+    assert min(broken.values()) > 0
+
+
+@pytest.mark.parametrize("length", [20.0, 60.0])
+def test_the_break_of_an_arrow_is_in_its_shaft_however_short(length):
+    from scipy.ndimage import label
+
+    for cut, parts in ((False, 1), (True, 2)):
+        image = Image.new("RGB", (100, 40), "white")
+        line = np.linspace((20.0, 20.0), (20.0 + length, 20.0), 40)
+        arrows.stamp(image, line, 5.0, arrows.Arrow(0.0, 1.0, RED, cut=cut))
+        assert label(np.asarray(image)[..., 1] < 128)[1] == parts
+
+
+@renders
+def test_no_number_is_written_over_what_is_said_of_the_machine(run):
+    with staged(run, (300, 170)) as shown:
+        arrow = arrows.Arrow(0.0, 1.0, RED, words="9 N·m")
+        state = states.State("blow, 200 N·m", style.INK)
+        shown.track.states[0] = state
+        shown.pose(0, 0.0)
+        (box,) = shown.words
+        assert box[1, 0] == pytest.approx(
+            style.width(state.words, arrows.LETTERS * shown.scale, bold=True), rel=0.1
+        )
+        free = np.asarray(shown.render())
+        numbered = np.asarray(shown.render([(0, arrow)]))
+        y, x = np.nonzero((free != numbered).any(axis=2))
+        assert len(x) > 200
+        assert not ((x < box[1, 0]) & (y < box[1, 1] - 4)).any()
