@@ -91,7 +91,7 @@ STRANGER = {
 }
 CLIPS = {  # name of the clip's file -> what it shows
     "inverted_pendulum": Clip("inverted_pendulum", "Inverted pendulum", 1.5),
-    "van_der_pol": Clip("van_der_pol", "Van der Pol, sensor noise", 2.0, "noise"),
+    "van_der_pol": Clip("van_der_pol", "Van der Pol, noise", 2.0, "noise"),
     "duffing": Clip("duffing", "Duffing", 3.0),
     "pendulum_network": Clip("pendulum_network", "Coupled pendulums", 2.0),
     "hard_stops": Clip(

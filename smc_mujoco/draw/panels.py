@@ -77,6 +77,7 @@ BETWEEN_DECADES = ((3.0,), (2.0, 5.0), (2.0, 3.0, 4.0, 5.0, 6.0, 8.0))
 DASHES = (0, (4, 4))  # of a reference's line
 DOTS = (0, (2, 2))  # of the upright line at which something happens
 REFERENCE = "reference"  # id of a reference's lines
+HEIGHT = 2  # channel of a free body
 
 
 class Panel(NamedTuple):
@@ -130,7 +131,10 @@ class Panel(NamedTuple):
         if single and plant.pose and name == "u" and group.unit == "m":  # of an actuator
             return f"actuator {group.channels[0] + 1} {letter}{unit}"
         if single and (plant.direct or self.channel is not None):
-            return f"{channel_names(plant)[group.channels[0]]} {letter}{unit}"
+            words = f"{channel_names(plant)[group.channels[0]]} {letter}"
+            if plant.pose and name == "x" and group.channels[0] == HEIGHT:
+                words = "height z"
+            return words + unit
         if name in WORDS or (name == "s" and plant.mixed):  # mixed plants have low panels
             return letter + ("" if group.driven else " on q") + unit
         kind = "position" if group.unit == "m" else "angle"
@@ -296,7 +300,8 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
 
     The motion is x; of several channels it is the largest error. A free body whose reference goes
     somewhere, or whose attitude stays in its settling band, has a map of the paths in place of the
-    error of its attitude.
+    error of its attitude. One whose reference stays has its height in place of the error of its
+    place, if that is off farthest upwards or downwards.
     """
     plant = traces[0].scenario.plant
     first = over_groups(traces, "tip")
@@ -318,8 +323,13 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
         elif place.group.driven or not many:
             motions.append(place._replace(quantity="settling") if many or first else place)
     moving = any(np.ptp(trace.r[:, :3], axis=0).any() for trace in traces)
-    if plant.pose and (moving or all(map(stays_settled, motions[1].traces))):
-        motions[1:] = [motions[0]._replace(quantity="path")]
+    if plant.pose:
+        place, turn = motions
+        if moving or all(map(stays_settled, turn.traces)):
+            motions[1] = place._replace(quantity="path")
+        off = [np.abs(run.x - run.r).max(axis=0) for run in place.traces]
+        if not moving and int(np.max(off, axis=0).argmax()) == HEIGHT:
+            motions[0] = by_channel(place._replace(quantity="x"))[HEIGHT]
     return [*first, *motions, *controls][:2]
 
 

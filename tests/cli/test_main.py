@@ -648,6 +648,7 @@ def test_a_film_of_an_answer_has_as_many_pictures_as_its_time_allows(tmp_path, m
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
     scenario = smc.Scenario(plant="duffing", law=smc.law("pid"), duration=0.5)
     recommendation = types.SimpleNamespace(worst_trace=smc.run(scenario))
+    assert studies._worst_title(recommendation).startswith("Worst run: Duffing")
     said = []
     note = lambda text, **how: said.append(text)  # noqa: E731
     terminal = types.SimpleNamespace(note=note, wrote=said.append)

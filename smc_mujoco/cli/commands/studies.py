@@ -158,7 +158,9 @@ def _save(recommendation: "RaceRecommendation", out: Path, terminal: Terminal) -
         file = recommendation.tuned.save(out / "recommended.json")
         terminal.wrote(file)
         terminal.note(f"To use {recommendation.law.name} with these gains, give --law {file}")
-    figure.figure([recommendation.worst_trace], out / "worst_run")
+    figure.figure(
+        [recommendation.worst_trace], out / "worst_run", title=_worst_title(recommendation)
+    )
     terminal.wrote(*page.files(out / "worst_run"))
     terminal.note(
         f"The figure shows a run of {recommendation.law.name} under "
@@ -191,6 +193,13 @@ def _margins_command(
     return f"There was no time for margins of {late}. This makes them: {shlex.join(words)}"
 
 
+def _worst_title(recommendation: "RaceRecommendation") -> str:
+    """Return the title of a figure or a film of the worst run of a race's first law."""
+    from smc_mujoco.draw import style
+
+    return f"Worst run: {style.head([recommendation.worst_trace.scenario])}"
+
+
 def _film(recommendation: "RaceRecommendation", out: Path, ends: float, terminal: Terminal) -> None:
     """Film the worst run of the first law of a race until a time of `time.monotonic`, s, with as
     many pictures a second as can be made by then; if these are too few, write one picture.
@@ -198,9 +207,10 @@ def _film(recommendation: "RaceRecommendation", out: Path, ends: float, terminal
     from smc_mujoco.draw.film import film as films
 
     run = [recommendation.worst_trace]
+    title = _worst_title(recommendation)
     try:
         begun = time.monotonic()
-        frames = films.Frames(run, size=films.FULL_SIZE)
+        frames = films.Frames(run, title=title, size=films.FULL_SIZE)
         pictures = iter(frames)
         next(pictures)
         first = time.monotonic()
@@ -210,14 +220,15 @@ def _film(recommendation: "RaceRecommendation", out: Path, ends: float, terminal
         fit = (MADE * (ends - time.monotonic()) - (first - begun)) / each  # pictures
         fps = min(MAX_FPS, films.FPS * fit / len(frames))
         if fps >= MIN_FPS:  # with fewer pictures a second, motion is shown more slowly
-            frames = films.Frames(run, size=films.FULL_SIZE, fps=fps)
+            frames = films.Frames(run, title=title, size=films.FULL_SIZE, fps=fps)
             fps = min(fps, fps * fit / len(frames))
         if fps >= MIN_FPS:
-            terminal.wrote(films.film(run, out / "worst_run.mp4", fps=fps))
+            terminal.wrote(films.film(run, out / "worst_run.mp4", title=title, fps=fps))
             terminal.note(f"The film has {fps:.2g} frames per second.")
         else:
             file = out / "worst_run_machine.png"
-            terminal.wrote(films.film(run, file, at=_worst_time(recommendation.worst_trace)))
+            at = _worst_time(recommendation.worst_trace)
+            terminal.wrote(films.film(run, file, title=title, at=at))
             needed = MIN_FPS * each * len(frames) / frames.fps
             terminal.note(
                 f"This picture stands in place of a film, which would take {needed:.0f} s; the "

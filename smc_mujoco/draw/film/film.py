@@ -312,8 +312,13 @@ def pictures(frames: Frames) -> Generator[Array]:
         keys.append([f"last periods, deflections × {clock.close.factor:g}"])
     lines = head_lines(runs, size, frames.title, keys)
     placed = placement(tracks, frames.camera, runs.names, size, lines)
+    order = ""
+    if placed.lanes is not None:
+        order = "back to front"
+        ordered = [[*key, order] for key in keys]
+        lines = head_lines(runs, size, frames.title, ordered)
+        placed = placement(tracks, frames.camera, runs.names, size, lines)
     whole = size, placed.tiles, placed.labels, frames.title
-    order = "" if placed.lanes is None else "back to front"
     sheet = Sheet(runs, *whole, keys[0], lines=lines, order=order)
     with contextlib.ExitStack() as opened:
         stages = [opened.enter_context(stage) for stage in staged(tracks, placed, clock.times)]
@@ -424,7 +429,8 @@ def placement(
     sizes = functools.partial(label_sizes, names, size)
     room = room_of(size, lines)
     words = STATE_HEIGHT * letters(size) if any(track.speaks for track in tracks) else 0.0
-    tiles, labels, view = camera.layout(len(tracks), room, sizes, points, turn, words=words)
+    several = len(tracks) > 1  # the name of one has room below it, where no chart is as wide
+    tiles, labels, view = camera.layout(len(tracks), room, sizes, points, turn, several, words)
     lanes = shared_picture.places(puppets, turn)
     if lanes is not None:
         every = np.concatenate([points + place for place in lanes])

@@ -14,7 +14,7 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import panels, quantities, style
 from smc_mujoco.simulation.trace import Trace
 
-PAST_LINE = 2.2  # points, width of a path that is flown
+FUTURE_LINE, PAST_LINE = 0.8, 1.5  # points, width of a path before and after it is flown
 
 
 def plane(traces: Sequence[Trace]) -> Array:
@@ -31,11 +31,12 @@ def plane(traces: Sequence[Trace]) -> Array:
 
 
 class Flight(NamedTuple):
-    """A run on a map: its path until now and its dot, with times in s and places, (2, m), in the
-    map's unit.
+    """A run on a map: its path until now, the path of its reference, which lies over it, and its
+    dot, with times in s and places, (2, m), in the map's unit.
     """
 
     past: Line2D
+    goal: Line2D
     dot: Line2D
     times: Array
     places: Array
@@ -69,15 +70,15 @@ def draw_map(
     rows = zip(panel.traces, colours, looks, strict=True)
     for trace, colour, look in reversed(list(rows)):
         places = factor * trace.x[:, axes].T
-        width = style.points(panels.LINE)
+        width = style.points(FUTURE_LINE)
         artists += ax.plot(*places, color=colour, lw=width, **look)
-        goal = {"color": style.INK, "lw": style.points(0.8), "ls": panels.DASHES, "zorder": 3}
+        thin = {"color": style.INK, "lw": style.points(0.8), "ls": panels.DASHES, "animated": True}
         if not np.ptp(trace.r[:, axes], axis=0).any():  # it stands still
-            goal |= {"marker": "+", "ms": style.points(9)}
-        ax.plot(*(factor * trace.r[:, axes].T), **goal)
-        wide = {"color": colour, "lw": style.points(PAST_LINE), "animated": True}
+            thin |= {"marker": "+", "ms": style.points(9)}
+        (goal,) = ax.plot(*(factor * trace.r[:, axes].T), **thin)
+        wide = {"color": colour, "lw": style.points(PAST_LINE), "animated": True, **look}
         (past,) = ax.plot([], [], **wide)
         dot = panels.dot(ax, colour, look)
-        flight = Flight(past, dot, trace.t, places)
+        flight = Flight(past, goal, dot, trace.t, places)
         flights.append(flight)
     return artists, flights

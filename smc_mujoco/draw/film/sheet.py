@@ -369,7 +369,8 @@ class Sheet:
             flown = one.places[:, one.times <= time + 1e-9]
             one.past.set_data(*flown)
             one.dot.set_data(*flown[:, -1:])
-            drawn += [one.past, one.dot]
+        for part in ("past", "goal", "dot"):
+            drawn += [getattr(one, part) for one in self.flights]
         self.clock.set_text(f"{moment.time:.{3 if moment.speed < 0.2 else 2}f} s")
         self.pace.set_text("" if moment.still else pace_words(moment.speed))
         words, opacity = self.event_words(moment)

@@ -23,6 +23,7 @@ from smc_mujoco.draw.film.track import MachineTrack
 LAW_SHARE = 0.75  # of the law's colour in a user's model, where several laws are shown; chosen
 DEFAULT_RGBA = np.array([0.5, 0.5, 0.5, 1.0], np.float32)  # MuJoCo's colour of geoms
 OUTLINE = 2.6  # px of a film of full size, around where the reference wants the machine; chosen
+DOTS = 5.0, 16.0  # px of a film of full size, from a machine to its reference: size, pitch; chosen
 WHITE = np.ones(4, np.float32)
 SHAPE_FIELDS = ("geom_pos", "geom_size", "geom_group", "geom_sameframe")
 
@@ -212,10 +213,26 @@ class Stage:
         picture = self.canvas.draw(lambda shown: None)
         picture = self.canvas.outlined(picture, self.add_outline, OUTLINE * self.scale)
         image = Image.fromarray(picture)
+        if self.followed is not None and self.aimed:
+            self.dot_to_goal(image)
         stamped = self.stamped(image, drawn)
         taken = [*self.words, *arrows.boxes(stamped, self.scale)]
         arrows.write_numbers(image, stamped, self.scale, taken)
         return np.asarray(image)
+
+    def dot_to_goal(self, image: Image.Image) -> None:
+        """Draw dots over the picture of a machine that is followed, to where its reference wants
+        it, or to the picture's edge.
+        """
+        middles = [data.geom_xpos[self.links].mean(axis=0) for data in (self.data, self.goal)]
+        start, stop = self.project(np.array(middles))
+        way = stop - start
+        far = float(np.linalg.norm(way))
+        size, pitch = np.array(DOTS) * self.scale
+        for at in np.arange(pitch, min(far, sum(image.size)), pitch).tolist():
+            middle = start + at / far * way
+            box = [*(middle - size / 2).tolist(), *(middle + size / 2).tolist()]
+            ImageDraw.Draw(image).ellipse(box, style.INK)
 
     def stamped(
         self, image: Image.Image, drawn: Sequence[tuple[int, arrows.Arrow]]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.films import without_charts
+from helpers.films import staged, without_charts
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
@@ -134,7 +134,39 @@ def test_in_one_picture_of_several_machines_words_say_their_order(monkeypatch):
     runs = []
     for law in ("classical", "adaptive"):
         runs.append(smc.run(smc.Scenario(plant="duffing", law=smc.law(law), duration=0.1)))
-    for shown in (runs, runs[:1]):
-        next(iter(film.Frames(shown, size=SIZE, at=0.05)))
-    assert "back to front" in keys[0]
-    assert "back to front" not in keys[1]
+    for shown, title in (
+        (runs, None),
+        (runs, "Two carts of one oscillator"),
+        (runs[:1], None),
+    ):
+        next(iter(film.Frames(shown, title=title, size=SIZE, at=0.05)))
+    assert ["back to front" in key for key in keys] == [True, True, False]
+
+
+@renders
+def test_the_name_of_one_machine_takes_nothing_of_the_picture_s_width():
+    run = smc.run(smc.Scenario(plant="inverted_pendulum", law="classical", duration=0.1))
+    (tile,) = placed([run], ["Classical"]).tiles.tolist()
+    assert tile[0] == 0
+    assert tile[2] > 0.99 * SIZE[0]
+
+
+@renders
+@pytest.mark.parametrize("off", [0.0, 0.1, 2.0])
+def test_dots_lead_from_a_machine_that_is_followed_to_where_it_should_be(off):
+    drone = smc.plant("quadrotor")
+    run = smc.run(smc.Scenario(plant=drone, law="geometric", x0=drone.rest, duration=0.05))
+    wanted = run.x + off * np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    with staged(dataclasses.replace(run, r=wanted), SIZE) as shown:
+        still = np.asarray(shown.shot(0, 0.0), int)
+        shown.followed = np.zeros((1, 3))
+        dotted = np.asarray(shown.shot(0, 0.0), int)
+        ends = shown.project(np.array([run.x[0, :3], wanted[0, :3]]))
+    y, x = np.nonzero((np.abs(dotted - still) > 60).any(axis=2))
+    if off == 0.0:
+        assert not len(x)
+        return
+    assert np.abs(x - ends[0, 0]).max() < 20
+    assert y.max() < ends[0, 1] + 10
+    assert abs(y.min() - max(0.0, ends[1, 1])) < 20
+    assert len(np.unique(y)) < 0.6 * np.ptp(y)  # with gaps

@@ -11,7 +11,7 @@ from helpers.runs import at_defaults
 from helpers.sketch import made
 
 import smc_mujoco as smc
-from smc_mujoco.draw import style
+from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.horizon import horizon
 
 LAWS = ("classical", "pid")
@@ -100,3 +100,29 @@ def test_a_map_shows_the_paths_of_flights_up_to_the_clock_to_one_scale():
         pixel = now[SIZE[1] - 1 - up, across]
         assert (np.abs(pixel - style.rgb(shown.runs.colours[0])).max() < 20) == flown
     assert not sheet([dataclasses.replace(run, r=0.0 * run.r)], ["one"], SIZE).flights
+
+
+def test_on_a_map_the_wanted_path_lies_over_those_that_are_flown():
+    """Three laws on one path hid it."""
+    reference = [smc.Sine(0.5, 6.0), *[smc.Constant(0.0)] * 5]
+    run = made(smc.Scenario(plant="quadrotor", reference=reference, law="geometric", duration=1.0))
+    shown = sheet([dataclasses.replace(run, x=run.r)], ["one"], SIZE)
+    left, top, right, bottom = shown.box(shown.page.axes[1])
+    seen = picture(shown, 1.0)[top:bottom, left:right].astype(int)
+    for colour in (style.INK, shown.runs.colours[0]):
+        assert (np.abs(seen - style.rgb(colour)).max(axis=2) < 40).sum() > 20
+
+
+@pytest.mark.parametrize(("channel", "label"), [(2, "height z (m)"), (0, "|x − r| (m)")])
+def test_a_free_body_that_is_off_most_in_height_has_its_height_as_first_chart(channel, label):
+    run = made(smc.Scenario(plant="quadrotor", law="geometric", duration=0.1))
+    stays = np.zeros_like(run.x)
+    x = stays.copy()
+    x[:, channel] += 0.5
+    first, _ = panels.strip([dataclasses.replace(run, x=x, r=stays)])
+    assert first.label == label
+    if channel == 2:
+        np.testing.assert_array_equal(first.traces[0].x[:, 0], x[:, 2])
+    moving = stays + 0.1 * np.sin(run.t)[:, None]
+    first, path = panels.strip([dataclasses.replace(run, x=x, r=moving)])
+    assert (first.quantity, path.quantity) == ("settling", "path")
