@@ -11,7 +11,7 @@ from matplotlib.gridspec import SubplotSpec
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from smc_mujoco.common.aliases import AnyPath, Data, Pair
+from smc_mujoco.common.aliases import AnyPath, Pair
 from smc_mujoco.common.errors import ScenarioError, find, items_of
 from smc_mujoco.control.source import by_words
 from smc_mujoco.draw import dark, horizon, lanes, quantities, style
@@ -47,14 +47,13 @@ SLIDE_PANELS = "x", "u", "settling", "channels"
 
 
 class DrawnRuns(NamedTuple):
-    """Runs of a figure or a film, with the names, colours and looks of their lines; `events` are
-    what happens to their plants; `span` is the time that panels show, and the whole time, s.
+    """Runs of a figure or a film, with their names and colours; `events` are what happens to
+    their plants; `span` is the time that panels show, and the whole time, s.
     """
 
     traces: Sequence[Trace]
     names: Sequence[str]
     colours: Sequence[str]
-    looks: Sequence[Data]
     head: str  # what they are of
     gains: str  # where these come from
     events: Sequence[style.Event]
@@ -74,7 +73,6 @@ class DrawnRuns(NamedTuple):
             shown,
             names,
             style.trace_colours(traces),
-            style.looks(traces),
             style.head(scenarios),
             by_words(dict(zip(names, sources, strict=True))),
             events,

@@ -110,6 +110,7 @@ def test_runs_of_one_law_have_shades_of_its_colour_and_lines_and_marks_tell_them
     assert hues == pytest.approx([own] * 3, abs=0.01)
     light = [style.luminance(shade) for shade in shades]
     assert light == sorted(light, reverse=True)
+    assert 1.05 / (light[0] + 0.05) > 3.0, "contrast to paper"
     assert least([*shades, style.FAILED]) > style.MIN_DISTANCE
     looks = style.looks(runs)
     assert len({str(look["ls"]) for look in looks}) == len(runs)

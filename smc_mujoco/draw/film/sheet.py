@@ -264,7 +264,8 @@ class Sheet:
         names = Labels.of(runs.names, wide, high)
         pitch = LINE_PITCH * names.letters
         share = names.letters / high
-        parts = zip(labels, self.tiles, names.words, runs.colours, runs.looks, strict=True)
+        looks = style.looks(runs.traces)
+        parts = zip(labels, self.tiles, names.words, runs.colours, looks, strict=True)
         for box, tile, words, colour, look in parts:
             left, top, right, bottom = box
             middle = (left + right) / 2
