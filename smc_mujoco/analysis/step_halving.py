@@ -40,9 +40,9 @@ NOTE = (
 )
 SCORE_NOTE = f"{NOTE}. The smallest value is shown, with the largest in brackets; {RANGE}"
 UNTRIED = (
-    "these runs were not repeated with half the physics step. If there is friction, contact or "
-    "another part that the condition or the model adds, or if the integrator is not RK4, half the "
-    f"step may change values by more than {100.0 * MAX_CHANGE:g} %"
+    "these runs were not repeated with half the physics step. If the condition or the model has "
+    "friction, contact, a motor, an encoder or another part, or if the integrator is not RK4, half "
+    f"the step may change values by more than {100.0 * MAX_CHANGE:g} %"
 )
 
 

@@ -68,7 +68,7 @@ def _of_motion(trace: Any) -> Iterator[str]:
     if not switches(trace):
         return
     cure = "smc.accuracy.step_halving([trace]) repeats the run at shorter steps"
-    name = trace.scenario.plant.name
+    name = f"{trace.scenario.plant.name} under {trace.scenario.law.name}"
     if np.any(trace.holding[_last(trace)]):
         yield (
             f"u of {name} chatters while dry friction, limits or contacts act on its joints, and "

@@ -74,12 +74,12 @@ MEANINGS = {
 }
 # A word in tables -> what their key says about it.
 MARKS = MEANINGS | {
-    "strong=True": "A star or bold type marks the winner. If no law wins, it marks every law that "
-    "may be the best. Such a law meets three requirements: no other law is shown to be better "
-    f"({100 * LEVEL:g} % confidence in each column and condition), all its own runs have arrived, "
-    "and it has enough samples. Even so, a law is not marked if its interval is too wide: the "
-    "upper end is more than 4 times the lower end and more than 4 times the floor, below which "
-    "values count as equal.",
+    "strong=True": "A star or bold type marks the winner. If no law wins, it marks each law that "
+    "meets four requirements: no other law is shown to be better "
+    f"({100 * LEVEL:g} % confidence in each column and condition), all its own runs have arrived "
+    "(see the next sentence), it has enough samples, and its interval is not too wide. An interval "
+    "is too wide if its upper end is more than 4 times the lower end and more than 4 times the "
+    "floor, below which values count as equal.",
     "": "A run has arrived if, in its last fifth, the error stays within 10 % of its initial value "
     "or within 5 times the sensor's resolution.",
     "below ": f"{BELOW} If a law below the floor may be the best, no law above the floor is "

@@ -55,16 +55,16 @@ DrawSeed = Annotated[int, Whole(low=0, high=MAX_SEED)]
 TIMES = "Computing time of each compiled law per sample, on this computer"
 TIME_HEADINGS = "plant", "law", "relative time", "median (s)", "99 % quantile (s)"
 TIME_NOTE = (
-    "Relative to the law pid, timed in turn with each law on the same measurements, so it is not "
-    "the ratio of two medians of the table. How far that of pid is from 1 shows how little such "
-    "times say: all depend on how busy the computer is."
+    "Relative time is a law's time over that of the law pid, timed in turn with it on the same "
+    "measurements, so it is not the ratio of two medians of the table. All times depend on how "
+    "busy the computer is: that of pid itself would be 1 on an idle one."
 )
 GAINS = "plant", "law", "gains", "sets", "J differ by", "best set"
 BEST_SET = (
-    "Run i uses set i. After the last set, the sets repeat from the first. The best set has the "
-    "lowest J that its search saw; J of the sets differ by up to the share shown. Tables show the "
-    "median over all sets, and traces are of the first. `smc-mujoco list LAW` has the units of a "
-    "law's gains."
+    "Each set is from a search of its own. Run i uses set i, and after the last set the first "
+    "comes again. The best set is that whose search ended with the lowest J; J of the searches "
+    "differ by up to the share shown. Tables show medians over all sets, and traces are of the "
+    "first. `smc-mujoco list LAW` has the units of a law's gains."
 )
 
 

@@ -188,7 +188,7 @@ def _chosen(
     their searches.
     """
     chosen, tunings = {}, {}
-    for name in _counted("choosing gains of law", names, trial):
+    for name in _counted(f"choosing gains of {joined(names)}: law", names, trial):
         one = raced.entrants[name]
         law = one.gains(0)
         if one.count > 1:

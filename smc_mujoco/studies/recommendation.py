@@ -263,7 +263,16 @@ class RaceRecommendation(Recommendation):
         return self.race.winner
 
     @property
-    def worst_condition(self) -> str:
+    def worst_words(self) -> str:
+        """Which run the worst one is, and why."""
+        last = "settles last" if self.settles[self.law.name] == 1.0 else "settles last or never"
+        return (
+            f"a run of {self.law.name} under {self.worst_run.condition}{self._worst_condition}. Of "
+            f"its runs there, this one {last}"
+        )
+
+    @property
+    def _worst_condition(self) -> str:
         """Why the worst run is under its condition, as `recommend` chooses it; "" if there is no
         other.
         """
@@ -365,7 +374,7 @@ class RaceRecommendation(Recommendation):
             least = min(least, done)
         share = "all" if least == runs else f"at least {least} of"
         each = f"each of the {len(found)} conditions" if len(found) > 1 else "its condition"
-        return f"in {share} {runs} further runs under {each}, before the last fifth of the run"
+        return f"in {share} {runs} runs of the tables under {each}, before the last fifth of a run"
 
     @property
     def _weighs(self) -> str:
@@ -419,8 +428,8 @@ class RaceRecommendation(Recommendation):
         text = f"{joined(parts)}. Each is applied alone, {where}. At these levels the error after "
         text += f"{self.worst_run.duration:g} s is still below 5 % of its initial value"
         if not all(margin.open for margin in self.margins):
-            text += ", at those after 'not' it is above"
-        text += ". Such a run need not settle"
+            text += ", and at those after 'but not' it is above"
+        text += ". A run at a tolerated level need not settle"
         if self.beside != "nominal":
             text += ". Delay and mass include those of the condition; friction and blows are added"
         if self.helped:
@@ -512,12 +521,14 @@ class RaceRecommendation(Recommendation):
 
 
 def _level(margin: Margin) -> str:
-    """Return the level of a margin with its unit, such as "at least 8.75 N m", or "8 (not 9) N m"
-    with the least level that is not tolerated.
+    """Return the level of a margin with its unit, such as "at least 8.75 N m", or "8 N m but not 9
+    N m" with the least level that is not tolerated.
     """
-    unit = "times" if margin.unit == "1" else margin.unit
-    beyond = f" (not {number(margin.value + margin.resolution)})" if not margin.open else ""
-    return f"{margin.text}{beyond} {unit}".strip().replace("≥", "at least")
+    unit = " times" if margin.unit == "1" else f" {margin.unit}".rstrip()
+    text = f"{margin.text}{unit}".replace("≥", "at least")
+    if margin.open:
+        return text
+    return f"{text} but not {number(margin.value + margin.resolution)}{unit}"
 
 
 def _cost(J: float) -> str:

@@ -289,12 +289,12 @@ def test_margins_from_the_side_from_which_gravity_helps_say_so(raced):
     friction = recommendation.margins[1]
     said = "Gravity or a spring pushes the slide to the goal from the start"
     for value, words in (
-        (2.0, "2.00 (not 2.14) N from the other side"),
+        (2.0, "2.00 N but not 2.14 N from the other side"),
         (math.nan, "none from the other"),
     ):
         other = dataclasses.replace(friction, value=value)
         told = dataclasses.replace(recommendation, helped=["the slide"], opposed=other)._margins
-        assert f"friction of 1.69 (not 1.83) N from the start and {words}" in told
+        assert f"friction of 1.69 N but not 1.83 N from the start and {words}" in told
         assert said in told
     assert said not in recommendation._margins
     late = dataclasses.replace(recommendation, helped=["the slide"])._margins
@@ -445,7 +445,8 @@ def test_a_law_that_does_not_settle_is_not_recommended_without_saying_where(race
     behind = dataclasses.replace(recommendation, **fields)
     reason = f"{winner} has the lower J, but under noise only 1 of its 4 runs settled before the "
     assert behind.answer[0] == f"Use: {others[0].name}. {reason}last fifth of the run"
-    assert recommendation.worst_condition == ""  # the only one
+    run = f"a run of {name} under coulomb"
+    assert recommendation.worst_words == f"{run}. Of its runs there, this one settles last"
     for counts, why in (
         ((4, 4), ", the condition in which its runs settle latest"),
         ((3, 4), ", the condition in which the fewest of its runs settle"),
@@ -453,7 +454,7 @@ def test_a_law_that_does_not_settle_is_not_recommended_without_saying_where(race
     ):
         runs = {f"condition {i}": (count, 4) for i, count in enumerate(counts)}
         several = dataclasses.replace(recommendation, settled={name: runs})
-        assert several.worst_condition.startswith(why)
+        assert several.worst_words.startswith(f"{run}{why}")
     pushed = dataclasses.replace(
         recommendation.worst_run, disturbance=smc.Constant(20.0)
     )  # u_max is 9
@@ -485,7 +486,7 @@ def test_the_page_has_the_numbers_of_the_code():
         f"had {min(medians):.2f} to {max(medians):.2f} times the J of whole searches, the worst "
         f"{max(row['worst'] for row in found):.2f} times",
         f"`--quick` is `--minutes {module.QUICK_MINUTES:g}`",
-        f"in how many of {module.RACE_SEEDS} further runs",
+        f"in how many of {module.RACE_SEEDS} runs of the tables",
         f"fewer than {100 * recommendation_module.RELIABLE:g} %",
         f"{quick_search.BUDGET} evaluations a gain",
         f"after {race.LOOKS[0]} sets the laws are compared",

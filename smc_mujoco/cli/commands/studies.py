@@ -33,8 +33,8 @@ Needs = Annotated[
         help="The scores to compare, separated by commas: fast (settling time), accurate (ultimate "
         "bound), on-track (ITAE), calm (TV rate of u), gentle (largest u), frugal (integral of "
         "u^2), no-overshoot. With --minutes or --quick they are only shown: the laws are compared "
-        "by J. You can also name properties that the law must have, such as no-velocity; "
-        "`smc-mujoco list --help` lists them under --need.",
+        "by J, and those that settle reliably come first. You can also name properties that the "
+        "law must have, such as no-velocity; `smc-mujoco list --help` lists them under --need.",
     ),
 ]
 WhichCondition = Annotated[
@@ -162,12 +162,7 @@ def _save(recommendation: "RaceRecommendation", out: Path, terminal: Terminal) -
         [recommendation.worst_trace], out / "worst_run", title=_worst_title(recommendation)
     )
     terminal.wrote(*page.files(out / "worst_run"))
-    terminal.note(
-        f"The figure shows a run of {recommendation.law.name} under "
-        f"{recommendation.worst_run.condition}{recommendation.worst_condition}. Of its runs there, "
-        "this one settles last or never.",
-        wrap=True,
-    )
+    terminal.note(f"The figure shows {recommendation.worst_words}.", wrap=True)
 
 
 def _margins_command(
@@ -345,8 +340,8 @@ def compare(
     Gains that you give in brackets are used as they are. Otherwise a law of the package uses the
     gains that are shipped for the plant. If there are none, or if the law is from your own file,
     it is tuned by one rule, the same for all laws. This takes seconds to minutes for each
-    law and plant. The default values in your file are used only if you give --no-tune or --gains
-    with a set other than tuned, or if the law cannot be tuned.
+    law and plant. The default values in your file are used only if you give --no-tune, or --gains
+    default, study or tracking, or if the law cannot be tuned.
 
     A stopped command resumes when you start it again. Without --law, the usual laws that suit the
     plant are compared; --law all compares every general-purpose law.
