@@ -159,12 +159,20 @@ def print_page(template: Template, console: Console, package: str, text: str) ->
 
 
 def _gains(template: Template) -> Iterable[str]:
-    """Yield a line for each gain: its default and its range."""
+    """Yield a line for each gain: its default with its unit on a hinge, and its range."""
     width = max(map(len, template.gains), default=0)
+    units = {}
+    for name, gain in template.gains.items():
+        if unit := gain.unit_at(template.defaults):
+            units[name] = unit.text("N m", "rad")
+    widest = max(map(len, units.values()), default=0)
     for name, gain in template.gains.items():
         allowed = "  >= 0" if gain.nonnegative else ""
         if gain.positive:
             allowed = "  > 0"
-        yield f"{name:{width}} = {gain.default:<8g}{allowed}".rstrip()
+        unit = units.get(name, "")
+        yield f"{name:{width}} = {gain.default:<8g} {unit:{widest}}{allowed}".rstrip()
+    if any("N m" in unit or "rad" in unit for unit in units.values()):
+        yield "on a slide N stands for N m, and m for rad"
     if not template.gains:
         yield "none"

@@ -357,7 +357,7 @@ def compare(
         verdicts follow but that on J, and shipped sets as they are. With fewer than seven
         searches or seeds hardly any law can win; the answer says how many it takes.
       budget: largest number of sets of gains that a search tries, for each gain. With less than the
-        default, a remark says that a law may trail because of its search.
+        default, or more, a remark says that a law may trail, or lead, because of its search.
       quick: runs of 3 s and seven searches, unless you give other numbers; by default three plants
         and three conditions, which take some minutes of processor time. On a plant for which no law
         has shipped gains, the searches are those of `which` within minutes, under the conditions

@@ -400,10 +400,11 @@ class Trial(NamedTuple):
             for words in known:
                 print(words, file=sys.stderr)
         found = candidate_of(default, tuned)
-        if rule.quick or rule.budget >= BUDGET:
+        if rule.quick or rule.budget == BUDGET:
             return found
-        less = f"at most {rule.budget} sets were tried for each gain, where {BUDGET} are usual"
-        remarks = found.remark, f"{less}: where it trails, its search may be why"
+        tried = f"at most {rule.budget} sets were tried for each gain, where {BUDGET} are usual"
+        where = "trails" if rule.budget < BUDGET else "leads"
+        remarks = found.remark, f"{tried}: where it {where}, its search may be why"
         return found._replace(remark="; ".join(filter(None, remarks)))
 
     def run(

@@ -240,10 +240,9 @@ def study(
             every[name] = scenario
     missing = {name: scenario for name, scenario in every.items() if name not in store.where}
     if progress and (done := len(every) - len(missing)):
-        print(
-            f"{done} of {len(every)} simulations are in {printable(str(store.parts))}",
-            file=sys.stderr,
-        )
+        both = " (runs, and repeats at half the physics step)" if repeated else ""
+        kept = printable(str(store.parts))
+        print(f"{done} of {len(every)} simulations{both} are in {kept}", file=sys.stderr)
     _compute(missing, store, plants, threads, progress, executor)
     changes = {name: run_key.source(s) for name, s in by_key.items()}
     for name, scores in _half_step_scores(repeated, store).items():

@@ -72,6 +72,12 @@ def test_a_filter_shows_the_laws_that_have_all_properties_and_no_others(call):
     assert f"{len(lines)} of {len(laws())} {words}" in flat(out)
 
 
+def test_a_condition_is_shown_on_the_plant_asked_for(call):
+    out = flat(call("list", "friction", "--plant", "duffing")[1])
+    assert "Conditions, on duffing for 10 s friction friction=(Coulomb(level=0.1), " in out
+    assert call("list", "scenes", "--plant", "duffing")[0] == 2
+
+
 # one of them
 
 
@@ -91,9 +97,10 @@ def test_a_page_has_all_that_is_known(name, template: Template, call):
 
 def test_a_page_has_ranges_degree_plants_and_how_to_use_it(call):
     out = flat(call("list", "pid")[1])
+    assert "on a slide N stands for N m, and m for rad" in out
     assert "kp kd > M ki" in out
-    assert "tt = 0.5 > 0" in out
-    assert "kp = 10 >= 0" in out
+    assert "tt = 0.5 s > 0" in out
+    assert "kp = 10 N m/rad >= 0" in out
     assert "degree 2: acts on e, with u in e''" in out
     assert 'smc.law("pid", kp=10, ki=5)' in out
     assert "plants inverted_pendulum" in flat(call("list", "swing_up")[1])

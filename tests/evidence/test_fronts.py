@@ -230,7 +230,9 @@ def test_a_gain_at_the_edge_of_its_box_is_named_once_for_a_plant_with_how_often(
     edges = [{"l": "upper"}, {"l": "upper"}, {}]
     points = [point("hodob", 0.1, gains={"l": 632.5}, edges=edge) for edge in edges]
     (said,) = fronts_sentences.at_edges(points)
-    assert said.startswith("hodob on duffing: l = 632.5 is at the upper end of its box: a larger")
+    assert said.startswith(
+        "hodob on duffing: l = 632.5 is at the upper end of where it was searched: a larger"
+    )
     assert said.endswith("(2 of 3 points)")
 
 

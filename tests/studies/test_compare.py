@@ -103,7 +103,9 @@ def test_a_gain_at_the_end_of_its_box_is_named_as_tune_names_it(found, folder):
     assert fair_gains.candidate_of(my_law(), tuned).remark == ""
     lam = tuned.gains["lam"]
     at_its_end = dataclasses.replace(tuned, searched={**tuned.searched, "lam": (lam, 100.0 * lam)})
-    (words,) = [note for note in at_its_end.tables[0].notes if "end of its box" in note]
+    (words,) = [
+        note for note in at_its_end.tables[0].notes if "end of where it was searched" in note
+    ]
     assert fair_gains.candidate_of(my_law(), at_its_end).remark == words
 
 

@@ -229,7 +229,7 @@ def edges_in_words(gains: Numbers, edges: Mapping[str, str]) -> list[str]:
     beyond = {"lower": "smaller", "upper": "larger"}
     sentences = []
     for name, side in edges.items():
-        place = f"{name} = {gains[name]:.4g} is at the {side} end of its box"
+        place = f"{name} = {gains[name]:.4g} is at the {side} end of where it was searched"
         sentences.append(f"{place}: a {beyond[side]} one may be better")
     return sentences
 

@@ -11,7 +11,8 @@ from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common import annexes
 from smc_mujoco.common.interrupts import delay_signals
 
-KINDS = ("plants", "laws", "surfaces", "estimators", "scenes", "conditions", "metrics")
+CONDITIONS = "conditions"
+KINDS = ("plants", "laws", "surfaces", "estimators", "scenes", CONDITIONS, "metrics")
 C_TIME = 10.0  # s, that compiler and trial of a law in C may take, each; chosen
 
 
@@ -35,7 +36,9 @@ Needs = Annotated[
 Plant = Annotated[
     str | None,
     typer.Option(
-        metavar="PLANT", autocompletion=options.PLANTS, help="Only laws that suit a plant."
+        metavar="PLANT",
+        autocompletion=options.PLANTS,
+        help="Only laws that suit a plant; with the name of a condition, what it is on this plant.",
     ),
 ]
 
@@ -63,7 +66,9 @@ def list_(
 
     Example: smc-mujoco list my_law.c
     """
-    options.only_for(ctx, ("needs", "plant"), name is None, "lists: leave out NAME")
+    options.only_for(ctx, ("needs",), name is None, "lists: leave out NAME")
+    listed = name is None or name == CONDITIONS
+    options.only_for(ctx, ("plant",), listed or name not in KINDS, "laws and conditions")
     terminal = Terminal(json)
     if name is not None and Path(name).suffix in (".c", ".so"):
         with delay_signals():
@@ -77,10 +82,14 @@ def list_(
             from smc_mujoco.metrics.catalogue import CATALOGUE
             from smc_mujoco.simulation.conditions import NAMED
             from smc_mujoco.studies.scene import scenes
+        of_condition = name in NAMED
+        options.only_for(ctx, ("plant",), of_condition, "lists and conditions: leave out NAME")
         if name in {*NAMED, *CATALOGUE, *scenes()} - {*plants()}:
-            _print_all(terminal, name)
+            _print_all(terminal, name, plant)
         else:
             law_pages.print_pages(name, terminal)
+    elif name == CONDITIONS:
+        _print_all(terminal, name, plant)
     elif needs is not None or plant is not None:
         with delay_signals():
             from smc_mujoco.cli import law_pages
@@ -90,12 +99,14 @@ def list_(
     terminal.finish()
 
 
-def _print_all(terminal: Terminal, kind: str) -> None:
+def _print_all(terminal: Terminal, kind: str, plant: str | None = None) -> None:
     """Print a line about each plant, law, surface, estimator, scene and condition, about each of a
-    kind, or about what has this name, which may be a metric's.
+    kind, or about what has this name, which may be a metric's. Conditions are those of the plant,
+    by default one that has stops, and numbers for jumps.
     """
     with delay_signals():
         from smc_mujoco.cli import law_pages, tables
+        from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.mechanisms.plant import catalogue as plants
         from smc_mujoco.metrics.catalogue import metrics
         from smc_mujoco.simulation.conditions import DURATION, NAMED
@@ -108,11 +119,11 @@ def _print_all(terminal: Terminal, kind: str) -> None:
         **law_pages.lists(),
         "Scenes, for smc-mujoco run": tables.listed(scene.scenes(), scene.question),
     }
-    machine = plants()["inverted_pendulum"]  # it has stops, and numbers for jumps
+    machine = as_plant(plant or "inverted_pendulum")
     conditions = []
     for name, condition in NAMED.items():
         conditions.append((name, condition.brief(machine, DURATION) or "the scenario's defaults"))
-    lists["Conditions, on inverted_pendulum for 10 s"] = conditions
+    lists[f"Conditions, on {machine.name} for 10 s"] = conditions
     lists["Metrics"] = [(metric.name, metric.summary) for metric in metrics()]
     for title, rows in lists.items():
         found = rows
