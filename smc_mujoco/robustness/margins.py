@@ -144,6 +144,8 @@ class MarginKind:
     levels: tuple[float, ...]  # tried first, from small to large
     put: Callable[[Scenario, float], Scenario]  # the scenario with a level
     none: float = 0.0  # the level without any effect
+    # the level that the scenario itself has, where a level replaces it
+    own: Callable[[Scenario], float] | None = None
     signed: bool = False  # whether a level is tolerated only if its negative is, too
     # by what the levels are multiplied for a scenario
     size: Callable[[Scenario], float] = lambda base: 1.0
@@ -164,6 +166,7 @@ class MarginKind:
 
     def search(self, base: Scenario, resolution: float) -> LevelSearch:
         """Return the search for the margin of a scenario."""
+        low = self.own(base) if self.own else self.none
         if quantum := self.quantum(base):
 
             def rounded(level: float) -> float:
@@ -171,13 +174,11 @@ class MarginKind:
 
             step = QUANTA[resolution] * quantum
             levels = list(map(rounded, self.levels))
-            return LevelSearch(
-                levels=levels, resolution=lambda low: step, rounded=rounded, low=self.none
-            )
+            return LevelSearch(levels=levels, resolution=lambda low: step, rounded=rounded, low=low)
         size = self.size(base)
         levels = [size * level for level in self.levels]
         return LevelSearch(
-            levels=levels, resolution=lambda low: resolution * max(low, levels[0]), low=self.none
+            levels=levels, resolution=lambda low: resolution * max(low, levels[0]), low=low
         )
 
     def expected(self, base: Scenario) -> float | None:
@@ -247,14 +248,17 @@ def _with_blow(base: Scenario, level: float) -> Scenario:
 
 
 def _with_mass(base: Scenario, level: float) -> Scenario:
-    """Return the scenario with `level` times the nominal mass; the mismatch may call it "mass" or
-    by its own name.
-    """
-    if base.plant.mass in base.mismatch:
-        mass = base.plant.mass
-    else:
-        mass = "mass"
-    return dataclasses.replace(base, mismatch=dict(base.mismatch) | {mass: level})
+    """Return the scenario with `level` times the nominal mass."""
+    return dataclasses.replace(base, mismatch=dict(base.mismatch) | {_name_of_mass(base): level})
+
+
+def _own_mass(base: Scenario) -> float:
+    return base.mismatch.get(_name_of_mass(base), 1.0)
+
+
+def _name_of_mass(base: Scenario) -> str:
+    """Return what the mismatch calls the mass: "mass", or by its own name."""
+    return base.plant.mass if base.plant.mass in base.mismatch else "mass"
 
 
 def _with_noise(base: Scenario, level: float) -> Scenario:
@@ -285,6 +289,7 @@ MARGIN_KINDS: dict[str, MarginKind] = {
         unit="s",
         levels=DELAYS,
         put=lambda base, level: dataclasses.replace(base, input_delay=level),
+        own=lambda base: base.input_delay,
         quantum=lambda base: base.control_period,
         theory=_critical_delay,
     ),
@@ -306,7 +311,12 @@ MARGIN_KINDS: dict[str, MarginKind] = {
         theory=_tolerated_force,
     ),
     "mass": MarginKind(
-        label="mass, of the nominal", unit="1", levels=MASS_RATIOS, put=_with_mass, none=1.0
+        label="mass, of the nominal",
+        unit="1",
+        levels=MASS_RATIOS,
+        put=_with_mass,
+        none=1.0,
+        own=_own_mass,
     ),
     "blow": MarginKind(
         label="blow halfway through the run, on every driven joint",

@@ -366,9 +366,16 @@ class Board(Tables):
             return f"no law may win over the default gains of {joined(self.barred)}"
         if all(len(block.away) == len(block.medians) for block in self.blocks):
             return "every law has runs that fail or do not arrive"
-        reasons = {}
+        tied: dict[str, list[str]] = {}
         for block in self.blocks:
-            reasons[self._tied(block) or self.too_few] = None
+            tied.setdefault(self._tied(block), []).append(block.condition)
+        untied = tied.pop("", None)
+        reasons = []
+        for reason, conditions in tied.items():
+            alone = len(conditions) == len(self.blocks)
+            reasons.append(reason if alone else f"{reason} under {_conditions(conditions)}")
+        if untied:
+            reasons.append(self.too_few)
         if reason := "; ".join(filter(None, reasons)) or self._too_few_to_rank:
             return reason
         if not self.best:

@@ -154,6 +154,7 @@ def race(
     begin = time.monotonic()
     kept = _kept(trial, [(one, 0, 0) for one in entrants if one.task])
     with bar("set of gains", LOOKS[0] * len(entrants), trial.progress, counted=True) as shown:
+        shown.latest = clock.ends
         everyone = _first_sets(trial, plant, entrants, goal, clock, shown)
         running = dict(everyone)
         # s that a law took in each round

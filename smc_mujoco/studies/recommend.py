@@ -286,7 +286,7 @@ def _added(trial: Trial, plant: Plant, goal: Objective) -> str:
             return (
                 f"{condition.name}, of {noise.position:g} {units} in positions and "
                 f"{noise.velocity:g} {units}/s in velocities (standard deviations), as no "
-                "condition that you asked for has any"
+                "condition that you asked for has any: give one with noise=Noise(...) to replace it"
             )
     return ""
 

@@ -490,8 +490,9 @@ class RaceRecommendation(Recommendation):
             f"{MEDIANS} These tables show no significance tests; those are below. "
             f"{capital(UNTRIED)}."
         )
+        cells = repr([table.rows for table in shown])
         for word, meaning in (("below ", BELOW), ("may exceed ", MARKS["may exceed "])):
-            if word in str(shown):
+            if word in cells:
                 notes.append(meaning)
         last = shown.pop()
         return [*shown, dataclasses.replace(last, notes=[*notes, "", *self.answer])]
@@ -526,7 +527,7 @@ def _level(margin: Margin) -> str:
     """
     unit = " times" if margin.unit == "1" else f" {margin.unit}".rstrip()
     text = f"{margin.text}{unit}".replace("≥", "at least")
-    if margin.open:
+    if margin.open or not margin.resolution:
         return text
     return f"{text} but not {number(margin.value + margin.resolution)}{unit}"
 

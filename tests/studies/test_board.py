@@ -438,6 +438,11 @@ def test_few_sets_are_no_reason_where_every_run_settles(boards):
     few = dataclasses.replace(block, **LOST, samples=3, sets=3)
     settles = dataclasses.replace(boards[0], metric="settles", blocks=(few,))
     assert settles.result == "no winner; all laws settle in the same runs"
+    some = dataclasses.replace(few, medians=dict(zip(LAWS, (0.0, 0.5, 1.0), strict=True)))
+    some = dataclasses.replace(some, condition="noise")
+    both = dataclasses.replace(settles, blocks=(few, some))
+    rank = "3 sets of gains or runs cannot rank 3 laws here; "
+    assert f"all laws settle in the same runs under {few.condition}; {rank}" in both.result
 
 
 def test_a_law_below_the_floor_may_beat_one_without_any_value():

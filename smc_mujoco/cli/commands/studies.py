@@ -224,7 +224,7 @@ def _film(recommendation: "RaceRecommendation", out: Path, ends: float, terminal
             file = out / "worst_run_machine.png"
             at = _worst_time(recommendation.worst_trace)
             terminal.wrote(films.film(run, file, title=title, at=at))
-            needed = MIN_FPS * each * len(frames) / frames.fps
+            needed = first - begun + MIN_FPS * each * len(frames) / frames.fps
             terminal.note(
                 f"This picture stands in place of a film, which would take {needed:.0f} s; the "
                 "same command with more --minutes makes it.",
