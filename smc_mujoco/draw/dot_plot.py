@@ -91,10 +91,13 @@ def plot(
     head = style.titled(title, f"Medians: {dots.heading}")
     with style.page(width):
         key, shared = _key(table, dots)
+        if shared and not head:  # it has no place beside a title
+            key.append(pages.entry(shared, lw=0))
+            shared = ""
         across = 1 if width < pages.NARROW else len(dots.metrics)
         tall = WORDS_HEIGHT + LINE_HEIGHT * dots.lines
         heights = np.repeat(tall, len(dots.metrics) // across)
-        space = pages.head_height(width, key) + style.points(0.6)
+        space = pages.head_height(width, key, bool(head)) + style.points(0.6)
         usual = space + style.points(heights.sum())
         if isinstance(size, str) and height is None and usual > pages.MAX_HEIGHT:
             cure = "fewer plants or conditions"
@@ -109,7 +112,7 @@ def plot(
         by_plant = axes.reshape(len(dots.conditions), -1)
         for plant, high, row in zip(dots.conditions, tall, by_plant, strict=True):
             _draw_plant(row, dots, plant, across == 1)
-            if title is not None or len(dots.conditions) > 1:
+            if (title is not None and head) or len(dots.conditions) > 1:
                 _name_row(row[0], dots.labels[plant], high)
         pages.set_head(page, width, head, key, shared)
         pages.space_ticks(page)

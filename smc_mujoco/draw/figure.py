@@ -1,6 +1,7 @@
 """Figures: x, u and s of several runs over time with their phase portrait."""
 
 import math
+import operator
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -42,7 +43,13 @@ BLOCK_WIDTHS = (1.4, 1.0, 1.0)  # relative: of panels over time, of single contr
 ROW_HEIGHT = 1.5  # inches on a full page, height of a panel over time
 MAX_WORST = 3  # channels of a robot that are drawn, those with the largest errors
 LINE_ROW, LINES_ROW = 0.37, 0.45  # relative height of a row with one line, and with several
+REFERENCE_WORDS = "dashes: reference"
+GREY_WORDS = "grey: reference ± 2 %"
 END_TIME = "time before the end (ms)"
+NOTES = {  # above panels of a column, which has no key
+    "target": f"{REFERENCE_WORDS}; {GREY_WORDS}",
+    "chattering": "band: range; line: mean where it chatters",
+}
 SLIDE_PANELS = "x", "u", "settling", "channels"
 
 
@@ -53,6 +60,7 @@ class DrawnRuns(NamedTuple):
 
     traces: Sequence[Trace]
     names: Sequence[str]
+    entries: Sequence[str]  # these; default names with the sources of gains where those differ
     colours: Sequence[str]
     head: str  # what they are of
     gains: str  # where these come from
@@ -66,19 +74,34 @@ class DrawnRuns(NamedTuple):
         traces = style.traces_of_one_plant(traces)
         names = style.labels(traces, labels)
         scenarios = [trace.scenario for trace in traces]
-        sources = [scenario.law.source.words for scenario in scenarios]
+        sources = [scenario.law.source for scenario in scenarios]
+        entries = names
+        if labels is None:
+            behind, _ = pages.gain_sources([[source] for source in sources])
+            entries = list(map(operator.add, names, behind))
+        words = [source.words for source in sources]
         shown = list(map(finite, traces))
         events = style.events(traces, names)
         return cls(
             shown,
             names,
+            entries,
             style.trace_colours(traces),
             style.head(scenarios),
-            by_words(dict(zip(names, sources, strict=True))),
+            by_words(dict(zip(style.numbered(names), words, strict=True))),
             events,
             style.marks(events),
             (horizon.horizon(shown), end(shown)),
         )
+
+    def gains_within(self, room: float, letters: float) -> str:
+        """Return where the gains come from, in the order of the runs if their names have no room,
+        with letters of this size.
+        """
+        if style.width(self.gains, letters) <= room:
+            return self.gains
+        sources = [trace.scenario.law.source.words for trace in self.traces]
+        return f"gains: {', '.join(sources)}"
 
 
 def figure(
@@ -111,15 +134,20 @@ def figure(
       traces: one or several traces.
       path: file to write; default: none. Without an ending, or with .svg or .png, an SVG and a PNG
         are written; with .pdf, a PDF.
-      labels: one per trace; default: the laws' labels, with what differs between runs of one law.
-      title: default: the plant's label, and the condition if all traces have one.
+      labels: one per trace, drawn as given; default: the laws' labels, with what differs between
+        runs of one law, and the sources of gains where these differ. With your labels these stand
+        beside the title.
+      title: None for the plant's label, and the condition if all traces have one; "" for no title,
+        as in a journal, and the panels take its place. What stands beside the title then goes to
+        the key.
       panels: names among "x", "error", "spread", "v", "u", "delivered", "reaction", "d", "tip",
         "contact", "s", "channels" (e and u of the channels with the largest errors, three at most),
         "phase", "settling" (|x - r|), "end" (close-up of u). Default: those that suit the plant and
         the size.
-      size: "ieee-column" (3.5 in wide, with a note in place of the key of lines and bands, which
-        is for its caption), "ieee-page" (7.16 in), "slide" (13.3 x 7.5 in, three panels, large
-        letters), or (width, height) in inches. Default: 8.8 in wide.
+      size: "ieee-column" (3.5 in wide, with notes above x and u in place of the key, which is for
+        its caption; no note where a change is named, or in a figure as high as a column),
+        "ieee-page" (7.16 in), "slide" (13.3 x 7.5 in, three panels, large letters), or (width,
+        height) in inches. Default: 8.8 in wide.
       format: "svg", "png" or "pdf", of the file.
       fig: Figure or SubFigure to draw into; default: a new one.
       ax: axes to draw one panel into, by default "x", in your own style; `ax.legend()` then names
@@ -171,11 +199,18 @@ def _composed_page(
     """
     width, height = size
     blocks = _blocks(runs, chosen)
-    handles, gains = pages.run_handles(runs.traces, runs.names, runs.colours)
+    head = style.titled(title, runs.head)
+    handles = pages.run_handles(runs.traces, runs.entries, runs.colours)
     key = _key([*blocks.left, *blocks.right], runs.events)
     if blocks.left_out:
         entry = pages.entry(blocks.left_out, lw=0)
         key.append(entry)
+    gains = ""
+    if runs.entries == runs.names:
+        gains = runs.gains_within(pages.note_room(width), style.points(pages.TEXT_SIZE))
+    if gains and not head:  # there is no place beside a title
+        key.append(pages.entry(runs.gains, lw=0))
+        gains = ""
     narrow = width < pages.NARROW
     if not narrow:
         handles += key
@@ -187,7 +222,7 @@ def _composed_page(
     least = 0.0
     if not narrow:
         least = 4.0 if blocks.beside else 1.0
-    space = pages.head_height(width, handles)
+    space = pages.head_height(width, handles, bool(head))
     rows = max(*columns.values(), least)
     heights = blocks.heights
     rows_of_all = sum(map(len, heights))
@@ -205,7 +240,6 @@ def _composed_page(
         titled = list(zip(panels, words, strict=True))
         _draw_over_time(page, cells[k], titled, runs, k == 0, noted)
     _draw_beside(page, cells[2], blocks.beside, blocks.places, runs)
-    head = style.titled(title, runs.head)
     pages.set_head(page, width, head, handles, gains)
     meaning = "; ".join(str(one.get_label()) for one in key)
     page.set_label(meaning)
@@ -390,19 +424,18 @@ def _draw_over_time(
 ) -> None:
     """Draw panels over time with their labels in the cells of a column.
 
-    If `named`, changes are named above the first. If `noted`, a note above the first u tells its
-    line and band, unless changes are named there.
+    If `named`, changes are named above the first. If `noted`, notes tell the lines and the grey of
+    the first x or error, and of the first u that chatters, unless changes are named there.
     """
+    notes = dict(NOTES) if noted else {}
     frames: list[Axes] = []
     axes: list[Axes] = []
     for cell, (panel, words) in zip(cells, overview, strict=True):
         above = axes[0] if axes else None
         frame, rows = _rows(page, cell, panel, runs, above)
         frame.set_ylabel(words)
-        if noted and panel.quantity == "u" and (axes or not runs.marks):
-            noted = False
-            if drawing.mean_window(panel.traces):
-                drawing.note(frame, "band: range; line: mean where it chatters")
+        if (axes or not runs.marks) and (told := notes.pop(_noted(panel), "")):
+            drawing.note(frame, told)
         frames.append(frame)
         for ax, part, colours in rows:
             axes.append(ax)
@@ -417,9 +450,19 @@ def _draw_over_time(
     page.align_ylabels(frames)
 
 
+def _noted(panel: Panel) -> str:
+    """Return which of the NOTES a panel needs, or ""."""
+    if drawing.aims(panel):
+        return "target"
+    if panel.quantity == "u" and drawing.mean_window(panel.traces):
+        return "chattering"
+    return ""
+
+
 def _draw_alone(ax: Axes, runs: DrawnRuns, wanted: str, title: str | None) -> None:
     """Draw one panel into a caller's axes, which keep their look."""
     name = find("panel", wanted, PANEL_NAMES)
+    head = style.titled(title, "")
     before = set(ax.findobj())
     blocks = _blocks(runs, [name])
     if blocks.beside:
@@ -438,10 +481,10 @@ def _draw_alone(ax: Axes, runs: DrawnRuns, wanted: str, title: str | None) -> No
         words = _time_words(runs)
         ax.set(xlim=(0.0, runs.span[0]), xlabel=words, ylabel=places[0].label)
         drawing.over_time(ax, places[0], runs.colours, names=runs.names)
-        drawing.mark(ax, runs.marks, named=title is None)
-    if title is not None:
-        ax.set_title(style.titled(title, ""))
-    handles = pages.run_handles(runs.traces, runs.names, runs.colours)[0]
+        drawing.mark(ax, runs.marks, named=not head)
+    if head:
+        ax.set_title(head)
+    handles = pages.run_handles(runs.traces, runs.entries, runs.colours)
     for handle in handles:
         ax.add_artist(handle)
     dark.suit_page(set(ax.findobj()) - before)
@@ -587,11 +630,10 @@ def _key(shown: Sequence[Panel], events: Sequence[style.Event]) -> list[Handle]:
     handles: list[Handle] = []
     thin = style.points(drawing.LIGHT_LINE)
     for panel in shown:
-        aims = [np.isfinite(trace.r).any() for trace in panel.traces]
-        if panel.quantity in ("x", "e") and any(aims):
+        if drawing.aims(panel):
             dashes = {"lw": thin, "ls": drawing.DASHES}
-            handles.append(pages.entry("dashes: reference", style.INK, **dashes))
-            band = Patch(color=style.BAND, label="grey: reference ± 2 %")
+            handles.append(pages.entry(REFERENCE_WORDS, style.INK, **dashes))
+            band = Patch(color=style.BAND, label=GREY_WORDS)
             handles.append(band)
             break
     for name, words in drawing.meaning(shown).items():

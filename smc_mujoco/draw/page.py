@@ -147,13 +147,14 @@ def blank(width: float, height: float, fig: Figure | SubFigure | None = None) ->
     return fig
 
 
-def head_height(width: float, handles: Sequence[Handle]) -> float:
-    """Return the height of the title and the legend, in inches."""
+def head_height(width: float, handles: Sequence[Handle], titled: bool = True) -> float:
+    """Return the height of the title, if there is one, and of the legend, in inches."""
     labels, columns = _legend(handles, width)
     lines = np.char.count(labels, "\n") + 1 if labels else np.zeros(0)
     parts = np.array_split(lines, columns)
     rows = max(part.sum() for part in parts)
-    return style.points(1.9 * TITLE_SIZE + 1.45 * TEXT_SIZE * rows) / 72
+    above = 1.9 * TITLE_SIZE if titled else 0.0
+    return style.points(above + 1.45 * TEXT_SIZE * rows) / 72
 
 
 def _legend(handles: Sequence[Handle], width: float) -> tuple[list[str], int]:
@@ -182,20 +183,26 @@ def _legend(handles: Sequence[Handle], width: float) -> tuple[list[str], int]:
     return labels, 1
 
 
+def note_room(width: float) -> float:
+    """Return the room for a note beside the title of a page of `width` inches, in points."""
+    return MAX_SHARE * (72 * width - 16)
+
+
 def set_head(
     page: Figure | SubFigure, width: float, title: str, handles: Sequence[Handle], note: str = ""
 ) -> None:
     """Draw the title with the legend below it, in as few rows as fit, and a note at the right of
     the title.
 
-    A long title has smaller letters, no smaller than the legend's, and then a second line.
+    A long title has smaller letters, no smaller than the legend's, and then a second line. Without
+    a title the legend is at the top.
     """
     size = style.points(TEXT_SIZE)
     big = style.points(TITLE_SIZE)
     room = 72 * width - 16
     words, columns = _legend(handles, width)
     if note:
-        note = style.cropped(note, MAX_SHARE * room, size)
+        note = style.cropped(note, note_room(width), size)
         room -= style.width(note, size) + big
         place = {"xytext": (-8, -style.points(TITLE_PAD) - big), "textcoords": "offset points"}
         look = {"fontsize": size, "color": style.MUTED, "ha": "right", "va": "baseline"}
@@ -226,21 +233,16 @@ def set_head(
 
 def run_handles(
     traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]
-) -> tuple[list[Handle], str]:
-    """Return a legend's entries for runs, which say when a run failed, and the note of
-    `gain_sources`.
-    """
+) -> list[Handle]:
+    """Return a legend's entries for runs, which say when a run failed."""
     handles: list[Handle] = []
-    sources = [[trace.scenario.law.source] for trace in traces]
-    gains, shared = gain_sources(sources)
     looks = style.looks(traces)
-    for trace, name, colour, source, look in zip(traces, names, colours, gains, looks, strict=True):
-        words = name + source
-        if how := style.ending(trace):
-            words += f" ({how})"
+    for trace, name, colour, look in zip(traces, names, colours, looks, strict=True):
+        how = style.ending(trace)
+        words = f"{name} ({how})" if how else name
         sample = entry(words, colour, lw=style.points(2.0), **look)
         handles.append(sample)
-    return handles, shared
+    return handles
 
 
 def gain_sources(sources: Sequence[Iterable[Source]]) -> tuple[list[str], str]:

@@ -369,6 +369,12 @@ def meaning(panels: Sequence[Panel]) -> dict[str, str]:
     return words
 
 
+def aims(panel: Panel) -> bool:
+    """Return whether a panel of x or of the error shows a reference."""
+    known = [np.isfinite(trace.r).any() for trace in panel.traces]
+    return panel.quantity in ("x", "e") and any(known)
+
+
 def parted(panel: Panel) -> bool:
     """Return whether the channels of a panel's runs ever differ."""
     spreads = [np.ptp(QUANTITIES[panel.quantity](trace), axis=1) for trace in panel.traces]
@@ -407,14 +413,20 @@ def smoothed(trace: Trace) -> bool:
 
 
 def mean_window(traces: Sequence[Trace]) -> float:
-    """Return the longest window of the means of u, s; 0 if no u chatters visibly."""
+    """Return the longest window of the means of u, s; 0 if no u chatters visibly.
+
+    It does if u swings to and fro, within the time in which two reversals are chattering.
+    """
+    from scipy.ndimage import grey_closing, grey_opening
+
     low, high = limits(traces, "u")
     longest = 0.0
     for trace in filter(smoothed, traces):
         for u in trace.u.T[drawn_channels(trace.u)]:
-            smooth_u = smooth(u, window(trace))
-            ripple = np.abs(smooth_u - u)
-            chattering = ripple.max()
+            meant = smooth(u, window(trace)) != u
+            near = window(trace) // 4
+            swing = grey_closing(u, near) - grey_opening(u, near)
+            chattering = 0.5 * swing[meant].max(initial=0.0)
             if chattering > VISIBLE_CHATTERING * (high - low):
                 seconds = window(trace) * trace.scenario.control_period
                 longest = max(longest, seconds)

@@ -364,13 +364,13 @@ def _template(law: Component | str) -> tuple[Template | None, str]:
 
 
 def titled(title: object, default: str) -> str:
-    """Return the title that a user gives, on one line, or the default."""
+    """Return the title that a user gives, on one line, or for None the default."""
     if title is None:
         return default
     line = " ".join(title.split()) if isinstance(title, str) else "\n"
     if not line.isprintable():
         raise ScenarioError(f"title is {shown(title)}: give a text")
-    return line or default
+    return line
 
 
 def in_words(name: str) -> str:
@@ -400,11 +400,16 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
     for trace, name in zip(traces, names, strict=True):
         words = differences(trace, traces)
         told.append(f"{name}: {words}" if words else name)
-    numbered = []
-    for i, name in enumerate(told):
-        several = told.count(name) > 1
-        numbered.append(f"{name} {told[:i].count(name) + 1}" if several else name)
-    return numbered
+    return numbered(told)
+
+
+def numbered(names: Sequence[str]) -> list[str]:
+    """Return names, equal ones with numbers behind them."""
+    apart = []
+    for i, name in enumerate(names):
+        several = names.count(name) > 1
+        apart.append(f"{name} {names[:i].count(name) + 1}" if several else name)
+    return apart
 
 
 def differences(trace: Trace, others: Sequence[Trace]) -> str:

@@ -71,9 +71,10 @@ def draw(
     down = math.ceil(len(kinds) / across)
     with style.page(width):
         key = _key(found)
+        head = style.titled(title, f"Margins: {style.heading(plants)}")
         rows = _most_laws(found)
         tall = style.points(AROUND + ROW_HEIGHT * rows) * down * len(plants)
-        page = pages.blank(width, height or pages.head_height(width, key) + tall, fig)
+        page = pages.blank(width, height or pages.head_height(width, key, bool(head)) + tall, fig)
         axes = page.subplots(down * len(plants), across, squeeze=False)
         for plant, of_plant in zip(plants, np.split(axes, len(plants)), strict=True):
             if len(plants) > 1:
@@ -83,8 +84,7 @@ def draw(
                 _panel(ax, here, named=ax in of_plant[:, 0])
             for ax in of_plant.flat[len(kinds) :]:
                 ax.set_axis_off()
-        about = f"Margins: {style.heading(plants)}"
-        pages.set_head(page, width, style.titled(title, about), key)
+        pages.set_head(page, width, head, key)
         pages.space_ticks(page)
         return pages.write(page, paths)
 

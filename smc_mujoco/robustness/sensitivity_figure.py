@@ -41,6 +41,8 @@ def draw(
     colour = style.law_colour(found.scenario.law)
     pale = style.mixed(colour, style.PAPER, PALE_SHARE)
     name = style.law_name(found.scenario.law)
+    about = f"What breaks {name}: {style.plant_name(found.scenario.plant)}"
+    head = style.titled(title, about)
     with style.page(width):
         worse = f"a run, darker: worse {CATALOGUE[found.metric].label}"
         handles: list[Handle] = [
@@ -55,13 +57,12 @@ def draw(
             handles.append(border)
         tall = style.points(max(MIN_HEIGHT, 0.9 + ROW_HEIGHT * len(found.axes)))
         rows, columns = (2, 1) if width < pages.NARROW else (1, 2)
-        tall = pages.head_height(width, handles) + rows * tall
+        tall = pages.head_height(width, handles, bool(head)) + rows * tall
         page = pages.blank(width, height or tall, fig)
         bars, runs = page.subplots(rows, columns)
         _bars(bars, found, colour, pale)
         _runs(runs, found, colour)
-        about = f"What breaks {name}: {style.plant_name(found.scenario.plant)}"
-        pages.set_head(page, width, title or about, handles)
+        pages.set_head(page, width, head, handles)
         if found.checked:
             page.supxlabel(found.checked, wrap=True, color=style.MUTED, size="small")
         return pages.write(page, paths)

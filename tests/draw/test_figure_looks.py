@@ -330,17 +330,59 @@ def test_panels_over_time_end_where_all_rest_and_never_before_something_happens(
 
 
 @pytest.mark.parametrize("size", [PAGE, COLUMN])
-def test_a_column_tells_of_its_band_and_mean_above_the_first_control_that_chatters(size, one):
-    def notes(trace):
-        page = figure([trace], size=size, panels=["x", "u", "s"])
+def test_a_column_tells_of_its_reference_and_of_band_and_mean_of_a_control_that_chatters(size, one):
+    def notes(trace, *names):
+        page = figure([trace], size=size, panels=names or ["x", "error", "u", "s"])
         return [ax.get_title(loc="right") for ax in page.axes]
 
+    aim = "dashes: reference; grey: reference ± 2 %" if size == COLUMN else ""
     words = "band: range; line: mean where it chatters" if size == COLUMN else ""
-    assert notes(one) == ["", words, ""]
-    assert notes(calm(one)) == ["", "", ""]
+    assert notes(one) == [aim, "", words, ""]
+    assert notes(one, "error") == [aim]
+    assert notes(calm(one)) == [aim, "", "", ""]
     jump = dataclasses.replace(one.scenario, jump=smc.Jump(0.5, {"mass": 2.0}))
-    page = figure([dataclasses.replace(one, scenario=jump)], size=size, panels=["u"])
-    assert page.axes[0].get_title(loc="right") == ""  # where the change is named
+    changed = dataclasses.replace(one, scenario=jump)
+    for name in "xu":
+        assert notes(changed, name) == [""]  # where the change is named
+
+
+def test_words_tell_of_a_band_only_where_one_is_seen(one):
+    """A control that falls steeply, with reversals too small to see, has a mean beside it."""
+    count = len(one.t)
+    tiny = 0.004 * (-1.0) ** np.arange(count)
+    fall = 1.0 - np.tanh((one.t - 0.5) / 0.004)
+    for swing, seen in ((0.0, False), (1.0, False), (50.0, True)):
+        u = fall + swing * tiny
+        trace = dataclasses.replace(one, u=u[:, None])
+        page = figure([trace], size=COLUMN, panels=["u"])
+        assert bool(page.axes[0].get_title(loc="right")) == seen
+        assert ("band: range of u" in str(page.get_label())) == seen
+
+
+@pytest.mark.parametrize("size", [None, COLUMN])
+def test_an_empty_title_draws_none_and_closes_the_gap(size, one):
+    def top(page):
+        page.draw_without_rendering()
+        height = page.get_figheight() * page.dpi
+        return height - max(ax.get_tightbbox().y1 for ax in page.axes), height
+
+    usual, height = top(figure([one], size=size))
+    (label,) = style.labels([one], None)
+    for title in ("", " "):
+        page = figure([one], size=size, title=title)
+        (legend,) = page.legends
+        assert label in [text.get_text() for text in legend.get_texts()]
+        assert not legend.get_title().get_text()
+        gap, lower = top(page)
+        big = style.points(pages.TITLE_SIZE) * page.dpi / 72 if size is None else 0.0
+        assert gap < usual - big
+        assert lower < height or size is None, "a page has its usual shape"
+        assert not page.artists, "nothing is beside the title"
+        assert "gains: default" in str(page.get_label())
+    alone = plt.figure().subplots()
+    figure([one], ax=alone, title=" ")
+    assert not alone.get_title()
+    plt.close("all")
 
 
 def test_the_error_is_the_largest_within_its_window_on_a_logarithmic_axis(one):

@@ -118,3 +118,37 @@ def test_figures_and_films_say_whose_gains_are_drawn():
     assert {"fast, gains: yours", "slow, gains: default"} <= set(drawn)
     assert [note.get_text() for note in smc.figure(alike).artists] == ["gains: yours"]
     assert DrawnRuns.of(mixed, ["fast", "slow"]).gains == "gains: yours for fast, default for slow"
+
+
+@pytest.mark.parametrize(
+    ("size", "said"),
+    [(None, "gains: yours for a, default for b_c"), ("ieee-column", "gains: yours, default")],
+)
+def test_labels_of_a_user_stay_and_the_sources_of_gains_are_beside_the_title(size, said):
+    laws = [FAST, at_default(SLOW)]
+    mixed = smc.run([smc.Scenario(plant="duffing", law=law, duration=0.1) for law in laws])
+    labels = ["a", "b_c"]
+    page = smc.figure(mixed, labels=labels, size=size)
+    drawn = [label.get_text() for label in page.legends[0].get_texts()]
+    assert drawn[:2] == labels
+    assert not any("gains" in label for label in drawn)
+    assert [note.get_text() for note in page.artists] == [said]
+    untitled = smc.figure(mixed, labels=labels, size=size, title="")
+    assert "gains: yours for a, default for b_c" in str(untitled.get_label())
+    twins = smc.figure(mixed, labels=["a", "a"])
+    assert [note.get_text() for note in twins.artists] == ["gains: yours for a 1, default for a 2"]
+
+
+def test_an_empty_title_of_medians_draws_none_and_the_key_has_the_source_of_gains(tmp_path):
+    smc.study(smc.grid("duffing", "classical", duration=0.1), tmp_path)
+    table = smc.Table.read(tmp_path)
+    pages = {title: smc.plot(table, metrics=["itae"], title=title) for title in (None, "", "T")}
+    for title, page in pages.items():
+        (legend,) = page.legends
+        head = legend.get_title().get_text()
+        assert head == {None: "Medians: Duffing oscillator"}.get(title, title)
+        key = [text.get_text() for text in legend.get_texts()]
+        assert ("gains: shipped" in key) == (title == "")
+        plant = "Duffing oscillator" if title == "T" else ""  # else the caption tells it
+        assert page.axes[0].get_title(loc="left") == plant
+    assert pages[""].get_figheight() < pages[None].get_figheight()

@@ -190,7 +190,7 @@ def film(
         pages show as an image; .png, the picture at the time `at`. None writes nothing, and returns
         the pictures for other packages, `Frames`.
       labels: one a trace; default: the laws' labels, with what differs between runs of one law.
-      title: default: the plant's name, and the condition if all traces have one.
+      title: None for the plant's name, and the condition if all traces have one; "" for no title.
       size: width and height in px, even. Default: 1280 x 720, and 800 x 450 for .webp and `Frames`.
       fps: frames a second; default: 30, and 20 for .webp.
       speed: of playback, such as 1 for real time or 0.25; default: 1, 1/2, 1/4 or 1/8

@@ -104,11 +104,15 @@ def head_lines(
     runs: DrawnRuns, size: tuple[int, int], title: str | None, keys: Sequence[Sequence[str]]
 ) -> int:
     """Return the number of lines over the machines: one where the title has room beside each of
-    the keys and the clock, and nothing happens to the plants, which is told there, too.
+    the keys and the clock, and nothing happens to the plants, which is told there, too; without a
+    title one.
     """
+    head = one_line(style.titled(title, runs.head))
+    if not head:
+        return 1
     if runs.events:
         return 2
-    room = key_room(size, one_line(style.titled(title, runs.head)))
+    room = key_room(size, head)
     fits = all(style.width(" · ".join(key), letters(size)) <= room for key in keys)
     return 1 if fits else 2
 
@@ -230,14 +234,14 @@ class Sheet:
         left = EDGE * high
         right = self.size[0] - left
         wide = style.width(title, high, bold=True)
-        share = max(LEAST_TITLE, min(1.0, (right - left) / wide))
+        share = max(LEAST_TITLE, min(1.0, (right - left) / max(wide, 1.0)))
         words = style.cropped(title, right - left, share * high, bold=True)
         first = FIRST_LINE * LINE_PITCH * high
         title_size = share * ONE_SIZE["axes.titlesize"]
         self.write(left, first, words, va="center", weight="bold", fontsize=title_size)
         if lines == 1:
             last = first
-            left += wide + high
+            left += wide + high if title else 0.0
             self.room = key_room(self.size, title)
         else:
             last = SECOND_LINE * LINE_PITCH * high
@@ -245,12 +249,9 @@ class Sheet:
         self.clock = self.write(right, last, ha="right", va="center", weight="bold")
         right -= style.width(CLOCK, high, bold=True) + high
         self.pace = self.write(right, last, ha="right", va="center", color=style.MUTED)
-        gains = self.runs.gains
-        if style.width(gains, high) > self.room:  # in the order of the machines
-            sources = [trace.scenario.law.source.words for trace in self.runs.traces]
-            gains = f"gains: {', '.join(sources)}"
+        gains = self.runs.gains_within(self.room, high)
         said = list(filter(None, [*key, order, gains]))
-        least = lines - 1  # beside the title there may be no words
+        least = int(lines == 2 or not title)  # beside the title there may be no words
         while len(said) > least and style.width(" · ".join(said), high) > self.room:
             said.pop()
         self.key = style.cropped(" · ".join(said), self.room, high)

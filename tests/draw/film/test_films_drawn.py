@@ -126,9 +126,10 @@ def test_words_over_machines_are_on_one_line_where_they_have_room():
         (trace, "Duffing under a title that is long", [key]),
         (trace, "Duffing", [key, ["last periods, deflections × 1000"] * 2]),
         (machine("duffing", jump=smc.Jump(0.2, {"mass": 2.0})), "Duffing", [key]),
+        (machine("duffing", jump=smc.Jump(0.2, {"mass": 2.0})), " ", [key * 9]),
     ):
         lines.append(head_lines(DrawnRuns.of([one], ["one"]), size, title, keys))
-    assert lines == [1, 2, 2, 2]
+    assert lines == [1, 2, 2, 2, 1]
     tile, label = np.zeros((1, 4), int), np.array([[0, 200, 800, 240]])
     page = Sheet(DrawnRuns.of([trace], ["one"]), size, tile, label, "Duffing", key, lines=1)
     picture(page, 0.5, 0.125)
@@ -140,6 +141,10 @@ def test_words_over_machines_are_on_one_line_where_they_have_room():
     assert min(box.y0 for box in boxes) > size[1] - room_of(size, 1).top
     full = Sheet(DrawnRuns.of([trace], ["one"]), size, tile, label, "Duffing " * 4, lines=1)
     assert full.key == "", "whole words or none"
+    bare = Sheet(DrawnRuns.of([trace], ["one"]), size, tile, label, "", ["u 6 N " * 40], lines=1)
+    assert bare.key.startswith("u 6 N u"), "it is cropped, as on a line of its own"
+    place = bare.below.get_window_extent(bare.canvas.get_renderer()).x0
+    assert place == pytest.approx(page.page.texts[0].get_window_extent().x0, abs=1.0)
 
 
 @pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
