@@ -28,11 +28,10 @@ PLAIN_WIDTH = 80  # characters of a line of plain text
 NAME_WIDTH = 20  # characters of a name before it is broken
 HEADING_WIDTH = 8  # characters of a heading at least
 NARROW_WIDTH = 12  # characters of a line below a number where space is short
-# In LaTeX: characters between two columns; letters of words in the width of a character; least
-# letters in a line of words, about the width of a column of a paper
-TEX_GAP = 2
-TEX_LETTERS = 1.15
-TEX_WIDTH = 60
+# In LaTeX: widths of a character, of one in a line below, and of the narrowest words, em
+TEX_CHARACTER = 0.5
+TEX_SMALL = 0.43
+TEX_WIDTH = 22
 MAX_HTML_ROWS = 40
 NEEDS = r"needs booktabs; \small\setlength{\tabcolsep}{2pt} before it makes it narrower"
 NO_BREAK = "\N{NO-BREAK SPACE}"
@@ -44,7 +43,7 @@ TEX |= {
     "^": r"\textasciicircum{}",
 }
 TEX |= {"–": "--", "·": r"$\cdot$", "×": r"$\times$", "±": r"$\pm$", "−": "$-$"}
-TEX |= {"′": "$'$", "″": "$''$"}
+TEX |= {"′": "$'$", "″": "$''$", NO_BREAK: "~"}
 LETTERS = "αβγδεζηθικλμνξπρστυφχψωΓΔΘΛΞΠΣΦΨΩ"
 LETTER_NAMES = (
     "alpha beta gamma delta varepsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau "
@@ -78,7 +77,7 @@ class Tabular:
     notes: Sequence[str] = ()  # paragraphs below the table
     left: int = 1  # columns of names, which are aligned to the left
     label: str = ""  # what LaTeX prints instead of the title
-    under: Sequence[str] = ()  # sentences that LaTeX prints below the table: what its cells mean
+    under: Sequence[str] = ()  # paragraphs that LaTeX prints below the table
 
     def __str__(self) -> str:
         return plain(self)
@@ -201,31 +200,28 @@ class Tabular:
 
     def to_latex(self) -> str:
         """Return a tabular, which needs the package booktabs, below comments with the notes; the
-        title and the sentences `under` the table are in print.
+        title and the paragraphs `under` the table are in print.
 
         What stands below a number is in a further line of its row. Words below numbers become
         letters, which a line under the table explains.
         """
-        lines = []
-        for text in (*self.notes, NEEDS):
-            lines.append(f"% {text}".replace("\n", " "))  # or what follows were no comment
         marks = self._marks()
-        width = 0
+        widths = []
         heads = []
         columns = []
         for i in range(len(self.headings)):
             letters = marks if i >= self.left else {}
             cells = [_cell(row[i]) for row in self.rows]
-            widest = max((_tex_width(cell, letters) for cell in cells), default=0)
-            head = self._heading(i, widest).splitlines()
-            width += max([widest, *map(len, head)]) + TEX_GAP
+            widest = max((_tex_width(cell, letters) for cell in cells), default=0.0)
+            head = self._heading(i, math.ceil(widest / TEX_CHARACTER)).splitlines()
+            widths.append(max([widest, *(TEX_CHARACTER * len(line) for line in head)]))
             heads.append([*map(tex, head)][::-1])
             columns.append([_tex_cell(cell, letters) for cell in cells])
-        width = max(math.floor(TEX_LETTERS * width), TEX_WIDTH)
-        lines += [
+        width = max(sum(widths), TEX_WIDTH)
+        lines = [
             f"\\begin{{tabular}}{{{'l' * self.left}{'r' * (len(self.headings) - self.left)}}}",
             "\\toprule",
-            *self._tex_words(self.label or self.title, width),
+            *self._tex_words([self.label or self.title], width),
             *_tex_lines(heads)[::-1],  # their last lines are level
             "\\midrule",
         ]
@@ -238,10 +234,10 @@ class Tabular:
         lines.append("\\bottomrule")
         meanings = []
         for words, mark in marks.items():
-            meanings.append(f"{mark}: {words}".replace(" ", NO_BREAK))
-        for text in ("; ".join(meanings), " ".join(self.under)):
-            lines += self._tex_words(text, width)
-        return "\n".join([*lines, "\\end{tabular}\n"])
+            meanings.append(f"({mark}): {words}".replace(" ", NO_BREAK))
+        lines += self._tex_words(["; ".join(meanings), *self.under], width)
+        comments = commented("\n".join([*self.notes, NEEDS]))
+        return "\n".join([comments, *lines, "\\end{tabular}\n"])
 
     def _marks(self) -> dict[str, str]:
         """Return words below numbers -> the letter that LaTeX prints instead."""
@@ -254,12 +250,15 @@ class Tabular:
                         marks.setdefault(line, chr(ord("a") + letter) * (1 + again))
         return marks
 
-    def _tex_words(self, text: str, width: int) -> list[str]:
-        """Return lines of words of a width, over all columns."""
-        wide = f"\\multicolumn{{{len(self.headings)}}}{{l}}"
+    def _tex_words(self, paragraphs: Iterable[str], width: float) -> list[str]:
+        """Return a row for each paragraph over all columns, which LaTeX breaks at a width, em."""
+        gaps = 2 * (len(self.headings) - 1)
+        wide = f"p{{\\dimexpr {width:.3g}em+{gaps}\\tabcolsep\\relax}}"
         lines = []
-        for line in _wrapped(text.replace(" %", f"{NO_BREAK}%"), width).splitlines():
-            lines.append(f"{wide}{{\\footnotesize {tex(line)}}} \\\\")
+        for text in filter(None, paragraphs):
+            words = tex(re.sub(r"(?<=\d) (?=%|ms\b)", NO_BREAK, text))
+            cell = f"\\multicolumn{{{len(self.headings)}}}{{{wide}}}"
+            lines.append(f"{cell}{{\\footnotesize\\raggedright {words}}} \\\\")
         return lines
 
 
@@ -405,10 +404,16 @@ def _tex_lines(cells: Iterable[Sequence[str]]) -> list[str]:
     return lines
 
 
-def _tex_width(cell: Cell, marks: Mapping[str, str]) -> int:
-    """Return the characters of the longest line of `_tex_cell`."""
-    lines = [line for line in _below(cell) if line not in marks]
-    return max(map(len, (cell.label or cell.text, *lines)))
+def _tex_width(cell: Cell, marks: Mapping[str, str]) -> float:
+    """Return about the width of `_tex_cell`, em."""
+    text = cell.label or cell.text
+    widths = []
+    for line in _below(cell):
+        if line in marks:
+            text += f" ({marks[line]})"
+        else:
+            widths.append(TEX_SMALL * len(line))
+    return max(TEX_CHARACTER * len(text), *widths, 0.0)
 
 
 def _tex_cell(cell: Cell, marks: Mapping[str, str]) -> list[str]:
@@ -421,17 +426,22 @@ def _tex_cell(cell: Cell, marks: Mapping[str, str]) -> list[str]:
     letters = []
     for line in _below(cell):
         if line in marks:
-            letters.append(marks[line])
+            letters.append(f"({marks[line]})")
         else:
             below.append(f"\\footnotesize {tex(line)}")
     if letters:
-        text += f"$^{{{','.join(letters)}}}$"
+        text += f"~{{\\footnotesize {','.join(letters)}}}"
     return [text, *below]
+
+
+def commented(text: str) -> str:
+    """Return text as comments of LaTeX."""
+    return "\n".join(f"% {line}".rstrip() for line in text.splitlines())
 
 
 def tex(text: str) -> str:
     """Return text with LaTeX's special characters escaped, and numbers with exponents, powers,
-    Greek letters and dashes in its notation.
+    Greek letters, dashes and u_max in its notation.
     """
 
     def written(match: re.Match[str]) -> str:
@@ -439,8 +449,11 @@ def tex(text: str) -> str:
             return f"${match['number']}\\cdot10^{{{match['power']}}}$"
         if match["raised"]:
             return f"$^{{{match['raised']}}}$"
+        if match["bound"]:
+            return r"$u_{\max}$"
         return TEX.get(match["letter"], match["letter"])
 
+    number = r"(?P<number>[<-]?[\d.]+)e(?P<power>-?\d+)"
     return re.sub(
-        r"(?P<number>[<-]?[\d.]+)e(?P<power>-?\d+)|\^(?P<raised>-?\d+)|(?P<letter>.)", written, text
+        rf"{number}|\^(?P<raised>-?\d+)|(?P<bound>\bu_max\b)|(?P<letter>.)", written, text
     )

@@ -751,8 +751,8 @@ def heading(
 
 
 def condition_name(condition: str) -> str:
-    """Return a condition as pictures and LaTeX name it."""
-    return condition.replace("_", " ")
+    """Return a condition as pictures and LaTeX name it, such as "delay 10 ms"."""
+    return re.sub(r"(?<=\d)ms\b", " ms", condition.replace("_", " "))
 
 
 def prefixed(largest: float, unit: str) -> tuple[float, str]:

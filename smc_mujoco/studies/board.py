@@ -62,8 +62,8 @@ MEANINGS = {
     "J (": "Tuning minimises J, summed over conditions: ITAE divided by the initial error, "
     "plus 0.001 s^3 times the variation of u divided by u_max and by the duration. The table's J "
     "is from separate runs, which tuning has not seen.",
-    "shipped": "Shipped gains come with the package.",
-    "tuned here": "Gains tuned here come from the user's own searches.",
+    "shipped": "Shipped gains come with smc_mujoco.",
+    "tuned here": "Gains tuned here were found by searches with smc_mujoco.",
     "settled runs": "A run counts as settled if it settles before its last fifth.",
     "settling time": "Settling time is when the error enters its band to stay: 2 % of its initial "
     "value, or of the reference's range if that is larger.",
@@ -93,15 +93,18 @@ MARKS = MEANINGS | {
 }
 LAST = "never", "fails", "not arrived"  # words in place of a value
 
-# A word in a table's headings and cells -> what LaTeX prints below the table about it.
+# A word in headings and cells -> what LaTeX prints about it below the last table.
 UNDER = {
-    "": f"Below each median, or share, is its {100 * LEVEL:g} % interval.",
+    "": f"Below each median is its {100 * LEVEL:g} % interval.",
     **MEANINGS,
+    "settled runs": "Settled runs are given as a share, not as a median. "
+    + MEANINGS["settled runs"],
     "default": "Default gains are those of the law's own file.",
-    "yours": "Gains marked yours were given by the user.",
+    "yours": "Gains marked yours were given by the authors.",
     "strong=True": "Bold: may be the best: no other law is shown to be better "
     f"({100 * LEVEL:g} % confidence).",
-    "below ": "Below a floor: too small to be resolved; such values count as equal.",
+    "below ": "Below a floor (of noise, resolution, or a small share of the start or of u_max): "
+    "such values count as equal.",
     "may exceed ": "May exceed a floor: the median is below it, but need not stay there.",
     "at half": "At half the step: the median with half the physics step.",
 }
@@ -558,8 +561,11 @@ class Boards(Tables, list[Board]):
         if not groups:
             return [Tabular(headings=["no boards: no metric applies"], rows=[], notes=self.absent)]
         tabulars = [_table(boards, self.labels, self.plants) for boards in groups.values()]
-        notes = *tabulars[-1].notes, *self.remarks, *key(self, repr(tabulars))
-        return [*tabulars[:-1], dataclasses.replace(tabulars[-1], notes=notes)]
+        words = str([(table.headings, table.rows) for table in tabulars])
+        last = tabulars[-1]
+        notes = *last.notes, *self.remarks, *key(self, words)
+        under = *last.under, _short_key(self, words)
+        return [*tabulars[:-1], dataclasses.replace(last, notes=notes, under=under)]
 
 
 def hidden(lead: float) -> str:
@@ -654,22 +660,13 @@ def _table(
     largest = max(boards, key=lambda board: len(board.blocks))
     plant = largest.group["plant"]
     headings = ["law", *map(heading, boards)]
-    words = str([headings, rows])
-    under = []
-    for word, text in UNDER.items():
-        if word in words:
-            under.append(text)
-    if _few(boards):
-        under.insert(1, FEW)
-    if UNDER["strong=True"] in under:
-        under += _wins(boards, labels)
     return Tabular(
         headings=headings,
         rows=rows,
         title=_title(largest, plant),
         label=_title(largest, style.plant_name(plants.get(plant, plant)), style.condition_name),
         notes=_verdicts(boards),
-        under=under,
+        under=_wins(boards, labels) if "strong=True" in str(rows) else (),
     )
 
 
@@ -687,7 +684,7 @@ def _title(board: Board, plant: str, named: Callable[[str], str] = str) -> str:
 
 
 def _wins(boards: Sequence[Board], labels: Mapping[str, str]) -> list[str]:
-    """Return which law wins in which metrics; one sentence where none does."""
+    """Return a paragraph: which law wins in which metrics."""
     won: dict[str, list[str]] = {}
     for board in boards:
         if board.winner:
@@ -695,7 +692,7 @@ def _wins(boards: Sequence[Board], labels: Mapping[str, str]) -> list[str]:
     sentences = []
     for law, metrics in won.items():
         sentences.append(f"{labels.get(law) or style.law_name(law)} wins: {joined(metrics)}.")
-    return sentences or ["No law wins."]
+    return [" ".join(sentences or ["No law wins."])]
 
 
 def _cell(board: Board, entry: BoardEntry) -> Cell:
@@ -734,8 +731,16 @@ def _few(boards: Sequence[Board]) -> bool:
     return False
 
 
+def _short_key(boards: Sequence[Board], words: str) -> str:
+    """Return what LaTeX prints about the words of tables."""
+    sentences = [text for word, text in UNDER.items() if word in words]
+    if _few(boards):
+        sentences.insert(1, FEW)
+    return " ".join(sentences)
+
+
 def key(boards: Sequence[Board], tables: str) -> list[str]:
-    """Return what the cells of these tables show, in paragraphs."""
+    """Return what the words of these tables mean, in paragraphs."""
     parts = [MEDIANS]
     if _few(boards):
         parts.append(FEW)

@@ -19,7 +19,7 @@ from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, co
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown, warn_once
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import replacing
-from smc_mujoco.common.tabular import Tables, Tabular
+from smc_mujoco.common.tabular import Tables, Tabular, commented, plain
 from smc_mujoco.common.text import joined, number
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Template, gains_text
@@ -137,6 +137,19 @@ class Compared(Tables):
         """The tables of the `leaderboard`, of worst cases, of times, and of gains."""
         tables = self._without_times
         times = []
+        for plant, by_law in self.times.items():
+            for law, time in by_law.items():
+                # to two digits: those of repeated calls differ by tens of percent
+                of_law = [number(value, 2) for value in (time.ratio, time.median, time.high)]
+                times.append((plant, law, *of_law))
+        if times:
+            about = {"headings": TIME_HEADINGS, "title": TIMES, "notes": [TIME_NOTE]}
+            tables.append(Tabular(rows=times, left=2, **about))
+        return [*tables, self._table_of_gains]
+
+    @property
+    def _table_of_gains(self) -> Tabular:
+        """The table of gains: their sources, the best sets, and remarks."""
         gains = []
         notes = self.remarks
         for plant, candidates in self.candidates.items():
@@ -151,14 +164,7 @@ class Compared(Tables):
                 apart = law.source.search.apart if law.source.search else ""
                 of_law = law.source.words, f"{len(sets)}", apart, gains_text(best)
                 gains.append((plant, law.name, *of_law))
-            for name, time in self.times.get(plant, {}).items():
-                # to two digits: those of repeated calls differ by tens of percent
-                of_law = [number(value, 2) for value in (time.ratio, time.median, time.high)]
-                times.append((plant, name, *of_law))
-        if times:
-            about = {"headings": TIME_HEADINGS, "title": TIMES, "notes": [TIME_NOTE]}
-            tables.append(Tabular(rows=times, left=2, **about))
-        return [*tables, Tabular(headings=GAINS, rows=gains, title="Gains", notes=notes, left=6)]
+        return Tabular(headings=GAINS, rows=gains, title="Gains", notes=notes, left=6)
 
     @property
     def _without_times(self) -> list[Tabular]:
@@ -170,15 +176,18 @@ class Compared(Tables):
         return tables
 
     def to_latex(self, path: AnyPath | None = None) -> str:
-        """Return a LaTeX tabular for each plant in each condition, which its first line names,
-        below comments with the verdicts; needs booktabs.
+        """Return a LaTeX tabular for each plant and condition, which its first line names: put each
+        into a float of its own; needs booktabs.
 
-        Five metrics are wider than a column of text: put them into table*, or compare fewer.
+        Five metrics are wider than a column of text: put them into table*, or compare fewer. Only
+        the last board says what intervals, metrics and bold type are. Comments have the verdicts,
+        and at the top the gains and remarks on them.
 
         Args:
           path: of a file to which it is written too.
         """
-        text = "\n".join(table.to_latex() for table in self._without_times)
+        gains = commented(plain(self._table_of_gains))
+        text = "\n".join([f"{gains}\n", *(table.to_latex() for table in self._without_times)])
         if path is not None:
             with replacing(Path(path)) as file:
                 file.write_text(text, encoding="utf-8")

@@ -50,10 +50,7 @@ TABLE = Tabular(
         ],
     ],
     notes=["A note.", "Another."],
-    under=[
-        "A word: 5 %.",
-        "A sentence, which goes on in the next line, as the table is wide as 9 %.",
-    ],
+    under=["A word: 5 %.", "A paragraph after 10 ms."],
     left=2,
 )
 
@@ -118,9 +115,38 @@ def test_a_number_with_an_exponent_is_one_formula(number):
     assert tabular.tex(f"k={number}e-8–2e5") == rf"k=${number}\cdot10^{{-8}}$--$2\cdot10^{{5}}$"
 
 
+def test_a_letter_beside_a_number_with_a_power_is_no_exponent():
+    cell = Cell("4.9e-8", "below 5e-5 rad", strong=True)
+    latex = Tabular(headings=["law", "bound"], rows=[["pid", cell]]).to_latex()
+    assert "\npid & \\textbf{\\boldmath$4.9\\cdot10^{-8}$}~{\\footnotesize (a)} \\\\\n" in latex
+    assert r"\raggedright (a):~below~$5\cdot10^{-5}$~rad} \\" in latex
+
+
+def test_latex_breaks_words_at_the_width_of_the_columns():
+    def width(columns: int) -> float:
+        """Return the width of the words, em."""
+        row = ["pid", *[Cell("1.23", "below 2.5 rad")] * columns]
+        latex = Tabular(headings=["law"] * len(row), rows=[row], under=["word " * 99]).to_latex()
+        assert latex.count("word") == 99
+        said = re.findall(
+            r"\n\\multicolumn\{(\d+)\}\{p\{\\dimexpr (.*?)em\+(\d+)\\tabcolsep", latex
+        )
+        assert len(said) == 2
+        (cells, em, gaps) = said[1]
+        assert (int(cells), int(gaps)) == (columns + 1, 2 * columns)
+        return float(em)
+
+    assert width(1) == tabular.TEX_WIDTH  # a column of a paper
+    assert width(11) - width(10) == pytest.approx(len("1.23 (a)") * tabular.TEX_CHARACTER)
+
+
+def test_u_max_is_a_formula_and_a_law_of_that_name_is_not():
+    assert tabular.tex("u_max, my_u_max") == r"$u_{\max}$, my\_u\_max"
+
+
 def test_every_character_that_latex_reads_is_written_out():
-    assert tabular.tex("a^-12 ⁰₉ \\~^&%$#_{}<|>Ωε–·×±−′″") == (
-        r"a$^{-12}$ $^0$$_9$ \textbackslash{}\textasciitilde{}\textasciicircum{}"
+    assert tabular.tex("a\N{NO-BREAK SPACE}^-12 ⁰₉ \\~^&%$#_{}<|>Ωε–·×±−′″") == (
+        r"a~$^{-12}$ $^0$$_9$ \textbackslash{}\textasciitilde{}\textasciicircum{}"
         r"\&\%\$\#\_\{\}$<$$|$$>$$\Omega$"
         r"$\varepsilon$--$\cdot$$\times$$\pm$$-$$'$$''$"
     )

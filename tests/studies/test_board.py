@@ -276,7 +276,7 @@ def test_a_law_has_its_label_in_latex_and_plots_and_values_below_the_floor_are_s
     boards = leaderboard(table, ["ultimate_bound"], by=("plant", "condition"))
     latex = boards.to_latex()
     for condition in ("nominal", "noise"):
-        assert rf"\multicolumn{{2}}{{l}}{{\footnotesize My rod, {condition}: 2 seeds" in latex
+        assert rf"\footnotesize\raggedright My rod, {condition}: 2 seeds" in latex
     assert "\nRoot sliding &" in latex
     assert "root_sliding" in repr(boards)
     drawn = dot_plot.plot(table.select(condition="nominal"), metrics=["ultimate_bound"])
@@ -298,7 +298,7 @@ def test_a_title_in_latex_has_words_and_one_of_a_terminal_has_names():
     (board,) = leaderboard(table, ["itae"])
     (summed,) = Boards([dataclasses.replace(board, summed=("noise", "light_load"))]).tables
     assert summed.title == "inverted_pendulum, delay_10ms under noise and light_load: 20 seeds"
-    assert summed.label == "Inverted pendulum, delay 10ms under noise and light load: 20 seeds"
+    assert summed.label == "Inverted pendulum, delay 10 ms under noise and light load: 20 seeds"
 
 
 @pytest.mark.parametrize(
@@ -314,11 +314,39 @@ def test_a_title_in_latex_has_words_and_one_of_a_terminal_has_names():
 def test_latex_says_in_print_what_its_own_columns_are(metric, heading):
     (table,) = leaderboard(made(), [metric]).tables
     metrics = "settled runs", "settling time", "ultimate bound", "ITAE", "TV rate"
-    said = [name for name in metrics if UNDER[name] in table.under]
+    said = [name for name in metrics if UNDER[name] in table.under[-1]]
     assert said == [heading]
-    printed = table.to_latex().partition("bottomrule")[2].replace(r"\%", "%")
-    words = printed.replace("} \\\\\n\\multicolumn{2}{l}{\\footnotesize ", " ")
-    assert UNDER[heading] in words
+    assert ("share" in table.under[-1]) == (metric == "settles")
+    printed = table.to_latex().partition("bottomrule")[2].replace(r"~\%", " %")
+    assert UNDER[heading] in printed
+
+
+def test_what_latex_says_of_all_tables_stands_below_the_last_one_only():
+    table = made(conditions=("nominal", "noise"))
+    nominal = np.flatnonzero(table.column("condition") == "nominal")
+    table.columns["settling_time"] = np.full(120, math.inf)
+    table.columns["half_step"] = np.full(120, None, object)
+    table.columns["half_step"][nominal[:20]] = '{"itae": 10.0}'
+    first, last = leaderboard(table, ["itae"], by=("plant", "condition")).tables
+    assert first.under == ["third wins: ITAE."]
+    wins, key = last.under
+    assert wins == "third wins: ITAE."
+    for word in ("", "yours", "ITAE", "strong=True", "at half"):  # a step of the first one
+        assert key.count(UNDER[word]) == 1
+    assert "(a):~" in first.to_latex()
+    assert "(a):~" not in last.to_latex()
+    assert UNDER["below "] not in key
+
+
+def test_a_verdict_that_says_below_is_no_cell_below_a_floor():
+    random = np.random.default_rng(0)
+    table = made()
+    table.columns["itae"] = np.exp(0.3 * random.normal(size=60))
+    boards = leaderboard(table, ["itae"])
+    assert "a lead below" in boards[0].result
+    (shown,) = boards.tables
+    assert "the floor. Values below" not in " ".join(shown.notes)
+    assert UNDER["below "] not in shown.under[-1]
 
 
 def test_the_shade_below_the_floor_begins_at_0_on_a_linear_axis():
@@ -393,7 +421,7 @@ def test_a_metric_in_a_unit_without_a_floor_says_so(monkeypatch):
 def test_latex_has_no_letter_that_an_engine_may_not_know():
     for character, text in TEX.items():
         assert text.isascii()
-        assert text.startswith(("\\", "$")) or character == "–"
+        assert text.startswith(("\\", "$")) or text in {"--", "~"}
         assert character == "$" or text.count("$") % 2 == 0
 
 

@@ -140,12 +140,25 @@ def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
     last = found.leaderboard.tables[-1]
     rows = last.to_latex().partition("\nPID & ")[2].splitlines()
     assert rows[1].startswith(r"\footnotesize yours & ")
-    assert {UNDER["shipped"], UNDER["tuned here"]} <= set(last.under)
+    assert f"{UNDER['shipped']} {UNDER['tuned here']}" in last.under[-1]
+    assert found.to_latex().count(UNDER["ITAE"]) == 2  # once as a comment, and once in print
     assert found.to_latex().count(r"\begin{tabular}") == 6  # J on each plant, too
     assert found._repr_html_().count("<table") == 8  # times, and gains
     assert len(found.plot().axes) == 10  # of all five metrics, on both plants
     assert found.traces[0].scenario == found.table.scenario(0)
     assert len(found.traces) == 12
+
+
+def test_latex_has_the_gains_how_far_searches_differ_and_remarks_as_comments(found):
+    head = found.to_latex().partition("\n\n")[0].splitlines()
+    assert all(line.startswith("%") for line in head)
+    words = " ".join(" ".join(line.removeprefix("%") for line in head).split())
+    for plant in PLANTS:
+        law = found.gains[plant]["my_law"]
+        assert f"{plant} my_law tuned here 12 {law.source.search.apart} lam=" in words
+    assert found.remarks
+    for remark in found.remarks:
+        assert remark in words
 
 
 @pytest.mark.filterwarnings("ignore:size=.* makes the figure")

@@ -62,7 +62,7 @@ def test_boards_print_the_sources(folder):
     _, _, row = boards.to_latex().partition("\nslow & ")
     assert row.splitlines()[1].startswith(r"\footnotesize default & ")
     for sentence in (UNDER["default"], UNDER["yours"]):
-        assert sentence in boards.tables[0].under
+        assert sentence in boards.tables[0].under[-1]
 
 
 def test_equal_gains_are_one_run_and_the_table_has_the_source_of_this_study(folder):

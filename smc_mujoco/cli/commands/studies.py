@@ -283,8 +283,9 @@ Latex = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE.tex",
-        help="Also write the tables as LaTeX. Five metrics are wider than a column of text: put "
-        "them into table*, or compare fewer.",
+        help="Also write the tables as LaTeX: a tabular for each plant and condition. Put each "
+        "into a float of its own. Five metrics are wider than a column of text: put them into "
+        "table*, or compare fewer.",
     ),
 ]
 Rig = Annotated[
