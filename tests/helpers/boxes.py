@@ -35,8 +35,8 @@ def recorded(monkeypatch):
         boxes[canvas, canvas.im.size][words, place] = (words, *box)
         write(canvas, place, words, fill, font, anchor=anchor, **named)
 
-    def placed(count, room, sizes, points, turn, **named):
-        tiles, labels, view = layout(count, room, sizes, points, turn, **named)
+    def placed(count, room, sizes, points, turn, *rest, **named):
+        tiles, labels, view = layout(count, room, sizes, points, turn, *rest, **named)
         seen = np.ptp(camera.project(points, turn, view.place, view.size), axis=0)
         shares.append(float((seen / view.size).max()))
         return tiles, labels, view
