@@ -352,10 +352,13 @@ class RaceRecommendation(Recommendation):
         text = f"with {race.looked} sets {hidden(seen)}"
         if math.isinf(sets):
             return f"{text}, and the laws are too close for more sets to tell them apart"
-        decide = f"about {sets:.0f} sets would decide"
+        if sets > race.looked:
+            text += f"; if the lead stays as it is, about {sets:.0f} sets in all would decide"
+        else:
+            text += f"; such a lead usually shows with {race.looked} sets, but did not here"
         if race.stopped and sets <= LOOKS[-1]:
-            return f"{text}; {decide}, and the same call goes on with them"
-        return f"{text}; if the lead stays as it is, {decide}"
+            text += f"; the same call goes on to {LOOKS[-1]} sets"
+        return text
 
     @property
     def _where(self) -> str:

@@ -435,6 +435,23 @@ def test_laws_for_which_there_is_no_time_are_named_and_the_clock_may_end_a_race_
     assert unknown.endswith("goes on from there if it is given more minutes")
 
 
+@pytest.mark.parametrize(
+    ("sets", "said"),
+    [
+        (9.0, "about 9 sets in all would decide; the same call goes on to 12 sets"),
+        (6.4, "usually shows with 7 sets, but did not here; the same call goes on to 12 sets"),
+        (31.0, "about 31 sets in all would decide"),
+    ],
+)
+def test_an_open_race_says_how_many_sets_in_all_would_decide(raced, monkeypatch, sets, said):
+    _, recommendation, _ = raced
+    comparison = recommendation.race.comparison
+    monkeypatch.setattr(recommendation_module, "needed", lambda of: sets)
+    monkeypatch.setattr(recommendation_module, "_ranked", lambda *rest: [*comparison.laws])
+    stopped = recommendation.race._replace(stopped=True, looked=7)
+    assert dataclasses.replace(recommendation, race=stopped)._takes.endswith(said)
+
+
 def test_a_law_that_does_not_settle_is_not_recommended_without_saying_where(raced):
     _, recommendation, _ = raced
     name = recommendation.law.name

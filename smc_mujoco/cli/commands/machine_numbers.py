@@ -127,7 +127,9 @@ def identify(
     """Estimate a machine's parameters from its logs: friction, armature, delay, masses and more.
 
     A log may come from any controller, and needs at least 40 rows a second. It has columns t in s,
-    and x (rad or m) and u (N m or N) of the joint, or x_JOINT and u_JOINT of each. You need no
+    and x (rad or m) and u of the joint, or x_JOINT and u_JOINT of each. u is what the actuator of
+    the file takes: the force of a motor (N m or N), the set-point of a position servo (rad or m,
+    from the goal). If a servo's force was logged, add (motor): arm.xml:elbow(motor). You need no
     first guess.
 
     Parameters of a joint are named JOINT.damping, .frictionloss, .armature, .stiffness, .gain,

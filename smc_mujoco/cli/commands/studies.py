@@ -274,7 +274,7 @@ Metrics = Annotated[
     str | None,
     typer.Option(
         "--metric",
-        help="What to compare, separated by commas: any scores listed by `smc-mujoco show`, or "
+        help="What to compare, separated by commas: any metrics of `smc-mujoco list metrics`, or "
         '"settles", the share of settled runs. Default: settles, settling_time, '
         "ultimate_bound, itae, tv_rate.",
     ),
