@@ -44,7 +44,7 @@ ROW_HEIGHT = 1.5  # inches on a full page, height of a panel over time
 MAX_WORST = 3  # channels of a robot that are drawn, those with the largest errors
 LINE_ROW, LINES_ROW = 0.37, 0.45  # relative height of a row with one line, and with several
 REFERENCE_WORDS = "dashes: reference"
-GREY_WORDS = "grey: reference ± 2 %"
+GREY_WORDS = "grey: settling band"
 END_TIME = "time before the end (ms)"
 NOTES = {  # above panels of a column, which has no key
     "target": f"{REFERENCE_WORDS}; {GREY_WORDS}",

@@ -257,10 +257,16 @@ class RaceRecommendation(Recommendation):
 
     @property
     def _lowest(self) -> str | None:
-        """The law that wins by J, over sets of gains or else with these; None if none does."""
-        if self.fixed and not self.race.winner:
+        """The law that wins by J, over sets of gains or else with these; if none does, that of the
+        lowest J over sets, where it settles too seldom; else None.
+        """
+        if self.race.winner:
+            return self.race.winner
+        if self.fixed and self.fixed.winners[0]:
             return self.fixed.winners[0]
-        return self.race.winner
+        first = self.race.running[0]
+        seldom = self.settles.get(first, 1.0) < RELIABLE <= self.settles[self.law.name]
+        return first if seldom else None
 
     @property
     def worst_words(self) -> str:
@@ -353,7 +359,7 @@ class RaceRecommendation(Recommendation):
         if math.isinf(sets):
             return f"{text}, and the laws are too close for more sets to tell them apart"
         if sets > race.looked:
-            text += f"; if the lead stays as it is, about {sets:.0f} sets in all would decide"
+            text += f"; if the lead stays as it is, about {sets:.0f} sets of each law would decide"
         else:
             text += f"; such a lead usually shows with {race.looked} sets, but did not here"
         if race.stopped and sets <= LOOKS[-1]:
@@ -404,7 +410,7 @@ class RaceRecommendation(Recommendation):
             low, high = size(min(medians), metric), size(max(medians), metric)
             few = f" in {len(medians)} of {count} conditions" if len(medians) < count else ""
             parts.append(f"{headings[metric]} {span(low, high) or low}{few}")
-        over = ", range of the medians over the conditions" if count > 1 else ""
+        over = ", range of the medians over the conditions asked for" if count > 1 else ""
         return f"{joined(parts)}{over}"
 
     @property
@@ -428,8 +434,9 @@ class RaceRecommendation(Recommendation):
                 level += f" ({self._reach})"
             parts.append(TOLERATED[margin.kind].format(level))
         where = "to the nominal plant" if self.beside == "nominal" else f"under {self.beside}"
-        text = f"{joined(parts)}. Each is applied alone, {where}. At these levels the error after "
-        text += f"{self.worst_run.duration:g} s is still below 5 % of its initial value"
+        text = f"{joined(parts)}. Each is applied alone, {where}. At these levels the largest "
+        text += f"error in the last fifth of a run of {self.worst_run.duration:g} s is still below "
+        text += "5 % of the initial error"
         if not all(margin.open for margin in self.margins):
             text += ", and at those after 'but not' it is above"
         text += ". A run at a tolerated level need not settle"

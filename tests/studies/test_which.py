@@ -206,7 +206,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     kinds = {*recommend.KINDS, *recommend.KINDS_OF_POSES}
     assert kinds == recommendation_module.TOLERATED.keys()
     assert recommendation_module.BELOW not in " ".join(text.split())  # no cell has that word
-    assert "At these levels the error after 1.5 s is still below 5 %" in lines["Tolerates"]
+    assert "error in the last fifth of a run of 1.5 s is still below 5 %" in lines["Tolerates"]
     assert "mass include those of the condition; friction and blows are" in lines["Tolerates"]
     (left,) = recommendation.race.entrants.keys() - {*compared}
     assert f"{left} left out" not in text  # of a law that was dropped a line below says so
@@ -438,9 +438,9 @@ def test_laws_for_which_there_is_no_time_are_named_and_the_clock_may_end_a_race_
 @pytest.mark.parametrize(
     ("sets", "said"),
     [
-        (9.0, "about 9 sets in all would decide; the same call goes on to 12 sets"),
+        (9.0, "about 9 sets of each law would decide; the same call goes on to 12 sets"),
         (6.4, "usually shows with 7 sets, but did not here; the same call goes on to 12 sets"),
-        (31.0, "about 31 sets in all would decide"),
+        (31.0, "about 31 sets of each law would decide"),
     ],
 )
 def test_an_open_race_says_how_many_sets_in_all_would_decide(raced, monkeypatch, sets, said):
@@ -474,6 +474,12 @@ def test_a_law_that_does_not_settle_is_not_recommended_without_saying_where(race
     behind = dataclasses.replace(recommendation, **fields)
     reason = f"{winner} has the lower J, but under noise only 1 of its 4 runs settled before the "
     assert behind.answer[0] == f"Use: {others[0].name}. {reason}last fifth of the run"
+    race = recommendation.race._replace(comparison=None)
+    lowest = race.running[0]
+    settles = {law.name: 1.0 for law in others} | {lowest: 0.25}
+    undecided = dataclasses.replace(behind, race=race, fixed=None, settles=settles)
+    assert lowest == winner
+    assert undecided.answer[0].endswith(f"{reason}last fifth of the run")
     run = f"a run of {name} under coulomb"
     assert recommendation.worst_words == f"{run}. Of its runs there, this one settles last"
     for counts, why in (
