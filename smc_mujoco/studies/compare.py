@@ -64,7 +64,7 @@ BEST_SET = (
     "Each set is from a search of its own. Run i uses set i, and after the last set the first "
     "comes again. The best set is that whose search ended with the lowest J; J of the searches "
     "differ by up to the share shown. Tables show medians over all sets, and traces are of the "
-    "first. `smc-mujoco list LAW` has the units of a law's gains."
+    "first. `smc-mujoco list LAW`, or list FILE.py, has the units of a law's gains."
 )
 
 
