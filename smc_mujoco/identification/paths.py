@@ -88,7 +88,7 @@ def resolved(base: Scenario, names: Sequence[str]) -> Paths:
             least = _open(plant.constraint(name).low)
             if name in NATURAL:
                 least = 0.0
-            unit = PARAMETER_UNITS[name] if plant.is_user_model else ""
+            unit = PARAMETER_UNITS.get(name, "") if plant.is_user_model else ""
             quantities[name] = Quantity(plant.parameters[name], unit, "the plant", least)
         elif quantity := _of_signals(base, str(name)):
             quantities[name] = quantity

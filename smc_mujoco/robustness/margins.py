@@ -326,12 +326,19 @@ MARGIN_KINDS: dict[str, MarginKind] = {
         signed=True,
         size=_size_of_blow,
     ),
-    "noise": MarginKind(label="position noise", unit="{x}", levels=NOISES, put=_with_noise),
+    "noise": MarginKind(
+        label="position noise",
+        unit="{x}",
+        levels=NOISES,
+        put=_with_noise,
+        own=lambda base: base.noise.position,
+    ),
     "jitter": MarginKind(
         label="largest delay of a sample, of the control period",
         unit="1",
         levels=JITTERS,
         put=with_jitter,
+        own=lambda base: base.clock.jitter / base.control_period,
         quantum=lambda base: JITTERS[0],
     ),
     "missed": MarginKind(
@@ -339,6 +346,7 @@ MARGIN_KINDS: dict[str, MarginKind] = {
         unit="1",
         levels=tuple(i / 10 for i in range(1, 10)),
         put=_with_missed,
+        own=lambda base: base.clock.missed,
     ),
     "loss": MarginKind(
         label="share of gain that an actuator loses",

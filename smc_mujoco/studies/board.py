@@ -77,7 +77,7 @@ MARKS = MEANINGS | {
     "strong=True": "A star or bold type marks the winner. If no law wins, it marks each law that "
     "meets four requirements: no other law is shown to be better "
     f"({100 * LEVEL:g} % confidence in each column and condition), all its own runs have arrived "
-    "(see the next sentence), it has enough samples, and its interval is not too wide. An interval "
+    "(see below), it has enough samples, and its interval is not too wide. An interval "
     "is too wide if its upper end is more than 4 times the lower end and more than 4 times the "
     "floor, below which values count as equal.",
     "": "A run has arrived if, in its last fifth, the error stays within 10 % of its initial value "

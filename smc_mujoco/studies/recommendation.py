@@ -249,8 +249,9 @@ class RaceRecommendation(Recommendation):
         ahead = self._lowest
         if ahead and ahead != self.law.name:
             name, done, of = self._least_settled(ahead)
+            lower = "lower J" if ahead in self._winners else "lower median J"
             text += (
-                f". {ahead} has the lower J, but under {name} only {done} of its {of} runs settled "
+                f". {ahead} has the {lower}, but under {name} only {done} of its {of} runs settled "
                 "before the last fifth of the run"
             )
         return text
@@ -258,15 +259,19 @@ class RaceRecommendation(Recommendation):
     @property
     def _lowest(self) -> str | None:
         """The law that wins by J, over sets of gains or else with these; if none does, that of the
-        lowest J over sets, where it settles too seldom; else None.
+        lowest median J over sets, where it settles too seldom; else None.
         """
-        if self.race.winner:
-            return self.race.winner
-        if self.fixed and self.fixed.winners[0]:
-            return self.fixed.winners[0]
+        for winner in self._winners:
+            return winner
         first = self.race.running[0]
         seldom = self.settles.get(first, 1.0) < RELIABLE <= self.settles[self.law.name]
         return first if seldom else None
+
+    @property
+    def _winners(self) -> list[str]:
+        """The laws that win by J, over sets of gains and then with these."""
+        with_these = self.fixed.winners[0] if self.fixed else None
+        return [*filter(None, (self.race.winner, with_these))]
 
     @property
     def worst_words(self) -> str:

@@ -264,8 +264,10 @@ def test_levels_take_the_place_of_a_conditions_own_or_come_on_top():
     for name, kind in margins.MARGIN_KINDS.items():
         put[name] = kind.put(under, 0.5)
     kinds = margins.MARGIN_KINDS
-    begins = [kinds[name].search(under, COARSE).low for name in ("delay", "mass", "friction")]
-    assert begins == [0.01, 1.5, 0.0]  # what the scenario itself has, the run that is tried first
+    replaced = "delay", "mass", "noise", "jitter", "missed"
+    begins = [kinds[name].search(under, COARSE).low for name in (*replaced, "friction")]
+    # what the scenario itself has, the run that is tried first; friction comes on top
+    assert begins == pytest.approx([0.01, 1.5, 0.1, 2.5e-4 / BASE.control_period, 0.2, 0.0])
     assert put["delay"].input_delay == 0.5
     assert put["mass"].mismatch == {"mass": 0.5}
     assert put["noise"].noise.position == 0.5

@@ -179,6 +179,9 @@ def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(tmp_path, monke
     found = trial(tmp_path).search_gains(DUFFING, default, rule)
     assert found.law == FAST
     assert found.remark == ""
+    for budget, where in ((8, "trails"), (100, "leads")):
+        other = trial(tmp_path).search_gains(DUFFING, default, rule._replace(budget=budget))
+        assert other.remark.endswith(f"where it {where}, its search may be why")
     # also with another seed of the comparison run i has the gains of search i
     for first in (0, 1_000_000):
         assert [found(first + i).gains["k1"] for i in range(3)] == [2.0, 2.5, 2.0]

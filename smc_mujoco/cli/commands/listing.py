@@ -67,8 +67,11 @@ def list_(
     Example: smc-mujoco list my_law.c
     """
     options.only_for(ctx, ("needs",), name is None, "lists: leave out NAME")
-    listed = name is None or name == CONDITIONS
-    options.only_for(ctx, ("plant",), listed or name not in KINDS, "laws and conditions")
+    if name is not None and plant is not None:
+        with delay_signals():
+            from smc_mujoco.simulation.conditions import NAMED
+        shown = name == CONDITIONS or name in NAMED
+        options.only_for(ctx, ("plant",), shown, "lists and conditions: leave out NAME")
     terminal = Terminal(json)
     if name is not None and Path(name).suffix in (".c", ".so"):
         with delay_signals():
@@ -82,20 +85,16 @@ def list_(
             from smc_mujoco.metrics.catalogue import CATALOGUE
             from smc_mujoco.simulation.conditions import NAMED
             from smc_mujoco.studies.scene import scenes
-        of_condition = name in NAMED
-        options.only_for(ctx, ("plant",), of_condition, "lists and conditions: leave out NAME")
         if name in {*NAMED, *CATALOGUE, *scenes()} - {*plants()}:
             _print_all(terminal, name, plant)
         else:
             law_pages.print_pages(name, terminal)
-    elif name == CONDITIONS:
-        _print_all(terminal, name, plant)
-    elif needs is not None or plant is not None:
+    elif name is None and (needs is not None or plant is not None):
         with delay_signals():
             from smc_mujoco.cli import law_pages
         law_pages.print_suitable(options.names(needs), plant, terminal)
     else:
-        _print_all(terminal, name or "")
+        _print_all(terminal, name or "", plant)
     terminal.finish()
 
 
