@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.tuning.objective import Objective, objectives
 from smc_mujoco.errors import ScenarioWarning
 from smc_mujoco.hardware import ElasticJoint, LuGre
 from smc_mujoco.mechanisms.custom import poles
@@ -178,6 +179,15 @@ def test_what_a_step_does_not_resolve_is_told_once_at_the_run(fields, told, recw
     assert bool(told) == bool(trace.unresolved)
     sentences = [str(w.message) for w in recwarn if "runs under" in str(w) or "chatters" in str(w)]
     assert sentences == ([trace.unresolved] if told else [])
+
+
+def test_runs_that_only_judge_gains_warn_of_nothing():
+    """Those of laws and gains that are not chosen would warn, too."""
+    law = smc.law("super_twisting")
+    goal = Objective(conditions=("nominal",), duration=2.0)
+    with pytest.warns(ScenarioWarning, match="chatters on coupled joints"):
+        smc.run(goal.holdout(chain(RANGE), law, 0))
+    objectives(chain(RANGE), [law], goal)
 
 
 def test_u_that_varies_in_its_last_digits_does_not_chatter():

@@ -48,7 +48,7 @@ from smc_mujoco.simulation.grid import (
     checked_starts,
     listed_conditions,
 )
-from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.run import run_unjudged
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
@@ -343,7 +343,7 @@ def _unseen(
         cases = list(map(step_halving.doubled, cases))
     if halved:
         cases = list(map(step_halving.halved, cases))
-    traces = run(cases, threads)
+    traces = run_unjudged(cases, threads)
     count = len(goal.conditions)
     for first in range(0, len(cases), count):
         yield cases[first : first + count], traces[first : first + count]

@@ -97,7 +97,7 @@ from smc_mujoco.simulation.grid import Starts
 from smc_mujoco.simulation.integration import stepped_by_mujoco
 from smc_mujoco.simulation.model import with_values
 from smc_mujoco.simulation.prepare import prepare
-from smc_mujoco.simulation.run import run, run_unjudged
+from smc_mujoco.simulation.run import run_unjudged
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.simulation.workers import Workers, called, opened
@@ -630,7 +630,8 @@ def _warn_of_result(tuned: Tuned) -> None:
         )
     first, *_ = tuned.definition.scenarios(tuned.plant, tuned.law, tuned.seed)
     if tuned.plant.is_user_model:
-        _warn_of_leaning(run(first))
+        (trace,) = run_unjudged([first])
+        _warn_of_leaning(trace)
     if tuned.definition.excess(first):
         _warn(
             f"all gains {tried} are predicted to chatter with more than "
