@@ -15,7 +15,7 @@ from smc_mujoco.identification import records
 from smc_mujoco.identification.first_guess import LARGEST_ANGLE
 from smc_mujoco.identification.own_rig import OwnRig
 from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
-from smc_mujoco.mechanisms.layout import dof_ids
+from smc_mujoco.mechanisms.layout import dof_ids, driven_names
 
 # Of the rate at which the joint swings on its servo by the model's inertia: a set-point that moves
 # so slowly is followed, also where the armature is fifteen times that inertia; chosen
@@ -37,7 +37,12 @@ def doubts(rig: OwnRig, data: Sequence[Data]) -> list[str]:
                 names = rig.columns.x[i], rig.columns.inputs[i]
                 x, u = record[names[0]], record[names[1]]
                 rate = SLOW * math.sqrt(motor.kp / inertias[i])
-                said += _of_servo(names, x, u, rate * period, rig.plant.units[i])
+                force = (
+                    f"; if {names[1]} is the motor's force and no set-point, ask for "
+                    f"{driven_names(rig.plant)[i]}(motor)"
+                )
+                for doubt in _of_servo(names, x, u, rate * period, rig.plant.units[i]):
+                    said.append(doubt + force)
     return list(dict.fromkeys(said))
 
 

@@ -98,6 +98,7 @@ def test_a_servo_s_right_log_leaves_no_doubt_also_of_a_joint_that_friction_holds
     [
         ({"x": -1.0}, "x moves against its set-point u: turn the sign"),
         ({"u": -1.0}, "x moves against its set-point u: turn the sign"),
+        ({"u": 300.0}, r"; if u is the motor's force and no set-point, ask for j1\(motor\)$"),
         ({"x": 57.3}, "if x is in degrees"),
         ({"u": 57.3}, "if u is in degrees"),
         ({"x": 180.0, "u": 180.0}, "x and u reach 2.*if that is in degrees"),
