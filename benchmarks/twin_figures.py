@@ -15,6 +15,7 @@ rows from them, and draws docs/rigs.svg.
 
 import dataclasses
 import functools
+import itertools
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
+from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from smc_mujoco.common.errors import find
@@ -35,9 +36,8 @@ FILE = Path(__file__).with_suffix(".json")
 UNFITTED = "unfitted"
 FITTED = "fitted on"
 HELD_OUT = "held out"
-MARKS = {UNFITTED: "D", HELD_OUT: "o", FITTED: "o"}  # filled, but for records that were fitted on
-PHONE_WIDTH = 4.0  # inches of the page of twins, whose letters are read on a phone
-ROW, BESIDE = 0.2, 0.35  # inches a row; rows from one record of a figure to the next
+WIDTH = 4.4  # inches of the page of twins, whose letters are read on a phone
+LINE, BESIDE, GAP = 11.0, 2.5, 6.0  # points: a line of words; from mark to mark; between machines
 LEAST, MOST = 0.25, 4.0  # ends of the axis: a triangle there stands for what is beyond
 
 
@@ -178,79 +178,124 @@ def orders(rig: str = "") -> list[Order]:
     return [row for row in _stored()[1] if name in ("", row.rig)]
 
 
-def twins_figure(rows: Sequence[TwinFigure], path: str | Path) -> list[Path]:
-    """Draw the twin's figures over the machine's, a row for each with a mark for each record.
+class Row(NamedTuple):
+    """The marks of a machine's records of one use, and the words beside them.
 
-    Write PATH.svg, PATH.png.
+    `places`: the height of each figure's mark; `name`, `words`: that of the machine's name, NaN
+    below the first row of the machine, and that of the use. All in points from the top.
+    """
+
+    figures: Sequence[TwinFigure]
+    places: Sequence[float]
+    name: float
+    words: float
+    end: float
+
+
+def laid_out(rows: Sequence[TwinFigure]) -> list[Row]:
+    """Return the rows of the figure: one for each machine and use of its records."""
+    groups: dict[tuple[str, str], list[TwinFigure]] = {}
+    for row in known(rows):
+        groups.setdefault((row.rig, row.use), []).append(row)
+    found: list[Row] = []
+    top = 0.0
+    for (rig, _), figures in groups.items():
+        first = not found or found[-1].figures[0].rig != rig
+        lines = 2 if first else 1
+        if first and found:
+            top += GAP
+        marks = BESIDE * (len(figures) + 2)
+        deep = max(LINE * lines, marks)
+        middle = top + 0.5 * deep
+        places = middle + BESIDE * (np.arange(len(figures)) - 0.5 * (len(figures) - 1))
+        words = middle + 0.5 * LINE * (lines - 1)
+        name = middle - 0.5 * LINE if first else math.nan
+        found.append(Row(figures, places.tolist(), name, words, top + deep))
+        top += deep
+    return found
+
+
+def twins_page(rows: Sequence[TwinFigure]) -> Figure:
+    """Return a figure of the twin's figures over the machine's: a row for each machine and use of
+    its records, with a mark for each figure of each record.
 
     A line is a mark's range, a cross is by published numbers. Figures that are kept aside, and
     variants of a twin, are left out.
     """
-    paths = pages.files(Path(path).with_suffix(""))
-    rigs: dict[str, dict[tuple[str, str], list[TwinFigure]]] = {}
-    for row in known(rows):
-        rigs.setdefault(row.rig, {}).setdefault((row.use, row.figure), []).append(row)
+    shown = laid_out(rows)
+    rigs = list(dict.fromkeys(row.figures[0].rig for row in shown))
     colours = dict(zip(rigs, style.spread(len(rigs)), strict=True))
-    place = 0.0
-    ticks = []
-    places = []
-    names = []
-    for rig, figures in rigs.items():
-        names.append((place + 0.6, rig))
-        place += 1.2
-        for (_, figure), group in figures.items():
-            for k, row in enumerate(group):
-                places.append((place + 0.5 + BESIDE * k, row))
-            deep = 1.0 + BESIDE * (len(group) - 1)
-            count = f", {len(group)} records" if len(group) > 1 else ""
-            ticks.append((place + 0.5 * deep, f"{figure}{count}"))
-            place += deep
-    with style.page(PHONE_WIDTH):
-        handles = []
-        for use in dict.fromkeys(row.use for _, row in places):
-            filling = style.PAPER if use == FITTED else style.INK
-            mark: Any = {"color": style.INK, "marker": MARKS[use], "mfc": filling, "ls": ""}
-            handles.append(Line2D([], [], label=use, **mark))
-        cross = Line2D([], [], color=style.MUTED, marker="x", ls="", label="published numbers")
-        handles.append(cross)
-        handles.append(Line2D([], [], color=style.INK, lw=1.0, label="the twin's range"))
-        height = pages.head_height(PHONE_WIDTH, handles) + ROW * place + 0.6
-        page = pages.blank(PHONE_WIDTH, height)
+    with style.page(WIDTH):
+        handles = [
+            pages.entry("twin, with its range", style.INK, lw=1.0, marker="o", ms=3.5),
+            pages.entry("published numbers", marker="x", ms=3.5, ls=""),
+        ]
+        height = pages.head_height(WIDTH, handles) + (shown[-1].end + GAP) / 72 + 0.5
+        page = pages.blank(WIDTH, height)
         ax = page.subplots()
-        for at, rig in names:
-            ax.text(LEAST * 1.05, at, rig, color=colours[rig], fontweight="bold", va="center")
-        for at, row in places:
-            _row(ax, at, row, colours[row.rig])
+        for row in shown:
+            for place, one in zip(row.places, row.figures, strict=True):
+                _mark(ax, place, one, colours[one.rig])
+        _name_rows(ax, shown, colours)
         ax.axvline(1.0, color=style.RULE, lw=0.8, zorder=0)
-        ax.set(
-            xscale="log", xlim=(LEAST, MOST), ylim=(place + 0.2, 0.0), xlabel="twin over machine"
-        )
-        ax.set_yticks([at for at, _ in ticks], [words for _, words in ticks])
+        ax.set(xscale="log", xlim=(LEAST, MOST), ylim=(shown[-1].end + GAP / 2, -GAP / 2))
+        ax.set_xlabel("twin over machine")
         ax.set_xticks([0.25, 0.5, 1.0, 2.0, 4.0], ["¼", "½", "1", "2", "4"])
         ax.xaxis.set_minor_locator(NullLocator())
-        pages.set_head(page, PHONE_WIDTH, "What simulation said, and what the machine did", handles)
-        pages.write(page, paths)
+        pages.set_head(page, WIDTH, "What simulation said, and what the machine did", handles)
+    assert isinstance(page, Figure)
+    return page
+
+
+def twins_figure(rows: Sequence[TwinFigure], path: str | Path) -> list[Path]:
+    """Write `twins_page` to PATH.svg and PATH.png."""
+    paths = pages.files(Path(path).with_suffix(""))
+    pages.write(twins_page(rows), paths)
     return paths
 
 
-def _row(ax: Axes, place: float, row: TwinFigure, colour: str) -> None:
-    """Draw a figure's ratio and its range; beyond the axis, or for a twin that falls, a triangle at
-    its end.
+def _name_rows(ax: Axes, rows: Sequence[Row], colours: dict[str, str]) -> None:
+    """Write the machines' names beside their rows, and how many figures are of which use; draw a
+    rule between machines.
     """
-    ends = np.clip([row.low / row.machine, row.high / row.machine], LEAST, MOST)
-    ax.plot(ends, [place, place], color=colour, lw=1.0)
-    marks = ((row.published, "x", style.MUTED), (row.twin, MARKS[row.use], colour))
-    for value, shape, ink in marks:
-        ratio = value / row.machine
+    ticks = []
+    labels = []
+    looks = []
+    for row in rows:
+        one = row.figures[0]
+        if not math.isnan(row.name):
+            ticks.append(row.name)
+            labels.append(one.rig)
+            looks.append({"color": colours[one.rig], "fontweight": "bold"})
+        ticks.append(row.words)
+        labels.append(f"{len(row.figures)} figures, {one.use}")
+        looks.append({})
+    ax.set_yticks(ticks, labels)
+    ax.tick_params(axis="y", length=0.0, pad=6.0)
+    ax.grid(False, axis="y")
+    for label, look in zip(ax.get_yticklabels(), looks, strict=True):
+        label.set(**look)
+    for row, below in itertools.pairwise(rows):
+        if not math.isnan(below.name):
+            ax.axhline(row.end + GAP / 2, color=style.GRID, lw=0.8, zorder=0)
+
+
+def _mark(ax: Axes, place: float, row: TwinFigure, colour: str) -> None:
+    """Draw a figure's ratio and its range; a triangle at the end of the axis stands for what of
+    them is beyond, and for a twin that falls.
+    """
+    ends = np.array([row.low / row.machine, row.high / row.machine])
+    ax.plot(np.clip(ends, LEAST, MOST), [place, place], color=colour, lw=1.0)
+    marks = [(row.published / row.machine, "x", style.MUTED), (row.twin / row.machine, "o", colour)]
+    for end in ends[(ends < LEAST) | (ends > MOST)]:
+        marks.append((end, "", colour))
+    for ratio, shape, ink in marks:
+        if math.isnan(ratio):
+            continue
+        mark = shape
         if ratio > MOST:
             mark = ">"
         elif ratio < LEAST:
             mark = "<"
-        else:
-            mark = shape
-        filling = ink
-        if row.use == FITTED and mark == shape:
-            filling = style.PAPER
-        if not math.isnan(ratio):
-            at = min(max(ratio, LEAST), MOST)
-            ax.plot(at, place, mark, color=ink, mfc=filling, ms=3.5, clip_on=False)
+        at = min(max(ratio, LEAST), MOST)
+        ax.plot(at, place, mark, color=ink, ms=3.5, clip_on=False)

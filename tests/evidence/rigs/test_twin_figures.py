@@ -1,6 +1,7 @@
 """What simulation said of real machines, and what these did: the rows of benchmarks."""
 
 import dataclasses
+import itertools
 import math
 import re
 from pathlib import Path
@@ -131,17 +132,64 @@ def test_laws_of_the_twin_stand_in_the_machines_order_in_the_hold():
 
 
 @pytest.mark.parametrize(
-    ("twin", "mark"),
+    ("twin", "marks"),
     [
-        (math.inf, ">"),
-        (0.1, "<"),
-        (2.0, "D"),
+        (math.inf, {">"}),
+        (0.1, {"<"}),
+        (2.0, {"o"}),
     ],
 )
-def test_what_is_beyond_the_axis_is_a_triangle_at_its_end(twin, mark):
-    ax = Figure().subplots()
+def test_what_is_beyond_the_axis_is_a_triangle_at_its_end(twin, marks):
     one = dataclasses.replace(row("emps", "program of 24.8 s", "rms error"), machine=1.0, twin=twin)
-    twin_figures._row(ax, 0.0, one, "#000000")
-    (drawn,) = [line for line in ax.lines if line.get_marker() != "None"]
-    assert drawn.get_marker() == mark
-    assert 0.25 <= np.asarray(drawn.get_xdata())[0] <= 4.0
+    assert marks_of(one) == marks
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "marks"),
+    [
+        (0.1, 2.0, {"o", "<"}),
+        (0.5, 8.0, {"o", ">"}),
+        (0.1, 8.0, {"o", "<", ">"}),
+        (0.5, 2.0, {"o"}),
+    ],
+)
+def test_a_range_that_the_frame_cuts_ends_in_a_triangle(low, high, marks):
+    one = row("emps", "program of 24.8 s", "rms error")
+    one = dataclasses.replace(one, machine=1.0, twin=1.0, low=low, high=high)
+    assert marks_of(one) == marks
+
+
+def marks_of(one):
+    """The marks of a figure, all of which must be on the axis."""
+    ax = Figure().subplots()
+    twin_figures._mark(ax, 0.0, one, "#000000")
+    marked = [line for line in ax.lines if line.get_marker() != "None"]
+    for line in marked:
+        assert 0.25 <= np.asarray(line.get_xdata())[0] <= 4.0
+    return {str(line.get_marker()) for line in marked}
+
+
+def test_every_figure_has_a_mark_in_the_row_of_its_machine_and_use():
+    shown = twin_figures.laid_out(twin_figures.rows())
+    drawn = [one for kept in shown for one in kept.figures]
+    assert sorted(map(repr, drawn)) == sorted(map(repr, twin_figures.known(twin_figures.rows())))
+    top = 0.0
+    for kept in shown:
+        assert len({(one.rig, one.use) for one in kept.figures}) == 1
+        assert len(kept.places) == len(kept.figures)
+        assert top < min(kept.places) <= max(kept.places) < kept.end
+        top = kept.end
+
+
+def test_the_rows_of_the_figure_fit_its_height():
+    page = twin_figures.twins_page(twin_figures.rows())
+    page.draw_without_rendering()
+    (ax,) = page.axes
+    frame = ax.get_window_extent()
+    boxes = [label.get_window_extent() for label in ax.get_yticklabels()]
+    for above, below in itertools.pairwise(boxes):
+        assert below.y1 <= above.y0
+    assert frame.y0 <= boxes[-1].y0 < boxes[0].y1 <= frame.y1
+    assert min(box.x0 for box in boxes) >= 0.0
+    whole = page.bbox
+    assert whole.height <= 1.25 * whole.width  # else it is too high for a slide
