@@ -94,6 +94,15 @@ class DrawnRuns(NamedTuple):
             (horizon.horizon(shown), end(shown)),
         )
 
+    @property
+    def early(self) -> list[Trace]:
+        """The traces over the time that panels show, and as far beyond it as means reach."""
+        found = []
+        for trace in self.traces:
+            beyond = 0.5 * window(trace) * trace.scenario.control_period
+            found.append(horizon.until(trace, self.span[0] + beyond))
+        return found
+
     def gains_within(self, room: float, letters: float) -> str:
         """Return where the gains come from, in the order of the runs if their names have no room,
         with letters of this size.
@@ -282,11 +291,7 @@ def _height_of(columns: Mapping[tuple[int, ...], float], block: int) -> float:
 
 def _blocks(runs: DrawnRuns, chosen: Sequence[str]) -> Blocks:
     """Return the chosen panels of traces."""
-    early = []
-    for trace in runs.traces:
-        beyond = 0.5 * window(trace) * trace.scenario.control_period  # means reach over the edge
-        shortened = horizon.until(trace, runs.span[0] + beyond)
-        early.append(shortened)
+    early = runs.early
     left: list[Panel] = []
     right: list[Panel] = []
     left_out = ""

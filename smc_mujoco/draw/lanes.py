@@ -27,7 +27,7 @@ MIN_WIDE_BAND = 0.2  # mean height of a wide band, of a panel's; chosen
 MAX_BANDS = 1  # wide bands that share a row; chosen
 LANE_BAND = 0.45  # opacity of a band in a row of its own, below a film
 LANE_GAP = 0.25  # letters between a row, and how far u swings
-END_SHARE = 0.1  # of the run: its end, over which a row says how far u swings
+END_SHARE = 0.1  # of the time shown: its end, over which a row says how far u swings
 MAX_SWITCHES = 20  # of a u that shares its axes with others
 SMOOTH_SHARE = 0.02  # of a panel's range: a swing below it is none
 FILM_RANGE = 1e-5  # of the largest error: below a film smaller ones are off the panel; chosen
@@ -172,8 +172,8 @@ def settled(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Artist]:
 
 
 def tell_swing(lane: Axes, trace: Trace, colour: str) -> None:
-    """Write beside a row how far u swings at the end of the run, with a bar; "smooth" if it does
-    not swing.
+    """Write beside a row how far u swings at the end of the time shown, with a bar; "smooth" if it
+    does not swing.
     """
     low, high = lane.get_ylim()
     for swings in lane.collections:

@@ -290,7 +290,7 @@ class Sheet:
         what moves in them.
         """
         high = self.letters
-        shown = panels.strip(self.runs.traces)
+        shown = panels.strip(self.runs.early)
         wide = self.size[0] / len(shown)
         left = style.width("−00.00", high) + 0.5 * high
         top = (1.0 - CHARTS_SHARE) * self.size[1] + 1.15 * LINE_PITCH * high

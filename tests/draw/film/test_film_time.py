@@ -46,6 +46,27 @@ def page():
     return sheet(traces, LAWS, SIZE)
 
 
+def test_curves_do_not_depend_on_how_long_a_run_goes_on_at_rest():
+    """Of 10 s of a run that rests after 0.4 s, a film had a point each 40 ms, and ranges of u over
+    40 ms in place of its line.
+    """
+    curves = []
+    for duration in (1.5, 10.0):
+        scenario = smc.Scenario(plant="inverted_pendulum", law="adrc", duration=duration)
+        shown = sheet([smc.run(scenario)], ["one"], SIZE)
+        assert shown.runs.span[0] < 0.7
+        own = []
+        for one in shown.moving:
+            lines = [line for line in one.axes.lines if line.get_gid() != panels.REFERENCE]
+            own.append(max(lines, key=lambda line: len(line.get_xdata())))
+        curves.append(own)
+    for one, other in zip(*curves, strict=True):
+        ax = one.axes
+        time = np.linspace(0.0, ax.get_xlim()[1], 1000)
+        apart = np.interp(time, *one.get_data()) - np.interp(time, *other.get_data())
+        assert np.abs(apart).max() < 0.01 * np.ptp(ax.get_ylim())
+
+
 def cursor(page, time):
     """Where the cursor is in the first panel, as a share of its width; none if it is not there."""
     left, top, right, _ = page.frames[0]
