@@ -72,7 +72,7 @@ def perform(
 
 def _title(scene: Scene, condition: str) -> str:
     if len(scene.conditions) > 1:
-        return f"{scene.title}, {condition}"
+        return style.under(scene.title, condition)
     return scene.title
 
 

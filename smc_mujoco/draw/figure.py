@@ -103,15 +103,6 @@ class DrawnRuns(NamedTuple):
             found.append(horizon.until(trace, self.span[0] + beyond))
         return found
 
-    def gains_within(self, room: float, letters: float) -> str:
-        """Return where the gains come from, in the order of the runs if their names have no room,
-        with letters of this size.
-        """
-        if style.width(self.gains, letters) <= room:
-            return self.gains
-        sources = [trace.scenario.law.source.words for trace in self.traces]
-        return f"gains: {', '.join(sources)}"
-
 
 def figure(
     traces: Trace | Sequence[Trace],
@@ -214,10 +205,9 @@ def _composed_page(
     if blocks.left_out:
         entry = pages.entry(blocks.left_out, lw=0)
         key.append(entry)
-    gains = ""
-    if runs.entries == runs.names:
-        gains = runs.gains_within(pages.note_room(width), style.points(pages.TEXT_SIZE))
-    if gains and not head:  # there is no place beside a title
+    gains = runs.gains if runs.entries == runs.names else ""
+    fits = style.width(gains, style.points(pages.TEXT_SIZE)) <= pages.note_room(width)
+    if gains and not (head and fits):  # there is no place beside a title
         key.append(pages.entry(runs.gains, lw=0))
         gains = ""
     narrow = width < pages.NARROW

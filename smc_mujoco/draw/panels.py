@@ -719,11 +719,10 @@ def close_up_begin(traces: Sequence[Trace]) -> float:
     return max(0.0, end(traces) - shown)
 
 
-def dot(ax: Axes, colour: str, look: Data) -> Line2D:
-    """Add to axes the dot of a run, or the mark of its line's look."""
-    mark = look.get("marker", "o")
+def dot(ax: Axes, colour: str) -> Line2D:
+    """Add to axes the dot of a run."""
     rim: Fields = {"mec": style.PAPER, "mew": style.points(0.6), "ms": style.points(5.0)}
-    (found,) = ax.plot([], [], mark, color=colour, zorder=6, clip_on=False, animated=True, **rim)
+    (found,) = ax.plot([], [], "o", color=colour, zorder=6, clip_on=False, animated=True, **rim)
     return found
 
 

@@ -56,6 +56,8 @@ MANY_DIGITS = 1e5  # from it on, matplotlib writes numbers with an exponent
 PREFIXES = {-2: "M", -1: "k", 0: "", 1: "m", 2: "µ", 3: "n"}
 # where a word begins in DCMotor, but not in LuGre
 CAMEL = re.compile(r"(?:(?<=[a-z]{3})|(?<=[A-Z]{2}))([A-Z])(?=[a-z])")
+# of runs of one law, in their order: Okabe and Ito's, which are told apart on light and dark pages
+RUN_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 MARKS = "osD^vPXh>*dp"  # of laws, for readers who see no colours; after twelve they begin again
 # of the runs in a picture, in widths of a line, for the same readers; chosen
 DASHES = [
@@ -205,9 +207,13 @@ def law_colour(law: Component | str) -> str:
 
 
 def trace_colours(traces: Sequence[Trace]) -> list[str]:
-    """Return one colour per trace, that of its law; of a law's several runs shades of it, from
-    light to dark.
+    """Return one colour per trace, that of its law; of one law's several runs beside others shades
+    of it, from light to dark; of runs that are all of one law a colour each, by their order.
     """
+    count = len(traces)
+    if count > 1 and len({_template(trace.scenario.law)[1] for trace in traces}) == 1:
+        more = _farthest([*RUN_COLOURS, *NEUTRAL], max(0, count - len(RUN_COLOURS)))
+        return [*RUN_COLOURS, *more][:count]
     colours = law_colours([trace.scenario.law for trace in traces])
     found = []
     for i, colour in enumerate(colours):
@@ -253,19 +259,10 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
 
 
 def looks(traces: Sequence[Trace]) -> list[dict[str, Any]]:
-    """Return the look of the line of each trace in a picture, which tells it from the others
-    without colour: its dashes, and a mark of runs that share a law.
+    """Return the look of the line of each trace in a picture, its dashes, which tell it from the
+    others without colour.
     """
-    names = [_template(trace.scenario.law)[1] for trace in traces]
-    found = []
-    for i, name in enumerate(names):
-        look: dict[str, Any] = {"ls": DASHES[i % len(DASHES)]}
-        if names.count(name) > 1:
-            before = names[:i].count(name)
-            mark = MARKS[before % len(MARKS)]
-            look |= {"marker": mark, "ms": points(4.5), "markevery": (0.04 + 0.02 * i, 0.2)}
-        found.append(look)
-    return found
+    return [{"ls": DASHES[i % len(DASHES)]} for i in range(len(traces))]
 
 
 @functools.cache
@@ -744,10 +741,16 @@ def heading(
 ) -> str:
     """Return plants, and the condition if there is only one, which is not the nominal one."""
     found = dict.fromkeys(plant_name(plant, short) for plant in plants)
-    names = list(found)
+    head = ", ".join(found)
     if len(set(conditions)) == 1 and conditions[0] != "nominal":
-        names.append(condition_name(conditions[0]))
-    return ", ".join(names)
+        return under(head, condition_name(conditions[0]))
+    return head
+
+
+def under(title: str, condition: str) -> str:
+    """Return a title followed by the condition, unless it names that already."""
+    named = re.search(rf"\b{re.escape(condition)}\b", title, re.IGNORECASE)
+    return title if named else f"{title}, {condition}"
 
 
 def condition_name(condition: str) -> str:

@@ -96,7 +96,7 @@ def test_a_users_laws_take_other_colours_than_the_librarys_which_keep_theirs():
     assert least(style.law_colours(mine[:8])) > style.MIN_DISTANCE
 
 
-def test_runs_of_one_law_have_shades_of_its_colour_and_lines_and_marks_tell_them_apart():
+def test_runs_of_one_law_beside_others_have_shades_of_its_colour_and_dashes_tell_them_apart():
     """Friction of 0, 0.005 and 0.02 was magenta, brown and green, then five reds."""
     runs = []
     for law in ("classical", "pid", "classical", "adaptive", "classical"):
@@ -114,9 +114,34 @@ def test_runs_of_one_law_have_shades_of_its_colour_and_lines_and_marks_tell_them
     assert least([*shades, style.FAILED]) > style.MIN_DISTANCE
     looks = style.looks(runs)
     assert len({str(look["ls"]) for look in looks}) == len(runs)
-    marks = [look.get("marker") for look in looks]
-    assert marks[1] is marks[3] is None
-    assert len({marks[0], marks[2], marks[4]} - {None}) == 3
+
+
+def test_runs_that_are_all_of_one_law_have_a_hue_each_the_same_on_light_and_dark_pages():
+    """Four designs of one law were four shades of one blue, with heaps of marks where they agreed;
+    and two sets of its gains were other colours on a dark page.
+    """
+    runs = []
+    for k in range(8):
+        law = smc.law("pid", kp=1.0 + k)
+        runs.append(made(smc.Scenario(plant="duffing", law=law, duration=0.1)))
+    colours = style.trace_colours(runs)
+    assert style.trace_colours(runs[:4]) == colours[:4]
+    assert least(colours) > style.MIN_DISTANCE
+    with plt.style.context("dark_background"):
+        assert style.trace_colours(runs) == colours
+        neutral = style.neutral_on_dark()
+        for colour in colours:
+            hues = []
+            for shade in (colour, dark.on_dark(colour, neutral)):
+                hues.append(colorsys.rgb_to_hls(*style.rgb(shade))[0])
+            assert hues[1] == pytest.approx(hues[0], abs=0.01)
+    (alone,) = style.trace_colours(runs[:1])
+    assert alone == style.law_colour("pid")
+
+
+def test_a_title_that_names_the_condition_does_not_repeat_it():
+    assert style.under("An arm and a Wall", "wall") == "An arm and a Wall"
+    assert style.under("Walled in", "wall") == "Walled in, wall"
 
 
 def test_law_colours_never_repeat_in_one_picture():

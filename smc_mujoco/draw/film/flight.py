@@ -78,7 +78,7 @@ def draw_map(
         (goal,) = ax.plot(*(factor * trace.r[:, axes].T), **thin)
         wide = {"color": colour, "lw": style.points(PAST_LINE), "animated": True, **look}
         (past,) = ax.plot([], [], **wide)
-        dot = panels.dot(ax, colour, look)
+        dot = panels.dot(ax, colour)
         flight = Flight(past, goal, dot, trace.t, places)
         flights.append(flight)
     return artists, flights

@@ -40,9 +40,7 @@ EDGE = 0.6  # letters, from the picture's edge to text
 CHARTS_SHARE = 0.355  # of the film's height
 MAX_LINES = 3  # of a label
 SAMPLE = 0.5  # letters, height of the line above a label
-# letters, of that line without and with marks, from its tile's side and from its foot
-INSET, MARKED_INSET = 0.3, 0.9
-DROP, MARKED_DROP = 0.5 * SAMPLE, 0.32
+INSET = 0.3  # letters, of that line, from its tile's side
 LEAST_TITLE = 0.75  # of the size of letters, of a long title, and of long labels
 TIME_TICKS = 5  # at most
 SIDES = ("left", "right")  # of the first and the last tick's words, so that they stay on the page
@@ -249,8 +247,7 @@ class Sheet:
         self.clock = self.write(right, last, ha="right", va="center", weight="bold")
         right -= style.width(CLOCK, high, bold=True) + high
         self.pace = self.write(right, last, ha="right", va="center", color=style.MUTED)
-        gains = self.runs.gains_within(self.room, high)
-        said = list(filter(None, [*key, order, gains]))
+        said = list(filter(None, [*key, order, self.runs.gains]))
         least = int(lines == 2 or not title)  # beside the title there may be no words
         while len(said) > least and style.width(" · ".join(said), high) > self.room:
             said.pop()
@@ -272,13 +269,10 @@ class Sheet:
             middle = (left + right) / 2
             tall = pitch * (1 + words.count("\n")) + SAMPLE * high
             start = top if top >= tile[3] else (top + bottom - tall) / 2  # below it, or beside
-            inset, drop = (MARKED_INSET, MARKED_DROP) if "marker" in look else (INSET, DROP)
-            y = start + drop * high
-            inset *= high
-            ends = np.array([left + inset, right - inset])
+            y = start + 0.5 * SAMPLE * high
+            ends = np.array([left + INSET * high, right - INSET * high])
             line = (ends / self.size[0], [1.0 - y / self.size[1]] * 2)
-            shown = {**look, "markevery": None, "mew": 0}  # a mark stands at each end
-            sample = Line2D(*line, color=colour, lw=style.points(2.5), **shown)
+            sample = Line2D(*line, color=colour, lw=style.points(2.5), **look)
             self.page.add_artist(sample)
             y = start + tall - 0.3 * names.letters
             place = {"ha": "center", "va": "baseline", "linespacing": LINE_PITCH}
@@ -407,10 +401,10 @@ def set_moving(row: Row) -> Moving:
     ax, panel, colours = row
     cursor = ax.axvline(0.0, color=style.MUTED, lw=style.points(0.8), animated=True)
     dots = []
-    rows = zip(panel.traces, colours, style.looks(panel.traces), strict=True)
-    for trace, colour, look in reversed(list(rows)):
+    rows = zip(panel.traces, colours, strict=True)
+    for trace, colour in reversed(list(rows)):
         t, y = panels.middle(trace, panel.quantity)
-        dot = panels.dot(ax, colour, look)
+        dot = panels.dot(ax, colour)
         clipped = np.clip(y, *ax.get_ylim())
         dots.append((dot, t, clipped))  # the first on top
     return Moving(ax, cursor, dots)

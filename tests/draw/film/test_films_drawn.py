@@ -12,7 +12,6 @@ import pytest
 from helpers.films import picture, sheet, staged
 from helpers.runs import at_defaults
 from helpers.sketch import failed, made
-from matplotlib.lines import Line2D
 from PIL import Image
 
 import smc_mujoco as smc
@@ -56,16 +55,8 @@ def test_labels_stay_below_their_tiles_on_as_many_lines_as_were_measured(wide):
     assert ("\n" in drawn[1].get_text()) == (wide == 150)
 
 
-def test_runs_of_one_law_have_their_marks_and_ticks_stay_on_the_page():
+def test_ticks_stay_on_the_page():
     page = sheet([machine("duffing"), machine("duffing", input_delay=0.01)])
-    assert [line.get_marker() for line in page.page.artists] == ["o", "s"]
-    for line in page.page.artists:
-        assert isinstance(line, Line2D)
-        middle = page.size[1] * (1.0 - np.asarray(line.get_ydata())[0])
-        half = 0.5 * line.get_markersize() / 72 * page.page.dpi
-        assert middle - np.sqrt(2.0) * half >= 100.0, "the label's top cuts a diamond"
-    for one in page.moving:
-        assert [dot.get_marker() for dot, *_ in one.dots] == ["s", "o"]
     for one in page.moving:
         for label in one.axes.get_xticklabels():
             box = label.get_window_extent()
