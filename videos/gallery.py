@@ -106,7 +106,7 @@ CLIPS = {  # name of the clip's file -> what it shows
             ARM, channels={"shoulder": smc.Channel(x0=-0.3), "elbow": smc.Channel(x0=0.1)}
         ),
         "Your robot, a wall, a ball",
-        0.8,
+        2.0,
         changes=STRANGER,
         laws=(
             smc.law("pid", kp=(150.0, 60.0), kd=(15.0, 5.0), ki=(50.0, 20.0)),

@@ -58,6 +58,8 @@ def settles_at(trace: Trace) -> float:
 def until(trace: Trace, time: float) -> Trace:
     """Return the trace up to a time, s, with two samples at least."""
     count = max(2, int(np.searchsorted(trace.t, time + 1e-9)))
+    if count >= len(trace.t):
+        return trace
     part = arrays_within(trace, slice(count))
     return dataclasses.replace(trace, **part)
 

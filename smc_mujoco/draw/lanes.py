@@ -97,7 +97,7 @@ def below_film(
         if panel.quantity == "largest":
             cut_peak(row.axes, row.panel)
         if laned:
-            tell_swing(row.axes, row.panel.traces[0], row.colours[0])
+            tell_swing(row.axes, row.panel.traces[0], row.colours[0], panel.scale[0])
     return found, drawn
 
 
@@ -171,9 +171,9 @@ def settled(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Artist]:
     return marks
 
 
-def tell_swing(lane: Axes, trace: Trace, colour: str) -> None:
-    """Write beside a row how far u swings at the end of the time shown, with a bar; "smooth" if it
-    does not swing.
+def tell_swing(lane: Axes, trace: Trace, colour: str, factor: float) -> None:
+    """Write beside a row how far u swings at the end of the time shown, in the unit of its numbers,
+    which are `factor` times as large, with a bar; "smooth" if it does not swing.
     """
     low, high = lane.get_ylim()
     for swings in lane.collections:
@@ -187,7 +187,7 @@ def tell_swing(lane: Axes, trace: Trace, colour: str) -> None:
     if trace.diverged_at is not None:
         words = "fails"
     elif swing > SMOOTH_SHARE * (high - low):
-        words = f"±{swing:.2g}"
+        words = f"±{style.short(factor * swing)}"
         places = lane.transLimits.transform([(0.0, least), (0.0, most)])
         ends = places[:, 1]
         look: Fields = {"color": colour, "lw": style.points(3), "clip_on": False}

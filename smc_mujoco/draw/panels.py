@@ -21,7 +21,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from smc_mujoco.common.aliases import Array, ArrayPair, Data, Fields, Pair
 from smc_mujoco.draw import style
-from smc_mujoco.draw.coincidence import agreements, tell_agreements
+from smc_mujoco.draw.coincidence import Agreement, agreements, tell_agreements
 from smc_mujoco.draw.decimate import COLUMNS, band, end, line, smooth, window
 from smc_mujoco.draw.quantities import (
     LASTING_QUANTILE,
@@ -50,7 +50,7 @@ LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single cha
 SLOWEST_LINE = 2.4  # points, width of the channel whose x comes to its reference last
 VISIBLE_CHATTERING = 0.01  # of a panel's height: chattering that is smaller needs no words; chosen
 QUANTITY_OF_UNIT = {  # quantity -> another one of the same unit
-    **dict.fromkeys(("spread", "e", "settling"), "x"),
+    **dict.fromkeys(("spread", "e", "settling", "distance"), "x"),
     "de": "v",
     **dict.fromkeys(("largest", "applied"), "u"),
     **dict.fromkeys(("reaction", "d"), "force"),
@@ -68,6 +68,8 @@ WHOLE_LABELS = {  # quantity, one number a sample -> what an axis says
     "contact": "force of contact (N)",
     "load": "largest |u| (% of limit)",
     "settling": "|x − r|",
+    "distance": "|x − r|",
+    "tip distance": "tip off its path (mm)",
     "largest": "largest |u|",
 }
 SINGLE = ("spread", *WHOLE_LABELS)  # one number a sample, whatever the number of channels
@@ -96,7 +98,7 @@ class Panel(NamedTuple):
         The unit is "" where the words have it; or where it depends on the law, as that of s does:
         the s of twisting is e, and that of PID is a force.
         """
-        if self.quantity in ("tip", "contact", "load"):
+        if self.quantity in ("tip", "tip distance", "contact", "load"):
             return 1.0, ""
         name = QUANTITY_OF_UNIT.get(self.quantity, self.quantity)
         unit = style.units(self.group)[name]
@@ -118,7 +120,7 @@ class Panel(NamedTuple):
         unit = self.scale[1]
         single = len(group.channels) == 1
         speed = group.unit.endswith("/s")
-        if name == "settling" and speed:
+        if name in ("settling", "distance") and speed:
             return f"|v − r′|{unit}"
         if name in WHOLE_LABELS:
             return WHOLE_LABELS[name] + unit
@@ -294,51 +296,6 @@ def together(panels: Sequence[Panel]) -> list[Panel]:
     return [Panel("u", group, runs)]
 
 
-def strip(traces: Sequence[Trace]) -> list[Panel]:
-    """Return the two panels below a film: the motion of the first two groups of channels, or of one
-    group with its u; of arms the tip's, with the force of its contact or the largest u.
-
-    The motion is x; of several channels it is the largest error. A free body whose reference goes
-    somewhere, or whose attitude stays in its settling band, has a map of the paths in place of the
-    error of its attitude. One whose reference stays has its height in place of the error of its
-    place, if that is off farthest upwards or downwards.
-    """
-    plant = traces[0].scenario.plant
-    first = over_groups(traces, "tip")
-    if first:
-        load = first[0]._replace(quantity="load")
-        first += [*over_groups(traces, "contact"), load]
-    motions = []
-    controls = []
-    for each in style.split(traces).items():
-        place = Panel("x", *each)
-        many = len(place.group.channels) > 1
-        if place.group.driven:
-            control = place._replace(quantity="largest" if many and plant.direct else "u")
-            controls += (
-                [control] if place.group.effort else by_channel(place._replace(quantity="u"))
-            )
-        if many and plant.direct and plant.n == plant.driven == 2:
-            motions += by_channel(place)
-        elif place.group.driven or not many:
-            motions.append(place._replace(quantity="settling") if many or first else place)
-    moving = any(np.ptp(trace.r[:, :3], axis=0).any() for trace in traces)
-    if plant.pose:
-        place, turn = motions
-        if moving or all(map(stays_settled, turn.traces)):
-            motions[1] = place._replace(quantity="path")
-        off = [np.abs(run.x - run.r).max(axis=0) for run in place.traces]
-        if not moving and int(np.max(off, axis=0).argmax()) == HEIGHT:
-            motions[0] = by_channel(place._replace(quantity="x"))[HEIGHT]
-    return [*first, *motions, *controls][:2]
-
-
-def stays_settled(trace: Trace) -> bool:
-    """Return whether no channel of a trace ever leaves its settling band."""
-    band = settling_band(trace.scenario, scale(trace))
-    return bool((np.abs(trace.x - trace.r) <= band).all())
-
-
 def meaning(panels: Sequence[Panel]) -> dict[str, str]:
     """Return the meaning of bands and lines that need an explanation: "band", "line", ... ->
     words.
@@ -486,12 +443,17 @@ def over_time(
             artists += ax.plot(trace.t[-1], last, "X", **ending)
     alone = name in SINGLE or len(panel.group.channels) == 1
     if names and alone and not clipped:  # words have no room above impacts
-        lines = []
-        for trace, y in zip(traces, means, strict=True):
-            lines.append((trace.t, y))
-        agreed = agreements(lines, heights, name in PEAKS)
-        tell_agreements(ax, agreed, names)
+        tell_agreements(ax, agreed(panel), names)
     return artists
+
+
+def agreed(panel: Panel) -> list[Agreement]:
+    """Return which of a panel's runs agree, in the means of their channels, and until when."""
+    name = panel.quantity
+    lines = []
+    for trace in panel.traces:
+        lines.append((trace.t, QUANTITIES[name](trace).mean(axis=1)))
+    return agreements(lines, limits(panel.traces, name), name in PEAKS)
 
 
 def set_logarithmic(ax: Axes, heights: Pair) -> None:

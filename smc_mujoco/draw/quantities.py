@@ -16,6 +16,7 @@ LASTING_QUANTILE = 0.98
 MIN_ERROR = 1e-9  # smaller errors are drawn at it; chosen
 MIN_RATIO = 4.0  # least ratio of a logarithmic axis, without its margin; chosen
 PEAKS = ("settling", "tip")  # drawn as `peaks`, on a logarithmic axis
+ERRORS = ("e", "distance", "tip distance")  # whose axis has their zero
 # of a run whose plant diverged: its first part sets a panel's range if no run lasts; chosen
 UNDIVERGED_SHARE = 0.8
 MARGIN = 0.08  # of a panel's height, above and below its curves
@@ -65,6 +66,8 @@ QUANTITIES: dict[str, Callable[[Trace], Array]] = {  # name -> (K+1, n)
     "contact": contact_force,
     "load": share_of_limit,
     "settling": lambda trace: peaks(np.abs(trace.x - trace.r).max(axis=1), trace),
+    "distance": lambda trace: np.abs(trace.x - trace.r).max(axis=1, keepdims=True),
+    "tip distance": lambda trace: 1e3 * tip_error(trace)[:, None],
     "largest": lambda trace: np.abs(trace.u).max(axis=1, keepdims=True),
 }
 
@@ -142,7 +145,7 @@ def limits(traces: Sequence[Trace], name: str) -> Pair:
         r = np.concatenate(references)
         low = min(low, r.min(initial=low))
         high = max(high, r.max(initial=high))
-    if name == "e":
+    if name in ERRORS:
         low = min(low, 0.0)
         high = max(high, 0.0)
     if name in PEAKS:

@@ -52,12 +52,16 @@ def timeline(
     if trace.scenario.plant.tip:  # its forces have their numbers
         return [ended(trace, time) for time in times.tolist()]
     shown = played(trace.t) if played else trace.t
+    ticks = MIN_STATE_TIME * np.floor(shown / MIN_STATE_TIME + 1e-9)
+    read = np.searchsorted(shown, ticks - 1e-9)  # numbers that change are held as long, too
     gap = backlash_gap(trace.scenario)
     hits = contacts(trace, shown)
-    struck = blows(trace, shown)
+    blown = blows(trace, shown)
     resting = []
-    for on in at_rest(trace).T:
-        resting.append(~extended(~on, shown, MIN_STATE_TIME))
+    moving = ~at_rest(trace)
+    moving[0] = True  # else a brief rest at the start would be shown
+    for moves in moving.T:
+        resting.append(~extended(moves, shown, MIN_STATE_TIME))
     rest = np.array(resting)
     rest &= has_dry_friction(trace.scenario)
     sides_of_flanks = []
@@ -80,9 +84,9 @@ def timeline(
             states.append(end)
         elif hits[k]:
             states.append(hits[k])
-        elif struck[k]:
-            states.append(struck[k])
-        elif said := off_place(trace, k):
+        elif blown[k]:
+            states.append(blown[k])
+        elif said := off_place(trace, int(read[k])):
             states.append(said)
         elif words:
             colour = style.INK if sticks.any() else style.MUTED
@@ -116,20 +120,28 @@ def ended(trace: Trace, time: float) -> State | None:
 
 def contacts(trace: Trace, shown: Array) -> list[State | None]:
     """Return what is said of contact at each sample, whose times in the film are `shown`, s: "hit,
-    280 N·m", with the largest force of the hit, which fades; "contact" of one that lasts.
+    280 N·m", with the largest force of the hit on a joint; then "contact" of one that lasts, and of
+    one from the start of the run on.
     """
+    touch = in_contact(trace)
+    acts = touch | (touch.any(axis=1)[:, None] & (np.nan_to_num(trace.reaction) != 0.0))
     words = "hit", "contact"
-    return told(trace, shown, in_contact(trace), trace.reaction, words, style.REACTION)
+    return told(trace, shown, acts, trace.reaction, words, style.REACTION)
 
 
 def blows(trace: Trace, shown: Array) -> list[State | None]:
     """Return what is said of impulses at each sample, as `contacts` does: "blow, 200 N·m"."""
-    struck = np.zeros(trace.d.shape, bool)
+    return told(trace, shown, struck(trace), trace.d, ("blow", ""), style.DISTURBANCE)
+
+
+def struck(trace: Trace) -> Array:
+    """Return where an impulse acts on each channel, (K + 1, n)."""
+    found = np.zeros(trace.d.shape, bool)
     for signal in trace.scenario.disturbance:
         if isinstance(signal, Impulse):
             during = (trace.t >= signal.time - 1e-9) & (trace.t < signal.time + signal.width)
-            struck |= during[:, None] & (np.nan_to_num(trace.d) != 0.0)
-    return told(trace, shown, struck, trace.d, ("blow", ""), style.DISTURBANCE)
+            found |= during[:, None] & (np.nan_to_num(trace.d) != 0.0)
+    return found
 
 
 def told(
@@ -137,7 +149,8 @@ def told(
 ) -> list[State | None]:
     """Return what is said at each sample, whose times in the film are `shown`, s, of forces,
     (K + 1, n), while they act on channels, (K + 1, n): the first of two words with the largest
-    force, which fades, where they are brief; else the second, or nothing if that is "".
+    force, and the second, or nothing if that is "", where they last for more than HIT_TIME. Words
+    fade at the end.
     """
     on: Array = np.asarray(acts.any(axis=1))
     said: list[State | None] = [None] * len(on)
@@ -145,20 +158,24 @@ def told(
     changes = np.diff(held.astype(int), prepend=0, append=0)
     edges = np.flatnonzero(changes)
     for first, stop in edges.reshape(-1, 2).tolist():
-        during = np.flatnonzero(on[first:stop]) + first
-        brief = bool(trace.t[during[-1]] - trace.t[during[0]] <= HIT_TIME)
-        now = words[1]
-        if brief:
-            now = f"{words[0]}, {largest(trace, acts[during], forces[during])}"
-        if not now:
+        last = first + int(np.flatnonzero(on[first:stop])[-1])
+        lasts = bool(trace.t[last] - trace.t[first] > HIT_TIME)
+        if lasts and not words[1]:
             continue
-        last = during[0]
+        begun = max(
+            np.searchsorted(trace.t, trace.t[first] + HIT_TIME, side="right"),
+            np.searchsorted(shown, shown[first] + MIN_STATE_TIME),
+        )
+        if lasts and first == 0:
+            begun = 0
+        elif begun > last:
+            begun = stop
+        peak = largest(trace, acts[first:begun], forces[first:begun]) if begun else ""
         for k in range(first, stop):
-            last = k if on[k] else last
-            passed = shown[k] - shown[last]
-            fade = 1.0 - passed / MIN_STATE_TIME
+            fade = 1.0 - (shown[k] - shown[last]) / MIN_STATE_TIME
             opacity = min(1.0, max(0.0, float(fade)))
-            said[k] = State(now, colour, opacity, brief)
+            now = f"{words[0]}, {peak}" if k < begun else words[1]
+            said[k] = State(now, colour, opacity, k < begun)
     return said
 
 
@@ -166,8 +183,7 @@ def largest(trace: Trace, acts: Array, forces: Array) -> str:
     """Return the largest of forces at some samples, (m, n), of the channels on which they act, with
     its unit.
     """
-    sizes = np.abs(np.nan_to_num(forces)).max(axis=0)
-    sizes = np.where(acts.any(axis=0), sizes, 0.0)
+    sizes = np.where(acts, np.abs(np.nan_to_num(forces)), 0.0).max(axis=0)
     channel = int(sizes.argmax())
     for group in conventions.groups(trace.scenario):
         if channel in group.channels:

@@ -9,8 +9,9 @@ import pytest
 from helpers import arms
 
 import smc_mujoco as smc
-from smc_mujoco.draw import panels, style
+from smc_mujoco.draw import style
 from smc_mujoco.draw.figure import figure
+from smc_mujoco.draw.film import charts
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +65,7 @@ def test_a_blow_and_a_payload_are_marked_and_named(trace):
 
 
 def test_panels_below_a_film_of_an_arm_tell_what_the_tip_does(trace):
-    strip = panels.strip([trace])
+    strip = charts.strip([trace])
     # joints that slide and that turn
     assert [panel.quantity for panel in strip] == ["tip", "load"]
     assert [panel.label for panel in strip] == [

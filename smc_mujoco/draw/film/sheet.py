@@ -25,7 +25,7 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import lanes, panels, style
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw.figure import DrawnRuns
-from smc_mujoco.draw.film import flight
+from smc_mujoco.draw.film import charts, flight
 from smc_mujoco.draw.film.camera import Room
 from smc_mujoco.draw.lanes import Row
 from smc_mujoco.draw.states import State
@@ -284,7 +284,7 @@ class Sheet:
         what moves in them.
         """
         high = self.letters
-        shown = panels.strip(self.runs.early)
+        shown = charts.strip(self.runs.early)
         wide = self.size[0] / len(shown)
         left = style.width("−00.00", high) + 0.5 * high
         top = (1.0 - CHARTS_SHARE) * self.size[1] + 1.15 * LINE_PITCH * high

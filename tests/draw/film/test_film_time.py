@@ -12,6 +12,7 @@ from helpers.sketch import made
 
 import smc_mujoco as smc
 from smc_mujoco.draw import panels, style
+from smc_mujoco.draw.film import charts
 from smc_mujoco.draw.horizon import horizon
 
 LAWS = ("classical", "pid")
@@ -140,10 +141,10 @@ def test_a_free_body_that_is_off_most_in_height_has_its_height_as_first_chart(ch
     stays = np.zeros_like(run.x)
     x = stays.copy()
     x[:, channel] += 0.5
-    first, _ = panels.strip([dataclasses.replace(run, x=x, r=stays)])
+    first, _ = charts.strip([dataclasses.replace(run, x=x, r=stays)])
     assert first.label == label
     if channel == 2:
         np.testing.assert_array_equal(first.traces[0].x[:, 0], x[:, 2])
     moving = stays + 0.1 * np.sin(run.t)[:, None]
-    first, path = panels.strip([dataclasses.replace(run, x=x, r=moving)])
-    assert (first.quantity, path.quantity) == ("settling", "path")
+    first, path = charts.strip([dataclasses.replace(run, x=x, r=moving)])
+    assert (first.label, path.quantity) == ("|x − r| (m)", "path")

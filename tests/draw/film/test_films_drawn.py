@@ -5,6 +5,7 @@ states.
 import contextlib
 import dataclasses
 import itertools
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -12,13 +13,14 @@ import pytest
 from helpers.films import picture, sheet, staged
 from helpers.runs import at_defaults
 from helpers.sketch import failed, made
+from helpers.sources import loaded
 from PIL import Image
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl, progress
-from smc_mujoco.draw import panels, states, style
+from smc_mujoco.draw import states, style
 from smc_mujoco.draw.figure import DrawnRuns
-from smc_mujoco.draw.film import arrows, film, flight, world
+from smc_mujoco.draw.film import arrows, charts, film, flight, world
 from smc_mujoco.draw.film.sheet import Moment, Sheet, head_lines, label_sizes, room_of
 from smc_mujoco.draw.states import State
 
@@ -155,12 +157,12 @@ def test_the_wind_on_a_drone_has_its_arrow_over_it_and_its_path_a_map():
     trace = smc.run(
         smc.Scenario(plant=drone, law="geometric", x0=drone.rest, disturbance=wind, duration=0.4)
     )
-    error, path = panels.strip([trace])
-    assert (error.quantity, path.quantity) == ("settling", "path")
+    error, path = charts.strip([trace])
+    assert (error.quantity, path.quantity) == ("distance", "path")
     assert flight.plane(path.traces).tolist() == [0, 2]
     yaw = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.5])
     turned = dataclasses.replace(trace, x=trace.x + yaw)
-    assert [panel.quantity for panel in panels.strip([turned])] == ["settling", "settling"]
+    assert [panel.label[:8] for panel in charts.strip([turned])] == ["|x − r| "] * 2
     with staged(trace, SIZE) as stage:
         stage.arrange(trace.x[-1])
         stage.forward()
@@ -406,3 +408,50 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
         assert clip.n_frames == 6
         assert clip.size == size
         assert still.size == size
+
+
+def test_no_chart_is_spent_on_what_all_runs_agree_in_if_another_differs():
+    """All designs of a law for a Furuta pendulum kept its pendulum upright alike."""
+    runs = []
+    for k in range(3):
+        run = machine("furuta", "none")
+        free = np.sin(3.0 * run.t)[:, None] * (1.0, 0.0) + (k * run.t)[:, None] * (0.0, 1.0)
+        runs.append(dataclasses.replace(run, x=free, u=np.full_like(run.u, 1.0 * k)))
+    alike = [dataclasses.replace(run, x=runs[0].x, u=runs[0].u) for run in runs]
+    assert [panel.label for panel in charts.strip(alike)] == [
+        panel.label for panel in charts.strip(alike[:1])
+    ]
+    assert len(charts.strip(runs)) == 2
+    assert not any(map(charts.all_agree, charts.strip(runs)))
+    assert all(map(charts.all_agree, charts.strip(alike)))
+
+
+@pytest.mark.parametrize(
+    ("ends", "quantity"),
+    [
+        ((0.01, 0.029), "distance"),
+        ((0.01, 0.031), "settling"),
+        ((0.01,), "settling"),
+        ((0.2,), "distance"),
+    ],
+)
+def test_an_error_is_on_a_logarithmic_axis_where_runs_end_more_than_a_factor_of_3_apart(
+    ends, quantity
+):
+    """Two drones that were 210 and 170 mm off were on one line of two decades."""
+    runs = []
+    for end in ends:
+        run = machine("pendulum_network")
+        falls = np.interp(run.t, [0.0, 0.5, 1.0], [0.5, end, end])
+        runs.append(dataclasses.replace(run, r=0.0 * run.r, x=falls[:, None] + 0.0 * run.x))
+    assert charts.strip(runs)[0].quantity == quantity
+
+
+def test_a_chart_shows_a_joint_that_is_hit():
+    """A wall held an arm's shoulder, and a chart was of its lift."""
+    scene = loaded(Path(__file__).parents[3] / "scenes" / "unseen_wall.py")
+    labels = []
+    for wall in (None, scene.WALL):
+        run = smc.run(dataclasses.replace(scene.run(scene.LAWS["PID"], wall), duration=0.5))
+        labels.append([panel.label.split(" (")[0] for panel in charts.strip([run])])
+    assert labels == [["|x − r|", "lift x"], ["|x − r|", "shoulder x"]]

@@ -1,8 +1,12 @@
 """Blows and hits in words, and arrows that are longer than fits: broken, with their numbers."""
 
+import dataclasses
+import itertools
+
 import numpy as np
 import pytest
 from helpers.films import staged
+from helpers.sketch import made
 from PIL import Image
 
 import smc_mujoco as smc
@@ -52,6 +56,44 @@ def test_a_blow_is_told_with_its_peak_from_its_start_and_fades(run):
 def test_an_impulse_that_lasts_is_no_blow():
     told = states.timeline(struck(0.2), np.arange(0.1, 0.3, 1e-2))
     assert not any(state.words.startswith("blow") for state in told if state)
+
+
+def test_every_first_contact_is_a_hit_with_its_peak_and_what_lasts_after_it_a_contact(run):
+    """An arm that struck a wall and stayed on it was never said to hit it."""
+    t = run.t
+    touches = (t >= 0.1) & (t < 0.5)
+    touches[np.searchsorted(t, 0.13) : np.searchsorted(t, 0.14)] = False  # it bounces
+    force = np.where(touches, 20.0, 0.0)
+    force[np.searchsorted(t, 0.15)] = 63.0
+    force[np.searchsorted(t, 0.3)] = 90.0
+    words = "hit", "contact"
+    told = states.told(run, t, touches[:, None], force[:, None], words, style.REACTION)
+    said = [state.words if state else None for state in told]
+    assert [word for word, _ in itertools.groupby(said)] == [None, "hit, 63 N·m", "contact"]
+    assert t[said.index("hit, 63 N·m")] == pytest.approx(0.1)
+    assert t[said.index("contact")] == pytest.approx(0.1 + states.MIN_STATE_TIME, abs=2e-3)
+    assert all(state.opacity == 1.0 for state in told[: np.searchsorted(t, 0.499)] if state)
+    since = states.told(run, t, (t < 0.5)[:, None], force[:, None], words, style.REACTION)
+    assert {state.words for state in since if state} == {"contact"}
+
+
+def test_words_are_shown_for_as_long_as_it_takes_to_read_them_unless_something_is_hit(run):
+    """A machine that was let go said "sticks" for a picture, and an error changed in each."""
+    drone = made(smc.Scenario(plant="quadrotor", law="geometric", duration=0.6))
+    drone = dataclasses.replace(drone, x=drone.r + drone.t[:, None])
+    times = np.arange(0.0, 0.6, 1e-3)
+    for trace in (run, drone):
+        said = [state.words if state else None for state in states.timeline(trace, times)]
+        spells = [(word, len(list(group))) for word, group in itertools.groupby(said)]
+        assert len(spells) > 2
+        for (word, count), (then, _) in itertools.pairwise(spells[1:]):
+            long = count >= 1e3 * states.MIN_STATE_TIME - 2
+            assert long or word is None or str(then).startswith("hit")
+    stuck = dataclasses.replace(
+        run.scenario, friction=smc.Coulomb(0.05), x0=0.5, disturbance=None, contact=None
+    )
+    first = smc.run(dataclasses.replace(stuck, duration=0.1))
+    assert set(states.timeline(first, np.arange(0.0, 0.1, 1e-3))) == {None}
 
 
 def test_an_arrow_is_broken_if_it_is_cut_and_its_number_is_told(run):

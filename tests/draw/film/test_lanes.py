@@ -46,6 +46,14 @@ def test_each_law_has_a_lane_that_says_its_swing(drawn):
         assert below.get_window_extent().y1 < lane.get_window_extent().y0
 
 
+def test_a_swing_is_told_in_the_unit_of_the_panel(drawn):
+    """A panel in mN said 0.006."""
+    _, rows = drawn
+    traces = [dataclasses.replace(trace, u=1e-3 * trace.u) for _, trace, _, _ in rows]
+    said = [row.axes.texts[-1].get_text() for row in sheet(traces, LAWS, SIZE).moving[1:]]
+    assert said == ["smooth", "±2", "±6"]
+
+
 def test_a_law_that_switches_in_few_samples_has_a_lane():
     run = made(
         smc.Scenario(
@@ -69,7 +77,7 @@ def test_two_laws_that_chatter_are_told_apart(drawn):
     made_of, rows = drawn
     shown = picture(made_of, 1.0).astype(int)
     heights = []
-    for lane, _, colour in rows:
+    for lane, _, colour, _ in rows:
         box = lane.get_window_extent()
         column = shown[int(SIZE[1] - box.y1) : int(SIZE[1] - box.y0), int(0.5 * (box.x0 + box.x1))]
         paper = np.array([255.0] * 3)
