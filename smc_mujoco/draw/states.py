@@ -20,6 +20,7 @@ from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import RUB
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.layout import channel_names
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.touching import in_contact, shapes
 from smc_mujoco.simulation.scenario import Scenario
@@ -100,15 +101,21 @@ def off_place(trace: Trace, k: int) -> State | None:
     """Return how far a free body, or a robot with a measured base, is off its place at a sample:
     what a camera that follows it hides. None of other machines.
     """
-    plant = trace.scenario.plant
-    first = 0 if plant.pose else plant.base
-    place = slice(first, first + 3)
+    place = place_channels(trace.scenario.plant)
     away = 1e3 * float(np.linalg.norm(trace.x[k, place] - trace.r[k, place]))
-    if first < 0 or not away >= 1.0:
+    if not away >= 1.0:
         return None
     if away >= 1e3:  # fewer letters, in a narrow tile
         return State(f"{style.short(1e-3 * away)} m off", style.INK)
     return State(f"{style.short(away)} mm off", style.INK)
+
+
+def place_channels(plant: Plant) -> slice:
+    """Return the channels of the place of a free body, or of a robot with a measured base; none of
+    other machines.
+    """
+    first = 0 if plant.pose else plant.base
+    return slice(first, first + 3) if first >= 0 else slice(0)
 
 
 def ended(trace: Trace, time: float) -> State | None:
@@ -124,7 +131,8 @@ def contacts(trace: Trace, shown: Array) -> list[State | None]:
     one from the start of the run on.
     """
     touch = in_contact(trace)
-    acts = touch | (touch.any(axis=1)[:, None] & (np.nan_to_num(trace.reaction) != 0.0))
+    touched: Array = np.asarray(touch.any(axis=1))
+    acts = touch | (touched[:, None] & (np.nan_to_num(trace.reaction) != 0.0))
     words = "hit", "contact"
     return told(trace, shown, acts, trace.reaction, words, style.REACTION)
 

@@ -81,7 +81,7 @@ class Overlay:
             tail = place - self.newton * peak
             stamped += self.arrow(image, tail, place, size, body)
         taken = [*self.stage.words, *arrows.boxes(stamped, self.scale)]
-        arrows.write_numbers(image, stamped, self.scale, taken)
+        arrows.write_numbers(image, stamped, self.scale, taken, image.width)
         return np.asarray(image)
 
     def trail(

@@ -72,6 +72,7 @@ CUT = 1.02  # of the longest arrow: a longer one is cut, and has its number
 LETTERS = 36.0  # px of a film of full size, of the number at an arrow, as of all its letters
 SMALL_LETTERS = 27.0  # px, of one that has no room else
 GAP = 4.0  # px of a film of full size, around a number
+NARROW = 500.0  # px of a film of full size: a tile that is less wide has one number at most
 PLACES = 12  # in each direction, at which room for a number is looked for
 MIN_BAR = 0.1  # of the longest arrow: smaller ranges have no bar
 
@@ -550,16 +551,19 @@ def boxes(stamped: Sequence[Stamped], scale: float) -> list[Array]:
 
 
 def write_numbers(
-    image: Image.Image, stamped: Sequence[Stamped], scale: float, taken: list[Array]
+    image: Image.Image, stamped: Sequence[Stamped], scale: float, taken: list[Array], wide: float
 ) -> None:
-    """Write the numbers of arrows, each once in a colour, in a film `scale` times as large as a
-    full one. None is written over the boxes `taken`, (2, 2) px each, which get those of the
-    numbers.
+    """Write the numbers of a machine's arrows, each once in a colour, in a film `scale` times as
+    large as a full one; in a narrow tile that of the longest alone. None is written over the boxes
+    `taken`, (2, 2) px each, which get those of the numbers.
     """
     said = set()
-    for arrow, line, _ in stamped:
+    numbered = [one for one in stamped if one.arrow.words]
+    if numbered and wide < NARROW * scale:
+        numbered = [max(numbered, key=lambda one: abs(one.arrow.high))]
+    for arrow, line, _ in numbered:
         key = arrow.words, arrow.rgba
-        if arrow.words and key not in said:
+        if key not in said:
             said.add(key)
             write(image, arrow, line, scale, taken)
 

@@ -19,6 +19,7 @@ TILE_EDGE = 0.03  # of a tile's height, free around what is seen; chosen
 HEAD_ROOM = 0.02  # of the picture's width: room above the machine in a tile, for arrowheads; chosen
 TILE_GAP = 2  # px between tiles
 MIN_HEIGHT = 0.25  # of a tile's, for a machine whose words have no room; chosen
+MAX_MISSED = 2.0  # sizes of what is seen, from a machine to its reference in the picture; chosen
 MAX_BESIDE = 0.3  # of a row's width, for a label beside its machine; chosen
 Camera = str | Sequence[float]  # a name, or azimuth and elevation in degrees
 # an allowed width -> widths and heights of labels, (n, 2), px, and how well they are read, 0 .. 1
@@ -35,11 +36,14 @@ class Room(NamedTuple):
 
 
 class View(NamedTuple):
-    """A camera's picture, px, its turn and its place, (3,) m, before a machine."""
+    """A camera's picture, px, its turn and its place, (3,) m, before a machine, which is in a room
+    of the picture.
+    """
 
     size: tuple[int, int]
     turn: Array
     place: Array
+    inside: Room
 
 
 def checked(chosen: Camera | None) -> Camera | None:
@@ -102,6 +106,23 @@ def fit(points: Array, turn: Array, size: tuple[int, int], room: Room) -> Array:
     return turn @ np.array([*centre, distance])
 
 
+def widened(view: View, points: Array, missed: Array) -> Array:
+    """Return how far the camera of a view of points (m, 3) goes back and aside in each frame,
+    (frames, 3) m, to see them as well at distances `missed`, (machines, frames, 3) m.
+
+    Distances over MAX_MISSED count less, and soon not at all: all machines have one view, in which
+    one that flees would make the others small.
+    """
+    reach = np.ptp(points, axis=0).max()
+    far = np.linalg.norm(missed, axis=2, keepdims=True)
+    seen = missed * np.clip(1.0 + MAX_MISSED - far / reach, 0.0, 1.0)
+    moves = []
+    for ways in seen.swapaxes(0, 1):
+        both = np.concatenate([points, *(points + way for way in ways)])
+        moves.append(fit(both, view.turn, view.size, view.inside) - view.place)
+    return np.array(moves)
+
+
 def project(points: Array, turn: Array, place: Array, size: tuple[int, int]) -> Array:
     """Return where points (m, 3) are in the picture of a camera at `place`: (m, 2) px from the top
     left.
@@ -161,7 +182,7 @@ def layout(
         top = min(max(edge, head, words), 0.5 * size[1])
         inside = Room(edge, top, size[0] - edge, size[1] - edge)
         place = fit(points, turn, size, inside)
-        view = View(size, turn, place)
+        view = View(size, turn, place, inside)
         merit = fits, read * magnification(view, points)
         layouts.append((merit, columns, pitch, view))
     _, columns, pitch, view = max(layouts, key=lambda one: one[0])

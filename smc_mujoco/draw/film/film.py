@@ -447,12 +447,16 @@ def placement(
 
 def staged(tracks: Sequence[MachineTrack], placed: Placement, times: Array) -> Iterator[Stage]:
     """Yield the stages of machines, one after the other."""
+    missed = np.array([track.missed for track in tracks])
+    widened = 0.0
+    if placed.followed and missed.size:
+        widened = camera.widened(placed.view, placed.points, missed)
     for k, track in enumerate(tracks):
         puppet = placed.puppets[k]
         path = None
         if placed.followed:
             raised = np.array([0.0, 0.0, puppet.height])
-            path = placed.followed[k].followed(times) + raised
+            path = placed.followed[k].followed(times) + raised + widened
         alone = len(tracks) == 1
         beside = 0.0 if placed.lanes is None else placed.lanes[k]
         yield Stage(track, puppet, placed.view, placed.points, placed.scale, alone, path, beside)

@@ -122,6 +122,6 @@ def shots(stages: Sequence[Stage], frame: int, time: float) -> list[Array]:
     for own in stamped:
         taken += arrows.boxes(own, first.scale)
     for own in stamped:
-        arrows.write_numbers(image, own, first.scale, taken)
+        arrows.write_numbers(image, own, first.scale, taken, image.width / len(stages))
     picture = np.asarray(image)
     return [picture[:, left:right] for left, _, right, _ in parts.tolist()]

@@ -49,7 +49,7 @@ class Stage:
     ):
         self.track = track
         self.puppet = puppet
-        self.size, self.turn, self.place = view
+        self.size, self.turn, self.place, _ = view
         self.start = view.place
         self.scale = scale
         self.alone = alone
@@ -217,7 +217,7 @@ class Stage:
             self.dot_to_goal(image)
         stamped = self.stamped(image, drawn)
         taken = [*self.words, *arrows.boxes(stamped, self.scale)]
-        arrows.write_numbers(image, stamped, self.scale, taken)
+        arrows.write_numbers(image, stamped, self.scale, taken, image.width)
         return np.asarray(image)
 
     def dot_to_goal(self, image: Image.Image) -> None:

@@ -36,8 +36,10 @@ class Motion(NamedTuple):
 class MachineTrack:
     """A trace at the frames of a film's clock; an arm has no arrows but those of its tip.
 
-    `framing` are its arrows at the times `grid`, s, of the whole run, which set the place of all,
-    and `speaks` is whether something is said of it in the run.
+    `missed`, (frames, 3) m, is the way from a machine whose place is measured to where its
+    reference wants it; (frames, 0) of others. `framing` are its arrows at the times `grid`, s, of
+    the whole run, which set the place of all, and `speaks` is whether something is said of it in
+    the run.
     """
 
     def __init__(
@@ -68,6 +70,8 @@ class MachineTrack:
                 self.drawn[k] = arrows.without_numbers(self.drawn[k], state.colour)
         self.x = sampled(trace, trace.x[:, :n], times)
         self.r = sampled(trace, trace.r[:, :n], times)
+        place = states.place_channels(trace.scenario.plant)
+        self.missed = np.nan_to_num(self.r - self.x)[:, place]
         self.ahead = leads(trace, times, edges)[:, :n]
 
     def rest(self, time: float) -> Array | None:

@@ -130,7 +130,7 @@ def set_floor(model: mujoco.MjModel, view: camera.View, points: Array, moved: Ar
     """Suit the floor to machines whose points are (m, 3) m, moved with the camera: its grid, and
     the haze into which it fades behind them.
     """
-    size, turn, place = view
+    size, turn, place, _ = view
     points = points + moved
     place = place + moved
     lowest = points.min(axis=0)

@@ -1,5 +1,7 @@
 """The film's camera, chosen by name or by angles; and what it sees of a user's own model."""
 
+import itertools
+
 import numpy as np
 import pytest
 from helpers.films import staged, tracks
@@ -146,3 +148,20 @@ def test_camera_sees_all_points_as_near_as_it_can():
     assert top >= 50 - 1e-6
     assert bottom <= 400 + 1e-6
     assert right - left == pytest.approx(1100) or bottom - top == pytest.approx(350)
+
+
+def test_a_camera_that_follows_goes_back_while_the_reference_is_far_but_not_for_one_that_flees():
+    """A drone's outline left the picture when it was farthest from it."""
+    turn = camera.turn(120.0, -20.0)
+    points = np.array(list(itertools.product((-0.2, 0.2), (-0.1, 0.1), (-0.05, 0.05))))
+    inside = camera.Room(20.0, 40.0, 380.0, 200.0)
+    size = (400, 220)
+    view = camera.View(size, turn, camera.fit(points, turn, size, inside), inside)
+    away = 0.4 * np.array([[0.0, 0.0, 0.0], [1.0, -1.0, 0.5], [-1.4, 0.2, 0.0], [30.0, 0.0, 0.0]])
+    moves = camera.widened(view, points, np.array([0.0 * away, away]))
+    assert np.abs(moves[[0, 3]]).max() < 1e-9
+    for move, way in zip(moves[:3], away[:3], strict=True):
+        for seen in (points, points + way):
+            x, y = camera.project(seen, turn, view.place + move, size).T
+            assert inside.left - 1e-6 <= x.min() < x.max() <= inside.right + 1e-6
+            assert inside.top - 1e-6 <= y.min() < y.max() <= inside.bottom + 1e-6

@@ -89,7 +89,7 @@ def test_a_number_at_an_arrow_hides_nothing_where_there_is_room_beside_it():
     line = np.linspace((100.0, 25.0), (150.0, 25.0), 40)
     arrow = arrows.Arrow(0.0, 1.0, arrows.rgba(style.DISTURBANCE), words="180 N·m")
     drawn = [arrows.stamp(image, line, 6.0, arrow)]
-    arrows.write_numbers(image, drawn, 0.625, arrows.boxes(drawn, 0.625))
+    arrows.write_numbers(image, drawn, 0.625, arrows.boxes(drawn, 0.625), image.width)
     dark = np.asarray(image).min(axis=2) < 128
     assert not dark[45:].any()
     assert dark[:, :95].any()

@@ -198,7 +198,7 @@ def test_words_of_a_machine_lie_over_neither_it_nor_its_arrows(speaks, monkeypat
     """A pendulum leans on a peg, or swings freely."""
     traces = two("inverted_pendulum", contact="peg" if speaks else ())
     with filmed(traces, monkeypatch) as (_, placed):
-        size, turn, place = placed.view
+        size, turn, place, _ = placed.view
         seen = camera.project(placed.points, turn, place, size)
         said = sheet.STATE_HEIGHT * sheet.letters(SIZE)
         assert (seen[:, 1].min() >= said - 1e-6) == speaks

@@ -164,7 +164,7 @@ def test_numbers_of_arrows_are_apart_and_none_is_written_twice():
         drawn.append(arrows.stamp(image, line, 4.0, arrow))
     taken = arrows.boxes(drawn, 0.5)
     before = np.asarray(image).copy()
-    arrows.write_numbers(image, drawn, 0.5, taken)
+    arrows.write_numbers(image, drawn, 0.5, taken, image.width)
     numbers = taken[sum(len(one.edge) for one in drawn) :]
     assert len(numbers) == 3
     changed = (np.asarray(image) != before).any(axis=2)
@@ -175,3 +175,18 @@ def test_numbers_of_arrows_are_apart_and_none_is_written_twice():
         others = [*taken[:-3], *numbers[:k]]
         assert arrows.is_apart(number, others)
         assert not arrows.is_apart(number, [*others, number])
+
+
+@pytest.mark.parametrize(("wide", "count"), [(499.0, 1), (501.0, 2)])
+def test_a_narrow_tile_has_the_number_of_its_longest_arrow_alone(wide, count):
+    """Seven numbers lay over three robots on two wheels."""
+    image = Image.new("RGB", (500, 200), "white")
+    drawn = []
+    for words, length, y in (("9 N", 2.0, 60.0), ("400 N", -3.0, 140.0)):
+        arrow = arrows.Arrow(0.0, length, (0.0, 0.0, 0.0, 1.0), words=words)
+        line = np.linspace((200.0, y), (260.0, y), 40)
+        drawn.append(arrows.stamp(image, line, 4.0, arrow))
+    taken = []
+    arrows.write_numbers(image, drawn, 1.0, taken, wide)
+    assert len(taken) == count
+    assert any(number[:, 1].mean() > 100.0 for number in taken)
