@@ -6,8 +6,8 @@ A function's hash covers its bytecode, constants, defaults, closure and everythi
 by a global name: constants by value, functions by their own code, objects by their class and by
 what pickle keeps of them. Functions and classes of Python and of the numerical packages count by
 name, since the versions of those packages are recorded. A law in C counts by its machine code, one
-in another file by its content. Names of files, line numbers and comments do not count. Hashes hold
-for one version of Python.
+in another file by its content. Names of files, line numbers, comments and docstrings do not count.
+Hashes hold for one version of Python.
 """
 
 import contextlib
@@ -254,13 +254,21 @@ def _function_contents(function: FunctionType) -> list[Any]:
     names = names_in(function.__code__)
     closure = list(map(_cell_contents, function.__closure__ or ()))
     return [
-        function.__code__,
+        _without_docstring(function),
         function.__defaults__,
         function.__kwdefaults__,
         closure,
         *_reached(function.__globals__, names.variables, names.attributes, set()),
         *_overloads(function),
     ]
+
+
+def _without_docstring(function: FunctionType) -> CodeType:
+    """Return a function's code with None in place of its docstring, which is its first constant."""
+    code = function.__code__
+    if function.__doc__ is None or code.co_consts[:1] != (function.__doc__,):
+        return code
+    return code.replace(co_consts=(None, *code.co_consts[1:]))
 
 
 def _overloads(function: FunctionType) -> list[Any]:

@@ -15,6 +15,7 @@ import math
 import re
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from decimal import Decimal
 from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.common import html
@@ -32,8 +33,9 @@ NARROW_WIDTH = 12  # characters of a line below a number where space is short
 TEX_CHARACTER = 0.5
 TEX_SMALL = 0.43
 TEX_WIDTH = 22
+NEAR_POWERS = 2  # of ten, between the ends of an interval that are written with one of them
 MAX_HTML_ROWS = 40
-NEEDS = r"needs booktabs; \small\setlength{\tabcolsep}{2pt} before it makes it narrower"
+NEEDS = r"needs booktabs; \footnotesize\setlength{\tabcolsep}{2pt} before it makes it narrower"
 NO_BREAK = "\N{NO-BREAK SPACE}"
 # A character -> as LaTeX writes it, with any engine.
 TEX = {c: f"\\{c}" for c in "&%$#_{}"} | {c: f"${c}$" for c in "<>|"}
@@ -222,6 +224,7 @@ class Tabular:
             f"\\begin{{tabular}}{{{'l' * self.left}{'r' * (len(self.headings) - self.left)}}}",
             "\\toprule",
             *self._tex_words([self.label or self.title], width),
+            "\\midrule",
             *_tex_lines(heads)[::-1],  # their last lines are level
             "\\midrule",
         ]
@@ -442,18 +445,35 @@ def commented(text: str) -> str:
 def tex(text: str) -> str:
     """Return text with LaTeX's special characters escaped, and numbers with exponents, powers,
     Greek letters, dashes and u_max in its notation.
+
+    Both ends of an interval have the larger of their powers of ten, where these are near.
     """
 
     def written(match: re.Match[str]) -> str:
         if match["number"]:
-            return f"${match['number']}\\cdot10^{{{match['power']}}}$"
+            return _with_power(match["number"], match["power"])
+        if match["low"]:
+            return _tex_interval(match["low"], match["of_low"], match["high"], match["of_high"])
         if match["raised"]:
             return f"$^{{{match['raised']}}}$"
         if match["bound"]:
             return r"$u_{\max}$"
         return TEX.get(match["letter"], match["letter"])
 
+    interval = r"(?P<low>-?[\d.]+)e(?P<of_low>-?\d+)–(?P<high>-?[\d.]+)e(?P<of_high>-?\d+)"
     number = r"(?P<number>[<-]?[\d.]+)e(?P<power>-?\d+)"
-    return re.sub(
-        rf"{number}|\^(?P<raised>-?\d+)|(?P<bound>\bu_max\b)|(?P<letter>.)", written, text
-    )
+    others = r"\^(?P<raised>-?\d+)|(?P<bound>\bu_max\b)|(?P<letter>.)"
+    return re.sub(rf"{interval}|{number}|{others}", written, text)
+
+
+def _with_power(number: str, power: str) -> str:
+    return f"${number}\\cdot10^{{{power}}}$"
+
+
+def _tex_interval(low: str, of_low: str, high: str, of_high: str) -> str:
+    """Return an interval of numbers with powers of ten."""
+    shift = int(of_high) - int(of_low)
+    if not 0 <= shift <= NEAR_POWERS:
+        return f"{_with_power(low, of_low)}--{_with_power(high, of_high)}"
+    shifted = Decimal(low).scaleb(-shift)
+    return f"({shifted}--{high})$\\cdot10^{{{of_high}}}$"

@@ -60,8 +60,8 @@ BELOW = (
 # A word in tables -> its meaning, which their key says, and LaTeX below the table.
 MEANINGS = {
     "J (": "Tuning minimises J, summed over conditions: ITAE divided by the initial error, "
-    "plus 0.001 s^3 times the variation of u divided by u_max and by the duration. The table's J "
-    "is from separate runs, which tuning has not seen.",
+    "plus 0.001 s^3 times the variation of u divided by u_max and by the duration. J in tables is "
+    "from separate runs, which tuning has not seen.",
     "shipped": "Shipped gains come with smc_mujoco.",
     "tuned here": "Gains tuned here were found by searches with smc_mujoco.",
     "settled runs": "A run counts as settled if it settles before its last fifth.",
@@ -102,9 +102,9 @@ UNDER = {
     "default": "Default gains are those of the law's own file.",
     "yours": "Gains marked yours were given by the authors.",
     "strong=True": "Bold: may be the best: no other law is shown to be better "
-    f"({100 * LEVEL:g} % confidence).",
+    f"({100 * LEVEL:g} % confidence). A law without bold is not always shown to be worse.",
     "below ": "Below a floor (of noise, resolution, or a small share of the start or of u_max): "
-    "such values count as equal.",
+    "such values count as equal; where one is bold, no value above the floor is.",
     "may exceed ": "May exceed a floor: the median is below it, but need not stay there.",
     "at half": "At half the step: the median with half the physics step.",
 }
@@ -405,15 +405,24 @@ class Board(Tables):
         names = joined(self.best)
         if len(self.best) == len(self.entries):
             names = "both laws" if len(self.entries) == 2 else "all laws"
-        if all(block.level for block in self.blocks):
+        if self.level:
             return f"{names} {SAME_RUNS if self.metric == SETTLES else LEVEL_WORDS}"
-        seen = []
-        for block in self.blocks:
-            if not math.isnan(block.resolves):
-                seen.append(block.resolves)
-        if not seen:
+        if math.isnan(self.resolves):
             return f"{names} are statistically indistinguishable"
-        return f"{names} are statistically indistinguishable; {hidden(max(seen))}"
+        return f"{names} are statistically indistinguishable; {hidden(self.resolves)}"
+
+    @property
+    def level(self) -> bool:
+        """Whether the best laws are level in every block."""
+        return all(block.level for block in self.blocks)
+
+    @property
+    def resolves(self) -> float:
+        """The largest of the blocks' least leads that would have been seen, a share; NaN without a
+        test.
+        """
+        seen = [block.resolves for block in self.blocks if not math.isnan(block.resolves)]
+        return max(seen, default=math.nan)
 
     @property
     def barred(self) -> list[str]:
@@ -684,15 +693,24 @@ def _title(board: Board, plant: str, named: Callable[[str], str] = str) -> str:
 
 
 def _wins(boards: Sequence[Board], labels: Mapping[str, str]) -> list[str]:
-    """Return a paragraph: which law wins in which metrics."""
+    """Return a paragraph: which law wins in which metrics, and which leads may be unseen in the
+    others.
+    """
     won: dict[str, list[str]] = {}
+    unseen = []
     for board in boards:
         if board.winner:
             won.setdefault(board.winner, []).append(board.label)
+        elif board.resolves < MAX_LEAD and not board.level:
+            unseen.append(f"{100 * board.resolves:.2g} % in {board.label}")
     sentences = []
     for law, metrics in won.items():
         sentences.append(f"{labels.get(law) or style.law_name(law)} wins: {joined(metrics)}.")
-    return [" ".join(sentences or ["No law wins."])]
+    if not won:
+        sentences.append("No law wins.")
+    if unseen:
+        sentences.append(f"Leads below {joined(unseen)} might not show.")
+    return [" ".join(sentences)]
 
 
 def _cell(board: Board, entry: BoardEntry) -> Cell:

@@ -63,9 +63,11 @@ def recommend(
     seeds: int,
     clock: AnswerTime,
     relevant: float,
+    untried_laws: int = 0,
 ) -> RaceRecommendation:
     """Race laws on a plant and recommend one of them, all as long as the clock lets it; `metrics`
-    are those of the tables, from that many seeds.
+    are those of the tables, from that many seeds, and `untried_laws` the number of further laws
+    that suit.
     """
     goal = trial.asked_goal(plant)
     entrants, left_out = _entrants(trial, plant, laws)
@@ -117,6 +119,7 @@ def recommend(
         worst_run=_worst_run(table, first.name),
         tuned=tuned.get(first.name),
         left_out=left_out,
+        untried_laws=untried_laws,
         judged=f"over {joined([one.name for one in goal.conditions])} on {plant.name}",
     )
 

@@ -5,6 +5,9 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
+from smc_mujoco.analysis.paired_runs import values
 from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.step_halving import UNTRIED
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST
@@ -191,6 +194,7 @@ class RaceRecommendation(Recommendation):
     worst_run: Scenario  # of the first law in the condition where it fares worst
     tuned: Tuned | None  # the searches for the gains of the first law; None if they were known
     left_out: Mapping[str, str]  # law -> why it could not be tuned
+    untried_laws: int  # number of the package's laws that suit, too, and were not tried
     judged: str  # what J is of, in words
 
     @cached_property
@@ -225,6 +229,9 @@ class RaceRecommendation(Recommendation):
             lines.append(f"Not searched: {late}; the same call goes on with them")
         for name, why in self.left_out.items():
             lines.append(f"Left out: {name}, {why}")
+        if self.untried_laws:
+            number_of = counted(self.untried_laws, "other law")
+            lines.append(f"Not tried: {number_of} of the package; name some by laws= (--law)")
         lines.append(f"Second: {self.second or 'none'}")
         lines.append(f"Gains: {self.law}{self._unit}, {self.law.source}")
         return lines
@@ -243,6 +250,8 @@ class RaceRecommendation(Recommendation):
             words.append("of the laws that were searched")
         if self.race.sets < LOOKS[0] and len(self.race.running) > 1 and not self.race.winner:
             words.append(f"after {counted(self.race.sets, 'set')} of gains, so more may change it")
+        if open_ := self._may_be_as_good:
+            words.append(f"not shown to be better than {joined(open_)}")
         if self.settles[self.law.name] < RELIABLE:
             words.append(f"which settled in {done} of {of} runs")
         text = ", ".join(words)
@@ -255,6 +264,14 @@ class RaceRecommendation(Recommendation):
                 "before the last fifth of the run"
             )
         return text
+
+    @property
+    def _may_be_as_good(self) -> list[str]:
+        """The other laws that may have the lowest J with these gains, where no test names a law."""
+        if not self.fixed or self._winners:
+            return []
+        names = [law.name for law in self.laws]
+        return [name for name in _best(self.fixed, names) if name != self.law.name]
 
     @property
     def _lowest(self) -> str | None:
@@ -326,7 +343,7 @@ class RaceRecommendation(Recommendation):
             more = "more minutes"
             if race.seconds:
                 minutes = math.ceil((LOOKS[0] - race.sets) * race.seconds / 60.0)
-                more = f"more minutes: the missing sets take about {minutes} at this speed"
+                more = f"more minutes: the missing sets take about {minutes} min at this speed"
             short = ""
             if race.sets < FIRST:
                 short = f", not even the first {FIRST}"
@@ -401,7 +418,9 @@ class RaceRecommendation(Recommendation):
 
     @property
     def _needs(self) -> str:
-        """The first law's medians in each metric, from its best condition to its worst."""
+        """The first law's medians in each metric, and in overshoot, which no default need has, from
+        its best condition to its worst.
+        """
         found: dict[str, list[float]] = {}
         headings = {}
         for board in self.leaderboard:
@@ -409,6 +428,8 @@ class RaceRecommendation(Recommendation):
             for entry in board.entries:
                 if entry.law == self.law.name and not math.isnan(entry.interval.median):
                     found.setdefault(board.metric, []).append(entry.interval.median)
+        found.setdefault("overshoot", self._medians("overshoot"))
+        headings.setdefault("overshoot", "overshoot (%)")
         parts = []
         count = len(self.settled[self.law.name])
         for metric, medians in found.items():
@@ -417,6 +438,16 @@ class RaceRecommendation(Recommendation):
             parts.append(f"{headings[metric]} {span(low, high) or low}{few}")
         over = ", range of the medians over the conditions asked for" if count > 1 else ""
         return f"{joined(parts)}{over}"
+
+    def _medians(self, metric: str) -> list[float]:
+        """Return the medians of the first law's runs in a metric, one for each condition."""
+        own = self.table.column("law") == self.law.name
+        conditions = self.table.column("condition")
+        numbers = values(self.table, metric)
+        medians = []
+        for condition in dict.fromkeys(conditions[own].tolist()):
+            medians.append(float(np.median(numbers[own & (conditions == condition)])))
+        return medians
 
     @property
     def _margins(self) -> str:
@@ -444,7 +475,7 @@ class RaceRecommendation(Recommendation):
         text += "5 % of the initial error"
         if not all(margin.open for margin in self.margins):
             text += ", and at those after 'but not' it is above"
-        text += ". A run at a tolerated level need not settle"
+        text += ". A run at a tolerated level need not settle, and may swing far before"
         if self.beside != "nominal":
             text += ". Delay and mass include those of the condition; friction and blows are added"
         if self.helped:
@@ -567,6 +598,12 @@ def _ranked(comparison: Comparison, order: Sequence[str]) -> list[str]:
     return [law for law in order if enough.get(law)]
 
 
+def _best(comparison: Comparison, order: Sequence[str]) -> list[str]:
+    """Return the laws that may have the lowest J, in an order of laws."""
+    beaten = dict(zip(comparison.laws, comparison.worse[:, 0], strict=True))
+    return [law for law in _ranked(comparison, order) if not beaten[law]]
+
+
 def _lead(comparison: Comparison, first: str, rival: str) -> str:
     """Return how J of a law compares with a rival's; where runs fail, without a ratio."""
     effect = comparison.effect(0, first, rival)
@@ -594,11 +631,11 @@ def _verdict(comparison: Comparison, order: Sequence[str]) -> str:
     rival = max(effects, key=lambda law: effects[law].high)
     at = comparison.laws.index(first), comparison.laws.index(rival)
     p = number(float(comparison.p[0][at]), 2)
-    lead = f"{_lead(comparison, first, rival)} (p {p})"
+    least = f"{100 * comparison.relevant:g} %"
+    lead = f"{_lead(comparison, first, rival)} (p {p} for a lead above {least})"
     if winner:
         return f"{winner} wins; its J is {lead}"
-    beaten = dict(zip(comparison.laws, comparison.worse[:, 0], strict=True))
-    best = [law for law in names if not beaten[law]]
+    best = _best(comparison, order)
     if len(best) == 1:
         return f"open: {best[0]} {ALONE}; its J is {lead}"
     either = f"either {best[0]} or {best[1]}" if len(best) == 2 else f"any of {joined(best)}"

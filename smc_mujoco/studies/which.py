@@ -69,7 +69,7 @@ def which(
     falling: Boolean = False,
     minutes: Positive | None = None,
 ) -> Recommendation:
-    """Recommend a law for a plant: compare all laws that suit, with gains for the plant, and say
+    """Recommend a law for a plant: compare the laws that suit, with gains for the plant, and say
     how certain the answer is.
 
         recommended = smc.which("duffing", "friction", laws=["pid", "adrc"], minutes=1)
@@ -83,7 +83,8 @@ def which(
         "calm", "gentle", "frugal", "no-overshoot"; by default fast, accurate and calm. With
         minutes they are only shown: the laws are compared by J. And what every law must have:
         "continuous" and the other names of `smc_mujoco.control.properties.PROPERTIES`.
-      laws: the laws to compare, by name or with your own gains. Default: all that suit.
+      laws: the laws to compare, by name or with your own gains. Default: all that suit; of
+        these the usual ones on your own model within minutes. The answer says how many are left.
       seeds: runs of a law in each condition, each with another start and other noise. Default: 24,
         or 14 with minutes.
       duration: of a run, s. Default: 5, or 3 with minutes.
@@ -141,7 +142,11 @@ def which(
     if minutes:
         spare = 60.0 * min(FILMED, FILMED_SHARE * minutes)
         clock = AnswerTime(began + 60.0 * minutes - spare, spare)
-        return recommend(trial, machine, chosen, compared, seeds or RACE_SEEDS, clock, relevant)
+        names = {law.name for law in chosen}
+        untried = [law for law in _of_package(machine, properties) if law.name not in names]
+        return recommend(
+            trial, machine, chosen, compared, seeds or RACE_SEEDS, clock, relevant, len(untried)
+        )
     count = seeds or SEEDS
     candidates = trial.candidates({machine.name: chosen}, count)
     table = trial.run(candidates, count)
@@ -181,8 +186,7 @@ def _with_values(run: Scenario, asked: Sequence[str]) -> list[str]:
 def _suited(plant: Plant, properties: Sequence[str], laws: object) -> Laws:
     """Return the laws to compare. Those without given gains are templates."""
     if laws is None:
-        left_out = {"none", *gain_sets.ALIASES}  # whose gains are those of laws that are there
-        chosen = [law for law in suitable(properties, plant) if law.name not in left_out]
+        chosen = _of_package(plant, properties)
     else:
         chosen = []
         for law in map(law_or_template, listed_laws(laws)):
@@ -198,6 +202,12 @@ def _suited(plant: Plant, properties: Sequence[str], laws: object) -> Laws:
             "give your own, as laws=[my_law]"
         )
     return chosen
+
+
+def _of_package(plant: Plant, properties: Sequence[str]) -> list[Component | Template]:
+    """Return the package's laws that suit a plant, each once."""
+    left_out = {"none", *gain_sets.ALIASES}  # whose gains are those of laws that are there
+    return [law for law in suitable(properties, plant) if law.name not in left_out]
 
 
 def _fit(table: Table) -> tuple[dict[str, float], list[str]]:

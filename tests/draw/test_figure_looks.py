@@ -335,7 +335,7 @@ def test_a_column_tells_of_its_reference_and_of_band_and_mean_of_a_control_that_
         page = figure([trace], size=size, panels=names or ["x", "error", "u", "s"])
         return [ax.get_title(loc="right") for ax in page.axes]
 
-    aim = "dashes: reference; grey: settling band" if size == COLUMN else ""
+    aim = "thin dashes: reference; grey: settling band" if size == COLUMN else ""
     words = "band: range; line: mean where it chatters" if size == COLUMN else ""
     assert notes(one) == [aim, "", words, ""]
     assert notes(one, "error") == [aim]

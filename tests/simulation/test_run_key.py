@@ -86,10 +86,12 @@ GAIN = {constant}
 
 @njit
 def helper(x):
+    "{words}"
     return {helper}
 
 @smc.law_function(gains={{"k": 1.0}})
 def mine(y, gains, memory):
+    "{words}"
     return {law}, y.e
 
 class Push(smc.Signal):
@@ -107,6 +109,7 @@ def written(
     constant="2.0",
     signal="p.amplitude",
     before="",
+    words="One.",
     module="written",
 ) -> str:
     """The key of a run under a law of the user's."""
@@ -116,6 +119,7 @@ def written(
         helper=helper,
         constant=constant,
         signal=signal,
+        words=words,
     )
     exec(compile(text, "written", "exec"), space)
     return key(scenario(space["mine"](), disturbance=space["Push"]()))
@@ -164,8 +168,8 @@ def test_every_law_of_a_mixture_decides_the_key():
     assert len({mixed(pair) for pair in ((1.0, 2.0), (1.0, 3.0), (4.0, 2.0), (2.0, 1.0))}) == 4
 
 
-def test_a_comment_or_a_line_more_is_no_edit():
-    assert written() == written() == written(before="# a comment\n\n")
+def test_a_comment_a_line_more_or_other_docstrings_are_no_edit():
+    assert written() == written() == written(before="# a comment\n\n") == written(words="Two.")
 
 
 def test_another_order_of_a_class_s_definitions_is_no_edit():

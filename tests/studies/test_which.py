@@ -181,6 +181,8 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     assert lines["Added"].startswith("noise, of 0.01 m in positions and 0.05 m/s in veloc")
     shares = [float(share) for share in re.findall(r"(\d+) % from \w+", lines[verdicts[3]])]
     assert sum(shares) == pytest.approx(100.0, abs=1.0)
+    assert re.search(r" and overshoot \(%\) \d", lines[verdicts[4]])  # which was not asked for
+    assert int(lines["Not tried"].split()[0]) == recommendation.untried_laws > 20
     assert shares == sorted(shares, reverse=True)
     assert recommendation.weighs.keys() == {"coulomb", "noise"}
     assert lines["Use"] == recommendation.law.name
@@ -359,7 +361,17 @@ def test_where_runs_fail_there_is_no_ratio_of_J():
     found = recommendation_module._verdict(Comparison(J, arrived=fine), ["a", "b"])
     assert "lower than b's in 8 of 8 runs, of which 0 of a and 8 of b fail" in found
     assert "times" not in found
+    assert re.search(r" \(p 0\.\d+ for a lead above 3 %\)$", found)
     assert [*map(recommendation_module._cost, (0.3, 1e9))] == ["0.300", "fails"]
+
+
+def test_where_no_test_names_a_law_the_first_line_says_so(raced):
+    _, recommendation, _ = raced
+    first, second = (law.name for law in recommendation.laws)
+    level = Comparison({first: np.full(8, 0.3), second: np.full(8, 0.3)})
+    race = recommendation.race._replace(comparison=None)
+    undecided = dataclasses.replace(recommendation, race=race, fixed=level)
+    assert undecided.answer[0] == f"Use: {first}, not shown to be better than {second}"
 
 
 def test_laws_that_may_have_the_lowest_J_are_all_named():
@@ -429,7 +441,9 @@ def test_laws_for_which_there_is_no_time_are_named_and_the_clock_may_end_a_race_
     assert "7 can name a winner" in over_sets
     assert f"open between {joined(few.race.running)}; " in over_sets
     assert "after 1 set of gains, so more may change it" in few.answer[0]
-    assert re.search(r"if it is given more minutes: the missing sets take about \d+ at", over_sets)
+    assert re.search(
+        r"if it is given more minutes: the missing sets take about \d+ min at", over_sets
+    )
     kept = few.race._replace(seconds=0.0)  # no set was searched in this call
     unknown = dataclasses.replace(few, race=kept).answer[1]
     assert unknown.endswith("goes on from there if it is given more minutes")

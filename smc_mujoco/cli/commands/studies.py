@@ -96,10 +96,11 @@ def which(
     choice is.
 
     All laws that suit the plant are compared by the same rules as in smc-mujoco compare, with the
-    package's gains or with gains that are tuned now. On a model of your own, tuning takes minutes
-    for each law. --quick takes at most ten minutes for all laws together. With --quick or --minutes
-    it also writes the gains, a figure and a film of the worst run. --law names the laws to try. A
-    stopped command resumes when you start it again.
+    package's gains or with gains that are tuned now. --law names those to try. On a model of your
+    own, tuning takes minutes for each law. --quick takes at most ten minutes for all laws together;
+    on your own model it tries only the usual laws, unless --law names others, and says how many are
+    left. With --quick or --minutes it also writes the gains, a figure and a film of the worst run.
+    A stopped command resumes when you start it again.
 
     Example: smc-mujoco which duffing --condition noise,coulomb --need calm,fast
 
@@ -284,8 +285,9 @@ Latex = Annotated[
     typer.Option(
         metavar="FILE.tex",
         help="Also write the tables as LaTeX: a tabular for each plant and condition. Put each "
-        "into a float of its own. Five metrics are wider than a column of text: put them into "
-        "table*, or compare fewer.",
+        "into a float of its own. A column of 252 pt has room for two metrics as a rule, or for "
+        "three in \\footnotesize with a narrow \\tabcolsep, as its comment says. Five fit into "
+        "table*.",
     ),
 ]
 Rig = Annotated[
