@@ -136,7 +136,7 @@ def figure(
         are written; with .pdf, a PDF.
       labels: one per trace, drawn as given; default: the laws' labels, with what differs between
         runs of one law, and the sources of gains where these differ. With your labels these stand
-        beside the title.
+        beside the title, or in the key where there is no room.
       title: None for the plant's label, and the condition if all traces have one; "" for no title,
         as in a journal, and the panels take its place. What stands beside the title then goes to
         the key.

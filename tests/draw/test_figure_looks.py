@@ -703,3 +703,16 @@ def test_a_metric_s_axis_is_of_one_kind_on_all_plants():
     page = smc.plot(Two(), metrics=["tv_rate", "settling_time"])
     scales = [ax.get_xscale() for ax in page.axes]
     assert scales == ["log", "linear", "log", "linear"]
+
+
+def test_where_gains_come_from_is_a_sentence_beside_the_title_or_in_the_key(one):
+    """It was "gains: yours, yours, default, yours"."""
+    own = dataclasses.replace(one.scenario, law=smc.law(one.scenario.law.name, k=3.0))
+    runs = [one, *[dataclasses.replace(one, scenario=own)] * 2]
+    for names in (["a", "b", "c"], ["that with default gains", "another relay", "a third relay"]):
+        page = figure(runs, labels=names)
+        first, *others = names
+        words = f"gains: default for {first}, yours for {' and '.join(others)}"
+        beside = [text.get_text() for text in page.artists if isinstance(text, Text)]
+        key = str(page.get_label())
+        assert (words in beside) == (words not in key) == (first == "a")
