@@ -27,22 +27,19 @@ MIN_SPREAD = 3.0
 
 
 def strip(traces: Sequence[Trace]) -> list[Panel]:
-    """Return the two panels below a film: the first two of its `candidates`, but those of joints
-    that nothing hits, where others are hit, and those in which all runs agree only if there are no
-    others.
+    """Return the two panels below a film: the first two of its `candidates`, those in which
+    all runs agree only if there are no others.
     """
-    hit = hit_channels(traces)
     found = []
-    for place, each in enumerate(candidates(traces, hit)):
+    for place, each in enumerate(candidates(traces)):
         linear = each.quantity in PEAKS and not needs_decades(each)
         panel = each._replace(quantity=LINEAR[each.quantity]) if linear else each
-        spared = bool(hit) and panel.group.driven and not hit.intersection(panel.group.channels)
-        found.append((spared, all_agree(panel), place, panel))
-    best = sorted(found, key=operator.itemgetter(0, 1, 2))[:2]
-    return [panel for *_, panel in sorted(best, key=operator.itemgetter(2))]
+        found.append((all_agree(panel), place, panel))
+    best = sorted(found, key=operator.itemgetter(0, 1))[:2]
+    return [panel for *_, panel in sorted(best, key=operator.itemgetter(1))]
 
 
-def candidates(traces: Sequence[Trace], hit: set[int]) -> list[Panel]:
+def candidates(traces: Sequence[Trace]) -> list[Panel]:
     """Return the panels that a film may have: the motion of the groups of channels, then their u,
     then |x - r|; of arms first the tip's, with the force of its contact or the largest u.
 
@@ -75,7 +72,8 @@ def candidates(traces: Sequence[Trace], hit: set[int]) -> list[Panel]:
             errors += [error] if place.group.driven else []
     if plant.pose:
         motions = flown(motions)
-    elif hit and plant.direct and motions[0].quantity == "settling":
+    elif plant.direct and not first and motions[0].quantity == "settling":
+        hit = hit_channels(traces)
         joints = worst_first(traces)
         motions[1:1] = [one._replace(quantity="x") for one in joints if one.channel in hit][:1]
     return [*first, *motions, *controls, *errors]
