@@ -33,7 +33,7 @@ NARROW_WIDTH = 12  # characters of a line below a number where space is short
 TEX_CHARACTER = 0.5
 TEX_SMALL = 0.43
 TEX_WIDTH = 22
-NEAR_POWERS = 2  # of ten, between the ends of an interval that are written with one of them
+NEAR_POWERS = 2  # of ten, from which on the lower end of an interval is written as 0
 MAX_HTML_ROWS = 40
 NEEDS = r"needs booktabs; \footnotesize\setlength{\tabcolsep}{2pt} before it makes it narrower"
 NO_BREAK = "\N{NO-BREAK SPACE}"
@@ -446,7 +446,8 @@ def tex(text: str) -> str:
     """Return text with LaTeX's special characters escaped, and numbers with exponents, powers,
     Greek letters, dashes and u_max in its notation.
 
-    Both ends of an interval have the larger of their powers of ten, where these are near.
+    Both ends of an interval have the power of ten of the larger end; the lower end is 0 if its
+    digits are far below those of the other.
     """
 
     def written(match: re.Match[str]) -> str:
@@ -460,7 +461,8 @@ def tex(text: str) -> str:
             return r"$u_{\max}$"
         return TEX.get(match["letter"], match["letter"])
 
-    interval = r"(?P<low>-?[\d.]+)e(?P<of_low>-?\d+)–(?P<high>-?[\d.]+)e(?P<of_high>-?\d+)"
+    low = r"(?P<low>[<-]?[\d.]+)e(?P<of_low>-?\d+)"
+    interval = rf"{low}–(?P<high>-?[\d.]+)(?:e(?P<of_high>-?\d+))?"
     number = r"(?P<number>[<-]?[\d.]+)e(?P<power>-?\d+)"
     others = r"\^(?P<raised>-?\d+)|(?P<bound>\bu_max\b)|(?P<letter>.)"
     return re.sub(rf"{interval}|{number}|{others}", written, text)
@@ -470,10 +472,15 @@ def _with_power(number: str, power: str) -> str:
     return f"${number}\\cdot10^{{{power}}}$"
 
 
-def _tex_interval(low: str, of_low: str, high: str, of_high: str) -> str:
-    """Return an interval of numbers with powers of ten."""
-    shift = int(of_high) - int(of_low)
-    if not 0 <= shift <= NEAR_POWERS:
+def _tex_interval(low: str, of_low: str, high: str, of_high: str | None) -> str:
+    """Return an interval whose lower end has a power of ten."""
+    shift = int(of_high or 0) - int(of_low)
+    if shift < 0:
         return f"{_with_power(low, of_low)}--{_with_power(high, of_high)}"
-    shifted = Decimal(low).scaleb(-shift)
-    return f"({shifted}--{high})$\\cdot10^{{{of_high}}}$"
+    first = "0"
+    if shift <= NEAR_POWERS:
+        less = "$<$" if low.startswith("<") else ""
+        first = f"{less}{Decimal(low.removeprefix('<')).scaleb(-shift)}"
+    if of_high is None:
+        return f"{first}--{high}"
+    return f"({first}--{high})$\\cdot10^{{{of_high}}}$"

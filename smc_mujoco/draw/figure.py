@@ -121,7 +121,8 @@ def figure(
         trace = smc.run(smc.Scenario(plant="duffing", law="pid", duration=1.0))
         smc.figure(trace, "duffing.svg")
 
-    x, u and s are drawn until all comes to rest, |x - r| over the whole run on a logarithmic axis.
+    x, u and s are drawn until a little after x has settled and moves by less than 2 % of its panel,
+    |x - r| over the whole run on a logarithmic axis.
     Each run of a network has a row with a line for each channel, and there is the spread max x -
     min x. Several runs of a free body have such rows of u. Of several joints there are e and u of
     those with the largest errors. Joints without an actuator, and channels in another unit, have
@@ -144,10 +145,10 @@ def figure(
         "contact", "s", "channels" (e and u of the channels with the largest errors, three at most),
         "phase", "settling" (|x - r|), "end" (close-up of u). Default: those that suit the plant and
         the size.
-      size: "ieee-column" (3.5 in wide, with notes above x and u in place of the key, which is for
-        its caption; no note where a change is named, or in a figure as high as a column),
-        "ieee-page" (7.16 in), "slide" (13.3 x 7.5 in, three panels, large letters), or (width,
-        height) in inches. Default: 8.8 in wide.
+      size: "ieee-column" (252 pt wide; what lines and bands mean stands above x and u, and not in
+        the key; it does not stand there where a change is named, or in a figure as high as a
+        column), "ieee-page" (516 pt), "slide" (13.3 x 7.5 in, three panels, large letters), or
+        (width, height) in inches. Default: 8.8 in wide.
       format: "svg", "png" or "pdf", of the file.
       fig: Figure or SubFigure to draw into; default: a new one.
       ax: axes to draw one panel into, by default "x", in your own style; `ax.legend()` then names

@@ -38,9 +38,10 @@ METADATA = {
     ".png": ("Description", {}),
     ".pdf": ("Subject", {"CreationDate": None}),
 }
+TEX_POINT = 1.0 / 72.27  # inches
 NAMED = {
-    "ieee-column": (3.5, None),
-    "ieee-page": (7.16, None),
+    "ieee-column": (252.0 * TEX_POINT, None),
+    "ieee-page": (516.0 * TEX_POINT, None),
     "slide": (style.SLIDE_WIDTH, 7.5),
 }  # inches
 MAX_HEIGHT = 9.0  # inches, of a figure in a journal, whose columns are 9.25 high

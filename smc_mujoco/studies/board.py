@@ -218,7 +218,7 @@ class Block:
         names = joined(low)
         if len(low) == len(self.medians) == 2:
             names = "both"
-        return f"{names} are below the floor of {self.floor} and count as equal"
+        return f"in the median {names} are below the floor of {self.floor} and count as equal"
 
     @property
     def all_settle_or_none(self) -> bool:
@@ -399,7 +399,7 @@ class Board(Tables):
         for block in self.blocks:
             if block.lead and block.lead.floor:
                 none = f"no law is shown to be better than {joined(self.best)}"
-                return f"{none}; the value of {block.lead.law} is {block.lead.words}"
+                return f"{none}; the median of {block.lead.law} is {block.lead.words}"
         if len(self.best) == 1:
             return f"{self.best[0]} {ALONE}"
         names = joined(self.best)
@@ -619,7 +619,7 @@ def spread(interval: Interval, low: str, high: str) -> str:
     """
     if math.isnan(interval.low) or math.isinf(interval.low):
         return ""
-    if interval.low > 0.0 and interval.high < LEAST_PRINTED:
+    if 0.0 < interval.high < LEAST_PRINTED:
         return ""
     return f"{low}–{high}"
 

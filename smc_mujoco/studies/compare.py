@@ -179,10 +179,10 @@ class Compared(Tables):
         """Return a LaTeX tabular for each plant and condition, which its first line names: put each
         into a float of its own; needs booktabs.
 
-        A column of 252 pt has room for two metrics as a rule, or for three of them below the line
-        that each tabular's comment ends with. Five fit into table*. Only the last board says what
-        intervals, metrics and bold type are. Comments have the verdicts, and at the top the gains
-        and remarks on them.
+        A column of 252 pt has room for two metrics, for long names of laws below the line that each
+        tabular's comment ends with. Five fit into table*. Only the last board says what intervals,
+        metrics and bold type are. Comments have the verdicts, and at the top the gains and remarks
+        on them.
 
         Args:
           path: of a file to which it is written too.

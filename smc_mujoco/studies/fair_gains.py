@@ -244,6 +244,12 @@ class Trial(NamedTuple):
             few = dict.fromkeys(self._if_few(of_plant, seeds) for of_plant in known.values())
             for sentence in filter(None, few):
                 print(sentence, file=sys.stderr)
+            for name, of_plant in known.items():
+                asked = [
+                    law.name for law, found in zip(laws[name], of_plant, strict=True) if not found
+                ]
+                if asked and self.tune:
+                    print(f"gains to search on {name}: {joined(asked)}", file=sys.stderr)
         by_plant: dict[str, list[Candidate]] = {}
         for plant in self.plants:
             by_plant[plant.name] = []

@@ -34,6 +34,7 @@ from smc_mujoco.simulation.doubts import constant_goal
 from smc_mujoco.simulation.force_bounds import default_u_max
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.signals import Noise
 from smc_mujoco.studies.answer_time import FEWEST_SEEDS, SHOWN, AnswerTime
 from smc_mujoco.studies.fair_gains import NOT_TUNED, Candidate, Laws, Trial, default_of
 from smc_mujoco.studies.leaderboard import leaderboard
@@ -89,7 +90,10 @@ def recommend(
     settled = _settled(table)
     least = {law: _least_share(settled[law]) for law in chosen}
     order = in_order({law: settled[law] for law in chosen}, fixed, raced.winner)
-    boards = leaderboard(table, metrics, BY, defaults=True, relevant=relevant)
+    shown = list(metrics)
+    if min(least.values()) < 1.0 and SETTLES not in shown:
+        shown.append(SETTLES)
+    boards = leaderboard(table, shown, BY, defaults=True, relevant=relevant)
     if not boards:
         raise ScenarioError(f"no need has a number in any run on {plant.name}: ask for others")
     ordered = tuple(chosen[law] for law in order)
@@ -109,7 +113,7 @@ def recommend(
         settled=settled,
         weighs=weighs,
         no_law=no_law,
-        added=_added(trial, plant, goal),
+        assumed=_assumed(trial, plant, goal),
         margins=margins,
         beside=str(base.condition),
         untried=untried,
@@ -279,19 +283,27 @@ def _weighed(
     )
 
 
-def _added(trial: Trial, plant: Plant, goal: Objective) -> str:
-    """Return the noise that a race adds to the conditions asked for, in words; "" for none."""
+def _assumed(trial: Trial, plant: Plant, goal: Objective) -> str:
+    """Return how often u changes and what it is made from, and each noise, in words; of noise that
+    no condition asked for has, that it is added.
+    """
+    period = 1e3 * trial.case(plant, "none", trial.conditions[0]).control_period
+    parts = [f"u changes every {period:g} ms and is made from measured positions and velocities"]
     asked = {condition.name for condition in trial.conditions}
     units = " or ".join(dict.fromkeys(plant.units[: plant.driven]))
     for condition in goal.conditions:
         noise = condition.on(plant, goal.duration).get("noise")
-        if noise and condition.name not in asked:
-            return (
-                f"{condition.name}, of {noise.position:g} {units} in positions and "
-                f"{noise.velocity:g} {units}/s in velocities (standard deviations), as no "
-                "condition that you asked for has any: give one with noise=Noise(...) to replace it"
+        if isinstance(noise, Noise):
+            parts.append(
+                f"{condition.name} has noise of {noise.position:g} {units} in positions and "
+                f"{noise.velocity:g} {units}/s in velocities (standard deviations)"
             )
-    return ""
+            if condition.name not in asked:
+                parts[-1] += (
+                    ", and is added, as no condition that you asked for has any: give one with "
+                    "noise=Noise(...) to replace it"
+                )
+    return "; ".join(parts)
 
 
 def _worst_run(table: Table, law: str) -> Scenario:

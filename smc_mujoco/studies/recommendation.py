@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smc_mujoco.analysis.paired_runs import values
+from smc_mujoco.analysis.paired_runs import SETTLES, values
 from smc_mujoco.analysis.ranking import Comparison
+from smc_mujoco.analysis.signed_rank import min_p
 from smc_mujoco.analysis.step_halving import UNTRIED
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST
 from smc_mujoco.analysis.tuning.result import Tuned
@@ -182,7 +183,7 @@ class RaceRecommendation(Recommendation):
     settled: Mapping[str, Mapping[str, tuple[int, int]]]
     weighs: Mapping[str, float]  # condition -> its share of J of the first law
     no_law: NoLaw  # beside the first law
-    added: str  # noise beside the conditions asked for, in words; "" for none
+    assumed: str  # how often u changes, and each noise, in words
     margins: Sequence[Margin]  # of the first law with its gains
     beside: str  # name of the condition beside which they are; "nominal" for none
     untried: Sequence[str]  # kinds of margins for which there was no time
@@ -218,8 +219,7 @@ class RaceRecommendation(Recommendation):
         lines.append(f"Scores of {self.law.name}: {self._needs}")
         if self.law.name != "none":
             lines.append(f"Without a law: {self.no_law.words}")
-        if self.added:
-            lines.append(f"Added: {self.added}")
+        lines.append(f"Assumed: {self.assumed}")
         lines += [f"Settles: {self._where}", f"Tolerates: {self._margins}"]
         for name, share in self.race.dropped.items():
             least = f"its best J was {number(share)} times the leader's worst J"
@@ -424,6 +424,8 @@ class RaceRecommendation(Recommendation):
         found: dict[str, list[float]] = {}
         headings = {}
         for board in self.leaderboard:
+            if board.metric == SETTLES:  # of which a line of its own tells
+                continue
             headings[board.metric] = heading(board)
             for entry in board.entries:
                 if entry.law == self.law.name and not math.isnan(entry.interval.median):
@@ -638,5 +640,10 @@ def _verdict(comparison: Comparison, order: Sequence[str]) -> str:
     best = _best(comparison, order)
     if len(best) == 1:
         return f"open: {best[0]} {ALONE}; its J is {lead}"
+    samples = effects[rival].samples
+    if min_p(samples) > comparison.limit:
+        units = "sets of gains" if effects[rival].sets else "runs"
+        can = f"{samples} {units} can rule out none of {joined(best)}"
+        return f"open, as {can}; J of {first} is {lead}"
     either = f"either {best[0]} or {best[1]}" if len(best) == 2 else f"any of {joined(best)}"
     return f"open, as {either} may have the lowest J; {first}'s is {lead}"

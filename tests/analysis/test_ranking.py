@@ -712,8 +712,8 @@ SHOWN = [
     (FINE, "0.00015 m"),
 ]
 BELOW = [  # factors of q of laws a, b and c, the winner, and what is said
-    ((0.3, 0.9), None, "both are below the floor of {q} and count as equal"),
-    ((0.5, 0.6, 3.0), None, "a and b are below the floor of {q} and count as equal"),
+    ((0.3, 0.9), None, "in the median both are below the floor of {q} and count as equal"),
+    ((0.5, 0.6, 3.0), None, "in the median a and b are below the floor of {q} and count as equal"),
     ((0.5, 1.01), None, "a is below the floor of {q}, unlike b's"),
     (
         (0.5, 4.0, 5.0),

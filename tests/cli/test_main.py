@@ -654,7 +654,7 @@ def test_a_film_of_an_answer_has_as_many_pictures_as_its_time_allows(tmp_path, m
     terminal = types.SimpleNamespace(note=note, wrote=said.append)
     studies._film(recommendation, tmp_path, time.monotonic() - 1.0, terminal)
     assert said[0] == tmp_path / "worst_run_machine.png"
-    assert re.match(r"This picture stands in place of a film, which would take \d+ s; ", said[1])
+    assert re.match(r"This picture stands in place of a film, which would take \d+ s\. ", said[1])
     with Image.open(said[0]) as picture:
         assert picture.size == (1280, 720)
     studies._film(recommendation, tmp_path, time.monotonic() + 600.0, terminal)

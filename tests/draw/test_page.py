@@ -61,4 +61,4 @@ def test_letters_have_11_px_in_a_readme_and_a_slide_has_three_panels_with_letter
     } == {16.0}
     smc.figure(trace, tmp_path / "a.png", size="ieee-column")
     with Image.open(tmp_path / "a.png") as image:
-        assert image.width == 1400
+        assert image.width == int(252 / 72.27 * 400)

@@ -444,7 +444,7 @@ LOST = {
 RESULTS = {  # changes of both blocks -> the result
     "few sets below the floor": (
         LOST | {"samples": 3, "sets": 3, "below": LAWS, "floor": "0.1 m"},
-        f"{EVIL}, second and third are below the floor of 0.1 m and count as equal",
+        f"in the median {EVIL}, second and third are below the floor of 0.1 m and count as equal",
     ),
     "barred": ({"untuned": ("second", "third")}, "no law may win over the default gains of second"),
     "all fail": (LOST | {"away": LAWS}, "every law has runs that fail"),

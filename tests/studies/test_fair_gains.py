@@ -221,10 +221,13 @@ def test_a_law_with_fewer_shipped_sets_than_searches_asked_for_is_tuned_too(monk
 
 
 def test_what_cannot_be_ranked_is_said_before_laws_are_tuned(monkeypatch, capsys):
-    mine = law_function(gains={"k": 2.0})(lambda y, gains, memory: (-gains.k * y.e, y.e))
+    @law_function(gains={"k": 2.0})
+    def mine(y, gains, memory):
+        return -gains.k * y.e, y.e
+
     monkeypatch.setattr(Trial, "search_gains", lambda *given: capsys.readouterr().err)
     for usual, words in (
-        (12, ""),
+        (12, "gains to search on duffing: mine and mine\n"),
         (5, "5 sets of gains or runs cannot rank 2 laws in 1 condition; 6"),
     ):
         asked = trial(Path("gains"), [DUFFING], usual=usual)._replace(
@@ -232,7 +235,7 @@ def test_what_cannot_be_ranked_is_said_before_laws_are_tuned(monkeypatch, capsys
         )
         (said, _) = asked.candidates({"duffing": [mine, mine]}, 12)["duffing"]
         assert said.startswith(words)
-        assert bool(said) == bool(words)
+        assert said.endswith("gains to search on duffing: mine and mine\n")
 
 
 def test_j_on_unseen_runs_is_kept(tmp_path, monkeypatch):

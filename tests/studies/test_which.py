@@ -177,8 +177,12 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
         f"Scores of {recommendation.law.name}",
         "Without a law",
     ]
-    assert [*lines][:9] == [*verdicts, "Added", "Settles", "Tolerates"]
-    assert lines["Added"].startswith("noise, of 0.01 m in positions and 0.05 m/s in veloc")
+    assert [*lines][:9] == [*verdicts, "Assumed", "Settles", "Tolerates"]
+    noise = (
+        "noise has noise of 0.01 m in positions and 0.05 m/s in velocities (standard deviations)"
+    )
+    made = "u changes every 1 ms and is made from measured positions and velocities"
+    assert lines["Assumed"].startswith(f"{made}; {noise}, and is added, as no condition")
     shares = [float(share) for share in re.findall(r"(\d+) % from \w+", lines[verdicts[3]])]
     assert sum(shares) == pytest.approx(100.0, abs=1.0)
     assert re.search(r" and overshoot \(%\) \d", lines[verdicts[4]])  # which was not asked for
@@ -365,6 +369,18 @@ def test_where_runs_fail_there_is_no_ratio_of_J():
     assert [*map(recommendation_module._cost, (0.3, 1e9))] == ["0.300", "fails"]
 
 
+def test_too_few_sets_to_rule_out_a_law_do_not_say_that_each_may_be_the_best():
+    """With rivals=1 the level is 5 % over the number of rivals: 2^-7 is below it beside five, and
+    not beside seven.
+    """
+    for count, few in ((6, False), (8, True)):
+        J = {f"law{k}": np.linspace(0.1, 0.2, 7) + 0.1 * k for k in range(count)}
+        J["law1"] = J["law0"][::-1]
+        said = recommendation_module._verdict(Comparison(J, rivals=1), [*J])
+        assert said.startswith("open, as 7 runs can rule out none of law0, ") == few
+        assert said.startswith("open, as either law0 or law1 may have the lowest J") != few
+
+
 def test_where_no_test_names_a_law_the_first_line_says_so(raced):
     _, recommendation, _ = raced
     first, second = (law.name for law in recommendation.laws)
@@ -376,10 +392,10 @@ def test_where_no_test_names_a_law_the_first_line_says_so(raced):
 
 def test_laws_that_may_have_the_lowest_J_are_all_named():
     J = {law: np.array([0.3, 0.5, 0.2, 0.4, 0.6, 0.3, 0.5]) for law in "abc"}
-    said = recommendation_module._verdict(Comparison(J), ["a", "b", "c"])
+    said = recommendation_module._verdict(Comparison(J, rivals=1), ["a", "b", "c"])
     assert said.startswith("open, as any of a, b and c may have the lowest J; a's is ")
     del J["c"]
-    said = recommendation_module._verdict(Comparison(J), ["a", "b"])
+    said = recommendation_module._verdict(Comparison(J, rivals=1), ["a", "b"])
     assert said.startswith("open, as either a or b may have the lowest J; a's is ")
 
 

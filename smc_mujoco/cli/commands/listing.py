@@ -108,7 +108,7 @@ def _print_all(terminal: Terminal, kind: str, plant: str | None = None) -> None:
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.mechanisms.plant import catalogue as plants
         from smc_mujoco.metrics.catalogue import metrics
-        from smc_mujoco.simulation.conditions import DURATION, NAMED
+        from smc_mujoco.simulation.conditions import DURATION, NAMED, applicable
         from smc_mujoco.studies import scene
 
     lists = {
@@ -120,8 +120,12 @@ def _print_all(terminal: Terminal, kind: str, plant: str | None = None) -> None:
     }
     machine = as_plant(plant or "inverted_pendulum")
     conditions = []
+    fit = applicable(NAMED, [machine], DURATION)
     for name, condition in NAMED.items():
-        conditions.append((name, condition.brief(machine, DURATION) or "the scenario's defaults"))
+        words = "not for this plant"
+        if name in fit:
+            words = condition.brief(machine, DURATION) or "the scenario's defaults"
+        conditions.append((name, words))
     lists[f"Conditions, on {machine.name} for 10 s"] = conditions
     lists["Metrics"] = [(metric.name, metric.summary) for metric in metrics()]
     for title, rows in lists.items():

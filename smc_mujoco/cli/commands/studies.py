@@ -99,8 +99,9 @@ def which(
     package's gains or with gains that are tuned now. --law names those to try. On a model of your
     own, tuning takes minutes for each law. --quick takes at most ten minutes for all laws together;
     on your own model it tries only the usual laws, unless --law names others, and says how many are
-    left. With --quick or --minutes it also writes the gains, a figure and a film of the worst run.
-    A stopped command resumes when you start it again.
+    left. With --quick or --minutes it also writes the gains, and a figure and a film of the worst
+    run; where time is short, a picture in place of the film. A stopped command resumes when you
+    start it again.
 
     Example: smc-mujoco which duffing --condition noise,coulomb --need calm,fast
 
@@ -227,8 +228,9 @@ def _film(recommendation: "RaceRecommendation", out: Path, ends: float, terminal
             terminal.wrote(films.film(run, file, title=title, at=at))
             needed = first - begun + MIN_FPS * each * len(frames) / frames.fps
             terminal.note(
-                f"This picture stands in place of a film, which would take {needed:.0f} s; the "
-                "same command with more --minutes makes it.",
+                f"This picture stands in place of a film, which would take {needed:.0f} s. The "
+                "same command with more --minutes judges the kept gains once more, which takes "
+                "minutes, and makes the film.",
                 wrap=True,
             )
     except ScenarioError as error:  # the answer stands without it
@@ -285,8 +287,7 @@ Latex = Annotated[
     typer.Option(
         metavar="FILE.tex",
         help="Also write the tables as LaTeX: a tabular for each plant and condition. Put each "
-        "into a float of its own. A column of 252 pt has room for two metrics as a rule, or for "
-        "three in \\footnotesize with a narrow \\tabcolsep, as its comment says. Five fit into "
+        "into a float of its own. A column of 252 pt has room for two metrics, five fit into "
         "table*.",
     ),
 ]
