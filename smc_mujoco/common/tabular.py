@@ -475,7 +475,7 @@ def _with_power(number: str, power: str) -> str:
 def _tex_interval(low: str, of_low: str, high: str, of_high: str | None) -> str:
     """Return an interval whose lower end has a power of ten."""
     shift = int(of_high or 0) - int(of_low)
-    if shift < 0:
+    if of_high and shift < 0:
         return f"{_with_power(low, of_low)}--{_with_power(high, of_high)}"
     first = "0"
     if shift <= NEAR_POWERS:
