@@ -24,6 +24,14 @@ FAR = 200.0  # counts, ends of the axis of a run to rest
 WIDTH, ROW, LANE = 4.8, 0.24, 0.36  # inches: letters are read on a phone
 NAMES = 94.0  # points, the width of the laws' names
 REVERSALS, REST = "Reversals, Coulomb 30 %", "To rest, Stribeck"
+RIGHT = {"marker": "D", "ms": 4.5, "mec": style.PAPER, "mew": 0.5, "ls": ""}  # seen on its bar
+WRONG = {"lw": 3.0, "solid_capstyle": "projecting"}  # so that equal errors have a square
+WORDS = {  # no line of the grid is seen through them
+    "va": "center",
+    "fontsize": "small",
+    "color": style.MUTED,
+    "bbox": {"fc": style.PAPER, "ec": "none", "pad": 0.5},
+}
 R_IN_WORDS = "R: variation of u at rest, bounds/s"
 
 Errors = dict[tuple[float, float], float]  # level of R and share of compensation -> counts
@@ -58,7 +66,7 @@ def why_empty(errors: Errors) -> str:
 
 def of_law(ax: Axes, place: float, errors: Errors, colour: str) -> None:
     """Draw a law's errors: a line from the low R to the high one, an arrow for what is beyond the
-    axis, a diamond for the right compensation, and a bar between 30 % off either way.
+    axis, a diamond for the right compensation, and a bar between 30 % off either way, tied to it.
     """
     low, high, _ = RATES
     plain = [errors[level, 0.0] for level in (low, high) if (level, 0.0) in errors]
@@ -68,17 +76,17 @@ def of_law(ax: Axes, place: float, errors: Errors, colour: str) -> None:
         error = errors.get((level, 0.0), 0.0)
         if error > MOST:
             ax.plot(MOST, above, ">", ms=4, color=colour, clip_on=False)
-            words = {"va": "center", "fontsize": "small", "color": style.MUTED}
-            ax.text(1.4 * MOST, above, f"{error:.0f}", words)
+            ax.text(1.4 * MOST, above, f"{error:.0f}", WORDS)
         elif error:
             ax.plot(error, above, "o", ms=4.5, mec=colour, mfc=fill)
     wrong = [errors[low, share] for share in (0.7, 1.3) if (low, share) in errors]
-    if len(wrong) == 2:
-        ax.plot(wrong, [below] * 2, color=colour, lw=3.5, alpha=0.35)
     if (low, 1.0) in errors:
-        ax.plot(errors[low, 1.0], below, "D", ms=3.5, color=colour)
+        right = errors[low, 1.0]
+        ax.plot([right, *wrong], [below] * (1 + len(wrong)), color=colour, lw=0.8)
+        ax.plot(wrong, [below] * len(wrong), color=colour, **WRONG)
+        ax.plot(right, below, color=colour, zorder=3, **RIGHT)
     if words := why_empty(errors):
-        ax.text(1.3, place, words, va="center", fontsize="small", color=style.MUTED)
+        ax.text(1.3, place, words, WORDS)
 
 
 def to_rest(points: Sequence[dict], joint: str, law: str) -> Trace:
@@ -101,9 +109,8 @@ def of_rest(ax: Axes, trace: Trace, count: float, colour: str) -> None:
         ax.fill_between(at, low, high, color=colour, alpha=0.3, lw=0)
     ax.plot(*decimate.line(t, error, width), color=colour, lw=1.2)
     if np.abs(error).min() > 10.0:
-        words = {"ha": "right", "va": "center", "fontsize": "small", "color": style.MUTED}
         where = f"rests at {error[-1]:.0f}".replace("-", "−")
-        ax.text(LASTS - 0.5, -10.0 * np.sign(error[-1]), where, words)
+        ax.text(LASTS - 0.5, -10.0 * np.sign(error[-1]), where, WORDS, ha="right")
     ax.axhspan(-1.0, 1.0, color=style.BAND, lw=0, zorder=0)
     ax.set_yscale("symlog", linthresh=1.0)
     ax.set(xlim=(SHOWN, LASTS), ylim=(-FAR, FAR))
@@ -118,8 +125,8 @@ def key() -> list[page.Handle]:
     return [
         page.entry(f"no compensation, R {low:g}", mfc=style.PAPER, **dot),
         page.entry(f"no compensation, R {high:g}", **dot),
-        page.entry(f"right compensation, R {low:g}", marker="D", ms=3.5, ls=""),
-        page.entry("30 % too small to too large", lw=3.5, alpha=0.35),
+        page.entry(f"right compensation, R {low:g}", **RIGHT),
+        page.entry("30 % too small to too large", **WRONG),
         Patch(color=style.BAND, label="below one count"),
     ]
 

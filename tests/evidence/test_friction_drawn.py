@@ -7,12 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_hex
 from matplotlib.text import Text
 
 from benchmarks import friction_figure
 from benchmarks.friction import LAWS
 from benchmarks.friction_figure import JOINTS, MOST, RESTS
 from benchmarks.friction_plants import joints
+from smc_mujoco.draw import style
 
 POINTS = json.loads(Path(friction_figure.__file__).with_name("friction.json").read_text())
 NONE, LATE = "no gains admitted", "gains only at R 100"
@@ -62,6 +64,41 @@ def test_a_row_has_the_errors_of_the_file_or_says_why_it_has_none(figure):
             assert "".join(words) == silent.get((joint, law), "")
             assert bool(shown) != bool(words)
             assert errors - {MOST} == shown
+
+
+def test_a_bar_of_wrong_compensation_is_as_dark_as_a_line_and_tied_to_its_diamond(figure):
+    drawn = 0
+    for ax, joint in zip(figure.axes[:2], JOINTS, strict=True):
+        for place, law in enumerate(LAWS):
+            known = friction_figure.errors_of(POINTS, joint, law)
+            wrong = {error for (_, share), error in known.items() if share in (0.7, 1.3)}
+            if not wrong:
+                continue
+            right = known[10.0, 1.0]
+            its = []
+            for line in ax.lines:
+                if any(place < height < place + 0.4 for height in line.get_ydata()):
+                    its.append(line)
+            (mark,) = [line for line in its if line.get_marker() == "D"]
+            (bar,) = [line for line in its if set(line.get_xdata()) == wrong]
+            (tie,) = [line for line in its if set(line.get_xdata()) == {right} | wrong]
+            assert tie.get_linewidth() < bar.get_linewidth()
+            assert tie.get_color() == bar.get_color() == mark.get_color()
+            assert bar.get_alpha() is None
+            assert 1.05 / (style.luminance(bar.get_color()) + 0.05) >= 3.0, law
+            assert mark.get_zorder() > bar.get_zorder()
+            assert mark.get_markeredgecolor() == style.PAPER, "seen on its bar"
+            drawn += 1
+    assert drawn == 12
+
+
+def test_no_line_of_the_grid_is_seen_through_words(figure):
+    for ax in figure.axes:
+        for text in ax.texts:
+            if "gains" in text.get_text() or "rests" in text.get_text():
+                box = text.get_bbox_patch()
+                assert box is not None
+                assert to_hex(box.get_facecolor(), keep_alpha=True).upper() == style.PAPER + "FF"
 
 
 def test_an_error_beyond_the_axis_has_an_arrow_and_its_number(figure):
