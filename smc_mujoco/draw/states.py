@@ -8,6 +8,7 @@ is the sign of the joint's reaction. Friction and contacts are in the reaction t
 flank is the sign of the actuator's force, which does not tell when a rotor is in play.
 """
 
+import itertools
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -18,8 +19,7 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import RUB
-from smc_mujoco.mechanisms.hardware.friction import Coulomb
-from smc_mujoco.mechanisms.layout import channel_names
+from smc_mujoco.mechanisms.layout import channel_names, dof_ids
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.touching import in_contact, shapes
@@ -58,13 +58,7 @@ def timeline(
     gap = backlash_gap(trace.scenario)
     hits = contacts(trace, shown)
     blown = blows(trace, shown)
-    resting = []
-    moving = ~at_rest(trace)
-    moving[0] = True  # else a brief rest at the start would be shown
-    for moves in moving.T:
-        resting.append(~extended(moves, shown, MIN_STATE_TIME))
-    rest = np.array(resting)
-    rest &= has_dry_friction(trace.scenario)
+    rest = resting(trace, shown)
     sides_of_flanks = []
     for flank in flanks(trace).T:
         sides_of_flanks.append(backlash_side(flank, shown, MIN_STATE_TIME))
@@ -200,6 +194,24 @@ def largest(trace: Trace, acts: Array, forces: Array) -> str:
     raise AssertionError
 
 
+def resting(trace: Trace, shown: Array) -> Array:
+    """Return where dry friction holds each channel, (n, K + 1), where the same ones are held long
+    enough to be read; the times of samples in the film are `shown`, s.
+    """
+    moving = ~at_rest(trace)
+    moving[0] = True  # else a brief rest at the start would be shown
+    held = []
+    for moves, rubs in zip(moving.T, has_dry_friction(trace.scenario), strict=True):
+        held.append(rubs & ~extended(moves, shown, MIN_STATE_TIME))
+    rest = np.array(held)
+    changes = np.diff(rest, axis=1).any(axis=0)
+    edges = [0, *(np.flatnonzero(changes) + 1).tolist(), len(shown)]
+    for first, stop in itertools.pairwise(edges):
+        if shown[stop - 1] - shown[first] < MIN_STATE_TIME - 1e-9:
+            rest[:, first:stop] = False
+    return rest
+
+
 def at_rest(trace: Trace) -> Array:
     """Return where each channel is at rest, in proportion to the speeds of its group, (K + 1,
     n).
@@ -210,23 +222,17 @@ def at_rest(trace: Trace) -> Array:
     return rest
 
 
-def has_dry_friction(scenario: Scenario) -> bool:
-    """Return whether dry friction can hold the machine, in its joints or under it."""
+def has_dry_friction(scenario: Scenario) -> Array:
+    """Return which channels dry friction can hold, in the joint or under the body, (n,)."""
     plant = scenario.plant
-    if plant.rubs or any(plant.parameters[name] > 0.0 for name in plant.dry):
-        return True
-    for part in scenario.friction:
-        rubs = (isinstance(part, Coulomb) and part.level > 0.0) or part.keeps_state
-        if part.side == "link" and rubs:
-            return True
-    if not scenario.contact:
-        return False
     model = shapes(scenario)[0].model
-    for i in range(model.npair):
-        rubs = model.pair(i).name.startswith(RUB)
-        if rubs and model.pair_friction[i, 0] > 0.0:
-            return True
-    return False
+    rubs = model.dof_frictionloss[dof_ids(model)] > 0.0
+    for part in scenario.friction:
+        if part.side == "link" and part.keeps_state:
+            rubs[list(part.channels(plant))] = True
+    for i in range(model.npair):  # of machines of one channel
+        rubs |= model.pair(i).name.startswith(RUB) and model.pair_friction[i, 0] > 0.0
+    return rubs
 
 
 def backlash_gap(scenario: Scenario) -> float:

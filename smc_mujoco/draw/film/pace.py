@@ -108,8 +108,8 @@ def clock(traces: Trace | Sequence[Trace], fps: Rate, speed: Speed | None = None
 
 
 def _rests_at_the_end(run: Trace) -> bool:
-    """Say whether dry friction holds all joints at the end of a run."""
-    return states.has_dry_friction(run.scenario) and states.at_rest(run)[-1].all()
+    """Say whether all joints rest at the end of a run of a machine with dry friction."""
+    return bool(states.has_dry_friction(run.scenario).any() and states.at_rest(run)[-1].all())
 
 
 def close_up(traces: Sequence[Trace], fps: float) -> FilmClock | None:

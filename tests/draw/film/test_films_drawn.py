@@ -316,7 +316,7 @@ def test_a_machine_is_told_to_stick_touch_or_lie_on_a_flank_when_it_does(
             word for word, t in zip(words, times, strict=True) if 1.02 < t < 1.1
         } <= touching | resting
     assert ("hit, 1 N" in words) is stops
-    assert states.has_dry_friction(trace.scenario) is dry
+    assert states.has_dry_friction(trace.scenario).tolist() == [dry]
 
 
 def test_of_two_joints_the_state_told_is_of_what_happens_in_either():
@@ -334,6 +334,38 @@ def test_of_two_joints_the_state_told_is_of_what_happens_in_either():
     (reported,) = states.timeline(dataclasses.replace(two, v=v, force=force), np.array([0.5]))
     assert reported
     assert reported.words == "slide sticks, 1 of 2 in play"
+
+
+@pytest.mark.parametrize(
+    ("plant", "parts", "said"),
+    [
+        ("furuta", {"friction": {"arm": smc.Coulomb(0.2)}}, "arm sticks"),
+        ("furuta", {"friction": {"hinge": smc.hardware.LuGre(0.5, 0.8, 0.05)}}, "hinge sticks"),
+        (smc.plant("furuta", cf=0.002), {}, "arm sticks"),
+        (smc.plant("furuta", cf=0.002, cfq=0.002), {}, "sticks"),
+    ],
+)
+def test_of_two_joints_at_rest_only_that_sticks_which_has_dry_friction(plant, parts, said):
+    """The hinge of a Furuta pendulum whose arm alone rubs was said to stick."""
+    run = made(smc.Scenario(plant=plant, law="none", duration=1.0, **parts))
+    rests = dataclasses.replace(run, v=0.0 * run.v)
+    (reported,) = states.timeline(rests, np.array([0.5]))
+    assert reported
+    assert reported.words == said
+
+
+def test_words_on_joints_that_stop_one_after_the_other_do_not_flicker():
+    rubs = smc.plant("furuta", cf=0.002, cfq=0.002)
+    run = made(smc.Scenario(plant=rubs, law="none", duration=3.0))
+    moves = [(run.t < 1.02) | (run.t > 2.02), (run.t < 1.07) | (run.t > 2.07)]
+    rests = dataclasses.replace(run, v=np.column_stack(moves).astype(float))
+    times = np.arange(0.0, 3.0, 0.01)
+    words = [now and now.words for now in states.timeline(rests, times)]
+    assert words[150] == "sticks"
+    for word, frames in itertools.groupby(words):
+        assert len(list(frames)) * 0.01 > states.MIN_STATE_TIME - 1e-6, word
+    for word, time in zip(words, times, strict=True):
+        assert word is None or 1.02 < time < 2.08
 
 
 def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
