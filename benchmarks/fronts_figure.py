@@ -19,7 +19,8 @@ from smc_mujoco.draw import page, style
 TICKS = (1.25, 2, 5)
 DECADES = (1e-4, 1e-3, 1e-2)
 WIDTH, ROW = 5.0, 0.95  # inches: letters are read on a phone
-LEAST, MOST = 1e-5, 0.05  # ends of the axis; what is below it is marked at its lower edge
+LEAST, MOST = 4e-5, 0.05  # ends of the axis; what is below it is marked at its lower edge
+MARKS = {"*": 7.0} | dict.fromkeys("sD^vPXo", 4.0)  # mark -> points; none like another in grey
 BEST = "Best rival at each J"
 
 Front = dict[float, float]  # level of J -> least error, of the start
@@ -59,13 +60,13 @@ def looks(laws: Sequence[str]) -> dict[str, dict[str, Any]]:
     found: dict[str, dict[str, Any]] = {}
     dashes = iter(style.DASHES)
     grey = style.mixed(style.MUTED, style.PAPER, 0.35)
-    for law, colour, mark in zip(laws, style.law_colours(laws), style.MARKS, strict=False):
+    for law, colour, mark in zip(laws, style.law_colours(laws), MARKS, strict=False):
         if law in RIVALS:
-            found[law] = {"color": grey, "lw": 0.7, "ms": 4.0}
+            found[law] = {"color": grey, "lw": 0.7}
         else:
-            found[law] = {"color": colour, "lw": 1.2, "ms": 4.0, "ls": next(dashes)}
+            found[law] = {"color": colour, "lw": 1.2, "ls": next(dashes)}
             found[law]["zorder"] = 3.0 - 0.1 * len(found)
-        found[law] |= {"marker": mark, "mew": 0.0}
+        found[law] |= {"marker": mark, "ms": MARKS[mark], "mew": 0.0}
     return found
 
 
@@ -102,8 +103,8 @@ def drawn(points: Sequence[dict], laws: Sequence[str]) -> Figure:
                 ax.set_xticks(TICKS, [f"{tick:g}" for tick in TICKS])
                 ax.set_yticks(DECADES)
                 ax.minorticks_off()
-            words = {"color": style.MUTED, "fontsize": "small", "ha": "right"}
-            row[-1].text(TICKS[-1], 1.5 * LEAST, "not ranked", **words)
+            words = {"color": style.MUTED, "fontsize": "small", "ha": "right", "va": "center"}
+            row[-1].text(TICKS[-1], (LEAST * FLOOR) ** 0.5, "not ranked", **words)
             row[0].set_ylabel("\n".join(style.plant_name(plant, short=True).rsplit(" ", 1)))
         for ax, (period, condition) in zip(panels[0], ROWS, strict=True):
             noise = "noise" if "noise" in condition else "no noise"

@@ -61,7 +61,15 @@ def test_sliding_laws_have_colours_and_rivals_one_grey():
     assert len(set(colours)) == len(colours) == 4
     (grey,) = {looks[law]["color"] for law in RIVALS}
     assert grey not in colours
-    assert len({look["marker"] for look in looks.values()}) == len(LAWS)
+    marks = [look["marker"] for look in looks.values()]
+    assert len(set(marks)) == len(LAWS)
+    assert len(set(marks) & set("o8hHp.")) == 1, "one mark looks like a circle"
+
+
+def test_the_axis_begins_just_below_the_floor(figure):
+    for ax in figure.axes:
+        low, high = ax.get_ylim()
+        assert fronts_sentences.FLOOR / 3.0 < low < fronts_sentences.FLOOR < high
 
 
 def test_the_figure_is_no_higher_than_wide_and_its_words_are_on_the_page(figure):
