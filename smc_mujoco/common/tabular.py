@@ -33,7 +33,7 @@ NARROW_WIDTH = 12  # characters of a line below a number where space is short
 TEX_CHARACTER = 0.5
 TEX_SMALL = 0.43
 TEX_WIDTH = 22
-NEAR_POWERS = 2  # of ten, from which on the lower end of an interval is written as 0
+NEAR_POWERS = 2  # of ten, between the ends of an interval; beyond, its lower end is a bound
 MAX_HTML_ROWS = 40
 NEEDS = r"needs booktabs; \footnotesize\setlength{\tabcolsep}{2pt} before it makes it narrower"
 NO_BREAK = "\N{NO-BREAK SPACE}"
@@ -446,8 +446,8 @@ def tex(text: str) -> str:
     """Return text with LaTeX's special characters escaped, and numbers with exponents, powers,
     Greek letters, dashes and u_max in its notation.
 
-    Both ends of an interval have the power of ten of the larger end; the lower end is 0 if its
-    digits are far below those of the other.
+    Both ends of an interval have the power of ten of the larger end; a lower end whose digits are
+    far below those of the other is a bound.
     """
 
     def written(match: re.Match[str]) -> str:
@@ -477,10 +477,12 @@ def _tex_interval(low: str, of_low: str, high: str, of_high: str | None) -> str:
     shift = int(of_high or 0) - int(of_low)
     if of_high and shift < 0:
         return f"{_with_power(low, of_low)}--{_with_power(high, of_high)}"
-    first = "0"
+    if of_high is None:
+        digits = len(high.partition(".")[2])
+        return f"$<${Decimal(1).scaleb(-digits):f}--{high}"
     if shift <= NEAR_POWERS:
         less = "$<$" if low.startswith("<") else ""
         first = f"{less}{Decimal(low.removeprefix('<')).scaleb(-shift)}"
-    if of_high is None:
-        return f"{first}--{high}"
+    else:
+        first = f"$<${10.0**-NEAR_POWERS:g}"
     return f"({first}--{high})$\\cdot10^{{{of_high}}}$"

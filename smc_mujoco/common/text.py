@@ -53,11 +53,11 @@ def span(low: str, high: str) -> str:
     return "" if low == high else f"{low}–{high}"
 
 
-def joined(parts: Iterable[str]) -> str:
+def joined(parts: Iterable[str], last_word: str = "and") -> str:
     """Return "a, b and c"; "" for no parts."""
     *others, last = list(parts) or [""]
     if others:
-        return f"{', '.join(others)} and {last}"
+        return f"{', '.join(others)} {last_word} {last}"
     return last
 
 

@@ -16,7 +16,15 @@ from smc_mujoco.analysis.paired_runs import (
     SETTLES,
     without_floor,
 )
-from smc_mujoco.analysis.ranking import LEVEL_SHARE, Effect, Rank, needed_to_rank, needed_to_win
+from smc_mujoco.analysis.ranking import (
+    BEST_ERROR,
+    LEVEL_SHARE,
+    RIVALS,
+    Effect,
+    Rank,
+    needed_to_rank,
+    needed_to_win,
+)
 from smc_mujoco.analysis.step_halving import APART, RANGE, UNTRIED
 from smc_mujoco.common.aliases import Names, Numbers, Pair
 from smc_mujoco.common.data import keyword_dataclass
@@ -57,6 +65,10 @@ BELOW = (
     "'below': the median is below the number beside it, the floor. Values below the floor count as "
     "equal."
 )
+TESTED = (
+    f"a paired test at {100 * BEST_ERROR:g} % over {RIVALS} rivals, or over those of a law if it "
+    "has more"
+)
 # A word in tables -> its meaning, which their key says, and LaTeX below the table.
 MEANINGS = {
     "J (": "Tuning minimises J, summed over conditions: ITAE divided by the initial error, "
@@ -75,8 +87,8 @@ MEANINGS = {
 # A word in tables -> what their key says about it.
 MARKS = MEANINGS | {
     "strong=True": "A star or bold type marks the winner. If no law wins, it marks each law that "
-    "meets four requirements: no other law is shown to be better "
-    f"({100 * LEVEL:g} % confidence in each column and condition), all its own runs have arrived "
+    f"meets four requirements: no other law is shown to be better ({TESTED}), all its own runs "
+    "have arrived "
     "(see below), it has enough samples, and its interval is not too wide. An interval "
     "is too wide if its upper end is more than 4 times the lower end and more than 4 times the "
     "floor, below which values count as equal.",
@@ -88,8 +100,9 @@ MARKS = MEANINGS | {
     f"variation per second, it is {100 * MIN_COMMAND_SHARE:g} % of u_max.",
     "may exceed ": "'may exceed': the median is below the floor, but it rises at the end of runs, "
     "or with half the physics step, so that it need not stay there.",
-    "at half": "'at half the step': the median with half the physics step, if it differs by more "
-    f"than {APART}; {RANGE}.",
+    "at half": "'at half the step': the median of the runs that were repeated with half the "
+    "physics step, which may be one in four, before and after, if these differ by more than "
+    f"{APART}; {RANGE}.",
 }
 LAST = "never", "fails", "not arrived"  # words in place of a value
 
@@ -101,12 +114,13 @@ UNDER = {
     + MEANINGS["settled runs"],
     "default": "Default gains are those of the law's own file.",
     "yours": "Gains marked yours were given by the authors.",
-    "strong=True": "Bold: may be the best: no other law is shown to be better "
-    f"({100 * LEVEL:g} % confidence). A law without bold is not always shown to be worse.",
+    "strong=True": f"Bold: may be the best: no other law is shown to be better ({TESTED}). A law "
+    "without bold is not always shown to be worse.",
     "below ": "Below a floor (of noise, resolution, or a small share of the start or of u_max): "
     "such values count as equal; where one is bold, no value above the floor is.",
     "may exceed ": "May exceed a floor: the median is below it, but need not stay there.",
-    "at half": "At half the step: the median with half the physics step.",
+    "at half": "At half the step: the median of the runs that were repeated with half the physics "
+    "step, before and after.",
 }
 
 
@@ -393,7 +407,7 @@ class Board(Tables):
 
     @property
     def tie(self) -> str:
-        """That the best laws are level or statistically indistinguishable, and the largest of the
+        """That the best laws are level, or that none is shown to be better, and the largest of the
         least leads that would have been seen; which law is below the floor, where one is.
         """
         for block in self.blocks:
@@ -402,14 +416,16 @@ class Board(Tables):
                 return f"{none}; the median of {block.lead.law} is {block.lead.words}"
         if len(self.best) == 1:
             return f"{self.best[0]} {ALONE}"
-        names = joined(self.best)
-        if len(self.best) == len(self.entries):
-            names = "both laws" if len(self.entries) == 2 else "all laws"
+        alike = len(self.best) == len(self.entries)
         if self.level:
+            names = joined(self.best)
+            if alike:
+                names = "both laws" if len(self.entries) == 2 else "all laws"
             return f"{names} {SAME_RUNS if self.metric == SETTLES else LEVEL_WORDS}"
-        if math.isnan(self.resolves):
-            return f"{names} are statistically indistinguishable"
-        return f"{names} are statistically indistinguishable; {hidden(self.resolves)}"
+        others = "another" if alike else joined(self.best, "or")
+        level = f"{100 * BEST_ERROR:g} % over {max(len(self.entries) - 1, RIVALS)} rivals"
+        text = f"no law is shown to be better than {others} (at {level})"
+        return text if math.isnan(self.resolves) else f"{text}; {hidden(self.resolves)}"
 
     @property
     def level(self) -> bool:
@@ -698,16 +714,21 @@ def _wins(boards: Sequence[Board], labels: Mapping[str, str]) -> list[str]:
     """
     won: dict[str, list[str]] = {}
     unseen = []
+    level = []
     for board in boards:
         if board.winner:
             won.setdefault(board.winner, []).append(board.label)
-        elif board.resolves < MAX_LEAD and not board.level:
+        elif board.level and len(board.best) > 1 and board.metric != SETTLES:
+            level.append(board.label)
+        elif board.resolves < MAX_LEAD:
             unseen.append(f"{100 * board.resolves:.2g} % in {board.label}")
     sentences = []
     for law, metrics in won.items():
         sentences.append(f"{labels.get(law) or style.law_name(law)} wins: {joined(metrics)}.")
     if not won:
         sentences.append("No law wins.")
+    if level:
+        sentences.append(f"The best laws {LEVEL_WORDS}: {joined(level)}.")
     if unseen:
         sentences.append(f"Leads below {joined(unseen)} might not show.")
     return [" ".join(sentences)]

@@ -120,9 +120,9 @@ def test_a_number_with_an_exponent_is_one_formula(number):
     [
         ("3.2e-9–8.1e-7", r"(0.032--8.1)$\cdot10^{-7}$"),
         ("1.9e5–5.2e5", r"(1.9--5.2)$\cdot10^{5}$"),
-        ("3.2e-9–8.1e-6", r"(0--8.1)$\cdot10^{-6}$"),
+        ("3.2e-9–8.1e-6", r"($<$0.01--8.1)$\cdot10^{-6}$"),
         ("<1e-9–2.0e-9", r"($<$1--2.0)$\cdot10^{-9}$"),
-        ("<1e-9–0.00223", "0--0.00223"),
+        ("<1e-9–0.00223", "$<$0.00001--0.00223"),
     ],
 )
 def test_the_ends_of_an_interval_share_a_power_if_theirs_are_near(interval, written):

@@ -151,8 +151,8 @@ def test_html_and_latex_have_the_numbers_of_the_text(boards):
                 assert power.replace("–", "--") in line
     assert re.fullmatch(r"[34]\.\de-7", table.rows[0][1].text)  # 4e-7 times 0.9 to 1.1
     below = table.to_latex().partition("bottomrule")[2]
-    assert "third wins: ITAE." in below
-    assert "might not show" not in below  # as the laws are level in ultimate bound
+    assert r"third wins: ITAE. The best laws are level within 10~\%: ultimate bound." in below
+    assert "might not show" not in below
     (few,) = leaderboard(made(seeds=3), metrics=["itae"]).tables
     assert "wins" not in few.to_latex().partition("bottomrule")[2]
     assert table.rows[2][2][:2] == ("100", "84–100")
@@ -230,6 +230,7 @@ def test_only_what_no_law_beats_is_marked(boards):
     cells = {row[0].text: row[1] for row in Boards([board]).tables[0].rows}
     assert [cells[law].strong for law in LAWS] == [False, True, True]
     (seen,) = re.findall(r"a lead below ([\d.]+) % might not show", board.verdict)
+    assert "no law is shown to be better than another (at 5 % over 15 rivals); a" in board.verdict
     words = rf"No law wins. Leads below {seen}~\% in ITAE might not show."
     assert words in Boards([board]).to_latex()
 
