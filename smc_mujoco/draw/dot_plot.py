@@ -53,7 +53,7 @@ def plot(
     size: Size = None,
     format: str | None = None,
     fig: Figure | SubFigure | None = None,
-    winners: Collection[Cell] = (),
+    winners: Collection[Cell] | None = None,
 ) -> Figure:
     """Draw the median of each law over the seeds, with its 95 % bootstrap interval: dots, by
     condition.
@@ -72,7 +72,7 @@ def plot(
       metrics: names of metrics, or "settles" for the settled runs in %.
       path, title, size, format, fig: as in `figure`.
       winners: (metric, plant, condition, law) of dots that get a ring; `compare`'s plot has those
-        of its verdicts.
+        of its verdicts. Where none is drawn, the key says so; None: it says nothing.
 
     Returns:
       The figure.
@@ -87,10 +87,12 @@ def plot(
     check_table(table)
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
-    dots = _dots(table, items_of("metrics", metrics), winners)
+    dots = _dots(table, items_of("metrics", metrics), winners or ())
     head = style.titled(title, f"Medians: {dots.heading}")
     with style.page(width):
         key, shared = _key(table, dots)
+        if winners is not None and not dots.won:
+            key.append(pages.entry("no winner in these metrics", lw=0))
         if shared and not head:  # it has no place beside a title
             key.append(pages.entry(shared, lw=0))
             shared = ""

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -477,6 +478,7 @@ def number_decades(axis: Axis, ends: Pair) -> None:
         if np.sum((numbers >= min(ends)) & (numbers <= max(ends))) > 1:
             break
     axis.set_minor_locator(LogLocator(subs=between))
+    axis.set_tick_params(which="minor", length=rcParams["xtick.major.size"])  # numbers in one line
     numbers = FuncFormatter(lambda value, _: style.short(value))
     axis.set_major_formatter(numbers)
     axis.set_minor_formatter(numbers)

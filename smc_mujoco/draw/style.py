@@ -50,7 +50,7 @@ HUES = 36  # of the grid from which colours are chosen
 REACTION = "#9018F0"
 NEUTRAL = (PAPER, INK, DISTURBANCE, REACTION, FAILED)  # colours that no law has
 DARK_PAGE = 0.2  # luminance of the darkest light page; chosen
-LOG_RANGE = 20.0  # largest over smallest value above which an axis may be logarithmic; chosen
+LOG_RANGE = 5.0  # largest over smallest value above which an axis may be logarithmic; chosen
 MANY_DIGITS = 1e5  # from it on, matplotlib writes numbers with an exponent
 # of units, by the power of 1000 that a number is given
 PREFIXES = {-2: "M", -1: "k", 0: "", 1: "m", 2: "µ", 3: "n"}

@@ -45,6 +45,9 @@ def made(seeds: int = 20, conditions: tuple[str, ...] = ("nominal",)) -> MadeTab
     )
 
 
+NO_WINNER = "no winner in these metrics"
+
+
 @pytest.fixture(scope="module")
 def boards() -> Boards:
     return leaderboard(made(), metrics=METRICS)
@@ -270,6 +273,35 @@ def test_a_plot_has_a_ring_around_each_winner_and_no_other_dot():
     assert len(rings[0]) == 2
     assert min(of_third) <= min(rings[0]) <= max(rings[0]) <= max(of_third)
     assert rings[1] == []
+
+
+@pytest.mark.parametrize(
+    ("metric", "winners", "said"),
+    [
+        ("itae", [("itae", "duffing", "nominal", "third")], ["winner"]),
+        ("ultimate_bound", [("itae", "duffing", "nominal", "third")], [NO_WINNER]),
+        ("itae", [], [NO_WINNER]),
+        ("itae", None, []),
+    ],
+)
+def test_the_key_of_a_plot_says_what_a_ring_is_or_that_no_law_of_these_metrics_wins(
+    metric, winners, said
+):
+    """A reader who had seen stars in a table took a plot without rings for a fault."""
+    drawn = dot_plot.plot(made(), metrics=[metric], winners=winners)
+    words = [text.get_text() for legend in drawn.legends for text in legend.get_texts()]
+    assert [one for one in words if "winner" in one] == said
+
+
+def test_an_axis_is_logarithmic_where_a_condition_is_several_times_as_slow():
+    """Settling times under a disturbance are ten times the others, of laws that are close."""
+    table = made(conditions=("nominal", "noise"))
+    for slower, scale in ((10.0, "log"), (3.0, "linear")):
+        times = np.repeat([0.32, 0.36, 0.40], 40)
+        times[table.column("condition") == "noise"] *= slower
+        table.columns["settling_time"] = times
+        (ax,) = dot_plot.plot(table, metrics=["settling_time"]).axes
+        assert ax.get_xscale() == scale
 
 
 def test_a_law_has_its_label_in_latex_and_plots_and_values_below_the_floor_are_shaded(tmp_path):
