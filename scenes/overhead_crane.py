@@ -31,7 +31,7 @@ def answer(runs):
 
 
 scene = smc.Scene(
-    title="Overhead crane, three weights of its trolley",
+    title="Overhead crane, three gains a of the law's surface",
     conditions={"weights": {"a = 0.3": run(0.3), "a = 0.67": run(0.67), "a = 4": run(4.0)}},
     answer=answer,
 )
