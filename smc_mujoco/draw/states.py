@@ -1,8 +1,8 @@
 """States of a machine over time: whether it sticks, hits or touches something, and where it lies in
 its backlash.
 
-A state is shown for MIN_STATE_TIME of the film at least, whatever its speed: a hit of 5 ms fades
-over that time, and so does a blow; rest is shown only if it lasts so long.
+A state is shown for MIN_STATE_TIME of the film at least, whatever its speed: rest is shown only if
+it lasts so long. A hit of 5 ms stays for HOLD_TIME, as a blow does, and then fades.
 `metrics.conventions.at_rest` defines rest, and `metrics.touching` contact. The flank of a backlash
 is the sign of the joint's reaction. Friction and contacts are in the reaction too: with them the
 flank is the sign of the actuator's force, which does not tell when a rotor is in play.
@@ -28,19 +28,20 @@ from smc_mujoco.simulation.signals import Impulse
 from smc_mujoco.simulation.trace import Trace
 
 MIN_STATE_TIME = 0.15  # s of a film, chosen: nine frames at 60 fps, long enough to read a word
+HOLD_TIME = 0.6  # s of a film, from the start of a hit or blow: its words and arrow; chosen
 HIT_TIME = 0.1  # s of the run: what lasts longer is no hit or blow; chosen
 SIDES = {-1: "left flank", 0: "in play", 1: "right flank", 2: "rattles"}
 
 
 class State(NamedTuple):
-    """The state of a machine in words, with their colour and their opacity, 0 .. 1, and whether
-    they have a force.
+    """The state of a machine in words, with their colour and their opacity, 0 .. 1, and the time of
+    the force that they have, s.
     """
 
     words: str
     colour: str
     opacity: float = 1.0
-    force: bool = False
+    peak: float | None = None
 
 
 def timeline(
@@ -152,45 +153,62 @@ def told(
     """Return what is said at each sample, whose times in the film are `shown`, s, of forces,
     (K + 1, n), while they act on channels, (K + 1, n): the first of two words with the largest
     force, and the second, or nothing if that is "", where they last for more than HIT_TIME. Words
-    fade at the end.
+    fade at the end, and those of the largest force are told before others.
     """
     on: Array = np.asarray(acts.any(axis=1))
     said: list[State | None] = [None] * len(on)
     held = extended(on, shown, MIN_STATE_TIME)
     changes = np.diff(held.astype(int), prepend=0, append=0)
     edges = np.flatnonzero(changes)
+    spells = []
     for first, stop in edges.reshape(-1, 2).tolist():
         last = first + int(np.flatnonzero(on[first:stop])[-1])
         lasts = bool(trace.t[last] - trace.t[first] > HIT_TIME)
         if lasts and not words[1]:
             continue
-        begun = max(
-            np.searchsorted(trace.t, trace.t[first] + HIT_TIME, side="right"),
-            np.searchsorted(shown, shown[first] + MIN_STATE_TIME),
+        ends = max(
+            int(np.searchsorted(trace.t, trace.t[first] + HIT_TIME, side="right")),
+            int(np.searchsorted(shown, shown[first] + MIN_STATE_TIME)),
         )
+        begun = max(ends, int(np.searchsorted(shown, shown[first] + HOLD_TIME)))
         if lasts and first == 0:
             begun = 0
         elif begun > last:
-            begun = stop
-        peak = largest(trace, acts[first:begun], forces[first:begun]) if begun else ""
-        for k in range(first, stop):
-            fade = 1.0 - (shown[k] - shown[last]) / MIN_STATE_TIME
+            begun = len(on)
+        hit = slice(first, min(ends, stop))
+        peak = largest(trace, acts[hit], forces[hit]) if begun else Peak(0.0, 0, "")
+        peak = peak._replace(sample=first + peak.sample)
+        until = float(max(shown[last], shown[first] + HOLD_TIME * (begun > 0)))
+        spells.append((peak, first, begun, until))
+    for peak, first, begun, until in sorted(spells):
+        for k in range(first, int(np.searchsorted(shown, until + MIN_STATE_TIME))):
+            fade = 1.0 - (shown[k] - until) / MIN_STATE_TIME
             opacity = min(1.0, max(0.0, float(fade)))
-            now = f"{words[0]}, {peak}" if k < begun else words[1]
-            said[k] = State(now, colour, opacity, k < begun)
+            if k < begun:
+                now = f"{words[0]}, {peak.words}"
+                said[k] = State(now, colour, opacity, float(trace.t[peak.sample]))
+            else:
+                said[k] = State(words[1], colour, opacity)
     return said
 
 
-def largest(trace: Trace, acts: Array, forces: Array) -> str:
-    """Return the largest of forces at some samples, (m, n), of the channels on which they act, with
-    its unit.
-    """
-    sizes = np.where(acts, np.abs(np.nan_to_num(forces)), 0.0).max(axis=0)
-    channel = int(sizes.argmax())
+class Peak(NamedTuple):
+    """The largest of forces, N or N m: its size, its sample, and its words with the unit."""
+
+    size: float
+    sample: int
+    words: str
+
+
+def largest(trace: Trace, acts: Array, forces: Array) -> Peak:
+    """Return the largest of forces at some samples, (m, n), of the channels on which they act."""
+    sizes = np.where(acts, np.abs(np.nan_to_num(forces)), 0.0)
+    sample, channel = np.unravel_index(sizes.argmax(), sizes.shape)
+    size = float(sizes.max())
     for group in conventions.groups(trace.scenario):
         if channel in group.channels:
             unit = style.units(group)["force"]
-            return f"{style.short(float(sizes[channel]))} {unit}"
+            return Peak(size, int(sample), f"{style.short(size)} {unit}")
     raise AssertionError
 
 

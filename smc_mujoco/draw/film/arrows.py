@@ -117,6 +117,7 @@ class Mount(NamedTuple):
     unit: float  # longest arrow at a slide, m; at a hinge, a factor on HINGE_LENGTH
     thick: float  # at a slide, m
     front: Array | None  # to the camera, (3,), for a slide that carries something
+    gap: float = RAIL_DISTANCE  # thicknesses from what slides to its nearest arrow
     beyond: bool = False  # on the other side of a hinge than the body, in a network
     radius: float = 0.0  # of bent arrows, m; 0 for straight ones
 
@@ -143,7 +144,7 @@ def mounts(
         hinge = slide._replace(unit=1.0, radius=USER_RADIUS * extent)
     else:
         thick = min(SLIDE_THICKNESS, MAX_RAIL_SHARE * rail)
-        slide = Mount(0, SLIDE_LENGTH * rail, thick, front, is_network(plant))
+        slide = Mount(0, SLIDE_LENGTH * rail, thick, front, beyond=is_network(plant))
         turning = CHAIN_FACTOR if plant.n > 1 else 1.0
         if is_network(plant):
             pivots = model.body_pos[model.jnt_bodyid[list(joints)]]
@@ -381,12 +382,14 @@ def frames(
     return found
 
 
-def without_numbers(drawn: Drawn, colour: str) -> Drawn:
-    """Return the arrows without the numbers in a colour: the words on a hit or a blow have them."""
-    kept = []
-    for channel, arrow in drawn.arrows:
-        told = arrow.rgba == rgba(colour)
-        kept.append((channel, arrow._replace(words="") if told else arrow))
+def held(drawn: Drawn, then: Drawn, shade: tuple[float, ...]) -> Drawn:
+    """Return the arrows with those of a shade, whatever its opacity, as they were `then`, without
+    their numbers: the words on a hit or a blow have them.
+    """
+    kept = [one for one in drawn.arrows if one[1].rgba[:3] != shade[:3]]
+    for channel, arrow in then.arrows:
+        if arrow.rgba[:3] == shade[:3]:
+            kept.append((channel, arrow._replace(rgba=shade, words="")))
     return drawn._replace(arrows=kept)
 
 
@@ -498,7 +501,7 @@ def path(
         turned = out @ data.geom_xmat[body].reshape(3, 3)
         box = model.geom_aabb[body]
         half = box[3:] @ np.abs(turned)
-        start = box[:3] @ turned + half + RAIL_DISTANCE * width
+        start = box[:3] @ turned + half + mount.gap * width
     start += LAYER_DISTANCE * width * arrow.layer
     return place + start * out + reach * along * way, arrow.size * width
 

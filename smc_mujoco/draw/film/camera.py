@@ -76,9 +76,11 @@ def turn(azimuth: float, elevation: float) -> Array:
     return np.column_stack([right, np.cross(right, ahead), -ahead])
 
 
-def fit(points: Array, turn: Array, size: tuple[int, int], room: Room) -> Array:
+def fit(
+    points: Array, turn: Array, size: tuple[int, int], room: Room, least: float = -np.inf
+) -> Array:
     """Return the nearest place, (3,) m, from which points (m, 3) are all within the room of a
-    picture of `size` px.
+    picture of `size` px; it is `least` m or more towards the camera.
 
     With p and z a point's place across and along the view, a camera at c across and at distance D
     sees it between the tangents a and b if a (z + D) <= p - c <= b (z + D). So every point bounds c
@@ -94,7 +96,7 @@ def fit(points: Array, turn: Array, size: tuple[int, int], room: Room) -> Array:
         [room.left - x, room.right - x, y - room.bottom, y - room.top]
     ) * pixel(size)
     sides = [(across, left, right), (up, low, high)]
-    distance = -np.inf
+    distance = least
     for p, a, b in sides:
         span = np.max(p - b * z) - np.min(p - a * z)
         distance = max(distance, span / (b - a))
@@ -107,20 +109,24 @@ def fit(points: Array, turn: Array, size: tuple[int, int], room: Room) -> Array:
 
 
 def widened(view: View, points: Array, missed: Array) -> Array:
-    """Return how far the camera of a view of points (m, 3) goes back and aside in each frame,
-    (frames, 3) m, to see them as well at distances `missed`, (machines, frames, 3) m.
+    """Return how far the cameras of machines go back and aside from a view of points (m, 3) m in
+    each frame, (machines, frames, 3) m, to see them as well at distances `missed`, of that shape.
 
-    Distances over MAX_MISSED count less, and soon not at all: all machines have one view, in which
-    one that flees would make the others small.
+    All go back as far, so that machines are as large, and each goes aside for its own distance
+    alone. Distances over MAX_MISSED count less, and soon not at all: one that flees would make the
+    others small.
     """
     reach = np.ptp(points, axis=0).max()
     far = np.linalg.norm(missed, axis=2, keepdims=True)
     seen = missed * np.clip(1.0 + MAX_MISSED - far / reach, 0.0, 1.0)
     moves = []
     for ways in seen.swapaxes(0, 1):
-        both = np.concatenate([points, *(points + way for way in ways)])
-        moves.append(fit(both, view.turn, view.size, view.inside) - view.place)
-    return np.array(moves)
+        every = [np.concatenate([points, points + way]) for way in ways]
+        places = [fit(both, view.turn, view.size, view.inside) for both in every]
+        back = float(max(place @ view.turn[:, 2] for place in places))
+        places = [fit(both, view.turn, view.size, view.inside, back) for both in every]
+        moves.append(np.array(places) - view.place)
+    return np.array(moves).swapaxes(0, 1)
 
 
 def project(points: Array, turn: Array, place: Array, size: tuple[int, int]) -> Array:

@@ -438,6 +438,7 @@ def placement(
         if camera.magnification(shared[2], every) > camera.magnification(view, points):
             tiles, labels, view = shared
             points = every
+            puppets = list(map(shared_picture.on_roof, puppets))
         else:
             lanes = None
     scale = size[0] / FULL_SIZE[0]
@@ -448,7 +449,7 @@ def placement(
 def staged(tracks: Sequence[MachineTrack], placed: Placement, times: Array) -> Iterator[Stage]:
     """Yield the stages of machines, one after the other."""
     missed = np.array([track.missed for track in tracks])
-    widened = 0.0
+    widened = np.zeros((len(tracks), 1, 3))
     if placed.followed and missed.size:
         widened = camera.widened(placed.view, placed.points, missed)
     for k, track in enumerate(tracks):
@@ -456,7 +457,7 @@ def staged(tracks: Sequence[MachineTrack], placed: Placement, times: Array) -> I
         path = None
         if placed.followed:
             raised = np.array([0.0, 0.0, puppet.height])
-            path = placed.followed[k].followed(times) + raised + widened
+            path = placed.followed[k].followed(times) + raised + widened[k]
         alone = len(tracks) == 1
         beside = 0.0 if placed.lanes is None else placed.lanes[k]
         yield Stage(track, puppet, placed.view, placed.points, placed.scale, alone, path, beside)

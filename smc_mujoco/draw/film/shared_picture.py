@@ -6,6 +6,7 @@ drawn behind the first only, and what stands before it before the last. Springs 
 draws the skins of one model alone.
 """
 
+import dataclasses
 import itertools
 from collections.abc import Sequence
 
@@ -32,6 +33,12 @@ def places(puppets: Sequence[Puppet], turn: Array) -> Array | None:
     near = nearness(turn)
     depth = np.ptp(boxes(first)[moved(first)] @ near)
     return np.arange(len(puppets))[:, None] * PITCH * depth * near
+
+
+def on_roof(puppet: Puppet) -> Puppet:
+    """Return a machine whose arrows lie on the roof of its cart: over it is the cart behind."""
+    mounts = [mount._replace(front=None, gap=0.0) for mount in puppet.mounts]
+    return dataclasses.replace(puppet, mounts=mounts)
 
 
 def nearness(turn: Array) -> Array:

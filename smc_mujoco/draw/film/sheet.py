@@ -43,7 +43,6 @@ SAMPLE = 0.5  # letters, height of the line above a label
 INSET = 0.3  # letters, of that line, from its tile's side
 LEAST_TITLE = 0.75  # of the size of letters, of a long title, and of long labels
 TIME_TICKS = 5  # at most
-SIDES = ("left", "right")  # of the first and the last tick's words, so that they stay on the page
 STATE_PLACE = 0.3  # letters, of what is said of a machine, from the corner of its tile
 STATE_HEIGHT = 1.5  # letters, from the top of a tile to below what is said there
 FUTURE_LINE = 0.4  # opacity of what is still to come
@@ -322,8 +321,14 @@ class Sheet:
         ticks = ticks[seen].tolist()
         ax.set_xlim(0.0, stop)
         ax.set_xticks(ticks, [*(f"{tick:g}" for tick in ticks[:-1]), f"{ticks[-1]:g} s"])
-        for label, side in zip(ax.get_xticklabels()[:: len(ticks) - 1 or 1], SIDES, strict=False):
-            label.set_horizontalalignment(side)
+        labels = ax.get_xticklabels()
+        labels[0].set_horizontalalignment("left")
+        if len(ticks) > 1:
+            box = ax.get_position()
+            middle = (box.x0 + box.width * ticks[-1] / stop) * self.size[0]
+            reach = middle + 0.5 * style.width(labels[-1].get_text(), self.letters)
+            if ticks[-1] > stop * (1.0 - 1e-9) or reach > self.size[0]:  # it stays on the page
+                labels[-1].set_horizontalalignment("right")
         ax.tick_params(length=0)
 
     def picture(self, moment: Moment, machines: Sequence[Array]) -> Array:

@@ -18,6 +18,7 @@ from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.run import poses
 from smc_mujoco.simulation.trace import Trace
 
+HALF_STILL = 0.5 / 240.0  # s around a peak, of its arrow: a frame of eightfold slow motion
 SAID_TIMES = 1000  # of a run, at which it is asked whether something is said of it; chosen
 
 
@@ -53,7 +54,7 @@ class MachineTrack:
         self.trace = trace
         self.colour = colour
         self.edges = edges = clock.edges
-        self.holds = states.MIN_STATE_TIME * clock.speeds
+        self.holds = states.HOLD_TIME * clock.speeds
         times = clock.times
         n = world.first_channels(trace.scenario).plant.n
         self.motion = motion(trace, np.union1d(grid, times))
@@ -66,8 +67,11 @@ class MachineTrack:
         some = trace.t[:: 1 + len(trace.t) // SAID_TIMES]
         self.speaks = any(states.timeline(trace, some, clock.played))
         for k, state in enumerate(self.states):
-            if state and state.force:
-                self.drawn[k] = arrows.without_numbers(self.drawn[k], state.colour)
+            if state and state.peak is not None:
+                around = state.peak + HALF_STILL * np.array([-1.0, 1.0])
+                (then,) = arrows.frames(trace, around, np.zeros(1), sizes, colour)
+                shade = arrows.rgba(state.colour, state.opacity)
+                self.drawn[k] = arrows.held(self.drawn[k], then, shade)
         self.x = sampled(trace, trace.x[:, :n], times)
         self.r = sampled(trace, trace.r[:, :n], times)
         place = states.place_channels(trace.scenario.plant)

@@ -158,10 +158,16 @@ def test_a_camera_that_follows_goes_back_while_the_reference_is_far_but_not_for_
     size = (400, 220)
     view = camera.View(size, turn, camera.fit(points, turn, size, inside), inside)
     away = 0.4 * np.array([[0.0, 0.0, 0.0], [1.0, -1.0, 0.5], [-1.4, 0.2, 0.0], [30.0, 0.0, 0.0]])
-    moves = camera.widened(view, points, np.array([0.0 * away, away]))
-    assert np.abs(moves[[0, 3]]).max() < 1e-9
-    for move, way in zip(moves[:3], away[:3], strict=True):
-        for seen in (points, points + way):
-            x, y = camera.project(seen, turn, view.place + move, size).T
+    home, moved = camera.widened(view, points, np.array([0.0 * away, away]))
+    back = np.array([home, moved]) @ turn[:, 2]
+    assert back[0] == pytest.approx(back[1])
+    assert (back[:, 1:3] > 0.1).all()
+    assert np.abs(moved[[0, 3]]).max() < 1e-9
+    middle = inside.left + inside.right, inside.top + inside.bottom
+    for frame, way in enumerate(away[:3]):
+        for move, seen in ((moved, points), (moved, points + way), (home, points)):
+            x, y = camera.project(seen, turn, view.place + move[frame], size).T
             assert inside.left - 1e-6 <= x.min() < x.max() <= inside.right + 1e-6
             assert inside.top - 1e-6 <= y.min() < y.max() <= inside.bottom + 1e-6
+        # one that is at home stays where it is in its tile
+        assert (x.min() + x.max(), y.min() + y.max()) == pytest.approx(middle, rel=0.02)

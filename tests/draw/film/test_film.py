@@ -257,7 +257,7 @@ def test_a_blow_of_milliseconds_is_told_with_its_size_as_long_as_it_takes_to_rea
     assert before is None
     assert blow == f"hit, {style.short(float(np.abs(hit.reaction).max()))} N"
     assert after is None
-    assert frames / 30 >= states.MIN_STATE_TIME
+    assert frames / 30 >= states.HOLD_TIME
     reported = states.timeline(hit, seconds(hit))
     told = [k for k, now in enumerate(reported) if now]
     assert told[0] == np.ceil(touching[0] * 30)  # at once, and not before
@@ -275,8 +275,11 @@ def test_what_is_told_lasts_in_the_film_not_in_the_run(hit):
         told = [now is not None for now in states.timeline(hit, times, played)]
         lasts.append(float(np.ptp(times[told])))
     touch = float(np.ptp(hit.t[states.in_contact(hit)[:, 0]]))
-    assert lasts[1] == pytest.approx(touch + states.MIN_STATE_TIME, abs=0.01)
-    assert lasts[0] == pytest.approx(touch + 0.125 * states.MIN_STATE_TIME, abs=0.01)
+    held = states.HOLD_TIME + states.MIN_STATE_TIME
+    assert lasts[1] == pytest.approx(held, abs=0.01)
+    assert lasts[0] == pytest.approx(
+        max(touch, 0.125 * states.HOLD_TIME) + 0.125 * states.MIN_STATE_TIME, abs=0.01
+    )
 
 
 def test_what_is_held_lasts_and_has_no_short_gaps():

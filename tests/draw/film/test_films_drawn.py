@@ -65,6 +65,20 @@ def test_ticks_stay_on_the_page():
             assert 0.0 <= box.x0 <= box.x1 <= 1280.0, label.get_text()
 
 
+@pytest.mark.parametrize(("duration", "inner"), [(0.6, True), (1.0, False), (0.51, True)])
+def test_words_of_the_last_tick_are_under_its_line_unless_it_is_the_end(duration, inner):
+    """The words of a line at 0.5 s stood 28 px left of it."""
+    run = machine("duffing", duration=duration)
+    page = sheet([run], size=(800, 450))
+    ax = page.moving[0].axes
+    label = ax.get_xticklabels()[-1]
+    box = label.get_window_extent()
+    line, _ = ax.transData.transform((ax.get_xticks()[-1], 0.0))
+    middle = 0.5 * (box.x0 + box.x1)
+    assert (abs(middle - line) < 2.0) == inner
+    assert box.x1 <= 800.0
+
+
 @pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 def test_a_film_is_the_same_on_a_dark_page():
     traces = [machine("duffing"), machine("duffing", input_delay=0.01)]
@@ -302,6 +316,7 @@ def test_a_machine_is_told_to_stick_touch_or_lie_on_a_flank_when_it_does(
     times = np.arange(0.0, 4.0, 1 / 30)
     reported = states.timeline(dataclasses.replace(trace, **moved), times)
     words = [now and now.words for now in reported]
+    told = states.HOLD_TIME + states.MIN_STATE_TIME + 0.02 if stops else 0.4
     for second, expected in (
         (0, moving),
         (1, resting),
@@ -309,7 +324,7 @@ def test_a_machine_is_told_to_stick_touch_or_lie_on_a_flank_when_it_does(
         (3, resting),
     ):
         assert {
-            word for word, t in zip(words, times, strict=True) if second + 0.4 < t < second + 0.95
+            word for word, t in zip(words, times, strict=True) if second + told < t < second + 0.95
         } <= expected
     if touching:
         assert {

@@ -38,19 +38,20 @@ def run():
 
 
 def test_a_blow_is_told_with_its_peak_from_its_start_and_fades(run):
-    times = np.arange(0.0, 0.6, 1e-3)
+    clock = pace.clock([run], 100.0, 0.1)
     said = {}
-    for time, state in zip(times, states.timeline(run, times), strict=True):
+    told = states.timeline(run, clock.times, clock.played)
+    for time, state in zip(clock.times, told, strict=True):
         if state and state.words == "blow, 200 N·m":
             said[round(float(time), 3)] = state
     first, *_, last = said
     assert first == 0.1
-    assert last >= 0.1 + 0.01 + 0.05
+    assert last >= 0.1 + 0.1 * (states.HOLD_TIME + 0.5 * states.MIN_STATE_TIME)
     opacities = [state.opacity for state in said.values()]
     assert opacities[0] == 1.0
     assert opacities == sorted(opacities, reverse=True)
     assert opacities[-1] < 0.8
-    assert all(state.colour == style.DISTURBANCE and state.force for state in said.values())
+    assert all(state.colour == style.DISTURBANCE and state.peak for state in said.values())
 
 
 def test_an_impulse_that_lasts_is_no_blow():
@@ -67,11 +68,11 @@ def test_every_first_contact_is_a_hit_with_its_peak_and_what_lasts_after_it_a_co
     force[np.searchsorted(t, 0.15)] = 63.0
     force[np.searchsorted(t, 0.3)] = 90.0
     words = "hit", "contact"
-    told = states.told(run, t, touches[:, None], force[:, None], words, style.REACTION)
+    told = states.told(run, 4.0 * t, touches[:, None], force[:, None], words, style.REACTION)
     said = [state.words if state else None for state in told]
-    assert [word for word, _ in itertools.groupby(said)] == [None, "hit, 63 N·m", "contact"]
+    assert [word for word, _ in itertools.groupby(said)] == [None, "hit, 63 N·m", "contact", None]
     assert t[said.index("hit, 63 N·m")] == pytest.approx(0.1)
-    assert t[said.index("contact")] == pytest.approx(0.1 + states.MIN_STATE_TIME, abs=2e-3)
+    assert t[said.index("contact")] == pytest.approx(0.1 + states.HOLD_TIME / 4.0, abs=2e-3)
     assert all(state.opacity == 1.0 for state in told[: np.searchsorted(t, 0.499)] if state)
     since = states.told(run, t, (t < 0.5)[:, None], force[:, None], words, style.REACTION)
     assert {state.words for state in since if state} == {"contact"}
@@ -149,3 +150,48 @@ def test_no_number_is_written_over_what_is_said_of_the_machine(run):
             number = np.array([(x.min(), y.min()), (x.max(), y.max())])
             assert arrows.is_apart(number, taken)
             taken = [*taken, number]
+
+
+def test_words_of_a_hit_and_its_arrow_at_its_peak_stay_and_fade_together(run):
+    """They stood for 0.2 s of a film."""
+    runs = film.DrawnRuns.of([run], None)
+    clock = pace.clock([run], 30.0, 0.25)
+    (track,) = film.tracks_at(clock, runs, arrows.scales([run]))
+    spells = []
+    frames = zip(track.states, track.drawn, strict=True)
+    for words, spell in itertools.groupby(frames, key=lambda one: one[0] and one[0].words):
+        if words is None or not words.startswith("hit"):
+            continue
+        lengths = set()
+        full = 0
+        for state, drawn in spell:
+            shade = arrows.rgba(state.colour, state.opacity)
+            (own,) = [arrow for _, arrow in drawn.arrows if arrow.rgba == shade]
+            lengths.add(own.high)
+            full += state.opacity == 1.0
+        assert len(lengths) == 1
+        spells.append(full / 30)
+    assert len(spells) >= 1
+    assert min(spells) >= states.HOLD_TIME - 1 / 30
+
+
+def test_a_strong_hit_is_told_until_it_fades_though_a_weak_one_follows(run):
+    t = run.t
+    force = np.zeros(len(t))
+    force[np.searchsorted(t, 0.1)] = 50.0
+    force[np.searchsorted(t, 0.3)] = 20.0
+    words = "hit", "contact"
+    acts = (force != 0.0)[:, None]
+    for forces, expected in (
+        (force, ["hit, 50 N·m", "hit, 20 N·m"]),
+        (70.0 * (force > 0.0) - force, ["hit, 20 N·m", "hit, 50 N·m"]),
+    ):
+        told = states.told(run, 2.0 * t, acts, forces[:, None], words, style.REACTION)
+        said = [state.words if state else None for state in told]
+        assert [word for word, _ in itertools.groupby(said)] == [None, *expected]
+        turn = (
+            0.1 + 0.5 * (states.HOLD_TIME + states.MIN_STATE_TIME)
+            if expected[0] > "hit, 3"
+            else 0.3
+        )
+        assert t[said.index(expected[1])] == pytest.approx(turn, abs=2e-3)
