@@ -165,6 +165,7 @@ def test_words_of_a_hit_and_its_arrow_at_its_peak_stay_and_fade_together(run):
         lengths = set()
         full = 0
         for state, drawn in spell:
+            assert state
             shade = arrows.rgba(state.colour, state.opacity)
             (own,) = [arrow for _, arrow in drawn.arrows if arrow.rgba == shade]
             lengths.add(own.high)
