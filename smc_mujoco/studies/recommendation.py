@@ -231,7 +231,7 @@ class RaceRecommendation(Recommendation):
             lines.append(f"Left out: {name}, {why}")
         if self.untried_laws:
             number_of = counted(self.untried_laws, "other law")
-            lines.append(f"Not tried: {number_of} of the package; name some by laws= (--law)")
+            lines.append(f"Not tried here: {number_of} of the package; name some by laws= (--law)")
         lines.append(f"Second: {self.second or 'none'}")
         lines.append(f"Gains: {self.law}{self._unit}, {self.law.source}")
         return lines
@@ -267,11 +267,10 @@ class RaceRecommendation(Recommendation):
 
     @property
     def _may_be_as_good(self) -> list[str]:
-        """The other laws that may have the lowest J with these gains, where no test names a law."""
+        """The other laws that were tried with these gains, where no test names a law."""
         if not self.fixed or self._winners:
             return []
-        names = [law.name for law in self.laws]
-        return [name for name in _best(self.fixed, names) if name != self.law.name]
+        return [law.name for law in self.laws if law is not self.law]
 
     @property
     def _lowest(self) -> str | None:
@@ -600,12 +599,6 @@ def _ranked(comparison: Comparison, order: Sequence[str]) -> list[str]:
     return [law for law in order if enough.get(law)]
 
 
-def _best(comparison: Comparison, order: Sequence[str]) -> list[str]:
-    """Return the laws that may have the lowest J, in an order of laws."""
-    beaten = dict(zip(comparison.laws, comparison.worse[:, 0], strict=True))
-    return [law for law in _ranked(comparison, order) if not beaten[law]]
-
-
 def _lead(comparison: Comparison, first: str, rival: str) -> str:
     """Return how J of a law compares with a rival's; where runs fail, without a ratio."""
     effect = comparison.effect(0, first, rival)
@@ -637,7 +630,8 @@ def _verdict(comparison: Comparison, order: Sequence[str]) -> str:
     lead = f"{_lead(comparison, first, rival)} (p {p} for a lead above {least})"
     if winner:
         return f"{winner} wins; its J is {lead}"
-    best = _best(comparison, order)
+    beaten = dict(zip(comparison.laws, comparison.worse[:, 0], strict=True))
+    best = [law for law in names if not beaten[law]]
     if len(best) == 1:
         return f"open: {best[0]} {ALONE}; its J is {lead}"
     samples = effects[rival].samples

@@ -186,7 +186,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     shares = [float(share) for share in re.findall(r"(\d+) % from \w+", lines[verdicts[3]])]
     assert sum(shares) == pytest.approx(100.0, abs=1.0)
     assert re.search(r" and overshoot \(%\) \d", lines[verdicts[4]])  # which was not asked for
-    assert int(lines["Not tried"].split()[0]) == recommendation.untried_laws > 20
+    assert int(lines["Not tried here"].split()[0]) == recommendation.untried_laws > 20
     assert shares == sorted(shares, reverse=True)
     assert recommendation.weighs.keys() == {"coulomb", "noise"}
     assert lines["Use"] == recommendation.law.name

@@ -44,6 +44,9 @@ CURES = {  # words of MuJoCo's message on a file -> what to do
 }
 OF_A_PART = "not found", "invalid qpos size", "mujocoinclude"  # words on a file that is no model
 
+# kinds of elements that parts add, and attributes that a default has not, on which MuJoCo fails
+ADDED = "actuator", "equality", "geom", "joint", "site", "tendon"
+NO_VALUES = {"classname", "compiler", "frame", "id", "info", "name", "parent", "signature"}
 MAX_KEPT = 16  # models that are kept as they were read; chosen
 Stamp = dict[str, tuple[int, int]]  # file -> time of its last change, ns, and size
 
@@ -123,6 +126,7 @@ class ModelSource:
                 and joint.parent.name not in taken
             ):
                 joint.name = joint.parent.name
+        _forget_defaults(spec)
         return spec
 
     def compiled(self, spec: mujoco.MjSpec) -> mujoco.MjModel:
@@ -131,6 +135,20 @@ class ModelSource:
             return mjcb.compiled(spec, _built)
         except ValueError as error:
             raise broken(self.path or self.label, str(error), self.path) from None
+
+
+def _forget_defaults(spec: mujoco.MjSpec) -> None:
+    """Reset the default classes of a model, whose own elements have their values by now: what parts
+    add to it takes none of them.
+    """
+    fresh = mujoco.MjSpec()
+    for found in (spec.default, *(body.classname for body in spec.bodies)):
+        for kind in ADDED:
+            plain = getattr(fresh.default, kind)
+            for name in {*dir(plain)} - NO_VALUES:
+                value = getattr(plain, name)
+                if hasattr(value, "__int__"):  # a number, an array or a choice
+                    setattr(getattr(found, kind), name, value)
 
 
 @functools.lru_cache(maxsize=MAX_KEPT)

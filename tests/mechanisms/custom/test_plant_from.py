@@ -27,6 +27,7 @@ from smc_mujoco.mechanisms.custom.user_model import UserModel
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import run_key, scenario_json
+from smc_mujoco.simulation.conditions import NAMED
 from smc_mujoco.simulation.model import mechanism
 
 TORQUE = smc.law("computed_torque", kp=100.0, kd=20.0)
@@ -1158,3 +1159,34 @@ def test_a_plant_of_one_s_own_goes_to_another_process(arm):
     again = pickle.loads(pickle.dumps(plant))
     assert again == plant
     assert hash(again) == hash(plant)
+
+
+DEFAULTS = {
+    "joint": 'damping=".1" frictionloss=".05" limited="true" range="-2 2"',
+    "motor": 'ctrlrange="-5 5" gear="5"',
+    "tendon": 'stiffness="3" damping=".2"',
+}
+DEFAULTED = """<mujoco model="one"><compiler angle="radian"/><default>{0}</default><worldbody>
+<body name="base" {1}><body><joint name="j" axis="0 1 0" {2}/><geom type="capsule" size=".02"
+fromto="0 0 0 0 0 -.3" mass=".5" contype="0" conaffinity="0"/></body></body></worldbody><actuator>
+<motor joint="j" {3}/></actuator></mujoco>"""
+
+
+@pytest.mark.filterwarnings("ignore:LuGre's bristles")
+@pytest.mark.parametrize("condition", ["lugre", "backlash", "elastic", "motor_side"])
+def test_what_parts_add_to_a_model_takes_none_of_its_defaults(condition):
+    """A rotor had the friction and the limits of the file's joints, a bristle the motor's gear."""
+    joint, motor = DEFAULTS["joint"], DEFAULTS["motor"]
+    classes = "".join(f"<{kind} {values}/>" for kind, values in DEFAULTS.items())
+    of_joints = f'<default class="own"><joint {joint}/></default>'
+    ends = []
+    for text in (
+        DEFAULTED.format("", "", joint, motor),
+        DEFAULTED.format(classes, "", "", ""),
+        DEFAULTED.format(of_joints, 'childclass="own"', "", motor),
+    ):
+        plant = smc.plant_from(text, {"j": smc.Channel(x0=0.3)})
+        law = smc.law("pid", kp=20.0, ki=5.0, kd=2.0)
+        fields = NAMED[condition].on(plant, 0.2)
+        ends.append(smc.run(smc.Scenario(plant=plant, law=law, duration=0.2, **fields)).x[-1, 0])
+    assert ends[0] == ends[1] == ends[2]
