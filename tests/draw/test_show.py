@@ -55,8 +55,8 @@ def test_a_notebook_shows_a_figure_that_pyplot_does_not_know_of(trace):
     figure = smc.figure(trace, title=title, size="ieee-column")
     assert figure.legends[0].get_title().get_text().split() == title.split()
     picture, metadata = figure._repr_png_()
-    assert Image.open(io.BytesIO(picture)).width == pytest.approx(3.5 * 200, abs=1)
-    assert metadata == {"width": pytest.approx(3.5 * 96)}
+    assert Image.open(io.BytesIO(picture)).width == pytest.approx(252 / 72.27 * 200, abs=1)
+    assert metadata == {"width": pytest.approx(252 / 72.27 * 96)}
     formatters = pytest.importorskip("IPython.core.formatters")
     reported, about = formatters.DisplayFormatter().format(figure)
     assert reported["image/png"] == picture
