@@ -287,8 +287,11 @@ def _assumed(trial: Trial, plant: Plant, goal: Objective) -> str:
     """Return how often u changes and what it is made from, and each noise, in words; of noise that
     no condition asked for has, that it is added.
     """
-    period = 1e3 * trial.case(plant, "none", trial.conditions[0]).control_period
-    parts = [f"u changes every {period:g} ms and is made from measured positions and velocities"]
+    period = 1e3 * trial.case(plant, "none", "nominal").control_period
+    parts = [
+        f"u changes every {period:g} ms and is made from measured positions and velocities, unless "
+        "a condition says otherwise"
+    ]
     asked = {condition.name for condition in trial.conditions}
     units = " or ".join(dict.fromkeys(plant.units[: plant.driven]))
     for condition in goal.conditions:
