@@ -122,14 +122,14 @@ def figure(
         smc.figure(trace, "duffing.svg")
 
     x, u and s are drawn until a little after x has settled and moves by less than 2 % of its panel,
-    |x - r| over the whole run on a logarithmic axis.
-    Each run of a network has a row with a line for each channel, and there is the spread max x -
-    min x. Several runs of a free body have such rows of u. Of several joints there are e and u of
-    those with the largest errors. Joints without an actuator, and channels in another unit, have
-    their own panels. Realistic mechanisms have panels of the actuator's force and of the reaction
-    of friction and contacts, arms of their tip. The end of a failed run and the instant at which a
-    plant changes are marked. Words say which curves agree, and so hide each other. The figure's
-    `get_label()` and its files say what lines mean.
+    |x - r| over the whole run on a logarithmic axis. Each run of a network has a row with a line
+    for each channel, and there is the spread max x - min x. Several runs of a free body have such
+    rows of u. Of several joints there are e and u of those with the largest errors. Joints without
+    an actuator, and channels in another unit, have their own panels. Realistic mechanisms have
+    panels of the actuator's force and of the reaction of friction and contacts, arms of their tip.
+    The end of a failed run and the instant at which a plant changes are marked. Words say which
+    curves agree, and so hide each other. The figure's `get_label()` and its files say what lines
+    mean.
 
     Args:
       traces: one or several traces.

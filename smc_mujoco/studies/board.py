@@ -88,10 +88,9 @@ MEANINGS = {
 MARKS = MEANINGS | {
     "strong=True": "A star or bold type marks the winner. If no law wins, it marks each law that "
     f"meets four requirements: no other law is shown to be better ({TESTED}), all its own runs "
-    "have arrived "
-    "(see below), it has enough samples, and its interval is not too wide. An interval "
-    "is too wide if its upper end is more than 4 times the lower end and more than 4 times the "
-    "floor, below which values count as equal.",
+    "have arrived (see below), it has enough samples, and its interval is not too wide. An "
+    "interval is too wide if its upper end is more than 4 times the lower end and more than 4 "
+    "times the floor, below which values count as equal.",
     "": "A run has arrived if, in its last fifth, the error stays within 10 % of its initial value "
     "or within 5 times the sensor's resolution.",
     "below ": f"{BELOW} If a law below the floor may be the best, no law above the floor is "
@@ -412,7 +411,7 @@ class Board(Tables):
         """
         for block in self.blocks:
             if block.lead and block.lead.floor:
-                none = f"no law is shown to be better than {joined(self.best)}"
+                none = f"no law is shown to be better than {joined(self.best, 'or')}"
                 return f"{none}; the median of {block.lead.law} is {block.lead.words}"
         if len(self.best) == 1:
             return f"{self.best[0]} {ALONE}"

@@ -64,7 +64,7 @@ def recommend(
     seeds: int,
     clock: AnswerTime,
     relevant: float,
-    untried_laws: int = 0,
+    untried_laws: int,
 ) -> RaceRecommendation:
     """Race laws on a plant and recommend one of them, all as long as the clock lets it; `metrics`
     are those of the tables, from that many seeds, and `untried_laws` the number of further laws

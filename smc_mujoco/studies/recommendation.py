@@ -250,8 +250,8 @@ class RaceRecommendation(Recommendation):
             words.append("of the laws that were searched")
         if self.race.sets < LOOKS[0] and len(self.race.running) > 1 and not self.race.winner:
             words.append(f"after {counted(self.race.sets, 'set')} of gains, so more may change it")
-        if open_ := self._may_be_as_good:
-            words.append(f"not shown to be better than {joined(open_)}")
+        if others := self._not_beaten:
+            words.append(f"not shown to be better than {joined(others, 'or')}")
         if self.settles[self.law.name] < RELIABLE:
             words.append(f"which settled in {done} of {of} runs")
         text = ", ".join(words)
@@ -266,8 +266,8 @@ class RaceRecommendation(Recommendation):
         return text
 
     @property
-    def _may_be_as_good(self) -> list[str]:
-        """The other laws that were tried with these gains, where no test names a law."""
+    def _not_beaten(self) -> list[str]:
+        """The other laws of the comparison with these gains, where no test names a law."""
         if not self.fixed or self._winners:
             return []
         return [law.name for law in self.laws if law is not self.law]

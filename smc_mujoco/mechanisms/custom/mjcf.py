@@ -142,7 +142,8 @@ def _forget_defaults(spec: mujoco.MjSpec) -> None:
     add to it takes none of them.
     """
     fresh = mujoco.MjSpec()
-    for found in (spec.default, *(body.classname for body in spec.bodies)):
+    classes = {found.name: found for found in (body.classname for body in spec.bodies)}
+    for found in (spec.default, *classes.values()):
         for kind in ADDED:
             plain = getattr(fresh.default, kind)
             for name in {*dir(plain)} - NO_VALUES:
