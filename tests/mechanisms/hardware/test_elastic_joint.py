@@ -14,6 +14,7 @@ from scipy.linalg import expm
 import smc_mujoco as smc
 from smc_mujoco.hardware import ElasticJoint
 from smc_mujoco.simulation.conditions import NAMED
+from smc_mujoco.simulation.model import compile_model
 
 INERTIA, DRAG, START = 0.125, 0.05, 0.3
 AXIS = smc.plant("servo_axis", M=INERTIA, b=DRAG, cf=0.0, offset=0.0)
@@ -136,6 +137,19 @@ def test_one_rotor_is_the_same_for_a_spring_and_a_play():
     )
     assert np.abs(stiff.x - rigid.x).max() < 2e-5
     assert np.abs(play.x - rigid.x).max() < 2e-3
+
+
+@pytest.mark.parametrize("name", sorted({*smc.plants()} - {"quadrotor"}))
+def test_a_rotor_on_a_plant_of_ours_has_no_limit_spring_or_friction_of_its_joints(name):
+    soft = ElasticJoint(100.0)
+    model = compile_model(smc.Scenario(plant=name, law="none", actuator=soft))
+    rotors = soft.rotors(model)
+    joints = model.dof_jntid[rotors]
+    assert len(rotors) == model.nu
+    assert not model.jnt_limited[joints].any()
+    assert not model.jnt_actfrclimited[joints].any()
+    assert not model.jnt_stiffness[joints].any()
+    assert not model.dof_frictionloss[rotors].any()
 
 
 def test_a_sensor_on_the_motor_side_reads_the_rotor_late_and_by_name():
