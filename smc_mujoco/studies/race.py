@@ -44,6 +44,7 @@ from smc_mujoco.studies.study import REPEATED_SEEDS
 
 LOOKS = (7, 12)  # numbers of sets after which the laws are judged
 WITHIN = 24  # sets that would decide, above which a race ends at the first look; chosen
+TIMED = 2  # sets after which the number of sets that fit is known: the first compiles, too
 FIRST = 3  # sets after which a law may be dropped; chosen
 FAR = 2.0  # times the leader's worst J, above which it is; chosen
 STUCK = 2.0  # times the least J of its law's others, above which a search is made again; chosen
@@ -165,6 +166,8 @@ def race(
             pieces = [(one, k, 0) for one in running.values() if one.task]
             count = len(running)
             over = start + count * _expected(rounds) > clock.race_ends(count)
+            if k == TIMED and rounds:
+                _tell_if_short(shown, k, (clock.race_ends(count) - start) / count, rounds)
             kept = _kept(trial, pieces)
             shown.latest = clock.race_ends(count)
             if over and not kept:
@@ -242,6 +245,16 @@ def _expect(shown: Bar, done: int, laws: int) -> None:
     """
     last = next(look for look in LOOKS if look > done)
     shown.reached(done * laws, last * laws)
+
+
+def _tell_if_short(shown: Bar, done: int, left: float, rounds: Sequence[float]) -> None:
+    """Say beside the bar if the time that is left for each law, s, is too short for the first
+    look.
+    """
+    fit = done + left / _expected(rounds)
+    if fit < LOOKS[0]:
+        enough = f"{LOOKS[0]} can name a winner"
+        shown.what = f"about {math.floor(fit)} sets of each law fit, and {enough}: set of gains"
 
 
 def hopeless(J: Mapping[str, Sequence[float]]) -> dict[str, float]:

@@ -83,7 +83,8 @@ def recommend(
     chosen, tuned = _chosen(trial, plant, raced, _shown(raced), goal)
     fixed = None
     if clock.work_left >= len(chosen) * (judgements(DECIDING) * clock.unit + few * table_work):
-        fixed = _fixed(trial, plant, chosen, goal, relevant)
+        rivals = [*chosen][: max(2, len(raced.first))]
+        fixed = _fixed(trial, plant, {law: chosen[law] for law in rivals}, goal, relevant)
     candidates = [Candidate(law, (law,)) for law in chosen.values()]
     made = clock.seeds(seeds, len(chosen) * table_work, margins_work)
     table = trial.run({plant.name: candidates}, made, coarse=True)
@@ -141,13 +142,9 @@ def _least_share(settled: Mapping[str, tuple[int, int]]) -> float:
 
 
 def _shown(raced: Race) -> list[str]:
-    """Return the laws that tables show: those that may be the best, or the winner and the law of
-    the lowest J beside it.
-    """
-    if not raced.winner:
-        return raced.first[:SHOWN]
-    others = [law for law in raced.running if law != raced.winner]
-    return [raced.winner, *others[:1]]
+    """Return the laws that tables show: those that may be the best, then the others of lowest J."""
+    others = [law for law in raced.running if law not in raced.first]
+    return [*raced.first, *others][:SHOWN]
 
 
 def _entrants(trial: Trial, plant: Plant, laws: Laws) -> tuple[list[Entrant], dict[str, str]]:

@@ -23,6 +23,7 @@ from smc_mujoco.robustness.margins import Margin
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.answer_time import SHOWN
 from smc_mujoco.studies.board import (
     ALONE,
     BELOW,
@@ -43,10 +44,10 @@ LEANS = (
 )
 TOLERATED = {  # kind of a margin -> what is tolerated, at a level
     "delay": "a delay of {}",
-    "friction": "friction of {}",
-    "disturbance": "a constant disturbance of {}",
+    "friction": "dry friction of {}",
+    "disturbance": "a constant disturbance of {} in either direction",
     "mass": "a mass of {} the nominal one",
-    "blow": "a blow of {}",
+    "blow": "a blow of {} in either direction",
 }
 RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
 
@@ -177,7 +178,8 @@ class RaceRecommendation(Recommendation):
     """What a race within minutes found: its laws, the best first, and which of them to use."""
 
     race: Race
-    # of `laws` with these gains, by J of the same unseen runs; None for one law, or without time
+    # of those of `laws` that may be the best, or else the first two, with these gains, by J of the
+    # same unseen runs; None for one law, or without time
     fixed: Comparison | None
     # law -> condition -> the numbers of its runs that settle, and of all
     settled: Mapping[str, Mapping[str, tuple[int, int]]]
@@ -268,9 +270,16 @@ class RaceRecommendation(Recommendation):
     @property
     def _not_beaten(self) -> list[str]:
         """The other laws of the comparison with these gains, where no test names a law."""
-        if not self.fixed or self._winners:
+        tried = self._tried
+        if self._winners or self.law.name not in tried:
             return []
-        return [law.name for law in self.laws if law is not self.law]
+        return [law for law in tried if law != self.law.name]
+
+    @property
+    def _tried(self) -> list[str]:
+        """The laws of the comparison with these gains, the one to use first."""
+        laws = self.fixed.laws if self.fixed else ()
+        return [law.name for law in self.laws if law.name in laws]
 
     @property
     def _lowest(self) -> str | None:
@@ -363,7 +372,7 @@ class RaceRecommendation(Recommendation):
     @property
     def _with_these(self) -> str:
         """What runs say of the laws with the gains printed, which may not be all that raced."""
-        names = [one.name for one in self.laws]
+        names = self._tried
         text = _verdict(self.fixed, names)  # pyright: ignore[reportArgumentType]
         of_some = f" of {joined(names)}" if len(names) < len(self.race.entrants) else ""
         return f"on separate runs{of_some}, {text}"
@@ -471,7 +480,11 @@ class RaceRecommendation(Recommendation):
                 level += f" ({self._reach})"
             parts.append(TOLERATED[margin.kind].format(level))
         where = "to the nominal plant" if self.beside == "nominal" else f"under {self.beside}"
-        text = f"{joined(parts)}. Each is applied alone, {where}. At these levels the largest "
+        plant = self.worst_run.plant
+        every = ", forces at every driven joint" if plant.driven > 1 and not plant.pose else ""
+        text = (
+            f"{joined(parts)}. Each is applied alone{every}, {where}. At these levels the largest "
+        )
         text += f"error in the last fifth of a run of {self.worst_run.duration:g} s is still below "
         text += "5 % of the initial error"
         if not all(margin.open for margin in self.margins):
@@ -530,8 +543,8 @@ class RaceRecommendation(Recommendation):
         missing = [law for law in self.race.running if law not in self.settled]
         if missing:
             notes.append(
-                f"The tables by condition leave out {joined(missing)}: they show only the laws "
-                f"that may be the best{' and the next one' if self.race.winner else ''}."
+                f"The tables by condition leave out {joined(missing)}: they show at most {SHOWN} "
+                "laws."
             )
         notes.append(
             f"{MEDIANS} These tables show no significance tests; those are below. "

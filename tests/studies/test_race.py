@@ -167,27 +167,50 @@ def test_a_race_that_stops_between_its_looks_keeps_what_the_first_look_said(run,
     assert True in ends
 
 
-def test_the_bar_never_shows_more_sets_than_are_to_be_made(run, monkeypatch):
-    """Beyond the first look, and after a law was dropped."""
-    shares = []
+@pytest.fixture
+def shown(monkeypatch):
+    """Return the bars of races, and what each was told: the work done, the whole, and its words."""
     bars = []
+    told = []
 
     class Recorded(Bar):
         def reached(self, done, whole):
             super().reached(done, whole)
-            shares.append((done, whole))
+            told.append((done, whole, self.what))
 
     def recorded(*given, **named):
         bars.append(Recorded(*given[:2]))
         return contextlib.nullcontext(bars[-1])
 
     monkeypatch.setattr(module, "bar", recorded)
+    return bars, told
+
+
+def test_the_bar_never_shows_more_sets_than_are_to_be_made(run, shown, monkeypatch):
+    """Beyond the first look, and after a law was dropped."""
+    bars, told = shown
     monkeypatch.setattr(module, "WITHIN", math.inf)
     raced = run({"a": 0.0, "b": 0.0, "c": 99.0})
     assert (raced.sets, [*raced.dropped]) == (12, ["c"])
-    assert all(done <= whole for done, whole in shares)
-    assert shares[-1] == (24, 24)
+    assert all(done <= whole for done, whole, _ in told)
+    assert told[-1][:2] == (24, 24)
     assert str(bars[0]).startswith("c dropped: set of gains")
+
+
+@pytest.mark.parametrize(("end", "fit"), [(85.0, 3), (105.0, 4), (150.0, 6), (190.0, None)])
+def test_the_bar_says_once_the_sets_are_timed_if_too_few_fit(
+    run, shown, now, monkeypatch, end, fit
+):
+    """A set of a law takes 11 to 13 s, and none is searched again."""
+    monkeypatch.setattr(module, "stuck", lambda J: [])
+    raced = run({"a": 0.0, "b": 0.0}, clock=AnswerTime(end))
+    words = [what for done, _, what in shown[1] if done == 6]
+    if fit is None:
+        assert raced.sets >= module.LOOKS[0]
+        assert words[0] == "set of gains"
+    else:
+        assert raced.sets == fit
+        assert words[0].startswith(f"about {fit} sets of each law fit, and 7 can name a winner")
 
 
 def test_a_race_leaves_the_time_that_the_runs_after_it_take(run, now):
