@@ -200,11 +200,11 @@ class Condition:
         return f"{self.name}: {texts}"
 
     def brief(self, plant: Plant, duration: float) -> str:
-        """Return the fields on a plant as text, without values that are defaults; arguments and
-        errors as in `on`.
+        """Return the fields on a plant for people, without those of parts that are none or 0 by
+        default; arguments and errors as in `on`.
         """
         fields = self.on(plant, duration)
-        return _assignments(fields, functools.partial(_as_text, defaults=False, files=False))
+        return _assignments(fields, functools.partial(_as_text, files=False, brief=True))
 
 
 def condition(name: str, **fields: Any) -> Condition:
@@ -468,17 +468,20 @@ def _assignments(fields: Data, as_text: Callable[[Any], str]) -> str:
     return ", ".join(f"{name}={as_text(value)}" for name, value in fields.items())
 
 
-def _as_text(value: Any, defaults: bool = True, files: bool = True) -> str:
-    """Return a value as `parse` reads it, with or without fields that have their default, and with
-    or without the files of a user's parts.
+def _as_text(value: Any, files: bool = True, brief: bool = False) -> str:
+    """Return a value as `parse` reads it, with or without the files of a user's parts; or `brief`,
+    for people, with six digits and without the fields of parts that are none or 0 by default.
     """
-    as_text = functools.partial(_as_text, defaults=defaults, files=files)
+    as_text = functools.partial(_as_text, files=files, brief=brief)
     if isinstance(value, Component):
         own = files and value.name not in estimators()
         word = _word(value.template, own) or value.name
         return f"{word}({_assignments(value.gains, repr)})"
     if isinstance(value, Part | Signal | Noise | Jump | Fault | Clock):
-        fields = stated(value, defaults)
+        fields = stated(value)
+        if brief:
+            given = stated(value, defaults=False)
+            fields = {name: of for name, of in fields.items() if name in given or of}
         if getattr(value, "about", ""):
             fields["about"] = "goal"
         kind = type(value)
@@ -486,13 +489,14 @@ def _as_text(value: Any, defaults: bool = True, files: bool = True) -> str:
         word = _word(kind, own) or kind.__name__
         return f"{word}({_assignments(fields, as_text)})"
     if isinstance(value, tuple):
-        return f"({', '.join(map(as_text, value))},)"
+        end = "" if brief else ","
+        return f"({', '.join(map(as_text, value))}{end})"
     if isinstance(value, Mapping):
         items = []
         for key, item in value.items():
             items.append(f"{key!r}: {as_text(item)}")
         return f"{{{', '.join(items)}}}"
-    return repr(value)
+    return f"{value:.6g}" if brief and isinstance(value, float) else repr(value)
 
 
 def _word(kind: Any, own: bool) -> str:

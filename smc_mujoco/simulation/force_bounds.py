@@ -6,6 +6,8 @@ Here `s` is a Scenario, which imports this module.
 import math
 from typing import Any
 
+from smc_mujoco.common.text import joined, number
+from smc_mujoco.mechanisms.layout import driven_names
 from smc_mujoco.mechanisms.plant import Plant
 
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
@@ -46,6 +48,19 @@ def default_u_max(plant: Plant) -> float:
     motor, else 6, or what a user's joint needs.
     """
     return max(_limits(plant), default=U_MAX)
+
+
+def bounds_in_words(s: Any, unit: str = "") -> str:
+    """Return the bounds on |u|, such as "9.00 N m", or "9.00 N m at shoulder and 4.00 N m at elbow"
+    where they differ; of the channels whose u has a `unit` if one is given.
+    """
+    joints: dict[str, list[str]] = {}
+    for name, limit, effort in zip(driven_names(s.plant), s.limits, s.efforts, strict=False):
+        if unit in ("", effort):
+            joints.setdefault(f"{number(limit)} {effort}", []).append(name)
+    if len(joints) == 1:
+        return next(iter(joints))
+    return joined(f"{most} at {joined(at)}" for most, at in joints.items())
 
 
 def _limits(plant: Plant) -> list[float]:

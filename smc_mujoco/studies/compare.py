@@ -32,8 +32,10 @@ from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.robustness.uncertainty import Uncertainty
 from smc_mujoco.robustness.worst_case import DURATION, WorstCase, WorstCases
 from smc_mujoco.simulation.conditions import Condition
+from smc_mujoco.simulation.force_bounds import bounds_in_words
 from smc_mujoco.simulation.grid import Starts, case, listed, listed_laws
 from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.simulation.workers import Workers
 from smc_mujoco.studies.board import Boards, unit_of
@@ -59,6 +61,7 @@ TIME_NOTE = (
     "measurements, so it is not the ratio of two medians of the table. All times depend on how "
     "busy the computer is: that of pid itself would be 1 on an idle one."
 )
+RUNS = "plant", "|u| at most", "control period (ms)", "duration (s)"
 GAINS = "plant", "law", "gains", "sets", "J differ by", "best set"
 BEST_SET = (
     "Each set is from a search of its own. Run i uses set i, and after the last set the first "
@@ -78,6 +81,8 @@ class Compared(Tables):
     # a board for each metric on each plant in each condition; on each plant, if that makes more
     # than 12 blocks
     leaderboard: Boards
+    # plant -> condition -> its fields there in words
+    conditions: Mapping[str, Mapping[str, str]]
     # plant -> law -> its `worst_case`; empty if it was not searched
     worst: Mapping[str, Mapping[str, WorstCase]]
     # plant -> law -> time of its compiled code a sample, on this machine; in no file
@@ -134,7 +139,7 @@ class Compared(Tables):
 
     @property
     def tables(self) -> list[Tabular]:
-        """The tables of the `leaderboard`, of worst cases, of times, and of gains."""
+        """The tables of the `leaderboard`, of worst cases, of times, of runs and of gains."""
         tables = self._without_times
         times = []
         for plant, by_law in self.times.items():
@@ -145,7 +150,24 @@ class Compared(Tables):
         if times:
             about = {"headings": TIME_HEADINGS, "title": TIMES, "notes": [TIME_NOTE]}
             tables.append(Tabular(rows=times, left=2, **about))
-        return [*tables, self._table_of_gains]
+        return [*tables, self._table_of_runs, self._table_of_gains]
+
+    @property
+    def _table_of_runs(self) -> Tabular:
+        """The table of what all runs on a plant have in common, and below it each condition."""
+        rows = []
+        for plant, first in self._first_runs.items():
+            period = f"{1e3 * first.control_period:g}"
+            rows.append((plant, bounds_in_words(first), period, f"{first.duration:g}"))
+        plants_of: dict[tuple[str, str], list[str]] = {}
+        for plant, of_plant in self.conditions.items():
+            for pair in of_plant.items():
+                plants_of.setdefault(pair, []).append(plant)
+        notes = []
+        for (name, words), on in plants_of.items():
+            where = f" on {joined(on)}" if len(on) < len(self.conditions) else ""
+            notes.append(f"{name}{where}: {words}")
+        return Tabular(headings=RUNS, rows=rows, title="Runs", notes=notes, left=2)
 
     @property
     def _table_of_gains(self) -> Tabular:
@@ -181,14 +203,16 @@ class Compared(Tables):
 
         A column of 252 pt has room for two metrics, for long names of laws below the line that each
         tabular's comment ends with. Five fit into table*. Only the last board says what intervals,
-        metrics and bold type are. Comments have the verdicts, and at the top the gains and remarks
-        on them.
+        metrics and bold type are. Comments have the verdicts, and at the top the bounds on u, each
+        condition, the gains, and remarks on them.
 
         Args:
           path: of a file to which it is written too.
         """
-        gains = commented(plain(self._table_of_gains))
-        text = "\n".join([f"{gains}\n", *(table.to_latex() for table in self._without_times)])
+        comments = []
+        for table in (self._table_of_runs, self._table_of_gains):
+            comments.append(f"{commented(plain(table))}\n")
+        text = "\n".join([*comments, *(table.to_latex() for table in self._without_times)])
         if path is not None:
             with replacing(Path(path)) as file:
                 file.write_text(text, encoding="utf-8")
@@ -264,11 +288,15 @@ class Compared(Tables):
     @property
     def _plant_names(self) -> list[str]:
         """The names of the plants in pictures."""
-        first_rows = {}
+        return [style.plant_name(scenario.plant) for scenario in self._first_runs.values()]
+
+    @property
+    def _first_runs(self) -> dict[str, Scenario]:
+        """Plant -> its first run."""
+        rows: dict[str, int] = {}
         for row, plant in enumerate(self.table.column("plant").tolist()):
-            first_rows.setdefault(plant, row)
-        runs = map(self.table.scenario, first_rows.values())
-        return [style.plant_name(scenario.plant) for scenario in runs]
+            rows.setdefault(plant, row)
+        return {plant: self.table.scenario(row) for plant, row in rows.items()}
 
     @property
     def _metrics(self) -> list[str]:
@@ -442,9 +470,20 @@ def compare(
         table=table,
         candidates=candidates,
         leaderboard=boards,
+        conditions=_in_words(trial, length),
         worst=worst_cases,
         times=_times(trial, candidates),
     )
+
+
+def _in_words(trial: Trial, duration: float) -> dict[str, dict[str, str]]:
+    """Return `Compared.conditions`, of runs of a duration, s."""
+    by_plant: dict[str, dict[str, str]] = {}
+    for plant in trial.plants:
+        of_plant = by_plant.setdefault(plant.name, {})
+        for one in trial.conditions:
+            of_plant[one.name] = one.brief(plant, duration) or "the scenario's defaults"
+    return by_plant
 
 
 def _leave_out_failed(holdout: Mapping[str, Holdout], table: Table) -> None:

@@ -17,9 +17,9 @@ from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import capital, counted, joined, number, span
 from smc_mujoco.control.component import Component, gains_text
-from smc_mujoco.mechanisms.layout import driven_names
 from smc_mujoco.metrics.conventions import leans
 from smc_mujoco.robustness.margins import Margin
+from smc_mujoco.simulation.force_bounds import bounds_in_words
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -476,8 +476,9 @@ class RaceRecommendation(Recommendation):
             level = _level(margin)
             if self.helped and margin.kind == "friction":
                 level += f" from the start and {self._from_other_side}"
-            if margin.unit == self.worst_run.efforts[0]:
-                level += f" ({self._reach})"
+            unit = self.worst_run.efforts[0]
+            if margin.unit == unit:
+                level += f" (|u| at most {bounds_in_words(self.worst_run, unit)})"
             parts.append(TOLERATED[margin.kind].format(level))
         where = "to the nominal plant" if self.beside == "nominal" else f"under {self.beside}"
         plant = self.worst_run.plant
@@ -508,21 +509,6 @@ class RaceRecommendation(Recommendation):
         if math.isnan(self.opposed.value):
             return "none from the other side"
         return f"{_level(self.opposed)} from the other side"
-
-    @property
-    def _reach(self) -> str:
-        """The bounds on u, of the channels where it has the unit of the first."""
-        run = self.worst_run
-        unit = run.efforts[0]
-        joints: dict[str, list[str]] = {}
-        for name, limit, effort in zip(
-            driven_names(run.plant), run.limits, run.efforts, strict=False
-        ):
-            if effort == unit:
-                joints.setdefault(f"{number(limit)} {unit}", []).append(name)
-        if len(joints) == 1:
-            return f"|u| at most {next(iter(joints))}"
-        return f"|u| at most {joined(f'{most} at {joined(at)}' for most, at in joints.items())}"
 
     @property
     def tables(self) -> list[Tabular]:

@@ -371,3 +371,20 @@ def test_play_and_counts_suit_how_far_a_slide_goes(way, refused):
         refused(lambda: find_condition("stepper").on(grip, 1.0), "stepper", "'j' of g", "Stepper(")
     else:
         assert find_condition("stepper").on(grip, 1.0)["actuator"].torque == 150.0
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        (
+            {"friction": (smc.Coulomb(0.1 + 0.2), smc.Viscous(0.05))},
+            "(Coulomb(level=0.3), Viscous(b=0.05))",
+        ),
+        ({"disturbance": smc.Sine(0.2, 5.0)}, "Sine(amplitude=0.2, omega=5)"),
+        ({"fault": smc.Fault(at=2.0, gain=0.0)}, "Fault(at=2, gain=0)"),
+        ({"sensor": smc.Encoder()}, "Encoder(counts=4096)"),
+    ],
+)
+def test_a_brief_text_has_every_number_but_zeros_that_nobody_gave(fields, words):
+    (name,) = fields
+    assert smc.condition("mine", **fields).brief(smc.plant("duffing"), 1.0) == f"{name}={words}"

@@ -143,16 +143,18 @@ def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
     assert f"{UNDER['shipped']} {UNDER['tuned here']}" in last.under[-1]
     assert found.to_latex().count(UNDER["ITAE"]) == 2  # once as a comment, and once in print
     assert found.to_latex().count(r"\begin{tabular}") == 6  # J on each plant, too
-    assert found._repr_html_().count("<table") == 8  # times, and gains
+    assert found._repr_html_().count("<table") == 9  # times, runs and gains
     assert len(found.plot().axes) == 10  # of all five metrics, on both plants
     assert found.traces[0].scenario == found.table.scenario(0)
     assert len(found.traces) == 12
 
 
-def test_latex_has_the_gains_how_far_searches_differ_and_remarks_as_comments(found):
-    head = found.to_latex().partition("\n\n")[0].splitlines()
+def test_latex_has_runs_conditions_gains_how_far_searches_differ_and_remarks_as_comments(found):
+    head = [*filter(None, found.to_latex().partition("\\begin")[0].splitlines())]
     assert all(line.startswith("%") for line in head)
     words = " ".join(" ".join(line.removeprefix("%") for line in head).split())
+    assert "inverted_pendulum 6.00 N m 1 0.5 friction: friction=(Coulomb(level=0.1), " in words
+    assert "encoder: sensor=Encoder(counts=4096)" in words
     for plant in PLANTS:
         law = found.gains[plant]["my_law"]
         assert f"{plant} my_law tuned here 12 {law.source.search.apart} lam=" in words

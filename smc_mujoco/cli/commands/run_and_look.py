@@ -110,7 +110,7 @@ def show(
     for name, value in s.given.items():
         if name not in ("duration", "control_period"):
             fields[name] = value
-    others = Condition("others", fields).brief(s.plant, s.duration).replace(",)", ")")
+    others = Condition("others", fields).brief(s.plant, s.duration)
     terminal.print(Text.assemble(plant, " under ", law, times, gains, others and f", {others}"))
     if loaded.failure:
         terminal.note(f"failed: {loaded.failure}", "red", wrap=True)
