@@ -86,16 +86,18 @@ def _parting(one: Line, other: Line, limits: Pair, logarithmic: bool) -> float:
     return float(t[held].max(initial=-np.inf))
 
 
-def tell_agreements(ax: Axes, shared: Sequence[Agreement], names: Sequence[str]) -> None:
-    """Write which traces agree, and until when, above the curves, on up to two lines: the range of
-    the axes grows by the height of the words.
+def tell_agreements(
+    ax: Axes, shared: Sequence[Agreement], names: Sequence[str], also: str = ""
+) -> None:
+    """Write which traces agree, and until when, and what else is to be said of them, above the
+    curves, on up to two lines: the range of the axes grows by the height of the words.
     """
     size = style.points(9.0)
     height = 72 * ax.get_window_extent().height / ax.figure.dpi  # points
     room = 72 * ax.get_window_extent().width / ax.figure.dpi - size
     forever = [one for one in shared if one[1] == np.inf]
     for which in (shared, forever):
-        said = agreement_words(which, names)
+        said = "; ".join(filter(None, (agreement_words(which, names), also)))
         words = style.wrapped(said, room, size, 2)
         lines = 1 + words.count("\n")
         if words and "…" not in words and height >= MIN_WORDS * size * lines:

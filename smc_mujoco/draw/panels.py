@@ -21,6 +21,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from smc_mujoco.common.aliases import Array, ArrayPair, Data, Fields, Pair
+from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
 from smc_mujoco.draw.coincidence import Agreement, agreements, tell_agreements
 from smc_mujoco.draw.decimate import COLUMNS, band, end, line, smooth, window
@@ -404,8 +405,9 @@ def over_time(
     the traces.
 
     The reference of x is drawn in front, its settling band behind. Words tell which traces agree,
-    as those behind are hidden. The traces `among` set the range, by default the panel's own;
-    `bands`: whether to draw ranges behind the lines; `names`: of the traces, for the words.
+    as those behind are hidden, and which have no values, as s of a law without a surface. The
+    traces `among` set the range, by default the panel's own; `bands`: whether to draw ranges behind
+    the lines; `names`: of the traces, for the words.
     """
     artists: list[Artist] = []
     name = panel.quantity
@@ -444,7 +446,12 @@ def over_time(
             artists += ax.plot(trace.t[-1], last, "X", **ending)
     alone = name in SINGLE or len(panel.group.channels) == 1
     if names and alone and not clipped:  # words have no room above impacts
-        tell_agreements(ax, agreed(panel), names)
+        empty = []
+        for i, mean in enumerate(means):
+            if not np.isfinite(mean).any():
+                empty.append(names[i])
+        missing = f"no {name}: {joined(empty)}" if empty else ""
+        tell_agreements(ax, agreed(panel), names, missing)
     return artists
 
 

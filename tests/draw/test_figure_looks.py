@@ -274,6 +274,18 @@ def test_words_above_the_curves_tell_which_agree_and_until_when(one):
     )
 
 
+def test_words_in_the_panel_of_s_name_the_laws_without_a_surface(one):
+    none = dataclasses.replace(one, s=np.full_like(one.s, np.nan))
+    other = dataclasses.replace(one, s=-one.s)
+    for runs, words in (
+        ([one, none, other, none], ["no s: b and d"]),
+        ([one, none, one], ["a and c agree; no s: b"]),
+        ([one, other], []),
+    ):
+        (ax,) = figure(runs, labels=list("abcd")[: len(runs)], panels=["s"]).axes
+        assert [text.get_text() for text in ax.texts] == words
+
+
 def test_controls_of_which_one_chatters_do_not_agree(one):
     chatters = dataclasses.replace(one, u=one.u + 0.5 * (-1.0) ** np.arange(len(one.t))[:, None])
     (ax,) = figure([one, chatters], panels=["u"]).axes
