@@ -249,7 +249,8 @@ class Trial(NamedTuple):
                     law.name for law, found in zip(laws[name], of_plant, strict=True) if not found
                 ]
                 if asked and self.tune:
-                    print(f"gains to search on {name}: {joined(asked)}", file=sys.stderr)
+                    which = f"{joined(asked)}, but for searches that {self.folder} has"
+                    print(f"gains to search on {name}: {which}", file=sys.stderr)
         by_plant: dict[str, list[Candidate]] = {}
         for plant in self.plants:
             by_plant[plant.name] = []
