@@ -8,7 +8,9 @@ have twice the usual physics step, where that fits.
 """
 
 import dataclasses
+import functools
 import math
+import operator
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
@@ -64,11 +66,10 @@ def recommend(
     seeds: int,
     clock: AnswerTime,
     relevant: float,
-    untried_laws: int,
+    untried_laws: Sequence[str],
 ) -> RaceRecommendation:
     """Race laws on a plant and recommend one of them, all as long as the clock lets it; `metrics`
-    are those of the tables, from that many seeds, and `untried_laws` the number of further laws
-    that suit.
+    are those of the tables, from that many seeds, and `untried_laws` further laws that suit.
     """
     goal = trial.asked_goal(plant)
     entrants, left_out = _entrants(trial, plant, laws)
@@ -99,6 +100,7 @@ def recommend(
         raise ScenarioError(f"no need has a number in any run on {plant.name}: ask for others")
     ordered = tuple(chosen[law] for law in order)
     first = ordered[0]
+    together = _together(trial, plant, first, made)
     weighs, no_law = _weighed(trial, plant, first, goal, clock)
     base = _base_of_margins(trial, plant, first)
     helped = helped_joints(base)
@@ -112,6 +114,7 @@ def recommend(
         race=raced,
         fixed=fixed,
         settled=settled,
+        together=together,
         weighs=weighs,
         no_law=no_law,
         assumed=_assumed(trial, plant, goal),
@@ -252,6 +255,22 @@ def _settled(table: Table) -> Settled:
     return found
 
 
+def _together(trial: Trial, plant: Plant, law: Component, seeds: int) -> tuple[int, int] | None:
+    """Return in how many runs a law settles under all conditions asked for at once, and how many
+    there are; None for a single condition, or for some that exclude each other.
+    """
+    if len(trial.conditions) < 2:
+        return None
+    both = functools.reduce(operator.add, trial.conditions)
+    try:
+        both.on(plant, trial.duration)
+    except ScenarioError:
+        return None
+    at_once = trial._replace(conditions=[both], folder=trial.folder / "together")
+    table = at_once.run({plant.name: [Candidate(law, (law,))]}, seeds, coarse=True)
+    return _settled(table)[law.name][both.name]
+
+
 def _weighed(
     trial: Trial, plant: Plant, law: Component, goal: Objective, clock: AnswerTime
 ) -> tuple[dict[str, float], NoLaw]:
@@ -290,6 +309,10 @@ def _assumed(trial: Trial, plant: Plant, goal: Objective) -> str:
         "a condition says otherwise"
     ]
     asked = {condition.name for condition in trial.conditions}
+    for condition in trial.conditions:
+        velocity = trial.case(plant, "none", condition).resolved.velocity
+        if velocity.name != "measured":
+            parts.append(f"under {condition.name} the velocity is {velocity} of the positions")
     units = " or ".join(dict.fromkeys(plant.units[: plant.driven]))
     for condition in goal.conditions:
         noise = condition.on(plant, goal.duration).get("noise")

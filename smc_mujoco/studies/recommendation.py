@@ -13,9 +13,11 @@ from smc_mujoco.analysis.signed_rank import min_p
 from smc_mujoco.analysis.step_halving import UNTRIED
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST
 from smc_mujoco.analysis.tuning.result import Tuned
+from smc_mujoco.analysis.tuning.search_space import edges_in_words
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import capital, counted, joined, number, span
+from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, gains_text
 from smc_mujoco.metrics.conventions import leans
 from smc_mujoco.robustness.margins import Margin
@@ -183,6 +185,9 @@ class RaceRecommendation(Recommendation):
     fixed: Comparison | None
     # law -> condition -> the numbers of its runs that settle, and of all
     settled: Mapping[str, Mapping[str, tuple[int, int]]]
+    # in how many runs the first law settles under all conditions asked for at once, and how many
+    # there are; None for one condition, or for some that exclude each other
+    together: tuple[int, int] | None
     weighs: Mapping[str, float]  # condition -> its share of J of the first law
     no_law: NoLaw  # beside the first law
     assumed: str  # how often u changes, and each noise, in words
@@ -197,7 +202,7 @@ class RaceRecommendation(Recommendation):
     worst_run: Scenario  # of the first law in the condition where it fares worst
     tuned: Tuned | None  # the searches for the gains of the first law; None if they were known
     left_out: Mapping[str, str]  # law -> why it could not be tuned
-    untried_laws: int  # number of the package's laws that suit, too, and were not tried
+    untried_laws: Sequence[str]  # the package's laws that suit, too, and were not tried
     judged: str  # what J is of, in words
 
     @cached_property
@@ -222,7 +227,15 @@ class RaceRecommendation(Recommendation):
         if self.law.name != "none":
             lines.append(f"Without a law: {self.no_law.words}")
         lines.append(f"Assumed: {self.assumed}")
-        lines += [f"Settles: {self._where}", f"Tolerates: {self._margins}"]
+        lines.append(f"Settles: {self._where}")
+        if self.together:
+            done, of = self.together
+            count = len(self.settled[self.law.name])
+            some = _some(done, of)
+            at_once = f"under all {count} conditions at once {some} of {of} runs settle"
+            cure = "if your machine has all, ask for one condition that has them"
+            lines.append(f"Together: {at_once}; gains were searched under each alone: {cure}")
+        lines.append(f"Tolerates: {self._margins}")
         for name, share in self.race.dropped.items():
             least = f"its best J was {number(share)} times the leader's worst J"
             lines.append(f"Dropped after {FIRST} sets of gains, without a test: {name}; {least}")
@@ -232,10 +245,17 @@ class RaceRecommendation(Recommendation):
         for name, why in self.left_out.items():
             lines.append(f"Left out: {name}, {why}")
         if self.untried_laws:
-            number_of = counted(self.untried_laws, "other law")
-            lines.append(f"Not tried here: {number_of} of the package; name some by laws= (--law)")
+            others = f"{counted(len(self.untried_laws), 'other law')} of the package"
+            usual = sum(law in gain_sets.COMPARED for law in self.untried_laws)
+            cure = "; name some by laws= (--law)"
+            if usual:
+                cure = f", {usual} of them usual ones, which are tried without laws= (--law)"
+            lines.append(f"Not tried here: {others}{cure}")
         lines.append(f"Second: {self.second or 'none'}")
-        lines.append(f"Gains: {self.law}{self._unit}, {self.law.source}")
+        gains = [f"Gains: {self.law}{self._unit}, {self.law.source}"]
+        if self.tuned:
+            gains += edges_in_words(self.tuned.gains, self.tuned.at_bound)
+        lines.append("; ".join(gains))
         return lines
 
     @property
@@ -480,7 +500,10 @@ class RaceRecommendation(Recommendation):
             if margin.unit == unit:
                 level += f" (|u| at most {bounds_in_words(self.worst_run, unit)})"
             parts.append(TOLERATED[margin.kind].format(level))
-        where = "to the nominal plant" if self.beside == "nominal" else f"under {self.beside}"
+        where = f"under {self.beside}"
+        if self.beside == "nominal":
+            several = len(self.settled[self.law.name]) > 1
+            where = f"to the nominal plant{', under none of the conditions' if several else ''}"
         plant = self.worst_run.plant
         every = ", forces at every driven joint" if plant.driven > 1 and not plant.pose else ""
         text = (

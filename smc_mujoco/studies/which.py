@@ -78,7 +78,8 @@ def which(
 
     Args:
       plant: a name, a Plant, or your own MJCF and its joints, as "arm.xml:shoulder,elbow".
-      conditions: names, texts or Conditions, see `condition`. Default: nominal, noise and sine.
+      conditions: names, texts or Conditions, see `condition`. Each is tried alone; "noise +
+        coulomb" is one that has both. Default: nominal, noise and sine.
       needs: the scores to compare: "fast", "accurate" (at the end), "on-track" (on the way),
         "calm", "gentle", "frugal", "no-overshoot"; by default fast, accurate and calm. With
         minutes they are only shown: the laws are compared by J. And what every law must have:
@@ -143,9 +144,9 @@ def which(
         spare = 60.0 * min(FILMED, FILMED_SHARE * minutes)
         clock = AnswerTime(began + 60.0 * minutes - spare, spare)
         names = {law.name for law in chosen}
-        untried = [law for law in _of_package(machine, properties) if law.name not in names]
+        others = [law.name for law in _of_package(machine, properties) if law.name not in names]
         return recommend(
-            trial, machine, chosen, compared, seeds or RACE_SEEDS, clock, relevant, len(untried)
+            trial, machine, chosen, compared, seeds or RACE_SEEDS, clock, relevant, others
         )
     count = seeds or SEEDS
     candidates = trial.candidates({machine.name: chosen}, count)

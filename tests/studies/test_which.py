@@ -29,6 +29,7 @@ from smc_mujoco.studies import recommendation as recommendation_module
 from smc_mujoco.studies import which as module
 from smc_mujoco.studies.answer_time import FEWEST_SEEDS, AnswerTime
 from smc_mujoco.studies.board import Boards
+from smc_mujoco.studies.fair_gains import Candidate, Trial
 
 FAST = smc.law("observer_free", lam=6.0, k1=2.0)
 SLOW = smc.law("observer_free", lam=6.0, k1=5.0).named("slow")
@@ -187,7 +188,13 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     shares = [float(share) for share in re.findall(r"(\d+) % from \w+", lines[verdicts[3]])]
     assert sum(shares) == pytest.approx(100.0, abs=1.0)
     assert re.search(r" and overshoot \(%\) \d", lines[verdicts[4]])  # which was not asked for
-    assert int(lines["Not tried here"].split()[0]) == recommendation.untried_laws > 20
+    untried = recommendation.untried_laws
+    assert int(lines["Not tried here"].split()[0]) == len(untried) > 20
+    usual = len({*gain_sets.COMPARED} & {*untried})
+    assert f" of the package, {usual} of them usual ones, which are" in lines["Not tried here"]
+    rare = [name for name in untried if name not in gain_sets.COMPARED]
+    told = dataclasses.replace(recommendation, untried_laws=rare).answer
+    assert f"Not tried here: {len(rare)} other laws of the package; name some by" in str(told)
     assert shares == sorted(shares, reverse=True)
     assert recommendation.weighs.keys() == {"coulomb", "noise"}
     assert lines["Use"] == recommendation.law.name
@@ -215,6 +222,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     assert recommendation_module.BELOW not in " ".join(text.split())  # no cell has that word
     assert "error in the last fifth of a run of 1.5 s is still below 5 %" in lines["Tolerates"]
     assert "mass include those of the condition; friction and blows are" in lines["Tolerates"]
+    assert recommendation.together is None  # there is one condition
     (left,) = recommendation.race.entrants.keys() - {*compared}
     assert f"{left} left out" not in text  # of a law that was dropped a line below says so
     kept = dataclasses.replace(recommendation, race=recommendation.race._replace(dropped={}))
@@ -318,6 +326,33 @@ def test_margins_from_the_side_from_which_gravity_helps_say_so(raced):
     assert said not in recommendation._margins
     late = dataclasses.replace(recommendation, helped=["the slide"])._margins
     assert "from the start and not tried from the other side (|u| at most 9.00 N)" in late
+
+
+def test_a_law_runs_under_all_conditions_at_once_unless_they_exclude_each_other(raced, tmp_path):
+    """With either of two forces the error ends below 2 % of the start, and with both above."""
+    _, recommendation, plant = raced
+    weak = smc.law("pid", kp=60.0, ki=0.0, kd=20.0)
+    force = 0.014 * 60.0 * 0.3  # N, for 1.4 % of a start near 0.3 m
+    rubs = smc.condition("rubs", friction=smc.Coulomb(force))
+    pushed = smc.condition("pushed", disturbance=smc.Constant(force))
+
+    def trial(*conditions):
+        return Trial.of(
+            [plant], conditions, (), 3.0, tmp_path, starts=None, threads=1, progress=False
+        )
+
+    for one in (rubs, pushed):
+        alone = trial(one).run({plant.name: [Candidate(weak, (weak,))]}, 3, coarse=True)
+        assert recommend._settled(alone)["pid"][one.name] == (3, 3)
+    assert recommend._together(trial(rubs, pushed), plant, weak, 3) == (0, 3)
+    assert recommend._together(trial(rubs), plant, weak, 3) is None
+    assert recommend._together(trial("period_10ms", "period_20ms"), plant, weak, 3) is None
+    for counts, words in (
+        ((0, 14), "none of 14 runs settle;"),
+        ((14, 14), "all of 14 runs settle;"),
+    ):
+        told = dataclasses.replace(recommendation, together=counts).answer
+        assert f"Together: under all 1 conditions at once {words}" in str(told)
 
 
 def test_from_the_other_side_gravity_pushes_away_and_less_friction_is_tolerated():

@@ -37,7 +37,8 @@ def conditions_by_default(default: str) -> Any:
         "--condition",
         metavar="NAME|TEXT|FILE",
         autocompletion=CONDITIONS,
-        help="Conditions from `smc-mujoco list`, separated by commas; noise+encoder joins two. "
+        help="Conditions from `smc-mujoco list`, separated by commas, each tried alone; "
+        "noise+encoder is one that has both. "
         "Give each condition of your own in a separate --condition: "
         '"worn gear: friction=Coulomb(0.05)" or a file with one condition on each line. '
         f"May be repeated. Default: {default}.",
