@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
+
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.law_time import LawTime, law_time
@@ -20,7 +22,7 @@ from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, s
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import replacing
 from smc_mujoco.common.tabular import Tables, Tabular, commented, plain
-from smc_mujoco.common.text import joined, number
+from smc_mujoco.common.text import joined, number, span
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Template, gains_text
 from smc_mujoco.control.law import Law, catalogue, suits
@@ -41,7 +43,7 @@ from smc_mujoco.simulation.workers import Workers
 from smc_mujoco.studies.board import Boards, unit_of
 from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, Holdout, leaderboard, objective_boards
-from smc_mujoco.studies.race import LOOKS
+from smc_mujoco.studies.race import LOOKS, STUCK
 from smc_mujoco.studies.study import FULL, QUICK
 from smc_mujoco.studies.table import Table
 
@@ -61,10 +63,13 @@ TIME_NOTE = (
     "measurements, so it is not the ratio of two medians of the table. All times depend on how "
     "busy the computer is: that of pid itself would be 1 on an idle one."
 )
-RUNS = "plant", "|u| at most", "control period (ms)", "duration (s)"
-GAINS = "plant", "law", "gains", "sets", "J differ by", "best set"
+RUNS = "plant", "|u| at most", "starts", "control period (ms)", "duration (s)"
+SI = "Numbers of conditions are in N or N m, m or rad, and s."
+MOST_STARTS = 3  # channels whose starts have room in a table
+GAINS = "plant", "law", "gains", "sets", "tried", "J differ by", "best set"
 BEST_SET = (
-    "Each set is from a search of its own. Run i uses set i, and after the last set the first "
+    "Each set is from a search of its own; 'tried' counts the sets that all these searches tried. "
+    "Run i uses set i, and after the last set the first "
     "comes again. The best set is that whose search ended with the lowest J; J of the searches "
     "differ by up to the share shown. Tables show medians over all sets, and traces are of the "
     "first. `smc-mujoco list LAW`, or list FILE.py, has the units of a law's gains."
@@ -129,6 +134,10 @@ class Compared(Tables):
                 words = [candidate.remark]
                 if candidate.law.source.kind == source.DEFAULT:
                     words.insert(0, "default gains")
+                search = candidate.law.source.search
+                if search and search.spread > STUCK - 1.0:
+                    apart = f"J of its searches differ by up to {search.apart}"
+                    words.append(f"{apart}, so where it trails, a search that was stuck may be why")
                 if any(words):
                     key = candidate.law.name, "; ".join(filter(None, words))
                     plants_of.setdefault(key, []).append(plant)
@@ -158,7 +167,8 @@ class Compared(Tables):
         rows = []
         for plant, first in self._first_runs.items():
             period = f"{1e3 * first.control_period:g}"
-            rows.append((plant, bounds_in_words(first), period, f"{first.duration:g}"))
+            starts = self._starts(plant, first)
+            rows.append((plant, bounds_in_words(first), starts, period, f"{first.duration:g}"))
         plants_of: dict[tuple[str, str], list[str]] = {}
         for plant, of_plant in self.conditions.items():
             for pair in of_plant.items():
@@ -167,7 +177,21 @@ class Compared(Tables):
         for (name, words), on in plants_of.items():
             where = f" on {joined(on)}" if len(on) < len(self.conditions) else ""
             notes.append(f"{name}{where}: {words}")
-        return Tabular(headings=RUNS, rows=rows, title="Runs", notes=notes, left=2)
+        return Tabular(headings=RUNS, rows=rows, title="Runs", notes=[*notes, SI], left=3)
+
+    def _starts(self, plant: str, first: Scenario) -> str:
+        """Return the range of the starts on a plant, of each channel; "" of many channels."""
+        if first.plant.n > MOST_STARTS:
+            return ""
+        names = self.table.column("plant"), self.table.column("law"), self.table.column("condition")
+        wanted = plant, first.law.name, str(first.condition)
+        alike = np.logical_and.reduce([of == name for of, name in zip(names, wanted, strict=True)])
+        runs = map(self.table.scenario, np.flatnonzero(alike).tolist())
+        starts = np.array([run.resolved.x0 for run in runs])
+        ranges = []
+        for low, high, unit in zip(starts.min(0), starts.max(0), first.plant.units, strict=False):
+            ranges.append(f"{span(number(low), number(high)) or number(low)} {unit}")
+        return joined(ranges)
 
     @property
     def _table_of_gains(self) -> Tabular:
@@ -183,10 +207,11 @@ class Compared(Tables):
                         best[k] = v
                 if len(sets) > 1 and BEST_SET not in notes:
                     notes = [BEST_SET, *notes]
-                apart = law.source.search.apart if law.source.search else ""
-                of_law = law.source.words, f"{len(sets)}", apart, gains_text(best)
+                search = law.source.search
+                tried, apart = (f"{search.evaluations}", search.apart) if search else ("", "")
+                of_law = law.source.words, f"{len(sets)}", tried, apart, gains_text(best)
                 gains.append((plant, law.name, *of_law))
-        return Tabular(headings=GAINS, rows=gains, title="Gains", notes=notes, left=6)
+        return Tabular(headings=GAINS, rows=gains, title="Gains", notes=notes, left=7)
 
     @property
     def _without_times(self) -> list[Tabular]:
@@ -201,8 +226,9 @@ class Compared(Tables):
         """Return a LaTeX tabular for each plant and condition, which its first line names: put each
         into a float of its own; needs booktabs.
 
-        A column of 252 pt has room for two metrics, for long names of laws below the line that each
-        tabular's comment ends with. Five fit into table*. Only the last board says what intervals,
+        In a paper of 10 pt, below the line that each tabular's comment ends with, two metrics are
+        about 200 pt wide and three up to 252 pt, which is a column; five are about 400 pt without
+        that line, and table* has 516. Only the last board says what intervals,
         metrics and bold type are. Comments have the verdicts, and at the top the bounds on u, each
         condition, the gains, and remarks on them.
 
@@ -385,7 +411,7 @@ def compare(
         run with their defaults.
       worst: whether to search the worst case of each law on each plant too; or the class in which
         to search it.
-      out: folder for gains and runs.
+      out: folder for gains, of the last version of each law, and runs.
       metrics, defaults, relevant: as in `leaderboard`.
       duration: of a run, s. Default: 10, or 3 if quick; 8 under an adversary.
       starts: where runs begin, see `starts`. Default: within 20 % of the plant's own x0.

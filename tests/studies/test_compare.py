@@ -91,10 +91,23 @@ def test_every_law_has_given_shipped_or_tuned_gains_and_its_table_says_which(fou
     gains = found.tables[-1]
     rows = [(plant, law, kind) for plant in PLANTS for law, kind in wanted.items()]
     assert [row[:3] for row in gains.rows] == rows
-    assert "kp=20" in gains.rows[2][5]
+    assert "kp=20" in gains.rows[2][6]
     searches = found.gains["duffing"]["my_law"].source.search
-    assert gains.rows[0][4] == searches.apart != ""  # as `tune` says it
-    assert gains.rows[2][4] == ""  # of given gains
+    assert gains.rows[0][4:6] == (f"{searches.evaluations}", searches.apart)  # as `tune` says it
+    assert gains.rows[2][4:6] == ("", "")  # of given gains
+    starts = found.table.select(plant="duffing", law="pid", condition="friction")
+    x0 = [starts.scenario(i).resolved.x0[0] for i in range(len(starts))]
+    assert found.tables[-2].rows[0][2] == f"{min(x0):.3g}–{max(x0):.3g} m"
+
+
+def test_a_law_of_which_a_search_was_stuck_is_named(found):
+    candidate = found.candidates["duffing"][0]
+    for spread, said in ((0.9, False), (6.6, True)):
+        search = dataclasses.replace(candidate.law.source.search, spread=spread)
+        law = candidate.law.sourced("tuned here", search)
+        one = dataclasses.replace(found, candidates={"duffing": [candidate._replace(law=law)]})
+        words = "J of its searches differ by up to 7.6 times, so where it trails, a search"
+        assert (words in str(one.remarks)) is said
 
 
 def test_a_gain_at_the_end_of_its_box_is_named_as_tune_names_it(found, folder):
@@ -153,11 +166,13 @@ def test_latex_has_runs_conditions_gains_how_far_searches_differ_and_remarks_as_
     head = [*filter(None, found.to_latex().partition("\\begin")[0].splitlines())]
     assert all(line.startswith("%") for line in head)
     words = " ".join(" ".join(line.removeprefix("%") for line in head).split())
-    assert "inverted_pendulum 6.00 N m 1 0.5 friction: friction=(Coulomb(level=0.1), " in words
+    assert "1 0.5 friction: friction=(Coulomb(level=0.1), Viscous(b=0.05)) encoder: " in words
     assert "encoder: sensor=Encoder(counts=4096)" in words
     for plant in PLANTS:
         law = found.gains[plant]["my_law"]
-        assert f"{plant} my_law tuned here 12 {law.source.search.apart} lam=" in words
+        search = law.source.search
+        tried = f"12 {search.evaluations} {search.apart}"
+        assert f"{plant} my_law tuned here {tried} lam=" in words
     assert found.remarks
     for remark in found.remarks:
         assert remark in words

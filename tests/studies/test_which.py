@@ -355,6 +355,22 @@ def test_a_law_runs_under_all_conditions_at_once_unless_they_exclude_each_other(
         assert f"Together: under all 1 conditions at once {words}" in str(told)
 
 
+def test_velocities_that_are_not_measured_and_gains_at_an_end_of_their_search_are_told(
+    raced, tmp_path
+):
+    _, recommendation, plant = raced
+    fields = {"starts": None, "threads": 1, "progress": False}
+    trial = Trial.of([plant], ["encoder", "coulomb"], (), 1.5, tmp_path, **fields)
+    made = recommend._assumed(trial, plant, trial.asked_goal(plant))
+    assert "; under encoder the velocity is filtered_difference(tau=0.005) of the positions" in made
+    assert made.count("the velocity is") == 1
+    searched = SimpleNamespace(gains={"lam": 2.0}, at_bound={"lam": "lower"})
+    (told,) = dataclasses.replace(recommendation, tuned=searched).answer[-1:]
+    assert told.endswith(
+        "; lam = 2 is at the lower end of where it was searched: a smaller one may be better"
+    )
+
+
 def test_from_the_other_side_gravity_pushes_away_and_less_friction_is_tolerated():
     """With 2 kg: from above 40 N and the weight fight friction, from below 40 N less the weight."""
     lift = smc.plant_from(HANGING, ["z"])

@@ -287,7 +287,8 @@ Latex = Annotated[
     typer.Option(
         metavar="FILE.tex",
         help="Also write the tables as LaTeX: a tabular for each plant and condition. Put each "
-        "into a float of its own. A column of 252 pt has room for two metrics, five fit into "
+        "into a float of its own. A column of 252 pt has room for two metrics, or three if laws "
+        "have short names, below the line that each tabular's comment ends with; five fit into "
         "table*.",
     ),
 ]
