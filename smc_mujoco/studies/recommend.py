@@ -318,13 +318,13 @@ def _assumed(trial: Trial, plant: Plant, goal: Objective) -> str:
         noise = condition.on(plant, goal.duration).get("noise")
         if isinstance(noise, Noise):
             parts.append(
-                f"{condition.name} has noise of {noise.position:g} {units} in positions and "
-                f"{noise.velocity:g} {units}/s in velocities (standard deviations)"
+                f"under {condition.name} positions have a noise of {noise.position:g} {units} and "
+                f"velocities of {noise.velocity:g} {units}/s (standard deviations)"
             )
             if condition.name not in asked:
                 parts[-1] += (
-                    ", and is added, as no condition that you asked for has any: give one with "
-                    "noise=Noise(...) to replace it"
+                    f". {condition.name.capitalize()} is added, as no condition that you asked for "
+                    "has any: give one with noise=Noise(...) to replace it"
                 )
     return "; ".join(parts)
 

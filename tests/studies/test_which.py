@@ -179,12 +179,10 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
         "Without a law",
     ]
     assert [*lines][:9] == [*verdicts, "Assumed", "Settles", "Tolerates"]
-    noise = (
-        "noise has noise of 0.01 m in positions and 0.05 m/s in velocities (standard deviations)"
-    )
+    noise = "under noise positions have a noise of 0.01 m and velocities of 0.05 m/s (standard deviations)"
     made = "u changes every 1 ms and is made from measured positions and velocities, unless a "
     made += "condition says otherwise"
-    assert lines["Assumed"].startswith(f"{made}; {noise}, and is added, as no condition")
+    assert lines["Assumed"].startswith(f"{made}; {noise}. Noise is added, as no condition")
     shares = [float(share) for share in re.findall(r"(\d+) % from \w+", lines[verdicts[3]])]
     assert sum(shares) == pytest.approx(100.0, abs=1.0)
     assert re.search(r" and overshoot \(%\) \d", lines[verdicts[4]])  # which was not asked for
