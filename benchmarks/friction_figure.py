@@ -21,6 +21,7 @@ RESTS = ("pid", "hodob", "pd_observer", "super_twisting", "boundary_layer")
 SHOWN, LASTS = 2.0, 20.0  # s of a run to rest
 LEAST, MOST = 0.3, 300.0  # counts, ends of the axis of the reversals
 FAR = 200.0  # counts, ends of the axis of a run to rest
+LANE_TICKS = [-10.0, -1.0, 1.0, 10.0]  # counts; between the middle two the axis is linear
 WIDTH, ROW, LANE = 4.8, 0.24, 0.36  # inches: letters are read on a phone
 NAMES = 94.0  # points, the width of the laws' names
 REVERSALS, REST = "Reversals, Coulomb 30 %", "To rest, Stribeck"
@@ -114,7 +115,7 @@ def of_rest(ax: Axes, trace: Trace, count: float, colour: str) -> None:
     ax.axhspan(-1.0, 1.0, color=style.BAND, lw=0, zorder=0)
     ax.set_yscale("symlog", linthresh=1.0)
     ax.set(xlim=(SHOWN, LASTS), ylim=(-FAR, FAR))
-    ax.set_yticks([-10.0, 10.0], ["−10", "10"])
+    ax.set_yticks(LANE_TICKS, ["−10", "", "", "10"])
     ax.minorticks_off()
 
 
@@ -127,7 +128,7 @@ def key() -> list[page.Handle]:
         page.entry(f"no compensation, R {high:g}", **dot),
         page.entry(f"right compensation, R {low:g}", **RIGHT),
         page.entry("30 % too small to too large", **WRONG),
-        Patch(color=style.BAND, label="below one count"),
+        Patch(color=style.BAND, label="below one count, log beyond"),
     ]
 
 
@@ -166,7 +167,7 @@ def drawn(points: Sequence[dict], rests: Mapping[tuple[str, str], Trace]) -> Fig
             look = {"ha": "right", "textcoords": "offset points"}
             ax.annotate(words, (0.0, 1.0), (-8.0, 5.0), "axes fraction", **look)
         for lane in panels[1:, 1]:
-            lane.set_yticks([-10.0, 10.0], ["", ""])
+            lane.set_yticks(LANE_TICKS, [""] * 4)
         page.set_head(figure, WIDTH, "Laws under friction", key(), R_IN_WORDS)
     assert isinstance(figure, Figure)
     return figure

@@ -261,7 +261,7 @@ def _draw_plant(row: Array, dots: Dots, plant: str, named: bool) -> None:
         _panel(ax, of_panel, dots.conditions[plant], dots.looks, name, rings, decades)
         floors = [dots.floors[name, plant, condition] for condition in dots.conditions[plant]]
         _shade(ax, floors, len(dots.looks) + 1)
-        ax.set_xlabel(_label(name, *dots.units[plant]))
+        ax.set_xlabel(_label(name, *dots.units[plant]) + (", log" if decades else ""))
         ax.tick_params(labelleft=named or ax is row[0])
 
 

@@ -593,7 +593,7 @@ def _draw_ends(page: Figure | SubFigure, cell: SubplotSpec, panel: Panel, runs: 
         drawing.last_samples(ax, part, colours)
     _equal_ranges(frame, rows)
     frame.set_ylabel(_end_words(panel))
-    rows[-1].axes.set_xlabel(END_TIME)
+    rows[-1].axes.set_xlabel(f"{END_TIME}\nrows as in the key")
 
 
 def _end_words(panel: Panel) -> str:

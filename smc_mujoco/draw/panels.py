@@ -27,6 +27,7 @@ from smc_mujoco.draw.coincidence import Agreement, agreements, tell_agreements
 from smc_mujoco.draw.decimate import COLUMNS, band, end, line, smooth, window
 from smc_mujoco.draw.quantities import (
     LASTING_QUANTILE,
+    MIN_ERROR,
     PEAKS,
     QUANTITIES,
     limits,
@@ -419,6 +420,8 @@ def over_time(
     ax.set_ylim(limits(among or traces, name))
     own = panel._replace(traces=among or traces)
     set_numbers(ax.yaxis, own)
+    if name == "settling":
+        mark_least(ax.yaxis, means)
     clipped = name == "reaction" and clip_impacts(ax, panel, colours)
     if name in ("x", "e"):
         target(ax, panel)
@@ -472,7 +475,7 @@ def set_logarithmic(ax: Axes, heights: Pair) -> None:
 
 def number_decades(axis: Axis, ends: Pair) -> None:
     """Number the decades of a logarithmic axis between its ends; with fewer than two of them,
-    numbers between them too, so that there are two.
+    numbers between them too, so that there are two, and ticks at all multiples of a decade.
     """
     first, last = np.log10(ends)
     if math.floor(last) > math.ceil(first):
@@ -484,11 +487,28 @@ def number_decades(axis: Axis, ends: Pair) -> None:
         numbers = np.outer(decades, [1.0, *between])
         if np.sum((numbers >= min(ends)) & (numbers <= max(ends))) > 1:
             break
-    axis.set_minor_locator(LogLocator(subs=between))
+    axis.set_minor_locator(LogLocator(subs=np.arange(2.0, 10.0)))
     axis.set_tick_params(which="minor", length=rcParams["xtick.major.size"])  # numbers in one line
-    numbers = FuncFormatter(lambda value, _: style.short(value))
-    axis.set_major_formatter(numbers)
-    axis.set_minor_formatter(numbers)
+
+    def numbered(value: float, _: int) -> str:
+        first_digit = round(value / 10.0 ** math.floor(math.log10(value) + 1e-9))
+        return style.short(value) if first_digit in (1, *between) else ""
+
+    axis.set_major_formatter(FuncFormatter(numbered))
+    axis.set_minor_formatter(FuncFormatter(numbered))
+
+
+def mark_least(axis: Axis, means: Sequence[Array]) -> None:
+    """Say at the number MIN_ERROR of a logarithmic axis that lines at it are of smaller errors."""
+    if not any((mean <= MIN_ERROR).any() for mean in means):
+        return
+    usual = axis.get_major_formatter()
+
+    def number(value: float, place: int | None = None) -> str:
+        text = usual(value, place)
+        return text.replace("{10", "{\\leq 10") if value < 2.0 * MIN_ERROR else text
+
+    axis.set_major_formatter(FuncFormatter(number))
 
 
 def steps(trace: Trace, name: str) -> str:

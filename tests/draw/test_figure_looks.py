@@ -715,6 +715,28 @@ def test_a_metric_s_axis_is_of_one_kind_on_all_plants():
     page = smc.plot(Two(), metrics=["tv_rate", "settling_time"])
     scales = [ax.get_xscale() for ax in page.axes]
     assert scales == ["log", "linear", "log", "linear"]
+    assert [ax.get_xlabel().endswith(", log") for ax in page.axes] == [True, False] * 2
+
+
+def test_an_axis_of_less_than_two_decades_has_two_numbers_and_ticks_between(one):
+    ax = Figure().subplots()
+    ax.set_xscale("log")
+    ax.set_xlim(0.15, 0.9)
+    panels.number_decades(ax.xaxis, (0.15, 0.9))
+    ticks = ax.get_xticks(minor=True)
+    texts = [ax.xaxis.get_minor_formatter()(tick, None) for tick in ticks]
+    shown = {text: tick for text, tick in zip(texts, ticks, strict=True) if 0.15 <= tick <= 0.9}
+    assert [*shown] == ["0.2", "", "0.5"]
+    assert sum(0.15 <= tick <= 0.9 for tick in ticks) == 8
+
+
+def test_errors_too_small_to_draw_are_at_a_number_that_says_so(one):
+    for least, said in ((1e-12, True), (1e-7, False)):
+        e = np.geomspace(1.0, least, len(one.t))[:, None]
+        (ax,) = figure([dataclasses.replace(one, x=one.r + e)], panels=["settling"]).axes
+        number = ax.yaxis.get_major_formatter()
+        assert ("leq" in number(1e-9, None)) is said
+        assert "leq" not in number(1e-6, None)
 
 
 def test_where_gains_come_from_is_a_sentence_beside_the_title_or_in_the_key(one):
