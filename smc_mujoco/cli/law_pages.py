@@ -33,7 +33,8 @@ CATALOGUES = {
 }
 # Relative degree -> what a law acts on.
 DEGREES = {1: "s, with u in s'", 2: "e, with u in e''", 3: "e, with u in e'''"}
-LINES = re.compile(r"(?<=\S)\n(?=(?!Sources?:)\S)")  # ends of lines within a paragraph
+# ends of lines within a paragraph, or an item of a list
+LINES = re.compile(r"(?<=\S)\n(?:  )?(?=(?!Sources?:|- [A-Z])\S)")
 CALL_TEMPLATES = {  # kind of component -> how a user makes one
     "law": "smc.law({})",
     "surface": "smc.Scenario(surface=smc.surface({}), ...)",

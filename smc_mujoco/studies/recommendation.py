@@ -49,7 +49,7 @@ TOLERATED = {  # kind of a margin -> what is tolerated, at a level
     "friction": "dry friction of {}",
     "disturbance": "a constant disturbance of {} in either direction",
     "mass": "a mass of {} the nominal one",
-    "blow": "a blow of {} in either direction",
+    "blow": "a blow, halfway through the run, of {} in either direction",
 }
 RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
 
@@ -276,6 +276,11 @@ class RaceRecommendation(Recommendation):
             words.append(f"not shown to be better than {joined(others, 'or')}")
         if self.settles[self.law.name] < RELIABLE:
             words.append(f"which settled in {done} of {of} runs")
+        elif self.together and self.together[0] < RELIABLE * self.together[1]:
+            some = _some(*self.together)
+            words.append(
+                f"with which {some} of {self.together[1]} runs settled under all conditions at once"
+            )
         text = ", ".join(words)
         ahead = self._lowest
         if ahead and ahead != self.law.name:
@@ -431,7 +436,8 @@ class RaceRecommendation(Recommendation):
         least = runs
         for done, _ in found.values():
             least = min(least, done)
-        share = "all" if least == runs else f"at least {least} of"
+        few = f"{least} of" if len(found) == 1 else f"at least {least} of"
+        share = "all" if least == runs else few
         each = f"each of the {len(found)} conditions" if len(found) > 1 else "its condition"
         return f"in {share} {runs} runs of the tables under {each}, before the last fifth of a run"
 

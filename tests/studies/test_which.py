@@ -214,7 +214,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     assert "mass under coulomb: 4 seeds" in text
     assert lines["Tolerates"].startswith("a delay of ")
     assert ". Each is applied alone, under coulomb. At these levels" in lines["Tolerates"]
-    assert " times the nominal one and a blow of " in lines["Tolerates"]
+    assert " times the nominal one and a blow, halfway through the run, of " in lines["Tolerates"]
     kinds = {*recommend.KINDS, *recommend.KINDS_OF_POSES}
     assert kinds == recommendation_module.TOLERATED.keys()
     assert recommendation_module.BELOW not in " ".join(text.split())  # no cell has that word
@@ -345,12 +345,11 @@ def test_a_law_runs_under_all_conditions_at_once_unless_they_exclude_each_other(
     assert recommend._together(trial(rubs, pushed), plant, weak, 3) == (0, 3)
     assert recommend._together(trial(rubs), plant, weak, 3) is None
     assert recommend._together(trial("period_10ms", "period_20ms"), plant, weak, 3) is None
-    for counts, words in (
-        ((0, 14), "none of 14 runs settle;"),
-        ((14, 14), "all of 14 runs settle;"),
-    ):
+    late = "with which none of 14 runs settled under all conditions at once"
+    for counts, words, first in (((0, 14), "none", f", {late}"), ((14, 14), "all", "")):
         told = dataclasses.replace(recommendation, together=counts).answer
-        assert f"Together: under all 1 conditions at once {words}" in str(told)
+        assert f"Together: under all 1 conditions at once {words} of 14 runs settle;" in str(told)
+        assert told[0] == f"Use: {recommendation.law.name}{first}"
 
 
 def test_velocities_that_are_not_measured_and_gains_at_an_end_of_their_search_are_told(
