@@ -155,7 +155,7 @@ def margins(
     device: options.Device = "cpu",
 ) -> None:
     """Find the largest delay, friction, noise and so on that a law tolerates: the error must still
-    end below 5 % of its initial value.
+    end below 5 % of its initial value, in runs of 10 s, or 5 s with --quick.
 
     The delay of u is in s; a constant disturbance and dry friction are in N or N m. Mass
     is a multiple of the nominal mass. Noise is the standard deviation of the position sensor, in
@@ -173,9 +173,9 @@ def margins(
         from smc_mujoco.control import gain_sets
         from smc_mujoco.draw.page import files
         from smc_mujoco.mechanisms.named import as_plant
-        from smc_mujoco.robustness.margins import KINDS
+        from smc_mujoco.robustness.margins import KINDS, QUICK_DURATION
         from smc_mujoco.robustness.margins import margins as search
-        from smc_mujoco.simulation.conditions import PLANTS
+        from smc_mujoco.simulation.conditions import DURATION, PLANTS
 
     terminal = Terminal(json)
     options.check_files(None, *files(figure))
@@ -199,7 +199,8 @@ def margins(
     for name in kind:
         terminal.print(tables.margins(name, results))
     sources = _sources(machines, chosen, gains)
-    words = [counted(len(results), "margin"), sources, f"{terminal.seconds:.0f} s"]
+    runs = f"in runs of {QUICK_DURATION if quick else DURATION:g} s"
+    words = [f"{counted(len(results), 'margin')} {runs}", sources, f"{terminal.seconds:.0f} s"]
     terminal.note(", ".join(filter(None, words)), "dim", wrap=True)
     if figure:
         results.figure(figure)
