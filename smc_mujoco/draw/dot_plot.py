@@ -43,6 +43,7 @@ RING: Fields = {"marker": "o", "mfc": "none", "mec": style.INK, "clip_on": False
 # inches on a full page, heights of a law's line, and of the title, numbers and label of a panel
 LINE_HEIGHT = 0.18
 WORDS_HEIGHT = 0.9
+HEAD_ROOM = 1.5  # inches of a column for the title and the key, about
 
 
 def plot(
@@ -119,6 +120,19 @@ def plot(
         pages.set_head(page, width, head, key, shared)
         pages.space_ticks(page)
         return pages.write(page, paths)
+
+
+def room_for_metrics(width: float, laws: int, conditions: Sequence[int]) -> int:
+    """Return how many metrics a page of a width, in, has room for, with that many laws and
+    conditions on each plant: five side by side, or on a narrow page up to three, one below the
+    other, in a journal's column.
+    """
+    if width >= pages.NARROW:
+        return 5
+    lines = (laws + 1) * sum(conditions)
+    with style.page(width):
+        tall = style.points(WORDS_HEIGHT * len(conditions) + LINE_HEIGHT * lines)
+    return max(1, min(3, int((pages.MAX_HEIGHT - HEAD_ROOM) / tall)))
 
 
 def _name_row(ax: Axes, plant: Plant | str, high: float) -> None:

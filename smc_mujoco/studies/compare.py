@@ -344,17 +344,21 @@ class Compared(Tables):
 
         Args:
           path, options: path, title, size, format and fig of `smc.figure`.
-          metrics: names of metrics. Default: five of those compared, or three on a page narrower
-            than 6 in, first those in which a law wins; a ScenarioWarning names the others.
+          metrics: names of metrics. Default: five of those compared, or on a page narrower than 6
+            in as many as fit, three at most; first those in which a law wins, and the settled runs
+            last. A ScenarioWarning names the others.
         """
         from smc_mujoco.draw import dot_plot, page
 
         names = list(metrics)
         if not names:
             width, _ = page.measure(options.get("size"), options.get("fig"))
-            most = 3 if width < page.NARROW else 5
+            counts = list(map(len, self.conditions.values()))
+            laws = max(map(len, self.candidates.values()))
+            most = dot_plot.room_for_metrics(width, laws, counts)
             won = {cell[0] for cell in self.leaderboard.winners}
-            first = sorted(self._metrics, key=lambda name: name not in won)[:most]
+            last = paired_runs.SETTLES
+            first = sorted(self._metrics, key=lambda name: (name not in won, name == last))[:most]
             names = [name for name in self._metrics if name in first]
             if others := [name for name in self._metrics if name not in first]:
                 warn_once(f"plot leaves out {joined(others)}: draw the rest with metrics={others}")

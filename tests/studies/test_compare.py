@@ -178,18 +178,18 @@ def test_latex_has_runs_conditions_gains_how_far_searches_differ_and_remarks_as_
         assert remark in words
 
 
-@pytest.mark.filterwarnings("ignore:size=.* makes the figure")
 def test_a_plot_that_has_no_room_for_all_metrics_keeps_those_in_which_a_law_wins(
     found, monkeypatch
 ):
     wins = [("tv_rate", "duffing", "encoder", "pid")]
     monkeypatch.setattr(type(found.leaderboard), "winners", wins)
     with pytest.warns(
-        smc.errors.ScenarioWarning, match="plot leaves out ultimate_bound and itae: "
+        smc.errors.ScenarioWarning, match="plot leaves out settles, ultimate_bound and itae: "
     ):
         page = found.plot(size="ieee-column")
-    names = [ax.get_xlabel().partition("\n")[0] for ax in page.axes[:3]]
-    assert names == ["settled runs", "settling time", "TV rate"]
+    names = [ax.get_xlabel().partition("\n")[0] for ax in page.axes[:2]]
+    assert names == ["settling time", "TV rate"]
+    assert page.get_size_inches()[1] < 9.25  # of a column
 
 
 def test_its_page_has_every_median_and_verdict_and_needs_no_other_file(found, tmp_path):
