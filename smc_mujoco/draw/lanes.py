@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from smc_mujoco.common.aliases import Array, Fields
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import band
-from smc_mujoco.draw.horizon import settles_at
 from smc_mujoco.draw.panels import (
     MIN_CLOSE_UP,
     SINGLE,
@@ -69,9 +68,10 @@ def below_film(
     colours: Sequence[str],
     names: Sequence[str],
     changes: Mapping[float, str],
+    settled: Sequence[float],
 ) -> tuple[list[Row], list[Artist]]:
     """Draw a panel below a film, whose time axis is set, and return its rows, one a run where they
-    would hide each other, and the artists of the runs.
+    would hide each other, and the artists of the runs, which have `settled` at these times, s.
     """
     found = [Row(ax, panel, colours)]
     laned = in_lanes(panel)
@@ -90,7 +90,6 @@ def below_film(
         mark(row.axes, changes, named=False)
         bands = laned or not crowded(panel)
         drawn += over_time(row.axes, row.panel, row.colours, panel.traces, bands, names)
-        drawn += settled(row.axes, row.panel, row.colours)
         if panel.quantity in PEAKS:
             low, high = row.axes.get_ylim()
             row.axes.set_ylim(max(low, FILM_RANGE * high), high)
@@ -98,6 +97,8 @@ def below_film(
             cut_peak(row.axes, row.panel)
         if laned:
             tell_swing(row.axes, row.panel.traces[0], row.colours[0], panel.scale[0])
+    if panel.quantity == "x":
+        drawn += mark_settled(ax, panel.traces, colours, settled)
     return found, drawn
 
 
@@ -154,17 +155,16 @@ def cut_peak(ax: Axes, panel: Panel) -> None:
         ax.annotate(words, (1.0, 1.0), xycoords="axes fraction", **place, **look)
 
 
-def settled(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Artist]:
-    """Mark when each run's x has settled for good, where it does after the start, and return the
-    marks.
+def mark_settled(
+    ax: Axes, traces: Sequence[Trace], colours: Sequence[str], times: Sequence[float]
+) -> list[Artist]:
+    """Mark on the x of runs when each has settled for good, s, where it does after the start, and
+    return the marks.
     """
     marks: list[Artist] = []
-    if panel.quantity != "x":
-        return marks
     look: Fields = {"ms": style.points(6), "mec": style.PAPER, "mew": style.points(0.5)}
-    for trace, colour in zip(panel.traces, colours, strict=True):
-        time = settles_at(trace)
-        if trace.diverged_at is None and 0.0 < time < min(trace.t[-1], ax.get_xlim()[1]):
+    for trace, colour, time in zip(traces, colours, times, strict=True):
+        if 0.0 < time < min(trace.t[-1], ax.get_xlim()[1]):
             mean = trace.x.mean(axis=1)
             y = float(np.interp(time, trace.t, mean))
             marks += ax.plot(time, y, "v", color=colour, zorder=6, clip_on=False, **look)

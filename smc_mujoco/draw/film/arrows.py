@@ -93,6 +93,7 @@ class Arrow(NamedTuple):
     body: str = ""  # which a blow hits
     cut: bool = False  # it is longer than fits
     words: str = ""  # its value, where that is written beside it
+    told: bool = False  # whether the word on its hit or blow has its value
 
 
 class Stamped(NamedTuple):
@@ -389,7 +390,7 @@ def held(drawn: Drawn, then: Drawn, shade: tuple[float, ...]) -> Drawn:
     kept = [one for one in drawn.arrows if one[1].rgba[:3] != shade[:3]]
     for channel, arrow in then.arrows:
         if arrow.rgba[:3] == shade[:3]:
-            kept.append((channel, arrow._replace(rgba=shade, words="")))
+            kept.append((channel, arrow._replace(rgba=shade, words="", told=True)))
     return drawn._replace(arrows=kept)
 
 
@@ -595,6 +596,12 @@ def write(image: Image.Image, arrow: Arrow, line: Array, scale: float, taken: li
                 colour = bytes_of(arrow.rgba)
                 ImageDraw.Draw(image).text(at, arrow.words, colour, letters, anchor="mm", **rim)
                 return
+
+
+def covers(words: Sequence[Array], edge: Array) -> bool:
+    """Return whether words, in boxes of (2, 2) px each, lie over an outline, (points, 2) px."""
+    inside = [((box[0] < edge) & (edge < box[1])).all(axis=1).any() for box in words]
+    return any(inside)
 
 
 def is_apart(box: Array, taken: Sequence[Array]) -> bool:

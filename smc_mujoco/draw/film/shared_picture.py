@@ -121,11 +121,11 @@ def shots(stages: Sequence[Stage], frame: int, time: float) -> list[Array]:
     picture = first.canvas.draw(add)
     picture = first.canvas.outlined(picture, add_outlines, OUTLINE * first.scale)
     image = Image.fromarray(picture)
-    stamped = [stage.stamped(image, own) for stage, own in zip(stages, drawn, strict=True)]
     parts = across(np.array([0, 0, *image.size]), len(stages))
     taken = [
         box + part[:2] for stage, part in zip(stages, parts, strict=True) for box in stage.words
     ]
+    stamped = [stage.stamped(image, own, taken) for stage, own in zip(stages, drawn, strict=True)]
     for own in stamped:
         taken += arrows.boxes(own, first.scale)
     for own in stamped:

@@ -29,6 +29,8 @@ from smc_mujoco.draw.film import charts, flight
 from smc_mujoco.draw.film.camera import Room
 from smc_mujoco.draw.lanes import Row
 from smc_mujoco.draw.states import State
+from smc_mujoco.metrics.catalogue import settling_time
+from smc_mujoco.simulation.trace import Trace
 
 # Numbers of presentation here are chosen. The letters of a page of this width, those of a journal's
 # column, are 11 px high where the film is as wide as a phone, 390 px.
@@ -48,8 +50,8 @@ STATE_HEIGHT = 1.5  # letters, from the top of a tile to below what is said ther
 FUTURE_LINE = 0.4  # opacity of what is still to come
 FUTURE_BAND = 0.12
 EVENT_TIME = 0.6  # s of the film over which words on what has ended fade; chosen
-CLOCK = "00.000 s"  # at its widest
-PACE = "4× faster"
+PACE = "4× slower"  # at its widest
+APART = 0.5  # letters, more than which the key ends before the room for the pace; chosen
 FIRST_LINE, SECOND_LINE = 0.62, 1.57  # lines, from the top to the middle of their letters
 HEAD_HEIGHTS = {1: 1.25, 2: 2.1}  # number of lines over the machines -> their height, in lines
 
@@ -87,11 +89,18 @@ def room_of(size: tuple[int, int], lines: int) -> Room:
     return Room(0.0, top, size[0], foot)
 
 
-def key_room(size: tuple[int, int], title: str = "") -> float:
-    """Return the room for the key beside the clock, px; also beside the title if it is given."""
+def clock_room(size: tuple[int, int], stop: float) -> float:
+    """Return the room for the clock of a film that ends at a time, s, px."""
+    return style.width(f"{stop:.3f} s", letters(size), bold=True)
+
+
+def key_room(size: tuple[int, int], stop: float, title: str = "") -> float:
+    """Return the room for the key beside the clock of a film that ends at a time, s, px; also
+    beside the title if it is given.
+    """
     high = letters(size)
     room = size[0] - 2 * EDGE * high
-    room -= style.width(CLOCK, high, bold=True) + style.width(PACE, high) + 2 * high
+    room -= clock_room(size, stop) + style.width(PACE, high) + 2 * high
     if title:
         room -= style.width(title, high, bold=True) + high
     return room
@@ -109,7 +118,7 @@ def head_lines(
         return 1
     if runs.events:
         return 2
-    room = key_room(size, head)
+    room = key_room(size, runs.span[1], head)
     fits = all(style.width(" · ".join(key), letters(size)) <= room for key in keys)
     return 1 if fits else 2
 
@@ -228,6 +237,7 @@ class Sheet:
     def write_head(self, title: str, key: Sequence[str], lines: int, order: str) -> None:
         """Write the title, and below or beside it the key, with the clock at the right."""
         high = self.letters
+        stop = self.start + self.runs.span[1]
         left = EDGE * high
         right = self.size[0] - left
         wide = style.width(title, high, bold=True)
@@ -239,12 +249,12 @@ class Sheet:
         if lines == 1:
             last = first
             left += wide + high if title else 0.0
-            self.room = key_room(self.size, title)
+            self.room = key_room(self.size, stop, title)
         else:
             last = SECOND_LINE * LINE_PITCH * high
-            self.room = key_room(self.size)
+            self.room = key_room(self.size, stop)
         self.clock = self.write(right, last, ha="right", va="center", weight="bold")
-        right -= style.width(CLOCK, high, bold=True) + high
+        right -= clock_room(self.size, stop) + high
         self.pace = self.write(right, last, ha="right", va="center", color=style.MUTED)
         said = list(filter(None, [*key, order, self.runs.gains]))
         least = int(lines == 2 or not title)  # beside the title there may be no words
@@ -284,6 +294,7 @@ class Sheet:
         """
         high = self.letters
         shown = charts.strip(self.runs.early)
+        settled = list(map(settles_at, self.runs.traces))
         wide = self.size[0] / len(shown)
         left = style.width("−00.00", high) + 0.5 * high
         top = (1.0 - CHARTS_SHARE) * self.size[1] + 1.15 * LINE_PITCH * high
@@ -303,8 +314,9 @@ class Sheet:
                 words = joint_shortened(panel.label, room, high)
                 ax.set_title(words, fontweight="normal", parse_math=False)
                 self.set_time(ax)
+                runs = self.runs
                 rows, drawn = lanes.below_film(
-                    ax, panel, self.runs.colours, self.runs.names, self.runs.marks
+                    ax, panel, runs.colours, runs.names, runs.marks, settled
                 )
                 moving += list(map(set_moving, rows))
             future += drawn
@@ -373,9 +385,13 @@ class Sheet:
         for part in ("past", "goal", "dot"):
             drawn += [getattr(one, part) for one in self.flights]
         self.clock.set_text(f"{moment.time:.{3 if moment.speed < 0.2 else 2}f} s")
-        self.pace.set_text("" if moment.still else pace_words(moment.speed))
         words, opacity = self.event_words(moment)
-        self.below.set(text=words or self.key, alpha=opacity)
+        said = words or self.key
+        self.below.set(text=said, alpha=opacity)
+        pace = "" if moment.still else pace_words(moment.speed)
+        if pace and self.room - style.width(said, self.letters) < APART * self.letters:
+            pace = f"· {pace}"  # else they read as one phrase
+        self.pace.set_text(pace)
         for text, state in zip(self.says, moment.states, strict=True):
             text.set_text(state.words if state else "")
             if state:
@@ -399,6 +415,13 @@ class Sheet:
                 if style.width(words, self.letters) > self.room:  # the machines' names say how
                     words = f"changed{when}"
         return words, opacity
+
+
+def settles_at(trace: Trace) -> float:
+    """Return when all joints of a run have settled for good, s, as metrics have it; inf if it
+    fails.
+    """
+    return float(settling_time(trace)) if trace.diverged_at is None else np.inf
 
 
 def set_moving(row: Row) -> Moving:

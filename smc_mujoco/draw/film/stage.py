@@ -215,7 +215,7 @@ class Stage:
         image = Image.fromarray(picture)
         if self.followed is not None and self.aimed:
             self.dot_to_goal(image)
-        stamped = self.stamped(image, drawn)
+        stamped = self.stamped(image, drawn, self.words)
         taken = [*self.words, *arrows.boxes(stamped, self.scale)]
         arrows.write_numbers(image, stamped, self.scale, taken, image.width)
         return np.asarray(image)
@@ -235,20 +235,29 @@ class Stage:
             ImageDraw.Draw(image).ellipse(box, style.INK)
 
     def stamped(
-        self, image: Image.Image, drawn: Sequence[tuple[int, arrows.Arrow]]
+        self,
+        image: Image.Image,
+        drawn: Sequence[tuple[int, arrows.Arrow]],
+        words: Sequence[Array],
     ) -> list[arrows.Stamped]:
-        """Draw arrows, given as (channel, arrow), over a picture; return those that are seen."""
+        """Draw arrows, given as (channel, arrow), over a picture in which words are in boxes of
+        (2, 2) px each; return those that are seen.
+        """
         found = []
         for i, arrow in sorted(drawn, key=lambda item: item[1].head):  # bars are behind arrows
-            if one := self.draw_arrow(image, self.mounts[i], arrow):
+            if one := self.draw_arrow(image, self.mounts[i], arrow, words):
                 found.append(one)
         return found
 
     def draw_arrow(
-        self, image: Image.Image, mount: arrows.Mount, arrow: arrows.Arrow
+        self,
+        image: Image.Image,
+        mount: arrows.Mount,
+        arrow: arrows.Arrow,
+        words: Sequence[Array],
     ) -> arrows.Stamped | None:
         """Draw an arrow over the picture and return it; nothing, None, if it has no place or points
-        at the camera.
+        at the camera, or if it lies under the words that have its value.
         """
         found = arrows.path(self.model, self.data, mount, arrow)
         if not found:
@@ -262,6 +271,8 @@ class Stage:
         across = self.project(np.array([points[0], beside]))
         least = arrows.MIN_SHAFT * self.scale * arrow.size
         thick = max(float(np.ptp(across[:, 1])), least)
+        if arrow.told and arrows.covers(words, arrows.outline(line, thick)):
+            return None
         if mount.radius and not arrow.body:
             anchor = self.project(self.data.xanchor[[mount.joint]])[0]
             leader = [*anchor.tolist(), *line[0].tolist()]

@@ -7,6 +7,7 @@ from helpers.films import staged
 import smc_mujoco as smc
 from smc_mujoco.common import gl
 from smc_mujoco.draw.film.stage import Stage
+from smc_mujoco.simulation.model import compile_model
 
 pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 SIZE = (640, 230)
@@ -32,6 +33,14 @@ def test_a_changed_colour_or_shape_is_drawn():
         shown.arrange(np.zeros(1), time=0.6)
         for other in (first, shown.render()):
             assert (changed(other, grey) > 50).sum() > 50
+
+
+def test_the_ground_of_van_der_pol_has_no_law_s_colour_and_two_greys():
+    model = compile_model(smc.Scenario(plant="van_der_pol", law="none"))
+    light, dark = (model.mat(name).rgba[:3] for name in ("energy_in", "energy_out"))
+    for tint in (light, dark):
+        assert np.ptp(tint) <= 0.1
+    assert light.mean() - dark.mean() >= 0.1
 
 
 def test_shadows_lie_on_the_floor_where_the_light_casts_them_with_smooth_edges():

@@ -107,6 +107,21 @@ def test_a_mark_says_when_each_law_has_settled(page):
         assert near > alike[:, middle + 20 : middle + 33].sum() + 20, rate
 
 
+@pytest.mark.parametrize("rate", [6.0, 0.0])
+def test_no_run_is_marked_as_settled_whose_free_joint_has_not(rate):
+    """A cart was marked whose pole went round."""
+    run = made(smc.Scenario(plant="cart_pole", law=at_defaults("lqr"), duration=2.0))
+    x = np.exp(-8.0 * run.t[:, None]) * [0.5, 0.0]
+    x[:, 1] = 3.0 * np.exp(-rate * run.t)
+    still = np.zeros_like(x)
+    run = dataclasses.replace(run, x=x, r=still, d=still)
+    first, _ = sheet([run], ["one"], SIZE).page.axes
+    assert first.get_title("left") == "position x (m)"
+    marks = [line.get_xdata() for line in first.lines if line.get_marker() == "v"]
+    expected = [np.log(50.0) / rate] if rate else []
+    np.testing.assert_allclose(np.ravel(marks), expected, atol=2e-3)
+
+
 def test_a_map_shows_the_paths_of_flights_up_to_the_clock_to_one_scale():
     reference = [smc.Sine(0.5, 6.0), *[smc.Constant(0.0)] * 5]
     run = made(smc.Scenario(plant="quadrotor", reference=reference, law="geometric", duration=1.0))

@@ -108,6 +108,24 @@ def test_the_clock_the_pace_what_changed_and_what_is_said_are_told_at_their_time
         assert not shown[60:160, 322:638].any()
 
 
+def test_the_pace_is_apart_from_the_key_on_its_line():
+    """ "back to front 2× slower" read as one phrase."""
+    runs = DrawnRuns.of([machine("duffing")], ["one"])
+    box = np.array([[0, 60, 320, 160]])
+    dotted = {}
+    for count in range(60):
+        page = Sheet(runs, (640, 360), box, 1.0 * box, "", ["l" * count], lines=1)
+        page.picture(Moment(0.1, 0.125, (None,)), [np.zeros((100, 320, 3), np.uint8)])
+        renderer = page.canvas.get_renderer()
+        pace = page.pace.get_window_extent(renderer).x0
+        gap = (pace - page.below.get_window_extent(renderer).x1) / page.letters
+        dotted[gap] = page.pace.get_text()
+    assert min(dotted) > 0.2
+    for gap, words in dotted.items():
+        assert words == ("8× slower" if gap > 1.5 else "· 8× slower"), gap
+    assert len(set(dotted.values())) == 2
+
+
 def test_a_blow_is_told_with_its_times_and_then_no_more():
     named = HINGES.replace('<body pos="0 0 1">', '<body name="link" pos="0 0 1">')
     plant = smc.plant_from(named, ["j", "k"], name="own")

@@ -111,6 +111,7 @@ def test_an_arrow_is_broken_if_it_is_cut_and_its_number_is_told(run):
                     assert state
                     assert state.colour == colour  # the number is in its words
                     assert arrow.words == ""
+                    assert arrow.told
     assert min(broken.values()) > 0
 
 
@@ -150,6 +151,27 @@ def test_no_number_is_written_over_what_is_said_of_the_machine(run):
             number = np.array([(x.min(), y.min()), (x.max(), y.max())])
             assert arrows.is_apart(number, taken)
             taken = [*taken, number]
+
+
+@renders
+def test_the_arrow_of_a_hit_is_not_drawn_under_the_words_that_have_its_number(run):
+    """Its head stood out of the digits."""
+    with staged(run, (640, 360)) as shown:
+        shown.pose(0, 0.0)
+        shown.words = []
+        bare = shown.render().astype(int)
+        arrow = arrows.Arrow(0.0, -1.0, RED)
+        y, x = np.nonzero((np.abs(shown.render([(0, arrow)]) - bare) > 60).any(axis=2))
+        box = np.array([(x.min(), y.min()), (x.max(), y.max())], float)
+        tail = np.array([(box[1, 0] - 5.0, box[0, 1]), box[1]])
+        for words, told, drawn in (
+            (tail, True, False),
+            (tail, False, True),
+            (tail + 10.0, True, True),
+        ):
+            shown.words = [words]
+            seen = shown.render([(0, arrow._replace(told=told))])
+            assert (np.abs(seen - bare) > 60).any() == drawn
 
 
 def test_words_of_a_hit_and_its_arrow_at_its_peak_stay_and_fade_together(run):
