@@ -1,5 +1,5 @@
 """Arrows in the scene: control, disturbance, and friction with contact, at each driven joint; at
-the others friction and contact alone.
+the others friction and contact alone. The constant weight of a slide counts as a disturbance.
 
 An arrow is the mean over the time of a frame. A bar behind the control's is its range, which shows
 how far a control swings that switches faster than the film. With a drive, arrow and bar show its
@@ -23,9 +23,11 @@ from smc_mujoco.draw import quantities, style
 from smc_mujoco.draw.decimate import Envelope, windows
 from smc_mujoco.draw.film import world
 from smc_mujoco.draw.panels import Panel, by_channel
-from smc_mujoco.mechanisms.layout import channel_names
+from smc_mujoco.mechanisms.layout import channel_names, dof_ids
 from smc_mujoco.mechanisms.plant import EFFORT, Plant, catalogue
 from smc_mujoco.metrics.conventions import ChannelGroup
+from smc_mujoco.metrics.once_per_trace import once_per_trace
+from smc_mujoco.metrics.touching import shapes
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -167,7 +169,7 @@ def loads(trace: Trace, edges: Array) -> dict[str, Envelope]:
     """
     signals = {
         "control": trace.applied,
-        "disturbance": trace.d,
+        "disturbance": trace.d + weights(trace),
         "reaction": trace.reaction,
         "force": trace.force,
     }
@@ -175,6 +177,34 @@ def loads(trace: Trace, edges: Array) -> dict[str, Envelope]:
     for name, y in signals.items():
         envelopes[name] = windows(trace.t, y, edges)
     return envelopes
+
+
+@once_per_trace
+def weights(trace: Trace) -> Array:
+    """Return the constant force of gravity on each channel, (K + 1, n) N: on slides on a slope, or
+    upright ones, that no hinge turns; 0 on others, whose weight depends on the pose.
+    """
+    found = np.zeros(trace.d.shape)
+    for shape in shapes(trace.scenario):
+        model = shape.model
+        data = mujoco.MjData(model)
+        world.forward(model, data)
+        mujoco.mj_comPos(model, data)
+        bias = np.zeros(model.nv)
+        mujoco.mj_rne(model, data, 0, bias)
+        for channel, dof in enumerate(dof_ids(model).tolist()):
+            if slides_alone(model, dof):
+                found[trace.t >= shape.time, channel] = -bias[dof]
+    return found
+
+
+def slides_alone(model: mujoco.MjModel, dof: int) -> bool:
+    """Return whether a joint slides, and so do all that carry it, and its weight is not borne."""
+    while dof >= 0:
+        if model.jnt_type[model.dof_jntid[dof]] != mujoco.mjtJoint.mjJNT_SLIDE:
+            return False
+        dof = model.dof_parentid[dof]
+    return model.ngravcomp == 0
 
 
 class Scale(NamedTuple):
@@ -213,6 +243,7 @@ def _of_one_unit(traces: Sequence[Trace]) -> dict[ChannelGroup, Sequence[Trace]]
 
 def scales(traces: Sequence[Trace]) -> dict[ChannelGroup, Scale]:
     """Return the scale of the arrows for each group of channels."""
+    traces = [dataclasses.replace(trace, d=trace.d + weights(trace)) for trace in traces]
     found = {}
     lasting = [0.0]  # forces that drive and disturb
     brief = [0.0]
@@ -476,7 +507,7 @@ def path(
     place = data.geom_xpos[body]
     if model.jnt_type[mount.joint] == mujoco.mjtJoint.mjJNT_HINGE:
         radius = model.geom_rbound[body]
-        arm = place - anchor
+        arm = np.cross(axis, np.cross(place - anchor, axis))  # a link may be beside its hinge
         length = np.linalg.norm(arm)
         if length < MIN_LEVER:
             return None

@@ -368,7 +368,7 @@ class Puppet:
         on_stage = self.scenario.plant.on_stage
         axes = self.data[0].xaxis[self.ids[self.on_bars]]
         machines = [shape.model for shape in self.shapes]
-        raised = world.cut(machines, points, axes, on_stage)
+        world.cut(machines, points, axes, on_stage)
         world.forward(model, self.data[0])
         kept = world.still(model) & (model.geom_group < world.HIDDEN_GROUP)
         standing = world.boxes(model, self.data[0])[kept]
@@ -400,7 +400,7 @@ class Puppet:
         if on_stage:
             standing[..., 2] = standing[..., 2].clip(low[2] - stand, high[2] + stand)
         points = np.concatenate([points, around.reshape(-1, 3), standing.reshape(-1, 3)])
-        height = -raised
+        height = -foot if kept.any() else 0.0
         if not on_stage:  # it stands on the floor, or hangs close above it
             height = -min(lowest, foot, float(around[..., 2].min(initial=np.inf)))
             hangs = foot > low[2] + FLOOR_SHARE * (high[2] - low[2])

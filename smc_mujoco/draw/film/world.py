@@ -240,21 +240,20 @@ def restyle(model: mujoco.MjModel) -> None:
         field[np.isin(names, "bob")] *= 1.3
 
 
-def cut(machines: Sequence[mujoco.MjModel], points: Array, bars: Array, own: bool) -> float:
+def cut(machines: Sequence[mujoco.MjModel], points: Array, bars: Array, own: bool) -> None:
     """Shorten columns, and rails and shafts along `bars`, (k, 3), to what moves, whose points are
     (m, 3) m, in all models.
 
     The foot of a column and the posts at the ends of a rail come closer, and marks beyond are
-    hidden. Columns are cut of the library's `own` machines. Returns how far the foot came up, m.
+    hidden. Columns are cut of the library's `own` machines.
     """
     model = machines[0]
     data = mujoco.MjData(model)
     forward(model, data)
     fixed = np.flatnonzero(still(model))
     if not len(fixed):
-        return 0.0
+        return
     corners = boxes(model, data)[fixed]
-    raised = 0.0
     margin = CUT_MARGIN * np.ptp(points, axis=0).max()
     lows = points.min(axis=0) - margin
     highs = points.max(axis=0) + margin
@@ -296,10 +295,8 @@ def cut(machines: Sequence[mujoco.MjModel], points: Array, bars: Array, own: boo
             elif not upright and not first <= middle <= last:
                 model.geom_group[geom] = HIDDEN_GROUP
             _move(model, data, geom, way)
-        raised = first - start if upright else 0.0
     for other, name in itertools.product(machines[1:], CUT_FIELDS):
         getattr(other, name)[fixed] = getattr(model, name)[fixed]
-    return raised
 
 
 def _move(model: mujoco.MjModel, data: mujoco.MjData, geom: int, way: Array) -> None:

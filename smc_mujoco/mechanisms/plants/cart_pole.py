@@ -17,6 +17,7 @@ from smc_mujoco.mechanisms.geometry import cart
 from smc_mujoco.mechanisms.plant import Field, Plant, geom_fields, model_spec
 
 MIN_INERTIA = 1e-13  # kg m^2, the pole's inertia about its own length, about which it never turns
+BEFORE = -0.35  # m along the hinge: the pole is drawn before the rail and its scale
 STOP_X = 1.7  # m, |x| at the end stops: chosen, before the posts
 
 
@@ -34,8 +35,8 @@ def fields(model, p):
     yield Field("dof_damping", model.joint("slide").dofadr[0], p.b)
     yield Field("dof_damping", model.joint("hinge").dofadr[0], p.bq)
     yield Field("opt.gravity", 2, -p.grav)
-    yield from geom_fields(model, "rod", (0.0, 0.0, p.l), (1, p.l))
-    yield from geom_fields(model, "tip", (0.0, 0.0, 2 * p.l))
+    yield from geom_fields(model, "rod", (0.0, BEFORE, p.l), (1, p.l))
+    yield from geom_fields(model, "tip", (0.0, BEFORE, 2 * p.l))
 
 
 def nominal(x, v, i, p):

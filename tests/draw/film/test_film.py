@@ -12,7 +12,8 @@ import subprocess
 import numpy as np
 import pytest
 from helpers.films import staged, without_charts
-from helpers.sketch import failed
+from helpers.runs import at_defaults
+from helpers.sketch import failed, made
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl, progress
@@ -26,6 +27,7 @@ from smc_mujoco.draw.film.arrows import (
     loads,
     scales,
     scales_by_channel,
+    weights,
 )
 from smc_mujoco.draw.film.arrows import frames as arrow_frames
 from smc_mujoco.draw.film.pace import FilmClock
@@ -342,6 +344,36 @@ def test_friction_draws_an_arrow_of_its_own(stuck):
     *_, violet = arrows(loads(stuck, np.array([0.1, 0.11])), 0, 0, scale, "#0072B2")
     assert violet.rgba[:3] == pytest.approx(np.array(style.rgb(style.REACTION)) / 255)
     assert abs(violet.high) == pytest.approx(0.5 / scale.longest, rel=0.05)  # it slides
+
+
+def test_forces_on_a_slide_that_sticks_sum_to_0_with_its_weight(stuck):
+    """Of a servo axis that stood still, u and friction pointed one way, and nothing back."""
+    axis = smc.Scenario(plant="servo_axis", law="pid", friction=Coulomb(1.0), duration=0.3)
+    jump = smc.Jump(0.2, {"offset": 2.0})
+    (trace,) = smc.run([dataclasses.replace(axis, jump=jump)])
+    drawn = loads(trace, np.array([0.1, 0.11, 0.29, 0.3]))
+    weight = drawn["disturbance"].mean[[0, 2], 0]
+    assert weight == pytest.approx([3.1648, 2.0 * 3.1648])
+    names = "control", "disturbance", "reaction"
+    total = np.sum([drawn[name].mean[[0, 2], 0] for name in names], axis=0)
+    assert total == pytest.approx([0.0, 0.0], abs=0.02)
+    (scale,) = scales([trace]).values()
+    assert scale.disturbance == pytest.approx(2.0 * 3.1648)
+    assert not loads(stuck, np.array([0.1, 0.11]))["disturbance"].mean.any()
+
+
+@pytest.mark.parametrize("carried", ["slide", "hinge"])
+def test_only_a_slide_that_no_hinge_turns_has_a_constant_weight(carried):
+    plant = smc.plant_from(
+        f"""<mujoco><worldbody><body><joint type="{carried}" axis="0 1 0" name="base"/>
+          <geom size=".1" mass="1"/><body><joint type="slide" axis="0 0 1" name="lift"/>
+          <geom size=".1" mass="2"/></body></body></worldbody>
+          <actuator><motor joint="base"/><motor joint="lift"/></actuator></mujoco>""",
+        ["base", "lift"],
+    )
+    trace = made(smc.Scenario(plant=plant, law=at_defaults("pid"), duration=0.1))
+    lift = -2.0 * 9.81 if carried == "slide" else 0.0
+    assert weights(trace)[-1] == pytest.approx([0.0, lift])
 
 
 @pytest.mark.parametrize(("joint", "channel"), [("slide", 0), ("hinge", 1)])

@@ -6,9 +6,10 @@ import contextlib
 import dataclasses
 import itertools
 
+import mujoco
 import numpy as np
 import pytest
-from helpers.films import without_charts
+from helpers.films import staged, without_charts
 from helpers.runs import at_defaults
 from helpers.sketch import made
 
@@ -156,6 +157,34 @@ def test_a_pendulum_s_picture_is_of_the_bob_s_arc(monkeypatch):
             rod = shown.project(ends)[0] - shown.project(shown.data.xanchor[:1])[0]
             rods.append(np.linalg.norm(rod))
     assert rods[0] > 1.2 * rods[1]
+
+
+def test_a_pole_is_seen_all_the_way_round_and_its_arrow_is_in_its_plane():
+    """Below the rail it was hidden by the cart, by the scale and by the floor."""
+    run = made(smc.Scenario(plant="cart_pole", law=at_defaults("lqr"), duration=1.0))
+    angles = np.linspace(0.0, 2.0 * np.pi, len(run.t))
+    x = np.column_stack([np.zeros_like(angles), angles])
+    with staged(dataclasses.replace(run, x=x, r=0.0 * x), (400, 215)) as shown:
+        model = shown.model
+        pole = [model.geom(f"m/{name}").id for name in ("rod", "tip")]
+        hit = np.zeros(1, np.int32)
+        for sample in range(0, len(angles), 50):
+            shown.arrange(x[sample])
+            shown.forward()
+            along = np.linspace(-0.9, 0.9, 10)[:, None] * model.geom_size[pole[0], 1]
+            middle = shown.data.geom_xpos[pole[0]]
+            turn = shown.data.geom_xmat[pole[0]].reshape(3, 3)
+            points = middle + along * turn[:, 2]
+            seen = shown.project(points)
+            assert ((seen > 0.0) & (seen < shown.size)).all()
+            for point in points:
+                way = point - shown.place
+                mujoco.mj_ray(model, shown.data, shown.place, way, None, 1, -1, hit)
+                assert hit[0] in pole, angles[sample]
+            arrow = arrows.Arrow(0.0, 1.0, arrows.WHITE)
+            found = arrows.path(model, shown.data, shown.mounts[1], arrow)
+            assert found
+            assert found[0][:, 1] == pytest.approx(middle[1])
 
 
 def test_bent_arrows_are_around_their_joint_and_stay_in_the_tile(monkeypatch):
