@@ -108,9 +108,10 @@ class Scenario:
       velocity: an Estimator of the velocity that the law sees, or the name of one. Default:
         "measured", or "filtered_difference" with an encoder, which measures no velocity.
       mismatch: parameter name -> factor on the true plant's parameter. For a parameter in
-        `plant.added`, such as a payload in kg, the value is added instead. `mass` is the plant's
-        mass. Your own model has numbers of its joints, as "elbow.damping", and payloads of its
-        bodies, as "hand.payload", a point mass in kg at the body's centre of mass.
+        `plant.added`, such as a payload in kg, the value is added instead. `mass` is what
+        `plant.mass` names: of a double pendulum m2 alone. Your own model has numbers of its
+        joints, as "elbow.damping", and payloads of its bodies, as "hand.payload", a point mass in
+        kg at the body's centre of mass.
       jump: a change of the true plant's parameters, or of numbers of parts, in mid-run, or None.
       fault: a Fault of one or all actuators in mid-run: less gain, a bias, or stuck. Or None.
       tracks: "position", or "speed" for a speed loop: then x' is scored and drawn against r', so

@@ -66,8 +66,8 @@ BELOW = (
     "equal."
 )
 TESTED = (
-    f"a paired test at {100 * BEST_ERROR:g} % over {RIVALS} rivals, or over those of a law if it "
-    "has more"
+    f"a paired test at {100 * BEST_ERROR:g} %, corrected for {RIVALS} rivals, or for all if there "
+    "are more"
 )
 # A word in tables -> its meaning, which their key says, and LaTeX below the table.
 MEANINGS = {
@@ -150,8 +150,8 @@ class Lead(NamedTuple):
     @property
     def words(self) -> str:
         """What is said of the law's value, such as "0.88 times pid's (0.84 to 0.92), and it is
-        ahead in 24 of 24 runs"; "below the floor of 0.01 rad, and it is ahead in 20 of 24 runs; in
-        the median pid's is at least 1.3 times it".
+        ahead in 24 of 24 runs"; "below the floor of 0.01 rad, and it is ahead in 20 of 24 runs;
+        pid's is at least 1.3 times the floor, in the median".
         """
         share = f"{self.effect.ahead} of {self.effect.samples}"
         units = "sets of gains" if self.effect.sets else "runs"
@@ -163,7 +163,9 @@ class Lead(NamedTuple):
             if least < MIN_TIMES:
                 return f"below the floor of {self.floor}, unlike {self.rival}'s"
             text = f"below the floor of {self.floor}, {ahead}"
-            return f"{text}; in the median {self.rival}'s is at least {number(least)} times it"
+            return (
+                f"{text}; {self.rival}'s is at least {number(least)} times the floor, in the median"
+            )
         ratio, low, high = map(number, self.effect[:3])
         text = f"{ratio} times {self.rival}'s ({low} to {high})"
         if not self.effect.ahead:
@@ -231,7 +233,7 @@ class Block:
         names = joined(low)
         if len(low) == len(self.medians) == 2:
             names = "both"
-        return f"in the median {names} are below the floor of {self.floor} and count as equal"
+        return f"medians of {names} are below the floor of {self.floor} and count as equal"
 
     @property
     def all_settle_or_none(self) -> bool:
@@ -422,7 +424,8 @@ class Board(Tables):
                 names = "both laws" if len(self.entries) == 2 else "all laws"
             return f"{names} {SAME_RUNS if self.metric == SETTLES else LEVEL_WORDS}"
         others = "another" if alike else joined(self.best, "or")
-        level = f"{100 * BEST_ERROR:g} % over {max(len(self.entries) - 1, RIVALS)} rivals"
+        count = max(len(self.entries) - 1, RIVALS)
+        level = f"{100 * BEST_ERROR:g} %, corrected for {count} rivals"
         text = f"no law is shown to be better than {others} (at {level})"
         return text if math.isnan(self.resolves) else f"{text}; {hidden(self.resolves)}"
 

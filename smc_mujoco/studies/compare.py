@@ -61,10 +61,10 @@ TIME_HEADINGS = "plant", "law", "relative time", "median (s)", "99 % quantile (s
 TIME_NOTE = (
     "Relative time is a law's time over that of the law pid, timed in turn with it on the same "
     "measurements, so it is not the ratio of two medians of the table. All times depend on how "
-    "busy the computer is: that of pid itself would be 1 on an idle one."
+    "busy the computer is: on an idle one pid's relative time is 1."
 )
 RUNS = "plant", "|u| at most", "starts", "control period (ms)", "duration (s)"
-SI = "Numbers of conditions are in N or N m, m or rad, and s."
+SI = "Values in conditions are in N or N m, m or rad, and s."
 MOST_STARTS = 3  # channels whose starts have room in a table
 GAINS = "plant", "law", "gains", "sets", "tried", "J differ by", "best set"
 BEST_SET = (

@@ -232,7 +232,7 @@ class RaceRecommendation(Recommendation):
             done, of = self.together
             count = len(self.settled[self.law.name])
             some = _some(done, of)
-            at_once = f"under all {count} conditions at once {some} of {of} runs settle"
+            at_once = f"with all {count} conditions combined {some} of {of} runs settle"
             cure = "if your machine has all, ask for one condition that has them"
             lines.append(f"Together: {at_once}; gains were searched under each alone: {cure}")
         lines.append(f"Tolerates: {self._margins}")
@@ -249,7 +249,7 @@ class RaceRecommendation(Recommendation):
             usual = sum(law in gain_sets.COMPARED for law in self.untried_laws)
             cure = "; name some by laws= (--law)"
             if usual:
-                cure = f", {usual} of them usual ones, which are tried without laws= (--law)"
+                cure = f"; without laws= (--law) the {usual} usual ones of them are tried, too"
             lines.append(f"Not tried here: {others}{cure}")
         lines.append(f"Second: {self.second or 'none'}")
         gains = [f"Gains: {self.law}{self._unit}, {self.law.source}"]
@@ -279,7 +279,7 @@ class RaceRecommendation(Recommendation):
         elif self.together and self.together[0] < RELIABLE * self.together[1]:
             some = _some(*self.together)
             words.append(
-                f"with which {some} of {self.together[1]} runs settled under all conditions at once"
+                f"with which {some} of {self.together[1]} runs settled with all conditions combined"
             )
         text = ", ".join(words)
         ahead = self._lowest
@@ -509,17 +509,18 @@ class RaceRecommendation(Recommendation):
         where = f"under {self.beside}"
         if self.beside == "nominal":
             several = len(self.settled[self.law.name]) > 1
-            where = f"to the nominal plant{', under none of the conditions' if several else ''}"
+            where = f"to the nominal plant{', without the conditions' if several else ''}"
         plant = self.worst_run.plant
-        every = ", forces at every driven joint" if plant.driven > 1 and not plant.pose else ""
+        joints = "; forces act at every driven joint"
+        every = joints if plant.driven > 1 and not plant.pose else ""
         text = (
-            f"{joined(parts)}. Each is applied alone{every}, {where}. At these levels the largest "
+            f"{joined(parts)}. Each is applied alone, {where}{every}. At these levels the largest "
         )
         text += f"error in the last fifth of a run of {self.worst_run.duration:g} s is still below "
         text += "5 % of the initial error"
         if not all(margin.open for margin in self.margins):
             text += ", and at those after 'but not' it is above"
-        text += ". A run at a tolerated level need not settle, and may swing far before"
+        text += ". A run at a tolerated level need not settle, and may first swing far"
         if self.beside != "nominal":
             text += ". Delay and mass include those of the condition; friction and blows are added"
         if self.helped:
@@ -566,7 +567,8 @@ class RaceRecommendation(Recommendation):
             f"{capital(UNTRIED)}."
         )
         cells = repr([table.rows for table in shown])
-        for word, meaning in (("below ", BELOW), ("may exceed ", MARKS["may exceed "])):
+        words = {"below ": BELOW, "may exceed ": MARKS["may exceed "], "not arrived": MARKS[""]}
+        for word, meaning in words.items():
             if word in cells:
                 notes.append(meaning)
         last = shown.pop()

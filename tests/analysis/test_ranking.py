@@ -712,14 +712,14 @@ SHOWN = [
     (FINE, "0.00015 m"),
 ]
 BELOW = [  # factors of q of laws a, b and c, the winner, and what is said
-    ((0.3, 0.9), None, "in the median both are below the floor of {q} and count as equal"),
-    ((0.5, 0.6, 3.0), None, "in the median a and b are below the floor of {q} and count as equal"),
+    ((0.3, 0.9), None, "medians of both are below the floor of {q} and count as equal"),
+    ((0.5, 0.6, 3.0), None, "medians of a and b are below the floor of {q} and count as equal"),
     ((0.5, 1.01), None, "a is below the floor of {q}, unlike b's"),
     (
         (0.5, 4.0, 5.0),
         "a",
         "a wins, for these gains; its value is below the floor of {q}, and it is ahead in 12 of 12 "
-        "runs; in the median b's is at least 4.",
+        "runs; b's is at least 4.",
     ),
     ((2.0, 3.0), "a", "a wins, for these gains; its value is 0.6"),
     ((2.0, 2.0), None, "level within 10 %"),

@@ -233,7 +233,10 @@ def test_only_what_no_law_beats_is_marked(boards):
     cells = {row[0].text: row[1] for row in Boards([board]).tables[0].rows}
     assert [cells[law].strong for law in LAWS] == [False, True, True]
     (seen,) = re.findall(r"a lead below ([\d.]+) % might not show", board.verdict)
-    assert "no law is shown to be better than another (at 5 % over 15 rivals); a" in board.verdict
+    assert (
+        "no law is shown to be better than another (at 5 %, corrected for 15 rivals); a"
+        in board.verdict
+    )
     words = rf"No law wins. Leads below {seen}~\% in ITAE might not show."
     assert words in Boards([board]).to_latex()
 
@@ -477,7 +480,7 @@ LOST = {
 RESULTS = {  # changes of both blocks -> the result
     "few sets below the floor": (
         LOST | {"samples": 3, "sets": 3, "below": LAWS, "floor": "0.1 m"},
-        f"in the median {EVIL}, second and third are below the floor of 0.1 m and count as equal",
+        f"medians of {EVIL}, second and third are below the floor of 0.1 m and count as equal",
     ),
     "barred": ({"untuned": ("second", "third")}, "no law may win over the default gains of second"),
     "all fail": (LOST | {"away": LAWS}, "every law has runs that fail"),

@@ -189,7 +189,10 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     untried = recommendation.untried_laws
     assert int(lines["Not tried here"].split()[0]) == len(untried) > 20
     usual = len({*gain_sets.COMPARED} & {*untried})
-    assert f" of the package, {usual} of them usual ones, which are" in lines["Not tried here"]
+    assert (
+        f"; without laws= (--law) the {usual} usual ones of them are tried"
+        in lines["Not tried here"]
+    )
     rare = [name for name in untried if name not in gain_sets.COMPARED]
     told = dataclasses.replace(recommendation, untried_laws=rare).answer
     assert f"Not tried here: {len(rare)} other laws of the package; name some by" in str(told)
@@ -345,10 +348,10 @@ def test_a_law_runs_under_all_conditions_at_once_unless_they_exclude_each_other(
     assert recommend._together(trial(rubs, pushed), plant, weak, 3) == (0, 3)
     assert recommend._together(trial(rubs), plant, weak, 3) is None
     assert recommend._together(trial("period_10ms", "period_20ms"), plant, weak, 3) is None
-    late = "with which none of 14 runs settled under all conditions at once"
+    late = "with which none of 14 runs settled with all conditions combined"
     for counts, words, first in (((0, 14), "none", f", {late}"), ((14, 14), "all", "")):
         told = dataclasses.replace(recommendation, together=counts).answer
-        assert f"Together: under all 1 conditions at once {words} of 14 runs settle;" in str(told)
+        assert f"Together: with all 1 conditions combined {words} of 14 runs settle;" in str(told)
         assert told[0] == f"Use: {recommendation.law.name}{first}"
 
 

@@ -287,9 +287,8 @@ Latex = Annotated[
     typer.Option(
         metavar="FILE.tex",
         help="Also write the tables as LaTeX: a tabular for each plant and condition. Put each "
-        "into a float of its own. A column of 252 pt has room for two metrics, or three if laws "
-        "have short names, below the line that each tabular's comment ends with; five fit into "
-        "table*.",
+        "into a float of its own. With the line that ends each tabular's comment put before it, a "
+        "column of 252 pt holds two metrics, or three if laws have short names; table* holds five.",
     ),
 ]
 Rig = Annotated[
