@@ -66,8 +66,8 @@ BELOW = (
     "equal."
 )
 TESTED = (
-    f"a paired test at {100 * BEST_ERROR:g} %, corrected for {RIVALS} rivals, or for all if there "
-    "are more"
+    f"a paired test at {100 * BEST_ERROR:g} %, corrected as for {RIVALS} rivals, or for all if "
+    "there are more"
 )
 # A word in tables -> its meaning, which their key says, and LaTeX below the table.
 MEANINGS = {
@@ -425,7 +425,7 @@ class Board(Tables):
             return f"{names} {SAME_RUNS if self.metric == SETTLES else LEVEL_WORDS}"
         others = "another" if alike else joined(self.best, "or")
         count = max(len(self.entries) - 1, RIVALS)
-        level = f"{100 * BEST_ERROR:g} %, corrected for {count} rivals"
+        level = f"{100 * BEST_ERROR:g} %, corrected as for {count} rivals"
         text = f"no law is shown to be better than {others} (at {level})"
         return text if math.isnan(self.resolves) else f"{text}; {hidden(self.resolves)}"
 

@@ -60,8 +60,8 @@ TIMES = "Computing time of each compiled law per sample, on this computer"
 TIME_HEADINGS = "plant", "law", "relative time", "median (s)", "99 % quantile (s)"
 TIME_NOTE = (
     "Relative time is a law's time over that of the law pid, timed in turn with it on the same "
-    "measurements, so it is not the ratio of two medians of the table. All times depend on how "
-    "busy the computer is: on an idle one pid's relative time is 1."
+    "measurements, so it is not the ratio of two medians of the table. A busy computer distorts "
+    "all times: pid, timed against itself, then differs from 1."
 )
 RUNS = "plant", "|u| at most", "starts", "control period (ms)", "duration (s)"
 SI = "Values in conditions are in N or N m, m or rad, and s."

@@ -323,8 +323,8 @@ def _assumed(trial: Trial, plant: Plant, goal: Objective) -> str:
             )
             if condition.name not in asked:
                 parts[-1] += (
-                    f". {condition.name.capitalize()} is added, as no condition that you asked for "
-                    "has any: give one with noise=Noise(...) to replace it"
+                    f". The condition {condition.name} is added, as yours have no noise: give one "
+                    "with noise=Noise(...) to replace it"
                 )
     return "; ".join(parts)
 

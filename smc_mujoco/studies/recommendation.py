@@ -229,12 +229,9 @@ class RaceRecommendation(Recommendation):
         lines.append(f"Assumed: {self.assumed}")
         lines.append(f"Settles: {self._where}")
         if self.together:
-            done, of = self.together
-            count = len(self.settled[self.law.name])
-            some = _some(done, of)
-            at_once = f"with all {count} conditions combined {some} of {of} runs settle"
             cure = "if your machine has all, ask for one condition that has them"
-            lines.append(f"Together: {at_once}; gains were searched under each alone: {cure}")
+            alone = f"gains were searched under each alone: {cure}"
+            lines.append(f"Together: {self._at_once(self.together)} settle; {alone}")
         lines.append(f"Tolerates: {self._margins}")
         for name, share in self.race.dropped.items():
             least = f"its best J was {number(share)} times the leader's worst J"
@@ -276,12 +273,9 @@ class RaceRecommendation(Recommendation):
             words.append(f"not shown to be better than {joined(others, 'or')}")
         if self.settles[self.law.name] < RELIABLE:
             words.append(f"which settled in {done} of {of} runs")
-        elif self.together and self.together[0] < RELIABLE * self.together[1]:
-            some = _some(*self.together)
-            words.append(
-                f"with which {some} of {self.together[1]} runs settled with all conditions combined"
-            )
         text = ", ".join(words)
+        if self.together and self.together[0] < RELIABLE * self.together[1]:
+            text += f"; {self._at_once(self.together)} settled"
         ahead = self._lowest
         if ahead and ahead != self.law.name:
             name, done, of = self._least_settled(ahead)
@@ -291,6 +285,11 @@ class RaceRecommendation(Recommendation):
                 "before the last fifth of the run"
             )
         return text
+
+    def _at_once(self, together: tuple[int, int]) -> str:
+        """How many runs, and of how many, with all conditions asked for."""
+        count = len(self.settled[self.law.name])
+        return f"with all {count} conditions at once, {_some(*together)} of its {together[1]} runs"
 
     @property
     def _not_beaten(self) -> list[str]:

@@ -234,7 +234,7 @@ def test_only_what_no_law_beats_is_marked(boards):
     assert [cells[law].strong for law in LAWS] == [False, True, True]
     (seen,) = re.findall(r"a lead below ([\d.]+) % might not show", board.verdict)
     assert (
-        "no law is shown to be better than another (at 5 %, corrected for 15 rivals); a"
+        "no law is shown to be better than another (at 5 %, corrected as for 15 rivals); a"
         in board.verdict
     )
     words = rf"No law wins. Leads below {seen}~\% in ITAE might not show."

@@ -182,7 +182,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     noise = "under noise positions have a noise of 0.01 m and velocities of 0.05 m/s (standard deviations)"
     made = "u changes every 1 ms and is made from measured positions and velocities, unless a "
     made += "condition says otherwise"
-    assert lines["Assumed"].startswith(f"{made}; {noise}. Noise is added, as no condition")
+    assert lines["Assumed"].startswith(f"{made}; {noise}. The condition noise is added, as")
     shares = [float(share) for share in re.findall(r"(\d+) % from \w+", lines[verdicts[3]])]
     assert sum(shares) == pytest.approx(100.0, abs=1.0)
     assert re.search(r" and overshoot \(%\) \d", lines[verdicts[4]])  # which was not asked for
@@ -348,10 +348,10 @@ def test_a_law_runs_under_all_conditions_at_once_unless_they_exclude_each_other(
     assert recommend._together(trial(rubs, pushed), plant, weak, 3) == (0, 3)
     assert recommend._together(trial(rubs), plant, weak, 3) is None
     assert recommend._together(trial("period_10ms", "period_20ms"), plant, weak, 3) is None
-    late = "with which none of 14 runs settled with all conditions combined"
-    for counts, words, first in (((0, 14), "none", f", {late}"), ((14, 14), "all", "")):
+    late = "; with all 1 conditions at once, none of its 14 runs settled"
+    for counts, words, first in (((0, 14), "none", late), ((14, 14), "all", "")):
         told = dataclasses.replace(recommendation, together=counts).answer
-        assert f"Together: with all 1 conditions combined {words} of 14 runs settle;" in str(told)
+        assert f"at once, {words} of its 14 runs settle; gains were searched under" in str(told)
         assert told[0] == f"Use: {recommendation.law.name}{first}"
 
 

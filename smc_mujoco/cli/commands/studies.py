@@ -287,8 +287,8 @@ Latex = Annotated[
     typer.Option(
         metavar="FILE.tex",
         help="Also write the tables as LaTeX: a tabular for each plant and condition. Put each "
-        "into a float of its own. With the line that ends each tabular's comment put before it, a "
-        "column of 252 pt holds two metrics, or three if laws have short names; table* holds five.",
+        "into a float of its own. Put the last line of its comment before each: then a column of "
+        "252 pt holds two metrics, or three if laws have short names; table* holds five.",
     ),
 ]
 Rig = Annotated[
