@@ -487,7 +487,7 @@ def number_decades(axis: Axis, ends: Pair) -> None:
         numbers = np.outer(decades, [1.0, *between])
         if np.sum((numbers >= min(ends)) & (numbers <= max(ends))) > 1:
             break
-    axis.set_minor_locator(LogLocator(subs=np.arange(2.0, 10.0)))
+    axis.set_minor_locator(LogLocator(subs=range(2, 10)))
     axis.set_tick_params(which="minor", length=rcParams["xtick.major.size"])  # numbers in one line
 
     def numbered(value: float, _: int) -> str:
