@@ -93,21 +93,22 @@ def band(t: Array, y: Array) -> tuple[Array, Array, Array]:
 
     count = len(t) - 1
     at = t
-    low = y.min(axis=1)
-    high = y.max(axis=1)
+    low = high = y
     if count > COLUMNS:
         edges = t[:: 2 * -(-count // (2 * COLUMNS))].copy()
         edges[-1] = t[-1]
         e = windows(t, y, edges)
         at = e.t
-        low = e.low.min(axis=1)
-        high = e.high.max(axis=1)
+        low = e.low
+        high = e.high
     size = int(np.searchsorted(at - at[0], MAX_GAP, side="right"))
-    lower = np.pad(low, (0, size), "minimum", stat_length=size)
-    upper = np.pad(high, (0, size), "maximum", stat_length=size)
-    lower = grey_opening(lower, size, mode="nearest")
-    upper = grey_closing(upper, size, mode="nearest")
-    return at, lower[: len(at)], upper[: len(at)]
+    # of each channel by itself: where channels cross, all of them are close, and that is no gap
+    after = ((0, size), (0, 0))
+    lower = np.pad(low, after, "minimum", stat_length=size)
+    upper = np.pad(high, after, "maximum", stat_length=size)
+    lower = grey_opening(lower, (size, 1), mode="nearest")
+    upper = grey_closing(upper, (size, 1), mode="nearest")
+    return at, lower[: len(at)].min(axis=1), upper[: len(at)].max(axis=1)
 
 
 def window(trace: Trace) -> int:

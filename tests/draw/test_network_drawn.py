@@ -35,6 +35,15 @@ def test_no_drawn_range_is_smaller_than_the_data_s(n):
     assert np.asarray(thick.get_ydata(), float)[-1] == pytest.approx(trace.x[-1, n - 2])
 
 
+@pytest.mark.parametrize("samples", [1000, 5000])
+def test_a_band_is_as_narrow_as_channels_that_cross(samples):
+    """Two lines through one point were a block of 20 ms there, far beyond both."""
+    t = np.linspace(0.0, 1.0, samples + 1)
+    at, low, high = decimate.band(t, np.stack([t - 0.5, 0.5 - t], axis=1))
+    np.testing.assert_allclose(high, np.abs(at - 0.5), atol=2e-3)
+    np.testing.assert_allclose(low, -np.abs(at - 0.5), atol=2e-3)
+
+
 def test_a_band_has_no_gaps_of_20_ms_between_swings_and_keeps_longer_ones():
     t = np.linspace(0.0, 3.0, 3001)
     pauses = (t % 0.1 < 0.015) | ((t > 1.0) & (t < 1.2))
