@@ -27,7 +27,6 @@ from smc_mujoco.draw.coincidence import Agreement, agreements, tell_agreements
 from smc_mujoco.draw.decimate import COLUMNS, band, end, line, smooth, window
 from smc_mujoco.draw.quantities import (
     LASTING_QUANTILE,
-    MIN_ERROR,
     PEAKS,
     QUANTITIES,
     limits,
@@ -420,8 +419,6 @@ def over_time(
     ax.set_ylim(limits(among or traces, name))
     own = panel._replace(traces=among or traces)
     set_numbers(ax.yaxis, own)
-    if name == "settling":
-        mark_least(ax.yaxis, means)
     clipped = name == "reaction" and clip_impacts(ax, panel, colours)
     if name in ("x", "e"):
         target(ax, panel)
@@ -496,19 +493,6 @@ def number_decades(axis: Axis, ends: Pair) -> None:
 
     axis.set_major_formatter(FuncFormatter(numbered))
     axis.set_minor_formatter(FuncFormatter(numbered))
-
-
-def mark_least(axis: Axis, means: Sequence[Array]) -> None:
-    """Say at the number MIN_ERROR of a logarithmic axis that lines at it are of smaller errors."""
-    if not any((mean <= MIN_ERROR).any() for mean in means):
-        return
-    usual = axis.get_major_formatter()
-
-    def number(value: float, place: int | None = None) -> str:
-        text = usual(value, place)
-        return text.replace("{10", "{\\leq 10") if value < 2.0 * MIN_ERROR else text
-
-    axis.set_major_formatter(FuncFormatter(number))
 
 
 def steps(trace: Trace, name: str) -> str:
