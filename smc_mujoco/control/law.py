@@ -142,7 +142,7 @@ def law_function(
       gains: name -> default value, or a Gain with unit and range, which `smc.tune` needs, such as
         Gain(4.0, RATE, positive=True) for the slope of a surface. Gain and the units are in
         `smc_mujoco.control.units`, whose docstring lists them.
-      memory: floats of memory per channel. Default: 8.
+      memory: floats of memory per channel, 1 or more. Default: 8.
       positive, nonnegative: names of gains that must be above 0, or at least 0, as a Gain can say.
       relative_degree: of the sliding variable that the law needs: 1, the default, 2 or 3 (of e).
       conditions: condition of the theorem, in words -> function of the gains, read by attribute,
