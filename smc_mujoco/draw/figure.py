@@ -620,7 +620,7 @@ def _draw_side(ax: Axes, name: str, place: Panel, runs: DrawnRuns) -> None:
         words = f"time (s)\nlargest over the preceding {width:.3g} ms"
         least = min(quantities.QUANTITIES["settling"](trace).min() for trace in panel.traces)
         if least <= quantities.MIN_ERROR:
-            words += ", at least $10^{-9}$"
+            words += ",\nat least $10^{-9}$"
         ax.set(xlabel=words, ylabel=panel.label, xlim=(0.0, runs.span[1]))
 
 

@@ -734,7 +734,7 @@ def test_errors_too_small_to_draw_are_at_a_least_one_and_the_axis_says_so(one):
     for least, said in ((1e-12, True), (1e-7, False)):
         e = np.geomspace(1.0, least, len(one.t))[:, None]
         (ax,) = figure([dataclasses.replace(one, x=one.r + e)], panels=["settling"]).axes
-        assert ax.get_xlabel().endswith(" ms, at least $10^{-9}$") is said
+        assert ax.get_xlabel().endswith(" ms,\nat least $10^{-9}$") is said
 
 
 def test_where_gains_come_from_is_a_sentence_beside_the_title_or_in_the_key(one):
