@@ -163,12 +163,16 @@ class Compared(Tables):
 
     @property
     def _table_of_runs(self) -> Tabular:
-        """The table of what all runs on a plant have in common, and below it each condition."""
+        """The table of the runs on each plant, with what differs by condition in one cell, and
+        below it each condition.
+        """
         rows = []
         for plant, first in self._first_runs.items():
-            period = f"{1e3 * first.control_period:g}"
-            starts = self._starts(plant, first)
-            rows.append((plant, bounds_in_words(first), starts, period, f"{first.duration:g}"))
+            runs = self._runs(plant, first.law.name)
+            bounds = joined(dict.fromkeys(map(bounds_in_words, runs)), "or")
+            periods = dict.fromkeys(f"{1e3 * run.control_period:g}" for run in runs)
+            starts = self._starts(runs)
+            rows.append((plant, bounds, starts, joined(periods, "or"), f"{first.duration:g}"))
         plants_of: dict[tuple[str, str], list[str]] = {}
         for plant, of_plant in self.conditions.items():
             for pair in of_plant.items():
@@ -179,17 +183,20 @@ class Compared(Tables):
             notes.append(f"{name}{where}: {words}")
         return Tabular(headings=RUNS, rows=rows, title="Runs", notes=[*notes, SI], left=3)
 
-    def _starts(self, plant: str, first: Scenario) -> str:
-        """Return the range of the starts on a plant, of each channel; "" of many channels."""
-        if first.plant.n > MOST_STARTS:
+    def _runs(self, plant: str, law: str) -> list[Scenario]:
+        """Return the runs of a law on a plant; other laws have the same but for their own law."""
+        own = (self.table.column("plant") == plant) & (self.table.column("law") == law)
+        return list(map(self.table.scenario, np.flatnonzero(own).tolist()))
+
+    @staticmethod
+    def _starts(runs: Sequence[Scenario]) -> str:
+        """Return the range of the starts of runs, of each channel; "" of many channels."""
+        plant = runs[0].plant
+        if plant.n > MOST_STARTS:
             return ""
-        names = self.table.column("plant"), self.table.column("law"), self.table.column("condition")
-        wanted = plant, first.law.name, str(first.condition)
-        alike = np.logical_and.reduce([of == name for of, name in zip(names, wanted, strict=True)])
-        runs = map(self.table.scenario, np.flatnonzero(alike).tolist())
         starts = np.array([run.resolved.x0 for run in runs])
         ranges = []
-        for low, high, unit in zip(starts.min(0), starts.max(0), first.plant.units, strict=False):
+        for low, high, unit in zip(starts.min(0), starts.max(0), plant.units, strict=False):
             ranges.append(f"{span(number(low), number(high)) or number(low)} {unit}")
         return joined(ranges)
 
@@ -226,11 +233,11 @@ class Compared(Tables):
         """Return a LaTeX tabular for each plant and condition, which its first line names: put each
         into a float of its own; needs booktabs.
 
-        In a paper of 10 pt, below the line that each tabular's comment ends with, two metrics are
-        about 200 pt wide and three up to 252 pt, which is a column; five are about 400 pt without
-        that line, and table* has 516. Only the last board says what intervals,
-        metrics and bold type are. Comments have the verdicts, and at the top the bounds on u, each
-        condition, the gains, and remarks on them.
+        Put the last line of its comment before each: then, in a paper of 10 pt, two metrics are
+        about 200 pt wide and three up to 252 pt, which is a column. Five are about 400 pt without
+        that line, and table* has 516. Only the last board says what intervals, metrics and bold
+        type are. Comments have the verdicts, and at the top the bounds on u, each condition, the
+        gains, and remarks on them.
 
         Args:
           path: of a file to which it is written too.

@@ -263,7 +263,7 @@ def _together(trial: Trial, plant: Plant, law: Component, seeds: int) -> tuple[i
         return None
     both = functools.reduce(operator.add, trial.conditions)
     try:
-        both.on(plant, trial.duration)
+        trial.case(plant, law, both)  # parts may exclude each other, such as two drives
     except ScenarioError:
         return None
     at_once = trial._replace(conditions=[both], folder=trial.folder / "together")

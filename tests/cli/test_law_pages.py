@@ -110,6 +110,15 @@ def test_a_page_has_ranges_degree_plants_and_how_to_use_it(call):
     )
 
 
+def test_items_of_a_list_and_equations_keep_lines_of_their_own(call):
+    """A formula that goes on with a minus in the next line is no item."""
+    items = re.findall(r"^  - (\w+)", call("list", "pd_observer")[1], re.M)
+    assert items == ["Incremental", "L1", "ADRC"]
+    assert re.search(r"^ +alpha\^2 = ", call("list", "lqi")[1], re.M)
+    assert "w tends to the bound" in flat(call("list", "conditioned_super_twisting")[1])
+    assert not re.search(r"^ *- ", call("list", "conditioned_super_twisting")[1], re.M)
+
+
 def test_a_plant_has_a_page_with_its_parameters_and_its_sets(call):
     code, printed, _ = call("list", "quadrotor")
     said = flat(printed)

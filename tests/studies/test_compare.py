@@ -100,6 +100,14 @@ def test_every_law_has_given_shipped_or_tuned_gains_and_its_table_says_which(fou
     assert found.tables[-2].rows[0][2] == f"{min(x0):.3g}–{max(x0):.3g} m"
 
 
+def test_a_table_of_runs_has_the_periods_and_bounds_of_all_conditions(tmp_path):
+    slow = smc.condition("slow", control_period=0.02, u_max=3.0)
+    laws = [smc.law("pid", kp=20.0)]
+    of = {"out": tmp_path, "duration": 0.1, "progress": False}
+    made = smc.compare(laws, "duffing", [slow, "nominal"], 1, **of)
+    assert made.tables[-2].rows[0][1:4:2] == ("3.00 N or 6.00 N", "20 or 1")
+
+
 def test_a_law_of_which_a_search_was_stuck_is_named(found):
     candidate = found.candidates["duffing"][0]
     for spread, said in ((0.9, False), (6.6, True)):

@@ -347,7 +347,8 @@ def test_a_law_runs_under_all_conditions_at_once_unless_they_exclude_each_other(
         assert recommend._settled(alone)["pid"][one.name] == (3, 3)
     assert recommend._together(trial(rubs, pushed), plant, weak, 3) == (0, 3)
     assert recommend._together(trial(rubs), plant, weak, 3) is None
-    assert recommend._together(trial("period_10ms", "period_20ms"), plant, weak, 3) is None
+    for pair in (("period_10ms", "period_20ms"), ("friction", "coulomb"), ("backlash", "elastic")):
+        assert recommend._together(trial(*pair), plant, weak, 3) is None
     late = "; with all 1 conditions at once, none of its 14 runs settled"
     for counts, words, first in (((0, 14), "none", late), ((14, 14), "all", "")):
         told = dataclasses.replace(recommendation, together=counts).answer
