@@ -30,6 +30,7 @@ END_SHARE = 0.1  # of the time shown: its end, over which a row says how far u s
 MAX_SWITCHES = 20  # of a u that shares its axes with others
 SMOOTH_SHARE = 0.02  # of a panel's range: a swing below it is none
 FILM_RANGE = 1e-5  # of the largest error: below a film smaller ones are off the panel; chosen
+STEM = 1.3  # px, width of the line over the mark of a settled run
 ROW_FILLED = 0.82  # part of a trace's row that its axes fill
 
 
@@ -158,16 +159,19 @@ def cut_peak(ax: Axes, panel: Panel) -> None:
 def mark_settled(
     ax: Axes, traces: Sequence[Trace], colours: Sequence[str], times: Sequence[float]
 ) -> list[Artist]:
-    """Mark on the x of runs when each has settled for good, s, where it does after the start, and
-    return the marks.
+    """Mark on the x of runs when each has settled for good, s, where it does after the start, with
+    a stem in the dashes of its line, and return the marks.
     """
     marks: list[Artist] = []
+    top = ax.get_ylim()[1]
     look: Fields = {"ms": style.points(6), "mec": style.PAPER, "mew": style.points(0.5)}
-    for trace, colour, time in zip(traces, colours, times, strict=True):
+    look |= {"marker": "v", "markevery": [0], "lw": style.points(STEM), "clip_on": False}
+    runs = zip(traces, colours, style.looks(traces), times, strict=True)
+    for trace, colour, dashes, time in runs:
         if 0.0 < time < min(trace.t[-1], ax.get_xlim()[1]):
             mean = trace.x.mean(axis=1)
             y = float(np.interp(time, trace.t, mean))
-            marks += ax.plot(time, y, "v", color=colour, zorder=6, clip_on=False, **look)
+            marks += ax.plot([time, time], [y, top], color=colour, zorder=6, **look, **dashes)
     return marks
 
 

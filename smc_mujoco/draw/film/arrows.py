@@ -96,6 +96,7 @@ class Arrow(NamedTuple):
     cut: bool = False  # it is longer than fits
     words: str = ""  # its value, where that is written beside it
     told: bool = False  # whether the word on its hit or blow has its value
+    hollow: bool = False  # whether only its edge is in its colour
 
 
 class Stamped(NamedTuple):
@@ -374,7 +375,8 @@ def arrows(
         if cut:
             unit = scale.units[name in ("disturbance", "reaction", "force")]
             words = f"{style.short(abs(mean) * longest)} {unit}"
-        drawn.append(Arrow(0.0, mean, shade, layer, size, cut=cut, words=words))
+        hollow = name == "reaction"
+        drawn.append(Arrow(0.0, mean, shade, layer, size, cut=cut, words=words, hollow=hollow))
         if layer == 0 and scale.control and high - low > MIN_BAR:
             drawn.append(Arrow(low, high, rgba(colour, 0.4), head=False))
     visible = []
@@ -563,7 +565,7 @@ def outline(line: Array, width: float, head: bool = True, longest: float = HEAD)
 def stamp(image: Image.Image, line: Array, width: float, arrow: Arrow, rim: int = 0) -> Stamped:
     """Draw an arrow along a line, (m, 2) px, with a break mark if it is cut."""
     edge = outline(line, width, arrow.head, CUT_HEAD if arrow.cut else HEAD)
-    paint(image, edge, arrow.rgba, rim)
+    paint(image, edge, arrow.rgba, rim, hollow=arrow.hollow)
     if arrow.cut:
         k = len(line) // 2  # of the shaft, whose other side is the outline's end
         sides = edge[[k, -1 - k]]
@@ -672,19 +674,29 @@ def number_places(ends: tuple[Array, Array], half: Array, most: Array, gap: floa
     return [free + reach, beside, other - reach]
 
 
-def paint(image: Image.Image, edge: Array, rgba: Sequence[float], rim: int = 0) -> None:
-    """Fill an outline, (points, 2) px, with smooth edges, and a rim of paper around it, px."""
+def paint(
+    image: Image.Image, edge: Array, rgba: Sequence[float], rim: int = 0, hollow: bool = False
+) -> None:
+    """Fill an outline, (points, 2) px, with smooth edges, and a rim of paper around it, px; or only
+    draw it, twice as wide as the rim, around paper.
+    """
     corner = np.floor(edge.min(axis=0)).astype(int) - rim
     far = np.ceil(edge.max(axis=0)).astype(int) + 1 + rim
     place = tuple(corner.tolist())
     size = SUPERSAMPLING * (far - corner)
     mask = Image.new("L", tuple(size.tolist()))
     points = list(map(tuple, (SUPERSAMPLING * (edge - corner)).tolist()))
-    ImageDraw.Draw(mask).polygon(points, round(255 * rgba[3]))
+    opaque = round(255 * rgba[3])
+    ImageDraw.Draw(mask).polygon(points, opaque)
     mask = mask.reduce(SUPERSAMPLING)
     if rim:
         wide = mask.filter(ImageFilter.MaxFilter(2 * rim + 1))
         image.paste(style.rgb(style.PAPER), place, wide)
+    if hollow and rim:
+        image.paste(style.rgb(style.PAPER), place, mask)
+        mask = Image.new("L", tuple(size.tolist()))
+        ImageDraw.Draw(mask).polygon(points, outline=opaque, width=2 * SUPERSAMPLING * rim)
+        mask = mask.reduce(SUPERSAMPLING)
     image.paste(bytes_of(rgba), place, mask)
 
 

@@ -134,6 +134,11 @@ class OnJoints(Part):
     def __init_subclass__(cls) -> None:
         cls.__repr__ = OnJoints.__repr__  # dataclasses keep it
 
+    def __post_init__(self) -> None:
+        if isinstance(self.on, str):  # one name, else its letters would be names
+            object.__setattr__(self, "on", (self.on,))
+        super().__post_init__()
+
     def __repr__(self) -> str:
         words = [f"{name}={value!r}" for name, value in stated(self).items()]
         return f"{type(self).__name__}({', '.join(words)})"

@@ -9,6 +9,7 @@ import pytest
 from helpers.films import picture, sheet
 from helpers.runs import at_defaults
 from helpers.sketch import made
+from matplotlib.lines import Line2D
 
 import smc_mujoco as smc
 from smc_mujoco.draw import panels, style
@@ -107,6 +108,19 @@ def test_a_mark_says_when_each_law_has_settled(page):
         assert near > alike[:, middle + 20 : middle + 33].sum() + 20, rate
 
 
+def test_the_dashes_over_a_mark_say_whose_it_is(page):
+    """In grey nothing said it."""
+    styles = []
+    for line in page.moving[0].axes.lines:
+        if line.get_marker() == "v":
+            styles.append(line._unscaled_dash_pattern)
+    expected = []
+    for look in style.looks(page.runs.traces):
+        expected.append(Line2D([], [], **look)._unscaled_dash_pattern)
+    assert styles == expected
+    assert expected[0] != expected[1]
+
+
 @pytest.mark.parametrize("rate", [6.0, 0.0])
 def test_no_run_is_marked_as_settled_whose_free_joint_has_not(rate):
     """A cart was marked whose pole went round."""
@@ -117,9 +131,9 @@ def test_no_run_is_marked_as_settled_whose_free_joint_has_not(rate):
     run = dataclasses.replace(run, x=x, r=still, d=still)
     first, _ = sheet([run], ["one"], SIZE).page.axes
     assert first.get_title("left") == "position x (m)"
-    marks = [line.get_xdata() for line in first.lines if line.get_marker() == "v"]
+    marks = [line.get_xdata()[0] for line in first.lines if line.get_marker() == "v"]
     expected = [np.log(50.0) / rate] if rate else []
-    np.testing.assert_allclose(np.ravel(marks), expected, atol=2e-3)
+    np.testing.assert_allclose(marks, expected, atol=2e-3)
 
 
 def test_a_map_shows_the_paths_of_flights_up_to_the_clock_to_one_scale():

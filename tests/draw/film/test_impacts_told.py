@@ -12,6 +12,7 @@ from PIL import Image
 import smc_mujoco as smc
 from smc_mujoco.common import gl
 from smc_mujoco.draw import states, style
+from smc_mujoco.draw.decimate import Envelope
 from smc_mujoco.draw.film import arrows, film, pace
 
 renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
@@ -129,6 +130,22 @@ def test_the_break_of_an_arrow_is_in_its_shaft_however_short(length):
         gap = np.flatnonzero(~inked[20, 20 : 20 + int(length / 2)])
         assert (len(gap) > 0) == cut
         assert not cut or 0.2 * length <= gap.mean() <= 0.3 * length
+
+
+def test_the_arrow_of_a_reaction_is_hollow():
+    """In grey it looked like the control's."""
+    line = np.linspace((10.0, 20.0), (80.0, 20.0), 40)
+    for hollow in (False, True):
+        image = Image.new("RGB", (100, 40), "black")
+        arrows.stamp(image, line, 12.0, arrows.Arrow(0.0, 1.0, RED, hollow=hollow), 2)
+        inside, edge = image.getpixel((20, 20)), image.getpixel((20, 15))
+        assert edge == arrows.bytes_of(RED)
+        assert inside == (style.rgb(style.PAPER) if hollow else edge)
+    force = Envelope(np.zeros(1), *np.ones((3, 1, 1)))
+    acting = dict.fromkeys(("control", "disturbance", "reaction"), force)
+    scale = arrows.Scale(1.0, 1.0, 1.0, longest=1.0, full=1.0, units=("N", "N"))
+    drawn = arrows.arrows(acting, 0, 0, scale, style.INK)
+    assert [arrow.hollow for arrow in drawn] == [False, False, True]
 
 
 @renders

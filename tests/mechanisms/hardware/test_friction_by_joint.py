@@ -75,6 +75,11 @@ def test_joints_survive_text_json_and_a_batch(friction):
     assert np.array_equal(batch.x, smc.run(made).x)
 
 
+def test_one_joint_may_be_given_by_its_name_alone():
+    """Its letters were taken for names of joints."""
+    assert smc.Coulomb(0.1, on="slide") == smc.Coulomb(0.1, on=("slide",))
+
+
 @pytest.mark.parametrize(
     ("friction", "words"),
     [
