@@ -490,6 +490,11 @@ def leads(count: dict[str, int]) -> int:
     return count["stands"] + count["below the floor"]
 
 
+def without(count: dict[str, int]) -> int:
+    """Return in how many cells of a table neither side leads."""
+    return count["all"] - leads(count) - count["contradicted"]
+
+
 def in_readme(points: Sequence[dict]) -> str:
     """Return what README says of the points that were not drawn."""
     quiet, noisy, *smooth = tallies([point for point in points if point["draw"] is None])
@@ -501,10 +506,11 @@ def in_readme(points: Sequence[dict]) -> str:
         f"rivals `adrc`, `pd_observer`, `hodob` and `pid` in {leads(noisy)} and trails it in "
         f"{noisy['contradicted']}. It has {quiet['all']} cases without noise: it leads in "
         f"{leads(quiet)} and trails in {quiet['contradicted']}; in {quiet['not ranked']} the "
-        "errors are too small to rank, below or near a ten-thousandth of the initial error. In the "
-        f"other cases no lead counts. Of these {noisy['all'] + quiet['all']} cases, with noise and "
-        f"without, {noisy['not settled'] + quiet['not settled']} have runs that scatter too much "
-        "to determine an error. Smooth "
+        "errors are too small to rank, below or near a ten-thousandth of the initial error. No "
+        f"lead counts in the other {without(noisy)} cases with noise and "
+        f"{without(quiet) - quiet['not ranked']} without; in "
+        f"{noisy['not settled'] + quiet['not settled']} of these, the runs scatter too much to "
+        "determine an error. Smooth "
         f"first-order sliding has {sum(its['all'] for its in smooth)} cases, with noise "
         f"or without: it leads the best rival in {sum(map(leads, smooth))} and trails it in "
         f"{sum(its['contradicted'] for its in smooth)}."

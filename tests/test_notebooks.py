@@ -55,6 +55,7 @@ SAID = {
         assert "in degrees?" in check_offset(np.degrees(0.0216))
         assert "in mrad?" in check_offset(21.6)
         assert "Is it in N m?" in check_load(1576.0) and "on average" in check_load(6.0)
+        assert "Is it in N m?" in check_load(0.001576) and "Is phi in rad/s?" in check_width(0.035)
         assert "Is phi in rad/s?" in check_width(97.4) and "Is it in rad/s?" in check_width(115.0)
         at_bound = [abs(trace.u) >= 6.0 for trace in starts]
         assert at_bound[0][0] and not at_bound[0][100:].any() and not at_bound[2].any()

@@ -155,7 +155,8 @@ def law_function(
       short: name in two or three letters. Default: initials.
       colour: "#RRGGBB". Default: a colour of a palette, always the same.
       linear_part: a `smc_mujoco.control.component.LinearPart`, of laws linear near s = 0.
-      family: one word, such as "terminal", by which lists group the laws.
+      family: one word, such as "terminal", by which lists group the laws. With "baseline" figures
+        do not draw what the law returns for s, because it has none.
       continuous: whether u is a continuous function of the measurement at s = 0 (at e = 0 for laws
         of e), however short the control period. Default: no.
       finite_time: what is 0 after a finite time by the law's theorem, without a disturbance: "e",

@@ -35,10 +35,12 @@ KINDS = {
 
 
 def spread_in_words(searches: int, spread: float) -> str:
-    """Return how far J of searches differ: "12 searches, whose J differ by up to 4.1 %"."""
+    """Return how far the searches are apart, such as "12 searches, whose final J values differ by
+    up to 4.1 %".
+    """
     if searches == 1:
         return "1 search"
-    return f"{searches} searches, whose J differ by up to {_apart(spread)}"
+    return f"{searches} searches, whose final J values differ by up to {_apart(spread)}"
 
 
 def _apart(spread: float) -> str:

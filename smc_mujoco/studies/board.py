@@ -48,6 +48,7 @@ LABELS = {SETTLES: "share of settled runs", OBJECTIVE: "J on unseen runs"}
 MIN_TIMES = 1.03  # least lead of a law below the floor that is printed; chosen
 MAX_LEAD = 0.995  # that may be said to show; chosen
 MAX_NAMED = 8  # conditions that a verdict names; chosen
+ALLOWED = "with an allowance for the physics step and for trends"
 ALONE = "is not shown to beat every rival, and none is shown to beat it"
 LEVEL_WORDS = f"are level within {100 * LEVEL_SHARE:g} %"
 # as far as these runs go: a share's interval is wider than 10 %
@@ -57,17 +58,15 @@ FEW = (
     f"below {100 * LEVEL:g} %."
 )
 MEDIANS = (
-    "A cell has a median, or for settled runs their share, and its "
-    f"{100 * LEVEL:g} % interval. If a law has several sets of gains, runs with the same set count "
-    "as one sample."
+    f"A cell has a median, or for settled runs their share, and its {100 * LEVEL:g} % interval."
 )
 BELOW = (
-    "'below': the median is below the number beside it, the floor. Values below the floor count as "
-    "equal."
+    "'below': the median is below the number beside the word, the floor. Values below the floor "
+    "count as equal."
 )
 TESTED = (
-    f"a paired test at {100 * BEST_ERROR:g} %, corrected as for {RIVALS} rivals, or for all if "
-    "there are more"
+    f"a paired test at {100 * BEST_ERROR:g} %, corrected as if there were {RIVALS} rivals, or "
+    "for all if there are more"
 )
 # A word in tables -> its meaning, which their key says, and LaTeX below the table.
 MEANINGS = {
@@ -91,8 +90,8 @@ MARKS = MEANINGS | {
     "have arrived (see below), it has enough samples, and its interval is not too wide. An "
     "interval is too wide if its upper end is more than 4 times the lower end and more than 4 "
     "times the floor, below which values count as equal.",
-    "": "A run has arrived if, in its last fifth, the error stays within 10 % of its initial value "
-    "or within 5 times the sensor's resolution.",
+    "": "A run has arrived if, in its last fifth, the error stays below 10 % of its initial value "
+    "or below 5 times the sensor's resolution.",
     "below ": f"{BELOW} If a law below the floor may be the best, no law above the floor is "
     "marked. For an error, the floor is 1e-4 of its initial value. For errors late in the run, it "
     "is also at least half an encoder count and at least the noise. For u and its "
@@ -150,22 +149,21 @@ class Lead(NamedTuple):
     @property
     def words(self) -> str:
         """What is said of the law's value, such as "0.88 times pid's (0.84 to 0.92), and it is
-        ahead in 24 of 24 runs"; "below the floor of 0.01 rad, and it is ahead in 20 of 24 runs;
-        pid's is at least 1.3 times the floor, in the median".
+        ahead of pid in 24 of 24 runs"; "below the floor of 0.01 rad, and it is ahead of pid in 20
+        of 24 runs; pid's median is 1.3 times the floor, ...".
         """
         share = f"{self.effect.ahead} of {self.effect.samples}"
         units = "sets of gains" if self.effect.sets else "runs"
-        ahead = f"and it is ahead {'with' if self.effect.sets else 'in'} {share} {units}"
+        among = "with" if self.effect.sets else "in"
+        ahead = f"and it is ahead of {self.rival} {among} {share} {units}"
         if self.lacking:
             return f"defined in every run, while {self.rival} has none in {self.lacking}, {ahead}"
         if self.floor:
             least = 1.0 / self.effect.high
             if least < MIN_TIMES:
                 return f"below the floor of {self.floor}, unlike {self.rival}'s"
-            text = f"below the floor of {self.floor}, {ahead}"
-            return (
-                f"{text}; {self.rival}'s is at least {number(least)} times the floor, in the median"
-            )
+            text = f"below the floor of {self.floor}, {ahead}; {self.rival}'s median is"
+            return f"{text} {number(least)} times the floor, {ALLOWED}"
         ratio, low, high = map(number, self.effect[:3])
         text = f"{ratio} times {self.rival}'s ({low} to {high})"
         if not self.effect.ahead:
@@ -425,7 +423,7 @@ class Board(Tables):
             return f"{names} {SAME_RUNS if self.metric == SETTLES else LEVEL_WORDS}"
         others = "another" if alike else joined(self.best, "or")
         count = max(len(self.entries) - 1, RIVALS)
-        level = f"{100 * BEST_ERROR:g} %, corrected as for {count} rivals"
+        level = f"{100 * BEST_ERROR:g} %, corrected as if there were {count} rivals"
         text = f"no law is shown to be better than {others} (at {level})"
         return text if math.isnan(self.resolves) else f"{text}; {hidden(self.resolves)}"
 
@@ -782,7 +780,9 @@ def _short_key(boards: Sequence[Board], words: str) -> str:
 
 def key(boards: Sequence[Board], tables: str) -> list[str]:
     """Return what the words of these tables mean, in paragraphs."""
-    parts = [MEDIANS]
+    parts = [
+        f"{MEDIANS} If a law has several sets of gains, runs with the same set count as one sample."
+    ]
     if _few(boards):
         parts.append(FEW)
     for word, text in MARKS.items():
@@ -796,10 +796,10 @@ def key(boards: Sequence[Board], tables: str) -> list[str]:
         parts.append(f"Every value ranks before {last}.")
     parts.append(
         "A winner is better than every other law in a paired test. In each metric by itself, the "
-        f"probability of any wrong winner is at most {100 * (1 - LEVEL):g} %, over all conditions "
-        "of the table; over several metrics together it may be as large as the sum of these "
-        "probabilities. A verdict gives the winner's least lead over its rivals: the ratio in "
-        f"paired runs with a {100 * LEVEL:g} % interval. It differs from the ratio of the medians. "
+        f"probability of any wrong winner is at most {100 * (1 - LEVEL):g} %, over all plants "
+        "and conditions compared; over several metrics together it may be as large as the sum of "
+        "these probabilities. A verdict gives the winner's least lead over its rivals: the ratio "
+        f"in paired runs with a {100 * LEVEL:g} % interval. It differs from that of the medians. "
         "A law is ahead if it is better by more than "
         f"{100 * boards[0].relevant:g} % of the larger value."
     )

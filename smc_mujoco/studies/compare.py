@@ -59,20 +59,20 @@ DrawSeed = Annotated[int, Whole(low=0, high=MAX_SEED)]
 TIMES = "Computing time of each compiled law per sample, on this computer"
 TIME_HEADINGS = "plant", "law", "relative time", "median (s)", "99 % quantile (s)"
 TIME_NOTE = (
-    "Relative time is a law's time over that of the law pid, timed in turn with it on the same "
-    "measurements, so it is not the ratio of two medians of the table. A busy computer distorts "
-    "all times: pid, timed against itself, then differs from 1."
+    "Relative time is a law's time over that of the law pid. For it the two are timed in turn on "
+    "the same measurements, so it differs from the ratio of the medians shown. A busy computer "
+    "distorts all times: pid, timed against itself, then differs from 1."
 )
 RUNS = "plant", "|u| at most", "starts", "control period (ms)", "duration (s)"
 SI = "Values in conditions are in N or N m, m or rad, and s."
 MOST_STARTS = 3  # channels whose starts have room in a table
-GAINS = "plant", "law", "gains", "sets", "tried", "J differ by", "best set"
+GAINS = "plant", "law", "gains", "searches", "evaluations", "J spread", "best set"
 BEST_SET = (
-    "Each set is from a search of its own; 'tried' counts the sets that all these searches tried. "
-    "Run i uses set i, and after the last set the first "
-    "comes again. The best set is that whose search ended with the lowest J; J of the searches "
-    "differ by up to the share shown. Tables show medians over all sets, and traces are of the "
-    "first. `smc-mujoco list LAW`, or list FILE.py, has the units of a law's gains."
+    "Each search ends with one set of gains. 'evaluations' counts the sets that all searches of a "
+    "law tried, and 'J spread' is how far the values of J with which they ended are apart. The "
+    "best set is that with the lowest. Run i uses set i, and after the last set the first comes "
+    "again. Tables show medians over all sets, and traces are of the first. `smc-mujoco list LAW`, "
+    "or list FILE.py, has the units of a law's gains."
 )
 
 
@@ -136,7 +136,7 @@ class Compared(Tables):
                     words.insert(0, "default gains")
                 search = candidate.law.source.search
                 if search and search.spread > STUCK - 1.0:
-                    apart = f"J of its searches differ by up to {search.apart}"
+                    apart = f"the final J values of its searches differ by up to {search.apart}"
                     words.append(f"{apart}, so where it trails, a search that was stuck may be why")
                 if any(words):
                     key = candidate.law.name, "; ".join(filter(None, words))
@@ -233,11 +233,11 @@ class Compared(Tables):
         """Return a LaTeX tabular for each plant and condition, which its first line names: put each
         into a float of its own; needs booktabs.
 
-        Put the last line of its comment before each: then, in a paper of 10 pt, two metrics are
-        about 200 pt wide and three up to 252 pt, which is a column. Five are about 400 pt without
-        that line, and table* has 516. Only the last board says what intervals, metrics and bold
-        type are. Comments have the verdicts, and at the top the bounds on u, each condition, the
-        gains, and remarks on them.
+        The last line of the comment over a tabular narrows it, where you copy it to just before the
+        tabular: then, in a paper of 10 pt, two metrics are about 200 pt wide and three up to 252
+        pt, which is a column. Five are about 400 pt without that line, and table* has 516. Only the
+        last board says what intervals, metrics and bold type are. Comments have the verdicts, and
+        at the top the bounds on u, each condition, the gains, and remarks on them.
 
         Args:
           path: of a file to which it is written too.

@@ -128,7 +128,7 @@ def recommend(
         tuned=tuned.get(first.name),
         left_out=left_out,
         untried_laws=untried_laws,
-        judged=f"over {joined([one.name for one in goal.conditions])} on {plant.name}",
+        judged=f"over {joined(_judged(trial, goal))} on {plant.name}",
     )
 
 
@@ -299,14 +299,24 @@ def _weighed(
     )
 
 
+def _judged(trial: Trial, goal: Objective) -> list[str]:
+    """Return the conditions that J is of, with a word on those that were not asked for."""
+    asked = {condition.name for condition in trial.conditions}
+    names = []
+    for condition in goal.conditions:
+        added = "" if condition.name in asked else " (added, see Assumed)"
+        names.append(f"{condition.name}{added}")
+    return names
+
+
 def _assumed(trial: Trial, plant: Plant, goal: Objective) -> str:
     """Return how often u changes and what it is made from, and each noise, in words; of noise that
     no condition asked for has, that it is added.
     """
     period = 1e3 * trial.case(plant, "none", "nominal").control_period
     parts = [
-        f"u changes every {period:g} ms and is made from measured positions and velocities, unless "
-        "a condition says otherwise"
+        f"u changes every {period:g} ms and is computed from measured positions and velocities, "
+        "unless a condition says otherwise"
     ]
     asked = {condition.name for condition in trial.conditions}
     for condition in trial.conditions:
@@ -323,8 +333,8 @@ def _assumed(trial: Trial, plant: Plant, goal: Objective) -> str:
             )
             if condition.name not in asked:
                 parts[-1] += (
-                    f". The condition {condition.name} is added, as yours have no noise: give one "
-                    "with noise=Noise(...) to replace it"
+                    f". None of your conditions has noise, so {condition.name} was added to them: "
+                    "to replace it, give a condition with noise=Noise(...)"
                 )
     return "; ".join(parts)
 

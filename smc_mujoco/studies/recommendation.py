@@ -158,7 +158,11 @@ class NoLaw(NamedTuple):
         """How it does, and in which conditions the experiment shows no need of a law."""
         held = "u = 0, at which the servo holds the goal" if self.holds else "u = 0"
         every = self.runs * len(self.settled)
-        each = f" ({self.runs} in each condition)" if len(self.settled) > 1 else ""
+        each = (
+            f" ({self.runs} in each of {len(self.settled)} conditions)"
+            if len(self.settled) > 1
+            else ""
+        )
         without = _some(sum(self.settled.values()), every)
         of_law = self.settled_by_law
         late = [name for name, count in of_law.items() if count < self.runs]
@@ -230,7 +234,7 @@ class RaceRecommendation(Recommendation):
         lines.append(f"Settles: {self._where}")
         if self.together:
             cure = "if your machine has all, ask for one condition that has them"
-            alone = f"gains were searched under each alone: {cure}"
+            alone = f"no run of the search for gains had them all: {cure}"
             lines.append(f"Together: {self._at_once(self.together)} settle; {alone}")
         lines.append(f"Tolerates: {self._margins}")
         for name, share in self.race.dropped.items():
@@ -246,7 +250,7 @@ class RaceRecommendation(Recommendation):
             usual = sum(law in gain_sets.COMPARED for law in self.untried_laws)
             cure = "; name some by laws= (--law)"
             if usual:
-                cure = f"; without laws= (--law) the {usual} usual ones of them are tried, too"
+                cure = f"; if you leave out laws= (--law), the {usual} usual ones are tried as well"
             lines.append(f"Not tried here: {others}{cure}")
         lines.append(f"Second: {self.second or 'none'}")
         gains = [f"Gains: {self.law}{self._unit}, {self.law.source}"]
@@ -289,7 +293,8 @@ class RaceRecommendation(Recommendation):
     def _at_once(self, together: tuple[int, int]) -> str:
         """How many runs, and of how many, with all conditions asked for."""
         count = len(self.settled[self.law.name])
-        return f"with all {count} conditions at once, {_some(*together)} of its {together[1]} runs"
+        some = _some(*together)
+        return f"with all {count} conditions at once, {some} of {together[1]} further runs"
 
     @property
     def _not_beaten(self) -> list[str]:
@@ -562,11 +567,13 @@ class RaceRecommendation(Recommendation):
                 "laws."
             )
         notes.append(
-            f"{MEDIANS} These tables show no significance tests; those are below. "
+            f"{MEDIANS} All runs of a law in the tables by condition have one set of gains. These "
+            "tables show no significance tests; those are below. "
             f"{capital(UNTRIED)}."
         )
         cells = repr([table.rows for table in shown])
-        words = {"below ": BELOW, "may exceed ": MARKS["may exceed "], "not arrived": MARKS[""]}
+        arrived = f"{MARKS['']} Every value ranks before 'not arrived'."
+        words = {"below ": BELOW, "may exceed ": MARKS["may exceed "], "not arrived": arrived}
         for word, meaning in words.items():
             if word in cells:
                 notes.append(meaning)

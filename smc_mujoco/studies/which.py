@@ -85,7 +85,8 @@ def which(
         minutes they are only shown: the laws are compared by J. And what every law must have:
         "continuous" and the other names of `smc_mujoco.control.properties.PROPERTIES`.
       laws: the laws to compare, by name or with your own gains. Default: all that suit; of
-        these the usual ones on your own model within minutes. The answer says how many are left.
+        these the usual ones on your own model within minutes. The answer says how many were not
+        tried.
       seeds: runs of a law in each condition, each with another start and other noise. Default: 24,
         or 14 with minutes.
       duration: of a run, s. Default: 5, or 3 with minutes.

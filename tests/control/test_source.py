@@ -167,7 +167,7 @@ def test_the_gains_of_one_law_are_told_with_their_search_and_of_several_by_their
     )
     shipped = [smc.law("pid").sourced("shipped", search).source]
     assert source.in_words({"a": shipped}) == (
-        "gains: shipped (CMA-ES, 90 evaluations, 3 searches, whose J differ by up to 3 %)"
+        "gains: shipped (CMA-ES, 90 evaluations, 3 searches, whose final J values differ by up to 3 %)"
     )
     others = {
         "a": shipped,

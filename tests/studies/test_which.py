@@ -180,9 +180,9 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     ]
     assert [*lines][:9] == [*verdicts, "Assumed", "Settles", "Tolerates"]
     noise = "under noise positions have a noise of 0.01 m and velocities of 0.05 m/s (standard deviations)"
-    made = "u changes every 1 ms and is made from measured positions and velocities, unless a "
+    made = "u changes every 1 ms and is computed from measured positions and velocities, unless a "
     made += "condition says otherwise"
-    assert lines["Assumed"].startswith(f"{made}; {noise}. The condition noise is added, as")
+    assert lines["Assumed"].startswith(f"{made}; {noise}. None of your conditions has")
     shares = [float(share) for share in re.findall(r"(\d+) % from \w+", lines[verdicts[3]])]
     assert sum(shares) == pytest.approx(100.0, abs=1.0)
     assert re.search(r" and overshoot \(%\) \d", lines[verdicts[4]])  # which was not asked for
@@ -190,7 +190,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     assert int(lines["Not tried here"].split()[0]) == len(untried) > 20
     usual = len({*gain_sets.COMPARED} & {*untried})
     assert (
-        f"; without laws= (--law) the {usual} usual ones of them are tried"
+        f"; if you leave out laws= (--law), the {usual} usual ones are tried"
         in lines["Not tried here"]
     )
     rare = [name for name in untried if name not in gain_sets.COMPARED]
@@ -252,7 +252,7 @@ def test_the_answer_says_how_the_plant_does_without_a_law_and_where_it_needs_non
     assert without.duration == 1.0
     assert without.times > 2.0
     assert not without.holds
-    said = "with u = 0, none of 8 separate runs of 1 s (4 in each condition) settle; with the law, "
+    said = "with u = 0, none of 8 separate runs of 1 s (4 in each of 2 conditions) settle; with the law, "
     for counts, words in (
         ((0, 0), "none do. "),
         ((3, 4), "7 do, not all under coulomb. "),
@@ -349,10 +349,10 @@ def test_a_law_runs_under_all_conditions_at_once_unless_they_exclude_each_other(
     assert recommend._together(trial(rubs), plant, weak, 3) is None
     for pair in (("period_10ms", "period_20ms"), ("friction", "coulomb"), ("backlash", "elastic")):
         assert recommend._together(trial(*pair), plant, weak, 3) is None
-    late = "; with all 1 conditions at once, none of its 14 runs settled"
+    late = "; with all 1 conditions at once, none of 14 further runs settled"
     for counts, words, first in (((0, 14), "none", late), ((14, 14), "all", "")):
         told = dataclasses.replace(recommendation, together=counts).answer
-        assert f"at once, {words} of its 14 runs settle; gains were searched under" in str(told)
+        assert f"at once, {words} of 14 further runs settle; no run of the search" in str(told)
         assert told[0] == f"Use: {recommendation.law.name}{first}"
 
 

@@ -62,8 +62,9 @@ Minutes = Annotated[
     float | None,
     typer.Option(
         help="Answer within so many minutes, with a film, or a picture if there is no time for a "
-        "film. Laws are tuned and compared under the conditions asked for, until one is shown to "
-        "have the lowest J. Laws that could not be tuned in time are listed."
+        "film. Laws are tuned and compared under the conditions asked for, and under noise if none "
+        "of these has any, until one is shown to have the lowest J. Laws that could not be tuned "
+        "in time are listed."
     ),
 ]
 Film = Annotated[
@@ -98,10 +99,10 @@ def which(
     All laws that suit the plant are compared by the same rules as in smc-mujoco compare, with the
     package's gains or with gains that are tuned now. --law names those to try. On a model of your
     own, tuning takes minutes for each law. --quick takes at most ten minutes for all laws together;
-    on your own model it tries only the usual laws, unless --law names others, and says how many are
-    left. With --quick or --minutes it also writes the gains, and a figure and a film of the worst
-    run; where time is short, a picture in place of the film. A stopped command resumes when you
-    start it again.
+    on your own model it tries only the usual laws, unless --law names others, and says how many it
+    did not try. With --quick or --minutes it also writes the gains, and a figure and a film of the
+    worst run; where time is short, a picture in place of the film. A stopped command resumes when
+    you start it again.
 
     Example: smc-mujoco which duffing --condition noise,coulomb --need calm,fast
 
@@ -287,8 +288,9 @@ Latex = Annotated[
     typer.Option(
         metavar="FILE.tex",
         help="Also write the tables as LaTeX: a tabular for each plant and condition. Put each "
-        "into a float of its own. Put the last line of its comment before each: then a column of "
-        "252 pt holds two metrics, or three if laws have short names; table* holds five.",
+        "into a float of its own. A column of 252 pt holds two metrics, or three if laws have "
+        "short names, if you copy the last line of the comment over a tabular to just before it; "
+        "table* holds five without.",
     ),
 ]
 Rig = Annotated[
