@@ -795,7 +795,7 @@ def key(boards: Sequence[Board], tables: str) -> list[str]:
     if last := joined(held):
         parts.append(f"Every value ranks before {last}.")
     parts.append(
-        "A winner is better than every other law in a paired test. In each metric by itself, the "
+        "A winner is better than every other law in a paired test. For each metric, the "
         f"probability of any wrong winner is at most {100 * (1 - LEVEL):g} %, over all plants "
         "and conditions compared; over several metrics together it may be as large as the sum of "
         "these probabilities. A verdict gives the winner's least lead over its rivals: the ratio "

@@ -333,8 +333,8 @@ def _assumed(trial: Trial, plant: Plant, goal: Objective) -> str:
             )
             if condition.name not in asked:
                 parts[-1] += (
-                    f". None of your conditions has noise, so {condition.name} was added to them: "
-                    "to replace it, give a condition with noise=Noise(...)"
+                    f". None of your conditions has noise, so one named {condition.name} was "
+                    "added: to replace it, give a condition with noise=Noise(...)"
                 )
     return "; ".join(parts)
 

@@ -233,9 +233,11 @@ class RaceRecommendation(Recommendation):
         lines.append(f"Assumed: {self.assumed}")
         lines.append(f"Settles: {self._where}")
         if self.together:
-            cure = "if your machine has all, ask for one condition that has them"
-            alone = f"no run of the search for gains had them all: {cure}"
-            lines.append(f"Together: {self._at_once(self.together)} settle; {alone}")
+            cure = "if your machine has them all, give them as one condition"
+            lines.append(
+                f"Together: {self._at_once(self.together)} settle. The search for gains never "
+                f"combined them: {cure}"
+            )
         lines.append(f"Tolerates: {self._margins}")
         for name, share in self.race.dropped.items():
             least = f"its best J was {number(share)} times the leader's worst J"

@@ -230,7 +230,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     words = " ".join(str(kept).split())
     assert f"leave out {left}: they show at most 5 laws." in words
     assert "too few" not in text
-    assert "J over coulomb and noise on mass" in text
+    assert "J over coulomb and noise (added, see Assumed) on mass" in text
     assert "*" not in text
 
 
@@ -352,7 +352,7 @@ def test_a_law_runs_under_all_conditions_at_once_unless_they_exclude_each_other(
     late = "; with all 1 conditions at once, none of 14 further runs settled"
     for counts, words, first in (((0, 14), "none", late), ((14, 14), "all", "")):
         told = dataclasses.replace(recommendation, together=counts).answer
-        assert f"at once, {words} of 14 further runs settle; no run of the search" in str(told)
+        assert f"at once, {words} of 14 further runs settle. The search for gains" in str(told)
         assert told[0] == f"Use: {recommendation.law.name}{first}"
 
 

@@ -260,7 +260,10 @@ Seeds = Annotated[
 ]
 Tune = Annotated[
     bool,
-    typer.Option(help="Whether to tune laws for which neither you nor the package gives gains."),
+    typer.Option(
+        help="Whether to tune a law if neither you nor the package gives its gains; default values "
+        "in your file do not count."
+    ),
 ]
 Searches = Annotated[
     int | None,
@@ -288,9 +291,9 @@ Latex = Annotated[
     typer.Option(
         metavar="FILE.tex",
         help="Also write the tables as LaTeX: a tabular for each plant and condition. Put each "
-        "into a float of its own. A column of 252 pt holds two metrics, or three if laws have "
-        "short names, if you copy the last line of the comment over a tabular to just before it; "
-        "table* holds five without.",
+        "into a float of its own. The comment above each says how to make it "
+        "narrower: then a column of 252 pt holds two metrics, or three if laws have short names. "
+        "table* holds five.",
     ),
 ]
 Rig = Annotated[
