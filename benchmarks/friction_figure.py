@@ -24,6 +24,8 @@ FAR = 200.0  # counts, ends of the axis of a run to rest
 LANE_TICKS = [-10.0, -1.0, 1.0, 10.0]  # counts; between the middle two the axis is linear
 WIDTH, ROW, LANE = 4.8, 0.24, 0.36  # inches: letters are read on a phone
 NAMES = 94.0  # points, the width of the laws' names
+RING = {"marker": "o", "ms": 7.0, "ls": ""}  # of the low R, so that equal errors are a target
+DISC = {"marker": "o", "ms": 3.5, "ls": ""}  # of the high R
 REVERSALS, REST = "Reversals, Coulomb 30 %", "To rest, Stribeck"
 RIGHT = {"marker": "D", "ms": 4.5, "mec": style.PAPER, "mew": 0.5, "ls": ""}  # seen on its bar
 WRONG = {"lw": 3.0, "solid_capstyle": "projecting"}  # so that equal errors have a square
@@ -73,13 +75,13 @@ def of_law(ax: Axes, place: float, errors: Errors, colour: str) -> None:
     plain = [errors[level, 0.0] for level in (low, high) if (level, 0.0) in errors]
     above, below = place - 0.15, place + 0.2
     ax.plot(plain, [above] * len(plain), color=colour, lw=1.2)
-    for level, fill in ((low, style.PAPER), (high, colour)):
+    for level, look in ((low, {"mfc": style.PAPER, **RING}), (high, {"mfc": colour, **DISC})):
         error = errors.get((level, 0.0), 0.0)
         if error > MOST:
             ax.plot(MOST, above, ">", ms=4, color=colour, clip_on=False)
             ax.text(1.4 * MOST, above, f"{error:.0f}", WORDS)
         elif error:
-            ax.plot(error, above, "o", ms=4.5, mec=colour, mfc=fill)
+            ax.plot(error, above, mec=colour, **look)
     wrong = [errors[low, share] for share in (0.7, 1.3) if (low, share) in errors]
     if (low, 1.0) in errors:
         right = errors[low, 1.0]
@@ -122,10 +124,9 @@ def of_rest(ax: Axes, trace: Trace, count: float, colour: str) -> None:
 def key() -> list[page.Handle]:
     """Return the legend's entries."""
     low, high, _ = RATES
-    dot = {"marker": "o", "ms": 4.5, "ls": ""}
     return [
-        page.entry(f"no compensation, R {low:g}", mfc=style.PAPER, **dot),
-        page.entry(f"no compensation, R {high:g}", **dot),
+        page.entry(f"no compensation, R {low:g}", mfc=style.PAPER, **RING),
+        page.entry(f"no compensation, R {high:g}", **DISC),
         page.entry(f"right compensation, R {low:g}", **RIGHT),
         page.entry("30 % too small to too large", **WRONG),
         Patch(color=style.BAND, label="below one count, log beyond"),

@@ -498,6 +498,7 @@ def without(count: dict[str, int]) -> int:
 def in_readme(points: Sequence[dict]) -> str:
     """Return what README says of the points that were not drawn."""
     quiet, noisy, *smooth = tallies([point for point in points if point["draw"] is None])
+    rest = without(quiet) - quiet["not ranked"]
     return (
         "A case is one plant, period, load and J, with or without sensor noise. A law's cases are "
         "those in which both searches found gains with at most that J, for the law and for at "
@@ -506,11 +507,11 @@ def in_readme(points: Sequence[dict]) -> str:
         f"rivals `adrc`, `pd_observer`, `hodob` and `pid` in {leads(noisy)} and trails it in "
         f"{noisy['contradicted']}. It has {quiet['all']} cases without noise: it leads in "
         f"{leads(quiet)} and trails in {quiet['contradicted']}; in {quiet['not ranked']} the "
-        "errors are too small to rank, below or near a ten-thousandth of the initial error. No "
-        f"lead counts in the other {without(noisy)} cases with noise and "
-        f"{without(quiet) - quiet['not ranked']} without; in "
-        f"{noisy['not settled'] + quiet['not settled']} of these, the runs scatter too much to "
-        "determine an error. Smooth "
+        "errors are too small to rank, below or near a ten-thousandth of the initial error. In "
+        f"the other {without(noisy) + rest} cases, {without(noisy)} with noise and {rest} "
+        "without, neither side has a lead that counts; in "
+        f"{noisy['not settled'] + quiet['not settled']} of these {without(noisy) + rest} the runs "
+        "scatter too much to determine an error. Smooth "
         f"first-order sliding has {sum(its['all'] for its in smooth)} cases, with noise "
         f"or without: it leads the best rival in {sum(map(leads, smooth))} and trails it in "
         f"{sum(its['contradicted'] for its in smooth)}."

@@ -29,6 +29,7 @@ ROUNDING = 1e-9  # in SI units: smaller metrics count as 0 where results are com
 SETTLES = "settles"
 SETTLED = "settled runs (%)"  # what tables and figures call it
 OBJECTIVE = "objective"  # a name used like a metric's: J on instances that no search has seen
+OF_J = "groups of runs"  # what J is of, one run in each condition
 UNITS = {metric.name: metric.unit for metric in metrics()}  # of what boards compare
 UNITS |= {SETTLES: "", OBJECTIVE: "s^2"}
 GROUPS = ("plant", "condition")

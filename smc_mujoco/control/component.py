@@ -24,7 +24,7 @@ from smc_mujoco.common.constraints import Each, Number, Whole, constrained
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown, users_stacklevel
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.control.source import DEFAULT, NONE, YOURS, GainSearch, Source, combined
+from smc_mujoco.control.source import DEFAULT, GIVEN, NONE, GainSearch, Source, combined
 from smc_mujoco.control.units import INPUT_GAIN, Gain, Unit
 
 GainConditions = Mapping[str, Callable[[SimpleNamespace], bool]]
@@ -120,7 +120,7 @@ class Component:
             object.__setattr__(self, "template", None)  # the function or the name was replaced
         source = self.source
         if source.gains != self.gains:  # the gains were replaced
-            source = Source(kind=YOURS if gains else NONE, gains=self.gains)
+            source = Source(kind=GIVEN if gains else NONE, gains=self.gains)
         if any(part.template and part.template.unmet(part.gains) for part in self.parts):
             source = dataclasses.replace(source, outside=True)
         object.__setattr__(self, "source", source)

@@ -36,7 +36,7 @@ def law(data: Data, source: Data | None) -> Component:
     else:
         component = restore(data, "law", all_laws() | _laws_of_annex(data["module"]))
     if source is None:
-        return component.sourced(sources.YOURS)
+        return component.sourced(sources.GIVEN)
     restored = dataclasses.replace(sources.restore(source), gains=component.gains)
     return dataclasses.replace(component, source=restored)
 

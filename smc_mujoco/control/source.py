@@ -1,10 +1,10 @@
 """Where the gains of a law come from, and the search behind them.
 
     smc.law("classical").source                            # default
-    smc.law("classical", k=3).source                       # yours
+    smc.law("classical", k=3).source                       # given
     smc.tune("duffing", "classical").law.source            # tuned here (CMA-ES and COBYQA, ...)
 
-A source belongs to one set of gains. A law whose gains are replaced has the source "yours".
+A source belongs to one set of gains. A law whose gains are replaced has the source "given".
 """
 
 import dataclasses
@@ -22,7 +22,7 @@ DEFAULT = "default"
 TUNED = "tuned here"
 SHIPPED = "shipped"
 STUDY = "study"
-YOURS = "yours"
+GIVEN = "given"
 MARK = " (outside its theorem)"  # of gains that miss a condition of their law's theorem
 KINDS = {
     NONE: "the law has no gains",
@@ -30,8 +30,9 @@ KINDS = {
     TUNED: "result of a search that the user ran",
     SHIPPED: "those of the package for this plant",
     STUDY: "those of a published study",
-    YOURS: "given by the user",
+    GIVEN: "given by the user",
 }
+OLD_WORDS = {"yours": GIVEN}  # in older files
 
 
 def spread_in_words(searches: int, spread: float) -> str:
@@ -114,14 +115,15 @@ def restore(data: Data) -> Source:
     """Return the source that `Source.about` wrote, without its gains."""
     kind = data["kind"].removesuffix(MARK)
     search = data["search"] and GainSearch(**data["search"])
-    return Source(kind=kind, search=search, outside=kind != data["kind"])
+    outside = kind != data["kind"]
+    return Source(kind=OLD_WORDS.get(kind, kind), search=search, outside=outside)
 
 
 def combined(sources: Sequence[Source]) -> Source:
     """Return the source of gains of several sources: the first if all are equal, else the user."""
     if len({(source.kind, source.search) for source in sources}) == 1:
         return sources[0]
-    return Source(kind=YOURS)
+    return Source(kind=GIVEN)
 
 
 def kinds(sources: Iterable[Source]) -> str:
@@ -144,7 +146,7 @@ def in_words(sources: Mapping[str, Iterable[Source]]) -> str:
 
 
 def by_words(words: Mapping[str, str]) -> str:
-    """Return "gains: shipped", or "gains: default for a and b, yours for c", from law -> source.
+    """Return "gains: shipped", or "gains: default for a and b, given for c", from law -> source.
 
     A law without gains has the source "" or "none", and is left out.
     """

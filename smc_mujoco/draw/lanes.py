@@ -1,5 +1,6 @@
 """Panels whose traces would hide each other: each trace has a row of its own."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -30,6 +31,7 @@ END_SHARE = 0.1  # of the time shown: its end, over which a row says how far u s
 MAX_SWITCHES = 20  # of a u that shares its axes with others
 SMOOTH_SHARE = 0.02  # of a panel's range: a swing below it is none
 FILM_RANGE = 1e-5  # of the largest error: below a film smaller ones are off the panel; chosen
+BESIDE = 4.0  # px, from the mark of a settled run to the next
 STEM = 1.3  # px, width of the line over the mark of a settled run
 ROW_FILLED = 0.82  # part of a trace's row that its axes fill
 
@@ -160,19 +162,36 @@ def mark_settled(
     ax: Axes, traces: Sequence[Trace], colours: Sequence[str], times: Sequence[float]
 ) -> list[Artist]:
     """Mark on the x of runs when each has settled for good, s, where it does after the start, with
-    a stem in the dashes of its line, and return the marks.
+    a stem in the dashes of its line, and return the marks. Those that would hide each other stand
+    beside each other.
     """
     marks: list[Artist] = []
     top = ax.get_ylim()[1]
+    shown = ax.get_xlim()[1]
+    beside = BESIDE * shown * ax.figure.dpi / 72 / ax.get_window_extent().width
+    places = apart(times, style.points(beside))
     look: Fields = {"ms": style.points(6), "mec": style.PAPER, "mew": style.points(0.5)}
     look |= {"marker": "v", "markevery": [0], "lw": style.points(STEM), "clip_on": False}
-    runs = zip(traces, colours, style.looks(traces), times, strict=True)
-    for trace, colour, dashes, time in runs:
-        if 0.0 < time < min(trace.t[-1], ax.get_xlim()[1]):
+    runs = zip(traces, colours, style.looks(traces), times, places, strict=True)
+    for trace, colour, dashes, time, place in runs:
+        if 0.0 < time < min(trace.t[-1], shown):
             mean = trace.x.mean(axis=1)
             y = float(np.interp(time, trace.t, mean))
-            marks += ax.plot([time, time], [y, top], color=colour, zorder=6, **look, **dashes)
+            marks += ax.plot([place, place], [y, top], color=colour, zorder=6, **look, **dashes)
     return marks
+
+
+def apart(times: Sequence[float], least: float) -> list[float]:
+    """Return places of marks at these times, s: later ones stand later where they are less than
+    `least` s apart.
+    """
+    order = sorted(range(len(times)), key=times.__getitem__)
+    places = list(times)
+    for before, after in itertools.pairwise(order):
+        lacking = least - (places[after] - places[before])
+        if 0.0 < lacking < np.inf:
+            places[after] += lacking
+    return places
 
 
 def tell_swing(lane: Axes, trace: Trace, colour: str, factor: float) -> None:

@@ -48,7 +48,6 @@ LABELS = {SETTLES: "share of settled runs", OBJECTIVE: "J on unseen runs"}
 MIN_TIMES = 1.03  # least lead of a law below the floor that is printed; chosen
 MAX_LEAD = 0.995  # that may be said to show; chosen
 MAX_NAMED = 8  # conditions that a verdict names; chosen
-ALLOWED = "with an allowance for the physics step and for trends"
 ALONE = "is not shown to beat every rival, and none is shown to beat it"
 LEVEL_WORDS = f"are level within {100 * LEVEL_SHARE:g} %"
 # as far as these runs go: a share's interval is wider than 10 %
@@ -61,8 +60,8 @@ MEDIANS = (
     f"A cell has a median, or for settled runs their share, and its {100 * LEVEL:g} % interval."
 )
 BELOW = (
-    "'below': the median is below the number beside the word, the floor. Values below the floor "
-    "count as equal."
+    "'below': the median is below the number after this word, which is called the floor. Values "
+    "below the floor count as equal."
 )
 TESTED = (
     f"a paired test at {100 * BEST_ERROR:g} %, corrected as if there were {RIVALS} rivals, or "
@@ -111,7 +110,7 @@ UNDER = {
     "settled runs": "Settled runs are given as a share, not as a median. "
     + MEANINGS["settled runs"],
     "default": "Default gains are those of the law's own file.",
-    "yours": "Gains marked yours were given by the authors.",
+    "given": "Gains marked given are the authors' own choice.",
     "strong=True": f"Bold: may be the best: no other law is shown to be better ({TESTED}). A law "
     "without bold is not always shown to be worse.",
     "below ": "Below a floor (of noise, resolution, or a small share of the start or of u_max): "
@@ -144,16 +143,17 @@ class Lead(NamedTuple):
     rival: str
     effect: Effect
     floor: str = ""  # in words, if the law is below it and the rival is not, else ""
+    unit: str = "runs"  # what values are of
     lacking: str = ""  # how many runs of the rival have no value, such as "5 of 24"
 
     @property
     def words(self) -> str:
         """What is said of the law's value, such as "0.88 times pid's (0.84 to 0.92), and it is
         ahead of pid in 24 of 24 runs"; "below the floor of 0.01 rad, and it is ahead of pid in 20
-        of 24 runs; pid's median is 1.3 times the floor, ...".
+        of 24 runs; pid's median is at least 1.3 times the floor".
         """
         share = f"{self.effect.ahead} of {self.effect.samples}"
-        units = "sets of gains" if self.effect.sets else "runs"
+        units = "sets of gains" if self.effect.sets else self.unit
         among = "with" if self.effect.sets else "in"
         ahead = f"and it is ahead of {self.rival} {among} {share} {units}"
         if self.lacking:
@@ -162,8 +162,8 @@ class Lead(NamedTuple):
             least = 1.0 / self.effect.high
             if least < MIN_TIMES:
                 return f"below the floor of {self.floor}, unlike {self.rival}'s"
-            text = f"below the floor of {self.floor}, {ahead}; {self.rival}'s median is"
-            return f"{text} {number(least)} times the floor, {ALLOWED}"
+            text = f"below the floor of {self.floor}, {ahead}; {self.rival}'s median is at least"
+            return f"{text} {number(least)} times the floor"
         ratio, low, high = map(number, self.effect[:3])
         text = f"{ratio} times {self.rival}'s ({low} to {high})"
         if not self.effect.ahead:
@@ -800,7 +800,9 @@ def key(boards: Sequence[Board], tables: str) -> list[str]:
         "and conditions compared; over several metrics together it may be as large as the sum of "
         "these probabilities. A verdict gives the winner's least lead over its rivals: the ratio "
         f"in paired runs with a {100 * LEVEL:g} % interval. It differs from that of the medians. "
-        "A law is ahead if it is better by more than "
+        "If of the two only the winner is below the floor, the verdict says how many times the "
+        "floor the rival's median is at least, after what half the physics step and a trend may "
+        "change. A law is ahead if it is better by more than "
         f"{100 * boards[0].relevant:g} % of the larger value."
     )
     if any(board.by_step for board in boards):

@@ -19,6 +19,7 @@ from smc_mujoco.analysis.bootstrap import Interval, median_of, share_interval
 from smc_mujoco.analysis.paired_runs import (
     EPS,
     OBJECTIVE,
+    OF_J,
     SETTLES,
     UNITS,
     RunColumns,
@@ -205,7 +206,7 @@ def objective_boards(
                 metric=OBJECTIVE,
                 unit=UNITS[OBJECTIVE],
                 entries=_entries(comparison, sets, sources[plant]),
-                blocks=(_block((plant, "unseen runs"), seeds, comparison, 0, untuned, ""),),
+                blocks=(_block((plant, "unseen runs"), seeds, comparison, 0, untuned, "", OF_J),),
                 family=_family(compared.values()),
                 relevant=relevant,
                 by_step=False,
@@ -314,8 +315,11 @@ def _block(
     at: int,
     untuned: Names,
     floor: str,
+    unit: str = "runs",
 ) -> Block:
-    """Return block `at` of a comparison, with its plant and condition and the number of seeds."""
+    """Return block `at` of a comparison, with its plant and condition, the number of seeds, and
+    what values are of.
+    """
     laws = np.array(comparison.laws)
     sets = comparison.sets[:, at]
     by_step = {}
@@ -357,7 +361,7 @@ def _block(
         away=tuple(laws[away].tolist()),
         worse=tuple(laws[comparison.worse[:, at]].tolist()),
         ahead=winner,
-        lead=_lead(comparison, at, ranked, floor),
+        lead=_lead(comparison, at, ranked, floor, unit),
         level=bool(comparison.level[at][np.ix_(best, best)].all()),
         resolves=_resolves(comparison, at, unbeaten),
         by_step=by_step,
@@ -371,7 +375,9 @@ def _block(
     )
 
 
-def _lead(comparison: Comparison, at: int, order: Sequence[str], floor: str) -> Lead | None:
+def _lead(
+    comparison: Comparison, at: int, order: Sequence[str], floor: str, unit: str
+) -> Lead | None:
     """Return the least lead of the law in front of a block, which comes first in `order`, over its
     rivals.
     """
@@ -391,7 +397,7 @@ def _lead(comparison: Comparison, at: int, order: Sequence[str], floor: str) -> 
     lost = ""
     if lacking[b]:
         lost = f"{lacking[b]} of {comparison.seeds[at]}"
-    return Lead(first, rival, effect, floor if effect.below else "", lost)
+    return Lead(first, rival, effect, floor if effect.below else "", unit, lost)
 
 
 def _resolves(comparison: Comparison, at: int, unbeaten: Sequence[str]) -> float:

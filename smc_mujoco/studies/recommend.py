@@ -333,8 +333,9 @@ def _assumed(trial: Trial, plant: Plant, goal: Objective) -> str:
             )
             if condition.name not in asked:
                 parts[-1] += (
-                    f". None of your conditions has noise, so one named {condition.name} was "
-                    "added: to replace it, give a condition with noise=Noise(...)"
+                    f". None of your conditions has noise, so a further one, called "
+                    f"{condition.name!r}, was added: to replace it, give a condition with "
+                    "noise=Noise(...)"
                 )
     return "; ".join(parts)
 

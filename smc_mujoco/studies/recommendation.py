@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smc_mujoco.analysis.paired_runs import SETTLES, values
+from smc_mujoco.analysis.paired_runs import OF_J, SETTLES, values
 from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.signed_rank import min_p
 from smc_mujoco.analysis.step_halving import UNTRIED
@@ -47,9 +47,9 @@ LEANS = (
 TOLERATED = {  # kind of a margin -> what is tolerated, at a level
     "delay": "a delay of {}",
     "friction": "dry friction of {}",
-    "disturbance": "a constant disturbance of {} in either direction",
+    "disturbance": "a constant disturbance, in its worse direction, of {}",
     "mass": "a mass of {} the nominal one",
-    "blow": "a blow, halfway through the run, of {} in either direction",
+    "blow": "a blow, halfway through the run in its worse direction, of {}",
 }
 RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
 
@@ -252,7 +252,8 @@ class RaceRecommendation(Recommendation):
             usual = sum(law in gain_sets.COMPARED for law in self.untried_laws)
             cure = "; name some by laws= (--law)"
             if usual:
-                cure = f"; if you leave out laws= (--law), the {usual} usual ones are tried as well"
+                others += f", {usual} of them usual ones"
+                cure = "; without laws= (--law) all usual ones are tried"
             lines.append(f"Not tried here: {others}{cure}")
         lines.append(f"Second: {self.second or 'none'}")
         gains = [f"Gains: {self.law}{self._unit}, {self.law.source}"]
@@ -281,7 +282,7 @@ class RaceRecommendation(Recommendation):
             words.append(f"which settled in {done} of {of} runs")
         text = ", ".join(words)
         if self.together and self.together[0] < RELIABLE * self.together[1]:
-            text += f"; {self._at_once(self.together)} settled"
+            text += f". But {self._at_once(self.together)} settled"
         ahead = self._lowest
         if ahead and ahead != self.law.name:
             name, done, of = self._least_settled(ahead)
@@ -642,8 +643,8 @@ def _lead(comparison: Comparison, first: str, rival: str) -> str:
     effect = comparison.effect(0, first, rival)
     lost = dict(zip(comparison.laws, comparison.away[:, 0].sum(axis=1).tolist(), strict=True))
     if not lost[first] and not lost[rival]:
-        return Lead(first, rival, effect).words
-    what = "sets of gains" if effect.sets else "runs"
+        return Lead(first, rival, effect, unit=OF_J).words
+    what = "sets of gains" if effect.sets else OF_J
     return (
         f"lower than {rival}'s in {effect.ahead} of {effect.samples} {what}, of which "
         f"{lost[first]} of {first} and {lost[rival]} of {rival} fail"
@@ -674,7 +675,7 @@ def _verdict(comparison: Comparison, order: Sequence[str]) -> str:
         return f"open: {best[0]} {ALONE}; its J is {lead}"
     samples = effects[rival].samples
     if min_p(samples) > comparison.limit:
-        units = "sets of gains" if effects[rival].sets else "runs"
+        units = "sets of gains" if effects[rival].sets else OF_J
         can = f"{samples} {units} can rule out none of {joined(best)}"
         return f"open, as {can}; J of {first} is {lead}"
     either = f"either {best[0]} or {best[1]}" if len(best) == 2 else f"any of {joined(best)}"

@@ -719,7 +719,7 @@ BELOW = [  # factors of q of laws a, b and c, the winner, and what is said
         (0.5, 4.0, 5.0),
         "a",
         "a wins, for these gains; its value is below the floor of {q}, and it is ahead of b in "
-        "12 of 12 runs; b's median is 4.",
+        "12 of 12 runs; b's median is at least 4.",
     ),
     ((2.0, 3.0), "a", "a wins, for these gains; its value is 0.6"),
     ((2.0, 2.0), None, "level within 10 %"),

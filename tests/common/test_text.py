@@ -35,7 +35,7 @@ TABLE = Tabular(
     headings=["law", "gains", "ITAE (m s^2)", "bound (m)", "time until it rests (s)"],
     rows=[
         [
-            Cell("pid", "yours"),
+            Cell("pid", "given"),
             "kp=3_0",
             Cell("1.2e-4", "1.1–1.3", strong=True),
             "3 %",
@@ -83,7 +83,7 @@ def test_a_table_fits_into_a_width_with_all_its_words_marks_and_notes(width):
         "Laws&gains",
         "law",
         "pid",
-        "yours",
+        "given",
         "1.2e-4",
         "3%",
         "never",

@@ -78,7 +78,7 @@ def test_a_text_is_its_law(files, text, name, gains):
     law = smc.law(text)
     assert law.name == name
     assert {each: law.gains[each] for each in gains} == gains
-    assert law.source.kind == ("yours" if "(" in text else "default" if law.gains else "none")
+    assert law.source.kind == ("given" if "(" in text else "default" if law.gains else "none")
 
 
 SHIPPED = scenario_json.describe(

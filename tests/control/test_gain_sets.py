@@ -62,7 +62,7 @@ def test_a_law_by_its_name_alone_has_its_shipped_gains_or_says_that_it_has_its_d
     assert by_name.law.source.kind == "shipped"
     own = smc.law("pid", plant="duffing", kp=50.0)
     assert own.gains == dict(shipped.gains) | {"kp": 50.0}
-    assert own.source.kind == "yours"
+    assert own.source.kind == "given"
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for given in (smc.law("pid"), smc.law("pid").template, "pid(kp=9)"):

@@ -31,7 +31,7 @@ def sets(name=LAW):
         "default": smc.law(name),
         "shipped": gain_sets.law(PLANT, name, "tuned"),
         "study": gain_sets.law(PLANT, name, "study"),
-        "yours": smc.law(name, k1=2.0),
+        "given": smc.law(name, k1=2.0),
     }
 
 
@@ -40,9 +40,9 @@ def test_a_law_is_the_users_only_with_gains_of_the_user():
         law.source.kind for law in (my_law(), my_law(k=2.0), smc.law("pid"), smc.law("pid", kp=9.0))
     ] == [
         "default",
-        "yours",
+        "given",
         "default",
-        "yours",
+        "given",
     ]
     assert smc.Scenario(plant=PLANT, law=my_law).law.source.kind == "default"
     assert smc.law("none").source.kind == "none"
@@ -131,7 +131,7 @@ def words(figure):
 def test_replaced_gains_are_the_users():
     for law in sets().values():
         changed = dataclasses.replace(law, gains={**law.gains, "k1": 7.5})
-        assert changed.source.kind == "yours"
+        assert changed.source.kind == "given"
         assert changed.source.search is None
 
 
@@ -147,7 +147,7 @@ def test_gains_by_channel_are_of_their_common_source():
         ]
     )
     assert both.source.kind == both.of_channel(1).source.kind == "shipped"
-    assert by_channel([default, shipped]).source.kind == "yours"
+    assert by_channel([default, shipped]).source.kind == "given"
     assert by_channel([smc.law("classical"), default]).source.kind == "default"
 
 
@@ -175,3 +175,7 @@ def test_the_gains_of_one_law_are_told_with_their_search_and_of_several_by_their
         "c": [smc.law("none").source],
     }
     assert source.in_words(others) == "gains: shipped for a, default for b"
+
+
+def test_files_in_which_given_gains_were_called_yours_can_still_be_read():
+    assert source.restore({"kind": "yours", "search": None}).kind == "given"

@@ -738,13 +738,13 @@ def test_errors_too_small_to_draw_are_at_a_least_one_and_the_axis_says_so(one):
 
 
 def test_where_gains_come_from_is_a_sentence_beside_the_title_or_in_the_key(one):
-    """It was "gains: yours, yours, default, yours"."""
+    """It was "gains: given, given, default, given"."""
     own = dataclasses.replace(one.scenario, law=smc.law(one.scenario.law.name, k=3.0))
     runs = [one, *[dataclasses.replace(one, scenario=own)] * 2]
     for names in (["a", "b", "c"], ["that with default gains", "another relay", "a third relay"]):
         page = figure(runs, labels=names)
         first, *others = names
-        words = f"gains: default for {first}, yours for {' and '.join(others)}"
+        words = f"gains: default for {first}, given for {' and '.join(others)}"
         beside = [text.get_text() for text in page.artists if isinstance(text, Text)]
         key = str(page.get_label())
         assert (words in beside) == (words not in key) == (first == "a")

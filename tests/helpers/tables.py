@@ -17,7 +17,7 @@ TEXTS = {
     "trends": None,
     "arrived": True,
     "touched": None,
-    "source": "yours",
+    "source": "given",
     "search": None,
     "scenario": '{"plant": {}}',
 }

@@ -53,7 +53,7 @@ def test_a_scenario_shows_what_it_was_given():
     assert cells(GIVEN) == {
         "plant": "inverted_pendulum (m = 0.5, l = 0.5, b = 0.02, grav = 9.81)",
         "law": "classical(k=2, c=3)",
-        "gains": "yours",
+        "gains": "given",
         "duration": "0.2",
         "x0": "(0.3,)",
         "noise": "Noise(position=0.01, velocity=0.05)",

@@ -60,7 +60,7 @@ def cells_of_html(boards: Boards) -> dict[str, list[str]]:
     for row in ElementTree.fromstring(f"<div>{text}</div>").iter("tr"):
         name, *cells = [" ".join(cell.itertext()) for cell in row]
         if cells:
-            rows[name.removesuffix(" yours")] = cells
+            rows[name.removesuffix(" given")] = cells
     del rows["law"]
     return rows
 
@@ -131,7 +131,7 @@ def test_html_and_latex_have_the_numbers_of_the_text(boards):
             lines.append(re.split(r"(?<!\\) & ", line.removesuffix(r" \\")))
         name, *rest = zip(*lines, strict=True)
         latex[name[0]] = rest
-        assert name[1] == r"\footnotesize yours"
+        assert name[1] == r"\footnotesize given"
     assert list(html) == ["third", EVIL, "second"]
     escaped = r"50 \% \& $<$b$>$x\_1\textasciicircum{}\{2\}$<$/b$>$ \textbackslash{} $\lambda$ = 2"
     assert list(latex)[1].startswith(escaped)
@@ -374,7 +374,7 @@ def test_what_latex_says_of_all_tables_stands_below_the_last_one_only():
     assert first.under == ["third wins: ITAE."]
     wins, key = last.under
     assert wins == "third wins: ITAE."
-    for word in ("", "yours", "ITAE", "strong=True", "at half"):  # a step of the first one
+    for word in ("", "given", "ITAE", "strong=True", "at half"):  # a step of the first one
         assert key.count(UNDER[word]) == 1
     assert "(a):~" in first.to_latex()
     assert "(a):~" not in last.to_latex()

@@ -83,7 +83,7 @@ def kinds(found, plant="duffing"):
 
 
 def test_every_law_has_given_shipped_or_tuned_gains_and_its_table_says_which(found):
-    wanted = {"my_law": "tuned here", "classical": "shipped", "pid": "yours"}
+    wanted = {"my_law": "tuned here", "classical": "shipped", "pid": "given"}
     for plant in PLANTS:
         assert kinds(found, plant) == wanted
     mine = [found.gains[plant]["my_law"].gains for plant in PLANTS]
@@ -157,10 +157,10 @@ def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
     (row,) = frame.query("plant == 'duffing' and condition == 'encoder'").itertuples()
     (entry,) = [entry for entry in boards[3].entries if entry.law == "pid"]
     assert row.unit == "m s^2"
-    assert (row.median, row.low, row.high, row.gains) == (*entry.interval[:3], "yours")
+    assert (row.median, row.low, row.high, row.gains) == (*entry.interval[:3], "given")
     last = found.leaderboard.tables[-1]
     rows = last.to_latex().partition("\nPID & ")[2].splitlines()
-    assert rows[1].startswith(r"\footnotesize yours & ")
+    assert rows[1].startswith(r"\footnotesize given & ")
     assert f"{UNDER['shipped']} {UNDER['tuned here']}" in last.under[-1]
     assert found.to_latex().count(UNDER["ITAE"]) == 2  # once as a comment, and once in print
     assert found.to_latex().count(r"\begin{tabular}") == 6  # J on each plant, too

@@ -58,10 +58,10 @@ def test_boards_print_the_sources(folder):
     for printed in (repr(boards), boards._repr_html_(), boards.to_latex()):
         words = " ".join(printed.split())  # lines of a terminal may end anywhere
         assert "default for slow" in words
-        assert "yours for fast" in words
+        assert "given for fast" in words
     _, _, row = boards.to_latex().partition("\nslow & ")
     assert row.splitlines()[1].startswith(r"\footnotesize default & ")
-    for sentence in (UNDER["default"], UNDER["yours"]):
+    for sentence in (UNDER["default"], UNDER["given"]):
         assert sentence in boards.tables[0].under[-1]
 
 
@@ -75,7 +75,7 @@ def test_equal_gains_are_one_run_and_the_table_has_the_source_of_this_study(fold
     ]
     table = smc.Table.read(folder)
     assert dict(zip(table.column("law"), table.column("source"), strict=True)) == {
-        "fast": "yours",
+        "fast": "given",
         "slow": "default",
     }
     assert table.scenario(16).law.source.kind == "default"
@@ -115,9 +115,9 @@ def test_figures_and_films_say_whose_gains_are_drawn():
     drawn = []
     for label in smc.figure(mixed).legends[0].get_texts():
         drawn.append(label.get_text())
-    assert {"fast, gains: yours", "slow, gains: default"} <= set(drawn)
-    assert [note.get_text() for note in smc.figure(alike).artists] == ["gains: yours"]
-    assert DrawnRuns.of(mixed, ["fast", "slow"]).gains == "gains: yours for fast, default for slow"
+    assert {"fast, gains: given", "slow, gains: default"} <= set(drawn)
+    assert [note.get_text() for note in smc.figure(alike).artists] == ["gains: given"]
+    assert DrawnRuns.of(mixed, ["fast", "slow"]).gains == "gains: given for fast, default for slow"
 
 
 @pytest.mark.parametrize(("size", "beside"), [(None, True), ("ieee-column", False)])
@@ -130,13 +130,13 @@ def test_labels_of_a_user_stay_and_the_sources_of_gains_are_beside_the_title_or_
     page = smc.figure(mixed, labels=labels, size=size)
     drawn = [label.get_text() for label in page.legends[0].get_texts()]
     assert drawn[:2] == labels
-    said = "gains: yours for a, default for b_c"
+    said = "gains: given for a, default for b_c"
     assert [note.get_text() for note in page.artists if note.get_text() == said] == [said] * beside
     assert (said in str(page.get_label())) == (not beside)
     untitled = smc.figure(mixed, labels=labels, size=size, title="")
-    assert "gains: yours for a, default for b_c" in str(untitled.get_label())
+    assert "gains: given for a, default for b_c" in str(untitled.get_label())
     twins = smc.figure(mixed, labels=["a", "a"])
-    assert [note.get_text() for note in twins.artists] == ["gains: yours for a 1, default for a 2"]
+    assert [note.get_text() for note in twins.artists] == ["gains: given for a 1, default for a 2"]
 
 
 def test_an_empty_title_of_medians_draws_none_and_the_key_has_the_source_of_gains(tmp_path):

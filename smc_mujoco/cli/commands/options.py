@@ -110,8 +110,9 @@ GainValues = Annotated[
 Gains = Annotated[
     str,
     typer.Option(
-        help="Set of gains: tuned (for error and variation of u), tracking (for error alone), "
-        "study (chosen for the package's first study) or default (from the law's file)."
+        help="Which of the package's gains to use: tuned (for error and variation of u), tracking "
+        "(for error alone), study (chosen for the package's first study) or default (from the "
+        "law's file)."
     ),
 ]
 Joints = Annotated[
@@ -165,7 +166,7 @@ PlantName = Annotated[
         "arm.xml:shoulder+elbow.\n\n"
         "- The goal is the keyframe named home; if there is none, the file's only keyframe, if it "
         "has a name; otherwise the model's default pose (qpos0). Add @NAME for another keyframe, "
-        "as arm.xml:elbow@up, or @ alone for the default pose.\n\n"
+        "as in arm.xml:elbow@up, or @ alone for the default pose.\n\n"
         "- The other joints are held by their own servos or motors; those without an actuator move "
         "freely. Add +locked to weld all other joints, or +file to free those that have a "
         "motor but no servo.\n\n"

@@ -61,7 +61,7 @@ Falling = Annotated[
 Minutes = Annotated[
     float | None,
     typer.Option(
-        help="Answer within so many minutes, with a film, or a picture if there is no time for a "
+        help="Answer within so many minutes, with a film, or a still if there is no time for a "
         "film. Laws are tuned and compared under the conditions asked for, and under noise if none "
         "of these has any, until one is shown to have the lowest J. Laws that could not be tuned "
         "in time are listed."
@@ -101,8 +101,8 @@ def which(
     own, tuning takes minutes for each law. --quick takes at most ten minutes for all laws together;
     on your own model it tries only the usual laws, unless --law names others, and says how many it
     did not try. With --quick or --minutes it also writes the gains, and a figure and a film of the
-    worst run; where time is short, a picture in place of the film. A stopped command resumes when
-    you start it again.
+    worst run; where time is short, a still of the machine in place of the film. A stopped command
+    resumes when you start it again.
 
     Example: smc-mujoco which duffing --condition noise,coulomb --need calm,fast
 
@@ -273,7 +273,12 @@ Searches = Annotated[
         "if you give this.",
     ),
 ]
-Worst = Annotated[bool, typer.Option("--worst", help="Also search for the worst case of each law.")]
+Worst = Annotated[
+    bool,
+    typer.Option(
+        "--worst", help="Also search for the worst case of each law, as `smc-mujoco worst` does."
+    ),
+]
 Duration = Annotated[
     float | None, typer.Option(help="Duration of a run, s; default 10, or 3 with --quick.")
 ]
@@ -292,8 +297,8 @@ Latex = Annotated[
         metavar="FILE.tex",
         help="Also write the tables as LaTeX: a tabular for each plant and condition. Put each "
         "into a float of its own. The comment above each says how to make it "
-        "narrower: then a column of 252 pt holds two metrics, or three if laws have short names. "
-        "table* holds five.",
+        "narrower: two metrics then fit a text column of 252 pt, or three if laws have short "
+        "names. Five fit table*.",
     ),
 ]
 Rig = Annotated[
@@ -356,8 +361,8 @@ def compare(
     plant are compared; --law all compares every general-purpose law.
 
     A rig is a real machine whose parameters were identified. With --rig, its parameter sets replace
-    plants and conditions. Laws use the rig's own gains; with --searches, they are tuned on the
-    parameter sets. For each metric, a line says whether one law wins on every set.
+    plants and conditions. Laws use the gains that are shipped for the rig; with --searches, they
+    are tuned on the parameter sets. For each metric, a line says whether one law wins on every set.
 
     Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition
     friction,encoder

@@ -57,7 +57,10 @@ BENT_DISTANCE = 0.35  # to the next one
 BENT_RAISE = 0.5  # by which the middle of a bent arrow is higher than the direction to the camera
 HEAD_WIDTH = 2.25  # half the width of a head, in shafts
 HEAD_LENGTH = 2.2  # in half widths
-HEAD, CUT_HEAD = 0.7, 0.5  # longest head, of its arrow, and of one with a break mark in its shaft
+FOOT_WIDTH, FOOT_LENGTH = 2.4, 0.6  # of the bar at the tail of a disturbance, in shafts
+MAX_FOOT = 0.16  # longest such bar, of its arrow
+EDGE_SHARE = 0.3  # widest edge of a hollow arrow, of its shaft
+HEAD, LESS_HEAD = 0.7, 0.5  # longest head, of its arrow, and of one with a break mark or a bar
 SUPERSAMPLING = 3  # pixels of a flat arrow for each of the picture, in both directions
 CHAIN_FACTOR = 1.6  # arrows of several pendulums are longer: they are seen from the side
 NETWORK_LENGTH = 0.72  # of the way between the outer pivots of a network, of its one arrow
@@ -97,6 +100,7 @@ class Arrow(NamedTuple):
     words: str = ""  # its value, where that is written beside it
     told: bool = False  # whether the word on its hit or blow has its value
     hollow: bool = False  # whether only its edge is in its colour
+    foot: bool = False  # whether there is a bar at its tail
 
 
 class Stamped(NamedTuple):
@@ -307,7 +311,8 @@ def along(force: Array, scale: Scale, body: str) -> Arrow:
     cut = length > MAX_BLOW
     words = f"{style.short(size)} N" if cut else ""
     shade = rgba(style.DISTURBANCE)
-    return Arrow(0.0, length, shade, way=force / size, body=body, cut=cut, words=words)
+    way = force / size
+    return Arrow(0.0, length, shade, way=way, body=body, cut=cut, words=words, foot=True)
 
 
 def rgba(colour: str, opacity: float = 1.0) -> tuple[float, ...]:
@@ -375,8 +380,8 @@ def arrows(
         if cut:
             unit = scale.units[name in ("disturbance", "reaction", "force")]
             words = f"{style.short(abs(mean) * longest)} {unit}"
-        hollow = name == "reaction"
-        drawn.append(Arrow(0.0, mean, shade, layer, size, cut=cut, words=words, hollow=hollow))
+        kind = {"hollow": name == "reaction", "foot": name == "disturbance"}
+        drawn.append(Arrow(0.0, mean, shade, layer, size, cut=cut, words=words, **kind))
         if layer == 0 and scale.control and high - low > MIN_BAR:
             drawn.append(Arrow(low, high, rgba(colour, 0.4), head=False))
     visible = []
@@ -540,9 +545,11 @@ def path(
     return place + start * out + reach * along * way, arrow.size * width
 
 
-def outline(line: Array, width: float, head: bool = True, longest: float = HEAD) -> Array:
+def outline(
+    line: Array, width: float, head: bool = True, longest: float = HEAD, foot: bool = False
+) -> Array:
     """Return the outline, (points, 2) px, of an arrow along a line (m, 2) px whose shaft is `width`
-    px wide, with a head of at most a share of its length.
+    px wide, with a head of at most a share of its length, and with a bar at its tail or without.
     """
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     way = np.append(0.0, steps.cumsum())
@@ -556,6 +563,9 @@ def outline(line: Array, width: float, head: bool = True, longest: float = HEAD)
     along = np.gradient(shaft, axis=0)
     sizes = np.linalg.norm(along, axis=1)[:, None]
     across = 0.5 * width * along[:, ::-1] * (-1, 1) / sizes
+    if foot:
+        barred = at <= min(FOOT_LENGTH * width, MAX_FOOT * way[-1])
+        across[barred] *= FOOT_WIDTH
     wing = long / HEAD_LENGTH / (0.5 * width) * across[-1]
     tip = [shaft[-1] + wing, line[-1], shaft[-1] - wing]
     back = (shaft - across)[::-1]
@@ -564,8 +574,10 @@ def outline(line: Array, width: float, head: bool = True, longest: float = HEAD)
 
 def stamp(image: Image.Image, line: Array, width: float, arrow: Arrow, rim: int = 0) -> Stamped:
     """Draw an arrow along a line, (m, 2) px, with a break mark if it is cut."""
-    edge = outline(line, width, arrow.head, CUT_HEAD if arrow.cut else HEAD)
-    paint(image, edge, arrow.rgba, rim, hollow=arrow.hollow)
+    longest = LESS_HEAD if arrow.cut or arrow.foot else HEAD
+    edge = outline(line, width, arrow.head, longest, arrow.foot)
+    inner = min(2.0 * rim, EDGE_SHARE * width) if arrow.hollow else 0.0
+    paint(image, edge, arrow.rgba, rim, inner)
     if arrow.cut:
         k = len(line) // 2  # of the shaft, whose other side is the outline's end
         sides = edge[[k, -1 - k]]
@@ -675,10 +687,10 @@ def number_places(ends: tuple[Array, Array], half: Array, most: Array, gap: floa
 
 
 def paint(
-    image: Image.Image, edge: Array, rgba: Sequence[float], rim: int = 0, hollow: bool = False
+    image: Image.Image, edge: Array, rgba: Sequence[float], rim: int = 0, inner: float = 0.0
 ) -> None:
     """Fill an outline, (points, 2) px, with smooth edges, and a rim of paper around it, px; or only
-    draw it, twice as wide as the rim, around paper.
+    an `inner` edge of so many px, around paper.
     """
     corner = np.floor(edge.min(axis=0)).astype(int) - rim
     far = np.ceil(edge.max(axis=0)).astype(int) + 1 + rim
@@ -692,10 +704,11 @@ def paint(
     if rim:
         wide = mask.filter(ImageFilter.MaxFilter(2 * rim + 1))
         image.paste(style.rgb(style.PAPER), place, wide)
-    if hollow and rim:
+    if inner:
         image.paste(style.rgb(style.PAPER), place, mask)
         mask = Image.new("L", tuple(size.tolist()))
-        ImageDraw.Draw(mask).polygon(points, outline=opaque, width=2 * SUPERSAMPLING * rim)
+        line = max(1, round(SUPERSAMPLING * inner))
+        ImageDraw.Draw(mask).polygon(points, outline=opaque, width=line)
         mask = mask.reduce(SUPERSAMPLING)
     image.paste(bytes_of(rgba), place, mask)
 

@@ -22,6 +22,7 @@ from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 
 from smc_mujoco.common.aliases import Array
+from smc_mujoco.control.source import DEFAULT
 from smc_mujoco.draw import lanes, panels, style
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw.figure import DrawnRuns
@@ -111,7 +112,7 @@ def head_lines(
 ) -> int:
     """Return the number of lines over the machines: one where the title has room beside each of
     the keys and the clock, and nothing happens to the plants, which is told there, too; without a
-    title one.
+    title one. A film of default gains always says so.
     """
     head = one_line(style.titled(title, runs.head))
     if not head:
@@ -119,7 +120,8 @@ def head_lines(
     if runs.events:
         return 2
     room = key_room(size, runs.span[1], head)
-    fits = all(style.width(" · ".join(key), letters(size)) <= room for key in keys)
+    gains = [runs.gains] if DEFAULT in runs.gains else []
+    fits = all(style.width(" · ".join([*key, *gains]), letters(size)) <= room for key in keys)
     return 1 if fits else 2
 
 

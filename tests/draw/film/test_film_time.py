@@ -12,7 +12,7 @@ from helpers.sketch import made
 from matplotlib.lines import Line2D
 
 import smc_mujoco as smc
-from smc_mujoco.draw import panels, style
+from smc_mujoco.draw import lanes, panels, style
 from smc_mujoco.draw.film import charts
 from smc_mujoco.draw.horizon import horizon
 
@@ -119,6 +119,11 @@ def test_the_dashes_over_a_mark_say_whose_it_is(page):
         expected.append(Line2D([], [], **look)._unscaled_dash_pattern)
     assert styles == expected
     assert expected[0] != expected[1]
+
+
+def test_marks_that_would_hide_each_other_stand_beside_each_other():
+    times = [1.05, np.inf, 1.0, 3.0, np.inf]
+    assert lanes.apart(times, 0.1) == pytest.approx([1.1, np.inf, 1.0, 3.0, np.inf])
 
 
 @pytest.mark.parametrize("rate", [6.0, 0.0])

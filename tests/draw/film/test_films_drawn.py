@@ -155,6 +155,9 @@ def test_words_over_machines_are_on_one_line_where_they_have_room():
     ):
         lines.append(head_lines(DrawnRuns.of([one], ["one"]), size, title, keys))
     assert lines == [1, 2, 2, 2, 1]
+    for law, count in ((smc.law("pid", kp=9.0), 1), (at_defaults("pid"), 2)):
+        runs = DrawnRuns.of([made(smc.Scenario(plant="duffing", law=law))], None)
+        assert head_lines(runs, size, "A title of middle length", [key]) == count, "told"
     tile, label = np.zeros((1, 4), int), np.array([[0, 200, 800, 240]])
     page = Sheet(DrawnRuns.of([trace], ["one"]), size, tile, label, "Duffing", key, lines=1)
     picture(page, 0.5, 0.125)

@@ -132,8 +132,8 @@ def test_the_break_of_an_arrow_is_in_its_shaft_however_short(length):
         assert not cut or 0.2 * length <= gap.mean() <= 0.3 * length
 
 
-def test_the_arrow_of_a_reaction_is_hollow():
-    """In grey it looked like the control's."""
+def test_the_arrow_of_a_reaction_is_hollow_and_that_of_a_disturbance_has_a_bar():
+    """In grey they looked like the control's."""
     line = np.linspace((10.0, 20.0), (80.0, 20.0), 40)
     for hollow in (False, True):
         image = Image.new("RGB", (100, 40), "black")
@@ -141,11 +141,18 @@ def test_the_arrow_of_a_reaction_is_hollow():
         inside, edge = image.getpixel((20, 20)), image.getpixel((20, 15))
         assert edge == arrows.bytes_of(RED)
         assert inside == (style.rgb(style.PAPER) if hollow else edge)
+    bare, barred = [arrows.outline(line, 4.0, foot=foot) for foot in (False, True)]
+    widths = [np.ptp(edge[np.abs(edge[:, 0] - 10.0) < 1.0, 1]) for edge in (bare, barred)]
+    assert widths == pytest.approx([4.0, 4.0 * arrows.FOOT_WIDTH])
     force = Envelope(np.zeros(1), *np.ones((3, 1, 1)))
     acting = dict.fromkeys(("control", "disturbance", "reaction"), force)
     scale = arrows.Scale(1.0, 1.0, 1.0, longest=1.0, full=1.0, units=("N", "N"))
     drawn = arrows.arrows(acting, 0, 0, scale, style.INK)
-    assert [arrow.hollow for arrow in drawn] == [False, False, True]
+    assert [(arrow.hollow, arrow.foot) for arrow in drawn] == [
+        (False, False),
+        (False, True),
+        (True, False),
+    ]
 
 
 @renders
