@@ -22,6 +22,7 @@ WIDTH, ROW = 5.0, 0.95  # inches: letters are read on a phone
 LEAST, MOST = 4e-5, 0.05  # ends of the axis; what is below it is marked at its lower edge
 MARKS = {"*": 7.0} | dict.fromkeys("sD^vPXo", 4.0)  # mark -> points; none like another in grey
 BEST = "Best rival at each J"
+J_IN_WORDS = "J: error and variation of u"
 
 Front = dict[float, float]  # level of J -> least error, of the start
 
@@ -112,7 +113,7 @@ def drawn(points: Sequence[dict], laws: Sequence[str]) -> Figure:
         letters = rcParams["axes.labelsize"]
         figure.supxlabel("J over the least J of all laws", fontsize=letters)
         figure.supylabel("rms error over the start", y=0.37, fontsize=letters)
-        page.set_head(figure, WIDTH, "The price of rejecting a load", key)
+        page.set_head(figure, WIDTH, "The price of rejecting a load", key, J_IN_WORDS)
     assert isinstance(figure, Figure)
     return figure
 

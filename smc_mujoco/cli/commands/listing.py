@@ -2,7 +2,7 @@
 
 import inspect
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -10,6 +10,9 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common import annexes
 from smc_mujoco.common.interrupts import delay_signals
+
+if TYPE_CHECKING:
+    from smc_mujoco.metrics.conventions import Metric
 
 CONDITIONS = "conditions"
 KINDS = ("plants", "laws", "surfaces", "estimators", "scenes", CONDITIONS, "metrics")
@@ -98,6 +101,12 @@ def list_(
     terminal.finish()
 
 
+def _about(metric: "Metric") -> str:
+    """Return a metric's summary, with its units for hinges and slides if it has one."""
+    units = dict.fromkeys(metric.unit_for(x) for x in ("rad", "m"))
+    return f"{metric.summary} [{' or '.join(units)}]".removesuffix(" []")
+
+
 def _print_all(terminal: Terminal, kind: str, plant: str | None = None) -> None:
     """Print a line about each plant, law, surface, estimator, scene and condition, about each of a
     kind, or about what has this name, which may be a metric's. Conditions are those of the plant,
@@ -127,7 +136,7 @@ def _print_all(terminal: Terminal, kind: str, plant: str | None = None) -> None:
             words = condition.brief(machine, DURATION) or "the scenario's defaults"
         conditions.append((name, words))
     lists[f"Conditions, on {machine.name} for 10 s"] = conditions
-    lists["Metrics"] = [(metric.name, metric.summary) for metric in metrics()]
+    lists["Metrics"] = [(metric.name, _about(metric)) for metric in metrics()]
     for title, rows in lists.items():
         found = rows
         if kind not in title.lower():
