@@ -500,9 +500,9 @@ def in_readme(points: Sequence[dict]) -> str:
     quiet, noisy, *smooth = tallies([point for point in points if point["draw"] is None])
     rest = without(quiet) - quiet["not ranked"]
     return (
-        "A case is one plant, period, load and J, with or without sensor noise. A law's cases are "
-        "those in which both searches found gains with at most that J, for the law and for at "
-        "least one rival. "
+        "A case is one plant, period, load and limit on J, with or without sensor noise. A law's "
+        "cases are those in which both searches found gains within the limit, for the law and for "
+        "at least one rival. "
         f"Super-twisting has {noisy['all']} cases with sensor noise: it leads the best of its "
         f"rivals `adrc`, `pd_observer`, `hodob` and `pid` in {leads(noisy)} and trails it in "
         f"{noisy['contradicted']}. It has {quiet['all']} cases without noise: it leads in "

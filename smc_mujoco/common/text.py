@@ -47,10 +47,12 @@ def _with_exponent(value: float, digits: int) -> str:
 
 
 def span(low: str, high: str) -> str:
-    """Return "1.1–1.3", the range of a median; "" where both ends are the same text, such as
-    "never", and the median says it.
+    """Return "1.1–1.3", the range of a median, or "1.1 to never"; "" where both ends are the same
+    text, such as "never", and the median says it.
     """
-    return "" if low == high else f"{low}–{high}"
+    if low == high:
+        return ""
+    return f"{low} to {high}" if high.isalpha() or " " in high else f"{low}–{high}"
 
 
 def joined(parts: Iterable[str], last_word: str = "and") -> str:

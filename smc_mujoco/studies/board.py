@@ -799,10 +799,12 @@ def key(boards: Sequence[Board], tables: str) -> list[str]:
         f"probability of any wrong winner is at most {100 * (1 - LEVEL):g} %, over all plants "
         "and conditions compared; over several metrics together it may be as large as the sum of "
         "these probabilities. A verdict gives the winner's least lead over its rivals: the ratio "
-        f"in paired runs with a {100 * LEVEL:g} % interval. It differs from that of the medians. "
-        "If of the two only the winner is below the floor, the verdict says how many times the "
-        "floor the rival's median is at least, after what half the physics step and a trend may "
-        "change. A law is ahead if it is better by more than "
+        f"in paired runs with a {100 * LEVEL:g} % interval. This ratio differs from the ratio of "
+        "the medians in the table. If the winner is below the floor and its nearest rival is not, "
+        "the verdict says how many times the floor the rival's median is, at least: first the "
+        "median is reduced by what half the physics step changes and, where it falls within the "
+        "last fifth of the run, by what it would fall in as much time again as the run. A law "
+        "is ahead if it is better by more than "
         f"{100 * boards[0].relevant:g} % of the larger value."
     )
     if any(board.by_step for board in boards):

@@ -59,9 +59,9 @@ DrawSeed = Annotated[int, Whole(low=0, high=MAX_SEED)]
 TIMES = "Computing time of each compiled law per sample, on this computer"
 TIME_HEADINGS = "plant", "law", "relative time", "median (s)", "99 % quantile (s)"
 TIME_NOTE = (
-    "Relative time is a law's median time over that of pid, which is timed anew in turn with each "
-    "law, on the same measurements, so it differs from the ratio of the medians shown. A busy "
-    "computer distorts all times: pid, timed against itself, then differs from 1."
+    "Compare laws by relative time: a law's median time over that of pid, which is timed anew in "
+    "turn with each law, on the same measurements. The medians in s are of different moments, and "
+    "a busy computer distorts them."
 )
 RUNS = "plant", "|u| at most", "starts", "control period (ms)", "duration (s)"
 SI = "Values in conditions are in N or N m, m or rad, and s."
@@ -69,11 +69,11 @@ MOST_STARTS = 3  # channels whose starts have room in a table
 GAINS = "plant", "law", "gains", "searches", "evaluations", "J spread", "best set"
 BEST_SET = (
     "Each search ends with one set of gains. 'evaluations' counts the sets that all searches of a "
-    "law tried. 'J spread' is by how much the largest J at which a search ended exceeds the "
-    "smallest, or how many times that it is. The best set is that with the smallest J. Run i uses "
-    "set i, and after the last set the first comes again. Tables show medians over all sets, and "
-    "traces are of the first. `smc-mujoco list LAW`, or list FILE.py, has the units of a law's "
-    "gains."
+    "law tried. 'J spread' is how far the largest J at which a search ended lies above the "
+    "smallest, in % of it; beyond 100 % it is told as a factor. The best set is that with the "
+    "smallest J. Run i uses set i, and after the last set the first comes again. Tables show "
+    "medians over all sets, and traces are of the first. `smc-mujoco list LAW`, or list FILE.py, "
+    "has the units of a law's gains."
 )
 
 

@@ -47,9 +47,9 @@ LEANS = (
 TOLERATED = {  # kind of a margin -> what is tolerated, at a level
     "delay": "a delay of {}",
     "friction": "dry friction of {}",
-    "disturbance": "a constant disturbance, in its worse direction, of {}",
+    "disturbance": "a constant disturbance of {} in the worse of its two directions",
     "mass": "a mass of {} the nominal one",
-    "blow": "a blow, halfway through the run in its worse direction, of {}",
+    "blow": "a blow of {} halfway through the run, in the worse of its two directions",
 }
 RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
 
@@ -227,7 +227,7 @@ class RaceRecommendation(Recommendation):
             lines.append("With the gains below: not tried, as the time was over")
         if len(self.weighs) > 1:
             lines.append(f"J of {self.law.name}: {self._weighs}")
-        lines.append(f"Scores of {self.law.name}: {self._needs}")
+        lines.append(f"Scores of {self.law.name}{self._needs}")
         if self.law.name != "none":
             lines.append(f"Without a law: {self.no_law.words}")
         lines.append(f"Assumed: {self.assumed}")
@@ -479,8 +479,8 @@ class RaceRecommendation(Recommendation):
             low, high = size(min(medians), metric), size(max(medians), metric)
             few = f" in {len(medians)} of {count} conditions" if len(medians) < count else ""
             parts.append(f"{headings[metric]} {span(low, high) or low}{few}")
-        over = ", range of the medians over the conditions asked for" if count > 1 else ""
-        return f"{joined(parts)}{over}"
+        over = ", from the lowest to the highest median over the conditions asked for"
+        return f"{over if count > 1 else ''}: {joined(parts)}"
 
     def _medians(self, metric: str) -> list[float]:
         """Return the medians of the first law's runs in a metric, one for each condition."""
@@ -511,7 +511,7 @@ class RaceRecommendation(Recommendation):
                 level += f" from the start and {self._from_other_side}"
             unit = self.worst_run.efforts[0]
             if margin.unit == unit:
-                level += f" (|u| at most {bounds_in_words(self.worst_run, unit)})"
+                level += f" (the bound on |u| is {bounds_in_words(self.worst_run, unit)})"
             parts.append(TOLERATED[margin.kind].format(level))
         where = f"under {self.beside}"
         if self.beside == "nominal":
@@ -575,7 +575,7 @@ class RaceRecommendation(Recommendation):
             f"{capital(UNTRIED)}."
         )
         cells = repr([table.rows for table in shown])
-        arrived = f"{MARKS['']} Every value ranks before 'not arrived'."
+        arrived = f"{MARKS['']} A run that has not arrived counts as worse than any value."
         words = {"below ": BELOW, "may exceed ": MARKS["may exceed "], "not arrived": arrived}
         for word, meaning in words.items():
             if word in cells:

@@ -216,10 +216,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     assert "mass under coulomb: 4 seeds" in text
     assert lines["Tolerates"].startswith("a delay of ")
     assert ". Each is applied alone, under coulomb. At these levels" in lines["Tolerates"]
-    assert (
-        " times the nominal one and a blow, halfway through the run in its worse direction, of "
-        in lines["Tolerates"]
-    )
+    assert " times the nominal one and a blow of " in lines["Tolerates"]
     kinds = {*recommend.KINDS, *recommend.KINDS_OF_POSES}
     assert kinds == recommendation_module.TOLERATED.keys()
     assert recommendation_module.BELOW not in " ".join(text.split())  # no cell has that word
@@ -297,7 +294,10 @@ def test_the_needs_are_those_of_the_tables_and_margins_at_the_end_of_their_searc
     friction = recommendation.margins[1]
     most = dataclasses.replace(friction, value=friction.searched)
     widest = dataclasses.replace(recommendation, margins=[most])
-    assert f"friction of at least {number(most.value)} N (|u| at most 9.00 N)" in widest._margins
+    assert (
+        f"friction of at least {number(most.value)} N (the bound on |u| is 9.00 N)"
+        in widest._margins
+    )
 
 
 MIXED = """<mujoco model="mixed"><worldbody>
@@ -328,7 +328,7 @@ def test_margins_from_the_side_from_which_gravity_helps_say_so(raced):
         assert said in told
     assert said not in recommendation._margins
     late = dataclasses.replace(recommendation, helped=["the slide"])._margins
-    assert "from the start and not tried from the other side (|u| at most 9.00 N)" in late
+    assert "from the start and not tried from the other side (the bound on |u| is 9.00 N)" in late
 
 
 def test_a_law_runs_under_all_conditions_at_once_unless_they_exclude_each_other(raced, tmp_path):
@@ -410,7 +410,7 @@ def test_where_motors_differ_the_bound_on_u_is_said_of_each_joint(raced):
     pair = smc.plant_from(text, ["a", "b"])
     run = smc.Scenario(plant=pair, law="pid")
     told = dataclasses.replace(recommendation, worst_run=run)._margins
-    assert "(|u| at most 9.00 N at a and 1.00 N at b)" in told
+    assert "(the bound on |u| is 9.00 N at a and 1.00 N at b)" in told
 
 
 def test_where_runs_fail_there_is_no_ratio_of_J():

@@ -97,12 +97,12 @@ def which(
     choice is.
 
     All laws that suit the plant are compared by the same rules as in smc-mujoco compare, with the
-    package's gains or with gains that are tuned now. --law names those to try. On a model of your
-    own, tuning takes minutes for each law. --quick takes at most ten minutes for all laws together;
-    on your own model it tries only the usual laws, unless --law names others, and says how many it
-    did not try. With --quick or --minutes it also writes the gains, and a figure and a film of the
-    worst run; where time is short, a still of the machine in place of the film. A stopped command
-    resumes when you start it again.
+    package's gains or with gains that are tuned now. --law names the laws to try. On a model of
+    your own, tuning takes minutes for each law. --quick takes at most ten minutes for all laws
+    together; on your own model it tries only the usual laws, unless --law names others, and says
+    how many it did not try. With --quick or --minutes it also writes the gains, and a figure and a
+    film of the worst run; where time is short, a still of the machine in place of the film. A
+    stopped command resumes when you start it again.
 
     Example: smc-mujoco which duffing --condition noise,coulomb --need calm,fast
 
