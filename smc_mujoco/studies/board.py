@@ -112,7 +112,8 @@ UNDER = {
     "default": "Default gains are those of the law's own file.",
     "given": "Gains marked given are the authors' own choice.",
     "strong=True": f"Bold: may be the best: no other law is shown to be better ({TESTED}). A law "
-    "without bold is not always shown to be worse.",
+    "without bold is not always shown to be worse. A law wins if it is shown to be better than "
+    "every other.",
     "below ": "Below a floor (of noise, resolution, or a small share of the start or of u_max): "
     "such values count as equal; where one is bold, no value above the floor is.",
     "may exceed ": "May exceed a floor: the median is below it, but need not stay there.",

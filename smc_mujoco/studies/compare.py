@@ -69,11 +69,11 @@ MOST_STARTS = 3  # channels whose starts have room in a table
 GAINS = "plant", "law", "gains", "searches", "evaluations", "J spread", "best set"
 BEST_SET = (
     "Each search ends with one set of gains. 'evaluations' counts the sets that all searches of a "
-    "law tried. 'J spread' is how far the largest J at which a search ended lies above the "
-    "smallest, in % of it; beyond 100 % it is told as a factor. The best set is that with the "
-    "smallest J. Run i uses set i, and after the last set the first comes again. Tables show "
-    "medians over all sets, and traces are of the first. `smc-mujoco list LAW`, or list FILE.py, "
-    "has the units of a law's gains."
+    f"law tried, by default at most {BUDGET} for each gain and search. 'J spread' is how far the "
+    "largest J at which a search ended lies above the smallest, in % of it; beyond 100 % it is "
+    "told as a factor. The best set is that with the smallest J. Run i uses set i, and after the "
+    "last set the first comes again. Tables show medians over all sets, and traces are of the "
+    "first. `smc-mujoco list LAW`, or list FILE.py, has the units of a law's gains."
 )
 
 

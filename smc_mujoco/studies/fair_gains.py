@@ -249,8 +249,11 @@ class Trial(NamedTuple):
                     law.name for law, found in zip(laws[name], of_plant, strict=True) if not found
                 ]
                 if asked and self.tune:
-                    which = f"{joined(asked)}, but for searches that {self.folder} has"
-                    print(f"gains to search on {name}: {which}", file=sys.stderr)
+                    kept = f"searches of these laws as they are now, which {self.folder} keeps"
+                    sentence = (
+                        f"gains to search on {name}: {joined(asked)}; {kept}, are not repeated"
+                    )
+                    print(sentence, file=sys.stderr)
         by_plant: dict[str, list[Candidate]] = {}
         for plant in self.plants:
             by_plant[plant.name] = []

@@ -227,7 +227,10 @@ def test_what_cannot_be_ranked_is_said_before_laws_are_tuned(monkeypatch, capsys
 
     monkeypatch.setattr(Trial, "search_gains", lambda *given: capsys.readouterr().err)
     for usual, words in (
-        (12, "gains to search on duffing: mine and mine, but for searches that gains has\n"),
+        (
+            12,
+            "gains to search on duffing: mine and mine; searches of these laws as they are now, which gains keeps, are not repeated\n",
+        ),
         (5, "5 sets of gains or runs cannot rank 2 laws in 1 condition; 6"),
     ):
         asked = trial(Path("gains"), [DUFFING], usual=usual)._replace(
@@ -236,7 +239,7 @@ def test_what_cannot_be_ranked_is_said_before_laws_are_tuned(monkeypatch, capsys
         (said, _) = asked.candidates({"duffing": [mine, mine]}, 12)["duffing"]
         assert said.startswith(words)
         assert said.endswith(
-            "gains to search on duffing: mine and mine, but for searches that gains has\n"
+            "gains to search on duffing: mine and mine; searches of these laws as they are now, which gains keeps, are not repeated\n"
         )
 
 
