@@ -91,6 +91,14 @@ class Panel(NamedTuple):
     group: ChannelGroup
     traces: Sequence[Trace]  # of these channels alone
     channel: int | None = None  # of a small panel
+    whole: Sequence[Trace] = ()  # of all channels of the group, where one is shown
+
+    def band(self, trace: Trace) -> float:
+        """Return the settling band of one of its traces, which is that of the group, as in
+        scores.
+        """
+        of_group = [one for one in self.whole if one.scenario is trace.scenario]
+        return settling_band(trace.scenario, scale([*of_group, trace][0]))
 
     @property
     def scale(self) -> tuple[float, str]:
@@ -261,7 +269,7 @@ def by_channel(panel: Panel) -> list[Panel]:
         traces = [group_trace(trace, within) for trace in panel.traces]
         effort = panel.traces[0].scenario.efforts[channel]
         group = dataclasses.replace(panel.group, channels=(channel,), effort=effort)
-        one = Panel(panel.quantity, group, traces, channel)
+        one = Panel(panel.quantity, group, traces, channel, panel.traces)
         panels.append(one)
     return panels
 
@@ -590,7 +598,7 @@ def target(ax: Axes, panel: Panel) -> None:
     for trace, times, values in references(panel.traces):
         drawn_values = values if panel.quantity == "x" else 0.0 * values
         t, r = line(times, drawn_values, 2)
-        half = settling_band(trace.scenario, scale(trace))
+        half = panel.band(trace)
         if not (r - half < bottom).all() or not (r + half > top).all():  # else it is the background
             ax.fill_between(t, r - half, r + half, color=style.BAND, lw=0, zorder=1)
         look = {"lw": style.points(0.8), "ls": DASHES, "zorder": 3, "gid": REFERENCE}

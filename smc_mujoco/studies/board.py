@@ -802,9 +802,10 @@ def key(boards: Sequence[Board], tables: str) -> list[str]:
         "these probabilities. A verdict gives the winner's least lead over its rivals: the ratio "
         f"in paired runs with a {100 * LEVEL:g} % interval. This ratio differs from the ratio of "
         "the medians in the table. If the winner is below the floor and its nearest rival is not, "
-        "the verdict says how many times the floor the rival's median is, at least: first the "
-        "median is reduced by what half the physics step changes and, where it falls within the "
-        "last fifth of the run, by what it would fall in as much time again as the run. A law "
+        "the verdict has a lower limit on how many times the floor the rival's median is: the "
+        "median is first reduced by the amount that it changes with half the physics step and, if "
+        "it still decreases in the last fifth of the run, by the decrease that would follow if "
+        "the run lasted twice as long. A law "
         "is ahead if it is better by more than "
         f"{100 * boards[0].relevant:g} % of the larger value."
     )

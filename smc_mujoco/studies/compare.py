@@ -59,9 +59,10 @@ DrawSeed = Annotated[int, Whole(low=0, high=MAX_SEED)]
 TIMES = "Computing time of each compiled law per sample, on this computer"
 TIME_HEADINGS = "plant", "law", "relative time", "median (s)", "99 % quantile (s)"
 TIME_NOTE = (
-    "Compare laws by relative time: a law's median time over that of pid, which is timed anew in "
-    "turn with each law, on the same measurements. The medians in s are of different moments, and "
-    "a busy computer distorts them."
+    "Compare laws by relative time: a law's median time divided by that of pid, which is timed "
+    "again for each law, alternating with it, both with the same samples of the sensors. The "
+    "medians in seconds were taken at different times, so a busy computer distorts how they "
+    "compare."
 )
 RUNS = "plant", "|u| at most", "starts", "control period (ms)", "duration (s)"
 SI = "Values in conditions are in N or N m, m or rad, and s."

@@ -336,8 +336,16 @@ class RaceRecommendation(Recommendation):
         last = "settles last" if self.settles[self.law.name] == 1.0 else "settles last or never"
         return (
             f"a run of {self.law.name} under {self.worst_run.condition}{self._worst_condition}. Of "
-            f"its runs there, this one {last}"
+            f"its runs there, this one {last}{self._not_shown}"
         )
+
+    @property
+    def _not_shown(self) -> str:
+        """That runs with all conditions at once are not among those of which one is shown, where
+        some of them do not settle.
+        """
+        done, of = self.together or (0, 0)
+        return ". Of the runs with all conditions at once none is shown" if done < of else ""
 
     @property
     def _worst_condition(self) -> str:
@@ -570,12 +578,15 @@ class RaceRecommendation(Recommendation):
                 "laws."
             )
         notes.append(
-            f"{MEDIANS} All runs of a law in the tables by condition have one set of gains. These "
-            "tables show no significance tests; those are below. "
+            f"{MEDIANS} {MARKS['settled runs']} All runs of a law in the tables by condition have "
+            "one set of gains. These tables show no significance tests; those are below. "
             f"{capital(UNTRIED)}."
         )
         cells = repr([table.rows for table in shown])
-        arrived = f"{MARKS['']} A run that has not arrived counts as worse than any value."
+        arrived = (
+            f"{MARKS['']} In metrics of u, such as TV rate, a run that has not arrived counts as "
+            "worse than any value."
+        )
         words = {"below ": BELOW, "may exceed ": MARKS["may exceed "], "not arrived": arrived}
         for word, meaning in words.items():
             if word in cells:
@@ -586,20 +597,21 @@ class RaceRecommendation(Recommendation):
     @property
     def _objectives(self) -> Tabular:
         """The table of J of each law's sets of gains."""
+        entrants = self.race.entrants
+        medians = {name: float(np.median(entrants[name].values)) for name in entrants}
         rows = []
-        for name in (*self.race.running, *self.race.dropped):
-            values = sorted(self.race.entrants[name].values)
-            below = values[(len(values) - 1) // 2]
-            above = values[len(values) // 2]
-            middle = _cost((below + above) / 2.0)
-            cell = Cell(middle, span(_cost(values[0]), _cost(values[-1])))
-            rows.append([name, cell, f"{len(values)}"])
+        for names in (self.race.running, self.race.dropped):
+            for name in sorted(names, key=medians.__getitem__):
+                values = entrants[name].values
+                cell = Cell(_cost(medians[name]), span(_cost(min(values)), _cost(max(values))))
+                rows.append([name, cell, f"{len(values)}"])
+        last = "; laws that were dropped come last" if self.race.dropped else ""
         return Tabular(
             headings=["law", "J (s^2)", "groups of runs"],
             rows=rows,
             title=f"J {self.judged}",
             notes=[
-                "Median and range over groups of runs that tuning has not seen. The first group "
+                f"Median and range over groups of runs that tuning has not seen{last}. The first group "
                 "uses the law's first set of gains, the second group the second set, and so on; "
                 "after the last set the first comes again. J is the time-weighted relative error "
                 "plus the weighted variation of u, added up over the conditions."
@@ -666,7 +678,8 @@ def _verdict(comparison: Comparison, order: Sequence[str]) -> str:
     at = comparison.laws.index(first), comparison.laws.index(rival)
     p = number(float(comparison.p[0][at]), 2)
     least = f"{100 * comparison.relevant:g} %"
-    lead = f"{_lead(comparison, first, rival)} (p {p} for a lead above {least})"
+    needs = "" if winner else f"; a winner needs at most {number(comparison.winning, 2)}"
+    lead = f"{_lead(comparison, first, rival)} (p {p} for a lead above {least}{needs})"
     if winner:
         return f"{winner} wins; its J is {lead}"
     beaten = dict(zip(comparison.laws, comparison.worse[:, 0], strict=True))

@@ -382,6 +382,16 @@ def test_the_settling_band_is_two_percent_around_the_reference():
     assert (low, high) == pytest.approx((traces[0].r.min() - half, traces[0].r.max() + half))
 
 
+def test_every_joint_has_the_band_of_the_score_that_of_the_largest_error_at_the_start():
+    """A joint near its goal had a narrower one, which a settled run left."""
+    arm = smc.plant("double_pendulum")
+    run = made(smc.Scenario(plant=arm, law=at_defaults("pid"), x0=(0.5, -0.1), duration=1.0))
+    heights = []
+    for panel in panels.by_channel(panels.of_groups([run], "x")[0]):
+        heights.append(panel.band(panel.traces[0]))
+    assert heights == pytest.approx([0.02 * np.abs(run.x[0] - run.r[0]).max()] * 2)
+
+
 def test_the_worst_joints_of_many_come_first_with_their_controls_beside_them(monkeypatch):
     """The run that is far off counts, and each joint in the scale of its kind."""
     traces = arm()

@@ -171,8 +171,9 @@ PlantName = Annotated[
         "freely. Add +locked to weld all other joints, or +file to free those that have a "
         "motor but no servo.\n\n"
         "- Brackets after a joint hold its options. elbow(u_max=9,x0=0.2) sets the bound on u and "
-        "the start. (motor) puts an ideal motor in place of the file's actuator. (servo) and "
-        "(servo=false) say what the actuator is. (partner=pole) names a passive joint, such as the "
+        "the start. (motor) puts an ideal motor in place of the file's actuator. (servo) "
+        "declares that the file's actuator is a position servo, and (servo=false) that it is not; "
+        "neither changes it. (partner=pole) names a passive joint, such as the "
         "pole on a cart, whose position and velocity the law also reads. A joint with (measured) "
         "is read, not driven.",
     ),
