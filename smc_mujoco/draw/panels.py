@@ -79,6 +79,7 @@ UNBANDED = ("x", "e", *SINGLE)  # drawn sample by sample, without a mean over ti
 NO_SURFACE = ("baseline", "predictive", "feedback", "linear")  # families of laws without an s
 BETWEEN_DECADES = ((3.0,), (2.0, 5.0), (2.0, 3.0, 4.0, 5.0, 6.0, 8.0))
 DASHES = (0, (4, 4))  # of a reference's line
+BAND_OPACITY = 0.22  # of the range of one run's values, or of two runs'; chosen
 DOTS = (0, (2, 2))  # of the upright line at which something happens
 REFERENCE = "reference"  # id of a reference's lines
 HEIGHT = 2  # channel of a free body
@@ -431,6 +432,7 @@ def over_time(
     if name in ("x", "e"):
         target(ax, panel)
     looks = style.looks(traces)
+    opacity = BAND_OPACITY * min(1.0, 2.0 / len(traces))  # lines are seen through several bands
     rows = zip(traces, colours, means, looks, strict=True)
     for trace, colour, mean, look in reversed(list(rows)):
         if not np.isfinite(mean).any():  # s of a law without a surface
@@ -439,7 +441,7 @@ def over_time(
         look |= {"color": colour, "drawstyle": steps(trace, name)}
         if bands and name not in UNBANDED and (smoothed(trace) or y.shape[1] > 1):
             edges = band(trace.t, y)
-            filled = ax.fill_between(*edges, color=colour, alpha=0.22, lw=0)
+            filled = ax.fill_between(*edges, color=colour, alpha=opacity, lw=0)
             artists.append(filled)
         if y.shape[1] > 1:
             artists += channels(ax, trace, y, name, look)
