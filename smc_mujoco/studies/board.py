@@ -597,8 +597,8 @@ class Boards(Tables, list[Board]):
 def hidden(lead: float) -> str:
     """Return a sentence: the least lead that samples show, a share, and that less may be unseen."""
     if lead < MAX_LEAD:
-        return f"a lead below {100 * lead:.2g} % might not show"
-    return "even the largest lead might not show"
+        return f"a lead below {100 * lead:.2g} % might go undetected"
+    return "even the largest lead might go undetected"
 
 
 def _conditions(names: Sequence[str]) -> str:
@@ -731,7 +731,7 @@ def _wins(boards: Sequence[Board], labels: Mapping[str, str]) -> list[str]:
     if level:
         sentences.append(f"The best laws {LEVEL_WORDS}: {joined(level)}.")
     if unseen:
-        sentences.append(f"Leads below {joined(unseen)} might not show.")
+        sentences.append(f"Leads below {joined(unseen)} might go undetected.")
     return [" ".join(sentences)]
 
 
@@ -802,10 +802,10 @@ def key(boards: Sequence[Board], tables: str) -> list[str]:
         "these probabilities. A verdict gives the winner's least lead over its rivals: the ratio "
         f"in paired runs with a {100 * LEVEL:g} % interval. This ratio differs from the ratio of "
         "the medians in the table. If the winner is below the floor and its nearest rival is not, "
-        "the verdict has a lower limit on how many times the floor the rival's median is: the "
-        "median is first reduced by the amount that it changes with half the physics step and, if "
-        "it still decreases in the last fifth of the run, by the decrease that would follow if "
-        "the run lasted twice as long. A law "
+        "the verdict says that the rival's median is at least so many times the floor. This "
+        "number is cautious: the median is first reduced by as much as halving the physics step "
+        "changes it. If the rival's values still fall in the last fifth of the run, it is also "
+        "reduced by as much as they would fall in a run twice as long. A law "
         "is ahead if it is better by more than "
         f"{100 * boards[0].relevant:g} % of the larger value."
     )

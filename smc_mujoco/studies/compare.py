@@ -72,7 +72,7 @@ BEST_SET = (
     "Each search ends with one set of gains. 'evaluations' counts the sets that all searches of a "
     f"law tried, by default at most {BUDGET} for each gain and search. 'J spread' is how far the "
     "largest J at which a search ended lies above the smallest, in % of it; beyond 100 % it is "
-    "told as a factor. The best set is that with the smallest J. Run i uses set i, and after the "
+    "given as a factor. The best set is that with the smallest J. Run i uses set i, and after the "
     "last set the first comes again. Tables show medians over all sets, and traces are of the "
     "first. `smc-mujoco list LAW`, or list FILE.py, has the units of a law's gains."
 )

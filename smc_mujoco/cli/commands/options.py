@@ -202,7 +202,9 @@ SceneName = Annotated[
 Threads = Annotated[
     int | None, typer.Option(min=1, help="Number of parallel simulations; default: one per core.")
 ]
-Device = Annotated[str, typer.Option(help="Where searches run: cpu, or cuda for an NVIDIA card.")]
+Device = Annotated[
+    str, typer.Option(help="Where runs of searches are computed: cpu, or cuda for an NVIDIA card.")
+]
 Executor = Annotated[
     str | None,
     typer.Option(

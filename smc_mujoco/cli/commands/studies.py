@@ -63,8 +63,8 @@ Minutes = Annotated[
     typer.Option(
         help="Answer within so many minutes, with a film, or a still if there is no time for a "
         "film. Laws are tuned and compared under the conditions asked for, and under noise if none "
-        "of these has any, until one is shown to have the lowest J. Laws that could not be tuned "
-        "in time are listed."
+        "of these has any, until one law is shown to have the lowest J. Laws that could not be "
+        "tuned in time are listed."
     ),
 ]
 Film = Annotated[
@@ -354,8 +354,8 @@ def compare(
     Gains that you give in brackets are used as they are. Otherwise a law of the package uses the
     gains that are shipped for the plant. If there are none, or if the law is from your own file,
     it is tuned by one rule, the same for all laws. This takes seconds to minutes for each
-    law and plant. The default values in your file are used only if you give --no-tune, or --gains
-    default, study or tracking, or if the law cannot be tuned.
+    law and plant. The default values in your file are used only with --no-tune, if the law cannot
+    be tuned, or with any --gains but tuned: the package has no such gains for your law.
 
     A stopped command resumes when you start it again. Without --law, the usual laws that suit the
     plant are compared; --law all compares every general-purpose law.
