@@ -356,6 +356,8 @@ def test_a_law_runs_under_all_conditions_at_once_unless_they_exclude_each_other(
         told = dataclasses.replace(recommendation, together=counts).answer
         assert f"at once, {words} of 14 further runs settle. The search for gains" in str(told)
         assert told[0] == f"Use: {recommendation.law.name}{first}"
+        shown = dataclasses.replace(recommendation, together=counts).worst_words
+        assert shown.endswith("with all conditions at once none is shown") == bool(first)
 
 
 def test_velocities_that_are_not_measured_and_gains_at_an_end_of_their_search_are_told(
@@ -434,6 +436,7 @@ def test_too_few_sets_to_rule_out_a_law_do_not_say_that_each_may_be_the_best():
         said = recommendation_module._verdict(Comparison(J, rivals=1), [*J])
         assert said.startswith("open, as 7 groups of runs can rule out none of law0, ") == few
         assert said.startswith("open, as either law0 or law1 may have the lowest J") != few
+        assert said.endswith(" for a lead above 3 %; a winner needs at most 0.025)")
 
 
 def test_where_no_test_names_a_law_the_first_line_says_so(raced):
