@@ -803,9 +803,9 @@ def key(boards: Sequence[Board], tables: str) -> list[str]:
         f"in paired runs with a {100 * LEVEL:g} % interval. This ratio differs from the ratio of "
         "the medians in the table. If the winner is below the floor and its nearest rival is not, "
         "the verdict says that the rival's median is at least so many times the floor. This "
-        "number is cautious: the median is first reduced by as much as halving the physics step "
-        "changes it. If the rival's values still fall in the last fifth of the run, it is also "
-        "reduced by as much as they would fall in a run twice as long. A law "
+        "number is cautious: the change that a physics step of half the size makes is first "
+        "subtracted from the median. If the rival's values are still decreasing during the last "
+        "fifth of the run, so is what they would decrease by in a run twice as long. A law "
         "is ahead if it is better by more than "
         f"{100 * boards[0].relevant:g} % of the larger value."
     )

@@ -328,8 +328,9 @@ def _assumed(trial: Trial, plant: Plant, goal: Objective) -> str:
         noise = condition.on(plant, goal.duration).get("noise")
         if isinstance(noise, Noise):
             parts.append(
-                f"under {condition.name} positions have a noise of {noise.position:g} {units} and "
-                f"velocities of {noise.velocity:g} {units}/s (standard deviations)"
+                f"under {condition.name!r} the measured positions carry noise of "
+                f"{noise.position:g} {units} and the measured velocities noise of "
+                f"{noise.velocity:g} {units}/s (standard deviations)"
             )
             if condition.name not in asked:
                 parts[-1] += (

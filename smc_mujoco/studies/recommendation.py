@@ -579,7 +579,8 @@ class RaceRecommendation(Recommendation):
             )
         notes.append(
             f"{MEDIANS} {MARKS['settled runs']} All runs of a law in the tables by condition have "
-            "one set of gains. These tables show no significance tests; those are below. "
+            "one set of gains. The scores in these tables are not tested for significance; only J "
+            "is, below. "
             f"{capital(UNTRIED)}."
         )
         cells = repr([table.rows for table in shown])

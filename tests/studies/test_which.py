@@ -179,7 +179,10 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
         "Without a law",
     ]
     assert [*lines][:9] == [*verdicts, "Assumed", "Settles", "Tolerates"]
-    noise = "under noise positions have a noise of 0.01 m and velocities of 0.05 m/s (standard deviations)"
+    noise = (
+        "under 'noise' the measured positions carry noise of 0.01 m and the measured velocities "
+    )
+    noise += "noise of 0.05 m/s (standard deviations)"
     made = "u changes every 1 ms and is computed from measured positions and velocities, unless a "
     made += "condition says otherwise"
     assert lines["Assumed"].startswith(f"{made}; {noise}. None of your conditions has")

@@ -203,7 +203,11 @@ Threads = Annotated[
     int | None, typer.Option(min=1, help="Number of parallel simulations; default: one per core.")
 ]
 Device = Annotated[
-    str, typer.Option(help="Where runs of searches are computed: cpu, or cuda for an NVIDIA card.")
+    str,
+    typer.Option(
+        help="Where the many runs of a search, for gains or for a margin, are computed: cpu, or "
+        "cuda for an NVIDIA card."
+    ),
 ]
 Executor = Annotated[
     str | None,
@@ -218,7 +222,8 @@ X0 = Annotated[
         "--x0",
         metavar="FLOAT[,FLOAT...]",
         help="Initial joint positions, rad or m, absolute and not relative to the goal: one number "
-        "for all joints, or one for each, such as 0.3,-0.2; default: the plant's.",
+        "for all joints, or one for each, such as 0.3,-0.2; default: the plant's. Where each run "
+        "has its own start, it is drawn within 20 % of them.",
     ),
 ]
 

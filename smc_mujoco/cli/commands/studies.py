@@ -354,11 +354,13 @@ def compare(
     Gains that you give in brackets are used as they are. Otherwise a law of the package uses the
     gains that are shipped for the plant. If there are none, or if the law is from your own file,
     it is tuned by one rule, the same for all laws. This takes seconds to minutes for each
-    law and plant. The default values in your file are used only with --no-tune, if the law cannot
-    be tuned, or with any --gains but tuned: the package has no such gains for your law.
+    law and plant. The default values in your file are used in three cases only: you give --no-tune;
+    the law cannot be tuned; or you give --gains tracking, study or default, as the package ships
+    none for a law of yours.
 
     A stopped command resumes when you start it again. Without --law, the usual laws that suit the
-    plant are compared; --law all compares every general-purpose law.
+    plant are compared: common sliding-mode laws, pid, adrc, pd_observer, lqi, mpc and
+    loop_shaping. --law all compares every general-purpose law.
 
     A rig is a real machine whose parameters were identified. With --rig, its parameter sets replace
     plants and conditions. Laws use the gains that are shipped for the rig; with --searches, they
