@@ -638,7 +638,7 @@ def spread(interval: Interval, low: str, high: str) -> str:
         return ""
     if 0.0 < interval.high < LEAST_PRINTED:
         return ""
-    return f"{low}–{high}"
+    return f"{low} to {high}" if math.isinf(interval.high) else f"{low}–{high}"
 
 
 def heading(board: Board) -> str:
@@ -805,7 +805,8 @@ def key(boards: Sequence[Board], tables: str) -> list[str]:
         "the verdict says that the rival's median is at least so many times the floor. This "
         "number is cautious: the change that a physics step of half the size makes is first "
         "subtracted from the median. If the rival's values are still decreasing during the last "
-        "fifth of the run, so is what they would decrease by in a run twice as long. A law "
+        "fifth of the run, the further decrease to be expected in a run twice as long is "
+        "subtracted, too. A law "
         "is ahead if it is better by more than "
         f"{100 * boards[0].relevant:g} % of the larger value."
     )

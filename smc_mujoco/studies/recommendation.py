@@ -253,7 +253,7 @@ class RaceRecommendation(Recommendation):
             cure = "; name some by laws= (--law)"
             if usual:
                 others += f", {usual} of them usual ones"
-                cure = "; without laws= (--law) all usual ones are tried"
+                cure = "; without the option --law (laws= in Python) all usual ones are tried"
             lines.append(f"Not tried here: {others}{cure}")
         lines.append(f"Second: {self.second or 'none'}")
         gains = [f"Gains: {self.law}{self._unit}, {self.law.source}"]
@@ -578,9 +578,9 @@ class RaceRecommendation(Recommendation):
                 "laws."
             )
         notes.append(
-            f"{MEDIANS} {MARKS['settled runs']} All runs of a law in the tables by condition have "
-            "one set of gains. The scores in these tables are not tested for significance; only J "
-            "is, below. "
+            f"{MEDIANS} {MARKS['settled runs']} In the tables by condition all runs of a law have "
+            "one set of gains, those of the first two laws as printed below. The scores in these "
+            "tables are not tested for significance; only J is, below. "
             f"{capital(UNTRIED)}."
         )
         cells = repr([table.rows for table in shown])

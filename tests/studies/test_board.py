@@ -170,7 +170,7 @@ def test_a_printed_median_lies_in_its_printed_interval(values):
 
     low, median, high = values
     texts = sizes(values, "settling_time")
-    ends = spread(Interval(median, low, high, 20), texts[0], texts[2]).split("–")
+    ends = re.split("–| to ", spread(Interval(median, low, high, 20), texts[0], texts[2]))
     if any(ends):
         assert number(ends[0]) <= number(texts[1]) <= number(ends[1])
     else:

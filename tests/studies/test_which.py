@@ -192,9 +192,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     untried = recommendation.untried_laws
     assert int(lines["Not tried here"].split()[0]) == len(untried) > 20
     usual = len({*gain_sets.COMPARED} & {*untried})
-    assert (
-        f", {usual} of them usual ones; without laws= (--law) all usual" in lines["Not tried here"]
-    )
+    assert f", {usual} of them usual ones; without the option --law" in lines["Not tried here"]
     rare = [name for name in untried if name not in gain_sets.COMPARED]
     told = dataclasses.replace(recommendation, untried_laws=rare).answer
     assert f"Not tried here: {len(rare)} other laws of the package; name some by" in str(told)

@@ -222,8 +222,8 @@ X0 = Annotated[
         "--x0",
         metavar="FLOAT[,FLOAT...]",
         help="Initial joint positions, rad or m, absolute and not relative to the goal: one number "
-        "for all joints, or one for each, such as 0.3,-0.2; default: the plant's. Where each run "
-        "has its own start, it is drawn within 20 % of them.",
+        "for all joints, or one for each, such as 0.3,-0.2; default: the plant's. Each run starts "
+        "within 20 % of these; in `margins` all start at them.",
     ),
 ]
 

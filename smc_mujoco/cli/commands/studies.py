@@ -355,8 +355,8 @@ def compare(
     gains that are shipped for the plant. If there are none, or if the law is from your own file,
     it is tuned by one rule, the same for all laws. This takes seconds to minutes for each
     law and plant. The default values in your file are used in three cases only: you give --no-tune;
-    the law cannot be tuned; or you give --gains tracking, study or default, as the package ships
-    none for a law of yours.
+    the law cannot be tuned; or you give --gains default, or --gains tracking or study, which exist
+    for the package's own laws only.
 
     A stopped command resumes when you start it again. Without --law, the usual laws that suit the
     plant are compared: common sliding-mode laws, pid, adrc, pd_observer, lqi, mpc and
