@@ -113,7 +113,7 @@ class Source:
 
 def restore(data: Data) -> Source:
     """Return the source that `Source.about` wrote, without its gains."""
-    kind = data["kind"].removesuffix(MARK)
+    kind: str = data["kind"].removesuffix(MARK)
     search = data["search"] and GainSearch(**data["search"])
     outside = kind != data["kind"]
     return Source(kind=OLD_WORDS.get(kind, kind), search=search, outside=outside)

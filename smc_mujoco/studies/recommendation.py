@@ -432,6 +432,8 @@ class RaceRecommendation(Recommendation):
             text += f"; if the lead stays as it is, about {sets:.0f} sets of each law would decide"
         else:
             text += f"; such a lead usually shows with {race.looked} sets, but did not here"
+        if race.looked < LOOKS[-1] < sets < math.inf:
+            text += f", and at most {LOOKS[-1]} are made"
         if race.stopped and sets <= LOOKS[-1]:
             text += f"; the same call goes on to {LOOKS[-1]} sets"
         return text

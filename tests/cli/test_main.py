@@ -28,6 +28,7 @@ from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
 from smc_mujoco.draw.film import pace
 from smc_mujoco.metrics.catalogue import metrics, score
 from smc_mujoco.simulation import run as runs
+from smc_mujoco.simulation.grid import case
 
 LABEL = "a label that is forty characters in all."
 SCENE = f'''"""Does a user's scene run?"""
@@ -646,9 +647,9 @@ def test_a_film_of_an_answer_has_as_many_pictures_as_its_time_allows(tmp_path, m
     clock = pace.clock
     monkeypatch.setattr(pace, "clock", lambda traces, fps, speed: clock(traces, fps, 1.0))
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
-    scenario = smc.Scenario(plant="duffing", law=smc.law("pid"), duration=0.5)
+    scenario = case("duffing", smc.law("pid"), "nominal", 0.5)
     recommendation = types.SimpleNamespace(worst_trace=smc.run(scenario))
-    assert studies._worst_title(recommendation).startswith("Worst run: Duffing")
+    assert studies._worst_title(recommendation).startswith("Worst run, nominal: Duffing")
     said = []
     note = lambda text, **how: said.append(text)  # noqa: E731
     terminal = types.SimpleNamespace(note=note, wrote=said.append)

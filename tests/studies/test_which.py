@@ -529,7 +529,7 @@ def test_laws_for_which_there_is_no_time_are_named_and_the_clock_may_end_a_race_
     [
         (9.0, "about 9 sets of each law would decide; the same call goes on to 12 sets"),
         (6.4, "usually shows with 7 sets, but did not here; the same call goes on to 12 sets"),
-        (31.0, "about 31 sets of each law would decide"),
+        (31.0, "about 31 sets of each law would decide, and at most 12 are made"),
     ],
 )
 def test_an_open_race_says_how_many_sets_in_all_would_decide(raced, monkeypatch, sets, said):

@@ -195,7 +195,8 @@ def _worst_title(recommendation: "RaceRecommendation") -> str:
     """Return the title of a figure or a film of the worst run of a race's first law."""
     from smc_mujoco.draw import style
 
-    return f"Worst run: {style.head([recommendation.worst_trace.scenario])}"
+    run = recommendation.worst_trace.scenario
+    return f"Worst run, {run.condition}: {style.head([run])}"
 
 
 def _film(recommendation: "RaceRecommendation", out: Path, ends: float, terminal: Terminal) -> None:

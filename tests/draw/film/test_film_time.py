@@ -136,7 +136,7 @@ def test_no_run_is_marked_as_settled_whose_free_joint_has_not(rate):
     run = dataclasses.replace(run, x=x, r=still, d=still)
     first, _ = sheet([run], ["one"], SIZE).page.axes
     assert first.get_title("left") == "position x (m)"
-    marks = [line.get_xdata()[0] for line in first.lines if line.get_marker() == "v"]
+    marks = [np.asarray(line.get_xdata())[0] for line in first.lines if line.get_marker() == "v"]
     expected = [np.log(50.0) / rate] if rate else []
     np.testing.assert_allclose(marks, expected, atol=2e-3)
 
