@@ -110,7 +110,7 @@ CLIPS = {  # name of the clip's file -> what it shows
         changes=STRANGER,
         laws=(
             smc.law("pid", kp=(150.0, 60.0), kd=(15.0, 5.0), ki=(50.0, 20.0)),
-            smc.law("super_twisting", k1=3.0, k2=4.4, c=2.5),
+            smc.law("super_twisting"),
         ),
     ),
     "quadrotor": Clip(

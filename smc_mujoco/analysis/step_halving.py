@@ -42,8 +42,7 @@ SCORE_NOTE = f"{NOTE}. The smallest value is shown, with the largest in brackets
 UNTRIED = (
     "these runs were not repeated with half the physics step. If the condition or the model has "
     "friction, contact, a motor, an encoder or other such hardware, or if the integrator is not "
-    "RK4, half "
-    f"the step may change values by more than {100.0 * MAX_CHANGE:g} %"
+    f"RK4, half the step may change values by more than {100.0 * MAX_CHANGE:g} %"
 )
 
 

@@ -161,11 +161,10 @@ def margins(
     is a multiple of the nominal mass. Noise is the standard deviation of the position sensor's
     noise, in rad or m; the velocity sensor has five times that number, in rad/s or m/s. A blow
     comes halfway through the run; its momentum is in N s or N m s. Jitter is a share of the control
-    period.
-    Missed is the share of samples that are missed. Loss is the fraction of its force that each
-    actuator loses. For laws that can be linearised, the column "theory" has the stability limit of
-    the linear loop. A law may tolerate more, with a small sustained oscillation. A law from your
-    own file has its default gains, so tune it first (smc-mujoco tune).
+    period. Missed is the share of samples that are missed. Loss is the fraction of its force that
+    each actuator loses. For laws that can be linearised, the column "theory" has the stability
+    limit of the linear loop. A law may tolerate more, with a small sustained oscillation. A law
+    from your own file has its default gains, so tune it first (smc-mujoco tune).
 
     Example: smc-mujoco margins duffing --law observer_free,classical --kind delay
     """

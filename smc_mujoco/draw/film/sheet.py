@@ -120,9 +120,21 @@ def head_lines(
     if runs.events:
         return 2
     room = key_room(size, runs.span[1], head)
-    gains = [runs.gains] if DEFAULT in runs.gains else []
-    fits = all(style.width(" · ".join([*key, *gains]), letters(size)) <= room for key in keys)
-    return 1 if fits else 2
+    gains = least_gains(runs.gains)
+    for key in keys:
+        words = " · ".join(filter(None, [*key, gains]))
+        if style.width(words, letters(size)) > room:
+            return 2
+    return 1
+
+
+def least_gains(words: str) -> str:
+    """Return the least that a film says of where gains come from: which are defaults, or that some
+    are; "" if none is.
+    """
+    if DEFAULT not in words:
+        return ""
+    return "gains partly default" if "," in words else words
 
 
 def one_line(words: str) -> str:
@@ -259,6 +271,8 @@ class Sheet:
         right -= clock_room(self.size, stop) + high
         self.pace = self.write(right, last, ha="right", va="center", color=style.MUTED)
         said = list(filter(None, [*key, order, self.runs.gains]))
+        if style.width(" · ".join(said), high) > self.room:
+            said = list(filter(None, [*key, order, least_gains(self.runs.gains)]))
         least = int(lines == 2 or not title)  # beside the title there may be no words
         while len(said) > least and style.width(" · ".join(said), high) > self.room:
             said.pop()

@@ -21,7 +21,7 @@ from smc_mujoco.common import gl, progress
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.figure import DrawnRuns
 from smc_mujoco.draw.film import arrows, charts, film, flight, world
-from smc_mujoco.draw.film.sheet import Moment, Sheet, head_lines, label_sizes, room_of
+from smc_mujoco.draw.film.sheet import Moment, Sheet, head_lines, label_sizes, least_gains, room_of
 from smc_mujoco.draw.states import State
 
 SIZE = (640, 300)
@@ -158,6 +158,12 @@ def test_words_over_machines_are_on_one_line_where_they_have_room():
     for law, count in ((smc.law("pid", kp=9.0), 1), (at_defaults("pid"), 2)):
         runs = DrawnRuns.of([made(smc.Scenario(plant="duffing", law=law))], None)
         assert head_lines(runs, size, "A title of middle length", [key]) == count, "told"
+    mixed = "gains: default for PID, given for ADRC"
+    assert [*map(least_gains, (mixed, "gains: default", "gains: given"))] == [
+        "gains partly default",
+        "gains: default",
+        "",
+    ]
     tile, label = np.zeros((1, 4), int), np.array([[0, 200, 800, 240]])
     page = Sheet(DrawnRuns.of([trace], ["one"]), size, tile, label, "Duffing", key, lines=1)
     picture(page, 0.5, 0.125)
