@@ -47,12 +47,15 @@ def _with_exponent(value: float, digits: int) -> str:
 
 
 def span(low: str, high: str) -> str:
-    """Return "1.1–1.3", the range of a median, or "1.1 to never"; "" where both ends are the same
-    text, such as "never", and the median says it.
+    """Return the range of a median in words, as `ends`; "" where both ends are the same text, such
+    as "never", and the median says it.
     """
-    if low == high:
-        return ""
-    return f"{low} to {high}" if high.isalpha() or " " in high else f"{low}–{high}"
+    return "" if low == high else ends(low, high)
+
+
+def ends(low: str, high: str) -> str:
+    """Return "1.1–1.3", or "1.1 to never" where the upper end is a word."""
+    return f"{low} to {high}" if high[:1].isalpha() else f"{low}–{high}"
 
 
 def joined(parts: Iterable[str], last_word: str = "and") -> str:

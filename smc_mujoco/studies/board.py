@@ -33,6 +33,7 @@ from smc_mujoco.common.text import (
     LEAST_PRINTED,
     capital,
     counted,
+    ends,
     every,
     in_one_notation,
     joined,
@@ -638,7 +639,7 @@ def spread(interval: Interval, low: str, high: str) -> str:
         return ""
     if 0.0 < interval.high < LEAST_PRINTED:
         return ""
-    return f"{low} to {high}" if math.isinf(interval.high) else f"{low}–{high}"
+    return ends(low, high)
 
 
 def heading(board: Board) -> str:

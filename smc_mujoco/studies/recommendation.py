@@ -601,9 +601,9 @@ class RaceRecommendation(Recommendation):
     def _objectives(self) -> Tabular:
         """The table of J of each law's sets of gains."""
         entrants = self.race.entrants
-        medians = {name: float(np.median(entrants[name].values)) for name in entrants}
         rows = []
         for names in (self.race.running, self.race.dropped):
+            medians = {name: float(np.median(entrants[name].values)) for name in names}
             for name in sorted(names, key=medians.__getitem__):
                 values = entrants[name].values
                 cell = Cell(_cost(medians[name]), span(_cost(min(values)), _cost(max(values))))
