@@ -490,33 +490,28 @@ def leads(count: dict[str, int]) -> int:
     return count["stands"] + count["below the floor"]
 
 
-def without(count: dict[str, int]) -> int:
-    """Return in how many cells of a table neither side leads."""
-    return count["all"] - leads(count) - count["contradicted"]
+def unranked(count: dict[str, int]) -> int:
+    """Return in how many cells of a table an error is too small, or not settled."""
+    return count["not ranked"] + count["not settled"]
 
 
-def in_readme(points: Sequence[dict]) -> str:
-    """Return what README says of the points that were not drawn."""
-    quiet, noisy, *smooth = tallies([point for point in points if point["draw"] is None])
-    rest = without(quiet) - quiet["not ranked"]
-    return (
-        "A case is one plant, period, load and limit on J, with or without sensor noise. A law's "
-        "cases are those in which both searches found gains within the limit, for the law and for "
-        "at least one rival. "
-        f"Super-twisting has {noisy['all']} cases with sensor noise: it leads the best of its "
-        f"rivals `adrc`, `pd_observer`, `hodob` and `pid` in {leads(noisy)} and trails it in "
-        f"{noisy['contradicted']}. It has {quiet['all']} cases without noise: it leads in "
-        f"{leads(quiet)} and trails in {quiet['contradicted']}; in {quiet['not ranked']} the "
-        "errors are too small to rank, below or near a ten-thousandth of the initial error. That "
-        f"leaves {without(noisy) + rest} of the {noisy['all'] + quiet['all']} cases, "
-        f"{without(noisy)} with noise and {rest} without, in which neither side has a lead that "
-        "counts; in "
-        f"{noisy['not settled'] + quiet['not settled']} of these {without(noisy) + rest} the runs "
-        "scatter too much to determine an error. Smooth first-order sliding (`boundary_layer`) has "
-        f"{sum(its['all'] for its in smooth)} cases, with noise or "
-        f"without: it leads the best rival in {sum(map(leads, smooth))} and trails it in "
-        f"{sum(its['contradicted'] for its in smooth)}."
+def in_readme(points: Sequence[dict]) -> Iterator[str]:
+    """Yield the lines of README's table of the points that were not drawn."""
+    quiet, noisy, smooth, smooth_noisy = tallies([one for one in points if one["draw"] is None])
+    yield (
+        "| sliding law | sensor noise | cases | leads the best rival | trails it | neither | not "
+        "ranked |"
     )
+    yield "|---" * 7 + "|"
+    rows = (
+        ("super-twisting, explicit or implicit", "yes", noisy),
+        ("super-twisting, explicit or implicit", "no", quiet),
+        ("smooth, first order (`boundary_layer`)", "yes", smooth_noisy),
+        ("smooth, first order (`boundary_layer`)", "no", smooth),
+    )
+    for law, noise, count in rows:
+        told = leads(count), count["contradicted"], count["open"], unranked(count)
+        yield f"| {law} | {noise} | {count['all']} | {' | '.join(map(str, told))} |"
 
 
 def first_words(points: Sequence[dict]) -> str:
@@ -607,7 +602,7 @@ def main() -> None:
     for name, words in how_often(points).items():
         print(f"{name}: {words}")
     print(
-        in_readme(points),
+        *in_readme(points),
         first_words(points),
         of_searches(points),
         of_runs(points),
