@@ -54,8 +54,12 @@ def span(low: str, high: str) -> str:
 
 
 def ends(low: str, high: str) -> str:
-    """Return "1.1–1.3", or "1.1 to never" where the upper end is a word."""
-    return f"{low} to {high}" if high[:1].isalpha() else f"{low}–{high}"
+    """Return "1.1–1.3"; "1.1 to never" where some never reach it; "1.1 or more" where some have
+    no value.
+    """
+    if high == "never":
+        return f"{low} to {high}"
+    return f"{low} or more" if high[:1].isalpha() else f"{low}–{high}"
 
 
 def joined(parts: Iterable[str], last_word: str = "and") -> str:

@@ -39,7 +39,7 @@ from smc_mujoco.common.text import (
     joined,
     number,
 )
-from smc_mujoco.control.source import Source, in_words, kinds
+from smc_mujoco.control.source import Source, kinds
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
@@ -61,13 +61,9 @@ MEDIANS = (
     f"A cell has a median, or for settled runs their share, and its {100 * LEVEL:g} % interval."
 )
 BELOW = (
-    "'below': the median is below the number after this word, which is called the floor. Values "
-    "below the floor count as equal."
+    "'floor': the median is below the number after this word. Values below a floor count as equal."
 )
-TESTED = (
-    f"a paired test at {100 * BEST_ERROR:g} %, corrected as if there were {RIVALS} rivals, or "
-    "for all if there are more"
-)
+TESTED = f"a paired test at {100 * BEST_ERROR:g} %, always corrected for at least {RIVALS} rivals"
 # A word in tables -> its meaning, which their key says, and LaTeX below the table.
 MEANINGS = {
     "J (": "Tuning minimises J, summed over conditions: ITAE divided by the initial error, "
@@ -92,7 +88,7 @@ MARKS = MEANINGS | {
     "times the floor, below which values count as equal.",
     "": "A run has arrived if, in its last fifth, the error stays below 10 % of its initial value "
     "or below 5 times the sensor's resolution.",
-    "below ": f"{BELOW} If a law below the floor may be the best, no law above the floor is "
+    "floor ": f"{BELOW} If a law below the floor may be the best, no law above the floor is "
     "marked. For an error, the floor is 1e-4 of its initial value. For errors late in the run, it "
     "is also at least half an encoder count and at least the noise. For u and its "
     f"variation per second, it is {100 * MIN_COMMAND_SHARE:g} % of u_max.",
@@ -115,8 +111,9 @@ UNDER = {
     "strong=True": f"Bold: may be the best: no other law is shown to be better ({TESTED}). A law "
     "without bold is not always shown to be worse. A law wins if it is shown to be better than "
     "every other.",
-    "below ": "Below a floor (of noise, resolution, or a small share of the start or of u_max): "
-    "such values count as equal; where one is bold, no value above the floor is.",
+    "floor ": "Floor: the median is below this floor (of noise, resolution, or a small share of "
+    "the start or of u_max). Values below it count as equal; where one is bold, no value above the "
+    "floor is.",
     "may exceed ": "May exceed a floor: the median is below it, but need not stay there.",
     "at half": "At half the step: the median of the runs that were repeated with half the physics "
     "step, before and after.",
@@ -424,8 +421,7 @@ class Board(Tables):
                 names = "both laws" if len(self.entries) == 2 else "all laws"
             return f"{names} {SAME_RUNS if self.metric == SETTLES else LEVEL_WORDS}"
         others = "another" if alike else joined(self.best, "or")
-        count = max(len(self.entries) - 1, RIVALS)
-        level = f"{100 * BEST_ERROR:g} %, corrected as if there were {count} rivals"
+        level = f"{100 * BEST_ERROR:g} %, always corrected for at least {RIVALS} rivals"
         text = f"no law is shown to be better than {others} (at {level})"
         return text if math.isnan(self.resolves) else f"{text}; {hidden(self.resolves)}"
 
@@ -748,7 +744,7 @@ def _cell(board: Board, entry: BoardEntry) -> Cell:
     below = [spread(interval, low, high)]
     for block in board.blocks:
         if entry.law in block.below:
-            below.append(f"below {block.floor}")
+            below.append(f"floor {block.floor}")
             break
         if block.floor and entry.law in block.rising:
             below.append(f"may exceed {block.floor}")
@@ -813,8 +809,6 @@ def key(boards: Sequence[Board], tables: str) -> list[str]:
     )
     if any(board.by_step for board in boards):
         parts.append(f"{capital(UNTRIED)}.")
-    if gains := in_words(sources(boards)):
-        parts.append(f"{capital(gains)}.")
     return parts
 
 

@@ -328,14 +328,14 @@ def _assumed(trial: Trial, plant: Plant, goal: Objective) -> str:
         noise = condition.on(plant, goal.duration).get("noise")
         if isinstance(noise, Noise):
             parts.append(
-                f"under {condition.name!r} the measured positions carry noise of "
+                f"under {condition.name} the measured positions carry noise of "
                 f"{noise.position:g} {units} and the measured velocities noise of "
                 f"{noise.velocity:g} {units}/s (standard deviations)"
             )
             if condition.name not in asked:
                 parts[-1] += (
-                    f". None of your conditions has noise, so a further one, called "
-                    f"{condition.name!r}, was added: to replace it, give a condition with "
+                    f". None of your conditions has noise, so the condition "
+                    f"{condition.name} was added: to replace it, give a condition with "
                     "noise=Noise(...)"
                 )
     return "; ".join(parts)

@@ -295,9 +295,8 @@ class RaceRecommendation(Recommendation):
 
     def _at_once(self, together: tuple[int, int]) -> str:
         """How many runs, and of how many, with all conditions asked for."""
-        count = len(self.settled[self.law.name])
         some = _some(*together)
-        return f"with all {count} conditions at once, {some} of {together[1]} further runs"
+        return f"with all conditions at once, {some} of {together[1]} further runs"
 
     @property
     def _not_beaten(self) -> list[str]:
@@ -580,9 +579,9 @@ class RaceRecommendation(Recommendation):
                 "laws."
             )
         notes.append(
-            f"{MEDIANS} {MARKS['settled runs']} In the tables by condition all runs of a law have "
-            "one set of gains, those of the first two laws as printed below. The scores in these "
-            "tables are not tested for significance; only J is, below. "
+            f"{MEDIANS} {MARKS['settled runs']} In the tables by condition each law has one set of "
+            "gains; those of the law to use and of the second are printed below. The scores in "
+            "these tables are not tested for significance; only J is, below. "
             f"{capital(UNTRIED)}."
         )
         cells = repr([table.rows for table in shown])
@@ -590,7 +589,7 @@ class RaceRecommendation(Recommendation):
             f"{MARKS['']} In metrics of u, such as TV rate, a run that has not arrived counts as "
             "worse than any value."
         )
-        words = {"below ": BELOW, "may exceed ": MARKS["may exceed "], "not arrived": arrived}
+        words = {"floor ": BELOW, "may exceed ": MARKS["may exceed "], "not arrived": arrived}
         for word, meaning in words.items():
             if word in cells:
                 notes.append(meaning)

@@ -751,7 +751,7 @@ def test_laws_below_the_floor_are_not_ranked_and_a_lead_over_it_is_a_least_one(
         cells[row[0].text] = row[1]
     for law, factor in zip("abc", factors, strict=False):
         below = factor < 1.0
-        assert (f"below {q}" in cells[law].below) == below
+        assert (f"floor {q}" in cells[law].below) == below
         if min(factors) < 1.0:  # those below are the best, and no other is marked
             assert cells[law].strong == below
         if below:
@@ -767,7 +767,7 @@ def test_a_median_below_the_floor_that_rises_says_that_it_may_pass_it():
     table = table_of(scores, "ultimate_bound", scenario=rows, trends=rises)
     (shown,) = leaderboard(table, ["ultimate_bound"]).tables
     said = {row[0].text: row[1].below.splitlines()[-1] for row in shown.rows}
-    assert said == {"a": "below 0.00015 m", "b": "may exceed 0.00015 m"}
+    assert said == {"a": "floor 0.00015 m", "b": "may exceed 0.00015 m"}
     assert "'may exceed': the median is below the floor, but" in " ".join(shown.notes)
     assert "May exceed a floor: " in shown.under[-1]
 

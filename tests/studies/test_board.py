@@ -234,7 +234,7 @@ def test_only_what_no_law_beats_is_marked(boards):
     assert [cells[law].strong for law in LAWS] == [False, True, True]
     (seen,) = re.findall(r"a lead below ([\d.]+) % might go undetected", board.verdict)
     assert (
-        "no law is shown to be better than another (at 5 %, corrected as if there were 15 "
+        "no law is shown to be better than another (at 5 %, always corrected for at least 15 "
         "rivals); a" in board.verdict
     )
     words = rf"No law wins. Leads below {seen}~\% in ITAE might go undetected."
@@ -378,7 +378,7 @@ def test_what_latex_says_of_all_tables_stands_below_the_last_one_only():
         assert key.count(UNDER[word]) == 1
     assert "(a):~" in first.to_latex()
     assert "(a):~" not in last.to_latex()
-    assert UNDER["below "] not in key
+    assert UNDER["floor "] not in key
 
 
 def test_a_verdict_that_says_below_is_no_cell_below_a_floor():
@@ -389,7 +389,7 @@ def test_a_verdict_that_says_below_is_no_cell_below_a_floor():
     assert "a lead below" in boards[0].result
     (shown,) = boards.tables
     assert "the floor. Values below" not in " ".join(shown.notes)
-    assert UNDER["below "] not in shown.under[-1]
+    assert UNDER["floor "] not in shown.under[-1]
 
 
 def test_the_shade_below_the_floor_begins_at_0_on_a_linear_axis():

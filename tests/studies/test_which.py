@@ -179,9 +179,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
         "Without a law",
     ]
     assert [*lines][:9] == [*verdicts, "Assumed", "Settles", "Tolerates"]
-    noise = (
-        "under 'noise' the measured positions carry noise of 0.01 m and the measured velocities "
-    )
+    noise = "under noise the measured positions carry noise of 0.01 m and the measured velocities "
     noise += "noise of 0.05 m/s (standard deviations)"
     made = "u changes every 1 ms and is computed from measured positions and velocities, unless a "
     made += "condition says otherwise"
@@ -237,7 +235,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
 def test_a_word_in_a_cell_is_explained(raced, monkeypatch):
     _, recommendation, _ = raced
     tables = list(recommendation.leaderboard.tables)
-    row = [*tables[0].rows[0][:-1], Cell("2e-6", "1e-6–3e-6\nbelow 1e-4 m")]
+    row = [*tables[0].rows[0][:-1], Cell("2e-6", "1e-6–3e-6\nfloor 1e-4 m")]
     tables[0] = dataclasses.replace(tables[0], rows=[row])
     monkeypatch.setattr(type(recommendation.leaderboard), "tables", tables)
     words = " ".join(str(recommendation).split())
@@ -352,7 +350,7 @@ def test_a_law_runs_under_all_conditions_at_once_unless_they_exclude_each_other(
     assert recommend._together(trial(rubs), plant, weak, 3) is None
     for pair in (("period_10ms", "period_20ms"), ("friction", "coulomb"), ("backlash", "elastic")):
         assert recommend._together(trial(*pair), plant, weak, 3) is None
-    late = ". But with all 1 conditions at once, none of 14 further runs settled"
+    late = ". But with all conditions at once, none of 14 further runs settled"
     for counts, words, first in (((0, 14), "none", late), ((14, 14), "all", "")):
         told = dataclasses.replace(recommendation, together=counts).answer
         assert f"at once, {words} of 14 further runs settle. The search for gains" in str(told)

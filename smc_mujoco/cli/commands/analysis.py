@@ -148,7 +148,7 @@ def margins(
     gains: options.Gains = "tuned",
     quick: Quick = False,
     condition: options.Condition = "nominal",
-    x0: options.X0 = None,
+    x0: options.X0Exactly = None,
     figure: Annotated[Path | None, options.picture("the margins")] = None,
     json: options.Json = None,
     threads: options.Threads = None,
@@ -164,7 +164,8 @@ def margins(
     period. Missed is the share of samples that are missed. Loss is the fraction of its force that
     each actuator loses. For laws that can be linearised, the column "theory" has the stability
     limit of the linear loop. A law may tolerate more, with a small sustained oscillation. A law
-    from your own file has its default gains, so tune it first (smc-mujoco tune).
+    from your own file has its default gains, so tune it first (smc-mujoco tune). Without --law,
+    every law with shipped gains is tried.
 
     Example: smc-mujoco margins duffing --law observer_free,classical --kind delay
     """

@@ -205,8 +205,7 @@ Threads = Annotated[
 Device = Annotated[
     str,
     typer.Option(
-        help="Where the many runs of a search, for gains or for a margin, are computed: cpu, or "
-        "cuda for an NVIDIA card."
+        help="Where the many runs of a search are computed: cpu, or cuda for an NVIDIA card."
     ),
 ]
 Executor = Annotated[
@@ -216,15 +215,21 @@ Executor = Annotated[
         help="A dask scheduler, whose workers do the searches and runs; default: threads here.",
     ),
 ]
+POSITIONS = (
+    "Initial joint positions, rad or m, absolute and not relative to the goal: one number for all "
+    "joints, or one for each, such as 0.3,-0.2; default: the plant's."
+)
 X0 = Annotated[
     str | None,
     typer.Option(
         "--x0",
         metavar="FLOAT[,FLOAT...]",
-        help="Initial joint positions, rad or m, absolute and not relative to the goal: one number "
-        "for all joints, or one for each, such as 0.3,-0.2; default: the plant's. Each run starts "
-        "within 20 % of these; in `margins` all start at them.",
+        help=f"{POSITIONS} Each run starts within 20 % of these.",
     ),
+]
+X0Exactly = Annotated[
+    str | None,
+    typer.Option("--x0", metavar="FLOAT[,FLOAT...]", help=f"{POSITIONS} All runs start at these."),
 ]
 
 

@@ -160,7 +160,9 @@ def _save(recommendation: "RaceRecommendation", out: Path, terminal: Terminal) -
     if recommendation.tuned:
         file = recommendation.tuned.save(out / "recommended.json")
         terminal.wrote(file)
-        terminal.note(f"To use {recommendation.law.name} with these gains, give --law {file}")
+        name = recommendation.law.name
+        terminal.note(f"To use {name} with these gains, give --law {file}")
+        terminal.note(f"smc-mujoco list {name} has their units")
     figure.figure(
         [recommendation.worst_trace], out / "worst_run", title=_worst_title(recommendation)
     )
@@ -223,7 +225,6 @@ def _film(recommendation: "RaceRecommendation", out: Path, ends: float, terminal
             fps = min(fps, fps * fit / len(frames))
         if fps >= MIN_FPS:
             terminal.wrote(films.film(run, out / "worst_run.mp4", title=title, fps=fps))
-            terminal.note(f"The film has {fps:.2g} frames per second.")
         else:
             file = out / "worst_run_machine.png"
             at = _worst_time(recommendation.worst_trace)
@@ -355,9 +356,8 @@ def compare(
     Gains that you give in brackets are used as they are. Otherwise a law of the package uses the
     gains that are shipped for the plant. If there are none, or if the law is from your own file,
     it is tuned by one rule, the same for all laws. This takes seconds to minutes for each
-    law and plant. The default values in your file are used in three cases only: you give --no-tune;
-    the law cannot be tuned; or you give --gains default, or --gains tracking or study, which exist
-    for the package's own laws only.
+    law and plant. The default values in your file are used only if you give --no-tune or
+    another --gains than tuned, or if the law cannot be tuned.
 
     A stopped command resumes when you start it again. Without --law, the usual laws that suit the
     plant are compared: common sliding-mode laws, pid, adrc, pd_observer, lqi, mpc and
