@@ -63,7 +63,10 @@ MEDIANS = (
 BELOW = (
     "'floor': the median is below the number after this word. Values below a floor count as equal."
 )
-TESTED = f"a paired test at {100 * BEST_ERROR:g} %, always corrected for at least {RIVALS} rivals"
+TESTED = (
+    f"a paired test at {100 * BEST_ERROR:g} %, corrected for multiple comparisons: for {RIVALS} "
+    "rivals even if there are fewer, for all if there are more"
+)
 # A word in tables -> its meaning, which their key says, and LaTeX below the table.
 MEANINGS = {
     "J (": "Tuning minimises J, summed over conditions: ITAE divided by the initial error, "
@@ -421,7 +424,7 @@ class Board(Tables):
                 names = "both laws" if len(self.entries) == 2 else "all laws"
             return f"{names} {SAME_RUNS if self.metric == SETTLES else LEVEL_WORDS}"
         others = "another" if alike else joined(self.best, "or")
-        level = f"{100 * BEST_ERROR:g} %, always corrected for at least {RIVALS} rivals"
+        level = f"{100 * BEST_ERROR:g} %, corrected for multiple comparisons"
         text = f"no law is shown to be better than {others} (at {level})"
         return text if math.isnan(self.resolves) else f"{text}; {hidden(self.resolves)}"
 

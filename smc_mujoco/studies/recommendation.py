@@ -294,9 +294,9 @@ class RaceRecommendation(Recommendation):
         return text
 
     def _at_once(self, together: tuple[int, int]) -> str:
-        """How many runs, and of how many, with all conditions asked for."""
+        """How many runs, and of how many, with all the conditions asked for."""
         some = _some(*together)
-        return f"with all conditions at once, {some} of {together[1]} further runs"
+        return f"with all the conditions asked for at once, {some} of {together[1]} further runs"
 
     @property
     def _not_beaten(self) -> list[str]:

@@ -234,8 +234,8 @@ def test_only_what_no_law_beats_is_marked(boards):
     assert [cells[law].strong for law in LAWS] == [False, True, True]
     (seen,) = re.findall(r"a lead below ([\d.]+) % might go undetected", board.verdict)
     assert (
-        "no law is shown to be better than another (at 5 %, always corrected for at least 15 "
-        "rivals); a" in board.verdict
+        "no law is shown to be better than another (at 5 %, corrected for multiple "
+        "comparisons); a" in board.verdict
     )
     words = rf"No law wins. Leads below {seen}~\% in ITAE might go undetected."
     assert words in Boards([board]).to_latex()

@@ -350,7 +350,7 @@ def test_a_law_runs_under_all_conditions_at_once_unless_they_exclude_each_other(
     assert recommend._together(trial(rubs), plant, weak, 3) is None
     for pair in (("period_10ms", "period_20ms"), ("friction", "coulomb"), ("backlash", "elastic")):
         assert recommend._together(trial(*pair), plant, weak, 3) is None
-    late = ". But with all conditions at once, none of 14 further runs settled"
+    late = ". But with all the conditions asked for at once, none of 14 further runs settled"
     for counts, words, first in (((0, 14), "none", late), ((14, 14), "all", "")):
         told = dataclasses.replace(recommendation, together=counts).answer
         assert f"at once, {words} of 14 further runs settle. The search for gains" in str(told)

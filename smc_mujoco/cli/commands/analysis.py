@@ -163,9 +163,10 @@ def margins(
     comes halfway through the run; its momentum is in N s or N m s. Jitter is a share of the control
     period. Missed is the share of samples that are missed. Loss is the fraction of its force that
     each actuator loses. For laws that can be linearised, the column "theory" has the stability
-    limit of the linear loop. A law may tolerate more, with a small sustained oscillation. A law
-    from your own file has its default gains, so tune it first (smc-mujoco tune). Without --law,
-    every law with shipped gains is tried.
+    limit of the linear loop. A law may tolerate more than that, with a small sustained oscillation.
+
+    Without --law, every law with shipped gains is tried. On a model of your own, give laws with
+    their gains. A law from your own file has its default gains, so tune it first (smc-mujoco tune).
 
     Example: smc-mujoco margins duffing --law observer_free,classical --kind delay
     """
