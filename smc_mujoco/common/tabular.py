@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 PLAIN_WIDTH = 80  # characters of a line of plain text
 NAME_WIDTH = 20  # characters of a name before it is broken
 HEADING_WIDTH = 8  # characters of a heading at least
-NARROW_WIDTH = 12  # characters of a line below a number where space is short
+NARROW_WIDTH = 12  # of a name, and of a line below a number, where space is short
 # In LaTeX: widths of a character, of one in a line below, and of the narrowest words, em
 TEX_CHARACTER = 0.5
 TEX_SMALL = 0.43
@@ -119,10 +119,13 @@ class Tabular:
             yield Text(note)
 
     def _columns(self, width: int) -> "list[list[Text]]":
-        """Return the columns of names, then those of numbers, the widest ones narrow where space
-        is short.
+        """Return the columns of names, then those of numbers. Where space is short the widest
+        numbers are narrow; where it is for names alone, the first of these.
         """
         names = list(map(self._names, range(self.left)))
+        for i in range(self.left):
+            if sum(map(_widest, names)) + self.left - 1 > width:
+                names[i] = self._names(i, NARROW_WIDTH)
         numbers = range(self.left, len(self.headings))
         columns = list(map(self._column, numbers))
         narrow = [self._column(i, narrow=True) for i in numbers]
@@ -136,14 +139,14 @@ class Tabular:
             columns[at] = narrow[at]
         return [*names, *columns]
 
-    def _names(self, i: int) -> "list[Text]":
-        """Return the heading and the cells of a column of names."""
+    def _names(self, i: int, width: int = NAME_WIDTH) -> "list[Text]":
+        """Return the heading and the cells of a column of names, broken beyond a width."""
         from rich.text import Text
 
         texts = [Text(self.headings[i])]
         for row in self.rows:
             cell = _cell(row[i])
-            name = Text(folded(cell.text, NAME_WIDTH), cell.colour)
+            name = Text(folded(cell.text, width), cell.colour)
             if cell.below:
                 name.append(f"\n{cell.below}", "dim")
             texts.append(name)

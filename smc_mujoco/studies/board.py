@@ -57,9 +57,7 @@ FEW = (
     f"With fewer than {MIN_INTERVAL_SAMPLES} samples an interval is their range, with a coverage "
     f"below {100 * LEVEL:g} %."
 )
-MEDIANS = (
-    f"A cell has a median, or for settled runs their share, and its {100 * LEVEL:g} % interval."
-)
+MEDIANS = f"A cell has a median and its {100 * LEVEL:g} % interval."
 BELOW = (
     "'floor': the median is below the number after this word. Values below a floor count as equal."
 )
@@ -74,7 +72,8 @@ MEANINGS = {
     "from separate runs, which tuning has not seen.",
     "shipped": "Shipped gains come with smc_mujoco.",
     "tuned here": "Gains tuned here were found by searches with smc_mujoco.",
-    "settled runs": "A run counts as settled if it settles before its last fifth.",
+    "settled runs": "Settled runs are given as a share, not as a median. A run counts as settled "
+    "if it settles before its last fifth.",
     "settling time": "Settling time is when the error enters its band to stay: 2 % of its initial "
     "value, or of the reference's range if that is larger.",
     "ultimate bound": "The ultimate bound is the largest absolute error of any channel in the last "
@@ -97,9 +96,9 @@ MARKS = MEANINGS | {
     f"variation per second, it is {100 * MIN_COMMAND_SHARE:g} % of u_max.",
     "may exceed ": "'may exceed': the median is below the floor, but it rises at the end of runs, "
     "or with half the physics step, so that it need not stay there.",
-    "at half": "'at half the step': the median of the runs that were repeated with half the "
-    "physics step, which may be one in four, before and after, if these differ by more than "
-    f"{APART}; {RANGE}.",
+    "at half": "'becomes ... at half the step': some runs, at least one in four, were repeated "
+    f"with half the physics step. Their medians before and after stand here if they differ by "
+    f"more than {APART}. {capital(RANGE)}.",
 }
 LAST = "never", "fails", "not arrived"  # words in place of a value
 
@@ -107,8 +106,6 @@ LAST = "never", "fails", "not arrived"  # words in place of a value
 UNDER = {
     "": f"Below each median is its {100 * LEVEL:g} % interval.",
     **MEANINGS,
-    "settled runs": "Settled runs are given as a share, not as a median. "
-    + MEANINGS["settled runs"],
     "default": "Default gains are those of the law's own file.",
     "given": "Gains marked given are the authors' own choice.",
     "strong=True": f"Bold: may be the best: no other law is shown to be better ({TESTED}). A law "
@@ -802,12 +799,11 @@ def key(boards: Sequence[Board], tables: str) -> list[str]:
         "these probabilities. A verdict gives the winner's least lead over its rivals: the ratio "
         f"in paired runs with a {100 * LEVEL:g} % interval. This ratio differs from the ratio of "
         "the medians in the table. If the winner is below the floor and its nearest rival is not, "
-        "the verdict says that the rival's median is at least so many times the floor. This "
-        "number is cautious: the change that a physics step of half the size makes is first "
-        "subtracted from the median. If the rival's values are still decreasing during the last "
-        "fifth of the run, the further decrease to be expected in a run twice as long is "
-        "subtracted, too. A law "
-        "is ahead if it is better by more than "
+        "the verdict says how many times the floor the rival's median is at least. Tests and "
+        "intervals of leads are cautious: what half the physics step changes counts against the "
+        "law in front, and so does a change between the last two fifths of a run, as if it went "
+        "on; under a periodic load this is partly a matter of phase. So a law may not win though "
+        "the intervals of the table do not overlap. A law is ahead if it is better by more than "
         f"{100 * boards[0].relevant:g} % of the larger value."
     )
     if any(board.by_step for board in boards):

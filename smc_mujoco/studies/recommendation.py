@@ -220,7 +220,7 @@ class RaceRecommendation(Recommendation):
         lines = [f"Use: {self._name}"]
         searched = any(one.task or one.count > 1 for one in self.race.entrants.values())
         if searched and self.race.comparison:
-            lines.append(f"Over all sets of gains: {self._over_sets}")
+            lines.append(f"Over all sets judged: {self._over_sets}")
         if self.fixed:
             lines.append(f"With the gains below: {self._with_these}")
         elif len(self.laws) > 1:
@@ -256,10 +256,7 @@ class RaceRecommendation(Recommendation):
                 cure = "; without the option --law (laws= in Python) all usual ones are tried"
             lines.append(f"Not tried here: {others}{cure}")
         lines.append(f"Second: {self.second or 'none'}")
-        gains = [f"Gains: {self.law}{self._unit}, {self.law.source}"]
-        if self.tuned:
-            gains += edges_in_words(self.tuned.gains, self.tuned.at_bound)
-        lines.append("; ".join(gains))
+        lines.append(self._gains)
         return lines
 
     @property
@@ -292,6 +289,17 @@ class RaceRecommendation(Recommendation):
                 "before the last fifth of the run"
             )
         return text
+
+    @property
+    def _gains(self) -> str:
+        """The first law's gains, where they come from, and which are at an end of their search."""
+        of = self.race.entrants[self.law.name].count
+        parts = [f"Gains: {self.law}{self._unit}, {self.law.source}"]
+        if of > 1:
+            parts.append(f"the best of the {of} sets judged")
+        if self.tuned:
+            parts += edges_in_words(self.tuned.gains, self.tuned.at_bound)
+        return "; ".join(parts)
 
     def _at_once(self, together: tuple[int, int]) -> str:
         """How many runs, and of how many, with all the conditions asked for."""

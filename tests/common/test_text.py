@@ -154,6 +154,18 @@ def test_latex_breaks_words_at_the_width_of_the_columns():
     assert width(11) - width(10) == pytest.approx(len("1.23 (a)") * tabular.TEX_CHARACTER)
 
 
+def test_names_too_wide_for_a_line_are_broken_after_underscores():
+    """Seven columns of names are 83 characters wide."""
+    row = ["inverted_pendulum", "super_twisting", "tuned here", "12", "1045", "7 %", "k1=2, k2=13"]
+    headings = ["plant", "law", "gains", "searches", "evaluations", "J spread", "best set"]
+    lines = str(Tabular(headings=headings, rows=[row], left=7)).splitlines()
+    assert max(map(len, lines)) <= tabular.PLAIN_WIDTH
+    assert [line.split()[:2] for line in lines[-2:]] == [
+        ["inverted_", "super_twisting"],
+        ["pendulum"],
+    ]
+
+
 def test_u_max_is_a_formula_and_a_law_of_that_name_is_not():
     assert tabular.tex("u_max, my_u_max") == r"$u_{\max}$, my\_u\_max"
 

@@ -172,7 +172,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     lines = dict(line.split(": ", 1) for line in recommendation.answer)
     verdicts = [
         "Use",
-        "Over all sets of gains",
+        "Over all sets judged",
         "With the gains below",
         f"J of {recommendation.law.name}",
         f"Scores of {recommendation.law.name}",
@@ -508,7 +508,7 @@ def test_laws_for_which_there_is_no_time_are_named_and_the_clock_may_end_a_race_
     few = dataclasses.replace(
         recommendation, race=recommendation.race._replace(sets=1, stopped=True)
     )
-    (over_sets,) = (line for line in few.answer if line.startswith("Over all sets of gains"))
+    (over_sets,) = (line for line in few.answer if line.startswith("Over all sets judged"))
     assert "; there was time for 1 set of gains of each law" in over_sets
     assert "not even the first 3" in over_sets
     assert "7 can name a winner" in over_sets
@@ -691,7 +691,7 @@ def test_a_law_with_few_shipped_sets_is_said_not_to_be_told_from_others(tmp_path
     found = smc.which("duffing", "noise", laws=laws, out=tmp_path, seeds=2, minutes=5, duration=1.5)
     counts = {name: one.count for name, one in found.race.entrants.items()}
     assert counts["fixed_time"] < race.LOOKS[0] < counts["pid"]
-    (over_sets,) = (line for line in found.answer if line.startswith("Over all sets of gains"))
+    (over_sets,) = (line for line in found.answer if line.startswith("Over all sets judged"))
     assert "fixed_time cannot be told from others, with fewer than 7 sets" in over_sets
     assert "fixed_time's" not in over_sets
 

@@ -27,15 +27,15 @@ Bound = Annotated[
         metavar="NAME=BOUND,...",
         help="Bounds of `smc.Uncertainty`. Ranges: delay=0:0.01 (s), friction=0:0.1 (N or N "
         "m), encoder=2048:32768 "
-        "(counts); factors: mass=0.7:1.3, friction_scale=0.5:2, bound=0.5:1 (on u_max), "
-        "period=1:4 (on the control "
-        "period; not in worst), parameters of the plant, as payload=0:2. Numbers: slope (of d, "
-        "per s), "
-        "position_noise, velocity_noise, hold (of an error, s), jitter (s), x0 (a share of it).",
+        "(counts), and what is added to a plant, as payload=0:2 (kg). Factors: mass=0.7:1.3, "
+        "friction_scale=0.5:2, bound=0.5:1 (on u_max), period=1:4 (on the control period; for "
+        "`sensitivity` alone), and other parameters of the plant. Numbers: slope (of d, per s), "
+        "position_noise, velocity_noise, hold (how long a measurement error stays the same, s), "
+        "jitter (s), x0 (a share of it).",
     ),
 ]
 Metric = Annotated[
-    str, typer.Option(help="The score to look at, any that `smc-mujoco show` lists; more is worse.")
+    str, typer.Option(help="The score to look at, any of `smc-mujoco list metrics`; more is worse.")
 ]
 QUICK_MARGINS = {  # defaults of `margins --quick`
     "plants": ["inverted_pendulum", "duffing"],
@@ -260,10 +260,11 @@ def worst(
     """Search for the worst case of each law within bounds that you give, instead of sampling at
     random.
 
-    Only what you bound is uncertain; all else is as in the condition. If you bound nothing, what
-    the plant declares is uncertain, such as an arm's payload, or else a disturbance up to a sixth
-    of what the weakest drive gives. On a rig, such as qube_servo, the adversary also chooses a
-    parameter set. The search is the same for all laws; there may be worse than it finds.
+    The search varies only what you bound; all else is as in the condition. If you bound nothing, it
+    varies what the plant declares as uncertain, such as an arm's payload; if the plant declares
+    nothing, a disturbance up to a sixth of the force of the weakest drive; and friction, if there
+    is any, by 50 %. On a rig, such as qube_servo, the adversary also chooses a parameter set. The
+    search is the same for all laws; there may be worse than it finds.
 
     The column "worst found" has the error of the worst run, and "median" the median error of as
     many random runs within the bounds. Laws are ordered by the worst. A line below the table says

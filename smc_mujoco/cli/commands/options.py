@@ -94,7 +94,9 @@ Defaults = Annotated[
 Disturbance = Annotated[
     float | None,
     typer.Option(
-        min=0.0, help="Bound on |d|, N or N m; default: that of the plant or the condition."
+        min=0.0,
+        help="Bound on |d| of a further disturbance, N or N m; default: none if you bound "
+        "anything.",
     ),
 ]
 Folder = Annotated[
