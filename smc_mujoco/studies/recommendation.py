@@ -293,7 +293,8 @@ class RaceRecommendation(Recommendation):
     @property
     def _gains(self) -> str:
         """The first law's gains, where they come from, and which are at an end of their search."""
-        of = self.race.entrants[self.law.name].count
+        entrant = self.race.entrants[self.law.name]
+        of = min(entrant.count, len(entrant.values))
         parts = [f"Gains: {self.law}{self._unit}, {self.law.source}"]
         if of > 1:
             parts.append(f"the best of the {of} sets judged")

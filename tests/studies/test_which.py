@@ -232,6 +232,13 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     assert "*" not in text
 
 
+def test_the_answer_counts_the_sets_of_gains_of_which_it_shows_the_best(raced):
+    _, recommendation, _ = raced
+    judged = len(recommendation.race.entrants[recommendation.law.name].values)
+    (gains,) = (line for line in recommendation.answer if line.startswith("Gains: "))
+    assert f"; the best of the {judged} sets judged" in gains
+
+
 def test_a_word_in_a_cell_is_explained(raced, monkeypatch):
     _, recommendation, _ = raced
     tables = list(recommendation.leaderboard.tables)
