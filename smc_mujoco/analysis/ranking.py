@@ -387,10 +387,16 @@ class Comparison:
         if ours_or_theirs.any():
             return math.nan
         lead = least_visible_lead(self.leads[at], self.first, self.relevant)
+        return 1.0 - (1.0 - lead) * (1.0 - self.charged(block, law, rival))
+
+    def charged(self, block: int, law: str, rival: str) -> float:
+        """Return the lead of a law over a rival that half the step and trends take from it, as a
+        share.
+        """
+        at = block, self.laws.index(law), self.laws.index(rival)
         difference = _difference(self.plain[at], self.leads[at])
         charged = np.nan_to_num(middle(difference))
-        lost = math.exp(-max(float(charged), 0.0))
-        return 1.0 - (1.0 - lead) * lost
+        return -math.expm1(-max(float(charged), 0.0))
 
     def step_change(self, block: int, law: str) -> tuple[float, float] | None:
         """Return the medians of a law's runs that were repeated at half the physics step, before

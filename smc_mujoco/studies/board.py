@@ -25,7 +25,7 @@ from smc_mujoco.analysis.ranking import (
     needed_to_rank,
     needed_to_win,
 )
-from smc_mujoco.analysis.step_halving import APART, RANGE, UNTRIED
+from smc_mujoco.analysis.step_halving import APART, UNTRIED
 from smc_mujoco.common.aliases import Names, Numbers, Pair
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
@@ -51,6 +51,7 @@ MAX_LEAD = 0.995  # that may be said to show; chosen
 MAX_NAMED = 8  # conditions that a verdict names; chosen
 ALONE = "is not shown to beat every rival, and none is shown to beat it"
 LEVEL_WORDS = f"are level within {100 * LEVEL_SHARE:g} %"
+CHARGED = "is charged for changes late in the runs or with half the physics step"
 # as far as these runs go: a share's interval is wider than 10 %
 SAME_RUNS = "settle in the same runs"
 FEW = (
@@ -61,6 +62,8 @@ MEDIANS = f"A cell has a median and its {100 * LEVEL:g} % interval."
 BELOW = (
     "'floor': the median is below the number after this word. Values below a floor count as equal."
 )
+TIMES_FLOOR = "times the floor"
+WHEN_SETTLED = "A run counts as settled if it settles before its last fifth."
 TESTED = (
     f"a paired test at {100 * BEST_ERROR:g} %, corrected for multiple comparisons: for {RIVALS} "
     "rivals even if there are fewer, for all if there are more"
@@ -72,8 +75,7 @@ MEANINGS = {
     "from separate runs, which tuning has not seen.",
     "shipped": "Shipped gains come with smc_mujoco.",
     "tuned here": "Gains tuned here were found by searches with smc_mujoco.",
-    "settled runs": "Settled runs are given as a share, not as a median. A run counts as settled "
-    "if it settles before its last fifth.",
+    "settled runs": f"Settled runs are given as a share, not as a median. {WHEN_SETTLED}",
     "settling time": "Settling time is when the error enters its band to stay: 2 % of its initial "
     "value, or of the reference's range if that is larger.",
     "ultimate bound": "The ultimate bound is the largest absolute error of any channel in the last "
@@ -96,9 +98,9 @@ MARKS = MEANINGS | {
     f"variation per second, it is {100 * MIN_COMMAND_SHARE:g} % of u_max.",
     "may exceed ": "'may exceed': the median is below the floor, but it rises at the end of runs, "
     "or with half the physics step, so that it need not stay there.",
-    "at half": "'becomes ... at half the step': some runs, at least one in four, were repeated "
-    f"with half the physics step. Their medians before and after stand here if they differ by "
-    f"more than {APART}. {capital(RANGE)}.",
+    "at half": "'repeated runs': some runs, at least one in four, were repeated with half the "
+    f"physics step. Their two medians are printed if they differ by more than {APART}; the true "
+    "value may lie outside the cell's interval.",
 }
 LAST = "never", "fails", "not arrived"  # words in place of a value
 
@@ -162,7 +164,7 @@ class Lead(NamedTuple):
             if least < MIN_TIMES:
                 return f"below the floor of {self.floor}, unlike {self.rival}'s"
             text = f"below the floor of {self.floor}, {ahead}; {self.rival}'s median is at least"
-            return f"{text} {number(least)} times the floor"
+            return f"{text} {number(least)} {TIMES_FLOOR}"
         ratio, low, high = map(number, self.effect[:3])
         text = f"{ratio} times {self.rival}'s ({low} to {high})"
         if not self.effect.ahead:
@@ -195,6 +197,7 @@ class Block:
     level: bool  # whether the `best` laws are all level with each other
     # the least lead with which one of the `best` would have won, a share; NaN without a test
     resolves: float
+    charged: float  # the lead of one of the `best` that half the step and trends take, a share
     # medians at the step and at half of it, where they differ much
     by_step: Mapping[str, Pair]
     samples: int  # largest number of any two laws, see `ranking`; for one law, of its runs
@@ -423,7 +426,12 @@ class Board(Tables):
         others = "another" if alike else joined(self.best, "or")
         level = f"{100 * BEST_ERROR:g} %, corrected for multiple comparisons"
         text = f"no law is shown to be better than {others} (at {level})"
-        return text if math.isnan(self.resolves) else f"{text}; {hidden(self.resolves)}"
+        if math.isnan(self.resolves):
+            return text
+        charged = max(block.charged for block in self.blocks)
+        if charged > self.relevant:
+            return f"{text}; {hidden(self.resolves)}, as {100 * charged:.2g} % {CHARGED}"
+        return f"{text}; {hidden(self.resolves)}"
 
     @property
     def level(self) -> bool:
@@ -752,7 +760,7 @@ def _cell(board: Board, entry: BoardEntry) -> Cell:
     alarms = [board.failures(entry)]
     if step:
         before, after = step
-        alarms.append(f"{before} becomes {after} at half the step")
+        alarms.append(f"repeated runs {before}, at half the step {after}")
     says = entry.law == board.winner or not entry.vague
     best = entry.rank.best and says and median != "" and not board.barred
     lines = "\n".join(filter(None, below))
@@ -798,14 +806,24 @@ def key(boards: Sequence[Board], tables: str) -> list[str]:
         "and conditions compared; over several metrics together it may be as large as the sum of "
         "these probabilities. A verdict gives the winner's least lead over its rivals: the ratio "
         f"in paired runs with a {100 * LEVEL:g} % interval. This ratio differs from the ratio of "
-        "the medians in the table. If the winner is below the floor and its nearest rival is not, "
-        "the verdict says how many times the floor the rival's median is at least. Tests and "
-        "intervals of leads are cautious: what half the physics step changes counts against the "
-        "law in front, and so does a change between the last two fifths of a run, as if it went "
-        "on; under a periodic load this is partly a matter of phase. So a law may not win though "
-        "the intervals of the table do not overlap. A law is ahead if it is better by more than "
-        f"{100 * boards[0].relevant:g} % of the larger value."
+        "the medians in the table. Tests and intervals of leads are cautious: what half the "
+        "physics step changes is charged to the law in front, and so is a change from the fourth "
+        "fifth of a run to the last, as if this trend continued; under a periodic load it is "
+        "partly a matter of phase. So a law may not win though the intervals of the table do not "
+        f"overlap. A law is ahead if it is better by more than {100 * boards[0].relevant:g} % of "
+        "the larger value."
     )
+    said = " ".join(board.verdict for board in boards)
+    if TIMES_FLOOR in said:
+        parts.append(
+            "If the winner is below the floor and its nearest rival is not, the verdict gives a "
+            "lower bound on the rival's median, in multiples of the floor."
+        )
+    if LEVEL_WORDS in said:
+        parts.append(
+            f"Laws are level if the {100 * LEVEL:g} % interval of their ratio in paired runs lies "
+            f"within {100 * LEVEL_SHARE:g} % of 1."
+        )
     if any(board.by_step for board in boards):
         parts.append(f"{capital(UNTRIED)}.")
     return parts

@@ -364,6 +364,7 @@ def _block(
         lead=_lead(comparison, at, ranked, floor, unit),
         level=bool(comparison.level[at][np.ix_(best, best)].all()),
         resolves=_resolves(comparison, at, unbeaten),
+        charged=_charged(comparison, at, unbeaten),
         by_step=by_step,
         seeds=seeds,
         runs=runs,
@@ -409,6 +410,17 @@ def _resolves(comparison: Comparison, at: int, unbeaten: Sequence[str]) -> float
         for rival in unbeaten[1:]:
             seen.append(comparison.visible(at, unbeaten[0], rival))
     return max(seen, key=lambda lead: (not math.isnan(lead), lead))
+
+
+def _charged(comparison: Comparison, at: int, unbeaten: Sequence[str]) -> float:
+    """Return the largest lead of the first of the unbeaten laws over another that half the step and
+    trends take from it, a share.
+    """
+    taken = [0.0]
+    if not comparison.shares:
+        for rival in unbeaten[1:]:
+            taken.append(comparison.charged(at, unbeaten[0], rival))
+    return max(taken)
 
 
 def _entries(

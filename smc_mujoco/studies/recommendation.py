@@ -31,6 +31,7 @@ from smc_mujoco.studies.board import (
     BELOW,
     MARKS,
     MEDIANS,
+    WHEN_SETTLED,
     Boards,
     Lead,
     heading,
@@ -235,8 +236,8 @@ class RaceRecommendation(Recommendation):
         if self.together:
             cure = "if your machine has them all, give them as one condition"
             lines.append(
-                f"Together: {self._at_once(self.together)} settle. The search for gains never "
-                f"combined them: {cure}"
+                f"Together: {self._at_once(self.together)} settle. Neither searches for gains nor "
+                f"the comparison combined them: {cure}"
             )
         lines.append(f"Tolerates: {self._margins}")
         for name, share in self.race.dropped.items():
@@ -587,10 +588,13 @@ class RaceRecommendation(Recommendation):
                 f"The tables by condition leave out {joined(missing)}: they show at most {SHOWN} "
                 "laws."
             )
+        share = "settled runs"
+        has_shares = any(share in heading for table in shown for heading in table.headings)
+        settled = MARKS[share] if has_shares else WHEN_SETTLED
         notes.append(
-            f"{MEDIANS} {MARKS['settled runs']} In the tables by condition each law has one set of "
-            "gains; those of the law to use and of the second are printed below. The scores in "
-            "these tables are not tested for significance; only J is, below. "
+            f"{MEDIANS} {settled} In the tables by condition each law has one set of gains; those "
+            "of the law to use and of the second are printed below. The scores in these tables are "
+            "not tested for significance; only J is, below. "
             f"{capital(UNTRIED)}."
         )
         cells = repr([table.rows for table in shown])

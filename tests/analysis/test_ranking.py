@@ -443,7 +443,9 @@ def test_the_least_visible_lead_follows_from_the_units_and_charges_what_the_step
     assert least_visible_lead([*leads[:11], INF], 0.001, 0.03) == 1.0
     cells = {"a": twelve(1.0), "b": twelve(1.0, seed=1)}
     plain = 1 - Comparison(cells).visible(0, "a", "b")
+    assert Comparison(cells).charged(0, "a", "b") == 0.0
     charged = Comparison(cells, halves={"a": 2.0 * cells["a"], "b": cells["b"]})
+    assert charged.charged(0, "a", "b") == pytest.approx(0.5, rel=0.05)
     assert 1 - charged.visible(0, "a", "b") == pytest.approx(plain / 2, rel=0.05)
 
 

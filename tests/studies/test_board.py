@@ -20,7 +20,7 @@ from smc_mujoco.analysis.ranking import Effect
 from smc_mujoco.common.tabular import TEX, plain
 from smc_mujoco.draw import dot_plot
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.studies.board import UNDER, Board, Boards, Lead, size, sizes, spread
+from smc_mujoco.studies.board import CHARGED, UNDER, Board, Boards, Lead, size, sizes, spread
 from smc_mujoco.studies.leaderboard import leaderboard
 
 pytestmark = pytest.mark.quick
@@ -203,7 +203,7 @@ def test_a_cell_has_one_notation():
     cell = cells[EVIL]
     assert re.fullmatch(r"\d\.\de-4", cell.text)
     assert re.fullmatch(r"\d\.\de-4–\d\.\de-3", cell.below)
-    assert cell.alarm == f"{cell.text} becomes 1.0e-2 at half the step"
+    assert cell.alarm == f"repeated runs {cell.text}, at half the step 1.0e-2"
 
 
 def test_only_what_no_law_beats_is_marked(boards):
@@ -428,7 +428,7 @@ def test_half_a_step_that_moves_a_median_is_an_alarm():
     for row in leaderboard(table, ["itae"]).tables[0].rows:
         rows[row[0].text] = row[1]
     before = float(np.median(table.column("itae")[:20]))
-    moved = f"{size(before, 'itae')} becomes {size(1.5 * before, 'itae')} at half the step"
+    moved = f"repeated runs {size(before, 'itae')}, at half the step {size(1.5 * before, 'itae')}"
     assert rows[EVIL].alarm == moved
     assert rows["second"].alarm == ""
 
@@ -514,6 +514,17 @@ def test_few_sets_are_no_reason_where_every_run_settles(boards):
     both = dataclasses.replace(settles, blocks=(few, some))
     rank = "3 sets of gains or runs cannot rank 3 laws here; "
     assert f"all laws settle in the same runs under {few.condition}; {rank}" in both.result
+
+
+def test_a_verdict_says_how_much_of_a_lead_is_charged_where_it_counts(boards):
+    tie = {"ahead": None, "lead": None, "best": LAWS, "worse": (), "level": False, "resolves": 0.27}
+    for charged, words in ((0.02, "undetected"), (0.2, f"undetected, as 20 % {CHARGED}")):
+        block = dataclasses.replace(boards[0].blocks[0], **tie, charged=charged)
+        entries = []
+        for entry in boards[0].entries:
+            entries.append(dataclasses.replace(entry, rank=entry.rank._replace(best=True)))
+        board = dataclasses.replace(boards[0], blocks=(block,), entries=tuple(entries))
+        assert board.result.endswith(f"a lead below 27 % might go {words}")
 
 
 def test_a_law_below_the_floor_may_beat_one_without_any_value():

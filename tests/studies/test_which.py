@@ -360,7 +360,9 @@ def test_a_law_runs_under_all_conditions_at_once_unless_they_exclude_each_other(
     late = ". But with all the conditions asked for at once, none of 14 further runs settled"
     for counts, words, first in (((0, 14), "none", late), ((14, 14), "all", "")):
         told = dataclasses.replace(recommendation, together=counts).answer
-        assert f"at once, {words} of 14 further runs settle. The search for gains" in str(told)
+        assert f"at once, {words} of 14 further runs settle. Neither searches for gains" in str(
+            told
+        )
         assert told[0] == f"Use: {recommendation.law.name}{first}"
         shown = dataclasses.replace(recommendation, together=counts).worst_words
         assert shown.endswith("with all conditions at once none is shown") == bool(first)

@@ -21,17 +21,18 @@ if TYPE_CHECKING:
     from smc_mujoco.robustness.uncertainty import Uncertainty
     from smc_mujoco.simulation.scenario import Scenario
 
-Bound = Annotated[
+RANGES = (
+    "Bounds of `smc.Uncertainty`. Ranges: delay=0:0.01 (s), friction=0:0.1 (N or N m), "
+    "encoder=2048:32768 (counts), and what is added to a plant, as payload=0:2 (kg). Numbers: "
+    "slope (of d, per s), position_noise, velocity_noise, hold (how long a measurement error stays "
+    "the same, s), jitter (s), x0 (a share of it). Factors: mass=0.7:1.3, friction_scale=0.5:2, "
+    "bound=0.5:1 (on u_max), other parameters of the plant"
+)
+Bound = Annotated[str | None, typer.Option(metavar="NAME=BOUND,...", help=f"{RANGES}.")]
+BoundOrPeriod = Annotated[
     str | None,
     typer.Option(
-        metavar="NAME=BOUND,...",
-        help="Bounds of `smc.Uncertainty`. Ranges: delay=0:0.01 (s), friction=0:0.1 (N or N "
-        "m), encoder=2048:32768 "
-        "(counts), and what is added to a plant, as payload=0:2 (kg). Factors: mass=0.7:1.3, "
-        "friction_scale=0.5:2, bound=0.5:1 (on u_max), period=1:4 (on the control period; for "
-        "`sensitivity` alone), and other parameters of the plant. Numbers: slope (of d, per s), "
-        "position_noise, velocity_noise, hold (how long a measurement error stays the same, s), "
-        "jitter (s), x0 (a share of it).",
+        metavar="NAME=BOUND,...", help=f"{RANGES}, and period=1:4 (on the control period)."
     ),
 ]
 Metric = Annotated[
@@ -261,9 +262,9 @@ def worst(
     random.
 
     The search varies only what you bound; all else is as in the condition. If you bound nothing, it
-    varies what the plant declares as uncertain, such as an arm's payload; if the plant declares
-    nothing, a disturbance up to a sixth of the force of the weakest drive; and friction, if there
-    is any, by 50 %. On a rig, such as qube_servo, the adversary also chooses a parameter set. The
+    varies friction, if there is any, by 50 %, and what the plant declares as uncertain, such as an
+    arm's payload; if the plant declares nothing, a disturbance up to a sixth of the force of the
+    weakest drive. On a rig, such as qube_servo, the adversary also chooses a parameter set. The
     search is the same for all laws; there may be worse than it finds.
 
     The column "worst found" has the error of the worst run, and "median" the median error of as
@@ -307,7 +308,7 @@ def sensitivity(
     plant: options.PlantName,
     law: options.OneLaw = "observer_free",
     disturbance: options.Disturbance = None,
-    bound: Bound = None,
+    bound: BoundOrPeriod = None,
     metric: Metric = "rms_error",
     gains: options.Gains = "tuned",
     condition: options.Condition = "nominal",

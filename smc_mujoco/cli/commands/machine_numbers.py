@@ -128,13 +128,13 @@ def identify(
 
     A log may come from any controller, and needs at least 40 rows a second. It has columns t in s,
     and x and u of the joint, or x_JOINT and u_JOINT of each. x is the position (rad or m) as the
-    file counts it. u is what the actuator of the file takes: the force of a motor (N m or N), or
-    the set-point of a position servo less the goal (rad or m). If a servo's force was logged, add
-    (motor): arm.xml:elbow(motor). You need no first guess.
+    model file counts it. u is what the actuator of the model takes: the force of a motor (N m or
+    N), or the set-point of a position servo, counted from the goal (rad or m). If a servo's force
+    was logged, add (motor): arm.xml:elbow(motor). You need no first guess.
 
     Parameters of a joint are named JOINT.damping, .frictionloss, .armature, .stiffness, .gain,
     .offset and .zero: the force is gain times u, plus offset, and zero is what the encoder reads
-    where the file counts 0. The delay from command to force is input_delay. A plant's own
+    where the model counts 0. The delay from command to force is input_delay. A plant's own
     parameters keep the names that they have in the plant, such as m (mass) and grav (gravity); m of
     your own model is the mass of all that moves, in kg. Parameters of a part that --condition adds
     are named FIELD.NAME, such as friction.coulomb. The command prints a table of the parameters

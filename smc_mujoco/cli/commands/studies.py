@@ -62,9 +62,9 @@ Minutes = Annotated[
     float | None,
     typer.Option(
         help="Answer within so many minutes, with a film, or a still if there is no time for a "
-        "film. Laws are tuned and compared under the conditions asked for, and under noise if none "
-        "of these has any, until one law is shown to have the lowest J. Laws that could not be "
-        "tuned in time are listed."
+        "film. Laws without shipped gains are tuned, and all laws are compared, under the "
+        "conditions asked for, and under noise if none of them has noise, until one law is shown "
+        "to have the lowest J. Laws that could not be tuned in time are listed."
     ),
 ]
 Film = Annotated[
