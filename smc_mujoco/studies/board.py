@@ -51,7 +51,7 @@ MAX_LEAD = 0.995  # that may be said to show; chosen
 MAX_NAMED = 8  # conditions that a verdict names; chosen
 ALONE = "is not shown to beat every rival, and none is shown to beat it"
 LEVEL_WORDS = f"are level within {100 * LEVEL_SHARE:g} %"
-CHARGED = "is charged for changes late in the runs or with half the physics step"
+CHARGED = "for changes late in the runs or with half the physics step"
 # as far as these runs go: a share's interval is wider than 10 %
 SAME_RUNS = "settle in the same runs"
 FEW = (
@@ -430,7 +430,8 @@ class Board(Tables):
             return text
         charged = max(block.charged for block in self.blocks)
         if charged > self.relevant:
-            return f"{text}; {hidden(self.resolves)}, as {100 * charged:.2g} % {CHARGED}"
+            reduced = f"as it is first reduced by {100 * charged:.2g} % {CHARGED}"
+            return f"{text}; {hidden(self.resolves)}, {reduced}"
         return f"{text}; {hidden(self.resolves)}"
 
     @property

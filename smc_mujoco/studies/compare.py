@@ -66,6 +66,7 @@ TIME_NOTE = (
 )
 RUNS = "plant", "|u| at most", "starts", "control period (ms)", "duration (s)"
 SI = "Values in conditions are in N or N m, m or rad, and s."
+COUNTS = "Counts of encoders are per revolution or per metre."
 MOST_STARTS = 3  # channels whose starts have room in a table
 GAINS = "plant", "law", "gains", "searches", "evaluations", "J spread", "best set"
 BEST_SET = (
@@ -183,7 +184,8 @@ class Compared(Tables):
         for (name, words), on in plants_of.items():
             where = f" on {joined(on)}" if len(on) < len(self.conditions) else ""
             notes.append(f"{name}{where}: {words}")
-        return Tabular(headings=RUNS, rows=rows, title="Runs", notes=[*notes, SI], left=3)
+        units = f"{SI} {COUNTS}" if "counts=" in "".join(notes) else SI
+        return Tabular(headings=RUNS, rows=rows, title="Runs", notes=[*notes, units], left=3)
 
     def _runs(self, plant: str, law: str) -> list[Scenario]:
         """Return the runs of a law on a plant; other laws have the same but for their own law."""

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from smc_mujoco.analysis.bootstrap import LEVEL
 from smc_mujoco.analysis.paired_runs import OF_J, SETTLES, values
 from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.signed_rank import min_p
@@ -50,7 +51,7 @@ TOLERATED = {  # kind of a margin -> what is tolerated, at a level
     "friction": "dry friction of {}",
     "disturbance": "a constant disturbance of {} in the worse of its two directions",
     "mass": "a mass of {} the nominal one",
-    "blow": "a blow of {} halfway through the run, in the worse of its two directions",
+    "blow": "a blow of {} (over 5 ms) halfway through the run, in the worse of its two directions",
 }
 RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
 
@@ -252,7 +253,9 @@ class RaceRecommendation(Recommendation):
             others = f"{counted(len(self.untried_laws), 'other law')} of the package"
             usual = sum(law in gain_sets.COMPARED for law in self.untried_laws)
             cure = "; name some by laws= (--law)"
-            if usual:
+            if not self.table.scenario(0).plant.is_user_model:
+                cure = "; without the option --law (laws= in Python) they are tried, too"
+            elif usual:
                 others += f", {usual} of them usual ones"
                 cure = "; without the option --law (laws= in Python) all usual ones are tried"
             lines.append(f"Not tried here: {others}{cure}")
@@ -629,7 +632,8 @@ class RaceRecommendation(Recommendation):
                 f"Median and range over groups of runs that tuning has not seen{last}. The first "
                 "group uses the law's first set of gains, the second group the second set, and so "
                 "on; after the last set the first comes again. J is the time-weighted relative "
-                "error plus the weighted variation of u, added up over the conditions."
+                "error plus the weighted variation of u, added up over the conditions. Verdicts on "
+                f"J, below, have ratios with {100 * LEVEL:g} % intervals."
             ],
         )
 

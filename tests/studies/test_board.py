@@ -518,7 +518,10 @@ def test_few_sets_are_no_reason_where_every_run_settles(boards):
 
 def test_a_verdict_says_how_much_of_a_lead_is_charged_where_it_counts(boards):
     tie = {"ahead": None, "lead": None, "best": LAWS, "worse": (), "level": False, "resolves": 0.27}
-    for charged, words in ((0.02, "undetected"), (0.2, f"undetected, as 20 % {CHARGED}")):
+    for charged, words in (
+        (0.02, "undetected"),
+        (0.2, f"undetected, as it is first reduced by 20 % {CHARGED}"),
+    ):
         block = dataclasses.replace(boards[0].blocks[0], **tie, charged=charged)
         entries = []
         for entry in boards[0].entries:

@@ -232,6 +232,16 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     assert "*" not in text
 
 
+def test_on_a_plant_of_the_package_all_laws_that_suit_are_tried(raced, monkeypatch):
+    _, recommendation, _ = raced
+    plant = recommendation.table.scenario(0).plant
+    monkeypatch.setattr(type(plant), "is_user_model", property(lambda self: False))
+    assert any(
+        re.fullmatch(r"Not tried here: \d+ other laws .* they are tried, too", line)
+        for line in recommendation.answer
+    )
+
+
 def test_the_answer_counts_the_sets_of_gains_of_which_it_shows_the_best(raced):
     _, recommendation, _ = raced
     judged = len(recommendation.race.entrants[recommendation.law.name].values)

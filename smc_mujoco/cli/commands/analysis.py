@@ -158,9 +158,9 @@ def margins(
     """Find the largest delay, friction, noise and so on that a law tolerates: the error must still
     end below 5 % of its initial value, in runs of 10 s, or 5 s with --quick.
 
-    The delay of u is in s; a constant disturbance and dry friction are in N or N m. Mass
-    is a multiple of the nominal mass. Noise is the standard deviation of the position sensor's
-    noise, in rad or m; the velocity sensor has five times that number, in rad/s or m/s. A blow
+    The delay of u is in s; a constant disturbance and dry friction are in N or N m. Mass is a
+    multiple of the nominal mass. Noise is the standard deviation of the position sensor's noise, in
+    rad or m; the velocity sensor has five times that number, in rad/s or m/s. A blow lasts 5 ms and
     comes halfway through the run; its momentum is in N s or N m s. Jitter is a share of the control
     period. Missed is the share of samples that are missed. Loss is the fraction of its force that
     each actuator loses. For laws that can be linearised, the column "theory" has the stability
@@ -262,9 +262,9 @@ def worst(
     random.
 
     The search varies only what you bound; all else is as in the condition. If you bound nothing, it
-    varies friction, if there is any, by 50 %, and what the plant declares as uncertain, such as an
-    arm's payload; if the plant declares nothing, a disturbance up to a sixth of the force of the
-    weakest drive. On a rig, such as qube_servo, the adversary also chooses a parameter set. The
+    varies friction, if there is any, by 50 %. It also varies what the plant declares as uncertain,
+    such as an arm's payload, or, if nothing is declared, a disturbance up to a sixth of the weakest
+    drive's force. On a rig, such as qube_servo, the adversary also chooses a parameter set. The
     search is the same for all laws; there may be worse than it finds.
 
     The column "worst found" has the error of the worst run, and "median" the median error of as

@@ -64,13 +64,18 @@ Beside = Annotated[
     typer.Option(
         "--condition",
         metavar="NAME|TEXT|FILE",
-        help="Effects that the model lacks, such as friction, whose parameters are to be found: "
+        help="Effects that the model lacks, such as friction: "
         '"mine: friction=LuGre(0.3, 0.4, 0.1)", "mine: friction=my_parts.py:stribeck()", or a '
-        "file with one such line.",
+        "file with one such line. Numbers that --for names are found; others stay as given.",
     ),
 ]
 Corrected = Annotated[
-    bool, typer.Option("--corrected", help="Correct for the errors of the simulation's steps.")
+    bool,
+    typer.Option(
+        "--corrected",
+        help="Correct for the errors of the simulation's steps, in several times the time; without "
+        "it the result is extrapolated to steps of 0.",
+    ),
 ]
 Starts = Annotated[
     int,
