@@ -62,7 +62,6 @@ MEDIANS = f"A cell has a median and its {100 * LEVEL:g} % interval."
 BELOW = (
     "'floor': the median is below the number after this word. Values below a floor count as equal."
 )
-TIMES_FLOOR = "times the floor"
 WHEN_SETTLED = "A run counts as settled if it settles before its last fifth."
 TESTED = (
     f"a paired test at {100 * BEST_ERROR:g} %, corrected for multiple comparisons: for {RIVALS} "
@@ -164,7 +163,7 @@ class Lead(NamedTuple):
             if least < MIN_TIMES:
                 return f"below the floor of {self.floor}, unlike {self.rival}'s"
             text = f"below the floor of {self.floor}, {ahead}; {self.rival}'s median is at least"
-            return f"{text} {number(least)} {TIMES_FLOOR}"
+            return f"{text} {number(least)} times the floor"
         ratio, low, high = map(number, self.effect[:3])
         text = f"{ratio} times {self.rival}'s ({low} to {high})"
         if not self.effect.ahead:
@@ -814,13 +813,7 @@ def key(boards: Sequence[Board], tables: str) -> list[str]:
         f"overlap. A law is ahead if it is better by more than {100 * boards[0].relevant:g} % of "
         "the larger value."
     )
-    said = " ".join(board.verdict for board in boards)
-    if TIMES_FLOOR in said:
-        parts.append(
-            "If the winner is below the floor and its nearest rival is not, the verdict gives a "
-            "lower bound on the rival's median, in multiples of the floor."
-        )
-    if LEVEL_WORDS in said:
+    if any(LEVEL_WORDS in board.verdict for board in boards):
         parts.append(
             f"Laws are level if the {100 * LEVEL:g} % interval of their ratio in paired runs lies "
             f"within {100 * LEVEL_SHARE:g} % of 1."

@@ -330,9 +330,10 @@ def test_a_blow_comes_at_half_time_in_shares_of_the_momentum_that_u_stops_in_its
     whole = np.sqrt(inertia * abs(BASE.resolved.x0[0]) * BASE.limits[0])
     assert level == pytest.approx(margins.BLOWS[0] * whole)
     blows = [one.disturbance[-1] for one in kind.scenarios(BASE, level)]
-    assert [(blow.impulse, blow.time) for blow in blows] == [
-        (level, BASE.duration / 2),
-        (-level, BASE.duration / 2),
+    width = 5e-3  # s, as the help of `margins` and the answer of `which` say
+    assert [(blow.impulse, blow.time, blow.width) for blow in blows] == [
+        (level, BASE.duration / 2, width),
+        (-level, BASE.duration / 2, width),
     ]
 
 
