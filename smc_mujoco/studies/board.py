@@ -51,7 +51,7 @@ MAX_LEAD = 0.995  # that may be said to show; chosen
 MAX_NAMED = 8  # conditions that a verdict names; chosen
 ALONE = "is not shown to beat every rival, and none is shown to beat it"
 LEVEL_WORDS = f"are level within {100 * LEVEL_SHARE:g} %"
-CHARGED = "for changes late in the runs or with half the physics step"
+CHARGED = "is taken off a lead for changes late in the runs or at half the physics step"
 # as far as these runs go: a share's interval is wider than 10 %
 SAME_RUNS = "settle in the same runs"
 FEW = (
@@ -97,8 +97,8 @@ MARKS = MEANINGS | {
     f"variation per second, it is {100 * MIN_COMMAND_SHARE:g} % of u_max.",
     "may exceed ": "'may exceed': the median is below the floor, but it rises at the end of runs, "
     "or with half the physics step, so that it need not stay there.",
-    "at half": "'repeated runs': some runs, at least one in four, were repeated with half the "
-    f"physics step. Their two medians are printed if they differ by more than {APART}; the true "
+    "at half": "'some runs': at least one in four runs were repeated with half the physics step. "
+    f"Their medians before and after are printed if they differ by more than {APART}; the true "
     "value may lie outside the cell's interval.",
 }
 LAST = "never", "fails", "not arrived"  # words in place of a value
@@ -429,8 +429,7 @@ class Board(Tables):
             return text
         charged = max(block.charged for block in self.blocks)
         if charged > self.relevant:
-            reduced = f"as it is first reduced by {100 * charged:.2g} % {CHARGED}"
-            return f"{text}; {hidden(self.resolves)}, {reduced}"
+            return f"{text}; {hidden(self.resolves)}, as {100 * charged:.2g} % {CHARGED}"
         return f"{text}; {hidden(self.resolves)}"
 
     @property
@@ -760,7 +759,7 @@ def _cell(board: Board, entry: BoardEntry) -> Cell:
     alarms = [board.failures(entry)]
     if step:
         before, after = step
-        alarms.append(f"repeated runs {before}, at half the step {after}")
+        alarms.append(f"some runs {before}, at half the step {after}")
     says = entry.law == board.winner or not entry.vague
     best = entry.rank.best and says and median != "" and not board.barred
     lines = "\n".join(filter(None, below))
@@ -808,10 +807,10 @@ def key(boards: Sequence[Board], tables: str) -> list[str]:
         f"in paired runs with a {100 * LEVEL:g} % interval. This ratio differs from the ratio of "
         "the medians in the table. Tests and intervals of leads are cautious: a lead is "
         "reduced by the change seen at half the physics step, and by that from the fourth fifth of "
-        "a run to the last, as if this trend continued. Under a periodic load, part of the second "
-        "change is only phase. So a law may not win though the intervals of the table do not "
-        f"overlap. A law is ahead if it is better by more than {100 * boards[0].relevant:g} % of "
-        "the larger value."
+        "a run to the last, as if this trend continued. Under a periodic load the latter comes "
+        "partly from the load's phase, and takes off more than needed. So a law may fail to win "
+        "though the intervals of the table do not overlap. A law is ahead if it is better by more "
+        f"than {100 * boards[0].relevant:g} % of the larger value."
     )
     if any(LEVEL_WORDS in board.verdict for board in boards):
         parts.append(

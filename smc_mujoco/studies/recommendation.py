@@ -629,9 +629,10 @@ class RaceRecommendation(Recommendation):
             rows=rows,
             title=f"J {self.judged}",
             notes=[
-                f"Median and range over groups of runs that tuning has not seen{last}. The first "
-                "group uses the law's first set of gains, the second group the second set, and so "
-                "on; after the last set the first comes again. J is the time-weighted relative "
+                f"Median and range over groups of runs that tuning has not seen{last}. A group has "
+                "one run in each condition, all with one set of gains: the first group with the "
+                "law's first set, the second with the second, and so on; after the last set the "
+                "first comes again. J is the time-weighted relative "
                 "error plus the weighted variation of u, added up over the conditions. Verdicts on "
                 f"J, below, have ratios with {100 * LEVEL:g} % intervals."
             ],

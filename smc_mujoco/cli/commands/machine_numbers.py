@@ -73,8 +73,8 @@ Corrected = Annotated[
     bool,
     typer.Option(
         "--corrected",
-        help="Correct for the errors of the simulation's steps, in several times the time; without "
-        "it the result is extrapolated to steps of 0.",
+        help="Halve the simulation's steps until their errors no longer matter, in several times "
+        "the time; by default the result is extrapolated to steps of 0.",
     ),
 ]
 Starts = Annotated[
