@@ -356,8 +356,8 @@ def compare(
     Gains that you give in brackets are used as they are. Otherwise a law of the package uses the
     gains that are shipped for the plant. If there are none, or if the law is from your own file,
     it is tuned by one rule, the same for all laws. This takes seconds to minutes for each
-    law and plant. The default values in your file are used only with --no-tune, with any --gains
-    but tuned, or if the law cannot be tuned.
+    law and plant. The default values in your file are used only with --no-tune, with --gains other
+    than tuned, or if the law cannot be tuned.
 
     A stopped command resumes when you start it again. Without --law, the usual laws that suit the
     plant are compared: common sliding-mode laws, pid, adrc, pd_observer, lqi, mpc and
