@@ -504,8 +504,8 @@ def in_readme(points: Sequence[dict]) -> Iterator[str]:
     )
     yield "|---" * 7 + "|"
     rows = (
-        ("super-twisting, the better of explicit and implicit", "yes", noisy),
-        ("super-twisting, the better of explicit and implicit", "no", quiet),
+        ("super-twisting, the better of explicit and implicit discretisation", "yes", noisy),
+        ("super-twisting, the better of explicit and implicit discretisation", "no", quiet),
         ("smooth, first order (`boundary_layer`)", "yes", smooth_noisy),
         ("smooth, first order (`boundary_layer`)", "no", smooth),
     )

@@ -807,10 +807,10 @@ def key(boards: Sequence[Board], tables: str) -> list[str]:
         f"in paired runs with a {100 * LEVEL:g} % interval. This ratio differs from the ratio of "
         "the medians in the table. Tests, intervals of leads and numbers after 'at least' are "
         "cautious: a lead is reduced by its change at half the physics step, and by its change "
-        "between the last two fifths of a run, as if that drift went on. Under a periodic load the "
-        "drift is partly a matter of the load's phase, and takes off more than needed. So a law "
-        "may fail to win though the intervals of the table do not overlap. A law is ahead if it is "
-        f"better by more than {100 * boards[0].relevant:g} % of the larger value."
+        "between the last two fifths of a run, in case it goes on changing. Under a periodic load "
+        "this reduction is larger than needed. So a law may fail to win though the intervals of "
+        "the table do not overlap. A law is ahead if it is better by more than "
+        f"{100 * boards[0].relevant:g} % of the larger value."
     )
     if any(LEVEL_WORDS in board.verdict for board in boards):
         parts.append(
