@@ -503,15 +503,14 @@ def in_readme(points: Sequence[dict]) -> Iterator[str]:
         "ranked |"
     )
     yield "|---" * 7 + "|"
-    rows = (
-        ("super-twisting, the better of explicit and implicit discretisation", "yes", noisy),
-        ("super-twisting, the better of explicit and implicit discretisation", "no", quiet),
-        ("smooth, first order (`boundary_layer`)", "yes", smooth_noisy),
-        ("smooth, first order (`boundary_layer`)", "no", smooth),
-    )
-    for law, noise, count in rows:
-        told = leads(count), count["contradicted"], count["open"], unranked(count)
-        yield f"| {law} | {noise} | {count['all']} | {' | '.join(map(str, told))} |"
+    rows = {
+        "super-twisting, the better of explicit and implicit discretisation": (noisy, quiet),
+        "smooth, first order (`boundary_layer`)": (smooth_noisy, smooth),
+    }
+    for law, counts in rows.items():
+        for noise, count in zip(("yes", "no"), counts, strict=True):
+            told = leads(count), count["contradicted"], count["open"], unranked(count)
+            yield f"| {law} | {noise} | {count['all']} | {' | '.join(map(str, told))} |"
 
 
 def first_words(points: Sequence[dict]) -> str:

@@ -59,7 +59,7 @@ FEW = (
     f"below {100 * LEVEL:g} %."
 )
 MEDIANS = f"A cell has a median and its {100 * LEVEL:g} % interval."
-BELOW = (
+FLOOR = (
     "'floor': the median is below the number after this word. Values below a floor count as equal."
 )
 WHEN_SETTLED = "A run counts as settled if it settles before its last fifth."
@@ -91,7 +91,7 @@ MARKS = MEANINGS | {
     "times the floor, below which values count as equal.",
     "": "A run has arrived if, in its last fifth, the error stays below 10 % of its initial value "
     "or below 5 times the sensor's resolution.",
-    "floor ": f"{BELOW} If a law below the floor may be the best, no law above the floor is "
+    "floor ": f"{FLOOR} If a law below the floor may be the best, no law above the floor is "
     "marked. For an error, the floor is 1e-4 of its initial value. For errors late in the run, it "
     "is also at least half an encoder count and at least the noise. For u and its "
     f"variation per second, it is {100 * MIN_COMMAND_SHARE:g} % of u_max.",
@@ -196,7 +196,7 @@ class Block:
     level: bool  # whether the `best` laws are all level with each other
     # the least lead with which one of the `best` would have won, a share; NaN without a test
     resolves: float
-    charged: float  # the lead of one of the `best` that half the step and trends take, a share
+    charged: float  # what half the step and trends take from that lead, a share
     # medians at the step and at half of it, where they differ much
     by_step: Mapping[str, Pair]
     samples: int  # largest number of any two laws, see `ranking`; for one law, of its runs
@@ -427,7 +427,8 @@ class Board(Tables):
         text = f"no law is shown to be better than {others} (at {level})"
         if math.isnan(self.resolves):
             return text
-        charged = max(block.charged for block in self.blocks)
+        # of the lead that is printed
+        charged = max(block.charged for block in self.blocks if block.resolves == self.resolves)
         if charged > self.relevant:
             return f"{text}; {hidden(self.resolves)}, as {100 * charged:.2g} % {CHARGED}"
         return f"{text}; {hidden(self.resolves)}"
@@ -808,8 +809,8 @@ def key(boards: Sequence[Board], tables: str) -> list[str]:
         "the medians in the table. Tests, intervals of leads and numbers after 'at least' are "
         "cautious: a lead is reduced by its change at half the physics step, and by its change "
         "between the last two fifths of a run, in case it goes on changing. Under a periodic load "
-        "this reduction is larger than needed. So a law may fail to win though the intervals of "
-        "the table do not overlap. A law is ahead if it is better by more than "
+        "this reduction can be larger than needed. So a law may fail to win though the intervals "
+        "of the table do not overlap. A law is ahead if it is better by more than "
         f"{100 * boards[0].relevant:g} % of the larger value."
     )
     if any(LEVEL_WORDS in board.verdict for board in boards):

@@ -349,6 +349,7 @@ def _block(
             unbeaten.append(law)
         if law not in laws[few]:
             ranked.append(law)
+    resolves, charged = _resolves(comparison, at, unbeaten)
     return Block(
         plant=name[0],
         condition=name[1],
@@ -363,8 +364,8 @@ def _block(
         ahead=winner,
         lead=_lead(comparison, at, ranked, floor, unit),
         level=bool(comparison.level[at][np.ix_(best, best)].all()),
-        resolves=_resolves(comparison, at, unbeaten),
-        charged=_charged(comparison, at, unbeaten),
+        resolves=resolves,
+        charged=charged,
         by_step=by_step,
         seeds=seeds,
         runs=runs,
@@ -401,26 +402,17 @@ def _lead(
     return Lead(first, rival, effect, floor if effect.below else "", unit, lost)
 
 
-def _resolves(comparison: Comparison, at: int, unbeaten: Sequence[str]) -> float:
+def _resolves(comparison: Comparison, at: int, unbeaten: Sequence[str]) -> tuple[float, float]:
     """Return the least lead of the first of the unbeaten laws with which it would have been seen to
-    be better than all others of them, a share; NaN without a test.
+    be better than all others of them, and what half the step and trends take from it, shares; NaN
+    and 0 without a test.
     """
-    seen = [math.nan]
+    seen = [(math.nan, 0.0)]
     if not comparison.shares:
         for rival in unbeaten[1:]:
-            seen.append(comparison.visible(at, unbeaten[0], rival))
-    return max(seen, key=lambda lead: (not math.isnan(lead), lead))
-
-
-def _charged(comparison: Comparison, at: int, unbeaten: Sequence[str]) -> float:
-    """Return the largest lead of the first of the unbeaten laws over another that half the step and
-    trends take from it, a share.
-    """
-    taken = [0.0]
-    if not comparison.shares:
-        for rival in unbeaten[1:]:
-            taken.append(comparison.charged(at, unbeaten[0], rival))
-    return max(taken)
+            pair = at, unbeaten[0], rival
+            seen.append((comparison.visible(*pair), comparison.charged(*pair)))
+    return max(seen, key=lambda found: (not math.isnan(found[0]), found[0]))
 
 
 def _entries(

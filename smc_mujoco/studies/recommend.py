@@ -334,7 +334,7 @@ def _assumed(trial: Trial, plant: Plant, goal: Objective) -> str:
             )
             if condition.name not in asked:
                 parts[-1] += (
-                    f". None of your conditions has noise, so the condition "
+                    ". None of your conditions has noise, so the condition "
                     f"{condition.name} was added: to replace it, give a condition with "
                     "noise=Noise(...)"
                 )

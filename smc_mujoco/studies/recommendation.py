@@ -29,7 +29,7 @@ from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.answer_time import SHOWN
 from smc_mujoco.studies.board import (
     ALONE,
-    BELOW,
+    FLOOR,
     MARKS,
     MEDIANS,
     WHEN_SETTLED,
@@ -605,7 +605,7 @@ class RaceRecommendation(Recommendation):
             f"{MARKS['']} In metrics of u, such as TV rate, a run that has not arrived counts as "
             "worse than any value."
         )
-        words = {"floor ": BELOW, "may exceed ": MARKS["may exceed "], "not arrived": arrived}
+        words = {"floor ": FLOOR, "may exceed ": MARKS["may exceed "], "not arrived": arrived}
         for word, meaning in words.items():
             if word in cells:
                 notes.append(meaning)

@@ -218,7 +218,7 @@ def test_within_minutes_the_answer_has_both_verdicts_the_margins_and_the_gains(r
     assert " times the nominal one and a blow of " in lines["Tolerates"]
     kinds = {*recommend.KINDS, *recommend.KINDS_OF_POSES}
     assert kinds == recommendation_module.TOLERATED.keys()
-    assert recommendation_module.BELOW not in " ".join(text.split())  # no cell has that word
+    assert recommendation_module.FLOOR not in " ".join(text.split())  # no cell has that word
     assert "error in the last fifth of a run of 1.5 s is still below 5 %" in lines["Tolerates"]
     assert "mass include those of the condition; friction and blows are" in lines["Tolerates"]
     assert recommendation.together is None  # there is one condition
@@ -256,7 +256,7 @@ def test_a_word_in_a_cell_is_explained(raced, monkeypatch):
     tables[0] = dataclasses.replace(tables[0], rows=[row])
     monkeypatch.setattr(type(recommendation.leaderboard), "tables", tables)
     words = " ".join(str(recommendation).split())
-    assert recommendation_module.BELOW in words
+    assert recommendation_module.FLOOR in words
     assert "'may exceed'" not in words
 
 

@@ -21,18 +21,18 @@ if TYPE_CHECKING:
     from smc_mujoco.robustness.uncertainty import Uncertainty
     from smc_mujoco.simulation.scenario import Scenario
 
-RANGES = (
+BOUNDS = (
     "Bounds of `smc.Uncertainty`. Ranges: delay=0:0.01 (s), friction=0:0.1 (N or N m), "
     "encoder=2048:32768 (counts), and what is added to a plant, as payload=0:2 (kg). Numbers: "
     "slope (of d, per s), position_noise, velocity_noise, hold (how long a measurement error stays "
     "the same, s), jitter (s), x0 (a share of it). Factors: mass=0.7:1.3, friction_scale=0.5:2, "
     "bound=0.5:1 (on u_max), other parameters of the plant"
 )
-Bound = Annotated[str | None, typer.Option(metavar="NAME=BOUND,...", help=f"{RANGES}.")]
+Bound = Annotated[str | None, typer.Option(metavar="NAME=BOUND,...", help=f"{BOUNDS}.")]
 BoundOrPeriod = Annotated[
     str | None,
     typer.Option(
-        metavar="NAME=BOUND,...", help=f"{RANGES}, and period=1:4 (on the control period)."
+        metavar="NAME=BOUND,...", help=f"{BOUNDS}, and period=1:4 (on the control period)."
     ),
 ]
 Metric = Annotated[
