@@ -181,13 +181,13 @@ def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chatte
     for cycle in stable:
         if cycle[1] > fastest / (1.0 + SAME_CYCLE_TOLERANCE):
             close.append(cycle)
-    one = min(close)
+    balance = min(close)
     if len(stable) > MAX_OTHER_CYCLES + 1:
         assumptions += ("N L is about 1 at many frequencies: do not trust the prediction",)
     elif len(stable) > 1:
         assumptions += ("other starts may end in another cycle",)
-    threshold = _threshold(loop, one, unstable)
-    return _prediction(loop, one, threshold, assumptions, ranges)
+    threshold = _threshold(loop, balance, unstable)
+    return _prediction(loop, balance, threshold, assumptions, ranges)
 
 
 def _threshold(loop: Loop, one: Balance, unstable: Sequence[Balance]) -> float:
@@ -195,13 +195,13 @@ def _threshold(loop: Loop, one: Balance, unstable: Sequence[Balance]) -> float:
     of L, or 0.
     """
     smaller = []
-    for other in unstable:
-        if other[0] < one[0]:
-            smaller.append(other)
+    for balance in unstable:
+        if balance[0] < one[0]:
+            smaller.append(balance)
     *turns, turn = _turns(loop, [*smaller, one])
     threshold = 0.0
-    for (amplitude, _), other in zip(smaller, turns, strict=True):
-        if round(other - turn) == 0:
+    for (amplitude, _), balance in zip(smaller, turns, strict=True):
+        if round(balance - turn) == 0:
             threshold = max(threshold, amplitude)
     return threshold
 
@@ -243,13 +243,14 @@ def cycles(loop: Loop) -> tuple[list[Balance], list[Balance]]:
     """
     balances: list[Balance] = []
     for cells in _starts(loop):
-        one = _first_balance(loop, cells)
-        if one and all(
-            np.abs(np.log(one) - np.log(other)).max() > SAME_CYCLE_TOLERANCE for other in balances
+        balance = _first_balance(loop, cells)
+        if balance and all(
+            np.abs(np.log(balance) - np.log(earlier)).max() > SAME_CYCLE_TOLERANCE
+            for earlier in balances
         ):
-            balances.append(one)
+            balances.append(balance)
     stable = _stable(loop, balances) or _of_two_samples(loop)
-    return stable, [one for one in balances if one not in stable]
+    return stable, [balance for balance in balances if balance not in stable]
 
 
 def _first_balance(loop: Loop, cells: Iterable[tuple]) -> Balance | None:
@@ -309,12 +310,12 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
         turns = winding[tuple(cells.T)]
         for sign in (1.0, -1.0):
             if sign * turns.sum() >= 0.0:
-                found = []
+                bounds = []
                 for cell in cells[turns == sign]:
                     low = start + step * cell
                     high = start + step * (cell + 1)
-                    found.append((low[::-1], high[::-1]))
-                yield found
+                    bounds.append((low[::-1], high[::-1]))
+                yield bounds
 
 
 def _may_balance(products: Array, sides: Array) -> Array:
@@ -426,12 +427,12 @@ def _of_two_samples(loop: Loop) -> list[Balance]:
         return math.log(product) if product > 0.0 else -50.0
 
     places = np.linspace(math.log(MIN_AMPLITUDE), math.log(MAX_AMPLITUDE), GRID_AMPLITUDES + 1)
-    found = []
+    balances = []
     for low, high in itertools.pairwise(places):
         if excess(low) > 0.0 >= excess(high):
             amplitude = math.exp(float(brentq(excess, low, high)))  # type: ignore[arg-type]
-            found.append((amplitude, fastest))
-    return found
+            balances.append((amplitude, fastest))
+    return balances
 
 
 def _stable(loop: Loop, balances: Sequence[Balance]) -> list[Balance]:
@@ -442,10 +443,10 @@ def _stable(loop: Loop, balances: Sequence[Balance]) -> list[Balance]:
     is stable.
     """
     decaying = []
-    for one in balances:
-        if _decays(loop, *one):
-            decaying.append(one)
-    decaying.sort(key=lambda one: one[1])
+    for balance in balances:
+        if _decays(loop, *balance):
+            decaying.append(balance)
+    decaying.sort(key=lambda balance: balance[1])
     turns = _turns(loop, decaying)
     stable = []
     for k, cycle in enumerate(decaying):

@@ -137,9 +137,9 @@ class Loop:
 
     def later(self, delay: float) -> "Loop":
         """Return the loop with an additional delay, s."""
-        made = copy.copy(self)
-        made.delay = self.delay + delay
-        return made
+        delayed = copy.copy(self)
+        delayed.delay = self.delay + delay
+        return delayed
 
     def _linearise_mechanism(self) -> None:
         """Linearise MuJoCo's model about rest at x = 0, without contacts, limits, dry friction and
@@ -223,8 +223,8 @@ class Loop:
         """
         driven = self.rows[: self.scenario.plant.driven]
         answer = np.abs(self._answer(omega)[driven])
-        others = np.delete(answer, self.channel)
-        return float(others.max(initial=0.0) / answer[self.channel])
+        of_others = np.delete(answer, self.channel)
+        return float(of_others.max(initial=0.0) / answer[self.channel])
 
     def _solve(self, omega: complex) -> Array:
         """Return the state at samples per unit of held u, with u's images at omega + 2 pi m /
@@ -336,7 +336,7 @@ class Loop:
             harmonics = self._harmonics_of_e(amplitude, omega, u, angles)
             angles, u, s = self._excited(harmonics, omega, MAX_SAMPLES_PER_PERIOD)
         first = _harmonic(u, angles)
-        at = _harmonic(s, angles)
+        of_s = _harmonic(s, angles)
         half = len(u) // 2
         early = _harmonic(u[:half], angles[:half])
         late = _harmonic(u[half:], angles[half:])
@@ -344,10 +344,12 @@ class Loop:
             amplitude=amplitude,
             omega=omega,
             gain=self._gain_of(first, amplitude, omega),
-            third=abs(_harmonic(s, 3.0 * angles) / at) if at and len(harmonics) > 1 else math.nan,
+            third=abs(_harmonic(s, 3.0 * angles) / of_s)
+            if of_s and len(harmonics) > 1
+            else math.nan,
             s=float(np.ptp(s)) / 2.0,
             u=float(np.ptp(u)) / 2.0,
-            rate=omega * abs(at),
+            rate=omega * abs(of_s),
             drift=abs(late - early) / (abs(first) or 1.0),
         )
 
@@ -399,9 +401,9 @@ class Loop:
                     continue
                 answer = self._answer(n * omega)
                 e = amplitude * turns
-                at = answer[self.rows[self.channel]]
-                x += (answer[self.rows[joint]] / at * e).real
-                answered = answer[self.nv + self.rows[joint]] / at
+                own_answer = answer[self.rows[self.channel]]
+                x += (answer[self.rows[joint]] / own_answer * e).real
+                answered = answer[self.nv + self.rows[joint]] / own_answer
                 v += (answered * e).real
             motion += [x, v]
         u, s = self._controlled(clock.h, motion)
@@ -441,8 +443,8 @@ class CompiledController:
     def __init__(self, *parts: Component | None):
         try:
             functions = []
-            for one in parts:
-                functions.append(None if one is None else cfunctions.compile_component(one))
+            for part in parts:
+                functions.append(None if part is None else cfunctions.compile_component(part))
         except NotCompilable as error:
             raise ScenarioError(
                 f"chattering is not predicted for a law that does not compile: {error}"
@@ -450,9 +452,9 @@ class CompiledController:
         self.functions, self.parts = functions, parts  # the functions keep their addresses alive
         addresses = []
         self.gains = []
-        for one, function in zip(parts, functions, strict=True):
+        for part, function in zip(parts, functions, strict=True):
             addresses.append(0 if function is None else function.address)
-            gains = () if one is None else one.gains.values()
+            gains = () if part is None else part.gains.values()
             self.gains.append(np.array([*gains, 0.0]))
         self.addresses = np.array(addresses)
 
@@ -481,7 +483,7 @@ class CompiledController:
         out = np.empty((len(x), 2))
         y = np.empty(len(FIELDS))
         g0, g1, g2 = self.gains
-        m0, m1, m2 = (np.zeros(one.memory if one else 1) for one in self.parts)
+        m0, m1, m2 = (np.zeros(part.memory if part else 1) for part in self.parts)
         model = np.array([models[0], joint_model])
         done = _run(self.addresses, g0, g1, g2, m0, m1, m2, start, x, v, q, dq, model, y, out)
         if done < 0:

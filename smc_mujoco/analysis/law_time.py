@@ -64,10 +64,10 @@ def law_time(scenario: Scenario) -> LawTime | None:
         rounds.append((own_round, other_round))
     of_timed, of_reference = zip(*rounds, strict=True)
     own = np.min(of_timed, axis=0)
-    other = np.min(of_reference, axis=0)
+    reference_time = np.min(of_reference, axis=0)
     quantiles = np.quantile(own, (0.5, 0.99))
     median, high = quantiles.tolist()
-    return LawTime(median, high, median / float(np.median(other)))
+    return LawTime(median, high, median / float(np.median(reference_time)))
 
 
 def _measured(scenario: Scenario) -> Array:

@@ -82,12 +82,12 @@ def linear(plant: Plant) -> Linear:
 
     def slopes(at: Callable[[Array, int], float]) -> Array:
         """Return -d f_i / d z_j / g, (n, n), by central differences."""
-        found = np.empty((n, n))
+        jacobian = np.empty((n, n))
         for j, z in enumerate(DIFFERENCE_STEP * np.eye(n)):
             for i in range(n):
                 difference = at(-z, i) - at(z, i)
-                found[i, j] = difference / (2.0 * DIFFERENCE_STEP * g[i])
-        return found
+                jacobian[i, j] = difference / (2.0 * DIFFERENCE_STEP * g[i])
+        return jacobian
 
     stiffness = slopes(lambda x, i: plant.nominal(x, rest, i, p)[0])
     damping = slopes(lambda v, i: plant.nominal(rest, v, i, p)[0])
@@ -145,13 +145,13 @@ def smallest_lam(plant: Plant, k1: Natural) -> float:
     By Routh-Hurwitz both coefficients of (1) must be positive: lam > -D and lam k1 > -K_j for every
     mode. A result of 0 confirms the paper's claim; with inf no lam is enough.
     """
-    at = linear(plant)
-    soft = -float(at.modes[0])
+    linearised = linear(plant)
+    soft = -float(linearised.modes[0])
     if k1 > 0.0:
         stiff = soft / k1
     else:
         stiff = math.inf if soft >= 0.0 else 0.0
-    return max(0.0, -at.damping, stiff)
+    return max(0.0, -linearised.damping, stiff)
 
 
 @constrained
@@ -166,9 +166,12 @@ def critical_delay(plant: Plant, lam: Natural, k1: Natural, control_period: Posi
     -1, tolerates less than one period. A loop with a stiff spring, K_j > lam k1, may be stable
     again with a longer delay.
     """
-    at = linear(plant)
+    linearised = linear(plant)
     if lam:
-        return min(_crossing(at, stiffness, lam, k1, control_period) for stiffness in at.modes)
+        return min(
+            _crossing(linearised, stiffness, lam, k1, control_period)
+            for stiffness in linearised.modes
+        )
     return 0.0
 
 

@@ -92,7 +92,7 @@ def _sampled(plant: Plant, control_period: float) -> tuple[np.ndarray, np.ndarra
     """Return A and B of the errors and rates of all channels from sample to sample, at the goal."""
     rest = plant.rest or (0.0,) * plant.n
     goal = (*rest[: plant.driven], *(plant.goal or (0.0,) * plant.free))
-    at = Scenario(
+    scenario = Scenario(
         plant=plant,
         law="none",
         x0=goal,
@@ -101,9 +101,9 @@ def _sampled(plant: Plant, control_period: float) -> tuple[np.ndarray, np.ndarra
         duration=control_period,
     )
     with installed(None):
-        model = models.with_values(models.compile_model(at), at)
+        model = models.with_values(models.compile_model(scenario), scenario)
         data = mujoco.MjData(model)
-        data.qpos[:], data.qvel[:] = models.initial_state(model, at)
+        data.qpos[:], data.qvel[:] = models.initial_state(model, scenario)
         dofs = dof_ids(model)
         if model.nv > len(dofs) or model.na:
             raise ScenarioError(
@@ -126,7 +126,7 @@ def _sampled(plant: Plant, control_period: float) -> tuple[np.ndarray, np.ndarra
     pushed = pushed[np.ix_(order, columns)]
     A = np.eye(len(order))
     B = np.zeros_like(pushed)
-    for _ in range(at.steps):
+    for _ in range(scenario.steps):
         A = step @ A
         B = step @ B + pushed
     return A, B

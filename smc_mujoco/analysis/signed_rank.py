@@ -32,15 +32,15 @@ def p_values(differences: ArrayLike) -> np.ndarray:
     The statistic is the number of pairs i <= j whose sum is above 0: without ties and zeros, the
     sum of the positive ranks. Ties and zeros lower it, so that the test keeps its level.
     """
-    given = np.asarray(differences, float)
-    p = np.ones(given.shape[:-1])
-    for at in np.ndindex(p.shape):
-        known = given[at][~np.isnan(given[at])]
-        if known.size:
+    samples = np.asarray(differences, float)
+    p = np.ones(samples.shape[:-1])
+    for index in np.ndindex(p.shape):
+        numbers = samples[index][~np.isnan(samples[index])]
+        if numbers.size:
             with np.errstate(invalid="ignore"):  # the sum of opposite infinities is not above 0
-                above = known[:, None] + known > 0.0  # each pair i < j twice
+                above = numbers[:, None] + numbers > 0.0  # each pair i < j twice
             rank_sum = int(above.sum() + above.trace()) // 2
-            p[at] = _tail(known.size, rank_sum)
+            p[index] = _tail(numbers.size, rank_sum)
     return p
 
 
@@ -50,20 +50,20 @@ def interval(differences: ArrayLike, error: float) -> tuple[float, float, float]
     The true centre lies beyond each end with probability `error`. Ends are infinite if the sample
     is too small.
     """
-    known = _finite(differences)
-    if not known.size:
+    numbers = _finite(differences)
+    if not numbers.size:
         return math.nan, math.nan, math.nan
-    i, j = np.triu_indices(known.size)
-    low, high = _ends(known[None], error)
-    sums = known[i] + known[j]
+    i, j = np.triu_indices(numbers.size)
+    low, high = _ends(numbers[None], error)
+    sums = numbers[i] + numbers[j]
     centre = float(np.median(sums)) / 2
     return centre, float(low[0]), float(high[0])
 
 
 def _finite(differences: ArrayLike) -> np.ndarray:
     """Return the differences that are known, with finite numbers in place of infinite ones."""
-    known = np.asarray(differences, float)
-    return np.clip(known[~np.isnan(known)], -MAX_LOG, MAX_LOG)
+    numbers = np.asarray(differences, float)
+    return np.clip(numbers[~np.isnan(numbers)], -MAX_LOG, MAX_LOG)
 
 
 def _ends(samples: np.ndarray, error: float) -> np.ndarray:
@@ -75,10 +75,10 @@ def _ends(samples: np.ndarray, error: float) -> np.ndarray:
     if not enough.size:
         ends = np.array([[-math.inf], [math.inf]])
         return ends.repeat(len(samples), axis=1)
-    at = i.size - enough[0], enough[0] - 1
+    ranks = i.size - enough[0], enough[0] - 1
     pairs = samples[:, i] + samples[:, j]
-    sums = np.partition(pairs, at, axis=1)
-    return sums[:, at].T / 2
+    sums = np.partition(pairs, ranks, axis=1)
+    return sums[:, ranks].T / 2
 
 
 def min_p(n: ArrayLike) -> np.ndarray:
@@ -128,12 +128,12 @@ def units_needed(leads: ArrayLike, error: float, relevant: float) -> float:
     """
     from scipy.special import stdtrit
 
-    known = _finite(leads)
-    i, j = np.triu_indices(known.size, 1)
-    gaps = known[i] - known[j]
+    numbers = _finite(leads)
+    i, j = np.triu_indices(numbers.size, 1)
+    gaps = numbers[i] - numbers[j]
     spread = np.median(np.abs(gaps))
     deviation = float(spread) / MEDIAN_DISTANCE
-    centre = interval(known, error)[0] + math.log1p(-relevant)
+    centre = interval(numbers, error)[0] + math.log1p(-relevant)
     if not centre > 0.0:
         return math.inf
     for n in range(max(2, math.ceil(-math.log2(error))), MAX_UNITS + 1):
@@ -163,14 +163,14 @@ def least_visible_lead(leads: ArrayLike, error: float, relevant: float) -> float
       error: one-sided level of the test.
       relevant: r.
     """
-    known = _finite(leads)
-    n = known.size
+    numbers = _finite(leads)
+    n = numbers.size
     if n < 2 or min_p(n) > error:
         return 1.0
-    centre = interval(known, error)[0]
+    centre = interval(numbers, error)[0]
     scale = math.sqrt(n / (n - 1))
-    centred = scale * (known - centre)
-    digest = hashlib.sha256(known.tobytes()).digest()
+    centred = scale * (numbers - centre)
+    digest = hashlib.sha256(numbers.tobytes()).digest()
     seed = int.from_bytes(digest[:8])
     drawn = np.random.default_rng(seed).integers(n, size=(LEAD_RESAMPLES, n))
     needed = []

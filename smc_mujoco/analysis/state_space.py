@@ -55,13 +55,13 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
         from control import StateSpace
 
     plant = as_plant(plant)
-    at = Scenario(plant=plant, law="none", x0=(plant.rest or 0.0) if x is None else x, v0=0.0)
+    scenario = Scenario(plant=plant, law="none", x0=(plant.rest or 0.0) if x is None else x, v0=0.0)
     with installed(None):
-        model = models.with_values(models.compile_model(at), at)
+        model = models.with_values(models.compile_model(scenario), scenario)
         model.opt.disableflags |= NONLINEAR_FLAGS
         model.actuator_delay[:] = 0.0
         data = mujoco.MjData(model)
-        data.qpos[:], data.qvel[:] = models.initial_state(model, at)
+        data.qpos[:], data.qvel[:] = models.initial_state(model, scenario)
         driven = model.actuator_ctrladr[drive_ids(model)]  # their places in ctrl
         dofs = dof_ids(model)
         _hold(model, data, driven, plant.name)
@@ -119,7 +119,7 @@ def _hold(model: mujoco.MjModel, data: mujoco.MjData, commands: Array, name: str
     data.ctrl[commands] -= solution[0]
     mujoco.mj_forward(model, data)
     if np.abs(data.qacc).max() > MAX_REST_ACCELERATION:
-        x = ", ".join(f"{one:g}" for one in data.qpos)
+        x = ", ".join(f"{position:g}" for position in data.qpos)
         raise ScenarioError(f"no command holds {name} at rest at x = {x}: give another x")
 
 

@@ -131,15 +131,15 @@ def repetitions(trace: Trace) -> list[Scenario]:
     Raise ScenarioError if the step cannot be halved.
     """
     scenario = trace.scenario
-    found = [halved(scenario), nudged(scenario)]
+    repeated = [halved(scenario), nudged(scenario)]
     if chatters(trace):
         with contextlib.suppress(ScenarioError):  # the step is too short for a quarter
-            found.append(halved(halved(scenario)))
+            repeated.append(halved(halved(scenario)))
     if scenario.contact and scenario.resolved.integrator != "RK4":
         step = scenario.resolved.physics_step
         with contextlib.suppress(ScenarioError):  # another part needs this integrator
-            found.append(dataclasses.replace(scenario, integrator="RK4", physics_step=step))
-    return found
+            repeated.append(dataclasses.replace(scenario, integrator="RK4", physics_step=step))
+    return repeated
 
 
 def step_halving(
@@ -167,8 +167,8 @@ def step_halving(
             last_channel = trace.scenario.plant.n - 1
             channel = whole("channel", channel, 0, last_channel)
     scenarios = list(map(repetitions, traces))
-    every = list(itertools.chain(*scenarios))
-    again = iter(run(every, threads=threads))
+    flat = list(itertools.chain(*scenarios))
+    again = iter(run(flat, threads=threads))
     changes = []
     for trace, repeated in zip(traces, scenarios, strict=True):
         cycles = []

@@ -498,9 +498,9 @@ def margins_of(
     unchanged = [(i, None) for i in range(0, len(cells.pairs), len(kinds))]
     held = cells.tolerated(unchanged, runs.by_mujoco)
     going = {}
-    for i, one in enumerate(cells.searches):
+    for i, of_cell in enumerate(cells.searches):
         if held[i // len(kinds)]:
-            going[i] = one
+            going[i] = of_cell
     find_boundaries(going, lambda tried: cells.tolerated(tried, runs.scored))
     again = {}  # MuJoCo has the last word on the ends
     ends = cells.ends_by(going, runs.covers)
@@ -552,11 +552,11 @@ class Cells:
     @property
     def left(self) -> int:
         """The work that the searches may still need."""
-        left = 0
+        work = 0
         for (base, kind), search in zip(self.pairs, self.searches, strict=True):
             signs = 2 if kind.signed else 1
-            left += search.left * base.work * signs
-        return left
+            work += search.left * base.work * signs
+        return work
 
     def tolerated(self, tried: Sequence[Tried], runner: Callable) -> list[bool]:
         """Return whether these levels are tolerated."""
@@ -564,13 +564,13 @@ class Cells:
         owners = []
         for k, (i, level) in enumerate(tried):
             base, kind = self.pairs[i]
-            some = [base] if level is None else kind.scenarios(base, level)
-            scenarios += some
-            owners += [k] * len(some)
+            of_level = [base] if level is None else kind.scenarios(base, level)
+            scenarios += of_level
+            owners += [k] * len(of_level)
         now = sum(scenario.work for scenario in scenarios)
-        whole = self.done + max(now, self.left)
+        expected = self.done + max(now, self.left)
         results = [True] * len(tried)
-        scores = runner(scenarios, summed(self.report, self.done, whole))
+        scores = runner(scenarios, summed(self.report, self.done, expected))
         for k, ((share,), _) in zip(owners, scores, strict=True):
             results[k] &= share <= TOLERATED_ERROR
         self.done += now

@@ -80,7 +80,7 @@ def draw(
             if len(plants) > 1:
                 of_plant[0, 0].set_title(style.plant_name(plant), parse_math=False)
             for ax, kind in zip(of_plant.flat, kinds, strict=False):
-                here = [one for one in found if (one.plant, one.kind) == (plant, kind)]
+                here = [entry for entry in found if (entry.plant, entry.kind) == (plant, kind)]
                 _panel(ax, here, named=ax in of_plant[:, 0])
             for ax in of_plant.flat[len(kinds) :]:
                 ax.set_axis_off()

@@ -101,5 +101,5 @@ def colour_indices(region: Basin, after: Sequence[float]) -> np.ndarray:
     undecided, then not.
     """
     shade = np.minimum(np.searchsorted(after, region.decided_at), SHADES - 1)
-    others = np.where(region.outcome == DOES_NOT, 4, 3)
-    return np.where(region.outcome == CONVERGES, shade, others)
+    undecided_or_not = np.where(region.outcome == DOES_NOT, 4, 3)
+    return np.where(region.outcome == CONVERGES, shade, undecided_or_not)

@@ -89,8 +89,8 @@ class Basin:
 
     def __repr__(self) -> str:
         share = f"{100 * self.share:.3g} % of {self.outcome.size} states"
-        found = f"{self.law} on {self.plant}: {share} come to rest within {self.duration:g} s"
-        return f"Basin({'; '.join(filter(None, (found, self.checked)))})"
+        text = f"{self.law} on {self.plant}: {share} come to rest within {self.duration:g} s"
+        return f"Basin({'; '.join(filter(None, (text, self.checked)))})"
 
     @property
     def share(self) -> float:
@@ -194,7 +194,9 @@ def basin_of(
             f"{base.plant.name} has channels in m and rad, which cannot start from the same state: "
             "map another plant"
         )
-    if moving := [one for one in base.references if not isinstance(one, Constant)]:
+    if moving := [
+        reference for reference in base.references if not isinstance(reference, Constant)
+    ]:
         raise ScenarioError(
             f"a map shows what comes to rest, and {shown(moving[0])} moves: give a constant "
             "reference"
@@ -259,20 +261,20 @@ class _Grid:
         base = self.base
         outcome = np.full(len(states), UNDECIDED, np.int8)
         decided_at = np.full(len(states), base.duration)
-        left = np.arange(len(states))
+        undecided = np.arange(len(states))
         done = 0.0
         for i, horizon in enumerate(HORIZONS):
             final = horizon == HORIZONS[-1]
             shortened = dataclasses.replace(base, duration=horizon * base.duration)
-            needed = done + left.size * base.work * sum(HORIZONS[i:])
-            for begin in range(0, left.size, size):
-                some = left[begin : begin + size]
-                outcome[some] = run(shortened, states[some], final)
-                done += some.size * shortened.work
+            needed = done + undecided.size * base.work * sum(HORIZONS[i:])
+            for begin in range(0, undecided.size, size):
+                batch = undecided[begin : begin + size]
+                outcome[batch] = run(shortened, states[batch], final)
+                done += batch.size * shortened.work
                 report(done, needed)
-            waits = outcome[left] == UNDECIDED
-            decided_at[left[~waits]] = shortened.duration
-            left = left[waits]
+            waits = outcome[undecided] == UNDECIDED
+            decided_at[undecided[~waits]] = shortened.duration
+            undecided = undecided[waits]
         return outcome, decided_at
 
     def by_mujoco(self, shortened: Scenario, states: Array, final: bool) -> list[int]:
@@ -293,12 +295,12 @@ class _Grid:
         def run(shortened: Scenario, states: Array, final: bool) -> Array:
             group = kind([shortened], (NAME,))
             rows = np.repeat(group.rows, len(states), axis=0)
-            at = group.layout.row
+            places = group.layout.row
             n = self.base.plant.n
-            rows[:, at.x0 : at.x0 + n] = states[:, :1]
-            rows[:, at.v0 : at.v0 + n] = states[:, 1:]
+            rows[:, places.x0 : places.x0 + n] = states[:, :1]
+            rows[:, places.v0 : places.v0 + n] = states[:, 1:]
             u_max = shortened.resolved.u_max
-            rows[:, at.reach : at.reach + 4] = _reach(self.x, self.v, u_max, final)
+            rows[:, places.reach : places.reach + 4] = _reach(self.x, self.v, u_max, final)
             if not final:
                 rows[:, SETTING.late] = _early(shortened.samples)
             outcome = group.run(rows, self.threads, device)[:, SCORES]

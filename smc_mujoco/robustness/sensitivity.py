@@ -137,8 +137,8 @@ class Sensitivity(Tables, SobolResult):
         """The axis that explains most, if the intervals tell."""
         if not self.axes or not np.ptp(self.values) or 2 * self.unscored > len(self.values):
             return "no axis, as the scores do not differ, or most runs have none"
-        first, *others = self.axes
-        if any(axis.total.high > first.total.low for axis in others):
+        first, *further = self.axes
+        if any(axis.total.high > first.total.low for axis in further):
             return "open, as intervals overlap (give more points)"
         share = _percent(first.total)
         return f"{in_words(first.name)}, {share.text} % ({share.below} %), alone and with others"
@@ -298,9 +298,9 @@ def _run(
     held = np.empty(len(design), bool)
     for first in range(0, len(design), AT_ONCE):
         cases = list(map(space.scenario_at, design[first : first + AT_ONCE]))
-        for i, (found, failed) in enumerate(fast.scored(cases, advance), first):
-            scores[i] = math.inf if failed is not None else found[0]
-            held[i] = failed is None and found[-1] <= TOLERATED_ERROR
+        for i, (of_run, failed) in enumerate(fast.scored(cases, advance), first):
+            scores[i] = math.inf if failed is not None else of_run[0]
+            held[i] = failed is None and of_run[-1] <= TOLERATED_ERROR
     return scores, held
 
 

@@ -90,16 +90,16 @@ def _runs(ax: Axes, found: SobolResult, colour: str) -> None:
     indices.
     """
     space = found.space
-    at = []
+    places = []
     if found.regions:
-        at = [cut.axis for cut in found.regions[0].cuts]
+        places = [cut.axis for cut in found.regions[0].cuts]
     for axis in found.axes:
         place = space.names.index(axis.name)
-        if axis.name != CHANCE and place not in at:
-            at.append(place)
+        if axis.name != CHANCE and place not in places:
+            places.append(place)
     columns = []
     factors = []
-    for i, axis in zip(at, (ax.xaxis, ax.yaxis), strict=False):
+    for i, axis in zip(places, (ax.xaxis, ax.yaxis), strict=False):
         _, high, unit = space.ends[i]
         factor, unit = style.prefixed(high, unit)
         factors.append(factor)
@@ -123,7 +123,7 @@ def _runs(ax: Axes, found: SobolResult, colour: str) -> None:
         look = {"c": tones[picked].tolist(), "marker": marker, "s": style.points(DOT_SIZE)}
         ax.scatter(columns[0][picked], columns[1][picked], **look)
     if found.regions:
-        _border(ax, found.regions[0].cuts, at, factors, space)
+        _border(ax, found.regions[0].cuts, places, factors, space)
 
 
 def _border(
@@ -137,6 +137,6 @@ def _border(
             ends[k][0] = factors[k] * space.value(cut.axis, cut.low)
         if cut.high < 1.0:
             ends[k][1] = factors[k] * space.value(cut.axis, cut.high)
-    (left, right), (low, high) = ends
+    (near, far), (low, high) = ends
     look = {"fill": False, "ls": "--", "ec": style.INK, "lw": style.points(1.2)}
-    ax.add_patch(Rectangle((left, low), right - left, high - low, **look))
+    ax.add_patch(Rectangle((near, low), far - near, high - low, **look))

@@ -102,17 +102,17 @@ class Space:
 
     def scenario_at(self, shares: Array) -> Scenario:
         """Return the scenario at a share of each axis."""
-        known = dict(zip(self.names, shares.tolist(), strict=True))
+        share_by_name = dict(zip(self.names, shares.tolist(), strict=True))
         m = len(self.members.constants)
-        chance = round(known.get(CHANCE, 0.0) * MAX_SEED)
+        chance = round(share_by_name.get(CHANCE, 0.0) * MAX_SEED)
         drawn = self.members.random(np.random.default_rng(chance))
         member = Member(
             shares[:m],
-            known.get("disturbance", 0.0) * drawn.force,
-            known.get("noise", 0.0) * drawn.noise,
+            share_by_name.get("disturbance", 0.0) * drawn.force,
+            share_by_name.get("noise", 0.0) * drawn.noise,
         )
         scenario = self.members.scenario_of(member)
-        if CHANCE in known:
+        if CHANCE in share_by_name:
             return dataclasses.replace(scenario, seed=chance)
         return scenario
 
@@ -154,8 +154,8 @@ class SobolResult:
 def _intervals(ends: Array, points: int) -> list[Interval]:
     """Return the interval of each axis from its value, low and high end, (3, axes)."""
     intervals = []
-    for at, low, high in ends.T.tolist():
-        intervals.append(Interval(at, low, high, points))
+    for estimate, low, high in ends.T.tolist():
+        intervals.append(Interval(estimate, low, high, points))
     return intervals
 
 
@@ -199,8 +199,8 @@ def estimates(f_A: Array, f_B: Array, f_AB: Array) -> ArrayPair:  # scipy's
         alone = slope / (1.0 - common**2)
     gaps = ((f_A - f_AB) ** 2).mean(-1)
     variance = np.var([f_A, f_B], axis=(0, -1))
-    whole = gaps / (2.0 * variance)
-    return np.where(common**2 < 1.0, alone, 0.0).T, whole.T
+    total = gaps / (2.0 * variance)
+    return np.where(common**2 < 1.0, alone, 0.0).T, total.T
 
 
 def _standardised(f: Array) -> Array:
@@ -234,27 +234,27 @@ def indices(
     first = total = [Interval(0.0, 0.0, 0.0, points)] * k
     if np.ptp(parts[:2]):
 
-        def of(at: Array) -> Array:
+        def of(draw: Array) -> Array:
             """Return both indices of each axis, (2, k), from some of the points."""
             # twice: scipy fails on one axis of one output, and centres in place
-            some = np.stack([parts[:, at]] * 2)
-            f_AB = some[:, 2:].swapaxes(0, 1)
-            outputs = {"f_A": some[:, 0], "f_B": some[:, 1], "f_AB": f_AB}
+            drawn = np.stack([parts[:, draw]] * 2)
+            f_AB = drawn[:, 2:].swapaxes(0, 1)
+            outputs = {"f_A": drawn[:, 0], "f_B": drawn[:, 1], "f_AB": f_AB}
             result = sobol_indices(func=outputs, n=points, method=estimates)  # pyright: ignore[reportArgumentType]
-            both = np.reshape([result.first_order, result.total_order], (2, 2, k))
-            return possible(*both[:, 0])
+            first_and_total = np.reshape([result.first_order, result.total_order], (2, 2, k))
+            return possible(*first_and_total[:, 0])
 
         draws = np.random.default_rng(seed).integers(points, size=(RESAMPLES, points))
         samples = []
-        for at in draws:
-            if np.ptp(parts[:2, at]):
-                samples.append(of(at))
+        for draw in draws:
+            if np.ptp(parts[:2, draw]):
+                samples.append(of(draw))
         resampled = np.array(samples)
         tails = [(1 - LEVEL) / 2, (1 + LEVEL) / 2]
         ends = np.quantile(resampled, tails, axis=0)
-        whole = np.array([of(np.arange(points)), *ends])  # (3, 2, k)
-        first = _intervals(whole[:, 0], points)
-        total = _intervals(whole[:, 1], points)
+        pairs = np.array([of(np.arange(points)), *ends])  # (3, 2, k)
+        first = _intervals(pairs[:, 0], points)
+        total = _intervals(pairs[:, 1], points)
     axes = []
     for i, name in enumerate(space.names):
         ordered = name != CHANCE and np.ptp(values) > 0.0
@@ -287,7 +287,7 @@ def regions(space: Space, shares: Array, failed: Array) -> list[Region]:
     """
     half = len(failed) // 2
     accepted = []
-    left = np.ones(len(failed), bool)  # not in a region yet
+    outside = np.ones(len(failed), bool)  # not in a region yet
     axes = [i for i, name in enumerate(space.names) if name != CHANCE]
     single: list[tuple[Cut, ...]] = []
     double: list[tuple[Cut, ...]] = []
@@ -303,18 +303,18 @@ def regions(space: Space, shares: Array, failed: Array) -> list[Region]:
             double.append(first + second)
     prices = dict.fromkeys(single, 1) | dict.fromkeys(double, 2)
     while len(accepted) < MAX_REGIONS and failed[:half].any():
-        chooses = left[:half]
+        chooses = outside[:half]
         gains = {}
         for cuts, price in prices.items():
             inside = _within(cuts, shares[:half])[chooses]
             gains[cuts] = _gain(inside, failed[:half][chooses], price)
         cuts = max(gains, key=gains.__getitem__)
-        tested = _within(cuts, shares) & left
+        tested = _within(cuts, shares) & outside
         tested[:half] = False
-        if gains[cuts] <= 0.0 or not _more_fail(failed[half:], tested[half:], left[half:]):
+        if gains[cuts] <= 0.0 or not _more_fail(failed[half:], tested[half:], outside[half:]):
             break
-        left &= ~_within(cuts, shares)
-        rest = left.copy()
+        outside &= ~_within(cuts, shares)
+        rest = outside.copy()
         rest[:half] = False
         accepted.append(Region(cuts, _rate(failed[tested]), _rate(failed[rest])))
     return accepted

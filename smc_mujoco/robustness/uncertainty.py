@@ -111,10 +111,10 @@ class Uncertainty:
             raise ScenarioError(
                 f"Uncertainty's parameters are {shown(self.parameters)}: give a range for each name"
             )
-        of = constraints.Range()
+        parse_range = constraints.Range()
         ranges = {}
         for name, value in self.parameters.items():
-            ranges[str(name)] = of(f"Uncertainty's {name}", value)
+            ranges[str(name)] = parse_range(f"Uncertainty's {name}", value)
         vars(self)["parameters"] = frozen(ranges)  # the class is frozen
         bounds = (
             self.disturbance,
@@ -134,12 +134,12 @@ class Uncertainty:
 
     def words(self, plant: Plant) -> str:
         """Return the bounds that were given as text, such as "disturbance 2 N, mass 0.7 to 1.3"."""
-        given = {}
+        bounds = {}
         for field in dataclasses.fields(self):
             if getattr(self, field.name) != field.default:
-                given[field.name] = getattr(self, field.name)
-        given |= given.pop("parameters", {})
-        return words_of(given, plant)
+                bounds[field.name] = getattr(self, field.name)
+        bounds |= bounds.pop("parameters", {})
+        return words_of(bounds, plant)
 
 
 def words_of(given: Mapping[str, float | Pair], plant: Plant) -> str:
@@ -237,7 +237,7 @@ class Members:
 
     def __init__(self, scenarios: Sequence[Scenario], within: Uncertainty):
         if dotted(within.parameters):
-            scenarios = [_with_numbers(one, within) for one in scenarios]
+            scenarios = [_with_numbers(case, within) for case in scenarios]
         scenario = scenarios[0]
         count = len(scenarios)
         self.scenario = scenario
@@ -325,11 +325,11 @@ class Members:
         else:
             bends = np.abs(np.diff(change)) > ROUNDING * np.abs(values).max()
         inner = np.flatnonzero(bends) + 1
-        at = np.unique(np.concatenate([[0], inner, [len(values) - 1]]))
-        times = (at * self.h).tolist()
+        places = np.unique(np.concatenate([[0], inner, [len(values) - 1]]))
+        times = (places * self.h).tolist()
         if steps:
-            return Held(times, values[at].tolist())
-        return TimeSeries(times, values[at].tolist())
+            return Held(times, values[places].tolist())
+        return TimeSeries(times, values[places].tolist())
 
     def limited(self, force: Array) -> Array:
         """Return a force limited to -1 .. 1, and in its slope."""
@@ -385,11 +385,11 @@ class Members:
         m = len(self.constants)
         rows = np.reshape(z[m : self.size(knots)], (-1, knots))
         shares = np.clip(member.shares + CONSTANT_DEVIATION * z[:m], 0.0, 1.0)
-        at = np.linspace(0.0, 1.0, knots)
+        knot_places = np.linspace(0.0, 1.0, knots)
 
         def added(row: Array, more: Array) -> Array:
             along = np.linspace(0.0, 1.0, len(row))
-            return np.clip(row + 2.0 * np.interp(along, at, more), -1.0, 1.0)
+            return np.clip(row + 2.0 * np.interp(along, knot_places, more), -1.0, 1.0)
 
         force = self.limited(added(member.force, rows[0])) if self.forced else member.force
         if self.times:
@@ -412,13 +412,13 @@ def mutated_signal(values: Array, rng: np.random.Generator) -> Array:
     signs = np.sign(values)
     switches = np.flatnonzero(signs[1:] != signs[:-1]) + 1
     if len(switches) and rng.random() < SHIFT_PROBABILITY:
-        at = int(rng.choice(switches))
-        piece = slice(at, at + length)
+        begin = int(rng.choice(switches))
+        piece = slice(begin, begin + length)
         if rng.random() < 0.5:
-            piece = slice(max(0, at - length), at)
+            piece = slice(max(0, begin - length), begin)
     else:
-        at = int(rng.integers(1 - length, max(last, 2 - length)))
-        piece = slice(max(0, at), at + length)
+        begin = int(rng.integers(1 - length, max(last, 2 - length)))
+        piece = slice(max(0, begin), begin + length)
     mutated[piece] *= -1.0
     return mutated
 
@@ -476,10 +476,10 @@ def _check_class(scenario: Scenario, within: Uncertainty) -> None:
         for field in dataclasses.fields(within):
             if field.name != "parameters":
                 fields.append(field.name)
-        known = ", ".join(sorted({*fields, *plant.parameters}))
+        names = ", ".join(sorted({*fields, *plant.parameters}))
         raise ScenarioError(
             f"no bound and no parameter of {plant.name} is called {foreign[0]!r}: choose from "
-            f"{known}"
+            f"{names}"
         )
     if (longest := scenario.duration - scenario.input_delay) < within.delay[1]:
         raise ScenarioError(
@@ -599,13 +599,13 @@ def _with_start(scenario: Scenario, share: float, i: int) -> Scenario:
 def with_friction(scenario: Scenario, level: float) -> Scenario:
     """Return the scenario with `level` added to the dry friction of driven joints, N or N m."""
     before = 0
-    others = []
+    further = []
     for part in scenario.friction:
         if isinstance(part, Coulomb) and not part.on:
             before += part.level
         else:
-            others.append(part)
-    return dataclasses.replace(scenario, friction=(*others, Coulomb(before + level)))
+            further.append(part)
+    return dataclasses.replace(scenario, friction=(*further, Coulomb(before + level)))
 
 
 def dry_frictions(plant: Plant) -> list[str]:
@@ -613,8 +613,8 @@ def dry_frictions(plant: Plant) -> list[str]:
     are not 0.
     """
     names = [name for name in plant.dry if plant.parameters[name]]
-    for name, one in model_numbers(plant).items():
-        if one.kind == "frictionloss" and one.value:
+    for name, constant in model_numbers(plant).items():
+        if constant.kind == "frictionloss" and constant.value:
             names.append(name)
     return names
 

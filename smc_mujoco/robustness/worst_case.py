@@ -104,15 +104,15 @@ class WorstCase(Tables):
     def __str__(self) -> str:
         s = self.nominal
         label = CATALOGUE[self.metric].label
-        found = f"{label} {self.words}"
+        result = f"{label} {self.words}"
         having = [words_of(self.constants, s.plant)]
         if self.within.disturbance:
             having.append("the force that was found")
         if having := ", ".join(filter(None, having)):
-            found += f" with {having}"
+            result += f" with {having}"
         drawn = f"median of random members {self.with_unit(self.median)}"
         words = "; ".join(
-            filter(None, (found, drawn, f"searched: {self.class_words}", self.checked))
+            filter(None, (result, drawn, f"searched: {self.class_words}", self.checked))
         )
         return f"{s.law.name} on {s.plant.name}: {words}"
 
@@ -314,11 +314,11 @@ def _worst_of(
     scenario = scenarios[0]
     if broken := drawing.broken or search.broken:
         warn_of_broken({scenario.law.name: broken})
-    known = []
-    for one in (*search.tried, *drawing.tried):
-        if one.by_mujoco:
-            known.append(one)
-    worst = max(known, key=lambda tried: tried.key)
+    by_mujoco = []
+    for attempt in (*search.tried, *drawing.tried):
+        if attempt.by_mujoco:
+            by_mujoco.append(attempt)
+    worst = max(by_mujoco, key=lambda tried: tried.key)
     constants = {}
     for constant, share in zip(members.constants, worst.member.shares.tolist(), strict=True):
         if constant.name != "set":  # the worst run's scenario is of it

@@ -357,8 +357,8 @@ class WorstCaseSearch:
 
     def _changes(self, rng: np.random.Generator) -> list[Case]:
         best: dict[int, TriedMember] = {}
-        for one in sorted(self.tried, key=lambda one: one.key, reverse=True):
-            best.setdefault(one.origin, one)
+        for tried in sorted(self.tried, key=lambda tried: tried.key, reverse=True):
+            best.setdefault(tried.origin, tried)
         parents = list(best.values())[: len(CHANGES_PER_PARENT)]
         counts = CHANGES_PER_PARENT[1 : len(parents)]
         cases = []
@@ -389,8 +389,8 @@ class WorstCaseSearch:
                 )
             yield cases
             keys = []
-            for one in self.tried[before:]:
-                keys.append(one.key)
+            for tried in self.tried[before:]:
+                keys.append(tried.key)
             order = sorted(range(len(keys)), key=keys.__getitem__, reverse=True)
             ranks = {}
             for rank, i in enumerate(order):

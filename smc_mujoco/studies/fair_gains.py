@@ -83,10 +83,10 @@ class Candidate(NamedTuple):
         """
         laws = list(map(self, instances))
         values, arrived = objectives(plant, laws, goal, instances, threads)
-        every = slice(None, None, REPEATED_SEEDS)
+        repeated = slice(None, None, REPEATED_SEEDS)
         halves = np.full(len(laws), math.nan)
-        halves[every], _ = objectives(
-            plant, laws[every], goal, instances[every], threads, halved=True
+        halves[repeated], _ = objectives(
+            plant, laws[repeated], goal, instances[repeated], threads, halved=True
         )
         return values, arrived, halves, np.arange(len(laws)) % len(self.sets)
 
@@ -97,10 +97,10 @@ def law_or_template(law: Component | Template | str) -> Component | Template:
         return all_laws()[law]
     if isinstance(law, Template):
         return law
-    given = coerce.law(law)
-    if given.template and given.source.kind == source.DEFAULT:
-        return given.template
-    return given
+    bound = coerce.law(law)
+    if bound.template and bound.source.kind == source.DEFAULT:
+        return bound.template
+    return bound
 
 
 def _without_search(
@@ -184,10 +184,10 @@ class Trial(NamedTuple):
         """Return a trial in conditions, or where these are None in those of the `known` ones that
         suit the plants, with other fields as given.
         """
-        given = conditions
-        if given is None:
-            given = applicable(known, plants, duration)
-        parsed = listed_conditions(given)
+        texts = conditions
+        if texts is None:
+            texts = applicable(known, plants, duration)
+        parsed = listed_conditions(texts)
         return cls(plants=plants, conditions=parsed, duration=duration, folder=Path(out), **fields)
 
     @property
@@ -216,10 +216,10 @@ class Trial(NamedTuple):
             check_names(self.plants, components, self.conditions)
             for named in (self.plants, components, self.conditions):
                 names = set()
-                for thing in named:
-                    if thing.name in names:
-                        raise ScenarioError(f"{thing.name!r} is there twice: give it once")
-                    names.add(thing.name)
+                for item in named:
+                    if item.name in names:
+                        raise ScenarioError(f"{item.name!r} is there twice: give it once")
+                    names.add(item.name)
         for plant in self.plants:
             for condition in self.conditions:
                 check_moving([self.case(plant, "none", condition)])
@@ -237,28 +237,30 @@ class Trial(NamedTuple):
           ScenarioError: none of several laws can be tuned on a plant, so that there could be no
             winner, unless `defaults`. It is raised before the first search.
         """
-        known = {}
+        without_search = {}
         for plant in self.plants:
-            known[plant.name] = self.known(plant, laws[plant.name])
+            without_search[plant.name] = self.known(plant, laws[plant.name])
         if self.progress:
-            few = dict.fromkeys(self._if_few(of_plant, seeds) for of_plant in known.values())
+            few = dict.fromkeys(
+                self._if_few(of_plant, seeds) for of_plant in without_search.values()
+            )
             for sentence in filter(None, few):
                 print(sentence, file=sys.stderr)
-            for name, of_plant in known.items():
-                asked = [
-                    law.name for law, found in zip(laws[name], of_plant, strict=True) if not found
+            for name, of_plant in without_search.items():
+                to_search = [
+                    law.name for law, ready in zip(laws[name], of_plant, strict=True) if not ready
                 ]
-                if asked and self.tune:
-                    kept = f"searches of these laws as they are now, which {self.folder} keeps"
-                    sentence = (
-                        f"gains to search on {name}: {joined(asked)}; {kept}, are not repeated"
-                    )
-                    print(sentence, file=sys.stderr)
+                if to_search and self.tune:
+                    repeated = f"searches of these laws as they are now, which {self.folder} keeps"
+                    sentence = f"gains to search on {name}: {joined(to_search)}; {repeated}"
+                    print(f"{sentence}, are not repeated", file=sys.stderr)
         by_plant: dict[str, list[Candidate]] = {}
         for plant in self.plants:
             by_plant[plant.name] = []
-            rule = self.rule(plant, known[plant.name])
-            for law, known_candidate in zip(laws[plant.name], known[plant.name], strict=True):
+            rule = self.rule(plant, without_search[plant.name])
+            for law, known_candidate in zip(
+                laws[plant.name], without_search[plant.name], strict=True
+            ):
                 candidate = known_candidate or default_of(law)
                 if known_candidate is None and self.tune:
                     candidate = self.search_gains(plant, law, rule)
@@ -271,13 +273,13 @@ class Trial(NamedTuple):
         Raises:
           ScenarioError: see `candidates`.
         """
-        asked = self.asked if self.tune else None
-        known = []
+        count = self.asked if self.tune else None
+        candidates = []
         for law in laws:
-            known.append(_without_search(plant, law, self.gain_set, asked))
+            candidates.append(_without_search(plant, law, self.gain_set, count))
         if self.tune and not self.defaults:
-            self._check_tunable(plant, laws, known, self.rule(plant, known).goal)
-        return known
+            self._check_tunable(plant, laws, candidates, self.rule(plant, candidates).goal)
+        return candidates
 
     def rule(self, plant: Plant, known: Sequence[Candidate | None]) -> GainRule:
         """Return how the gains of the other laws are searched: as those of the package, from the
@@ -356,8 +358,8 @@ class Trial(NamedTuple):
         """Return the objective of whole searches on a plant."""
         usual = Objective()
         fit = applicable([c.name for c in usual.conditions], [plant], usual.duration)
-        kept = tuple(c for c in usual.conditions if c.name in fit)
-        return dataclasses.replace(usual, conditions=kept, starts=starts or usual.starts)
+        suited = tuple(c for c in usual.conditions if c.name in fit)
+        return dataclasses.replace(usual, conditions=suited, starts=starts or usual.starts)
 
     def search_gains(self, plant: Plant, law: Component | Template, rule: GainRule) -> Candidate:
         """Return a law with gains that searches find, or found in an earlier call, or with its
@@ -371,10 +373,10 @@ class Trial(NamedTuple):
             template = default.template
         ranges = template and (dict(template.gains), dict(template.conditions))
         folder = self.folder / "gains"
-        known = [f"gains of {default.name} for {plant.name} are kept in {folder}"]
+        cached_gains = [f"gains of {default.name} for {plant.name} are kept in {folder}"]
 
         def searched() -> result.Tuned:
-            known.clear()
+            cached_gains.clear()
             with warnings.catch_warnings():  # the remark says so
                 warnings.filterwarnings("ignore", "no set of gains tried", ScenarioWarning)
                 return search.tune(
@@ -407,15 +409,15 @@ class Trial(NamedTuple):
         except ScenarioError as error:
             return default_of(law, f"{NOT_TUNED}{error}")
         if self.progress:
-            for words in known:
+            for words in cached_gains:
                 print(words, file=sys.stderr)
-        found = candidate_of(default, tuned)
+        candidate = candidate_of(default, tuned)
         if rule.quick or rule.budget == BUDGET:
-            return found
+            return candidate
         tried = f"at most {rule.budget} sets were tried for each gain, where {BUDGET} are usual"
         where = "trails" if rule.budget < BUDGET else "leads"
-        remarks = found.remark, f"{tried}: where it {where}, its search may be why"
-        return found._replace(remark="; ".join(filter(None, remarks)))
+        remarks = candidate.remark, f"{tried}: where it {where}, its search may be why"
+        return candidate._replace(remark="; ".join(filter(None, remarks)))
 
     def run(
         self,
@@ -454,7 +456,7 @@ class Trial(NamedTuple):
         by_plant = {}
         words = "J on unseen runs"
         laws = sum(map(len, candidates.values()))
-        with bar(words, laws, self.progress, counted=True) as shown:
+        with bar(words, laws, self.progress, counted=True) as progress_bar:
             for plant in self.plants:
                 goal = self._goal(plant, self.starts)
                 if self.rule(plant, candidates[plant.name]).quick:
@@ -467,7 +469,7 @@ class Trial(NamedTuple):
                         parts = self._holdout(plant, candidate, goal, self.seeds(count))
                         for of_law, values in zip(runs[:4], parts, strict=True):
                             of_law[candidate.law.name] = values  # pyright: ignore[reportIndexIssue] made as dicts
-                        shown.advance(1.0)
+                        progress_bar.advance(1.0)
                     by_plant[plant.name] = runs
         return by_plant
 
@@ -505,24 +507,26 @@ def candidate_of(default: Component, tuned: result.Tuned) -> Candidate:
     """Return a law with the gains of each search, or with those that it had if no search found
     better ones.
     """
-    found = tuned.law.source
+    tuned_source = tuned.law.source
     if tuned.before < tuned.objective:
         if default.source.kind == source.DEFAULT:
             own = "defaults"
         else:
             own = "own gains"
-        kept = default.sourced(found.kind, found.search)
-        return Candidate(kept, (kept,), f"its {own}, better than those tried")
+        unchanged = default.sourced(tuned_source.kind, tuned_source.search)
+        return Candidate(unchanged, (unchanged,), f"its {own}, better than those tried")
     sets = []
     for tried in tuned.sets:
         gains = dict(default.gains) | dict(zip(tuned.bounds, tried.gains, strict=True))
         with_gains = dataclasses.replace(default, gains=gains)
-        sets.append(with_gains.sourced(found.kind, found.search))
-    best = dataclasses.replace(default, gains=tuned.law.gains).sourced(found.kind, found.search)
+        sets.append(with_gains.sourced(tuned_source.kind, tuned_source.search))
+    best = dataclasses.replace(default, gains=tuned.law.gains).sourced(
+        tuned_source.kind, tuned_source.search
+    )
     remarks = search_space.edges_in_words(tuned.gains, tuned.at_bound)
     if names := list(search_space.without_unit(default)):
-        given = f"no unit is given for {joined(names)}"
-        remarks.append(f"{given}, so the search is centred on their defaults")
+        unitless = f"no unit is given for {joined(names)}"
+        remarks.append(f"{unitless}, so the search is centred on their defaults")
     return Candidate(best, tuple(sets), "; ".join(remarks))
 
 

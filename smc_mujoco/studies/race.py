@@ -98,7 +98,7 @@ class Entrant:
     @property
     def values(self) -> list[float]:
         """J of each set."""
-        return [one.value for one in self.J if one]
+        return [unseen_J.value for unseen_J in self.J if unseen_J]
 
 
 class Race(NamedTuple):
@@ -153,40 +153,42 @@ def race(
     comparison, looked = None, 0
     stopped = False
     begin = time.monotonic()
-    kept = _kept(trial, [(one, 0, 0) for one in entrants if one.task])
-    with bar("set of gains", LOOKS[0] * len(entrants), trial.progress, counted=True) as shown:
-        shown.latest = clock.ends
-        everyone = _first_sets(trial, plant, entrants, goal, clock, shown)
+    from_folder = _kept(trial, [(entrant, 0, 0) for entrant in entrants if entrant.task])
+    with bar(
+        "set of gains", LOOKS[0] * len(entrants), trial.progress, counted=True
+    ) as progress_bar:
+        progress_bar.latest = clock.ends
+        everyone = _first_sets(trial, plant, entrants, goal, clock, progress_bar)
         running = dict(everyone)
         # s that a law took in each round
-        rounds = [] if kept else [(time.monotonic() - begin) / len(running)]
+        rounds = [] if from_folder else [(time.monotonic() - begin) / len(running)]
         for k in range(1, LOOKS[-1]):
-            _expect(shown, k, len(running))
+            _expect(progress_bar, k, len(running))
             start = time.monotonic()
-            pieces = [(one, k, 0) for one in running.values() if one.task]
+            pieces = [(entrant, k, 0) for entrant in running.values() if entrant.task]
             count = len(running)
             over = start + count * _expected(rounds) > clock.race_ends(count)
             if k == TIMED and rounds:
-                _tell_if_short(shown, k, (clock.race_ends(count) - start) / count, rounds)
-            kept = _kept(trial, pieces)
-            shown.latest = clock.race_ends(count)
-            if over and not kept:
+                _tell_if_short(progress_bar, k, (clock.race_ends(count) - start) / count, rounds)
+            from_folder = _kept(trial, pieces)
+            progress_bar.latest = clock.race_ends(count)
+            if over and not from_folder:
                 stopped = True
                 break
-            for i, made in _searched(trial, pieces):
-                pieces[i][0].found.append(made)
-                shown.advance(1.0)
+            for i, result in _searched(trial, pieces):
+                pieces[i][0].found.append(result)
+                progress_bar.advance(1.0)
             _again(trial, list(running.values()))
             clock.judged(*_judge(trial, plant, list(running.values()), goal, k + 1))
-            if not kept:
+            if not from_folder:
                 rounds.append((time.monotonic() - start) / len(running))
             if k + 1 == FIRST:
-                values = {name: one.values for name, one in running.items()}
+                values = {name: entrant.values for name, entrant in running.items()}
                 dropped = hopeless(values)
                 for name in dropped:
                     del running[name]
                 if dropped:
-                    shown.says(f"{joined(dropped)} dropped: set of gains")
+                    progress_bar.says(f"{joined(dropped)} dropped: set of gains")
             if k + 1 in LOOKS:
                 comparison, looked = judged(running, goal, relevant), k + 1
                 if comparison is None or comparison.winners[0] or needed(comparison) > WITHIN:
@@ -194,7 +196,7 @@ def race(
     count = len(next(iter(running.values())).J)
     if count < LOOKS[0]:
         comparison, looked = judged(running, goal, relevant), count
-    unsearched = [one.law.name for one in entrants if one.law.name not in everyone]
+    unsearched = [entrant.law.name for entrant in entrants if entrant.law.name not in everyone]
     seconds = (len(running) + len(unsearched)) * _expected(rounds)
     return Race(everyone, unsearched, dropped, comparison, count, looked, stopped, seconds)
 
@@ -210,26 +212,26 @@ def _first_sets(
     """Search the first set of each law and judge it at once, so that the time of what follows is
     known. Return the laws that have one, by name: those for which there was time, and at least one.
     """
-    there = [one for one in entrants if one.task is None]
-    pieces = [(one, 0, 0) for one in entrants if one.task]
+    ready = [entrant for entrant in entrants if entrant.task is None]
+    pieces = [(entrant, 0, 0) for entrant in entrants if entrant.task]
     taken: list[float] = []  # s of each law
     last = time.monotonic()
-    if there:
-        _judge(trial, plant, there, goal, 1)
+    if ready:
+        _judge(trial, plant, ready, goal, 1)
 
     def over() -> bool:
         end = last + _expected(taken or [0.0])
-        return bool(there) and end > clock.race_ends(len(there) + 1, first=True)
+        return bool(ready) and end > clock.race_ends(len(ready) + 1, first=True)
 
-    for i, made in _searched(trial, pieces, over):
-        one = pieces[i][0]
-        one.found.append(made)
-        clock.judged(*_judge(trial, plant, [one], goal, 1))
-        there.append(one)
+    for i, result in _searched(trial, pieces, over):
+        entrant = pieces[i][0]
+        entrant.found.append(result)
+        clock.judged(*_judge(trial, plant, [entrant], goal, 1))
+        ready.append(entrant)
         shown.advance(1.0)
         taken.append(time.monotonic() - last)
         last = time.monotonic()
-    return {one.law.name: one for one in entrants if one in there}
+    return {entrant.law.name: entrant for entrant in entrants if entrant in ready}
 
 
 def _expected(rounds: Sequence[float]) -> float:
@@ -273,12 +275,12 @@ def stuck(J: Sequence[float]) -> list[int]:
     """Return the searches of a law whose J in training is more than STUCK times the least of the
     others.
     """
-    found = []
+    again = []
     for k, value in enumerate(J):
-        others = [*J[:k], *J[k + 1 :]]
-        if others and value > STUCK * min(others):
-            found.append(k)
-    return found
+        rest = [*J[:k], *J[k + 1 :]]
+        if rest and value > STUCK * min(rest):
+            again.append(k)
+    return again
 
 
 def judged(running: Mapping[str, Entrant], goal: Objective, relevant: float) -> Comparison | None:
@@ -289,11 +291,11 @@ def judged(running: Mapping[str, Entrant], goal: Objective, relevant: float) -> 
     halves = {}
     numbers = {}
     fine = {}
-    for name, one in running.items():
-        whole, halved = zip(*filter(None, one.J), strict=True)
-        values[name] = np.array(whole)
+    for name, entrant in running.items():
+        full_step, halved = zip(*filter(None, entrant.J), strict=True)
+        values[name] = np.array(full_step)
         halves[name] = np.array(halved)
-        numbers[name] = np.arange(len(whole)) % one.count
+        numbers[name] = np.arange(len(full_step)) % entrant.count
         fine[name] = values[name] < FAILURE_COST
     return compared(values, goal, halves, numbers, fine, relevant, looks=len(LOOKS))
 
@@ -307,11 +309,11 @@ def needed(comparison: Comparison) -> float:
     count = int(comparison.ranked[:, 0].sum())
     if count < 2:
         return math.inf
-    first, *others = np.argsort(middles, kind="stable")[:count].tolist()
+    first, *rivals = np.argsort(middles, kind="stable")[:count].tolist()
     needs = []
-    for other in others:
+    for rival in rivals:
         needs.append(
-            units_needed(comparison.leads[0, first, other], comparison.error, comparison.relevant)
+            units_needed(comparison.leads[0, first, rival], comparison.error, comparison.relevant)
         )
     return max(needs)
 
@@ -361,27 +363,27 @@ def _searched(
     files = {}
     for i, piece in enumerate(pieces):
         file = _file(trial, *piece)
-        made = file.read()
-        if made is None:
+        result = file.read()
+        if result is None:
             files[i] = file
             writable(file.path)
         else:
-            yield i, made
+            yield i, result
     missing = list(files)
     if trial.executor is None:
         for i in missing:
             if over():
                 return
-            one, k, draw = pieces[i]
-            yield i, files[i].keep(one.search(k, draw))
+            entrant, k, draw = pieces[i]
+            yield i, files[i].keep(entrant.search(k, draw))
     elif missing:
         calls = []
         for i in missing:
-            one, k, draw = pieces[i]
-            calls.append(one.call(k, draw))
+            entrant, k, draw = pieces[i]
+            calls.append(entrant.call(k, draw))
         with opened(trial.executor) as pool:
-            for j, made in called(pool, search.searched, calls):
-                yield missing[j], files[missing[j]].keep(made)
+            for j, result in called(pool, search.searched, calls):
+                yield missing[j], files[missing[j]].keep(result)
                 if over():
                     return
 
@@ -389,17 +391,17 @@ def _searched(
 def _again(trial: Trial, running: Sequence[Entrant]) -> None:
     """Make stuck searches once more, and keep the better ones."""
     pieces = []
-    for one in running:
-        for k in stuck([made.best.objective for made in one.found]):
-            if k not in one.again:
-                one.again.add(k)
-                pieces.append((one, k, 1))
-    for i, made in _searched(trial, pieces):
-        one, k, _ = pieces[i]
-        if made.best.objective < one.found[k].best.objective:
-            one.found[k] = made
-            if k < len(one.J):
-                one.J[k] = None
+    for entrant in running:
+        for k in stuck([result.best.objective for result in entrant.found]):
+            if k not in entrant.again:
+                entrant.again.add(k)
+                pieces.append((entrant, k, 1))
+    for i, result in _searched(trial, pieces):
+        entrant, k, _ = pieces[i]
+        if result.best.objective < entrant.found[k].best.objective:
+            entrant.found[k] = result
+            if k < len(entrant.J):
+                entrant.J[k] = None
 
 
 def _judge(
@@ -412,21 +414,21 @@ def _judge(
     """Compute J of the first sets, on unseen runs, where it is not known. Return the number of
     `judgements` that this was, and how long it took, s.
     """
-    wanted = []
+    unjudged = []
     laws = []
     numbers = []
-    for one in running:
-        one.J += [None] * (count - len(one.J))
+    for entrant in running:
+        entrant.J += [None] * (count - len(entrant.J))
         for k in range(count):
-            if one.J[k] is None:
-                wanted.append((one, k))
-                laws.append(one.gains(k))
+            if entrant.J[k] is None:
+                unjudged.append((entrant, k))
+                laws.append(entrant.gains(k))
                 numbers.append(k)
     start = time.monotonic()
     values, halves = unseen(trial, plant, laws, goal, numbers)
     spent = time.monotonic() - start
-    for (one, k), value, half in zip(wanted, values.tolist(), halves.tolist(), strict=True):
-        one.J[k] = Unseen(value, half)
+    for (entrant, k), value, half in zip(unjudged, values.tolist(), halves.tolist(), strict=True):
+        entrant.J[k] = Unseen(value, half)
     return judgements(numbers), spent
 
 
@@ -451,15 +453,15 @@ def unseen(
     values, _ = objectives(plant, laws, goal, instances, trial.threads, doubled=True)
     halves = np.full(len(laws), math.nan)
     again = []
-    some = []
+    laws_again = []
     repeated = []
     for i, k in enumerate(numbers):
         if k % REPEATED_SEEDS == 0:
             again.append(i)
-            some.append(laws[i])
+            laws_again.append(laws[i])
             repeated.append(instances[i])
     if again:
         halves[again], _ = objectives(
-            plant, some, goal, repeated, trial.threads, halved=True, doubled=True
+            plant, laws_again, goal, repeated, trial.threads, halved=True, doubled=True
         )
     return values, halves

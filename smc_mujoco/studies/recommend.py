@@ -73,7 +73,9 @@ def recommend(
     """
     goal = trial.asked_goal(plant)
     entrants, left_out = _entrants(trial, plant, laws)
-    table_work = sum(_coarse(trial, plant, "none", one).work for one in trial.conditions)
+    table_work = sum(
+        _coarse(trial, plant, "none", condition).work for condition in trial.conditions
+    )
     kinds = len(KINDS) + 1  # friction from two sides
     margins_work = TRIED * kinds * _coarse(trial, plant, "none", trial.conditions[0]).work
     clock.unit = _work_of_judgement(plant, goal)
@@ -87,20 +89,20 @@ def recommend(
         rivals = [*chosen][: max(2, len(raced.first))]
         fixed = _fixed(trial, plant, {law: chosen[law] for law in rivals}, goal, relevant)
     candidates = [Candidate(law, (law,)) for law in chosen.values()]
-    made = clock.seeds(seeds, len(chosen) * table_work, margins_work)
-    table = trial.run({plant.name: candidates}, made, coarse=True)
+    count = clock.seeds(seeds, len(chosen) * table_work, margins_work)
+    table = trial.run({plant.name: candidates}, count, coarse=True)
     settled = _settled(table)
     least = {law: _least_share(settled[law]) for law in chosen}
     order = in_order({law: settled[law] for law in chosen}, fixed, raced.winner)
-    shown = list(metrics)
-    if min(least.values()) < 1.0 and SETTLES not in shown:
-        shown.append(SETTLES)
-    boards = leaderboard(table, shown, BY, defaults=True, relevant=relevant)
+    compared_metrics = list(metrics)
+    if min(least.values()) < 1.0 and SETTLES not in compared_metrics:
+        compared_metrics.append(SETTLES)
+    boards = leaderboard(table, compared_metrics, BY, defaults=True, relevant=relevant)
     if not boards:
         raise ScenarioError(f"no need has a number in any run on {plant.name}: ask for others")
     ordered = tuple(chosen[law] for law in order)
     first = ordered[0]
-    together = _together(trial, plant, first, made)
+    together = _together(trial, plant, first, count)
     weighs, no_law = _weighed(trial, plant, first, goal, clock)
     base = _base_of_margins(trial, plant, first)
     helped = helped_joints(base)
@@ -141,34 +143,34 @@ def _coarse(
 
 def _least_share(settled: Mapping[str, tuple[int, int]]) -> float:
     """Return the least share of a condition's runs that settle, of (settled, all) by condition."""
-    return min(count / of for count, of in settled.values())
+    return min(count / runs for count, runs in settled.values())
 
 
 def _shown(raced: Race) -> list[str]:
     """Return the laws that tables show: those that may be the best, then the others of lowest J."""
-    others = [law for law in raced.running if law not in raced.first]
-    return [*raced.first, *others][:SHOWN]
+    rest = [law for law in raced.running if law not in raced.first]
+    return [*raced.first, *rest][:SHOWN]
 
 
 def _entrants(trial: Trial, plant: Plant, laws: Laws) -> tuple[list[Entrant], dict[str, str]]:
     """Return the laws that race, and why others cannot be tuned, by name."""
-    known = trial.known(plant, laws)
-    rule = trial.rule(plant, known)
+    candidates = trial.known(plant, laws)
+    rule = trial.rule(plant, candidates)
     entrants = []
     left_out: dict[str, str] = {}
-    for law, found in zip(laws, known, strict=True):
-        made = coerce.law(law)
+    for law, candidate in zip(laws, candidates, strict=True):
+        bound = coerce.law(law)
         task = None
-        if found is None:
+        if candidate is None:
             try:
-                task = search.task_of(plant, made, rule.goal, rule.budget, 0, trial.threads)
+                task = search.task_of(plant, bound, rule.goal, rule.budget, 0, trial.threads)
                 task = task._replace(quick=rule.quick, device=trial.device)
             except BrokenLawError:
                 raise
             except ScenarioError as error:
-                left_out[made.name] = f"{NOT_TUNED}{error}"
-        if found or task:
-            entrants.append(Entrant(found, task))
+                left_out[bound.name] = f"{NOT_TUNED}{error}"
+        if candidate or task:
+            entrants.append(Entrant(candidate, task))
         elif trial.defaults or len(laws) == 1:
             entrants.append(Entrant(default_of(law), None))
     return entrants, left_out
@@ -196,19 +198,19 @@ def _chosen(
     """
     chosen, tunings = {}, {}
     for name in _counted(f"choosing gains of {joined(names)}: law", names, trial):
-        one = raced.entrants[name]
-        law = one.gains(0)
-        if one.count > 1:
-            order = np.argsort(one.values[: one.count], kind="stable")[:CONSIDERED].tolist()
-            sets = list(map(one.gains, order))
+        entrant = raced.entrants[name]
+        law = entrant.gains(0)
+        if entrant.count > 1:
+            order = np.argsort(entrant.values[: entrant.count], kind="stable")[:CONSIDERED].tolist()
+            sets = list(map(entrant.gains, order))
             laws = []
             for tried in sets:
                 laws += [tried] * len(CHOOSING)
             J, _ = unseen(trial, plant, laws, goal, [*CHOOSING] * len(sets))
             logarithms = np.log(J).reshape(len(sets), -1)
             law = sets[int(logarithms.sum(axis=1).argmin())]
-        if one.task:
-            tuned = search.result_of(one.task, tuple(one.found)).sourced()
+        if entrant.task:
+            tuned = search.result_of(entrant.task, tuple(entrant.found)).sourced()
             law = law.sourced(source.TUNED, tuned.search)
             tunings[name] = tuned.of_law(law)
         chosen[name] = law
@@ -235,24 +237,24 @@ def _fixed(
         return None
     J = {}
     halves = {}
-    one = {}
+    set_numbers = {}
     fine = {}
     for name in _counted("unseen runs of law", [*chosen], trial):
         law = chosen[name]
         J[name], halves[name] = unseen(trial, plant, [law] * len(DECIDING), goal, DECIDING)
-        one[name] = np.zeros(len(DECIDING))
+        set_numbers[name] = np.zeros(len(DECIDING))
         fine[name] = J[name] < FAILURE_COST
-    return compared(J, goal, halves, one, fine, relevant)
+    return compared(J, goal, halves, set_numbers, fine, relevant)
 
 
 def _settled(table: Table) -> Settled:
     """Return law -> condition -> the numbers of runs that settle, and of all."""
-    found: Settled = {}
+    counts: Settled = {}
     columns = table.column("law").tolist(), table.column("condition").tolist()
     for law, condition, missed in zip(*columns, values(table, SETTLES).tolist(), strict=True):
-        done, of = found.setdefault(law, {}).get(condition, (0, 0))
-        found[law][condition] = done + (not missed), of + 1
-    return found
+        done, runs = counts.setdefault(law, {}).get(condition, (0, 0))
+        counts[law][condition] = done + (not missed), runs + 1
+    return counts
 
 
 def _together(trial: Trial, plant: Plant, law: Component, seeds: int) -> tuple[int, int] | None:
@@ -261,14 +263,14 @@ def _together(trial: Trial, plant: Plant, law: Component, seeds: int) -> tuple[i
     """
     if len(trial.conditions) < 2:
         return None
-    both = functools.reduce(operator.add, trial.conditions)
+    combined = functools.reduce(operator.add, trial.conditions)
     try:
-        trial.case(plant, law, both)  # parts may exclude each other, such as two drives
+        trial.case(plant, law, combined)  # parts may exclude each other, such as two drives
     except ScenarioError:
         return None
-    at_once = trial._replace(conditions=[both], folder=trial.folder / "together")
+    at_once = trial._replace(conditions=[combined], folder=trial.folder / "together")
     table = at_once.run({plant.name: [Candidate(law, (law,))]}, seeds, coarse=True)
-    return _settled(table)[law.name][both.name]
+    return _settled(table)[law.name][combined.name]
 
 
 def _weighed(
@@ -282,11 +284,11 @@ def _weighed(
     names = [condition.name for condition in goal.conditions]
     costs, settled = weighed(plant, law, goal, instances, trial.threads)
     none = coerce.law("none")
-    others, settled_without = weighed(plant, none, goal, instances, trial.threads)
+    without_costs, settled_without = weighed(plant, none, goal, instances, trial.threads)
     total = costs.sum(axis=0)
     parts = (total / total.sum()).tolist()
-    ratios = others.sum(axis=1) / costs.sum(axis=1)
-    failed = np.maximum(costs, others) >= FAILURE_COST
+    ratios = without_costs.sum(axis=1) / costs.sum(axis=1)
+    failed = np.maximum(costs, without_costs) >= FAILURE_COST
     without = dict(zip(names, settled_without.sum(axis=0).tolist(), strict=True))
     case = trial.case(plant, none, trial.conditions[0])
     return dict(zip(names, parts, strict=True)), NoLaw(
@@ -301,10 +303,10 @@ def _weighed(
 
 def _judged(trial: Trial, goal: Objective) -> list[str]:
     """Return the conditions that J is of, with a word on those that were not asked for."""
-    asked = {condition.name for condition in trial.conditions}
+    by_user = {condition.name for condition in trial.conditions}
     names = []
     for condition in goal.conditions:
-        added = "" if condition.name in asked else " (added, see Assumed)"
+        added = "" if condition.name in by_user else " (added, see Assumed)"
         names.append(f"{condition.name}{added}")
     return names
 
@@ -318,7 +320,7 @@ def _assumed(trial: Trial, plant: Plant, goal: Objective) -> str:
         f"u changes every {period:g} ms and is computed from measured positions and velocities, "
         "unless a condition says otherwise"
     ]
-    asked = {condition.name for condition in trial.conditions}
+    by_user = {condition.name for condition in trial.conditions}
     for condition in trial.conditions:
         velocity = trial.case(plant, "none", condition).resolved.velocity
         if velocity.name != "measured":
@@ -332,7 +334,7 @@ def _assumed(trial: Trial, plant: Plant, goal: Objective) -> str:
                 f"{noise.position:g} {units} and the measured velocities noise of "
                 f"{noise.velocity:g} {units}/s (standard deviations)"
             )
-            if condition.name not in asked:
+            if condition.name not in by_user:
                 parts[-1] += (
                     ". None of your conditions has noise, so the condition "
                     f"{condition.name} was added: to replace it, give a condition with "
@@ -373,15 +375,15 @@ def _margins(trial: Trial, base: Scenario, clock: AnswerTime) -> tuple[list[Marg
     if base.resolved.x0 == constant_goal(base):
         return [], []
     kinds = KINDS_OF_POSES if base.plant.pose else KINDS
-    found: list[Margin] = []
-    for some in (kinds[:2], kinds[2:]):
-        tried = some[: int(min(len(some), clock.margins_left / (TRIED * base.work)))]
+    margins: list[Margin] = []
+    for pair in (kinds[:2], kinds[2:]):
+        tried = pair[: int(min(len(pair), clock.margins_left / (TRIED * base.work)))]
         if tried:
             with bar(f"margins of {joined(tried)}", shown=trial.progress) as drawn:
-                found += margins_of([base], tried, COARSE, trial.threads, drawn.reached)
-        if len(tried) < len(some):
+                margins += margins_of([base], tried, COARSE, trial.threads, drawn.reached)
+        if len(tried) < len(pair):
             break
-    return found, [*kinds[len(found) :]]
+    return margins, [*kinds[len(margins) :]]
 
 
 def helped_joints(base: Scenario) -> list[int]:
@@ -407,11 +409,11 @@ def _opposed(
     x0 = np.array(base.resolved.x0)
     x0[helped] = 2.0 * np.array(base.plant.origin)[helped] - x0[helped]
     try:
-        other = dataclasses.replace(base, x0=tuple(x0.tolist()))
+        mirrored = dataclasses.replace(base, x0=tuple(x0.tolist()))
     except ScenarioError:  # beyond a limit, or inside something
         return None
     with bar("margin from the other side", shown=trial.progress) as drawn:
-        return margins_of([other], ["friction"], COARSE, trial.threads, drawn.reached)[0]
+        return margins_of([mirrored], ["friction"], COARSE, trial.threads, drawn.reached)[0]
 
 
 def _work_of_judgement(plant: Plant, goal: Objective) -> float:

@@ -120,7 +120,7 @@ def which(
     machine = as_plant(plant)
     if not falling and (why := falls(machine)):
         raise ScenarioError(f"{why}; falling=True (--falling) goes on all the same")
-    asked, properties = _metrics_and_properties(needs)
+    metrics_asked, properties = _metrics_and_properties(needs)
     chosen = _suited(machine, properties, laws)
     if minutes and machine.is_user_model and laws is None:
         chosen = [law for law in chosen if law.name in gain_sets.COMPARED] or chosen
@@ -140,14 +140,14 @@ def which(
         executor=executor,
     )
     trial.check({machine.name: chosen})
-    compared = _with_values(trial.case(machine, "none", trial.conditions[0]), asked)
+    compared = _with_values(trial.case(machine, "none", trial.conditions[0]), metrics_asked)
     if minutes:
         spare = 60.0 * min(FILMED, FILMED_SHARE * minutes)
         clock = AnswerTime(began + 60.0 * minutes - spare, spare)
         names = {law.name for law in chosen}
-        others = [law.name for law in _of_package(machine, properties) if law.name not in names]
+        untried = [law.name for law in _of_package(machine, properties) if law.name not in names]
         return recommend(
-            trial, machine, chosen, compared, seeds or RACE_SEEDS, clock, relevant, others
+            trial, machine, chosen, compared, seeds or RACE_SEEDS, clock, relevant, untried
         )
     count = seeds or SEEDS
     candidates = trial.candidates({machine.name: chosen}, count)
@@ -164,8 +164,8 @@ def which(
 def _metrics_and_properties(needs: str | Sequence[str]) -> tuple[list[str], list[str]]:
     """Return the metrics and the properties among the needs; without metrics, DEFAULT_NEEDS."""
     compared, properties = [], []
-    given = needs.split(",") if isinstance(needs, str) else listed("needs", needs)
-    for need in given:
+    listed_needs = needs.split(",") if isinstance(needs, str) else listed("needs", needs)
+    for need in listed_needs:
         name = need.strip() if isinstance(need, str) else need
         find("need", name, {**NEEDS, **PROPERTIES})
         if name in NEEDS:

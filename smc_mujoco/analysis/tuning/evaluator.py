@@ -91,12 +91,12 @@ class Evaluator:
             for (fast, _), indices in members.items():
                 if fast:
                     self.engine = EQUATION
-                    some = [self.cases[i] for i in indices]
-                    made = equation.Equations(goal, some, self.names, self.threads, device)
+                    of_group = [self.cases[i] for i in indices]
+                    runner = equation.Equations(goal, of_group, self.names, self.threads, device)
                 else:
                     batch = [prepared[i] for i in indices]
-                    made = _RepeatedBatch(batch, names, self.threads, off, slots)
-                self._runs.append((indices, made))
+                    runner = _RepeatedBatch(batch, names, self.threads, off, slots)
+                self._runs.append((indices, runner))
 
     def __call__(self, candidates: Sequence[Floats]) -> list[Evaluation]:
         """Return the evaluations of sets of gains."""
@@ -108,15 +108,15 @@ class Evaluator:
                 terms[row * size + indices[column]] = costs
         if self.engine == PYTHON:
             terms = self._terms_of_traces(candidates)
-        made = []
+        evaluations = []
         for k, gains in enumerate(candidates):
             terms_of_set = terms[k * size : (k + 1) * size]
             of_tracking, of_variation = zip(*terms_of_set, strict=True)
             tracking = float(sum(of_tracking))
             variation = float(sum(of_variation))
             cost = tracking + self.goal.weight * variation + self.excess(gains)
-            made.append(Evaluation(gains, cost, tracking, variation))
-        return made
+            evaluations.append(Evaluation(gains, cost, tracking, variation))
+        return evaluations
 
     def of_first(self) -> "Evaluator":
         """Return the evaluator of the first case alone."""
@@ -176,9 +176,9 @@ def _putter(
 ) -> Callable[[Array], None]:
     """Return the function that puts a candidate's gains among the numbers of a run."""
     law = prepared.scenario.law
-    at = int(record["law"]["parameters"])
+    start = int(record["law"]["parameters"])
     width = prepared.scenario.plant.driven if law.joint else 1
-    values = state.view(packed.numbers, at, (len(law.gains), width))
+    values = state.view(packed.numbers, start, (len(law.gains), width))
     rows = []
     for name in names:
         rows.append(list(law.gains).index(name))
@@ -209,26 +209,26 @@ class _RepeatedBatch(ScenarioBatch):
         self.first_records = self.records.copy()
         self.first_numbers = [packed.numbers.copy() for packed in self.packed]
         self.start = {name: array.copy() for name, array in self.started.items()}
-        each = zip(prepared, self.records, self.packed, strict=True)
-        self.put = [_putter(item, names, record, packed) for item, record, packed in each]
+        runs = zip(prepared, self.records, self.packed, strict=True)
+        self.put = [_putter(item, names, record, packed) for item, record, packed in runs]
 
     def __call__(self, candidates: Sequence[Floats], terms: Terms) -> list[Pair]:
-        made: list[Pair] = []
+        costs: list[Pair] = []
         count = len(self.cases)
         for first in range(0, len(candidates), self.slots):
-            some = candidates[first : first + self.slots]
-            self.again(np.repeat(some, count, axis=0))
-            for k in range(len(some) * count):
+            side_by_side = candidates[first : first + self.slots]
+            self.again(np.repeat(side_by_side, count, axis=0))
+            for k in range(len(side_by_side) * count):
                 case = self.cases[k % count]
-                made.append(terms(case, self.failed_at(k), self.logs[k]))
-        return made
+                costs.append(terms(case, self.failed_at(k), self.logs[k]))
+        return costs
 
     def again(self, gains: Array) -> None:
         """Run the first simulations, as many as gains are given, from their start."""
         self.records[:] = self.first_records
         self.records["failure"][len(gains) :] = state.INTERRUPTED  # they are not stepped
-        for one, first in zip(self.packed, self.first_numbers, strict=True):
-            one.numbers[:] = first
+        for packed, first in zip(self.packed, self.first_numbers, strict=True):
+            packed.numbers[:] = first
         for put, values in zip(self.put, gains, strict=False):
             put(values)
         self.errors.clear()

@@ -155,8 +155,8 @@ class Objective:
             common[name] = getattr(self, name)
         first = Scenario(plant=plant, law=law, **common)
         fields = []
-        for one in self.conditions:
-            fields.append(one.on(first.plant, self.duration))
+        for part in self.conditions:
+            fields.append(part.on(first.plant, self.duration))
         cases = []
         for i, (condition, changes) in enumerate(zip(self.conditions, fields, strict=True)):
             self.starts.check_condition(condition.name, changes)
@@ -285,12 +285,12 @@ def objectives(
         `step_halving.doubled`.
       halved: whether the runs have half their physics step, or half of the doubled one.
     """
-    found = []
-    there = []
+    costs = []
+    arrived = []
     for cases, runs in _unseen(plant, laws, goal, instances, threads, halved, doubled):
-        found.append(goal.evaluation(cases[0], runs).objective)
-        there.append(all(map(metrics.arrived, runs)))
-    return np.array(found), np.array(there)
+        costs.append(goal.evaluation(cases[0], runs).objective)
+        arrived.append(all(map(metrics.arrived, runs)))
+    return np.array(costs), np.array(arrived)
 
 
 def weighed(

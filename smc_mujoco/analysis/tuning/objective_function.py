@@ -59,8 +59,8 @@ class ObjectiveFunction:
         if not self._task.holds(values):
             return math.inf
         self.evaluations += 1
-        [found] = self._evaluator([values])
-        return found.objective
+        [evaluation] = self._evaluator([values])
+        return evaluation.objective
 
     def law(self, gains: Iterable[float]) -> Component:
         """Return the law with a set of gains, to run it, or to compare it with others."""

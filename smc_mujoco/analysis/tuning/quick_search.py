@@ -62,8 +62,12 @@ def search(
     spent = round(alone.count / len(every.cheap.cases))
     count = max(FEWEST, int(KEPT * usual))
     decided = alone.decided.values()
-    kept = sorted(decided, key=_objective)[:count]
-    rows = np.log10([one.gains for one in kept]) if kept else space.inside[None]
+    promising = sorted(decided, key=_objective)[:count]
+    rows = (
+        np.log10([evaluation.gains for evaluation in promising])
+        if promising
+        else space.inside[None]
+    )
     costs = every.screen(rows)
     logs = rows[np.argmin(costs)]
     share = int(EVOLVED_SHARE * size)

@@ -137,7 +137,7 @@ class Tuned(Tables):
     @property
     def sets(self) -> list[Evaluation]:
         """The best set of each search, in order: run i uses set i, modulo their number."""
-        return [found.best for found in self.searches]
+        return [result.best for result in self.searches]
 
     @property
     def best(self) -> SearchResult:
@@ -170,12 +170,12 @@ class Tuned(Tables):
     @property
     def evaluations(self) -> int:
         """Number of sets of gains that all searches evaluated, cheaply or accurately."""
-        return sum(found.evaluations for found in self.searches)
+        return sum(result.evaluations for result in self.searches)
 
     @property
     def spread(self) -> float:
         """By how much the largest J of a search exceeds the least one, as a share of it."""
-        worst = max(found.best.objective for found in self.searches)
+        worst = max(result.best.objective for result in self.searches)
         return worst / self.objective - 1.0
 
     @property
@@ -194,17 +194,17 @@ class Tuned(Tables):
         ones.
         """
         front: list[Evaluation] = []
-        for one in sorted(self.history, key=lambda e: (e.tracking, e.variation)):
-            if not one.failed and (not front or one.variation < front[-1].variation):
-                front.append(one)
+        for evaluation in sorted(self.history, key=lambda e: (e.tracking, e.variation)):
+            if not evaluation.failed and (not front or evaluation.variation < front[-1].variation):
+                front.append(evaluation)
         return front
 
     def record(self) -> Fields:
         """Return what `control.gain_sets` stores of it, without the history."""
         return {
             "gains": list(self.bounds),
-            "sets": [one.gains for one in self.sets],
-            "objectives": [float(f"{one.objective:.6g}") for one in self.sets],
+            "sets": [evaluation.gains for evaluation in self.sets],
+            "objectives": [float(f"{evaluation.objective:.6g}") for evaluation in self.sets],
             "evaluations": self.evaluations,
             "seed": self.seed,
             "rule": self.rule,
@@ -248,16 +248,16 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
     if not tuned:
         raise ScenarioError("cannot compare []: give a list of tunings")
     first = tuned[0]
-    for one in tuned:
+    for tuning in tuned:
         for name in COMPARED_FIELDS:
-            if getattr(one, name) != getattr(first, name):
+            if getattr(tuning, name) != getattr(first, name):
                 raise ScenarioError(
-                    f"{one.law.name} and {first.law.name} were tuned with another {name}: tune "
+                    f"{tuning.law.name} and {first.law.name} were tuned with another {name}: tune "
                     "them in the same way"
                 )
-        if len(one.searches) != len(first.searches):
+        if len(tuning.searches) != len(first.searches):
             raise ScenarioError(
-                f"{one.law.name} and {first.law.name} were tuned in unequal numbers of searches: "
-                "tune them in the same way"
+                f"{tuning.law.name} and {first.law.name} were tuned in unequal numbers of "
+                "searches: tune them in the same way"
             )
-    return sorted(tuned, key=lambda one: one.objective)
+    return sorted(tuned, key=lambda tuning: tuning.objective)

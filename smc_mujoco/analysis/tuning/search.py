@@ -187,11 +187,11 @@ def tune(
         goal = objective
     else:
         goal = find("objective", objective, OBJECTIVES)
-    given = {}
+    replaced = {}
     for name, value in changes.items():
         if value is not None:
-            given[name] = value
-    goal = dataclasses.replace(goal, **given)
+            replaced[name] = value
+    goal = dataclasses.replace(goal, **replaced)
     own = checked_name(coerce.law(law))
     task = task_of(plant, own, goal, budget, seed, threads, outside_theorem)
     task = task._replace(device=device, quick=quick)
@@ -201,25 +201,25 @@ def tune(
         _warn(_without_unit_warning(task.law))
     failure = failure_of_law(task)
     words = f"tuning {task.law.name} for {task.plant.name}: evaluation"
-    with bar(words, searches * task.size, shown=progress, counted=True) as shown:
+    with bar(words, searches * task.size, shown=progress, counted=True) as progress_bar:
         files = [] if folder is None else [task.file(i, folder) for i in range(searches)]
-        found = {}
+        results = {}
         missing = []
         for i in range(searches):
-            made = files[i].read() if files else None
-            if made:
-                found[i] = made
+            result = files[i].read() if files else None
+            if result:
+                results[i] = result
             else:
                 missing.append(i)
-        shown.advance(len(found) * task.size)
+        progress_bar.advance(len(results) * task.size)
         writable(*(files[i].path for i in missing if files))
         if executor is None:
-            work = _searched_here(task, missing, failure, shown)
+            work = _searched_here(task, missing, failure, progress_bar)
         else:
-            work = _searched_elsewhere(task, missing, failure, shown, executor)
-        for i, made in work:
-            found[i] = files[i].keep(made) if files else made
-        in_order = tuple(found[i] for i in range(searches))
+            work = _searched_elsewhere(task, missing, failure, progress_bar, executor)
+        for i, result in work:
+            results[i] = files[i].keep(result) if files else result
+        in_order = tuple(results[i] for i in range(searches))
         tuned = result_of(task, in_order)
     _warn_of_result(tuned)
     return tuned.sourced()
@@ -243,8 +243,8 @@ def _searched_elsewhere(
     """Have workers make searches side by side, and yield the number and the result of each."""
     calls = [task.call(i, failure) for i in missing]
     with opened(executor) as pool:
-        for k, made in called(pool, searched, calls):
-            yield missing[k], made
+        for k, result in called(pool, searched, calls):
+            yield missing[k], result
             shown.advance(task.size)
 
 
@@ -359,8 +359,8 @@ class TuningTask(NamedTuple):
                 return self._best_of(trials, best, failure)
             random = np.random.default_rng([self.seed, i, draw] if draw else [self.seed, i])
         accurate = self._evaluator(cases)
-        every = self._trials(_cheap(accurate), accurate, report)
-        trials = self._search(every, random)
+        trials_of_all = self._trials(_cheap(accurate), accurate, report)
+        trials = self._search(trials_of_all, random)
         return self._best_of(trials, trials.best, failure)
 
     def _evaluator(self, cases: Sequence[Scenario], by_equation: bool = False) -> Evaluator:
@@ -390,18 +390,18 @@ class TuningTask(NamedTuple):
         control period.
         """
         if by_equation.engine == EQUATION:
-            every = by_equation
+            coarse = by_equation
             accurate = self._evaluator(by_equation.cases)
         else:
-            every = _cheap(by_equation, at_period=True)
+            coarse = _cheap(by_equation, at_period=True)
             accurate = by_equation
-        first = every.of_first()
-        trials = self._trials(every, every, report)
+        first = coarse.of_first()
+        trials = self._trials(coarse, coarse, report)
         alone = self._trials(first, first, lambda count: None)
         space = quick_search.SearchSpace(self.box, self.searched, self.inside)
         spent = quick_search.search(alone, trials, space, random, self.size)
-        decided = accurate([one.gains for one in quick_search.first(trials)])
-        best = min(decided, key=lambda one: one.objective)
+        decided = accurate([evaluation.gains for evaluation in quick_search.first(trials)])
+        best = min(decided, key=lambda evaluation: evaluation.objective)
         self._refuse_broken(best, failure)
         count = spent + trials.count + len(decided)
         return SearchResult(
@@ -417,8 +417,8 @@ class TuningTask(NamedTuple):
 
     def _refuse_broken(self, best: Evaluation, failure: str) -> None:
         """Raise BrokenLawError if every run of a whole search fails."""
-        whole = self.quick or self.budget >= BUDGET
-        if failure and whole and best.objective >= FAILURE_COST * len(self.goal.conditions):
+        full = self.quick or self.budget >= BUDGET
+        if failure and full and best.objective >= FAILURE_COST * len(self.goal.conditions):
             raise _broken(self.law, failure)
 
     def _best_of(self, trials: Trials, best: Evaluation, failure: str) -> SearchResult:
@@ -438,11 +438,11 @@ def task_of(
     outside_theorem: bool = False,
 ) -> TuningTask:
     """Return what the searches of a tuning share: plant, bound on u, and search space."""
-    first, *others = goal.scenarios(plant, law, seed)
-    if len(units := sorted({one.efforts[0] for one in (first, *others)})) > 1:
-        both = f"{units[0]} and {units[1]}"
+    first, *further = goal.scenarios(plant, law, seed)
+    if len(units := sorted({scenario.efforts[0] for scenario in (first, *further)})) > 1:
+        two_units = f"{units[0]} and {units[1]}"
         raise ScenarioError(
-            f"the conditions of a tuning have commands in {both}: tune for each drive alone"
+            f"the conditions of a tuning have commands in {two_units}: tune for each drive alone"
         )
     _refuse_mixed_commands(first)
     bound = goal.u_max or (default_u_max(first.plant) if first.force_command else min(first.limits))
