@@ -43,11 +43,10 @@ mutants: ## small faults of ROOM=metrics, drawn from SEED, and which of them its
 	@./setup.sh requirements-test.lock
 	@ROOM="$(ROOM)" SEED="$(SEED)" COUNT="$(COUNT)" $(BIN)/python tests/mutants.py
 
-check: ## lint, format, types, and phrases that read twice
+check: ## lint, format and types
 	@./setup.sh requirements-test.lock
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/python -m pytest -q tests/test_words.py
 	@# without this variable pyright asks the package index for a newer version of itself
 	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright --pythonpath $(BIN)/python
 	@# what a user's type checkers say of README's and the tutorial's scripts

@@ -30,6 +30,7 @@ CATALOGUES = {
 # The rooms of the package, each of which imports from itself and from those before it.
 ROOMS = (
     "common",
+    "answers",
     "mechanisms",
     "control",
     "simulation",

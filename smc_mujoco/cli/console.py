@@ -10,6 +10,7 @@ from typing import Any
 
 from rich.console import Console
 
+from smc_mujoco.answers.answer import Answer
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.files import with_ending, writable, write_json
 from smc_mujoco.common.scripts import users_traceback
@@ -70,6 +71,11 @@ class Terminal(Console):
         """Print, and remember it for `finish`."""
         self.printed += objects
         super().print(*objects, **options)
+
+    def answer(self, result: Answer, full: bool = False) -> None:
+        """Print a result's answer, or with `full` its evidence; remember it for `finish`."""
+        self.printed.append(result)
+        super().print(result.full if full else result)
 
     def note(self, text: str, style: str | None = None, wrap: bool = False) -> None:
         """Print text without coloured numbers, on one line unless `wrap`."""

@@ -14,6 +14,7 @@ import typer
 
 from smc_mujoco.cli.commands import (
     analysis,
+    glossary,
     listing,
     machine_numbers,
     rigs,
@@ -37,7 +38,13 @@ atexit.register(gc.freeze)
 DRAWN = ("film", "figure", "plot", "video")  # commands that do not exist, and that users try
 # heading in the help -> commands; the annexes add theirs
 GROUPS: dict[str, list[Callable[..., None]]] = {
-    "Run and look": [listing.list_, run_and_look.run, run_and_look.show, run_and_look.view],
+    "Run and look": [
+        listing.list_,
+        glossary.explain,
+        run_and_look.run,
+        run_and_look.show,
+        run_and_look.view,
+    ],
     "Compare": [studies.compare, studies.which],
     "Tune and analyse": [
         analysis.tune,

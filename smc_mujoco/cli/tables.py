@@ -15,6 +15,7 @@ from rich.text import Text
 from smc_mujoco.analysis.differ import differ
 from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.analysis.step_halving import MARK, NOTE, SCORE_NOTE, first_order
+from smc_mujoco.answers.answer import Answer
 from smc_mujoco.common.registry import Catalogue
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import first_paragraph, number
@@ -355,6 +356,8 @@ def document(printed: Iterable[Any]) -> dict[str, Any]:
             tables.append(shown)
         elif isinstance(shown, Tables):
             tables += shown.tables
+            if isinstance(shown, Answer):
+                notes += shown.lines
         elif str(shown):
             notes.append(str(shown))
     return {"tables": [table.about() for table in tables], "notes": notes}

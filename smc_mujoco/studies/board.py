@@ -134,7 +134,7 @@ class BoardEntry:
     sources: tuple[Source, ...] = ()  # of its gains
 
 
-class Lead(NamedTuple):
+class LeastLead(NamedTuple):
     """The law in front in a block, the rival over which its lead is least (by the upper end of the
     interval), and how they compare.
     """
@@ -189,7 +189,7 @@ class Block:
     away: Names  # laws with runs that failed or have not arrived, which do not win
     ahead: str | None  # the law that is better than every other, laws with default gains included
     # None for one law, for "settles", or if the law in front has runs without a value
-    lead: Lead | None
+    lead: LeastLead | None
     seeds: int  # in which every law ran
     # distinct runs in these seeds; in the others every law repeats the result of an earlier one
     runs: int

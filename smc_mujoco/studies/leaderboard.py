@@ -33,7 +33,7 @@ from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.board import Block, Board, BoardEntry, Boards, Lead
+from smc_mujoco.studies.board import Block, Board, BoardEntry, Boards, LeastLead
 
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 MAX_RATIO = 4.0  # of the ends of a median's interval, above which it says too little; chosen
@@ -379,7 +379,7 @@ def _block(
 
 def _lead(
     comparison: Comparison, at: int, order: Sequence[str], floor: str, unit: str
-) -> Lead | None:
+) -> LeastLead | None:
     """Return the least lead of the law in front of a block, which comes first in `order`, over its
     rivals.
     """
@@ -399,7 +399,7 @@ def _lead(
     lost = ""
     if lacking[b]:
         lost = f"{lacking[b]} of {comparison.seeds[at]}"
-    return Lead(first, rival, effect, floor if effect.below else "", unit, lost)
+    return LeastLead(first, rival, effect, floor if effect.below else "", unit, lost)
 
 
 def _resolves(comparison: Comparison, at: int, unbeaten: Sequence[str]) -> tuple[float, float]:

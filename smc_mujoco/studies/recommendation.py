@@ -34,7 +34,7 @@ from smc_mujoco.studies.board import (
     MEDIANS,
     WHEN_SETTLED,
     Boards,
-    Lead,
+    LeastLead,
     heading,
     hidden,
     size,
@@ -675,7 +675,7 @@ def _lead(comparison: Comparison, first: str, rival: str) -> str:
     effect = comparison.effect(0, first, rival)
     lost = dict(zip(comparison.laws, comparison.away[:, 0].sum(axis=1).tolist(), strict=True))
     if not lost[first] and not lost[rival]:
-        return Lead(first, rival, effect, unit=OF_J).words
+        return LeastLead(first, rival, effect, unit=OF_J).words
     what = "sets of gains" if effect.sets else OF_J
     return (
         f"lower than {rival}'s in {effect.ahead} of {effect.samples} {what}, of which "

@@ -33,6 +33,7 @@ CALLS = {
     "list --need continuous,two-gains --json l.json": ["cli.law_pages.print_suitable"],
     "list --plant duffing": ["cli.law_pages.print_suitable"],
     "list law.c": ["exchange.c.law_from_c.check"],
+    "explain star": ["cli.commands.glossary.meaning"],
     "run duffing": ["cli.run_scene.perform"],
     "run duffing --out there --no-film --seed 7 --threads 2 --export csv,mat --no-repeat "
     "--json r.json": ["cli.run_scene.perform"],
@@ -456,7 +457,7 @@ def test_every_command_that_prints_tables_takes_json():
     without = {
         name for name, (_, command) in COMMANDS.items() if "--json" not in parameters(command)
     }
-    assert without == {*annexes.here(["enter", "export", "view"])}
+    assert without == {*annexes.here(["enter", "explain", "export", "view"])}
 
 
 # what is printed and written

@@ -20,7 +20,7 @@ from smc_mujoco.analysis.ranking import Effect
 from smc_mujoco.common.tabular import TEX, plain
 from smc_mujoco.draw import dot_plot
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.studies.board import CHARGED, UNDER, Board, Boards, Lead, size, sizes, spread
+from smc_mujoco.studies.board import CHARGED, UNDER, Board, Boards, LeastLead, size, sizes, spread
 from smc_mujoco.studies.leaderboard import leaderboard
 
 pytestmark = pytest.mark.quick
@@ -532,7 +532,7 @@ def test_a_verdict_says_how_much_of_a_lead_is_charged_where_it_counts(boards):
 
 def test_a_law_below_the_floor_may_beat_one_without_any_value():
     never = Effect(0.0, 0.0, 0.0, ahead=12, samples=12, sets=True, below=True)
-    lead = Lead("pid", "none", never, floor="0.006 N/s", lacking="12 of 12")
+    lead = LeastLead("pid", "none", never, floor="0.006 N/s", lacking="12 of 12")
     assert lead.words == (
         "defined in every run, while none has none in 12 of 12, and it is ahead of none with 12 of "
         "12 sets "
@@ -560,12 +560,12 @@ def test_the_result_names_the_winner_its_least_lead_and_the_conditions(pair):
     assert "second wins under noise and loses under nominal" in split
     many = dataclasses.replace(pair, blocks=(*[first] * 9, turned)).result
     assert "third wins under 9 conditions and loses under noise" in many
-    lead = Lead("a", "b", Effect(0.85, 0.8, 0.9, 5, 8, True))
+    lead = LeastLead("a", "b", Effect(0.85, 0.8, 0.9, 5, 8, True))
     assert (
         lead.words
         == "0.850 times b's (0.800 to 0.900), and it is ahead of b with 5 of 8 sets of gains"
     )
-    level = Lead("a", "b", Effect(0.992, 0.99, 0.993, 0, 8, False))
+    level = LeastLead("a", "b", Effect(0.992, 0.99, 0.993, 0, 8, False))
     assert level.words == (
         "0.992 times b's (0.990 to 0.993), but in none of 8 runs lower by more than the 3 % that "
         "counts"

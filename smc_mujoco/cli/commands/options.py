@@ -64,6 +64,7 @@ def _completing(module: str, name: str) -> Callable[[str], list[str]]:
     return complete
 
 
+WORDS = _completing("answers.explain", "glossary")
 CONDITIONS = _completing("simulation.conditions", "NAMED")
 PLANTS = _completing("mechanisms.plant", "plants")
 LAWS = _completing("control.law", "all_laws")
@@ -125,6 +126,10 @@ Joints = Annotated[
 ]
 Json = Annotated[
     Path | None, typer.Option(metavar="FILE.json", help="Also write the result to a file.")
+]
+Full = Annotated[
+    bool,
+    typer.Option("--full", help="Print all tables with their intervals in place of the answer."),
 ]
 OneLaw = Annotated[str, typer.Option("--law", autocompletion=LAWS, help=f"A law. {GAINS_HELP}")]
 LawToTune = Annotated[

@@ -1,0 +1,1 @@
+"""What results say: facts, one file of templates, and three layers."""

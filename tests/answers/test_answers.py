@@ -1,0 +1,138 @@
+"""What a line says is what its fact holds, and words of answers are explained."""
+
+import math
+import re
+
+import pytest
+from helpers.words import words
+
+from smc_mujoco.answers import answers
+from smc_mujoco.answers.answer import Answer
+from smc_mujoco.answers.explain import explain, glossary
+from smc_mujoco.answers.facts import Lead, NextStep, Open, Settles, Tied, Trails, Use
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.tabular import Cell, Tabular
+
+pytestmark = pytest.mark.quick
+
+
+def test_a_lead_names_law_rival_metric_and_both_ends():
+    lines = dict(
+        answers.leads(
+            [
+                Lead(law="adrc", rival="pid", metric="J", low=0.213, high=0.254),
+                Lead(law="adrc", rival="pid", metric="ITAE", low=0.11, high=0.18),
+                Lead(law="adrc", rival="sta", metric="energy", low=0.5),
+                Lead(law="mine", rival="pid", metric="settling time", low=0.2, high=0.34),
+            ]
+        )
+    )
+    assert words(lines["adrc"]) == words(
+        "J 21 to 25 % and ITAE 11 to 18 % below pid; energy at least 50 % below sta"
+    )
+    assert re.findall(r"\d+", lines["mine"]) == ["20", "34"]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "text"),
+    [
+        (0.213, 0.254, "21 to 25 %"),
+        (0.211, 0.212, "21 %"),
+        (0.0123, 0.9989, "1.2 to 100 %"),
+        (0.031, math.nan, "at least 3.1 %"),
+    ],
+)
+def test_shares_have_two_digits(low, high, text):
+    assert answers.percent(low, high) == text
+
+
+def test_the_law_to_use_comes_with_its_gains_and_the_laws_that_lead_elsewhere():
+    text = answers.use(
+        Use(law="adrc", gains="wc=30", unless=(("ITAE", "pid"), ("J", "sta"), ("energy", "pid")))
+    )
+    assert text.index("adrc") < text.index("wc=30") < text.index("pid") < text.index("sta")
+    assert text.count("pid") == 1
+    assert "(" not in answers.use(Use(law="none", gains=""))
+
+
+def test_settled_runs_are_counted_by_law():
+    all_but_one = [("a", Settles(12, 12)), ("b", Settles(7, 12))]
+    assert "b 7 of 12" in answers.settled(all_but_one)
+    assert "a " not in answers.settled(all_but_one)
+    assert "24" in answers.settled([("a", Settles(12, 12)), ("b", Settles(12, 12))])
+    assert "None" in answers.settled([("a", Settles(0, 12))])
+
+
+def test_a_law_that_loses_has_its_ratio_and_who_is_ahead():
+    label, text = answers.trails(
+        Trails(law="mine", leader="adrc", metric="J", times=1.783, ahead=("adrc", "pid"))
+    )
+    assert label == "mine"
+    assert "1.78 times adrc's" in text
+    assert "pid" in text
+
+
+def test_what_is_tied_and_what_is_open_stand_on_lines_of_their_own():
+    ((label, text),) = answers.ties([Tied(metric="J", laws=("a", "b"), floor="0.1 mrad")])
+    assert (label, "0.1 mrad" in text) == ("tied", True)
+    ((label, text),) = answers.opens(
+        [
+            Open(metric="J", laws=("a", "b"), hidden=0.12),
+            Open(metric="ITAE", laws=("a", "b"), sets_needed=8),
+        ]
+    )
+    assert label == "open"
+    assert "12 %" in text
+    assert "8 sets" in text
+    assert answers.ties([]) == answers.opens([]) == []
+
+
+def test_a_line_is_at_most_80_wide_but_a_command_stays_whole():
+    command = f"smc-mujoco compare {'x' * 90}"
+    lines = answers.labelled(
+        [("adrc", "J 21 to 25 % below the rest " * 9), answers.next_step(NextStep(command))]
+    )
+    assert max(map(len, lines[:-1])) <= answers.WIDTH
+    assert lines[1].startswith(" " * 6)
+    assert lines[-1] == f"next  {command}"
+
+
+class Sample(Answer):
+    @property
+    def lines(self):
+        return ["a wins", "b < c"]
+
+    @property
+    def tables(self):
+        return [Tabular(headings=["law", "J"], rows=[["a", Cell("1", "0.9–1.1")]], title="All")]
+
+
+def test_a_result_prints_its_answer_and_holds_its_evidence(tmp_path):
+    result = Sample()
+    assert str(result) == repr(result) == "a wins\nb < c"
+    assert "0.9–1.1" in str(result.full)
+    in_notebook = result._repr_html_()
+    answer, evidence = in_notebook.split("<details>")
+    assert "b &lt; c" in answer
+    assert "0.9–1.1" in evidence
+    page = result.to_html(tmp_path / "report.html").read_text()
+    assert page.index("a wins") < page.index("0.9–1.1")
+    assert "<h1>a wins</h1>" in page
+
+
+@pytest.mark.parametrize("word", sorted(glossary()))
+def test_an_explanation_fits_ten_lines_of_a_screen(word):
+    lines = explain(word).splitlines()
+    assert lines[0] == word
+    assert 2 <= len(lines) <= 10
+    assert max(map(len, lines)) <= answers.WIDTH
+    assert "](" not in "".join(lines)
+
+
+def test_a_word_is_found_in_any_case_and_number():
+    assert explain("Stars") == explain("star")
+
+
+def test_an_unknown_word_is_refused_with_a_near_one():
+    with pytest.raises(ScenarioError, match="star"):
+        explain("strar")
