@@ -129,7 +129,7 @@ SAID = {
     ranking: [
         f"there are {ranking.MIN_LEVEL_UNITS} units or more",
         f"lies within {percent(ranking.LEVEL_SHARE)}",
-        f"max(1, rho)^{ranking.TREND_POWER}",
+        f"p = {ranking.TREND_POWER:g} without a periodic load",
     ],
     attack: [f"at most {attack.MAX_CORNERS}, each"],
     uncertainty.default_class: [

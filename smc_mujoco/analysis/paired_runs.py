@@ -9,8 +9,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from smc_mujoco.analysis.ranking import first_of_kind
+from smc_mujoco.analysis.ranking import TREND_POWER, first_of_kind
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.errors import ScenarioError, has, items_of, one_line, shown
 from smc_mujoco.common.files import from_json
@@ -19,7 +20,12 @@ from smc_mujoco.control.source import Source, restore
 from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.metrics.conventions import groups as channel_groups
-from smc_mujoco.metrics.conventions import resolution, settles_in_time
+from smc_mujoco.metrics.conventions import (
+    late_metrics_judged,
+    late_time,
+    resolution,
+    settles_in_time,
+)
 from smc_mujoco.simulation.scenario import Scenario
 
 MIN_COMMAND_SHARE = 1e-3  # of the bound on u: smaller values of u matter on no machine; chosen
@@ -230,11 +236,14 @@ class RunGroup:
         """The number of seeds of each block in which every law ran."""
         return tuple(self.common.sum(axis=1).tolist())
 
-    def scores(self, by_row: ByRow) -> Scores:
-        """Return the scores of the laws in the blocks in which a metric applies."""
+    def scores(self, by_row: ByRow, judged: ArrayLike = True) -> Scores:
+        """Return the scores of the laws in the blocks in which a metric applies, of those `judged`:
+        all, or a value for each block.
+        """
+        ran = (self.rows >= 0) & np.atleast_1d(judged)[:, None]
         cubes = []
         for row in by_row:
-            of_runs = np.where(self.rows >= 0, row[self.rows], np.nan)
+            of_runs = np.where(ran, row[self.rows], np.nan)
             cubes.append(of_runs)
         cube = cubes[0]
         if np.isnan(cube).all():
@@ -472,6 +481,22 @@ def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
         u=MIN_COMMAND_SHARE * max(filter(math.isfinite, scenario.limits), default=0.0),
     )
     return FLOORS[entry.unit](least)
+
+
+def is_judged(scenario: Scenario | None, metric: str) -> bool:
+    """Return whether runs of this kind are long enough for a verdict on a metric, see
+    `late_metrics_judged`.
+    """
+    entry = CATALOGUE.get(metric)
+    if scenario is None or entry is None or not entry.late:
+        return True
+    return late_metrics_judged(scenario)
+
+
+def trend_power(scenario: Scenario | None) -> float:
+    """Return how many times the last part of a run fits into it."""
+    late = late_time(scenario) if scenario else 0.0
+    return scenario.duration / late if scenario and late else TREND_POWER
 
 
 def floor_words(scenario: Scenario | None, metric: str) -> str:

@@ -7,13 +7,14 @@ through others: its lead is the median of theirs. A run that repeats the results
 counted.
 
 The lead. With y a law's value in a run, y' that of the same run at half the physics step, and rho
-how the value changes over the last fifth of the run,
+how the value changes over the last part of the run, which is the share 1/p of it, with p = 5
+without a periodic load,
 
-    high = max(y, y') max(1, rho)^5         low = min(y, y') min(1, rho)^5
+    high = max(y, y') max(1, rho)^p         low = min(y, y') min(1, rho)^p
     d_i  = log( max(low of the rival, q) / max(high of the law, q) )        one for each unit i
 
 q is the smallest value that matters in the problem, see `paired_runs.floor`. If the trend goes on,
-the value changes by the factor rho^5 in as much time again: only a law that rises and a rival that
+the value changes by the factor rho^p in as much time again: only a law that rises and a rival that
 falls are charged. rho is the median of a law's runs in a block, and 1 if it differs from 1 by no
 more than what is relevant. Where only some of the runs were repeated at half the step, the median
 of their relative changes widens the others. For shares, d is the difference.
@@ -84,8 +85,8 @@ from smc_mujoco.common.constraints import Number, constrained
 
 RELEVANT = 0.03  # r, default share of the larger value that is relevant; chosen
 Relevant = Annotated[float, Number(low=0.0, high=0.5)]
-# the last part is a fifth of a run: a trend that lasts as long again goes on for 5 of them
-TREND_POWER = 5
+# p where the last part is a fifth of a run: a trend that lasts as long again goes on for 5 of them
+TREND_POWER = 5.0
 LEVEL_SHARE = 0.1  # laws are level if the interval of their ratio lies within this share; chosen
 MIN_LEVEL_UNITS = 12  # with fewer units no laws are called level; chosen
 # of log rho: a value that has vanished within the last fifth of a run has fallen enough
@@ -131,6 +132,7 @@ class Comparison:
       halves, trends: y' and rho of each run, NaN where they are not known. Default: nowhere.
       arrived: whether each run has arrived. Default: all have.
       first_order: whether the integrator of all blocks, or of each, is of first order.
+      powers: p of all blocks, or of each.
       rivals: the number of a law's rivals for which levels are corrected, even if it has fewer.
       looks: how often the laws may be judged, each time with more units; every look has an equal
         share of the errors.
@@ -149,6 +151,7 @@ class Comparison:
         trends: Mapping[str, ArrayLike] | None = None,
         arrived: Mapping[str, ArrayLike] | None = None,
         first_order: ArrayLike = False,
+        powers: ArrayLike = TREND_POWER,
         rivals: int = RIVALS,
         looks: int = 1,
     ):
@@ -163,7 +166,10 @@ class Comparison:
         results = self._cube(outcomes, np.arange(seeds))
         self.floors = np.broadcast_to(np.asarray(floors, float), blocks)
         self.first_order = np.broadcast_to(np.asarray(first_order, bool), blocks)
-        self.low, self.high = bounds(self.cells, self.halves, rises, self.floors, shares, relevant)
+        of_blocks = np.broadcast_to(np.asarray(powers, float), blocks)
+        self.low, self.high = bounds(
+            self.cells, self.halves, rises, of_blocks, self.floors, shares, relevant
+        )
         plain = self.cells if shares else _logarithms(self.cells, self.floors)
         self.beyond = relevant if shares else -math.log1p(-relevant)  # what d must exceed
         ran = ~np.isnan(self.cells[0])
@@ -418,6 +424,7 @@ def bounds(
     cells: np.ndarray,
     halves: np.ndarray,
     trends: np.ndarray,
+    powers: np.ndarray,
     floors: np.ndarray,
     shares: bool,
     relevant: float,
@@ -439,7 +446,7 @@ def bounds(
         rise = np.log(middle(trends))[..., None]
     matters = np.abs(rise) > (relevant or RELEVANT)
     clipped = np.clip(rise, -MAX_RISE, MAX_RISE)
-    rise = TREND_POWER * np.where(matters, clipped, 0.0)
+    rise = powers[:, None] * np.where(matters, clipped, 0.0)
     q = _logarithms(floors[:, None])
     once = np.isnan(half)
     lowest = np.where(once, whole - widening, half)

@@ -146,7 +146,7 @@ def arrived(trace: Trace) -> bool:
 
 def trends(trace: Trace) -> dict[str, float]:
     """Return name -> rho of the metrics of the last part: their value over that of the run without
-    its last fifth.
+    its last part.
 
     A run in which such a metric falls has not yet reached its end. Metrics that are 0 in either
     part are left out.
@@ -254,7 +254,7 @@ def ultimate_bound(trace: Trace) -> float:
     ...
 
 
-@metric("", error=True)
+@metric("", error=True, late=True)
 def rest_share(trace: Trace) -> float:
     """Ultimate bound over the scale."""
     return CATALOGUE["ultimate_bound"].formula(trace) / scale(trace)

@@ -40,6 +40,9 @@ project:
   may be within it when the run ends, and then has a settling time. "settles" counts the runs that
   settle in time.
 - last part: the last 20 % of the run, the samples with t >= t0 + 0.8 (tK - t0), at least one.
+  Where disturbances and references have a period, it is the least number of whole periods that is
+  as long: a piece of a period says where the run ends. If two such parts are more than 85 % of the
+  run, the last part is the last 20 %, and no law wins by it.
 - approach: the part of one channel's run towards one reference. It begins at t[0], and again at
   each sample at which r has jumped by more than the settling band; the side it comes from is the
   sign of e there.
@@ -73,7 +76,14 @@ from smc_mujoco.common.errors import ScenarioError, has, shown
 from smc_mujoco.common.text import first_paragraph, joined, number
 from smc_mujoco.mechanisms.custom.scales import falls
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
-from smc_mujoco.metrics.fold import LAST_PART, ROUNDING, Fold, first_sample
+from smc_mujoco.metrics.fold import (
+    LAST_PART,
+    ROUNDING,
+    Fold,
+    first_sample,
+    judges_last_part,
+    late_periods,
+)
 from smc_mujoco.simulation.python_functions import evaluate
 
 if TYPE_CHECKING:
@@ -331,7 +341,8 @@ def folded(unit: str, fold: Fold, **flags: Any) -> Callable[[Callable], Callable
     def enter(described: Callable) -> Callable[[Trace], float]:
         @functools.wraps(described)
         def formula(trace: Trace) -> float:
-            return fold.of(trace.t, signal(trace, fold.signal))
+            first = last_part(trace).start if fold.part == "late" else None
+            return fold.of(trace.t, signal(trace, fold.signal), first)
 
         late = fold.part == "late"
         return metric(unit, fold=fold, late=late, command=fold.signal == "u", **flags)(formula)
@@ -479,7 +490,19 @@ def leans(trace: Trace) -> bool:
 
 def last_part(trace: Trace) -> slice:
     """Return the samples of the last part."""
-    return slice(first_sample("late", trace.t), None)
+    return slice(first_sample("late", trace.t, late_time(trace.scenario)), None)
+
+
+def late_time(scenario: Scenario) -> float:
+    """Return how long the last part of a run under a periodic load is, s; 0 if it is LAST_PART."""
+    period = scenario.load_period
+    count = late_periods(scenario.duration, period)
+    return count * period if count else 0.0
+
+
+def late_metrics_judged(scenario: Scenario) -> bool:
+    """Return whether metrics of the last part may be compared, see the module's conventions."""
+    return judges_last_part(scenario.duration, scenario.load_period)
 
 
 def settles_in_time(time: Any, duration: Any) -> Any:

@@ -7,6 +7,7 @@ functions of a trace, in the catalogue.
 
 from __future__ import annotations
 
+import math
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -16,6 +17,8 @@ from smc_mujoco.common.aliases import Array
 LAST_PART = 0.2  # of the run's duration
 ROUNDING = 1e-9  # of the duration: a sample that is so little before the last part belongs to it
 TRANSIENT_SHARE = 0.25  # of the run, which an "early" part leaves out
+# of the run's duration: the last part and as much before it, where a load is periodic; chosen
+TWO_PARTS = 0.85
 
 
 class Fold(NamedTuple):
@@ -33,19 +36,21 @@ class Fold(NamedTuple):
     timed: bool = False  # whether it is weighted by the time since the start
     rate: bool = False  # whether it is over the time of its part
 
-    def of(self, t: Array, signal: Array) -> float:
-        """Return the value for times t, (K + 1,), and a signal, (K + 1, n)."""
+    def of(self, t: Array, signal: Array, first: int | None = None) -> float:
+        """Return the value for times t, (K + 1,), and a signal, (K + 1, n), whose part begins with
+        sample `first`; default: that of `first_sample`.
+        """
         if self.reduction not in ("integral", "held"):
-            return self.channels(t, signal).max()
-        t, y = self._taken(t, signal)
+            return self.channels(t, signal, first).max()
+        t, y = self._taken(t, signal, first)
         total = y.sum(axis=1)
         if self.timed:
             total = (t - t[0]) * total
         return np.trapezoid(total, t) if self.reduction == "integral" else total[:-1] @ np.diff(t)
 
-    def channels(self, t: Array, signal: Array) -> Array:
+    def channels(self, t: Array, signal: Array, first: int | None = None) -> Array:
         """Return the value of each channel, (n,), of a fold of the worst channel."""
-        t, y = self._taken(t, signal)
+        t, y = self._taken(t, signal, first)
         if self.reduction == "largest":
             return y.max(axis=0, initial=0.0)
         if self.reduction == "range":
@@ -56,9 +61,10 @@ class Fold(NamedTuple):
         total = y.sum(axis=0)
         return total / ((t[-1] - t[0]) or np.inf) if self.rate else total
 
-    def _taken(self, t: Array, signal: Array) -> tuple[Array, Array]:
+    def _taken(self, t: Array, signal: Array, first: int | None) -> tuple[Array, Array]:
         """Return the times of the part, and what is taken of each sample in it."""
-        first = first_sample(self.part, t)
+        if first is None:
+            first = first_sample(self.part, t)
         y = signal[first:]
         if self.change:
             y = np.diff(y, axis=0)
@@ -67,13 +73,36 @@ class Fold(NamedTuple):
         return t[first:], y
 
 
-def first_sample(part: str, t: Array) -> int:
-    """Return the index of the first sample of a part of a run with these times, (K + 1,)."""
+def late_periods(duration: float, period: float) -> int:
+    """Return how many whole periods of a load are the last part of a run, s; 0 if the load has no
+    period, or if two such parts are longer than TWO_PARTS of the run.
+    """
+    if not 0.0 < period < duration:
+        return 0
+    count = math.ceil(LAST_PART * (1.0 - ROUNDING) * duration / period)
+    return count if 2.0 * count * period <= TWO_PARTS * duration else 0
+
+
+def judges_last_part(duration: float, period: float) -> bool:
+    """Return whether the last part of a run, s, says how it goes on: a piece of a period does not.
+
+    The load has a period, s, or 0 for none.
+    """
+    return period == 0.0 or late_periods(duration, period) > 0
+
+
+def first_sample(part: str, t: Array, late: float = 0.0) -> int:
+    """Return the index of the first sample of a part of a run with these times, (K + 1,), whose
+    last part has a length `late`, s; 0 for LAST_PART of the run.
+    """
     if not part:
         return 0
     start, end = t[[0, -1]]
     if part == "late":
-        since = end - LAST_PART * (1 + ROUNDING) * (end - start)
+        length = LAST_PART * (end - start)
+        if 0.0 < late < end - start:
+            length = late
+        since = end - length - LAST_PART * ROUNDING * (end - start)
     else:
         since = start + TRANSIENT_SHARE * (1.0 - ROUNDING) * (end - start)
     return int(np.searchsorted(t, since))

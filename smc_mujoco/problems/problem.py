@@ -31,6 +31,7 @@ from smc_mujoco.control.law import Law, all_laws
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import ITAE, TV
+from smc_mujoco.metrics.fold import first_sample
 from smc_mujoco.robustness.uncertainty import Uncertainty
 from smc_mujoco.robustness.worst_case import worst_case
 from smc_mujoco.simulation.grid import Starts, case
@@ -237,7 +238,7 @@ class Problem:
             bounds = np.array(trace.scenario.limits[: plant.driven])
             commands = trace.u
         variation = TV.channels(trace.t, commands[:, : len(bounds)]) / bounds
-        last = float(worst[conventions.last_part(trace)].max())
+        last = float(worst[first_sample("late", trace.t) :].max())
         values = {
             "failed": 0.0,
             "accuracy": max(last, self._values["floor"]),
@@ -362,7 +363,7 @@ def _within_from(trace: Trace, error: Array, level: float) -> float:
     the last fifth.
     """
     time = conventions.last_exit(trace.t, error, level)
-    if time <= trace.t[conventions.last_part(trace)][0]:
+    if time <= trace.t[first_sample("late", trace.t)]:
         return time
     return math.inf
 

@@ -12,11 +12,15 @@ On a user's model x0 counts from the default goal.
 A free body may rest anywhere, so that x0 is no scale. It starts at x_i = x0_i + (spread + by) z_i,
 in m and rad, also from seed 0.
 
+Seed s > 0 also moves each sinusoidal disturbance by a phase, uniform and drawn from s: runs of one
+phase would be one number.
+
 A run with contacts must start clear of its obstacles. There -|z_i| replaces z_i, which moves the
 start inwards, and pendulums that may touch each other ("bobs") start in order from left to right.
 """
 
 import dataclasses
+import math
 import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -62,13 +66,15 @@ from smc_mujoco.simulation.conditions import (
 from smc_mujoco.simulation.force_bounds import U_MAX
 from smc_mujoco.simulation.model import compile_model, initial_state, with_values
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import Noise
+from smc_mujoco.simulation.signals import Noise, Sine
 
 LawOfSeed = Callable[[int], Law]  # seed -> the law of that run
 MAX_REST_ACCELERATION = 1e-9  # rad/s^2 or m/s^2; chosen: rounding stays below
 SPREAD = 0.2  # of x0, to either side; chosen
 GRID_SEEDS = 2**52  # number of a grid's seeds; tuning takes larger ones
-ERROR_STREAM = 2**31  # beyond the channels, whose starts are drawn with their index
+# beyond the channels, whose starts are drawn with their index
+ERROR_STREAM = 2**31
+PHASE_STREAM = ERROR_STREAM + 1
 # where a plant starts at 0
 START_CURE = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"
 
@@ -153,6 +159,22 @@ def _with_drawn_error(scenario: Scenario, seed: int) -> Scenario:
     return dataclasses.replace(scenario, feedforward=compensation)
 
 
+def _with_drawn_phases(scenario: Scenario) -> Scenario:
+    """Return a scenario whose sinusoidal disturbances have the phases of its seed."""
+    if scenario.seed == 0 or not any(isinstance(load, Sine) for load in scenario.disturbance):
+        return scenario
+    generator = np.random.default_rng([scenario.seed, PHASE_STREAM])
+    loads = []
+    for load in scenario.disturbance:
+        if isinstance(load, Sine):
+            phase = load.phase + float(generator.uniform(0.0, 2.0 * math.pi))
+            loads.append(dataclasses.replace(load, phase=phase))
+        else:
+            loads.append(load)
+    drawn = dataclasses.replace(scenario, disturbance=tuple(loads))
+    return drawn.named(scenario.condition)
+
+
 def _farthest(start: Sequence[float], rest: Sequence[float]) -> float:
     """Return the largest distance of a channel from its place of rest."""
     return max(abs(x - r) for x, r in zip(start, rest, strict=True))
@@ -221,9 +243,10 @@ def grid(
         text, see `law`.
       conditions: names, such as "noise" or "noise + coulomb", or your own conditions, see
         `condition`.
-      seeds: a number of seeds, 0, 1, ..., or the seeds themselves. A seed is a start and a noise,
-        the same in every condition and under every law; see `starts`. If a law was tuned several
-        times, the seed also selects which of its gains are used.
+      seeds: a number of seeds, 0, 1, ..., or the seeds themselves. A seed is a start, a noise and
+        the phase of sinusoidal disturbances, the same in every condition and under every law; see
+        `starts`. If a law was tuned several times, the seed also selects which of its gains are
+        used.
       gains: "study", "tuned", "tracking" or "default", see `gains`.
       duration: of each run, s.
       starts: where runs begin, by seed. Default: within 20 % of the plant's own x0.
@@ -284,7 +307,7 @@ def all_combinations(
             for law in laws(plant):
                 for seed in seeds:
                     run = case(plant, law(seed), condition, duration, seed=seed, starts=starts)
-                    runs.append(run)
+                    runs.append(_with_drawn_phases(run))
             check_moving(runs[: len(seeds)])
             scenarios += runs
     return scenarios

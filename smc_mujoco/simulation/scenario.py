@@ -45,6 +45,7 @@ from smc_mujoco.simulation.signals import (
     Noise,
     PerChannel,
     Signal,
+    common_period,
 )
 
 MAX_TIME = 1e9  # s, of runs
@@ -415,6 +416,13 @@ class Scenario:
         if isinstance(reference, PerChannel):
             return reference.signals
         return (reference,) * self.plant.driven
+
+    @property
+    def load_period(self) -> float:
+        """The common period of disturbances and references, s; 0 if none is periodic, inf if they
+        have none in common.
+        """
+        return common_period((*self.disturbance, *self.references))
 
     @property
     def scored_channels(self) -> tuple[int, ...]:

@@ -16,7 +16,8 @@ other noises of a run. Times are in seconds. A reference is in m or rad, a distu
 import dataclasses
 import math
 from collections import namedtuple
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from fractions import Fraction
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -37,6 +38,8 @@ EARLY = (
     1.0 - 1e-15
 )  # factor on a switching time, because sums of decimal times differ from it by an ulp or two
 MAX_MISSED = 0.99  # probability; chosen: of a hundred samples one runs
+MAX_BEAT = 32  # periods of a beat, chosen: runs are seldom longer
+SAME_RATIO = 1e-6  # of the ratio of two periods, chosen: a phase moves by no more in a run
 SINUSOIDS = (
     32  # of band-limited noise; chosen: its kurtosis is 3 - 3/64, 1.6 % below that of a Gaussian
 )
@@ -60,6 +63,9 @@ class Signal:
                 return p.amplitude * math.exp(-t), 0.0, 0.0
 
         smc.run(smc.Scenario(plant="duffing", law="pid", disturbance=Decay(0.5), duration=1.0))
+
+    A signal that repeats itself after a time has an attribute or a property `period`, s: metrics of
+    the last part of a run are then taken over whole periods.
 
     If the class attribute `cartesian` is true, the signal is a force on bodies, N, not on joints: a
     `Push` on one body, or else a horizontal force on the body of each channel.
@@ -141,6 +147,11 @@ class Sine(Signal):
         if not isinstance(about, str) or about not in ("", "goal"):
             raise ScenarioError(f"Sine's about is {shown(about)}: give 'goal', or leave it out")
         object.__setattr__(self, "about", about)
+
+    @property
+    def period(self) -> float:
+        """The period, s; 0 of a constant."""
+        return abs(2.0 * math.pi / self.omega) if self.omega and self.amplitude else 0.0
 
     @staticmethod
     def value(t, p):
@@ -589,6 +600,25 @@ def _band_limited(t, sigma, low, high, memory, seed, channel, stream):
     for i in range(SINUSOIDS):
         total += math.cos(memory[i] * t + memory[SINUSOIDS + i])
     return sigma * math.sqrt(2.0 / SINUSOIDS) * total
+
+
+def common_period(signals: Iterable[Signal]) -> float:
+    """Return the period of signals together, s: that of their beat; 0 if none is periodic, inf if
+    it is more than MAX_BEAT of the longest period.
+    """
+    together = 0.0
+    for signal in signals:
+        parts = getattr(signal, "signals", None)
+        period = float(getattr(signal, "period", 0.0) if parts is None else common_period(parts))
+        if not together or not period:
+            together = together or period
+            continue
+        ratio = max(together, period) / min(together, period)
+        beat = Fraction(ratio if ratio < MAX_BEAT else 0.0).limit_denominator(MAX_BEAT)
+        if abs(beat - ratio) > SAME_RATIO * ratio:
+            return math.inf
+        together = max(together, period) * beat.denominator
+    return together
 
 
 def bounds_of(signal: Signal) -> Pair | None:

@@ -125,6 +125,12 @@ def _absent(metrics: Sequence[str], ranked: Sequence["RankedGroup"]) -> list[str
             scenario = next(filter(None, group.ran), None)
             if scenario and metric in CATALOGUE:
                 reasons.append(CATALOGUE[metric].refusal(scenario))
+            for block, ran in zip(group.group.blocks, group.ran, strict=True):
+                if not paired_runs.is_judged(ran, metric):
+                    reasons.append(
+                        f"{metric} is not compared on {block[0]} under {block[1]}: the last part "
+                        "of a run needs two periods of the load, so give a longer duration"
+                    )
     return list(dict.fromkeys(filter(None, reasons)))
 
 
@@ -161,7 +167,8 @@ def _boards_of(
     scores = []
     compared = {}
     for i, each in enumerate(ranked):
-        of_group = each.group.scores(by_row)
+        judged = [paired_runs.is_judged(scenario, metric) for scenario in each.ran]
+        of_group = each.group.scores(by_row, judged)
         scores.append(of_group)
         if of_group.blocks:
             compared[i] = _compared(of_group, each.ran, metric, relevant)
@@ -290,8 +297,10 @@ def _compared(
     """Compare the scores of laws in a metric; `ran` has a scenario of each block of the group."""
     floors = []
     of_first_order = []
+    powers = []
     for k in scores.blocks:
         scenario = ran[k]
+        powers.append(paired_runs.trend_power(scenario))
         floors.append(paired_runs.floor(scenario, metric))
         of_first_order.append(scenario is not None and first_order(scenario))
     return Comparison(
@@ -305,6 +314,7 @@ def _compared(
         trends=scores.trends,
         arrived=scores.arrived,
         first_order=of_first_order,
+        powers=powers,
     )
 
 

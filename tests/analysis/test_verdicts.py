@@ -9,6 +9,7 @@ import pytest
 from helpers.tables import table_of
 
 from smc_mujoco.analysis.ranking import Comparison, corrected, needed_to_rank, needed_to_win
+from smc_mujoco.metrics.fold import Fold, first_sample, late_periods
 from smc_mujoco.studies.leaderboard import leaderboard
 
 SETS = 12
@@ -155,3 +156,47 @@ def test_beside_a_law_below_the_floor_none_above_it_is_starred():
         "low": True,
     }
     assert not found.worse[found.laws.index("above"), 0]
+
+
+LATE_METRICS = {
+    "ultimate_bound": Fold("e", "largest", part="late"),
+    "tv_rate": Fold("u", "sum", part="late", change=True, rate=True),
+}
+
+
+def under_a_sine(rng, name, lead):
+    """A comparison of two laws whose runs are sines of one amplitude, the second larger by a lead,
+    each law with a phase of its own; runs differ by 5 % and 0.1 rad.
+    """
+    duration, h = 10.0, 0.02
+    period = 2 * math.pi / 5.0
+    part = late_periods(duration, period) * period
+    t = np.arange(0.0, duration + h / 2, h)
+    values, trends = {}, {}
+    for law, size in (("first", 1.0), ("second", 1.0 / (1.0 - lead))):
+        phase = rng.uniform(0.0, 2 * math.pi)
+        amplitudes = size * np.exp(rng.normal(0.0, 0.05, 12))
+        phases = phase + rng.normal(0.0, 0.1, 12)
+        values[law], trends[law] = [], []
+        for amplitude, angle in zip(amplitudes, phases, strict=True):
+            signal = np.sin(5.0 * t + angle) + 0.02 * rng.normal(size=t.size)
+            begin = first_sample("late", t, part)
+            fold = LATE_METRICS[name]
+            sizes = []
+            for end in (t.size, begin + 1):  # the last part, and as much before it
+                start = first_sample("late", t[:end], part)
+                sizes.append(fold.of(t[:end], amplitude * signal[:end, None], start))
+            values[law].append(sizes[0])
+            trends[law].append(sizes[0] / sizes[1])
+    return Comparison(values, trends=trends, powers=duration / part)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LATE_METRICS)
+def test_under_a_sine_equal_laws_have_no_winner_and_a_lead_of_a_quarter_shows(name):
+    rng = np.random.default_rng(11)
+    twins = [under_a_sine(rng, name, 0.0).winners[0] for _ in range(200)]
+    assert sum(map(bool, twins)) <= 10
+    apart = [under_a_sine(rng, name, 0.25).winners[0] for _ in range(50)]
+    assert apart.count("first") >= 40
+    assert "second" not in apart

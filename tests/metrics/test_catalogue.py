@@ -17,7 +17,7 @@ import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.plant import plant
 from smc_mujoco.metrics import catalogue as m
-from smc_mujoco.metrics import limit_cycle
+from smc_mujoco.metrics import conventions, fold, limit_cycle
 from smc_mujoco.metrics.conventions import group_trace, groups, scale, turns
 from smc_mujoco.simulation.trace import Trace
 
@@ -64,6 +64,7 @@ def run(
     units=(),
     free=False,
     noise=0.0,
+    period=0.0,
     **fields,
 ):
     """A Run; a signal may be a scalar, (K+1,) for one channel or (K+1, n).
@@ -97,6 +98,8 @@ def run(
         tracks="position",
         friction=(),
         scored_channels=tuple(range(n)),
+        duration=t[-1],
+        load_period=period,
     )
     more = {"force": u, "reaction": reaction, "scenario": scenario} | fields
     return Run(
@@ -598,10 +601,51 @@ def test_trends_are_of_the_metrics_of_the_last_part_alone():
     for metric in m.metrics():
         if metric.late:
             late.add(metric.name)
-    assert late == same - {"rest_share", "reversal_rate", "reversal_error"}
+    assert late == same - {"reversal_rate", "reversal_error"}
     rho = m.trends(run(t, **plain))
     assert rho.keys() == late - {"slip_rate"}  # which is 0
     assert rho["ultimate_bound"] == pytest.approx(math.exp(6.4 - 8.0), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("omega", "seconds"),
+    [
+        (5.0, 2 * 2 * math.pi / 5.0),  # two periods are the least that is as long as a fifth
+        (2.2, 2 * math.pi / 2.2),
+        (40.0, 13 * 2 * math.pi / 40.0),
+    ],
+)
+def test_under_a_periodic_load_the_last_part_is_whole_periods_and_the_phase_decides_nothing(
+    omega, seconds
+):
+    t = clock(10, 1e-3)
+    values = []
+    for phase in (0.0, 1.0, 2.5):
+        x = np.sin(omega * t + phase)
+        swinging = run(t, x, u=x, period=2 * math.pi / omega)
+        values.append(m.score(swinging))
+        part = t[conventions.last_part(swinging)]
+        assert np.ptp(part) == pytest.approx(seconds, abs=2e-3)
+        rho = m.trends(swinging)
+        for name in ("ultimate_bound", "tv_rate", "ripple"):
+            assert rho[name] == pytest.approx(1.0, abs=2e-3)
+            assert values[-1][name] == pytest.approx(values[0][name], rel=2e-3)
+        assert values[-1]["ultimate_bound"] == pytest.approx(1.0, abs=1e-4)
+        assert values[-1]["tv_rate"] == pytest.approx(2 * omega / math.pi, rel=2e-3)
+
+
+def test_two_periods_and_the_two_before_fit_or_the_last_part_is_a_fifth_without_a_verdict():
+    assert fold.late_periods(10.0, 0.0) == 0
+    assert fold.late_periods(10.0, 2.0) == 1
+    assert fold.late_periods(10.0, 1.99) == 2
+    assert fold.late_periods(10.0, 4.25) == 1
+    assert fold.late_periods(10.0, 4.26) == fold.late_periods(10.0, math.inf) == 0
+    assert fold.judges_last_part(10.0, 0.0)
+    assert fold.judges_last_part(10.0, 4.25)
+    assert not fold.judges_last_part(10.0, 4.26)
+    assert not fold.judges_last_part(10.0, math.inf)
+    t = clock(10, 0.1)
+    assert conventions.last_part(run(t, period=6.3)) == conventions.last_part(run(t))
 
 
 def test_a_law_that_drops_the_pole_has_settled_nothing_also_where_both_have_one_unit():

@@ -388,3 +388,14 @@ def test_play_and_counts_suit_how_far_a_slide_goes(way, refused):
 def test_a_brief_text_has_every_number_but_zeros_that_nobody_gave(fields, words):
     (name,) = fields
     assert smc.condition("mine", **fields).brief(smc.plant("duffing"), 1.0) == f"{name}={words}"
+
+
+def test_the_phase_of_a_sine_is_of_the_seed_alike_for_all_laws_and_that_of_seed_0_is_as_written():
+    condition = "push: disturbance=(Sine(0.2, 5.0, 0.3), Constant(0.1))"
+    runs = smc.grid("duffing", ["pid", "adrc"], condition, seeds=4, duration=1.0)
+    phases = [run.disturbance[0].phase for run in runs]
+    assert phases[0] == 0.3
+    assert phases[:4] == phases[4:]
+    assert len(set(phases)) == 4
+    assert all(run.condition == "push" for run in runs)
+    assert {run.disturbance[1] for run in runs} == {smc.Constant(0.1)}

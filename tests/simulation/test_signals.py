@@ -484,3 +484,35 @@ def test_parts_survive_json():
         (Sticker(), Sticker((3.0,), 5.0)),
     ):
         assert scenario_json._restored(json.loads(json.dumps(scenario_json._data(value)))) == value
+
+
+@pytest.mark.parametrize(
+    ("loads", "period"),
+    [
+        ((), 0.0),
+        ((smc.Constant(1.0),), 0.0),
+        ((smc.Sine(1.0, 5.0),), 2 * math.pi / 5.0),
+        ((smc.Sine(1.0, -5.0), smc.Step(1.0, time=0.5)), 2 * math.pi / 5.0),
+        ((smc.Sine(0.0, 5.0),), 0.0),
+        ((smc.Sine(1.0, 4.0), smc.Sine(1.0, 6.0)), math.pi),
+        ((smc.Sine(1.0, 4.0) + smc.Sine(1.0, 6.0),), math.pi),
+        ((smc.Sine(1.0, 1.0), smc.Sine(1.0, math.sqrt(2.0))), math.inf),
+        ((smc.Sine(1.0, 1.0), smc.Sine(1.0, 1.001)), math.inf),
+    ],
+)
+def test_loads_have_the_period_of_their_beat_or_none(loads, period):
+    run = smc.Scenario(plant="duffing", law="pid", disturbance=loads)
+    assert run.load_period == pytest.approx(period)
+
+
+def test_a_signal_of_your_own_says_its_period():
+    @dataclasses.dataclass(frozen=True)
+    class Square(smc.Signal):
+        period: float = 0.5
+
+        @staticmethod
+        def value(t, p):
+            return 1.0 if t % p.period < 0.5 * p.period else -1.0, 0.0, 0.0
+
+    run = smc.Scenario(plant="duffing", law="pid", disturbance=(Square(), smc.Sine(1.0, math.pi)))
+    assert run.load_period == pytest.approx(2.0)

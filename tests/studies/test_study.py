@@ -300,3 +300,16 @@ def test_a_law_that_does_nothing_wins_in_no_metric(plant, law, tmp_path):
     assert any(board.winner == law for board in boards)
     for board in boards:
         assert all("none" not in block.best for block in board.blocks), board.metric
+
+
+def test_a_metric_of_a_piece_of_a_period_is_not_compared_and_the_board_says_why(tmp_path):
+    slow, fast = (f"{name}: disturbance=Sine(0.2, {w})" for name, w in (("slow", 5), ("fast", 20)))
+    runs = smc.grid("duffing", ["pid", "adrc"], [slow, fast], seeds=2, duration=2.0)
+    boards = smc.leaderboard(smc.study(runs, tmp_path), ["itae", "ultimate_bound"])
+    conditions = {}
+    for board in boards:
+        conditions[board.metric] = [block.condition for block in board.blocks]
+    assert conditions == {"itae": ["slow", "fast"], "ultimate_bound": ["fast"]}
+    (reason,) = boards.absent
+    assert "ultimate_bound" in reason
+    assert "duffing under slow" in reason

@@ -32,7 +32,7 @@ from smc_mujoco.mechanisms.hardware.beside_joint import BesideJoint
 from smc_mujoco.mechanisms.hardware.drives import advanced
 from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
 from smc_mujoco.mechanisms.layout import moves_alone
-from smc_mujoco.metrics.conventions import SETTLING_BAND, groups, settling_band
+from smc_mujoco.metrics.conventions import SETTLING_BAND, groups, late_time, settling_band
 from smc_mujoco.metrics.fold import first_sample
 from smc_mujoco.simulation.cfunctions import compile_component
 from smc_mujoco.simulation.prepare import compensation, nominal_values, references, run_of, settings
@@ -536,7 +536,7 @@ def _settings(s: Resolved) -> Settings:
         "samples": s.samples,
         "jump_step": s.jump_step,
         "early": first_sample("early", t),
-        "late": first_sample("late", t),
+        "late": first_sample("late", t, late_time(s)),
         "logging": False,
     }
     return Settings(*(numbers[name] for name in Settings._fields))

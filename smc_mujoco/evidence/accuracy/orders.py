@@ -38,7 +38,7 @@ from smc_mujoco.draw.style import law_colour
 from smc_mujoco.evidence.accuracy.scaling import QUANTITIES, Accuracy, scaling
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.metrics.conventions import last_part
+from smc_mujoco.metrics.fold import first_sample
 from smc_mujoco.simulation.coerce import MIN_TIME
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import (
@@ -222,8 +222,7 @@ def _measured(trace: Trace) -> PeriodRun:
             failure=trace.failure or f"it diverged at {trace.diverged_at:g} s",
         )
     driven = slice(trace.scenario.plant.driven)
-    end = last_part(trace)
-    count = len(trace.t) - end.start
+    count = len(trace.t) - first_sample("late", trace.t)
     sizes = {
         "e": np.abs(trace.x - trace.r)[-PARTS * count :, driven],
         "s": np.abs(trace.s)[-PARTS * count :, driven],
