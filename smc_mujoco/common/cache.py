@@ -74,11 +74,11 @@ def cached(
     load: Callable[[Path], T],
 ) -> T:
     """Return the result of `make`, from its file if there is one; see `CachedResult`."""
-    kept = CachedResult(path, depends, save, load)
-    if (found := kept.read()) is not None:
-        return found
+    file = CachedResult(path, depends, save, load)
+    if (result := file.read()) is not None:
+        return result
     writable(path)
-    return kept.keep(make())
+    return file.keep(make())
 
 
 def _seal(files: Iterable[Path]) -> str:

@@ -20,7 +20,7 @@ from typing import Annotated, Any, ParamSpec, TypeVar
 import numpy as np
 
 from smc_mujoco.common.data import keyword_dataclass
-from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, told, unknown, whole
+from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown, warned, whole
 from smc_mujoco.common.files import as_path
 
 P = ParamSpec("P")
@@ -95,21 +95,21 @@ class Flag(Constraint):
 
 @keyword_dataclass
 class Each(Constraint):
-    """A value that satisfies `one`, or a list with such a value for each channel, as a tuple."""
+    """A value that satisfies `item`, or a list with such a value for each channel, as a tuple."""
 
-    one: Constraint
+    item: Constraint
 
     def __call__(self, what: str, value: Any) -> Any:
         is_list = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes)
         if not is_list or not getattr(value, "ndim", 1):
-            return self.one(what, value)
+            return self.item(what, value)
         if not (listed := items_of(what, value)):
             raise ScenarioError(
                 f"{what} is {shown(value)}: give a number, or one for each driven channel"
             )
         checked = []
         for i, item in enumerate(listed):
-            checked.append(self.one(f"{what}[{i}]", item))
+            checked.append(self.item(f"{what}[{i}]", item))
         return tuple(checked)
 
 
@@ -160,14 +160,14 @@ class FilePath(Constraint):
 
 @keyword_dataclass
 class OrNone(Constraint):
-    """None, or what satisfies `one`."""
+    """None, or what satisfies `item`."""
 
-    one: Constraint
+    item: Constraint
 
     def __call__(self, what: str, value: Any) -> Any:
         if value is None:
             return None
-        return self.one(what, value)
+        return self.item(what, value)
 
 
 MAX_SEED = 2**53 - 1  # a float64 holds every whole number up to it exactly
@@ -193,10 +193,10 @@ def of_type(kind: Any) -> Constraint | None:
                 return note
         return None
     options = typing.get_args(kind)
-    found = next(filter(None, map(of_type, options)), None)
-    if found and type(None) in options:
-        return OrNone(one=found)
-    return found
+    constraint = next(filter(None, map(of_type, options)), None)
+    if constraint and type(None) in options:
+        return OrNone(item=constraint)
+    return constraint
 
 
 @functools.cache
@@ -218,11 +218,11 @@ def of_parameters(function: Callable) -> dict[str, Constraint]:
 
 
 def _declared(types: dict[str, Any]) -> dict[str, Constraint]:
-    found = {}
+    constraints = {}
     for name, declared in types.items():
         if constraint := of_type(declared):
-            found[name] = constraint
-    return found
+            constraints[name] = constraint
+    return constraints
 
 
 def constrain(data: Any) -> None:
@@ -276,7 +276,7 @@ def constrained(function: Callable[P, T]) -> Callable[P, T]:
     @functools.wraps(function)
     def checked(*args: P.args, **kwargs: P.kwargs) -> T:
         try:
-            given = signature.bind(*args, **kwargs)
+            bound = signature.bind(*args, **kwargs)
         except TypeError as error:
             unexpected = [name for name in kwargs if name not in signature.parameters]
             if not unexpected:
@@ -285,12 +285,12 @@ def constrained(function: Callable[P, T]) -> Callable[P, T]:
             words = _unexpected(function.__name__, name, name, signature.parameters)
             raise TypeError(words) from error
         for name, constraint in constraints.items():
-            if name in given.arguments:
-                given.arguments[name] = constraint(name, given.arguments[name])
-        token = told.set(told.get(set()))
+            if name in bound.arguments:
+                bound.arguments[name] = constraint(name, bound.arguments[name])
+        token = warned.set(warned.get(set()))
         try:
-            return function(*given.args, **given.kwargs)
+            return function(*bound.args, **bound.kwargs)
         finally:
-            told.reset(token)
+            warned.reset(token)
 
     return checked

@@ -52,13 +52,13 @@ def printable(text: str) -> str:
     """Return the text with escapes for characters that a terminal would act on, such as a newline
     in a file's name.
     """
-    shown = []
+    characters = []
     for c in text:
         if c.isprintable():
-            shown.append(c)
+            characters.append(c)
         else:
-            shown.append(c.encode("unicode_escape").decode())
-    return "".join(shown)
+            characters.append(c.encode("unicode_escape").decode())
+    return "".join(characters)
 
 
 def shown(value: object) -> str:
@@ -106,23 +106,23 @@ def _nearest(name: str, names: list[str]) -> list[str]:
     """Return the names that an abbreviation may mean, else the nearest in spelling, else the first
     that contains it.
     """
-    plain = {known.casefold(): known for known in names}
-    wanted = name.casefold()
+    plain = {candidate.casefold(): candidate for candidate in names}
+    lowered = name.casefold()
     if name.isupper():
         abbreviated = []
-        for known in names:
-            if _abbreviates(wanted, known.split("_")):
-                abbreviated.append(known)
+        for candidate in names:
+            if _abbreviates(lowered, candidate.split("_")):
+                abbreviated.append(candidate)
         if abbreviated:
             return abbreviated
-    words = [known for known in plain if wanted in known.split("_")]
+    words = [candidate for candidate in plain if lowered in candidate.split("_")]
     if len(words) > 1:
-        return [plain[known] for known in words[:MAX_MEANT]]
-    close = difflib.get_close_matches(wanted, list(plain), n=1)
-    if len(wanted) <= 3:  # most short words are near each other
-        close = [known for known in close if known[0] == wanted[0]]
-    if not close and len(wanted) > 1:
-        close = [known for known in plain if wanted in known]
+        return [plain[candidate] for candidate in words[:MAX_MEANT]]
+    close = difflib.get_close_matches(lowered, list(plain), n=1)
+    if len(lowered) <= 3:  # most short words are near each other
+        close = [candidate for candidate in close if candidate[0] == lowered[0]]
+    if not close and len(lowered) > 1:
+        close = [candidate for candidate in plain if lowered in candidate]
     return [plain[close[0]]] if close else []
 
 
@@ -260,13 +260,13 @@ def name(what: str, value: object) -> str:
     return value
 
 
-# what `warn_once` has told in this call of the user's, however many scenarios it makes
-told: ContextVar[set[str]] = ContextVar("told")
+# what `warn_once` has warned of in this call of the user's, however many scenarios it makes
+warned: ContextVar[set[str]] = ContextVar("warned")
 
 
 def warn_once(sentence: str, kind: type[Warning] = ScenarioWarning) -> None:
     """Warn of a doubt, if any, that a call of the user's may raise many times."""
-    before = told.get(set())
+    before = warned.get(set())
     if sentence and sentence not in before:
         before.add(sentence)
         warnings.warn(sentence, kind, users_stacklevel())

@@ -88,10 +88,10 @@ def writable(*paths: AnyPath | None) -> None:
 
     Call it before a computation that takes minutes.
     """
-    for given in paths:
-        if given is None:
+    for target in paths:
+        if target is None:
             continue
-        path = Path(given)
+        path = Path(target)
         if os.path.isdir(path):  # unlike Path.is_dir, False also for a name that is too long
             raise ScenarioError(f"cannot write {path}: it is a folder, give the file in it a name")
         with (
@@ -294,5 +294,5 @@ def own(path: Path) -> bool:
     about = path.stat()
     if os.name != "posix":
         return True
-    others = stat.S_IWGRP | stat.S_IWOTH
-    return about.st_uid in (os.getuid(), 0) and not about.st_mode & others
+    by_anybody = stat.S_IWGRP | stat.S_IWOTH
+    return about.st_uid in (os.getuid(), 0) and not about.st_mode & by_anybody

@@ -231,12 +231,12 @@ class _CodePickler(pickle._Pickler):
         return (str, (f"{type(obj).__name__} {kind}",), contents)
 
 
-def _as_written(thing: Any) -> Any:
+def _as_written(value: Any) -> Any:
     """Return the function that the user wrote, without its wrappers: compiled, static or cached."""
-    if not isinstance(thing, FunctionType | MethodType | type):
+    if not isinstance(value, FunctionType | MethodType | type):
         for name in ("py_func", "__func__", "__wrapped__"):
-            thing = getattr(thing, name, thing)
-    return thing
+            value = getattr(value, name, value)
+    return value
 
 
 def _versioned(thing: Any) -> bool:
@@ -281,12 +281,12 @@ def _overloads(function: FunctionType) -> list[Any]:
 @functools.lru_cache(maxsize=1)
 def _overloads_of(count: int) -> dict[int, list[Any]]:
     """Return the id of a function -> its overloads; numba has registered `count` globals so far."""
-    found: dict[int, list[Any]] = {}
-    for known, kind in builtin_registry.globals:
+    overloads: dict[int, list[Any]] = {}
+    for function, kind in builtin_registry.globals:
         for template in getattr(kind, "templates", ()):
             if "_overload_func" in vars(template):
-                found.setdefault(id(known), []).append(vars(template)["_overload_func"])
-    return found
+                overloads.setdefault(id(function), []).append(vars(template)["_overload_func"])
+    return overloads
 
 
 def _reached(

@@ -196,18 +196,18 @@ def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "m
         try:
             name = backend if backend in LIBRARIES else "glfw"
             module.GLContext = importlib.import_module(f"mujoco.{name}").GLContext
-            made = mujoco.Renderer(model, height, width)
+            rendering = mujoco.Renderer(model, height, width)
         finally:
             if before is not None:
                 module.GLContext = before
             elif hasattr(module, "GLContext"):
                 del module.GLContext
-    _RENDERERS.add(made)
+    _RENDERERS.add(rendering)
     atexit.unregister(_close_all)
     atexit.register(
         _close_all
     )  # registered after MuJoCo's function that ends EGL, so that it runs before that one
-    return made
+    return rendering
 
 
 def _after_fork() -> None:

@@ -346,18 +346,18 @@ def compiled(signature: Any, body: Callable, key: Key | None = None) -> Any:
     With a key it is loaded from the disk, or written there.
     """
     options = {"error_model": "numpy"}
-    made = internals.CFunc(body, (signature.args, signature.return_type), {}, options)
+    function = internals.CFunc(body, (signature.args, signature.return_type), {}, options)
     if key is not None:
-        made._cache = Cache(key)  # pyright: ignore[reportAttributeAccessIssue] numba's own
-    _in_thread(made.compile)
-    return made
+        function._cache = Cache(key)  # pyright: ignore[reportAttributeAccessIssue] numba's own
+    _in_thread(function.compile)
+    return function
 
 
-def compile_for(made: Any, arguments: tuple[Any, ...], key: Key | None) -> None:
+def compile_for(dispatcher: Any, arguments: tuple[Any, ...], key: Key | None) -> None:
     """Compile a function of numba's njit for the types of these arguments, as `compiled` does."""
     if key is not None:
-        made._cache = Cache(key)
-    _in_thread(made.compile, tuple(map(typeof, arguments)))
+        dispatcher._cache = Cache(key)
+    _in_thread(dispatcher.compile, tuple(map(typeof, arguments)))
 
 
 def _in_thread(work: Callable, *arguments: Any) -> None:
@@ -415,9 +415,10 @@ def _within_bounds(kernel, prepare, context, builder, sig, args, ufunc, kind):
     for target, array in itertools.product(targets, arrays):
         if array.ndim > target.ndim:
             raise TypingError("it writes into an array of fewer dimensions than it reads")
-        for its, size in zip(reversed(array.shape), reversed(target.shape), strict=False):
+        for own_size, size in zip(reversed(array.shape), reversed(target.shape), strict=False):
             fits = builder.or_(
-                builder.icmp_signed("==", its, size), builder.icmp_signed("==", its, its.type(1))
+                builder.icmp_signed("==", own_size, size),
+                builder.icmp_signed("==", own_size, own_size.type(1)),
             )
             with builder.if_then(builder.not_(fits), likely=False):
                 context.call_conv.return_user_exc(
@@ -452,8 +453,8 @@ def cache_folder() -> Path:
     """Return the folder of compiled functions."""
     if folder := getattr(numba.config, "CACHE_DIR", ""):
         return Path(folder)
-    kept = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    return Path(kept, "smc_mujoco", "numba")
+    caches = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    return Path(caches, "smc_mujoco", "numba")
 
 
 class Cache:
@@ -603,18 +604,18 @@ def calls_plain(function: Any) -> str:
     names none.
     """
     names: dict[str, None] = {}
-    left = [function]
+    unread = [function]
     seen = []
-    while left:
-        caller = left.pop(0)
+    while unread:
+        caller = unread.pop(0)
         if not isinstance(caller, FunctionType) or caller in seen:
             continue
         seen.append(caller)
-        left += helpers(caller)
+        unread += helpers(caller)
         for value in values_in(caller):
             if isinstance(value, FunctionType) and not value.__module__.startswith("smc_mujoco."):
                 names[value.__name__] = None
-                left.append(value)
+                unread.append(value)
     return _cure([*names]) if names else ""
 
 
@@ -644,14 +645,14 @@ def jit(function: Callable) -> Callable:
     with internals.global_compiler_lock:
         copies = dict(_shared)
         try:
-            made = rebuild(function, checked, copies)
+            copied = rebuild(function, checked, copies)
         except Exception as error:
             raise NotCompilable(f"a {type(function).__name__} is not a plain function") from error
         # shared only now: after an exception the copies may lack functions that they call
         for original, copy in copies.items():
             if (original.__module__ or "").startswith("smc_mujoco."):
                 _shared[original] = copy
-        return made
+        return copied
 
 
 def _refuse_unchecked(function: FunctionType, callers: tuple[FunctionType, ...]) -> None:

@@ -120,10 +120,10 @@ def compiled(
 
 def _callbacks() -> dict[str, Any]:
     """Return name -> the installed callback, or None."""
-    known = {}
+    installed = {}
     for name in CALLBACKS:
-        known[name] = getattr(mujoco, f"get_mjcb_{name}")()
-    return known
+        installed[name] = getattr(mujoco, f"get_mjcb_{name}")()
+    return installed
 
 
 def _install(callbacks: dict[str, Any]) -> None:

@@ -60,10 +60,10 @@ def timed(
         if shutil.which(guarded[0]) is None:
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), guarded[0])
         guarded = ["sh", "-c", GUARDED, "sh", *command]
-    held, kept = os.pipe()
+    reading_end, writing_end = os.pipe()
     with (
-        os.fdopen(held) as stdin,
-        os.fdopen(kept, "w"),
+        os.fdopen(reading_end) as stdin,
+        os.fdopen(writing_end, "w"),
         subprocess.Popen(
             guarded,
             cwd=cwd,

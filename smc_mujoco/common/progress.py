@@ -166,18 +166,18 @@ def _in_notebook() -> Iterator[Callable[[Bar], None]]:
     from IPython.display import DisplayHandle
 
     output = DisplayHandle()
-    shown = False
+    displayed = False
 
     def draw(bar: object) -> None:
-        nonlocal shown
-        write = output.update if shown else output.display
-        shown = True
+        nonlocal displayed
+        write = output.update if displayed else output.display
+        displayed = True
         write({"text/plain": str(bar)}, raw=True)
 
     try:
         yield draw
     finally:
-        if shown:
+        if displayed:
             draw("")
 
 

@@ -67,10 +67,10 @@ def _swapped(value: Any, names: Names, finish: Callable, copies: dict) -> Any:
         return rebuild(value, finish, copies)
     if isinstance(value, ModuleType) and _holds(value, names.attributes):
         copy = ModuleType(value.__name__)
-        for name, thing in vars(value).items():
-            vars(copy)[name] = thing
+        for name, attribute in vars(value).items():
+            vars(copy)[name] = attribute
             if name in names.attributes:
-                vars(copy)[name] = _swapped(thing, Names(set(), set()), finish, copies)
+                vars(copy)[name] = _swapped(attribute, Names(set(), set()), finish, copies)
         return copy
     return value
 
@@ -85,13 +85,13 @@ def helpers(function: FunctionType) -> list[FunctionType]:
     were written.
     """
     names = names_in(function.__code__)
-    found: list[Any] = []
+    values: list[Any] = []
     for value in values_in(function):
-        found.append(value)
+        values.append(value)
         if isinstance(value, ModuleType):
-            found += list(map(vars(value).get, names.attributes))
+            values += list(map(vars(value).get, names.attributes))
     written = []
-    for value in found:
+    for value in values:
         if is_jitted(value):
             written.append(value.py_func)
     return written

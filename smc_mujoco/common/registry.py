@@ -148,10 +148,10 @@ class Catalogue(Mapping[str, T_co]):
                     "it another name"
                 )
             return self.own[name]
-        first, *others = self.added[name]
-        if others:
+        first, *further = self.added[name]
+        if further:
             kind = KINDS[first.point.group][0]
-            packages = " and ".join(repr(entry.package) for entry in (first, *others))
+            packages = " and ".join(repr(entry.package) for entry in (first, *further))
             raise ScenarioError(
                 f"{kind} {name!r} is in the packages {packages}: uninstall one of them, or rename "
                 "it"
@@ -173,22 +173,22 @@ class Catalogue(Mapping[str, T_co]):
     def __len__(self) -> int:
         return sum(1 for _ in self)
 
-    def __or__(self, other: Mapping[str, U]) -> "Catalogue[T_co | U]":
+    def __or__(self, more: Mapping[str, U]) -> "Catalogue[T_co | U]":
         """Return the entries of both.
 
         Of two entries of the library with one name, that of `other` is taken.
         """
-        if not isinstance(other, Catalogue):
-            other = Catalogue(other)
-        names = {*self.added, *other.added}
-        both = {}
+        if not isinstance(more, Catalogue):
+            more = Catalogue(more)
+        names = {*self.added, *more.added}
+        entries = {}
         for name in names:
             ours = self.added.get(name, ())
-            theirs = other.added.get(name, ())
-            both[name] = (*ours, *theirs)
+            theirs = more.added.get(name, ())
+            entries[name] = (*ours, *theirs)
         # it is only read
-        own: Any = ChainMap[str, Any](other.own, self.own)  # pyright: ignore[reportArgumentType]
-        return Catalogue(own, both)
+        own: Any = ChainMap[str, Any](more.own, self.own)  # pyright: ignore[reportArgumentType]
+        return Catalogue(own, entries)
 
     def taken(self, name: str) -> bool:
         """Return whether an entry has this name.
@@ -253,13 +253,13 @@ def _points() -> dict[str, list[EntryPoint]]:
 
     It reads their metadata, and imports nothing.
     """
-    known = importlib.metadata.entry_points()
-    found = {}
-    for group in known.groups:
+    installed = importlib.metadata.entry_points()
+    by_group = {}
+    for group in installed.groups:
         if group.startswith(PREFIX):
-            in_group = known.select(group=group)
-            found[group] = sorted(in_group, key=lambda point: (point.name, point.value))
-    return found
+            in_group = installed.select(group=group)
+            by_group[group] = sorted(in_group, key=lambda point: (point.name, point.value))
+    return by_group
 
 
 def points(group: str) -> list[EntryPoint]:

@@ -43,7 +43,7 @@ def execute(path: Path) -> dict:
         raise ScenarioError(f"{where}: {error}") from error
 
 
-def object_named(text: str, what: str, wanted: Callable[[Any], bool]) -> Any:
+def object_named(text: str, what: str, is_kind: Callable[[Any], bool]) -> Any:
     """Return what FILE.py:NAME names, such as "my_parts.py:stribeck". The file is run, unless it is
     imported already.
 
@@ -59,13 +59,13 @@ def object_named(text: str, what: str, wanted: Callable[[Any], bool]) -> Any:
     if not os.path.isfile(file):
         raise ScenarioError(f"no file {file!r}: give the file that defines {name!r}")
     defined = _imported(file) or _defined(file, Path(file).read_bytes())
-    if name in defined and wanted(defined[name]):
+    if name in defined and is_kind(defined[name]):
         return defined[name]
-    others = []
-    for other, value in defined.items():
-        if wanted(value):
-            others.append(other)
-    cure = f"it has {joined(others)}" if others else "it has none"
+    fitting = []
+    for defined_name, value in defined.items():
+        if is_kind(value):
+            fitting.append(defined_name)
+    cure = f"it has {joined(fitting)}" if fitting else "it has none"
     raise ScenarioError(f"{file} has no {what} {name!r}: {cure}")
 
 

@@ -15,5 +15,5 @@ def of(name: str) -> str:
 
 def versions() -> dict[str, str]:
     """Return package -> version, of those that the numbers of a search depend on."""
-    others = "mujoco", "numba", "numpy", "scipy", "cmaes"
-    return {"smc_mujoco": __version__} | {name: of(name) for name in others}
+    packages = "mujoco", "numba", "numpy", "scipy", "cmaes"
+    return {"smc_mujoco": __version__} | {name: of(name) for name in packages}

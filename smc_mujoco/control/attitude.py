@@ -174,9 +174,9 @@ def steer(y, v, stiffness, damping, memory):
             (y.ddr[i] - memory[3 + i, 0]) / y.dt - stiffness[i] * y.de[i] - damping[i] * change
         )
         memory[3 + i, 0] = y.ddr[i]
-    wanted = of_thrust(F, y.r[3:])
-    w = rate_of(wanted, F, dF, y.r[3:], y.dr[3:])
-    error = relative(wanted, quaternion(y.x[3], y.x[4], y.x[5]))
+    attitude = of_thrust(F, y.r[3:])
+    w = rate_of(attitude, F, dF, y.r[3:], y.dr[3:])
+    error = relative(attitude, quaternion(y.x[3], y.x[4], y.x[5]))
     moving = rotate_inverse(error, w[0], w[1], w[2])
     return F, error, (y.v[3] - moving[0], y.v[4] - moving[1], y.v[5] - moving[2]), moving
 

@@ -30,7 +30,7 @@ from smc_mujoco.control.units import INPUT_GAIN, Gain, Unit
 GainConditions = Mapping[str, Callable[[SimpleNamespace], bool]]
 GainValue = float | tuple[float, ...]  # one number for all channels, or one for each driven channel
 FREE_BODY = "a free body"  # among a law's plants: it is for plants whose channels are a pose
-ANY_GAIN = Each(one=Number(infinite=True))
+ANY_GAIN = Each(item=Number(infinite=True))
 FINITE_TIME = ("", "s", "e")  # values of the option: what a law brings to 0 in finite time
 AccuracyOrder = float | Callable[[SimpleNamespace], float]  # a number, or a function of the gains
 
@@ -90,7 +90,7 @@ class Component:
     requires_model: bool = False
     joint: bool = False  # whether it is a law of many joints
     shared: Names = ()  # gains that are one number for all joints in a law of many joints
-    each: "tuple[Component, ...]" = ()  # the laws of the driven channels if they are different laws
+    channel_laws: "tuple[Component, ...]" = ()  # of the driven channels if they differ
     # None if not available
     template: "Template | None" = dataclasses.field(default=None, compare=False, repr=False)
     # where the gains come from
@@ -149,17 +149,19 @@ class Component:
     @property
     def uniform(self) -> bool:
         """Whether all channels have the same law with the same gains."""
-        return not self.each and not any(isinstance(value, tuple) for value in self.gains.values())
+        return not self.channel_laws and not any(
+            isinstance(value, tuple) for value in self.gains.values()
+        )
 
     @property
     def parts(self) -> "tuple[Component, ...]":
         """The laws of its channels if they are different laws, else itself."""
-        return self.each or (self,)
+        return self.channel_laws or (self,)
 
     def on_computed_torque(self) -> "Component":
         """Return the law of many joints whose outer law is this one, see `control.outer_law`."""
         outer = self.template
-        if self.joint or self.each or outer is None or self.plants:
+        if self.joint or self.channel_laws or outer is None or self.plants:
             raise ScenarioError(
                 f"{self.name} cannot be the outer law of computed torque: "
                 "give one law of one channel, for all plants"
@@ -182,8 +184,8 @@ class Component:
             raise ScenarioError(f"law {self.name!r} is of many joints: give a law of one channel")
         if self.uniform:
             return self
-        if self.each:
-            return self.each[min(i, len(self.each) - 1)]
+        if self.channel_laws:
+            return self.channel_laws[min(i, len(self.channel_laws) - 1)]
         gains = {}
         for name, value in self.gains.items():
             gains[name] = gain_at(value, i)
@@ -447,7 +449,7 @@ def by_channel(laws: "Sequence[Component]") -> Component:
         function=None,
         relative_degree=max(law.relative_degree for law in laws),
         requires_model=any(law.requires_model for law in laws),
-        each=tuple(laws),
+        channel_laws=tuple(laws),
     )
     return component.sourced(source.kind, source.search)
 

@@ -16,8 +16,8 @@ ANNEXES = ("evidence", "problems")  # with laws that are not in the catalogue, a
 
 def describe(c: Component) -> Fields:
     """Return a component as plain data that JSON represents without loss."""
-    if c.each:
-        return {"name": c.name, "each": list(map(describe, c.each))}
+    if c.channel_laws:
+        return {"name": c.name, "each": list(map(describe, c.channel_laws))}
     return {
         "name": c.name,
         "gains": dict(c.gains),

@@ -106,12 +106,12 @@ def _shipped(text: object, plant: Plant, gains: Mapping[str, float | Sequence[fl
         raise ScenarioError(
             f"law {shown(text)} is none of the library by its name: leave plant={plant.name!r} out"
         )
-    head, given = _parts("law", text, "pid(kp=50,ki=50,kd=8)")
+    head, gains_of_text = _parts("law", text, "pid(kp=50,ki=50,kd=8)")
     shipped = gain_sets.law(plant, head)
     warn_once(gain_sets.other_parameters_warning(plant))
-    if not (given or gains):
+    if not (gains_of_text or gains):
         return shipped
-    return all_laws()[head].bind({**shipped.gains, **given, **gains}, warn=True)
+    return all_laws()[head].bind({**shipped.gains, **gains_of_text, **gains}, warn=True)
 
 
 def laws(text: object) -> list[str | Law]:

@@ -143,11 +143,11 @@ def general() -> Names:
     name.
     """
     left_out = {"none", *ALIASES, *COMPARED}
-    others = []
+    further = []
     for name, template in catalogue().items():
         if not template.plants and name not in left_out:
-            others.append(name)
-    return *COMPARED, *sorted(others)
+            further.append(name)
+    return *COMPARED, *sorted(further)
 
 
 @constrained

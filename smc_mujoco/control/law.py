@@ -219,12 +219,12 @@ def checked_name(law: Law) -> Law:
     """Return the law. Raise ScenarioError if it is a user's with the name of a law of the
     catalogue.
     """
-    known = all_laws().get(law.name)
-    if known is None or law.function is None:
+    namesake = all_laws().get(law.name)
+    if namesake is None or law.function is None:
         return law
     # module and name stay the same when the module is loaded again
     names = set()
-    for f in (law.function, known.function):
+    for f in (law.function, namesake.function):
         names.add((getattr(f, "__module__", ""), getattr(f, "__qualname__", f)))
     if len(names) == 1:
         return law
@@ -266,7 +266,9 @@ def suits(law: Law | Template, plant: Plant) -> bool:
         if name in plants_known():
             plants.append(plants_known()[name])
     return (
-        plant.is_user_model and plant.underactuated and any(known.underactuated for known in plants)
+        plant.is_user_model
+        and plant.underactuated
+        and any(machine.underactuated for machine in plants)
     )
 
 
@@ -305,11 +307,11 @@ def laws(plant: Plant | str | None = None, kind: str = "law") -> list[str]:
     if kind != "law":
         raise ScenarioError(f"laws of kind {kind!r} are not for single plants: leave plant out")
     plant = as_plant(plant)
-    known = all_laws() if plant.pose else catalogue()
-    whole = not plant.free and plant.pose != "heading"
-    found = []
-    for name, law in known.items():
+    candidates = all_laws() if plant.pose else catalogue()
+    fully_driven = not plant.free and plant.pose != "heading"
+    suited = []
+    for name, law in candidates.items():
         unread = law.joint and plant.unmodelled  # a law of many joints reads the model
-        if suits(law, plant) and (law.plants or name == "none" or whole) and not unread:
-            found.append(name)
-    return found
+        if suits(law, plant) and (law.plants or name == "none" or fully_driven) and not unread:
+            suited.append(name)
+    return suited

@@ -48,13 +48,16 @@ def at_plant(law: Law, plant: Plant) -> Law:
     """Return a law with the values of `linearised` for those of its gains a1, a2 and b that were
     not given.
     """
-    if law.each:
-        return dataclasses.replace(law, each=tuple(at_plant(one, plant) for one in law.each))
-    known = law.template.gains if law.template else {}
+    if law.channel_laws:
+        return dataclasses.replace(
+            law,
+            channel_laws=tuple(at_plant(channel_law, plant) for channel_law in law.channel_laws),
+        )
+    declared = law.template.gains if law.template else {}
     missing = {}
     for name, value in law.gains.items():
-        if name in known and known[name].plant and value == math.inf:
-            missing[name] = known[name].plant
+        if name in declared and declared[name].plant and value == math.inf:
+            missing[name] = declared[name].plant
     if not missing:
         return law
     values = linearised(plant, law.name)

@@ -116,7 +116,7 @@ class Gain:
         infinite = bool(np.isinf(self.default).any())
         above = 0.0 if self.positive else -math.inf
         low = 0.0 if self.nonnegative else -math.inf
-        return Each(one=Number(above=above, low=low, infinite=infinite))
+        return Each(item=Number(above=above, low=low, infinite=infinite))
 
     def unit_at(self, gains: Mapping[str, float]) -> Unit | None:
         """Return the unit at these values of all gains."""

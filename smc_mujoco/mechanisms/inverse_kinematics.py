@@ -35,9 +35,9 @@ def solve(
     data.qpos[:] = initial_pose(model)
     numbers = {}
     for i in range(model.nsite if kind == "site" else model.nbody):
-        known = getattr(model, kind)(i).name
-        if known:
-            numbers[known] = i
+        element_name = getattr(model, kind)(i).name
+        if element_name:
+            numbers[element_name] = i
     tip = find(f"{kind} of {plant.name}", name, numbers)
     if kind == "site":
         places = data.site_xpos
@@ -70,9 +70,9 @@ def solve(
             move *= min(1.0, MAX_MOVE / float(longest))
             x = np.clip(x + move, low, high)
         else:
-            there = ", ".join(f"{value:.4g}" for value in point)
+            coordinates = ", ".join(f"{value:.4g}" for value in point)
             raise ScenarioError(
-                f"the tip of {plant.name} does not reach ({there}) m, "
+                f"the tip of {plant.name} does not reach ({coordinates}) m, "
                 f"point {i} of {len(points)} on its path: it "
                 f"stays {np.linalg.norm(away):.3g} m away; give points within reach, or another x0"
             )

@@ -37,15 +37,17 @@ def joints(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
     """Return the channels' joints: first the driven ones, then those that are only measured."""
     if (site := spec.site(POSE)) is not None:
         return [site.parent.joints[0]] * len(PLACES)
-    found = [spec.joint(actuator.target.removeprefix(ROTOR)) for actuator in drive_actuators(spec)]
-    names = [joint.name for joint in found]
+    channel_joints = [
+        spec.joint(actuator.target.removeprefix(ROTOR)) for actuator in drive_actuators(spec)
+    ]
+    names = [joint.name for joint in channel_joints]
     for sensor in spec.sensors:
         joint = sensor.objname.removeprefix(ROTOR)
         if sensor.type == mujoco.mjtSensor.mjSENS_JOINTPOS and joint not in names:
-            found.append(spec.joint(joint))
+            channel_joints.append(spec.joint(joint))
         elif sensor.name == f"{BASE}:x":
-            found += [spec.site(BASE).parent.joints[0]] * len(PLACES)
-    return found
+            channel_joints += [spec.site(BASE).parent.joints[0]] * len(PLACES)
+    return channel_joints
 
 
 def drive_ids(model: mujoco.MjModel) -> np.ndarray:
@@ -154,8 +156,8 @@ def all_joints(plant: Plant) -> tuple[str, ...]:
         if model.jnt_type[joint] >= mujoco.mjtJoint.mjJNT_SLIDE.value:  # or a hinge
             names.append(model.joint(joint).name)
     first = [name for name in channel_names(plant) if name in names]
-    every = dict.fromkeys((*first, *names))
-    return tuple(filter(None, every))
+    ordered = dict.fromkeys((*first, *names))
+    return tuple(filter(None, ordered))
 
 
 @functools.lru_cache(maxsize=32)

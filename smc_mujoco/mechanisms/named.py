@@ -87,9 +87,9 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
                 "give FILE.xml:joint, of a xacro what xacro FILE > FILE.urdf writes"
             )
         return plant(text, **values)
-    rest, _, others = text.rpartition("+")
-    if others.strip() in OTHERS:
-        return from_text(rest, folder, **{"others": others.strip()} | values)
+    rest, _, what_others_do = text.rpartition("+")
+    if what_others_do.strip() in OTHERS:
+        return from_text(rest, folder, **{"others": what_others_do.strip()} | values)
     path = model["path"]
     texts = BETWEEN_JOINTS.split(model["joints"] or "")
     joints = list(filter(str.strip, texts))
@@ -156,13 +156,13 @@ def _channel(text: str) -> tuple[str, Any]:
             f"channel {text!r} cannot be read: write it as lift(motor,u_max=30,x0=0.2)"
         )
     fields: dict[str, Any] = {}
-    known = {}
+    options = {}
     for field in dataclasses.fields(Channel):
         if field.name not in ("law", "reference"):
-            known[field.name] = field
+            options[field.name] = field
     for item in filter(str.strip, (read["fields"] or "").split(",")):
         name, _, value = (part.strip() for part in item.partition("="))
-        find(f"field of channel {read['joint']!r}", name, known)
+        find(f"field of channel {read['joint']!r}", name, options)
         if name in ("motor", "servo"):
             fields[name] = {"": True, "true": True, "false": False}.get(value.lower(), value)
         elif name == "partner":

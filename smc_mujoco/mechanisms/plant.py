@@ -42,12 +42,12 @@ Range = tuple[str, float, float]  # joint, least and largest position, rad or m
 
 
 class Field(NamedTuple):
-    """One write into an MjModel: model.<name>[at] = value ('opt.gravity' for an option), or +=
+    """One write into an MjModel: model.<name>[place] = value ('opt.gravity' for an option), or +=
     where it adds.
     """
 
     name: str
-    at: Any
+    place: Any
     value: Any
     adds: bool = False  # whether the value is added to the present one
 
@@ -61,12 +61,12 @@ def geom_fields(
     """Yield the fields of a geom, its place and one of its sizes (index, value); none in a run that
     leaves it out.
     """
-    if (at := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)) < 0:
+    if (geom := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)) < 0:
         return
     if pos:
-        yield Field("geom_pos", at, pos)
+        yield Field("geom_pos", geom, pos)
     if size:
-        yield Field("geom_size", (at, size[0]), size[1])
+        yield Field("geom_size", (geom, size[0]), size[1])
 
 
 class Variant(NamedTuple):
@@ -88,7 +88,7 @@ class Native(NamedTuple):
 
     address: int
     values: Floats
-    kept: tuple  # the objects whose addresses are among the values
+    alive: tuple  # the objects whose addresses are among the values
 
 
 class Dynamics(NamedTuple):
@@ -398,9 +398,9 @@ def compiled_for_runs(spec: mujoco.MjSpec, nuserdata: int) -> mujoco.MjModel:
 
 def write(model: mujoco.MjModel, fields: Iterator[Field]) -> None:
     """Write fields into a model."""
-    for name, at, value, adds in fields:
+    for name, place, value, adds in fields:
         values = field_array(model, name)
-        values[at] = values[at] + value if adds else value
+        values[place] = values[place] + value if adds else value
 
 
 def field_array(model: mujoco.MjModel, name: str) -> Array:
@@ -467,8 +467,8 @@ def plant(name: str, *, set: Any = None, **parameters: float) -> Plant:
       A Plant.
     """
     base = find("plant", name, catalogue())
-    given = parameters.pop("n", base.n)
-    n = whole(f"n of {name}", given, *base.sizes)
+    size = parameters.pop("n", base.n)
+    n = whole(f"n of {name}", size, *base.sizes)
     values = dict(base.parameters)
     values.update(find(f"set of {name}", set, base.sets) if set is not None else {})
     for key, value in parameters.items():

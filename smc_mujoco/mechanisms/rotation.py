@@ -126,8 +126,8 @@ def mix(x, u, rows, actuators, keeps_torques, controls):
         controls[j] = of_force + rows[i + 3] * u[3] + rows[i + 4] * u[4] + rows[i + 5] * u[5]
         excess = max(excess, controls[j] - rows[i + 7])
     for j in range(actuators):
-        kept = controls[j] - (excess if keeps_torques != 0 else 0.0)
-        controls[j] = min(max(kept, rows[8 * j + 6]), rows[8 * j + 7])
+        command = controls[j] - (excess if keeps_torques != 0 else 0.0)
+        controls[j] = min(max(command, rows[8 * j + 6]), rows[8 * j + 7])
 
 
 def pose_errors(x: Array, r: Array) -> Array:

@@ -160,11 +160,11 @@ def trends(trace: Trace) -> dict[str, float]:
     for name, array in trace.arrays().items():
         begun[name] = array[:count]
     earlier = conventions.by_group(dataclasses.replace(trace, **begun))
-    whole = conventions.by_group(trace)
+    groups_of_run = conventions.by_group(trace)
     ratios = {}
     for m in metrics():
         if m.late and not m.refusal(trace.scenario):
-            now = m.worst(whole)
+            now = m.worst(groups_of_run)
             before = m.worst(earlier)
             if now > 0.0 and before > 0.0:
                 ratios[m.name] = now / before

@@ -158,21 +158,21 @@ def group_trace(trace: Trace, group: ChannelGroup) -> Trace:
     Its scenario has all channels.
     """
     plant = trace.scenario.plant
-    whole = trace.arrays()
+    arrays_by_name = trace.arrays()
     if trace.scenario.tracks == "speed" and trace.x.shape[1] == plant.n:
-        whole |= {"x": trace.v, "r": reference_rates(trace)}
-    whole |= _stuck(trace)
+        arrays_by_name |= {"x": trace.v, "r": reference_rates(trace)}
+    arrays_by_name |= _stuck(trace)
     if len(group.channels) == trace.x.shape[1]:
-        changed = any(whole[name] is not getattr(trace, name) for name in whole)
-        return dataclasses.replace(trace, **whole) if changed else trace
+        changed = any(arrays_by_name[name] is not getattr(trace, name) for name in arrays_by_name)
+        return dataclasses.replace(trace, **arrays_by_name) if changed else trace
     if plant.pose:  # metrics take x - r for the error
-        whole["x"] = trace.r + trace.e
+        arrays_by_name["x"] = trace.r + trace.e
     columns = []
     for i in group.channels:
         if i in trace.scenario.scored_channels:
             columns.append(i)
     arrays = {}
-    for name, array in whole.items():
+    for name, array in arrays_by_name.items():
         if name != "t":
             arrays[name] = array[:, columns]
     if (
@@ -296,7 +296,7 @@ class Metric:
         first driven group.
         """
         of_plant = groups(machine)
-        chosen = next((known for known in of_plant if known.name == group), of_plant[0])
+        chosen = next((own_group for own_group in of_plant if own_group.name == group), of_plant[0])
         return self.unit_for(chosen.unit, chosen.effort)
 
 

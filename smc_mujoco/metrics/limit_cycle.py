@@ -133,15 +133,15 @@ def _order(rates: Array, spectrum: Array, first: int, peak: int, periods: float)
     order = 1
     largest = sizes[peak]
     for k in range(2, round(periods / MIN_PERIODS) + 1 if periods >= 3 * MIN_PERIODS else 4):
-        at = round(periods / k)
-        if sizes[at] <= largest:
+        line = round(periods / k)
+        if sizes[line] <= largest:
             continue
-        strong = at >= first and spectrum[at] > MIN_LINE_SHARE * spectrum[peak]
-        if at < MIN_PERIODS or (
-            strong and abs(_refined(rates, at) - periods / k) < MAX_LINE_OFFSET
+        strong = line >= first and spectrum[line] > MIN_LINE_SHARE * spectrum[peak]
+        if line < MIN_PERIODS or (
+            strong and abs(_refined(rates, line) - periods / k) < MAX_LINE_OFFSET
         ):
             order = k
-            largest = sizes[at]
+            largest = sizes[line]
     return order
 
 

@@ -101,8 +101,8 @@ def tip_paths(trace: Trace) -> ArrayPair:
 
 def tip_error(trace: Trace) -> Array:
     """Return the tip's distance from its wanted path, m, (K + 1,). Raises like `tip_path`."""
-    actual, wanted = tip_paths(trace)
-    return np.linalg.norm(actual - wanted, axis=1)
+    actual, reference = tip_paths(trace)
+    return np.linalg.norm(actual - reference, axis=1)
 
 
 def knows_contacts(scenario: Scenario) -> bool:
@@ -150,9 +150,9 @@ def contacts(trace: Trace) -> Contacts:
     contacts = Contacts(np.zeros(count), np.zeros(count), np.zeros((count, 3)))
     data.qpos[:] = initial_pose(model)
     jump = trace.scenario.jump_sample
-    whole = None
+    states_of_all = None
     if any(part.loose for part in scenario.contact):
-        whole = states(trace, trace.t)
+        states_of_all = states(trace, trace.t)
     for k in range(len(trace.t)):
         if np.isnan(trace.x[k]).any():  # the run has failed
             for values in contacts:
@@ -161,8 +161,8 @@ def contacts(trace: Trace) -> Contacts:
         if k == jump:
             models.put_values(model, compiled, scenario, scenario.jump_step)
             mujoco.mj_setConst(model, mujoco.MjData(model))
-        if whole is not None:  # a ball, which no channel moves
-            poses, speeds = whole
+        if states_of_all is not None:  # a ball, which no channel moves
+            poses, speeds = states_of_all
             data.qpos[:] = poses[k]
             data.qvel[:] = speeds[k]
         data.qpos[positions] = trace.x[k]
@@ -232,8 +232,8 @@ def tip_scores(trace: Trace, force: Positive | None = None) -> dict[str, float]:
         start = FORCE_START * (1.0 - fold.ROUNDING) * np.ptp(trace.t)
         late = pressed.force[trace.t >= trace.t[0] + start]
         values["mean_force"] = late.mean()
-        if wanted := force or trace.scenario.law.gains.get("force"):
-            values["force_error"] = 100.0 * (late.mean() / wanted - 1.0)
+        if reference_force := force or trace.scenario.law.gains.get("force"):
+            values["force_error"] = 100.0 * (late.mean() / reference_force - 1.0)
         values["force_ripple"] = late.std()
         values["touching"] = 100.0 * (late > 0.0).mean()
         values["depth"] = pressed.depth.max()

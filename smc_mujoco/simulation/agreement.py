@@ -40,43 +40,43 @@ Call = Callable[..., int]  # with the pointers of a C function, see cfunctions
 
 def check_component(c: Component, n: int, driven: int) -> None:
     """Check a law, a surface or an estimator, of a plant of n channels."""
-    made = cfunctions.compile_component(c)
-    if isinstance(made, AtAddress) or _needs_no_check(made, c.function):
+    compiled = cfunctions.compile_component(c)
+    if isinstance(compiled, AtAddress) or _needs_no_check(compiled, c.function):
         return
     name = f"{c.kind} {c.name!r}"
     if c.joint:
         python = python_functions.of_joint_law(c, n, driven, NoDynamics)
         joint_inputs = _joint_inputs(n, driven)
-        _check(made, name, python, joint_inputs, c.numbers(driven), c.memory * n, 2 * n)
+        _check(compiled, name, python, joint_inputs, c.numbers(driven), c.memory * n, 2 * n)
         return
     python = python_functions.of_channel_component(c)
     record = Reading if c.kind == "estimator" else Measurement
     inputs = _inputs(record._fields)
-    _check(made, name, python, inputs, c.numbers(1), c.memory, 2)
+    _check(compiled, name, python, inputs, c.numbers(1), c.memory, 2)
 
 
 def check_signal(signal: Signal) -> None:
     """Check a reference, a disturbance or another signal."""
-    made = cfunctions.compile_signal(signal)
-    if _needs_no_check(made, type(signal).value):
+    compiled = cfunctions.compile_signal(signal)
+    if _needs_no_check(compiled, type(signal).value):
         return
     inputs = _inputs(state.INSTANT.names)
     python = python_functions.of_signal(signal)
     numbers = cfunctions.signal_values(signal)
     memory = max(signal.memory, 1)
-    _check(made, type(signal).__name__, python, inputs, numbers, memory, 3)
+    _check(compiled, type(signal).__name__, python, inputs, numbers, memory, 3)
 
 
 def check_part(part: Part, kind: str, numbers: Callable[[], Sequence[float]]) -> None:
     """Check what a part does on one joint, with its numbers of one."""
-    made = cfunctions.compile_part(part, kind)
-    if kind not in cfunctions.OF_JOINTS or _needs_no_check(made, getattr(part, kind)):
+    compiled = cfunctions.compile_part(part, kind)
+    if kind not in cfunctions.OF_JOINTS or _needs_no_check(compiled, getattr(part, kind)):
         return
     record = Sight if kind == "read" else JointState
     inputs = _inputs(record._fields)
     python = python_functions.of_part(part, kind)
     count = cfunctions.OF_JOINTS[kind][1]
-    _check(made, type(part).__name__, python, inputs, numbers(), part.memory, count)
+    _check(compiled, type(part).__name__, python, inputs, numbers(), part.memory, count)
 
 
 class NoDynamics:
@@ -112,12 +112,12 @@ def _input(names: Sequence[str] | None, t: float, size: float) -> Array:
 
 def _inputs(names: Sequence[str] | None) -> list[Array]:
     """Return one set of inputs by name for each time and size."""
-    return [_input(names, *at) for at in zip(TIMES, SIZES, strict=True)]
+    return [_input(names, *instant) for instant in zip(TIMES, SIZES, strict=True)]
 
 
 def _joint_inputs(n: int, driven: int) -> list[Array]:
     dtype = stored_dtype(n)
-    found = []
+    inputs = []
     for t, size in zip(TIMES, SIZES, strict=True):
         names = tuple(map(str, range(dtype.itemsize // 8)))
         numbers = _input(names, t, size)
@@ -126,12 +126,12 @@ def _joint_inputs(n: int, driven: int) -> list[Array]:
             record[name] = FIXED[name]
         record["t"], record["n"], record["driven"] = t, n, driven
         record["M"] = 1.3 * np.eye(n) + 0.1
-        found.append(numbers)
-    return found
+        inputs.append(numbers)
+    return inputs
 
 
 def _check(
-    made: CompiledFunction,
+    function: CompiledFunction,
     name: str,
     python: python_functions.PythonFunction,
     inputs: Sequence[Array],
@@ -142,10 +142,10 @@ def _check(
     """Compare a compiled function with itself, and with its Python. Raise NotCompilable if Python
     has to call it.
     """
-    made.checked = True
+    function.checked = True
     parameters = np.array([*numbers, 0.0])
     rounds: list[list[Any]] = []
-    compiled = python_functions.C_FUNCTION(made.address)
+    compiled = python_functions.C_FUNCTION(function.address)
 
     taken: list[float] = []  # s, of each round: one may be long, as garbage is collected in it
 
@@ -175,14 +175,14 @@ def _check(
     ):
         warnings.simplefilter("ignore")
         expected = _results(python.call, inputs, parameters, memory, count, python)
-    for own, other in zip(once, expected, strict=False):  # as far as Python came
-        if not _agree(own, other):
-            made.differs = (
-                f"gives {_words(own, count)} compiled and {_words(other, count)} in Python, for "
-                "the same inputs: compiled integers have 64 bits and wrap, and numbers of small "
-                "types add up differently, so write floats, such as 2.0**70"
+    for own, theirs in zip(once, expected, strict=False):  # as far as Python came
+        if not _agree(own, theirs):
+            function.differs = (
+                f"gives {_words(own, count)} compiled and {_words(theirs, count)} in Python, "
+                "for the same inputs: compiled integers have 64 bits and wrap, and numbers of "
+                "small types add up differently, so write floats, such as 2.0**70"
             )
-            raise NotCompilable(f"{name} {made.differs}")
+            raise NotCompilable(f"{name} {function.differs}")
 
 
 def _results(
@@ -197,11 +197,11 @@ def _results(
 
     Python stops where it raises what compiled code cannot: its form may need numba.
     """
-    kept = np.zeros(memory + 1)
-    found: list[Array | None] = []
+    state = np.zeros(memory + 1)
+    results: list[Array | None] = []
     for numbers in inputs:
         outputs = np.zeros(count)
-        arrays = numbers.copy(), parameters, kept, outputs
+        arrays = numbers.copy(), parameters, state, outputs
         pointers = []
         for array in arrays:
             pointers.append(array.ctypes.data_as(python_functions.DOUBLES))
@@ -211,11 +211,11 @@ def _results(
             if cause is not None and not isinstance(cause, FAILURES):
                 break
         if failed or not np.isfinite(outputs).all():
-            kept[:] = 0.0
-            found.append(None)
+            state[:] = 0.0
+            results.append(None)
         else:
-            found.append(np.append(outputs, kept))
-    return found
+            results.append(np.append(outputs, state))
+    return results
 
 
 def _agree(a: Array | None, b: Array | None) -> bool:

@@ -70,34 +70,34 @@ def bump(plant: Plant, time: float, rubs: float) -> tuple[Stops, Impulse]:
 
 def _stopped(plant: Plant, rubs: float) -> list[Stopped]:
     """Return each driven joint that a blow moves."""
-    at = at_goal(plant)
+    goal_moments = at_goal(plant)
     goal = np.array(plant.rest or plant.origin)
     away = np.array(usual_start(plant)) - goal
     if not away[: plant.driven].any():
         largest = np.abs(away).max()
         away[: plant.driven] = BESIDE_OTHERS * largest
-    inverse = np.linalg.inv(at.M)[at.dofs]
+    inverse = np.linalg.inv(goal_moments.M)[goal_moments.dofs]
     gained = inverse @ _blown(plant, goal)  # speed of each joint for a unit of momentum on all
-    inverse = inverse[:, at.dofs]
+    inverse = inverse[:, goal_moments.dofs]
     without_law = Scenario.recorded(plant=plant, law="none")
     bounds = np.array(without_law.drive_train.forces)
-    load = np.abs(at.load)
-    held = bounds * (1.0 + rubs) + load + at.dry
+    load = np.abs(goal_moments.load)
+    resisted = bounds * (1.0 + rubs) + load + goal_moments.dry
     names = channel_names(plant)
     candidates = []
     for j in range(plant.driven):
         if not away[j] or not gained[j] > 0.0:
             continue
-        dof = at.dofs[j]
+        dof = goal_moments.dofs[j]
         side = -math.copysign(1.0, away[j])
         distance = abs(away[j])
         near, far = _room(plant, j, distance, side)
         # of what moves at once, and of the joint where servos or PDs hold the others
-        own_mass = at.M[dof, dof]
+        own_mass = goal_moments.M[dof, dof]
         mass = max(1.0 / gained[j], own_mass)
-        stiffness = max(at.K[dof, dof], 0.0) * near
-        force = np.abs(inverse[j]) @ held / gained[j] + stiffness
-        drag = max(at.D[dof, dof], 0.0)
+        stiffness = max(goal_moments.K[dof, dof], 0.0) * near
+        force = np.abs(inverse[j]) @ resisted / gained[j] + stiffness
+        drag = max(goal_moments.D[dof, dof], 0.0)
         damping = drag + 0.5 * rubs * bounds[j]
         work = 2.0 * REACH * mass * force * near
         momentum = math.sqrt(work) + force * WIDTH + damping * near

@@ -148,37 +148,37 @@ def callback():
     """Return the compiled callback void(const mjModel*, mjData*), from numba's cache on disk if it
     is there.
     """
-    at = offsets()
+    offset = offsets()
 
     def control(model, data):
-        if integers(model + at.nuserdata)[0] < USERDATA:
+        if integers(model + offset.nuserdata)[0] < USERDATA:
             return
-        userdata = array_at(data + at.userdata)
+        userdata = array_at(data + offset.userdata)
         if userdata[0] != MAGIC:
             return
         address = int(userdata[1])
         arrays = Arrays(
-            array_at(data + at.qpos),
-            array_at(data + at.qvel),
-            array_at(data + at.ctrl),
-            array_at(data + at.xfrc_applied),
-            array_at(data + at.qfrc_applied),
-            array_at(data + at.sensordata),
-            array_at(data + at.xipos),
-            array_at(data + at.xanchor),
-            array_at(data + at.xaxis),
-            array_at(data + at.actuator_force),
-            array_at(data + at.qfrc_constraint),
-            array_at(data + at.qfrc_bias),
-            array_at(data + at.qfrc_spring),
-            array_at(data + at.qfrc_passive),
-            array_at(data + at.qfrc_actuator),
-            array_at(data + at.qLDiagInv),
-            array_at(data + at.efc_frictionloss),
-            array_at(data + at.efc_aref),
-            array_at(model + at.dof_frictionloss),
-            integers(model + at.actuator_user)[0],
-            integers(model + at.body_user)[0],
+            array_at(data + offset.qpos),
+            array_at(data + offset.qvel),
+            array_at(data + offset.ctrl),
+            array_at(data + offset.xfrc_applied),
+            array_at(data + offset.qfrc_applied),
+            array_at(data + offset.sensordata),
+            array_at(data + offset.xipos),
+            array_at(data + offset.xanchor),
+            array_at(data + offset.xaxis),
+            array_at(data + offset.actuator_force),
+            array_at(data + offset.qfrc_constraint),
+            array_at(data + offset.qfrc_bias),
+            array_at(data + offset.qfrc_spring),
+            array_at(data + offset.qfrc_passive),
+            array_at(data + offset.qfrc_actuator),
+            array_at(data + offset.qLDiagInv),
+            array_at(data + offset.efc_frictionloss),
+            array_at(data + offset.efc_aref),
+            array_at(model + offset.dof_frictionloss),
+            integers(model + offset.actuator_user)[0],
+            integers(model + offset.body_user)[0],
         )
         run_simulation(address, simulation_at(address, 0), arrays)
 

@@ -239,13 +239,13 @@ def cached(function: Callable) -> Callable:
 
     The code is kept on disk, as for C functions.
     """
-    made = njit(error_model="numpy")(function)
+    compiled_function = njit(error_model="numpy")(function)
 
     @functools.wraps(function)
     def call(*arguments: Any) -> Any:
-        if not made.overloads:
-            compile_for(made, arguments, _key(function, function))
-        return made(*arguments)
+        if not compiled_function.overloads:
+            compile_for(compiled_function, arguments, _key(function, function))
+        return compiled_function(*arguments)
 
     return call
 
@@ -322,17 +322,17 @@ def _compile(
 ) -> CompiledFunction:
     """Return what a compiler makes of these arguments. Its errors begin with the name."""
     try:
-        made = compiler(*arguments)
+        compiled_function = compiler(*arguments)
     except CallsPlain as error:  # numba says the first of them
-        every = calls_plain(arguments[0]) or error
-        raise NotCompilable(f"{name} does not compile: {every}") from None
+        plain_calls = calls_plain(arguments[0]) or error
+        raise NotCompilable(f"{name} does not compile: {plain_calls}") from None
     except NotCompilable as error:
         raise NotCompilable(f"{name} does not compile: {error}") from None
     except TypeError:
         raise NotCompilable(f"{name} does not compile: it is not hashable") from None
-    if made.differs:
-        raise NotCompilable(f"{name} {made.differs}")
-    return made
+    if compiled_function.differs:
+        raise NotCompilable(f"{name} {compiled_function.differs}")
+    return compiled_function
 
 
 def signal_values(s: Signal) -> tuple[float, ...]:

@@ -63,9 +63,9 @@ def plant(name: str, value: object, s: Any) -> Plant:
     changes are among its parameters.
     """
     machine = as_plant(value)
-    given = vars(s)
-    mismatch = given.get("mismatch")
-    jump = given.get("jump")
+    fields = vars(s)
+    mismatch = fields.get("mismatch")
+    jump = fields.get("jump")
     changed: list[str] = []
     if isinstance(mismatch, Mapping):
         changed += dotted(mismatch)
@@ -210,12 +210,12 @@ def state(name: str, value: float | Sequence[float] | None, s: Any) -> Floats | 
         values = items_of(name, value)
     n = s.plant.n
     if len(values) not in (1, n):
-        wanted = "one number"
+        counts = "one number"
         if n > 1:
-            wanted += f", or {n}"
+            counts += f", or {n}"
         raise ScenarioError(
             f"{name} has {len(values)} values, and {s.plant.name} {counted(n, 'channel')}: give "
-            f"{wanted}"
+            f"{counts}"
         )
     states = []
     for item in values * (n // len(values)):
@@ -332,10 +332,10 @@ def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
     if isinstance(value, list | tuple) and len(value) == 1:
         value = value[0]
     items: list[Any] = [value]
-    others: list[Any] = []  # of measured channels
+    of_measured: list[Any] = []  # of measured channels
     if isinstance(value, Mapping | list | tuple):
-        own, others = _split(value, plant)
-        items = values_per_channel("reference", own, plant) + others
+        own, of_measured = _split(value, plant)
+        items = values_per_channel("reference", own, plant) + of_measured
     for item in items:
         if not isinstance(item, Signal):
             amplitude = "0.0"
@@ -349,7 +349,7 @@ def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
         if getattr(item, "about", ""):
             about_goal = dataclasses.replace(item, about="")
             items[i] = at_goal[i] + about_goal
-    if not others and all(item == items[0] for item in items):
+    if not of_measured and all(item == items[0] for item in items):
         return items[0]
     return PerChannel(tuple(items))
 
@@ -400,12 +400,12 @@ def friction(name: str, value: Frictions | None, s: Any) -> tuple[Friction, ...]
     Kinds on a joint must differ, and one at most keeps a state by which it holds the joint at rest.
     """
     items = _by_joint(name, value, s, Friction, "smc.Coulomb(0.05)", all_joints)
-    for part, other in itertools.combinations(items, 2):
-        same = type(part) is type(other) and part.on == other.on
+    for part, another in itertools.combinations(items, 2):
+        same = type(part) is type(another) and part.on == another.on
         first_joints = part.joint_names(s.plant)
-        both = {*first_joints} & {*other.joint_names(s.plant)}
-        if same or (part.keeps_state and other.keeps_state and both):
-            kinds = f"{type(part).__name__} and {type(other).__name__}"
+        shared = {*first_joints} & {*another.joint_names(s.plant)}
+        if same or (part.keeps_state and another.keeps_state and shared):
+            kinds = f"{type(part).__name__} and {type(another).__name__}"
             raise ScenarioError(f"{name} has {kinds} on the same joint: give one of them")
     ordered = sorted(items, key=lambda part: (type(part).__name__, part.on))
     return tuple(ordered)
@@ -477,10 +477,10 @@ def actuator(name: str, value: Actuators | None, s: Any) -> tuple[Actuator, ...]
     if value is None and "actuator" not in s.plant.suggested:
         return ()
     driven = driven_names(s.plant)
-    given = [part for part in as_tuple(value) if not getattr(part, "kept", False)]
-    items = _by_joint(name, given, s, Actuator, "smc.Lag(0.01)", driven_names)
-    kept = _kept(items, s.plant)
-    if kept:
+    added = [part for part in as_tuple(value) if not getattr(part, "is_of_file", False)]
+    items = _by_joint(name, added, s, Actuator, "smc.Lag(0.01)", driven_names)
+    of_file = _kept(items, s.plant)
+    if of_file:
         before = []
         after = []
         for part in items:
@@ -488,30 +488,30 @@ def actuator(name: str, value: Actuators | None, s: Any) -> tuple[Actuator, ...]
                 before.append(part)
             else:
                 after.append(part)
-        items = before + kept + after
+        items = before + of_file + after
     for chain in dict.fromkeys(chains(items, driven)):
         drives = []
-        others = []
+        beside = []
         for part in chain:
             if part.drives:
                 drives.append(part)
             else:
-                others.append(type(part).__name__)
-        if len(others) > 1:
+                beside.append(type(part).__name__)
+        if len(beside) > 1:
             raise ScenarioError(
-                f"{name} has {joined(others)}, and a joint has one rotor beside it: give one"
+                f"{name} has {joined(beside)}, and a joint has one rotor beside it: give one"
             )
         if len(drives) > 2 or (len(drives) == 2 and not drives[0].leads):
-            raise ScenarioError(_too_many(name, drives, kept))
+            raise ScenarioError(_too_many(name, drives, of_file))
     return tuple(sorted(items, key=lambda part: not part.drives))
 
 
-def _too_many(name: str, drives: Sequence[Actuator], kept: Sequence[Actuator]) -> str:
+def _too_many(name: str, drives: Sequence[Actuator], of_file: Sequence[Actuator]) -> str:
     """Return a sentence that refuses the drives of one joint, which are too many."""
-    if file := next((part for part in drives if part in kept), None):
-        others = joined(type(part).__name__ for part in drives if part is not file)
+    if file := next((part for part in drives if part in of_file), None):
+        too_many = joined(type(part).__name__ for part in drives if part is not file)
         return (
-            f"{name} has {others}, and the joint keeps the {type(file).__name__} of its file: "
+            f"{name} has {too_many}, and the joint keeps the {type(file).__name__} of its file: "
             "leave that out, or give smc.Channel(motor=True) for an ideal motor instead"
         )
     return (
@@ -524,8 +524,8 @@ def _kept(items: list[Actuator], plant: Plant) -> list[Actuator]:
     their kind. An item that is one of them, as of a record, is taken out.
     """
     parts = []
-    kept = plant.suggested.get("actuator", ())
-    for joint, chain in zip(driven_names(plant), kept, strict=False):
+    suggested = plant.suggested.get("actuator", ())
+    for joint, chain in zip(driven_names(plant), suggested, strict=False):
         for part in chain:
             own = part.of_file(() if plant.driven == 1 else (joint,))
             if own in items:

@@ -157,8 +157,8 @@ class Condition:
         Single events happen at half of the duration.
         """
         length = number("duration", duration, above=0.0)
-        given = self.fields(plant, length) if callable(self.fields) else self.fields
-        fields = dict(given)
+        template = self.fields(plant, length) if callable(self.fields) else self.fields
+        fields = dict(template)
         refused = []
         for name in NOT_OF_FREE_BODIES:
             if plant.pose and fields.get(name) and not isinstance(fields[name], Mapping):
@@ -252,14 +252,14 @@ def find_condition(value: "Condition | AnyPath") -> Condition:
     """Return the Condition for a Condition, a name, several names joined by "+", the text of a
     condition, or the path of a text file with one.
     """
-    found = find_conditions(value)
-    if len(found) != 1:
-        names = joined(repr(one.name) for one in found)
+    conditions = find_conditions(value)
+    if len(conditions) != 1:
+        names = joined(repr(condition.name) for condition in conditions)
         raise ScenarioError(
-            f"{str(value)!r} has {len(found)} conditions ({names}), and this takes one: leave the "
-            "others out, or join two as noise+encoder"
+            f"{str(value)!r} has {len(conditions)} conditions ({names}), and this takes one: leave "
+            "the others out, or join two as noise+encoder"
         )
-    return found[0]
+    return conditions[0]
 
 
 def find_conditions(value: "Condition | AnyPath") -> list[Condition]:
@@ -297,8 +297,8 @@ def _of_text(value: object) -> Condition:
         raise ScenarioError(
             f"condition {shown(value)} joins {count:,} conditions: give at most {MAX_JOINED}"
         )
-    first, *others = [find("condition", part.strip(), NAMED) for part in value.split("+")]
-    return sum(others, start=first)
+    first, *further = [find("condition", part.strip(), NAMED) for part in value.split("+")]
+    return sum(further, start=first)
 
 
 def applicable(names: Iterable[str], plants: Sequence[Plant], duration: float) -> list[str]:
@@ -480,8 +480,8 @@ def _as_text(value: Any, files: bool = True, brief: bool = False) -> str:
     if isinstance(value, Part | Signal | Noise | Jump | Fault | Clock):
         fields = stated(value)
         if brief:
-            given = stated(value, defaults=False)
-            fields = {name: of for name, of in fields.items() if name in given or of}
+            changed = stated(value, defaults=False)
+            fields = {name: number for name, number in fields.items() if name in changed or number}
         if getattr(value, "about", ""):
             fields["about"] = "goal"
         kind = type(value)
@@ -551,8 +551,8 @@ def _jump(size: str) -> Recipe:
     def fields(plant: Plant, duration: float) -> Data:
         if size not in plant.jumps:
             with_jump = []
-            for name, other in plants().items():
-                if size in other.jumps:
+            for name, machine in plants().items():
+                if size in machine.jumps:
                     with_jump.append(name)
             cure = f"choose another condition, or one of {', '.join(with_jump)}"
             raise ScenarioError(
@@ -587,14 +587,14 @@ def _stepper(plant: Plant, duration: float) -> Data:
                 f"{joint.travel:.2g} rad (m): give your own, as pulses: "
                 "actuator=Stepper(torque=2, speed=60, ramp=80), u_max=80"
             )
-    each: Any = _each_joint("actuator", lambda limit, plant: of_rig(30.0 * limit))
-    return each(plant, duration) | {"u_max": of_rig(1.0).ramp}
+    motors: Any = _each_joint("actuator", lambda limit, plant: of_rig(30.0 * limit))
+    return motors(plant, duration) | {"u_max": of_rig(1.0).ramp}
 
 
 def _fault(plant: Plant, duration: float) -> Data:
     """Return the loss of half the force, at 2 s, or at half of a run that is too short for it."""
-    at = 2.0 if duration > 2.0 else duration / 2
-    return {"fault": Fault(at=at, gain=0.5)}
+    time = 2.0 if duration > 2.0 else duration / 2
+    return {"fault": Fault(at=time, gain=0.5)}
 
 
 def _sized(signal: Signal, plant: Plant) -> Signal:
@@ -658,8 +658,8 @@ class JointSize(NamedTuple):
 
 def _joint_sizes(plant: Plant) -> list[JointSize]:
     """Return the sizes of the driven joints."""
-    at = at_goal(plant)
-    inertias = np.diag(at.M)[at.dofs].tolist()
+    moments = at_goal(plant)
+    inertias = np.diag(moments.M)[moments.dofs].tolist()
     apart = np.subtract(usual_start(plant), plant.origin)
     ways = np.abs(apart)[: plant.driven].tolist()
     limits = Scenario.recorded(plant=plant, law="none").drive_train.forces

@@ -254,8 +254,8 @@ def _compensation(view, k, t, i):
     for j in range(sim.compensated):
         part = part_at(sim.compensations, j)
         if part.channel == i:
-            at = record.AT
-            if evaluate(part.function, 0, address + at.joint_state, address + at.exerted):
+            places = record.AT
+            if evaluate(part.function, 0, address + places.joint_state, address + places.exerted):
                 return True, 0.0
             force += sim.exerted.force
     return False, sim.share * math.tanh(abs(v) / sim.eps) * force / drive_at(sim.drives, i).gain
@@ -418,7 +418,7 @@ MOMENTS = Moments(
     ask=_ask,
     compensate=_compensate,
     commanded=_commanded,
-    asked=_asked,
+    finish=_asked,
     apply=_apply,
     arrived=_arrived,
     sum_forces=_sum_forces,

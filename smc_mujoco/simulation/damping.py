@@ -23,16 +23,16 @@ def forces(scenario: Scenario, x: Array) -> Array:
 
     It is that of the mean speed, which positions give exactly.
     """
-    found = np.zeros(x.shape)
+    damping = np.zeros(x.shape)
     starts = 0, scenario.jump_sample
     for machine, first in zip(scenario.machines, starts, strict=False):
-        found[1 + first :] = 0.0  # a jump may take damping away
+        damping[1 + first :] = 0.0  # a jump may take damping away
         coefficients = _coefficients(machine)
         if coefficients.any():
             v = np.diff(x[first:], axis=0) / scenario.control_period
             constant, linear, square = coefficients
-            found[1 + first :] = -(constant + linear * np.abs(v) + square * v * v) * v
-    return found
+            damping[1 + first :] = -(constant + linear * np.abs(v) + square * v * v) * v
+    return damping
 
 
 def _coefficients(scenario: Scenario) -> Array:
@@ -51,13 +51,13 @@ def of_file(plant: Plant) -> Array:
     """Return the damping of each joint of a user's file, (3, n): the factors of v, |v| v and v^2 v.
     0 for other plants, and for the channels of a free body.
     """
-    found = np.zeros((3, plant.n))
+    coefficients = np.zeros((3, plant.n))
     if not plant.is_user_model or plant.pose:
-        return found
+        return coefficients
     model = compiled(plant.spec())
     for i, name in enumerate(channel_names(plant)):
         joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
         if joint >= 0:  # a measured base has none
             dof = model.jnt_dofadr[joint]
-            found[:, i] = (model.dof_damping[dof], *model.dof_dampingpoly[dof])
-    return found
+            coefficients[:, i] = (model.dof_damping[dof], *model.dof_dampingpoly[dof])
+    return coefficients

@@ -59,8 +59,8 @@ def constant_goal(s: Any) -> tuple[float, ...] | None:
     """
     if not all(isinstance(signal, Constant) for signal in s.references):
         return None
-    wanted = tuple(signal.parameters()["amplitude"] for signal in s.references)
-    return wanted + tuple(s.plant.goal or s.plant.origin[s.plant.driven :])
+    amplitudes = tuple(signal.parameters()["amplitude"] for signal in s.references)
+    return amplitudes + tuple(s.plant.goal or s.plant.origin[s.plant.driven :])
 
 
 def _positions_for_speeds(s: Any) -> Iterator[str]:
@@ -160,11 +160,11 @@ def of_default_gains(s: Any) -> str:
     """Return a sentence on default gains of the library's, which are for a force, before an
     actuator of a file that takes another command, or "".
     """
-    if not any(part.kept and part.unit for part in s.actuator):
+    if not any(part.is_of_file and part.unit for part in s.actuator):
         return ""
-    known = catalogue()
+    library = catalogue()
     for law in s.law.parts:
-        if law.name in known and law.gains and law.source.kind == DEFAULT:
+        if law.name in library and law.gains and law.source.kind == DEFAULT:
             return (
                 f"{s.drive_train.words[0].removesuffix('.')}, and the default gains of {law.name} "
                 f"are for a force: tune them, as smc.tune(plant, {law.name!r}) does"

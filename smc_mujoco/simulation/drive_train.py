@@ -36,11 +36,11 @@ class DriveTrain:
         """The motor of each driven channel whose u is no force; else an Actuator that does
         nothing.
         """
-        found = []
+        motors = []
         for chain in self.chains:
             special = (part for part in chain if part.unit)
-            found.append(next(special, Actuator()))
-        return found
+            motors.append(next(special, Actuator()))
+        return motors
 
     @property
     def accelerates(self) -> bool:
@@ -95,15 +95,15 @@ class DriveTrain:
         if not isinstance(bounds, tuple):
             bounds = (bounds,) * self.plant.driven
         limits = self.plant.limits or bounds
-        found = []
+        smaller = []
         for motor, bound, limit in zip(self.motors, bounds, limits, strict=True):
             if motor.accelerates:  # the plant's limits are of a force
-                found.append(bound)
+                smaller.append(bound)
             elif motor.unit:
-                found.append(min(bound, motor.bound or math.inf))
+                smaller.append(min(bound, motor.bound or math.inf))
             else:
-                found.append(min(bound, limit))
-        return tuple(found)
+                smaller.append(min(bound, limit))
+        return tuple(smaller)
 
     @property
     def forces(self) -> list[float]:
@@ -117,20 +117,20 @@ class DriveTrain:
         `exact_friction`.
         """
         step = self.scenario.resolved.physics_step
-        found = []
+        torques = []
         for chain in self.chains:
             even = next((part for part in chain if part.even), None)
             torque = Torque() if even is None else even.mujoco_torque(step, True)
-            found.append(torque)
-        return found
+            torques.append(torque)
+        return torques
 
     @property
     def scales(self) -> list[float]:
         """The control of the actuator of each driven channel, per unit of u."""
-        found = []
+        scales = []
         for chain in self.chains:
-            found.append(math.prod(part.scale for part in chain))
-        return found
+            scales.append(math.prod(part.scale for part in chain))
+        return scales
 
     @cached_property
     def nominal(self) -> list[NominalDrive]:

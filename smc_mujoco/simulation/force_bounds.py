@@ -21,9 +21,9 @@ def default_bound(s: Any) -> float | tuple[float, ...]:
     bounds = list(suggested) if isinstance(suggested, tuple) else [suggested] * s.plant.driven
     # what the plant suggests is for the servos that it keeps
     none = ((),) * s.plant.driven
-    kept = s.plant.suggested.get("actuator", none)
+    drives_of_file = s.plant.suggested.get("actuator", none)
     for i, motor in enumerate(s.drive_train.motors):
-        if motor.bound is not None and not any(part.unit for part in kept[i]):
+        if motor.bound is not None and not any(part.unit for part in drives_of_file[i]):
             bounds[i] = motor.bound
     return tuple(bounds) if len(set(bounds)) > 1 else bounds[0]
 
@@ -32,13 +32,13 @@ def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:
     """Return what the plant's channels suggest, or the default bound; one number if all channels
     have the same.
     """
-    given = plant.suggested.get("u_max", (None,) * plant.driven)
-    limits = [default_u_max(plant)] * len(given)
+    suggested = plant.suggested.get("u_max", (None,) * plant.driven)
+    limits = [default_u_max(plant)] * len(suggested)
     # the bound of one joint's motor is no other's
     if _unbounded(plant):
         limits = _limits(plant)
     bounds = []
-    for limit, bound in zip(limits, given, strict=True):
+    for limit, bound in zip(limits, suggested, strict=True):
         bounds.append(limit if bound is None else bound)
     return tuple(bounds) if len(set(bounds)) > 1 else bounds[0]
 
@@ -60,7 +60,7 @@ def bounds_in_words(s: Any, unit: str = "") -> str:
             joints.setdefault(f"{number(limit)} {effort}", []).append(name)
     if len(joints) == 1:
         return next(iter(joints))
-    return joined(f"{most} at {joined(at)}" for most, at in joints.items())
+    return joined(f"{most} at {joined(names)}" for most, names in joints.items())
 
 
 def _limits(plant: Plant) -> list[float]:

@@ -57,9 +57,9 @@ def scenario(
     for name in changes:
         if name not in Scenario.fields():
             raise unknown("field of a Scenario", name, Scenario.fields())
-    made = case(sets.paper_plant(plant), law_name, condition, duration, gains, changes=changes)
-    return dataclasses.replace(made, seed=changes.get("seed", seed)).named(
-        None if changes else made.condition
+    of_study = case(sets.paper_plant(plant), law_name, condition, duration, gains, changes=changes)
+    return dataclasses.replace(of_study, seed=changes.get("seed", seed)).named(
+        None if changes else of_study.condition
     )
 
 

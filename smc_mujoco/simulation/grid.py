@@ -149,13 +149,13 @@ def _with_drawn_error(scenario: Scenario, seed: int) -> Scenario:
     """Return a scenario whose Feedforward has the error of a seed, evenly within that of the
     Feedforward.
     """
-    given = scenario.feedforward
-    if not isinstance(given, Feedforward) or given.error == 0.0:
+    feedforward = scenario.feedforward
+    if not isinstance(feedforward, Feedforward) or feedforward.error == 0.0:
         return scenario
-    most = abs(given.error)
+    most = abs(feedforward.error)
     generator = np.random.default_rng([seed, ERROR_STREAM])
     drawn = generator.uniform(-most, most)
-    compensation = dataclasses.replace(given, error=float(drawn))
+    compensation = dataclasses.replace(feedforward, error=float(drawn))
     return dataclasses.replace(scenario, feedforward=compensation)
 
 
@@ -278,12 +278,12 @@ def grid(
     return all_combinations(machines, laws_on, conditions, seeds, duration, starts)
 
 
-def _seeds(given: object) -> list[int]:
+def _seeds(seeds: object) -> list[int]:
     """Return seeds: those given, or as many as a number says."""
-    if not isinstance(given, Iterable):
-        given = range(whole("seeds", given, 1, MAX_ITEMS))
+    if not isinstance(seeds, Iterable):
+        seeds = range(whole("seeds", seeds, 1, MAX_ITEMS))
     checked = []
-    for seed in listed("seeds", given):
+    for seed in listed("seeds", seeds):
         checked.append(whole("a seed", seed, 0, GRID_SEEDS - 1))
     return checked
 
@@ -414,12 +414,12 @@ def check_names(
         ),
         ("conditions", "give each its own name", of_conditions),
     ):
-        known = {}
-        for name, thing, content in things:
-            first, first_content = known.setdefault(name, (thing, content))
+        first_by_name = {}
+        for name, value, content in things:
+            first, first_content = first_by_name.setdefault(name, (value, content))
             if first_content != content:
-                both = f"{one_line(str(first))} and {one_line(str(thing))}"
-                raise ScenarioError(f"two {what} have the name {name!r}, {both}: {cure}")
+                contents = f"{one_line(str(first))} and {one_line(str(value))}"
+                raise ScenarioError(f"two {what} have the name {name!r}, {contents}: {cure}")
 
 
 def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Component:
@@ -446,10 +446,10 @@ def listed_laws(laws: object) -> list[str | Law | Template]:
 
 def listed_conditions(conditions: object) -> list[Condition]:
     """Return one or several conditions as a list. The path of a file stands for all that it has."""
-    found = []
+    expanded = []
     for value in listed("conditions", conditions):
-        found += find_conditions(value)
-    return found
+        expanded += find_conditions(value)
+    return expanded
 
 
 def listed(what: str, values: object) -> list:

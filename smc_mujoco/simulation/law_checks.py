@@ -181,16 +181,16 @@ def blind(plant: Plant, laws: Iterable[Component | Template]) -> str:
     """
     if plant.pose or not plant.free:
         return ""
-    found = []
+    names = []
     for law in laws:
         template = law if isinstance(law, Template) else law.template
         if template is None or template.joint or template.name == "none":
             continue
         if not reads(template) & PARTNER:
-            found.append(law.name)
-    if not found:
+            names.append(law.name)
+    if not names:
         return ""
     return (
-        f"{joined(dict.fromkeys(found))} of {plant.name} cannot see what nothing drives there, "
+        f"{joined(dict.fromkeys(names))} of {plant.name} cannot see what nothing drives there, "
         "which may fall or swing on: a law that reads y.q, or one of many joints, can"
     )

@@ -125,7 +125,7 @@ def mechanism(scenario: Scenario) -> Mechanism:
         base = compile_model(scenario, USERDATA, scenery=False)
         shared = _mechanisms[key] = Mechanism(base, channels(base))
         _recent.append(shared)
-        while sum(mujoco.mj_sizeModel(one.model) for one in _recent) > MAX_RECENT_BYTES:
+        while sum(mujoco.mj_sizeModel(recent.model) for recent in _recent) > MAX_RECENT_BYTES:
             _recent.popleft()
     elif source := getattr(scenario.plant.build, "source", None):  # of a user's model
         source.check_unchanged()
@@ -241,11 +241,11 @@ def _pose_channels(model: mujoco.MjModel) -> np.ndarray:
     joint = free_joint(model)
     drives = drive_ids(model)
     table = _places(model, joint, POSE)
-    at = np.arange(len(PLACES))
+    axes = np.arange(len(PLACES))
     table["gathered"] = table["qvel"]
-    table["xfrc"] = 6 * model.jnt_bodyid[joint] + at
+    table["xfrc"] = 6 * model.jnt_bodyid[joint] + axes
     # 0 is of the world, which no force moves
-    table["horizontal"] = np.where(at == 0, table["xfrc"], 0)
+    table["horizontal"] = np.where(axes == 0, table["xfrc"], 0)
     table["ctrl"][: len(drives)] = model.actuator_ctrladr[drives]
     return table
 
@@ -255,7 +255,7 @@ def _places(model: mujoco.MjModel, joint: int, site: str) -> np.ndarray:
     in all other fields.
     """
     table = np.full(len(PLACES), -1, CHANNEL)
-    at = np.arange(len(PLACES))
+    axes = np.arange(len(PLACES))
     turns = np.arange(len(PLACES)) - 3
     for name, kinds in POSE_SENSORS.items():
         addresses = []
@@ -265,10 +265,10 @@ def _places(model: mujoco.MjModel, joint: int, site: str) -> np.ndarray:
         first, second = addresses
         if name == "v_sensor":
             second = second + turns
-        table[name] = np.where(turns < 0, first + at, second)
-    places = np.minimum(at, 3)
+        table[name] = np.where(turns < 0, first + axes, second)
+    places = np.minimum(axes, 3)
     table["qpos"] = model.jnt_qposadr[joint] + places
-    table["qvel"] = model.jnt_dofadr[joint] + at
+    table["qvel"] = model.jnt_dofadr[joint] + axes
     table["turn"] = np.where(turns < 0, -1, turns)
     table["sign"] = np.where(turns < 0, 1, 0)
     return table
@@ -341,10 +341,10 @@ def without_scenery(spec: mujoco.MjSpec, pushed: Collection[str] = ()) -> None:
             if wrap.type in ROUND_WRAPS:
                 needed.add(wrap.target.name)
     for body in reversed(spec.bodies[1:]):
-        kept = [*body.sites, *body.bodies, *body.frames, body.explicitinertial]
+        needs = [*body.sites, *body.bodies, *body.frames, body.explicitinertial]
         for geom in body.geoms:
-            kept.append(geom.contype or geom.conaffinity or geom.name in needed)
-        if not any(kept) and _is_fixed(body) and body.name not in needed:
+            needs.append(geom.contype or geom.conaffinity or geom.name in needed)
+        if not any(needs) and _is_fixed(body) and body.name not in needed:
             spec.delete(body)
 
 

@@ -57,8 +57,8 @@ def put(after: Scenario, packed: Any, runs: Iterator[Any]) -> None:
     for part, _ in s.acting:
         numbers = part.numbers(next(runs))
         for place, _ in enumerate(part.channels(s.plant)):
-            at = place if len(numbers) > 1 else 0
-            _write(packed.numbers, next(rows), numbers[at])
+            joint = place if len(numbers) > 1 else 0
+            _write(packed.numbers, next(rows), numbers[joint])
     for sensor in s.sensors:
         (numbers,) = sensor.numbers(next(runs))
         for i in sensor.channels(s.plant):
@@ -72,5 +72,5 @@ def put(after: Scenario, packed: Any, runs: Iterator[Any]) -> None:
 
 def _write(numbers: np.ndarray, row: Any, values: Any) -> None:
     """Write the parameters of the function in a row."""
-    at = int(row["function"]["parameters"])
-    state.view(numbers, at, (len(values),))[:] = values
+    place = int(row["function"]["parameters"])
+    state.view(numbers, place, (len(values),))[:] = values

@@ -37,16 +37,16 @@ class PartNumber(NamedTuple):
         """Return the parts with another number, unchecked: a search keeps within its range. A level
         at rest follows one while sliding that would pass it, and the other way round.
         """
-        made = copy.copy(parts[self.part])
-        self._set(made, self.name, value)
-        ordered = getattr(made, "ordered", ())  # of frictions
-        if ordered and self.name in ordered and getattr(made, ordered[1]) is not None:
-            low, high = (np.ravel(getattr(made, name))[max(self.joint, 0)] for name in ordered)
+        changed = copy.copy(parts[self.part])
+        self._set(changed, self.name, value)
+        ordered = getattr(changed, "ordered", ())  # of frictions
+        if ordered and self.name in ordered and getattr(changed, ordered[1]) is not None:
+            low, high = (np.ravel(getattr(changed, name))[max(self.joint, 0)] for name in ordered)
             if low > high:
-                (other,) = set(ordered) - {self.name}
-                self._set(made, other, value)
+                (partner,) = set(ordered) - {self.name}
+                self._set(changed, partner, value)
         after = parts[self.part + 1 :]
-        return *parts[: self.part], made, *after
+        return *parts[: self.part], changed, *after
 
     def _set(self, made: Any, name: str, value: float) -> None:
         """Set a number of a part, of this joint where each has one."""
@@ -98,7 +98,7 @@ def paths_of_parts(scenario: Any, field: str) -> list[str]:
     return paths
 
 
-def part_number(scenario: Any, path: str, known: Sequence[str]) -> PartNumber:
+def part_number(scenario: Any, path: str, paths: Sequence[str]) -> PartNumber:
     """Return where a number of a part is.
 
     Raises:
@@ -114,19 +114,19 @@ def part_number(scenario: Any, path: str, known: Sequence[str]) -> PartNumber:
         joints = _joints_of(part, plant)
         if joint and ".".join(joint) not in joints:
             continue
-        each = isinstance(getattr(part, name), tuple)
-        if each and not joint:
+        by_joint = isinstance(getattr(part, name), tuple)
+        if by_joint and not joint:
             continue
-        if joint and not each and len(joints) > 1:
+        if joint and not by_joint and len(joints) > 1:
             raise ScenarioError(
                 f"{path} is one number of {counted(len(joints), 'joint')}: name it "
                 f"{field}.{name}, or give each joint its own {type(part).__name__}, as "
                 f"{field}={{{'.'.join(joint)!r}: ...}}"
             )
-        place = joints.index(".".join(joint)) if each else -1
+        place = joints.index(".".join(joint)) if by_joint else -1
         matches.append(PartNumber(field, i, name, place))
     if not matches:
-        raise unknown(f"number of {plant.name}", path, known)
+        raise unknown(f"number of {plant.name}", path, paths)
     if len(matches) > 1:
         raise ScenarioError(
             f"{path} is a number of {len(matches)} parts: name the joint, as {field}.JOINT.{name}"
@@ -144,9 +144,9 @@ def changed(scenario: Any, factors: Mapping[str, float]) -> dict[str, Any]:
     Raises:
       ScenarioError: there is no such number, or it leaves its range.
     """
-    known = []
+    paths = []
     for field in FIELDS:
-        known += paths_of_parts(scenario, field)
+        paths += paths_of_parts(scenario, field)
     of_parts: dict[tuple[str, int], dict[str, Any]] = {}
     for path, factor in factors.items():
         if path.startswith("disturbance."):
@@ -154,14 +154,14 @@ def changed(scenario: Any, factors: Mapping[str, float]) -> dict[str, Any]:
                 f"Jump has {path}, and a disturbance is a function of time by itself: give one "
                 "that changes then, such as smc.signals.Held(times, values)"
             )
-        place = part_number(scenario, path, known)
+        place = part_number(scenario, path, paths)
         parts = parts_of(scenario, place.field)
         numbers = of_parts.setdefault((place.field, place.part), {})
         own = getattr(parts[place.part], place.name)
-        every = numbers.get(place.name, own)
+        current = numbers.get(place.name, own)
         value = place.of(parts)
         scaled = value * factor if value else factor
-        numbers[place.name] = place.within(every, scaled)
+        numbers[place.name] = place.within(current, scaled)
     fields = {}
     for (field, i), numbers in of_parts.items():
         parts = fields.get(field, parts_of(scenario, field))

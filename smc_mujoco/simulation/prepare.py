@@ -133,17 +133,17 @@ def _refuse_mistakes(s: Resolved, reason: str) -> None:
     Python, too.
     """
     about = reason.partition(" does not compile: ")[0]
-    of = None
+    broken = None
     for part in (*s.law.parts, s.surface, s.velocity):
         if part is not None and about == f"{part.kind} {part.name!r}":
-            of = part
+            broken = part
             break
-    if of is not None and (mistake := RETURNS_OTHERS.search(reason)):
+    if broken is not None and (mistake := RETURNS_OTHERS.search(reason)):
         returned = re.sub("^1 numbers", "1 number", mistake[1])
-        wanted = {"law": "u and s", "surface": "s and v_eq"}.get(of.kind, "a velocity")
-        raise BrokenLawError(f"{about} returns {returned}: return {wanted}")
-    if of is not None and (mistake := UNKNOWN_FIELD.search(reason)):
-        record = FIELDS.get(mistake[2], ()) or of.gains
+        right = {"law": "u and s", "surface": "s and v_eq"}.get(broken.kind, "a velocity")
+        raise BrokenLawError(f"{about} returns {returned}: return {right}")
+    if broken is not None and (mistake := UNKNOWN_FIELD.search(reason)):
+        record = FIELDS.get(mistake[2], ()) or broken.gains
         where = "y" if mistake[2] in FIELDS else "gains"
         sentence = unknown(where, mistake[1], record)
         hint = str(sentence).partition(": ")[2]
@@ -167,9 +167,9 @@ def _compile(s: Resolved) -> None:
         cfunctions.compile_nominal(s.plant)
     for signal in signals:
         agreement.check_signal(signal)
-    others = [(sensor, "read") for sensor in s.sensors]
-    others += [(part, "steady") for part in s.compensated]
-    for part, kind in (*s.acting, *others):
+    beside = [(sensor, "read") for sensor in s.sensors]
+    beside += [(part, "steady") for part in s.compensated]
+    for part, kind in (*s.acting, *beside):
         agreement.check_part(part, kind, lambda part=part: part.numbers(run_of(s, part))[0])
 
 
@@ -407,11 +407,11 @@ def _signal(signal: Signal, buffer: Functions, channels: int = 1) -> dict[str, i
 
 def compensation(s: Resolved) -> dict[str, Any]:
     """Return the numbers of a record that set the compensation of friction."""
-    given = s.feedforward
-    if not isinstance(given, Feedforward):
+    feedforward = s.feedforward
+    if not isinstance(feedforward, Feedforward):
         return {}
-    share = 1.0 + given.error
-    return {"share": share, "eps": given.eps, "on_reference": given.on == "reference"}
+    share = 1.0 + feedforward.error
+    return {"share": share, "eps": feedforward.eps, "on_reference": feedforward.on == "reference"}
 
 
 def settings(s: Resolved) -> dict[str, Any]:
@@ -467,10 +467,10 @@ def nominal_values(s: Resolved) -> list[float]:
     """Return the values of the plant's parameters as the law's model has them: true ones in the
     model "true".
     """
-    known = s.plant.parameters
+    values = s.plant.parameters
     if s.model == "true":
-        known = vars(s.plant.values(s.factors(0)))
-    return [known[name] for name in s.plant.parameters]
+        values = vars(s.plant.values(s.factors(0)))
+    return [values[name] for name in s.plant.parameters]
 
 
 def pause_phase(s: Resolved) -> int:
@@ -519,8 +519,8 @@ def _native_nominal(s: Resolved) -> Native | None:
     if not s.plant.by_mujoco:
         return None
     if not s.law.joint:
-        known = dict(zip(s.plant.parameters, nominal_values(s), strict=True))
-        return s.plant.nominal.native(known)
+        values = dict(zip(s.plant.parameters, nominal_values(s), strict=True))
+        return s.plant.nominal.native(values)
     if s.model == "none":
         return None
     at_rest = "g" in read_by(s.law.function)

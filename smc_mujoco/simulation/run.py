@@ -280,7 +280,7 @@ def states(trace: Trace, times: Array) -> tuple[Array, Array]:
     prepared = prepare(trace.scenario)
     scenario = trace.scenario.resolved
     total = scenario.samples * scenario.steps
-    wanted: list[int] = np.clip(
+    ends: list[int] = np.clip(
         np.floor(times / scenario.physics_step + 1e-6).astype(int), 0, total
     ).tolist()
     state_at = {}
@@ -289,14 +289,14 @@ def states(trace: Trace, times: Array) -> tuple[Array, Array]:
         qpos = batch.batch.bind("qpos")
         qvel = batch.batch.bind("qvel")
         last = qpos[0].copy(), qvel[0].copy()
-        for end in sorted(set(wanted)):
+        for end in sorted(set(ends)):
             batch.advance_to(end)
             if batch.records["failure"][0] == state.FINE:
                 last = qpos[0].copy(), qvel[0].copy()
             state_at[end] = last
-    found = [state_at[end] for end in wanted]
-    every_qpos = np.array([q for q, _ in found])
-    return every_qpos, np.array([v for _, v in found])
+    pairs = [state_at[end] for end in ends]
+    every_qpos = np.array([q for q, _ in pairs])
+    return every_qpos, np.array([v for _, v in pairs])
 
 
 class ScenarioBatch:
@@ -579,13 +579,13 @@ class ScenarioBatch:
 
     def failure(self, i: int, code: int) -> str:
         """Return the failure of simulation i in words."""
-        known = {
+        sentences = {
             state.DIVERGED: self.errors.get(i, PLANT_DIVERGED),
             state.INTERRUPTED: INTERRUPTED,
             state.DISTURBANCE_NOT_FINITE: DISTURBANCE_NOT_FINITE,
         }
-        if code in known:
-            return known[code]
+        if code in sentences:
+            return sentences[code]
         if why := self.python_failure(i):
             return why
         if code in (state.LAW_RAISED, state.NOT_FINITE) and (why := self.law_failure(i)):

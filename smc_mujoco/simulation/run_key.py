@@ -74,12 +74,12 @@ def _without_modules(data: Any) -> Any:
         return list(map(_without_modules, data))
     if not isinstance(data, dict):
         return data
-    kept = {}
+    plain = {}
     for name, value in data.items():
         # a gain may be called so, too
         of_user = name == "module" and isinstance(value, str) and not value.startswith(PACKAGE)
-        kept[name] = None if of_user else _without_modules(value)
-    return kept
+        plain[name] = None if of_user else _without_modules(value)
+    return plain
 
 
 def portable_key(scenario: Scenario) -> str:
@@ -129,9 +129,9 @@ def condition(scenario: Scenario, data: Fields | None = None) -> str:
     usual = json.loads(nominal)
     parts = []
     for field, value in json.loads(text).items():
-        given = getattr(scenario, field)
-        if usual.get(field) != value and given is not None:  # None is a default
-            parts.append(f"{field}={' '.join(repr(given).split())}")
+        attribute = getattr(scenario, field)
+        if usual.get(field) != value and attribute is not None:  # None is a default
+            parts.append(f"{field}={' '.join(repr(attribute).split())}")
     name = ", ".join(parts)
     if len(name) <= MAX_NAME:
         return name

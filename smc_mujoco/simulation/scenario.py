@@ -255,11 +255,11 @@ class Scenario:
             if "convert" in f.metadata:
                 converted.append(f)
             elif f.name in declared:
-                given = getattr(self, f.name)
-                vars(self)[f.name] = declared[f.name](f.name, given)
+                raw = getattr(self, f.name)
+                vars(self)[f.name] = declared[f.name](f.name, raw)
         for f in converted:  # these may depend on the others
-            given = getattr(self, f.name)
-            value = f.metadata["convert"](f.name, given, self)
+            raw = getattr(self, f.name)
+            value = f.metadata["convert"](f.name, raw, self)
             vars(self)[f.name] = value  # the class is frozen
 
     def __eq__(self, other: object) -> bool:
@@ -406,8 +406,8 @@ class Scenario:
     @property
     def compensated(self) -> tuple[Friction, ...]:
         """The frictions that the feedforward compensates."""
-        given = self.feedforward
-        return given.friction if isinstance(given, Feedforward) else ()  # pyright: ignore[reportReturnType]
+        feedforward = self.feedforward
+        return feedforward.friction if isinstance(feedforward, Feedforward) else ()  # pyright: ignore[reportReturnType]
 
     @property
     def references(self) -> tuple[Signal, ...]:

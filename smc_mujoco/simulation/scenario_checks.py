@@ -135,8 +135,8 @@ def _check_forces(s: Any) -> None:
             )
     for d in s.disturbance:
         if isinstance(d, Push):
-            known = dict.fromkeys(bodies(s.plant))
-            find(f"body of {s.plant.name} in a Push", d.body, known)
+            names = dict.fromkeys(bodies(s.plant))
+            find(f"body of {s.plant.name} in a Push", d.body, names)
     forces = []
     for d in s.disturbance:
         if d.cartesian and not isinstance(d, Push):
@@ -215,9 +215,9 @@ def check_names(s: Any) -> None:
     """Check that no parameter is named twice, once by its own name and once as the mass."""
     for name, factors in (("mismatch", s.mismatch), ("Jump", s.jump.factors if s.jump else {})):
         if s.plant.mass != "mass" and {"mass", s.plant.mass} <= factors.keys():
-            both = f"{s.plant.mass} {factors[s.plant.mass]:g} and mass {factors['mass']:g}"
+            masses = f"{s.plant.mass} {factors[s.plant.mass]:g} and mass {factors['mass']:g}"
             raise ScenarioError(
-                f"{name} has {both}, which are the same parameter of {s.plant.name}: give one of "
+                f"{name} has {masses}, which are the same parameter of {s.plant.name}: give one of "
                 "them"
             )
 
@@ -271,7 +271,7 @@ def check_rotors(s: Any, part: Friction) -> None:
     pairs = zip(driven_names(s.plant), s.drive_train.chains, strict=True)
     chains = dict(pairs)
     for joint in part.joint_names(s.plant):
-        if all(one.drives for one in chains.get(joint, ())):
+        if all(actuator.drives for actuator in chains.get(joint, ())):
             raise ScenarioError(
                 f"{type(part).__name__} is on side 'motor' of joint {joint!r} of {s.plant.name}, "
                 "which has no rotor beside it: give actuator=smc.hardware.ElasticJoint(...) or "

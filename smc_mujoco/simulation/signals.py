@@ -418,7 +418,7 @@ def _dryden(t, sigma, T, dt, memory, seed, channel, stream):
     root = math.sqrt(3.0)
     knot = t / dt
     x = dt / T
-    left = math.exp(-x)
+    decay = math.exp(-x)
     if memory[0] == 0.0:  # the stationary state
         z = philox.normals(seed, channel, stream, 0)
         memory[1] = sigma * (z[0] if channel == 0.0 else math.sqrt(0.5) * z[0])
@@ -432,16 +432,16 @@ def _dryden(t, sigma, T, dt, memory, seed, channel, stream):
         memory[0] += 1.0
         z = philox.normals(seed, channel, stream, memory[0])
         if channel == 0.0:
-            memory[1] = left * memory[1] + sigma * math.sqrt(-math.expm1(-2.0 * x)) * z[0]
+            memory[1] = decay * memory[1] + sigma * math.sqrt(-math.expm1(-2.0 * x)) * z[0]
             memory[4] = memory[1]
             continue
         first = -0.5 * math.expm1(-2.0 * x)  # covariances of both states' noise in a step
-        both = 0.25 - left * left * (0.5 * x + 0.25)
-        second = 0.25 - left * left * (0.5 * x * x + 0.5 * x + 0.25)
+        covariance = 0.25 - decay * decay * (0.5 * x + 0.25)
+        second = 0.25 - decay * decay * (0.5 * x * x + 0.5 * x + 0.25)
         a = math.sqrt(first)
-        c = both / a
-        p = left * memory[1]
-        q = left * (x * memory[1] + memory[2])
+        c = covariance / a
+        p = decay * memory[1]
+        q = decay * (x * memory[1] + memory[2])
         memory[1] = p + sigma * a * z[0]
         memory[2] = q + sigma * (c * z[0] + math.sqrt(max(0.0, second - c * c)) * z[1])
         memory[4] = root * memory[1] + (1.0 - root) * memory[2]
@@ -904,10 +904,10 @@ class Sum(Signal):
     def value(t, p, data):
         r, dr, ddr = 0.0, 0.0, 0.0
         for k in range(data.shape[1]):
-            one = _part_of_sum(t, data[0, k], data[1, k], data[2, k], data[3, k])
-            r += one[0]
-            dr += one[1]
-            ddr += one[2]
+            term = _part_of_sum(t, data[0, k], data[1, k], data[2, k], data[3, k])
+            r += term[0]
+            dr += term[1]
+            ddr += term[2]
         return r, dr, ddr
 
 

@@ -76,7 +76,7 @@ class Moments(NamedTuple):
     # (view, k, t, i) -> raised, what compensates friction of channel i; after its law
     compensate: Any = always((False, 0.0))
     commanded: Any = always(None)  # (view, i, u): after the bound
-    asked: Any = always(FINE)  # (view, k) -> failure; after all laws
+    finish: Any = always(FINE)  # (view, k) -> failure; after all laws
     apply: Any = always(None)  # (view, i, u): give the actuator its command
     arrived: Any = always(None)  # (view): after all of them
     sum_forces: Any = always(None)  # (view)
@@ -282,7 +282,7 @@ def _commanding(of: Moments) -> Any:
     drive_of = of.drive
     now_of = of.now
     commanded = of.commanded
-    asked = of.asked
+    finish = of.finish
 
     @inlined
     def command(view, k, t):
@@ -307,7 +307,7 @@ def _commanding(of: Moments) -> Any:
             ring[i], now.u, now.s = bounded, bounded, s
             now.compensation = compensation
             commanded(view, i, bounded)
-        return asked(view, k)
+        return finish(view, k)
 
     return command
 

@@ -278,16 +278,16 @@ def _columns(path: AnyPath, names: list[str], column: str | None) -> tuple[int, 
     name.
     """
     plain = [NAME_WITH_UNIT.sub(r"\1", name) for name in names]
-    at = next((plain.index(name) for name in ("t", "time") if name in plain), 0)
-    if (unit := NAME_WITH_UNIT.fullmatch(names[at])) and unit[2] not in SECOND_SPELLINGS:
+    time_column = next((plain.index(name) for name in ("t", "time") if name in plain), 0)
+    if (unit := NAME_WITH_UNIT.fullmatch(names[time_column])) and unit[2] not in SECOND_SPELLINGS:
         raise ScenarioError(
-            f"time column {names[at]!r} of {path} is not in seconds: give times in s"
+            f"time column {names[time_column]!r} of {path} is not in seconds: give times in s"
         )
     if column is None:
-        return at, int(at == 0)
+        return time_column, int(time_column == 0)
     if not isinstance(column, str) or column not in (*names, *plain):
         raise unknown(f"column of {path}", column, names)
-    return at, (names if column in names else plain).index(column)
+    return time_column, (names if column in names else plain).index(column)
 
 
 def _number(cell: str) -> float | None:
@@ -320,8 +320,8 @@ def _knots(first: float, last: float) -> Array:
         raise ScenarioError(
             f"times span {last - first:g} s: give a path of {MAX_KNOTS * KNOT_SPACING:g} s at most"
         )
-    whole = np.ceil(steps - 1e-9)
-    count = max(2, int(whole) + 1)
+    intervals = np.ceil(steps - 1e-9)
+    count = max(2, int(intervals) + 1)
     return np.linspace(first, last, count)
 
 

@@ -169,11 +169,11 @@ class Trace:
         efforts = s.efforts[: s.plant.driven]
         for name, units in (("x", s.plant.units), ("u", efforts)):
             for unit in dict.fromkeys(units):
-                columns = [i for i, other in enumerate(units) if other == unit]
+                columns = [i for i, of_channel in enumerate(units) if of_channel == unit]
                 values = getattr(self, name)[:, columns]
                 finite = values[np.isfinite(values)]
-                known = finite.tolist() or [math.nan]
-                rows[f"{name} ({unit})"] = f"{min(known):.3g} to {max(known):.3g}"
+                samples = finite.tolist() or [math.nan]
+                rows[f"{name} ({unit})"] = f"{min(samples):.3g} to {max(samples):.3g}"
         return html.fields(rows, "Trace")
 
     def save(self, path: AnyPath) -> Path:
@@ -224,11 +224,11 @@ class Trace:
         Several of your own model have the names of its joints: x_shoulder, x_elbow, ...
         """
         ends = column_ends(self.scenario.plant)
-        found = {"t": self.t}
+        columns = {"t": self.t}
         for name in ARRAYS[1:]:
             for end, column in zip(ends, getattr(self, name).T, strict=True):
-                found[f"{name}{end}"] = column
-        return found
+                columns[f"{name}{end}"] = column
+        return columns
 
     def units(self) -> dict[str, str]:
         """Return the unit of each of the `columns`: "s", "rad", "N m", ...; "" for s, whose unit
@@ -244,7 +244,7 @@ class Trace:
     def _units(self, name: str) -> list[str]:
         """Return the unit of an array for each channel, (n,)."""
         pairs = zip(self.scenario.plant.units, self.scenario.efforts, strict=True)
-        found = []
+        units_by_channel = []
         for x, u in pairs:
             units = {
                 "x": x,
@@ -254,8 +254,8 @@ class Trace:
                 "applied": u,
                 "s": "",
             }
-            found.append(units.get(name, EFFORT[x]))
-        return found
+            units_by_channel.append(units.get(name, EFFORT[x]))
+        return units_by_channel
 
     def _unit(self, name: str) -> str:
         """Return the unit of an array, or those of its channels where they differ: "m, rad"."""
@@ -427,11 +427,11 @@ def from_log(scenario: Scenario, log: Array, failed_step: int, failure: str | No
     arrays = {name: np.ascontiguousarray(log[name]) for name in names}
     if scenario.plant.goal and not scenario.plant.measured:
         arrays["r"][:, scenario.plant.driven :] = scenario.plant.goal
-    known = []
+    finite_by_array = []
     for values in arrays.values():
         fits = np.isfinite(values[:end])
-        known.append(fits.all(axis=1))
-    finite = np.array(known)
+        finite_by_array.append(fits.all(axis=1))
+    finite = np.array(finite_by_array)
     if not finite.all():
         k = int(np.argmin(finite.all(axis=0)))
         name = names[int(np.argmin(finite[:, k]))]
@@ -486,10 +486,10 @@ def load(path: AnyPath) -> Trace:
             f"{path} holds no scenario ({words(error)}): give a file that a run wrote"
         ) from None
     with reading(path, *FILE) as file, zipfile.ZipFile(file) as archive:
-        found = archive.namelist()
+        members = archive.namelist()
         names: list[str] = list(ARRAYS)
         for name in OPTIONAL:
-            if f"{name}.npy" in found:
+            if f"{name}.npy" in members:
                 names.append(name)
         arrays = {name: _checked_array(archive, name, scenario) for name in names}
     return Trace(**arrays, scenario=scenario, **end)

@@ -99,11 +99,11 @@ def _failed(future: Future) -> bool:
 def _on_worker(call: bytes, sender: dict[str, str]) -> Any:
     """Make a call, on a worker."""
     if (here := software()) != sender:
-        other = []
+        differing = []
         for name, version in sender.items():
             if here.get(name) != version:
-                other.append(f"{name} {here.get(name)}")
-        raise ScenarioError(_version_mismatch(", ".join(other)))
+                differing.append(f"{name} {here.get(name)}")
+        raise ScenarioError(_version_mismatch(", ".join(differing)))
     try:
         function, arguments = pickle.loads(call)
     except (ImportError, AttributeError) as error:
@@ -202,7 +202,7 @@ class _Dask(Executor):
     def submit(self, fn: Callable, /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Have one of the workers call fn(*args, **kwargs)."""
         future: Future[Any] = Future()
-        there = self.client.submit(fn, *args, pure=False, **kwargs)
+        task = self.client.submit(fn, *args, pure=False, **kwargs)
 
         def ended(done: Any) -> None:
             if not future.set_running_or_notify_cancel():  # nobody waits for it any more
@@ -214,7 +214,7 @@ class _Dask(Executor):
             except BaseException as error:  # any: somebody waits for this future
                 future.set_exception(_translated(error))
 
-        there.add_done_callback(ended)
+        task.add_done_callback(ended)
         return future
 
 

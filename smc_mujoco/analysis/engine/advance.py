@@ -92,9 +92,9 @@ def driving(form: Form) -> Any:
     """Return a function (view, i, stage) -> the force of the drive of channel i, whose mean over
     the step is the state's `middle`.
     """
-    at = layout(form).drive
+    drive_at = layout(form).drive
     work_at = layout(form).work
-    if at is None:
+    if drive_at is None:
 
         @inlined
         def command(view, i, stage):
@@ -103,7 +103,7 @@ def driving(form: Form) -> Any:
             return state.delayed
 
         return command
-    part, _, numbers, memory = at
+    part, _, numbers, memory = drive_at
     advance = part.function
     factors = reader(part.names)
     size = len(part.names)
@@ -112,16 +112,16 @@ def driving(form: Form) -> Any:
     @inlined
     def drive(view, i, stage):
         row, _, work = view
-        kept = kept_in(work, memory + width * i)
+        filters = kept_in(work, memory + width * i)
         state = state_in(work, work_at.states + STATES * i)
         if stage == 0:
             of_drive = factors(row, numbers + size * i)
-            state.middle = advance(of_drive, kept, state.delayed, work[work_at.v + i])
+            state.middle = advance(of_drive, filters, state.delayed, work[work_at.v + i])
         force = state.middle
         if stage == 0:
-            force -= kept.rise
+            force -= filters.rise
         elif stage == 3:
-            force += kept.rise
+            force += filters.rise
         return force
 
     return drive
@@ -162,8 +162,8 @@ def _rubbing(form: Form, compile_user: Compiler) -> Any:
     its speed, `at_rest` is f at speed 0.
     """
     total = always(0.0)
-    for at in reversed(layout(form).frictions):
-        total = and_friction(at.part, total, _holding(form, acting(at, compile_user)))
+    for part_at in reversed(layout(form).frictions):
+        total = and_friction(part_at.part, total, _holding(form, acting(part_at, compile_user)))
     row_at, work_at = layout(form)[:2]
 
     @inlined
@@ -202,22 +202,22 @@ def _holding(form: Form, of_stage: Any) -> Any:
 
     @inlined
     def force(view, y, i):
-        found, held = of_stage(view, y, i)
+        exerted, held = of_stage(view, y, i)
         state_in(view.work, work_at.states + STATES * i).held += held
-        return found
+        return exerted
 
     return force
 
 
-def and_friction(part: ChannelFunction, others: Any, force: Any) -> Any:
+def and_friction(part: ChannelFunction, inner: Any, force: Any) -> Any:
     """Return a function (view, y, i) -> the force of a friction on channel i, and of the others."""
     channels = part.channels
 
     @inlined
     def total(view, y, i):
-        found = others(view, y, i)
+        sum_of_forces = inner(view, y, i)
         if i in channels:
-            found += force(view, y, i)
-        return found
+            sum_of_forces += force(view, y, i)
+        return sum_of_forces
 
     return total

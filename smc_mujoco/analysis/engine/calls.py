@@ -53,13 +53,13 @@ def compiled_once(function: Callable) -> Any:
     """Return a function of counts and addresses, compiled, and kept on the disk if all that it uses
     has a hash.
     """
-    made = njit(error_model="numpy", nogil=True)(function)
+    dispatcher = njit(error_model="numpy", nogil=True)(function)
     try:
         key = Key(function.__module__, fingerprint.now(function))
     except ScenarioError:  # a function that has no hash is compiled in every process
         key = None
-    compile_for(made, (0,) * function.__code__.co_argcount, key)
-    return made
+    compile_for(dispatcher, (0,) * function.__code__.co_argcount, key)
+    return dispatcher
 
 
 @functools.cache
@@ -77,38 +77,38 @@ def array_in(typingctx, numbers, first, count):
     array = types.Array(types.float64, 1, "C")
 
     def codegen(context, builder, signature, args):
-        made = cgutils.create_struct_proxy(array)(context, builder)
+        header = cgutils.create_struct_proxy(array)(context, builder)
         eight = context.get_constant(types.intp, 8)
         arrayobj.populate_array(
-            made,
+            header,
             data=builder.gep(args[0], [args[1]]),
             shape=[args[2]],
             strides=[eight],
             itemsize=eight,
             meminfo=None,
         )
-        return made._getvalue()
+        return header._getvalue()
 
     return array(numbers, types.intp, types.intp), codegen
 
 
-def signal(at: SignalAt | None, compile_user: Compiler) -> Any:
+def signal(signal_at: SignalAt | None, compile_user: Compiler) -> Any:
     """Return a function (view, t, i) -> value, rate and acceleration of a signal in channel i, all
     0 without one; of a signal that sees the loop, (view, t, e, de, s).
     """
-    if at is None:
+    if signal_at is None:
         return always((0.0, 0.0, 0.0))
-    kind, first, last = at
+    kind, first, last = signal_at
     value = compile_user(kind.value)
     values = reader(parameters(kind))
     numbers = first + PARAMETERS
     table = numbers + len(parameters(kind))
-    kept = last + 1
+    memory_at = last + 1
     memory = kind.memory
     rows = kind.rows
 
     def random(view, t, i):
-        state = array_in(view.work, kept + i * memory, memory)
+        state = array_in(view.work, memory_at + i * memory, memory)
         seed = view.row[SETTING.seed]
         return value(t, values(view.row, numbers), state, seed, float(i), view.row[first + STREAM])
 
@@ -118,7 +118,7 @@ def signal(at: SignalAt | None, compile_user: Compiler) -> Any:
         return value(t, values(view.row, numbers), points.reshape((rows, count)))
 
     def seeing(view, t, e, de, s):
-        state = array_in(view.work, kept, memory)
+        state = array_in(view.work, memory_at, memory)
         return value(t, values(view.row, numbers), state, e, de, s)
 
     def plain(view, t, i):
@@ -159,9 +159,9 @@ def added(at: SignalAt, others: Any, d: int, driven: int, compile_user: Compiler
     return add
 
 
-def acting(at: PartAt, compile_user: Compiler) -> Any:
+def acting(part_at: PartAt, compile_user: Compiler) -> Any:
     """Return a function (view, y, i) -> what a part gives channel i for y."""
-    part, _, first, kept = at
+    part, _, first, memory_at = part_at
     function = compile_user(part.function)
     numbers = reader(part.names)
     memory = part.memory
@@ -169,7 +169,7 @@ def acting(at: PartAt, compile_user: Compiler) -> Any:
 
     @inlined
     def act(view, y, i):
-        state = array_in(view.work, kept + i * memory, memory)
+        state = array_in(view.work, memory_at + i * memory, memory)
         return function(y, numbers(view.row, first + i * size), state)
 
     return act
@@ -180,13 +180,13 @@ def by_channel(functions: Sequence[Any], j: int = 0) -> Any:
     function = functions[j]
     if j == len(functions) - 1:
         return function
-    others = by_channel(functions, j + 1)
+    further = by_channel(functions, j + 1)
 
     @inlined
     def choose(view, y, i):
         if i == j:
             return function(view, y, i)
-        return others(view, y, i)
+        return further(view, y, i)
 
     return choose
 
@@ -210,9 +210,9 @@ def law(form: Form, at: PartAt, compile_user: Compiler) -> Any:
     return in_c
 
 
-def calling(form: Form, at: PartAt) -> Any:
+def calling(form: Form, law_at: PartAt) -> Any:
     """Return a function (view, i): call a law in C, which takes addresses, on what was measured."""
-    part, address, numbers, kept = at
+    part, address, numbers, memory_at = law_at
     memory = part.memory
     measured = layout(form).work.measured
     commanded = layout(form).work.commanded
@@ -220,7 +220,7 @@ def calling(form: Form, at: PartAt) -> Any:
     @inlined
     def ask(view, i):
         first = place(view.work)
-        state = first + 8 * (kept + i * memory)
+        state = first + 8 * (memory_at + i * memory)
         gains = place(view.row) + 8 * numbers
         function = int(view.row[address])
         if call(function, first + 8 * measured, gains, state, first + 8 * commanded) != 0:

@@ -44,18 +44,18 @@ def compiled(form: Form) -> Any:
             last = min(first + LANES, count)
             samples = 0
             for i in range(first, last):
-                kept = pointer(scores + score_bytes * i)
-                samples = max(samples, start(view(i, i - first, rows, tables, work), kept))
+                scores_of_run = pointer(scores + score_bytes * i)
+                samples = max(samples, start(view(i, i - first, rows, tables, work), scores_of_run))
             for k in range(samples + 1):
                 for i in range(first, last):
-                    kept = pointer(scores + score_bytes * i)
-                    if kept[FAILURE] != UNDER_WAY:
+                    scores_of_run = pointer(scores + score_bytes * i)
+                    if scores_of_run[FAILURE] != UNDER_WAY:
                         continue
                     log = pointer(logs + log_bytes * i)
                     try:
-                        take(view(i, i - first, rows, tables, work), kept, log, k)
+                        take(view(i, i - first, rows, tables, work), scores_of_run, log, k)
                     except Exception:
-                        kept[FAILURE] = RAISED
+                        scores_of_run[FAILURE] = RAISED
 
     return compiled_once(runs)
 
@@ -72,7 +72,7 @@ def run_rows(
 
     `logs` is (runs, K + 1, n, 6) and gets `form.LOGGED`, if the rows say `logging`.
     """
-    made = compiled(form)
+    simulate = compiled(form)
     rows = np.array(rows, order="C")  # a copy, in which `stop` writes
     width = SCORES + len(form.metrics)
     scores = np.full((len(rows), width), np.nan)
@@ -82,7 +82,7 @@ def run_rows(
     def piece(part: slice) -> None:
         work = np.zeros(LANES * _work_size(form))
         arrays = rows[part], tables, work, scores[part], logs[part]
-        made(len(rows[part]), *map(address, arrays), logs[part].strides[0])
+        simulate(len(rows[part]), *map(address, arrays), logs[part].strides[0])
 
     def share() -> None:
         for part in parts:  # each thread takes the next piece that none has begun

@@ -138,7 +138,7 @@ class RowPlaces(NamedTuple):
     limits: int
     bands: int  # within which a channel has settled
     shares: int  # 2 % of the scale of a channel's group
-    known: int  # values of the plant, as the law knows them; as many as it has names
+    nominal: int  # values of the plant, as the law knows them; as many as it has names
     before: int  # and as they are until a jump
     after: int
     damping: int  # on bodies; this and `levels` only with frictions or in an implicit step
@@ -260,7 +260,7 @@ def _row_places(form: Form, row: Places) -> RowPlaces:
         limits=row.take(n),
         bands=row.take(n),
         shares=row.take(n),
-        known=row.take(values),
+        nominal=row.take(values),
         before=row.take(values),
         after=row.take(values),
         damping=row.take(form.bodies if form.rubs else 0),

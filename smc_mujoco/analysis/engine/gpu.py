@@ -63,19 +63,19 @@ def kernel(form: Form) -> Any:
             return
         row = cuda.local.array(row_size, float64)
         work = cuda.local.array(work_size, float64)
-        kept = cuda.local.array(score_size, float64)
+        own_scores = cuda.local.array(score_size, float64)
         for i in range(row_size):
             row[i] = rows[run, i]
         for i in range(score_size):
-            kept[i] = np.nan
+            own_scores[i] = np.nan
         view = View(_pointer(row), _pointer(tables), _pointer(work))
-        samples = start(view, _pointer(kept))
+        samples = start(view, _pointer(own_scores))
         for k in range(samples + 1):
-            take(view, _pointer(kept), _pointer(kept), k)
-            if kept[FAILURE] != UNDER_WAY:
+            take(view, _pointer(own_scores), _pointer(own_scores), k)
+            if own_scores[FAILURE] != UNDER_WAY:
                 break
         for i in range(score_size):
-            scores[run, i] = kept[i]
+            scores[run, i] = own_scores[i]
 
     return runs
 
@@ -127,17 +127,17 @@ def compiled_control(form: Form) -> Any:
 
 def run_rows(form: Form, rows: Array, tables: Array) -> Array:
     """Return the scores of runs, as `cpu.run` does."""
-    made = compiled(form)
+    simulate = compiled(form)
     width = SCORES + len(form.metrics)
     scores = np.full((len(rows), width), np.nan)
     points = cuda.to_device(tables)
     for first in range(0, len(rows), PIECE):
         piece = np.ascontiguousarray(rows[first : first + PIECE])
         part = cuda.to_device(piece)
-        found = cuda.device_array((len(part), scores.shape[1]))
+        on_device = cuda.device_array((len(part), scores.shape[1]))
         with warnings.catch_warnings():  # few runs leave the device half idle
             warnings.filterwarnings("ignore", message=".*Grid size")
             blocks = -(-len(part) // THREADS)
-            made[blocks, THREADS](part, points, found)
-        scores[first : first + PIECE] = found.copy_to_host()
+            simulate[blocks, THREADS](part, points, on_device)
+        scores[first : first + PIECE] = on_device.copy_to_host()
     return scores

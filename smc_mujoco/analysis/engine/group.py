@@ -79,8 +79,10 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
         != ("implicitfast" if steps_implicitly(s) else "RK4"),
     }
     for name in filter(holds, metrics):
-        told = f"{name} needs the force of friction or of a play on the joint, as a trace has it"
-        beyond[told] = steps_implicitly(s)
+        sentence = (
+            f"{name} needs the force of friction or of a play on the joint, as a trace has it"
+        )
+        beyond[sentence] = steps_implicitly(s)
     return first_of(beyond) or why_not_sampled(s, metrics, device)
 
 
@@ -131,22 +133,22 @@ def first_of(beyond: Mapping[str, bool]) -> str:
 
 def _users(s: Resolved) -> list[tuple[Any, int]]:
     """Return the functions of a run that are not this package's, each with its memory."""
-    found = []
+    functions = []
     for part in _components(s):
-        found.append((part.function, part.memory))
+        functions.append((part.function, part.memory))
     for signal in (*s.references, *s.disturbance, s.feedforward_signal, *s.noise.errors):
         if signal is not None:
-            found.append((type(signal).value, signal.memory))
+            functions.append((type(signal).value, signal.memory))
     for part in s.sensors:
-        found.append((part.read, part.memory))
+        functions.append((part.read, part.memory))
     for part in s.exact_parts:
-        found.append(part.written)
+        functions.append(part.written)
     for part in s.compensated:
-        found.append((part.steady, part.memory))
+        functions.append((part.steady, part.memory))
     for part in _held(s):
-        found.append((part.force, part.memory))
+        functions.append((part.force, part.memory))
     users = []
-    for function, memory in found:
+    for function, memory in functions:
         if not fingerprint.ours(function):
             users.append((function, memory))
     return users
@@ -188,26 +190,26 @@ def key(scenario: Scenario) -> Hashable:
 
 def _rotors(s: Resolved) -> tuple[int, ...]:
     """Return the channels whose drive turns a rotor."""
-    found = []
+    turning = []
     for i, chain in enumerate(s.drive_train.chains):
         if any(isinstance(part, BesideJoint) for part in chain):
-            found.append(i)
-    return tuple(found)
+            turning.append(i)
+    return tuple(turning)
 
 
 def form_of(s: Resolved, metrics: Sequence[str] = ()) -> Form:
     """Return the form of one run."""
-    every = tuple(range(s.plant.n))
+    all_channels = tuple(range(s.plant.n))
     drives = []
     for part in _drives(s):
-        drives.append(ChannelFunction(advanced, part.names, part.memory, every))
+        drives.append(ChannelFunction(advanced, part.names, part.memory, all_channels))
     sensors = []
     for part in s.sensors:
-        sensor = ChannelFunction(part.read, part.names, part.memory, every)
+        sensor = ChannelFunction(part.read, part.names, part.memory, all_channels)
         sensors.append(sensor)
     laws = []
     for law in s.law.of_channels(s.plant.driven):
-        laws.append(_part(law)._replace(channels=every if law.joint else ()))
+        laws.append(_part(law)._replace(channels=all_channels if law.joint else ()))
     frictions = [_on_channels(part, part.stage_force, s) for part in s.exact_parts]
     on_rotors = []
     for part in _held(s):
@@ -359,13 +361,13 @@ class FormGroup:
         """Return the metrics of every scenario, and the time of its failure, s, or None."""
         logs = not set(CYCLE).isdisjoint(self.form.metrics)
         runs = self._logged(threads) if logs else self.run(self.rows, threads, device)
-        found = []
+        scored = []
         for s, scores in zip(self.scenarios, runs, strict=True):
             time = None
             if scores[FAILURE] != FINE:
                 time = float(scores[FAILED_STEP] * s.physics_step)
-            found.append((scores[SCORES:].tolist(), time))
-        return found
+            scored.append((scores[SCORES:].tolist(), time))
+        return scored
 
     def _logged(self, threads: int | None) -> np.ndarray:
         """Return the scores of all runs, of which some at a time write a log for the metrics that
@@ -379,10 +381,10 @@ class FormGroup:
         size = max(1, LOG_NUMBERS // math.prod(shape))
         parts = []
         for first in range(0, len(rows), size):
-            some = rows[first : first + size]
-            logs = np.zeros((len(some), *shape))
-            scores = cpu.run_rows(self.form, some, self.tables, cores(threads), logs)
-            for run, row, log in zip(scores, some, logs, strict=True):
+            batch = rows[first : first + size]
+            logs = np.zeros((len(batch), *shape))
+            scores = cpu.run_rows(self.form, batch, self.tables, cores(threads), logs)
+            for run, row, log in zip(scores, batch, logs, strict=True):
                 if run[FAILURE] == FINE:
                     self._put_cycle(run, row, log)
             parts.append(scores)
@@ -391,30 +393,30 @@ class FormGroup:
     def _put_cycle(self, scores: np.ndarray, row: np.ndarray, log: np.ndarray) -> None:
         """Write the numbers of a run's limit cycle into its scores."""
         driven = log[: int(row[SETTING.samples]) + 1, : self.form.driven]
-        found = cycles(driven, int(row[SETTING.late]), float(row[SETTING.period]))
-        for name, value in zip(CYCLE, found, strict=True):
+        cycle = cycles(driven, int(row[SETTING.late]), float(row[SETTING.period]))
+        for name, value in zip(CYCLE, cycle, strict=True):
             if name in self.form.metrics:
                 scores[SCORES + self.form.metrics.index(name)] = value
 
     def _fill(self, row: np.ndarray, s: Resolved) -> None:
         row[: len(SETTING)] = _settings(s)
-        at = self.layout.row
-        _put(row, at.x0, s.x0)
-        _put(row, at.v0, s.v0)
-        _put(row, at.limits, s.limits)
+        places = self.layout.row
+        _put(row, places.x0, s.x0)
+        _put(row, places.v0, s.v0)
+        _put(row, places.limits, s.limits)
         scales = _scales(s)
         bands = np.array([settling_band(s, scale) for scale in scales])
-        _put(row, at.bands, bands)
-        _put(row, at.shares, SETTLING_BAND * scales)
-        _put(row, at.known, nominal_values(s))
+        _put(row, places.bands, bands)
+        _put(row, places.shares, SETTLING_BAND * scales)
+        _put(row, places.nominal, nominal_values(s))
         first = s.plant.values(s.factors(0))
-        _put(row, at.before, [*vars(first).values()])
+        _put(row, places.before, [*vars(first).values()])
         later = s.plant.values(s.factors(max(s.jump_step, 0)))
-        _put(row, at.after, [*vars(later).values()])
+        _put(row, places.after, [*vars(later).values()])
         if self.form.noise:
-            row[at.draw] = noise.drawing().address
+            row[places.draw] = noise.drawing().address
         if s.sensors:
-            _put(row, at.hinges, [unit == "rad" for unit in s.plant.units])
+            _put(row, places.hinges, [unit == "rad" for unit in s.plant.units])
         self._fill_law(row, s)
         self._fill_hardware(row, s)
         self._fill_signals(row, s)
@@ -424,10 +426,10 @@ class FormGroup:
         if self.layout.surface and s.surface:
             _put(row, self.layout.surface.numbers, s.surface.numbers(1))
         laws = s.law.of_channels(s.plant.driven)
-        for at, law in zip(self.layout.laws, laws, strict=True):
-            _put(row, at.numbers, law.numbers(self._columns))
-            if at.part.function is None:
-                row[at.address] = compile_component(law).address
+        for law_at, law in zip(self.layout.laws, laws, strict=True):
+            _put(row, law_at.numbers, law.numbers(self._columns))
+            if law_at.part.function is None:
+                row[law_at.address] = compile_component(law).address
 
     def _fill_hardware(self, row: np.ndarray, s: Resolved) -> None:
         parts: list[tuple[PartAt | None, Any]] = []
@@ -442,11 +444,11 @@ class FormGroup:
             parts += zip(self.layout.frictions, (*s.exact_parts, *on_joints), strict=True)
             parts += zip(self.layout.rotor_frictions, on_rotors, strict=True)
         parts += zip(self.layout.compensated, s.compensated, strict=True)
-        for at, part in parts:
-            assert at is not None  # one loop's scenarios have the same parts
+        for part_at, part in parts:
+            assert part_at is not None  # one loop's scenarios have the same parts
             names = len(part.names)
-            last = at.numbers + self.form.n * names
-            table = row[at.numbers : last].reshape(-1, names)
+            last = part_at.numbers + self.form.n * names
+            table = row[part_at.numbers : last].reshape(-1, names)
             channels = [*part.channels(s.plant)]
             table[channels] = part.numbers(run_of(s, part))
             if part.counted:
@@ -489,23 +491,23 @@ class FormGroup:
 
     def gain_columns(self, name: str) -> list[int]:
         """Return where a gain of the law is in a row: of every channel."""
-        found = []
-        for at in self.layout.laws:
-            place = at.part.names.index(name)
-            first = at.numbers + place * self._columns
-            found += range(first, first + self._columns)
-        return found
+        columns = []
+        for law_at in self.layout.laws:
+            place = law_at.part.names.index(name)
+            first = law_at.numbers + place * self._columns
+            columns += range(first, first + self._columns)
+        return columns
 
     def _fill_signals(self, row: np.ndarray, s: Resolved) -> None:
-        at = self.layout
-        self._fill_signal(row, at.feedforward, s.feedforward_signal)
-        for place, signal in zip(at.references, references(s), strict=True):
+        places = self.layout
+        self._fill_signal(row, places.feedforward, s.feedforward_signal)
+        for place, signal in zip(places.references, references(s), strict=True):
             self._fill_signal(row, place, signal)
-        for place, signal in zip(at.errors, s.noise.errors, strict=True):
+        for place, signal in zip(places.errors, s.noise.errors, strict=True):
             self._fill_signal(row, place, signal)
-        free = list(at.disturbances)
+        free = list(places.disturbances)
         for i, signal in enumerate(s.disturbance):
-            place = next(one for one in free if one.kind is type(signal))
+            place = next(candidate for candidate in free if candidate.kind is type(signal))
             free.remove(place)
             self._fill_signal(row, place, signal, s.noise_stream(i))
 

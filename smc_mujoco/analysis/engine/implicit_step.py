@@ -145,6 +145,6 @@ def _turning(form: Form, compile_user: Compiler) -> Any:
 def _rubbing(form: Form, frictions: Sequence[PartAt], compile_user: Compiler) -> Any:
     """Return a function (view, y, i) -> the force of frictions for the JointState of channel i."""
     total = always(0.0)
-    for at in reversed(frictions):
-        total = and_friction(at.part, total, acting(at, compile_user))
+    for part_at in reversed(frictions):
+        total = and_friction(part_at.part, total, acting(part_at, compile_user))
     return total

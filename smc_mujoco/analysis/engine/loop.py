@@ -123,7 +123,7 @@ def simulation(form: Form, compile_user: Compiler, noise: Any) -> Any:
 
 def moments(form: Form, compile_user: Compiler, noise: Any) -> Moments:
     """Return what a run of the form does at each moment."""
-    found = Moments(
+    of_form = Moments(
         **_records(form),
         **_sensing(form, compile_user),
         **_forces(form, compile_user),
@@ -138,8 +138,8 @@ def moments(form: Form, compile_user: Compiler, noise: Any) -> Moments:
         sums=form.rubs,
     )
     if form.joint:
-        return found._replace(ask=_asking_all(form, compile_user))
-    return found._replace(ask=asking(found, _asked(form, compile_user)))
+        return of_form._replace(ask=_asking_all(form, compile_user))
+    return of_form._replace(ask=asking(of_form, _asked(form, compile_user)))
 
 
 def _records(form: Form) -> Fields:
@@ -187,10 +187,10 @@ def remembering(form: Form) -> Any:
 
     @inlined
     def remember(view, step):
-        at = work_at.past + step % past * 2 * bodies
+        first = work_at.past + step % past * 2 * bodies
         for i in range(bodies):
-            view.work[at + i] = view.work[work_at.x + i]
-            view.work[at + bodies + i] = view.work[work_at.v + i]
+            view.work[first + i] = view.work[work_at.x + i]
+            view.work[first + bodies + i] = view.work[work_at.v + i]
 
     return remember
 
@@ -226,17 +226,17 @@ def _late_sensing(form: Form) -> Fields:
             time = reading(view, i, 0, t) * period
         # on CUDA, floor gives a float
         step = max(0, int(math.floor(time / h + 0.5)))  # noqa: RUF046
-        at = work_at.past + step % past * 2 * bodies + side(i)
-        return view.work[at], view.work[at + bodies]
+        place = work_at.past + step % past * 2 * bodies + side(i)
+        return view.work[place], view.work[place + bodies]
 
     return {"reading": reading, "sense": sense}
 
 
 def _sensing(form: Form, compile_user: Compiler) -> Fields:
     """Return the moments of sensors, their errors, and the estimator."""
-    at = layout(form)
-    row_at, work_at = at[:2]
-    estimator = estimating(at.estimator, compile_user)
+    places = layout(form)
+    row_at, work_at = places[:2]
+    estimator = estimating(places.estimator, compile_user)
     side = _siding(form)
 
     @inlined
@@ -249,20 +249,20 @@ def _sensing(form: Form, compile_user: Compiler) -> Fields:
         body = side(i)
         return view.work[work_at.x + body], view.work[work_at.v + body]
 
-    found: Fields = {
+    fields: Fields = {
         "errors": always((-0.0, -0.0)),  # which change no bit
         "sense": sense,
         "estimate": estimate,
     }
     if form.past:
-        found |= _late_sensing(form)
+        fields |= _late_sensing(form)
     if any(form.errors):
-        error_of_x, error_of_v = at.errors
+        error_of_x, error_of_v = places.errors
         of_x = signal(error_of_x, compile_user)
         of_v = signal(error_of_v, compile_user)
-        found["errors"] = inlined(lambda view, t: (of_x(view, t, 0)[0], of_v(view, t, 0)[0]))
-    if at.sensor:
-        sensor = acting(at.sensor, compile_user)
+        fields["errors"] = inlined(lambda view, t: (of_x(view, t, 0)[0], of_v(view, t, 0)[0]))
+    if places.sensor:
+        sensor = acting(places.sensor, compile_user)
         drops = form.drops
 
         @inlined
@@ -274,8 +274,8 @@ def _sensing(form: Form, compile_user: Compiler) -> Fields:
             x, v = sensor(view, sight, i)
             return False, x, v
 
-        found["read"] = read
-    return found
+        fields["read"] = read
+    return fields
 
 
 def _forces(form: Form, compile_user: Compiler) -> Fields:
@@ -322,8 +322,8 @@ def _disturbing(form: Form, compile_user: Compiler) -> Any:
         for i in range(driven):
             view.work[work_at.d + i] = 0.0
 
-    for at in layout(form).disturbances:
-        total = added(at, total, work_at.d, driven, compile_user)
+    for signal_at in layout(form).disturbances:
+        total = added(signal_at, total, work_at.d, driven, compile_user)
 
     @inlined
     def disturb(view, t, k):
@@ -356,8 +356,8 @@ def _compensating(form: Form, compile_user: Compiler) -> Any:
     refer = _referring(form, compile_user)
     row_at, work_at = layout(form)[:2]
     steady = always(0.0)
-    for at in layout(form).compensated:
-        steady = _with_steady(form, at, steady, compile_user)
+    for part_at in layout(form).compensated:
+        steady = _with_steady(form, part_at, steady, compile_user)
 
     @inlined
     def compensate(view, k, t, i):
@@ -373,34 +373,34 @@ def _compensating(form: Form, compile_user: Compiler) -> Any:
     return compensate
 
 
-def _with_steady(form: Form, at: PartAt, others: Any, compile_user: Compiler) -> Any:
+def _with_steady(form: Form, part_at: PartAt, inner: Any, compile_user: Compiler) -> Any:
     """Return a function (view, i, y) -> the force that a joint needs against a friction and
     others at a steady speed.
     """
-    force = acting(at, compile_user)
-    acts = tuple(i in at.part.channels for i in range(form.n))
+    force = acting(part_at, compile_user)
+    acts = tuple(i in part_at.part.channels for i in range(form.n))
 
     @inlined
     def total(view, i, y):
-        found = others(view, i, y)
+        needed = inner(view, i, y)
         if acts[i]:
-            found += force(view, y, i)
-        return found
+            needed += force(view, y, i)
+        return needed
 
     return total
 
 
 def _referring(form: Form, compile_user: Compiler) -> Any:
     """Return a function (view, t, i) -> reference of channel i with its rate and acceleration."""
-    return by_channel([signal(at, compile_user) for at in layout(form).references])
+    return by_channel([signal(signal_at, compile_user) for signal_at in layout(form).references])
 
 
 def _asked(form: Form, compile_user: Compiler) -> Asked:
     """Return what asks the law of one channel."""
-    at = layout(form)
+    places = layout(form)
     refer = _referring(form, compile_user)
     model = _modelling(form, compile_user)
-    laws = by_channel([law(form, one, compile_user) for one in at.laws])
+    laws = by_channel([law(form, law_at, compile_user) for law_at in places.laws])
 
     @inlined
     def motion(view, i, k, t):
@@ -412,17 +412,17 @@ def _asked(form: Form, compile_user: Compiler) -> Asked:
         f, g = model(view, i)
         return False, f, g
 
-    asked = Asked(
+    moments_of_law = Asked(
         partners=always(form.n > form.driven),
         knows=always(form.true_model),
         refer=motion,
         nominal=nominal,
         law=_answering(laws),
     )
-    if at.surface is None:
-        return asked
-    slide = _answering(acting(at.surface, compile_user))
-    return asked._replace(slides=always(True), slide=slide)
+    if places.surface is None:
+        return moments_of_law
+    slide = _answering(acting(places.surface, compile_user))
+    return moments_of_law._replace(slides=always(True), slide=slide)
 
 
 def _answering(function: Any) -> Any:
@@ -430,8 +430,8 @@ def _answering(function: Any) -> Any:
 
     @inlined
     def answer(view, i, y):
-        one, two = function(view, y, i)
-        return False, one, two
+        first, second = function(view, y, i)
+        return False, first, second
 
     return answer
 
@@ -447,7 +447,7 @@ def _modelling(form: Form, compile_user: Compiler) -> Any:
     def nominal(view, i):
         xs = array_in(view.work, work_at.seen_x, n)
         vs = array_in(view.work, work_at.seen_v, n)
-        return function(xs, vs, i, values(view.row, row_at.known))
+        return function(xs, vs, i, values(view.row, row_at.nominal))
 
     return nominal
 
@@ -490,7 +490,7 @@ def _measuring_all(form: Form, compile_user: Compiler) -> Any:
             work[work_at.measured + i] = 0.0
         address = place(work) + 8 * work_at.measured
         y = begin_measurement(address, t, settings.period, settings.uses_model, 0, n, driven)
-        known = values(row, row_at.known)
+        nominal_numbers = values(row, row_at.nominal)
         xs = array_in(work, work_at.seen_x, n)
         vs = array_in(work, work_at.seen_v, n)
         for i in range(n):
@@ -500,8 +500,8 @@ def _measuring_all(form: Form, compile_user: Compiler) -> Any:
             put_channel(y, i, xs[i], vs[i], a, row[row_at.limits + i], r, dr, ddr)
             y.M[i, i] = 1.0
             if settings.uses_model != 0.0:  # M is diagonal
-                f, g = nominal(xs, vs, i, known)
-                at_rest = nominal(xs, array_in(work, work_at.rest, n), i, known)[0]
+                f, g = nominal(xs, vs, i, nominal_numbers)
+                at_rest = nominal(xs, array_in(work, work_at.rest, n), i, nominal_numbers)[0]
                 y.M[i, i] = 1.0 / g
                 y.h[i] = -f / g
                 y.g[i] = -at_rest / g

@@ -46,14 +46,14 @@ def drawn_ahead(form: Form) -> Any:
     @inlined
     def noise(view, i, j):
         row, _, work = view
-        kept = first_place + LISTS + KEPT * i
+        list_at = first_place + LISTS + KEPT * i
         seed = row[SETTING.seed]
         first = j - j % AHEAD
-        if work[kept + 1] != first + 1.0 or work[kept] != seed:
+        if work[list_at + 1] != first + 1.0 or work[list_at] != seed:
             call(int(row[address]), int(seed), i, first, place(work) + 8 * first_place)
-            work[kept] = seed
-            work[kept + 1] = first + 1.0
-        pair = kept + 2 + 2 * (j - first)
+            work[list_at] = seed
+            work[list_at + 1] = first + 1.0
+        pair = list_at + 2 + 2 * (j - first)
         return work[pair], work[pair + 1]
 
     return noise
@@ -80,7 +80,7 @@ def _draw(seed, channel, first, state):
         lists[ends[eighth]] = m
         ends[eighth] += 1
     for eighth in range(EIGHTHS):
-        for at in range(eighth * AHEAD, ends[eighth]):
-            m = lists[at]
+        for entry in range(eighth * AHEAD, ends[eighth]):
+            m = lists[entry]
             pairs[2 * m], pairs[2 * m + 1] = philox.cartesian(pairs[2 * m], pairs[2 * m + 1])
     return 0

@@ -61,12 +61,12 @@ def taking(n: int, reach: int, now: int, first: int) -> Any:
             distance = max(distance, abs(e), abs(v))
             work[LARGEST_U] = max(work[LARGEST_U], abs(sample.u))
             for j, value in enumerate((sample.x, sample.v, sample.u)):
-                at = SIGNALS * i + j
+                place = SIGNALS * i + j
                 if k == late:
-                    work[LOW + at] = value
-                    work[HIGH + at] = value
-                work[LOW + at] = min(work[LOW + at], value)
-                work[HIGH + at] = max(work[HIGH + at], value)
+                    work[LOW + place] = value
+                    work[HIGH + place] = value
+                work[LOW + place] = min(work[LOW + place], value)
+                work[HIGH + place] = max(work[HIGH + place], value)
         if k == 0:
             work[START] = square
         # the first parts have a sample more than the others, as in numpy's array_split

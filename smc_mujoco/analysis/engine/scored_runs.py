@@ -75,7 +75,7 @@ class ScoredRuns:
         self, cases: Sequence[Scenario], report: Report = lambda steps: None
     ) -> list[Scored]:
         """Return the scores of scenarios, in their order."""
-        found: list[Scored] = [([], None)] * len(cases)
+        results: list[Scored] = [([], None)] * len(cases)
         members: dict[Any, list[int]] = {}
         for i, case in enumerate(cases):
             kind, why = self._kind(case)
@@ -83,30 +83,30 @@ class ScoredRuns:
                 self.refused[why] += 1
             members.setdefault(kind and (kind, kind.key_of(case)), []).append(i)
         for key, indices in self._large_enough(members).items():
-            some = [cases[i] for i in indices]
+            batch = [cases[i] for i in indices]
             if key is None:
-                scored = self.by_mujoco(some, report)
+                scored = self.by_mujoco(batch, report)
             else:
-                known = self.forms.get(key, [])
-                made = key[0](some, tuple(self.formulas), known)
-                self.forms[key] = [made.form]
-                scored = made.scored(self.device, self.threads)
-                report(sum(case.work for case in some))
-                self._take(some, scored)
+                forms_of_kind = self.forms.get(key, [])
+                group = key[0](batch, tuple(self.formulas), forms_of_kind)
+                self.forms[key] = [group.form]
+                scored = group.scored(self.device, self.threads)
+                report(sum(case.work for case in batch))
+                self._take(batch, scored)
             for i, scores in zip(indices, scored, strict=True):
-                found[i] = scores
-        return found
+                results[i] = scores
+        return results
 
     def _large_enough(self, members: dict[Any, list[int]]) -> dict[Any, list[int]]:
         """Return groups of runs, in which those that are too few for their kind are MuJoCo's."""
-        kept: dict[Any, list[int]] = {}
+        large: dict[Any, list[int]] = {}
         for key, indices in members.items():
             if key is not None and len(indices) < key[0].least:
                 self.refused[f"they are fewer than {key[0].least} of one model"] += len(indices)
-                kept.setdefault(None, []).extend(indices)
+                large.setdefault(None, []).extend(indices)
             else:
-                kept.setdefault(key, []).extend(indices)
-        return kept
+                large.setdefault(key, []).extend(indices)
+        return large
 
     def covers(self, case: Scenario) -> bool:
         """Return whether the fast engine can run a scenario."""
@@ -135,15 +135,15 @@ class ScoredRuns:
         self, cases: Sequence[Scenario], report: Report = lambda steps: None
     ) -> list[Scored]:
         """Return the same, by MuJoCo alone."""
-        found: list[Scored] = [([], None)] * len(cases)
+        results: list[Scored] = [([], None)] * len(cases)
         for i, trace in stream(cases, self.threads, report):
             values = [math.nan] * len(self.formulas)
             if trace.diverged_at is None:
                 values = [formula(trace) for formula in self.formulas.values()]
             elif trace.broken:
                 self.broken.setdefault(trace.scenario.law.name, trace.broken)
-            found[i] = values, trace.diverged_at
-        return found
+            results[i] = values, trace.diverged_at
+        return results
 
     def _take(self, cases: Sequence[Scenario], scored: Iterable[Scored]) -> None:
         """Draw runs evenly from all, see J. S. Vitter, ACM Trans. Math. Softw. 11:37, 1985,
@@ -162,7 +162,7 @@ class ScoredRuns:
 
         Warn of laws that fail in these, or in MuJoCo's own.
         """
-        others = self.by_mujoco([case for case, _ in self.drawn])
+        by_mujoco = self.by_mujoco([case for case, _ in self.drawn])
         warn_of_broken(self.broken)
         refused = []
         for why, n in self.refused.items():
@@ -171,13 +171,13 @@ class ScoredRuns:
             return "; ".join(refused)
         apart = dict.fromkeys(self.formulas, 0.0)
         failed = 0  # in one of the two
-        for (_, (ours, time)), (theirs, other_time) in zip(self.drawn, others, strict=True):
+        for (_, (ours, time)), (theirs, other_time) in zip(self.drawn, by_mujoco, strict=True):
             if (time is None) != (other_time is None):
                 failed += 1
             elif time is None:
-                for name, value, other in zip(apart, ours, theirs, strict=True):
-                    if value != other and not (math.isnan(value) and math.isnan(other)):
-                        apart[name] = max(apart[name], abs(value - other))
+                for name, value, their_value in zip(apart, ours, theirs, strict=True):
+                    if value != their_value and not (math.isnan(value) and math.isnan(their_value)):
+                        apart[name] = max(apart[name], abs(value - their_value))
         parts = []
         for name, value in apart.items():
             parts.append(f"{value:.1g} in {name}")

@@ -82,15 +82,15 @@ def tallying(form: Form) -> Any:
     """
     work_at = layout(form).work
     metrics = []
-    for name, at in zip(form.metrics, layout(form).metrics, strict=True):
+    for name, first in zip(form.metrics, layout(form).metrics, strict=True):
         if fold := _fold(name):
             n = form.n if CATALOGUE[name].shared else form.driven
             samples = Samples(n, work_at.now, work_at.before)
-            metrics.append(folding(fold, samples, at))
+            metrics.append(folding(fold, samples, first))
         elif name in CYCLE:
             metrics.append((always(None), always(math.nan)))
         else:
-            metrics.append(WRITTEN_OUT[name](form, at))
+            metrics.append(WRITTEN_OUT[name](form, first))
     return _together(metrics)
 
 
@@ -242,13 +242,13 @@ def _worst(fold: Fold, n: int, value: Any, at: int) -> tuple[Any, Any]:
         steps = row[SETTING.samples] - first(row)
         worst = 0.0
         for i in range(n):
-            found = work[at + i]
+            total = work[at + i]
             if ranges:
-                found -= work[at + n + i]
+                total -= work[at + n + i]
             if mean:
-                found /= steps + 1.0
-                found = math.sqrt(found) if root else abs(found)
-            worst = max(worst, found)
+                total /= steps + 1.0
+                total = math.sqrt(total) if root else abs(total)
+            worst = max(worst, total)
         if rate and steps > 0.0:
             worst /= steps * row[SETTING.period]
         return worst

@@ -84,11 +84,11 @@ def flank_force(joint, rotor, apart, half_gap, h):
         for body, sign in ((rotor, side), (joint, -side)):
             press = sign * _yields(body, way, h)
             if low < press < high:
-                found = _lacks(joint, rotor, push, press, side, h)
-                if found < 0.0:
-                    low, below = press, found
+                lack = _lacks(joint, rotor, push, press, side, h)
+                if lack < 0.0:
+                    low, below = press, lack
                 else:
-                    high, above = press, found
+                    high, above = press, lack
     if high == math.inf:
         return side * (low - below * IMPEDANCE / (joint.mobility + rotor.mobility))
     return side * (low - below * (high - low) / (above - below))

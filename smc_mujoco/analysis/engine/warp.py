@@ -110,12 +110,12 @@ def run_rows(runs: WorldRuns, rows: Array, device: str = "cuda") -> Array:
     """
     rows = np.ascontiguousarray(rows)
     members = np.arange(len(rows)) % len(runs.scenarios)
-    found = []
+    scores_by_piece = []
     with warp.ScopedDevice(device):
         for first in range(0, len(rows), PIECE):
             piece = slice(first, first + PIECE)
-            found.append(_run(runs, rows[piece], members[piece]))
-    return np.concatenate(found)
+            scores_by_piece.append(_run(runs, rows[piece], members[piece]))
+    return np.concatenate(scores_by_piece)
 
 
 def _run(runs: WorldRuns, rows: Array, members: Array) -> Array:
@@ -142,23 +142,23 @@ def values_of(runs: WorldRuns) -> dict[str, Array]:
     base = runs.model
     model = copy.copy(base)
     data = mujoco.MjData(model)
-    each = [field_values(base, s, 0) for s in runs.scenarios]
+    values_by_scenario = [field_values(base, s, 0) for s in runs.scenarios]
     names = set()
-    for values in each:
+    for values in values_by_scenario:
         for name in values:
             if not _of_sensors(name):
                 names.add(name)
     if not names:
         return {}
-    found: dict[str, list[Array]] = {name: [] for name in sorted(names.union(DERIVED))}
-    for values in each:
+    arrays: dict[str, list[Array]] = {name: [] for name in sorted(names.union(DERIVED))}
+    for values in values_by_scenario:
         for name in names:
             values_of_field = values.get(name, field_array(base, name))
             field_array(model, name)[:] = values_of_field
         mujoco.mj_setConst(model, data)
-        for name, of_each in found.items():
+        for name, of_each in arrays.items():
             of_each.append(field_array(model, name).copy())
-    return {name: np.array(of_each) for name, of_each in found.items()}
+    return {name: np.array(of_each) for name, of_each in arrays.items()}
 
 
 def worlds_of(

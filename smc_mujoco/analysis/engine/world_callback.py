@@ -78,15 +78,15 @@ class WorldRuns(NamedTuple):
         """Return the states at which the worlds of rows start, (worlds, nq) and (worlds, nv), given
         the model's.
         """
-        at = world_places(self.form)[0]
+        places = world_places(self.form)[0]
         of_row = layout(self.form).row
         n = self.form.n
-        found = []
-        for state, place, start in ((qpos, at.qpos, of_row.x0), (qvel, at.qvel, of_row.v0)):
+        pair = []
+        for state, place, start in ((qpos, places.qpos, of_row.x0), (qvel, places.qvel, of_row.v0)):
             states = np.tile(state, (len(rows), 1))
             states[:, rows[0, place : place + n].astype(int)] = rows[:, start : start + n]
-            found.append(states)
-        return found[0], found[1]
+            pair.append(states)
+        return pair[0], pair[1]
 
 
 @functools.cache
@@ -126,7 +126,7 @@ def controlling(form: Form, compile_user: Compiler) -> Any:
     act = _acting(form)
     release = _releasing(form)
     n = form.n
-    at = world_places(form)[0]
+    places = world_places(form)[0]
     work_at = layout(form).work
     called = layout(form).work_size
 
@@ -138,15 +138,15 @@ def controlling(form: Form, compile_user: Compiler) -> Any:
             return
         count = int(work[called])
         work[called] = count + 1.0
-        calls = int(row[at.calls])
+        calls = int(row[places.calls])
         step = count // calls
         stage = count - step * calls
         steps = int(row[SETTING.steps])
         k = step // steps
         within = step - k * steps
         for i in range(n):
-            work[work_at.x + i] = world.qpos[int(row[at.qpos + i])]
-            work[work_at.v + i] = world.qvel[int(row[at.qvel + i])]
+            work[work_at.x + i] = world.qpos[int(row[places.qpos + i])]
+            work[work_at.v + i] = world.qvel[int(row[places.qvel + i])]
         if stage == 0:
             if within == 0 and k > 0:  # at the end of its period: a sample may come late
                 record(view, scores, scores, k - 1)
@@ -170,7 +170,7 @@ def _acting(form: Form) -> Any:
     driven = form.driven
     disturbed = bool(form.disturbances)
     drive = driving(form)
-    at = world_places(form)[0]
+    places = world_places(form)[0]
     work_at = layout(form).work
 
     @inlined
@@ -178,9 +178,9 @@ def _acting(form: Form) -> Any:
         row, _, work = view
         for i in range(driven):
             u = drive(view, i, stage)
-            world.ctrl[int(row[at.ctrl + i])] = row[at.scale + i] * u
+            world.ctrl[int(row[places.ctrl + i])] = row[places.scale + i] * u
             if disturbed:
-                world.qfrc_applied[int(row[at.qvel + i])] = work[work_at.d + i]
+                world.qfrc_applied[int(row[places.qvel + i])] = work[work_at.d + i]
 
     return act
 
@@ -188,13 +188,13 @@ def _acting(form: Form) -> Any:
 def _releasing(form: Form) -> Any:
     """Return a function (view, world): let nothing act any more."""
     driven = form.driven
-    at = world_places(form)[0]
+    places = world_places(form)[0]
 
     @inlined
     def release(view, world):
         for i in range(driven):
-            world.ctrl[int(view.row[at.ctrl + i])] = 0.0
-            world.qfrc_applied[int(view.row[at.qvel + i])] = 0.0
+            world.ctrl[int(view.row[places.ctrl + i])] = 0.0
+            world.qfrc_applied[int(view.row[places.qvel + i])] = 0.0
 
     return release
 
@@ -220,10 +220,10 @@ def compiled(form: Form) -> Any:
                 pointer(ctrl + 8 * nu * i),
                 pointer(qfrc_applied + 8 * nv * i),
             )
-            kept = pointer(scores + score_bytes * i)
+            scores_of_world = pointer(scores + score_bytes * i)
             try:
-                control(view, kept, world)
+                control(view, scores_of_world, world)
             except Exception:
-                kept[FAILURE] = RAISED
+                scores_of_world[FAILURE] = RAISED
 
     return compiled_once(worlds)

@@ -65,15 +65,15 @@ class WorldGroup(FormGroup):
         self.mechanism = mechanism(scenarios[0])
         for scenario in scenarios:
             check_start(self.mechanism, scenario)
-        at, size = world_places(self.form)
+        places, size = world_places(self.form)
         rows = np.zeros((len(scenarios), size))
         rows[:, : self.layout.row_size] = self.rows
         for row, s in zip(rows, self.scenarios, strict=True):
-            row[at.calls] = calls_in_step(self.form, s)
+            row[places.calls] = calls_in_step(self.form, s)
             for name in ("qpos", "qvel", "ctrl"):
-                first = getattr(at, name)
+                first = getattr(places, name)
                 row[first : first + s.plant.n] = self.mechanism.channels[name]
-            row[at.scale : at.scale + s.plant.driven] = s.drive_train.scales
+            row[places.scale : places.scale + s.plant.driven] = s.drive_train.scales
         self.rows = rows
 
     @property

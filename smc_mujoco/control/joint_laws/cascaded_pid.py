@@ -118,8 +118,8 @@ def cascaded_pid(y, gains, memory):
             else (gains.Pz, gains.Iz, gains.Pvz, gains.Ivz)
         )
         memory[i, 0] = _integrated(memory[i, 0], -y.e[i], y.dt, gains.speed / I if I > 0.0 else 0.0)
-        wanted = min(max(I * memory[i, 0] - P * y.e[i], -gains.speed), gains.speed)
-        s[i] = y.v[i] - wanted
+        speed = min(max(I * memory[i, 0] - P * y.e[i], -gains.speed), gains.speed)
+        s[i] = y.v[i] - speed
         memory[i, 1] = _integrated(
             memory[i, 1], -s[i], y.dt, gravity * slope / Iv if Iv > 0.0 else 0.0
         )

@@ -46,10 +46,10 @@ from smc_mujoco.control.units import ASSUMED_B, RATE, Gain
     relative_degree=2,
 )
 def adrc(y, gains, memory):
-    b, known = assumed(y, gains.b)
+    b, f = assumed(y, gains.b)
     l1, l2, l3 = corrections(gains.w, y.dt)
     d = observe(y, l1, l2, l3, memory)
     s = gains.wc * gains.wc * memory[1] + 2.0 * gains.wc * memory[2]
-    u = -(s + d + known) / b
-    memory[4] = b * clipped(y, u) + known
+    u = -(s + d + f) / b
+    memory[4] = b * clipped(y, u) + f
     return u, s

@@ -36,15 +36,15 @@ from smc_mujoco.control.units import ACCELERATION, ASSUMED_B, RATE, SLOPE, Gain
     memory=4,
 )
 def disturbance_observer(y, gains, memory):
-    b, known = assumed(y, gains.b)
+    b, f = assumed(y, gains.b)
     if (
         memory[0] != 0.0
     ):  # memory: started, d^, last de, the acceleration b u + f - r'' of the last period
         acceleration = (y.de - memory[2]) / y.dt
         memory[1] += (1.0 - math.exp(-gains.l * y.dt)) * (acceleration - memory[3] - memory[1])
     s, v_eq = sliding(y, gains.c)
-    u = (v_eq - gains.k * sgn(s) - memory[1] - known) / b
+    u = (v_eq - gains.k * sgn(s) - memory[1] - f) / b
     memory[0] = 1.0
     memory[2] = y.de
-    memory[3] = b * clipped(y, u) + known
+    memory[3] = b * clipped(y, u) + f
     return u, s

@@ -78,10 +78,10 @@ def observe(y, l1, l2, l3, memory):
     relative_degree=2,
 )
 def extended_state(y, gains, memory):
-    b, known = assumed(y, gains.b)
+    b, f = assumed(y, gains.b)
     l1, l2, l3 = corrections(gains.w, y.dt)
     d = observe(y, l1, l2, l3, memory)
     s = y.de + gains.c * y.e
-    u = (-gains.k * sgn(s) - gains.c * y.de - d - known) / b
-    memory[4] = b * clipped(y, u) + known
+    u = (-gains.k * sgn(s) - gains.c * y.de - d - f) / b
+    memory[4] = b * clipped(y, u) + f
     return u, s

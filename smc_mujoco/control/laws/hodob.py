@@ -50,15 +50,15 @@ from smc_mujoco.control.units import ASSUMED_B, RATE, Gain
 def hodob(y, gains, memory):
     # memory: started, the last rate, the known acceleration of the last period, z of the next
     # period, and r dt
-    b, known = assumed(y, gains.b)
+    b, f = assumed(y, gains.b)
     if memory[0] != 0.0:
         pole = math.exp(-gains.l * y.dt)
         miss = (y.de - memory[1]) / y.dt - memory[2] - memory[3]
         memory[4] += (1.0 - pole) * (1.0 - pole) * miss
         memory[3] += memory[4] + (1.0 - pole * pole) * miss
     s = gains.wc * gains.wc * y.e + 2.0 * gains.wc * y.de
-    u = -(s + memory[3] + known) / b
+    u = -(s + memory[3] + f) / b
     memory[0] = 1.0
     memory[1] = y.de
-    memory[2] = b * clipped(y, u) + known
+    memory[2] = b * clipped(y, u) + f
     return u, s

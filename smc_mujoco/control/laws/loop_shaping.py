@@ -210,7 +210,7 @@ def observe(v, e, n0, n1, memory):
     x2 = memory[3]
     x3 = memory[4]
     for i in range(3):
-        kept = (
+        free = (
             memory[PHI + 3 * i] * x1 + memory[PHI + 3 * i + 1] * x2 + memory[PHI + 3 * i + 2] * x3
         )
         driven = (
@@ -218,7 +218,7 @@ def observe(v, e, n0, n1, memory):
             + memory[GAMMA + 3 * i + 1] * q2
             + memory[GAMMA + 3 * i + 2] * q3
         )
-        memory[2 + i] = kept + driven
+        memory[2 + i] = free + driven
     return memory[4]
 
 

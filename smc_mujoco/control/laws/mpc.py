@@ -280,14 +280,14 @@ def move(n, share, low, high, memory):
     """Write how a share of the step changes the moves, each clipped to its bounds. Return whether
     none is clipped.
     """
-    whole = True
+    unclipped = True
     for i in range(n):
         v = memory[PLAN + ROW * i]
-        wanted = memory[PLAN + ROW * i] + share * memory[STEP + i]
-        memory[MOVED + i] = min(max(wanted, low), high) - v
-        if wanted < low or wanted > high:
-            whole = False
-    return whole
+        unbounded = memory[PLAN + ROW * i] + share * memory[STEP + i]
+        memory[MOVED + i] = min(max(unbounded, low), high) - v
+        if unbounded < low or unbounded > high:
+            unclipped = False
+    return unclipped
 
 
 @njit
@@ -318,18 +318,18 @@ def advance(n, low, high, memory):
 
 
 @njit
-def solve(n, e, de, low, high, kept, memory):
+def solve(n, e, de, low, high, factor, memory):
     """Solve for the plan from a multiple of the last one, and return its `residual`."""
     for i in range(n):
-        memory[PLAN + ROW * i] = min(max(kept * memory[PLAN + ROW * i], low), high)
-    left = residual(n, e, de, low, high, memory)
+        memory[PLAN + ROW * i] = min(max(factor * memory[PLAN + ROW * i], low), high)
+    error = residual(n, e, de, low, high, memory)
     for _ in range(MOST_STEPS):
-        if left <= ENOUGH:
+        if error <= ENOUGH:
             break
         if advance(n, low, high, memory) == 0.0:
             break
-        left = residual(n, e, de, low, high, memory)
-    return left
+        error = residual(n, e, de, low, high, memory)
+    return error
 
 
 @njit
@@ -394,21 +394,21 @@ def recall(n, e, de, middle, reach, memory):
     At the end a free move is at a bound, or the gradient of a held one is 0; below 0, a move is
     beyond.
     """
-    left = UNBOUNDED
+    margin = UNBOUNDED
     for i in range(n):
         value = tabulated(i, e, de, middle, reach, memory)
         side = memory[SIDE + ROW * i]
         if side == 0.0:
             memory[PLAN + ROW * i] = min(max(value, middle - reach), middle + reach)
-            left = min(left, reach - abs(value - middle))
+            margin = min(margin, reach - abs(value - middle))
         else:
             memory[PLAN + ROW * i] = middle + side * reach
-            left = min(left, -side * value)
+            margin = min(margin, -side * value)
     memory[AT_E] = e
     memory[AT_DE] = de
     memory[AT_MIDDLE] = middle
     memory[AT_REACH] = reach
-    return left
+    return margin
 
 
 @njit
@@ -427,8 +427,8 @@ def planned(n, e, de, middle, reach, memory):
     """Write the best plan: the tabulated one, or else a new one, which is then tabulated. Return
     its `recall`.
     """
-    left = recall(n, e, de, middle, reach, memory)
-    if left < 0.0:
+    margin = recall(n, e, de, middle, reach, memory)
+    if margin < 0.0:
         low = middle - reach
         high = middle + reach
         if (
@@ -436,7 +436,7 @@ def planned(n, e, de, middle, reach, memory):
         ):  # bounds cut the steps short: the state is far from the last
             solve(n, e, de, low, high, 0.0, memory)
         tabulate(n, low, high, memory)
-    return left
+    return margin
 
 
 @law_function(

@@ -37,8 +37,8 @@ from smc_mujoco.control.units import OBSERVER_FREE, RATE2, Gain
 )
 def observer_free_integral(y, gains, memory):
     s, v_eq = sliding(y, gains.k1)
-    whole = s + gains.ki * memory[0]
-    u = command(y, v_eq - y.model * gains.ki * y.e - gains.lam * math.tanh(whole))
-    if (abs(whole) <= 2.0 and abs(u) <= y.limit) or y.e * whole < 0.0:
+    sigma = s + gains.ki * memory[0]
+    u = command(y, v_eq - y.model * gains.ki * y.e - gains.lam * math.tanh(sigma))
+    if (abs(sigma) <= 2.0 and abs(u) <= y.limit) or y.e * sigma < 0.0:
         memory[0] += y.dt * y.e
-    return u, whole
+    return u, sigma

@@ -49,14 +49,14 @@ from smc_mujoco.control.units import ASSUMED_B, RATE, Gain
 )
 def pd_observer(y, gains, memory):
     # memory: started, the last rate, the known acceleration of the last period, and z
-    b, known = assumed(y, gains.b)
+    b, f = assumed(y, gains.b)
     if memory[0] != 0.0:
         memory[3] += (1.0 - math.exp(-gains.l * y.dt)) * (
             (y.de - memory[1]) / y.dt - memory[2] - memory[3]
         )
     s = gains.wc * gains.wc * y.e + 2.0 * gains.wc * y.de
-    u = -(s + memory[3] + known) / b
+    u = -(s + memory[3] + f) / b
     memory[0] = 1.0
     memory[1] = y.de
-    memory[2] = b * clipped(y, u) + known
+    memory[2] = b * clipped(y, u) + f
     return u, s

@@ -207,7 +207,7 @@ def _bounds(u_max: float | Sequence[float], joints: int) -> Floats:
         raise ScenarioError(
             f"u_max has {len(u_max)} values for {joints} joints: give one, or {joints}"
         )
-    return Each(one=BOUND)("u_max", u_max)
+    return Each(item=BOUND)("u_max", u_max)
 
 
 def _files(exported: ExportedLaw, identifier: str) -> dict[str, str]:

@@ -133,18 +133,18 @@ def coerce(channels: object) -> Pairs:
 
 def as_text(joint: str, channel: Channel) -> str:
     """Return a channel as on the command line, such as "lift(motor,x0=0.2)"."""
-    given = []
+    options = []
     for field in dataclasses.fields(channel):
         value = getattr(channel, field.name)
         if field.name in SUGGESTED or value in (None, False, field.default):
             continue
         if value is True:
-            given.append(field.name)
+            options.append(field.name)
         else:
             text = value if isinstance(value, str) else format(value, "g")
-            given.append(f"{field.name}={text}")
-    if given:
-        return f"{joint}({','.join(given)})"
+            options.append(f"{field.name}={text}")
+    if options:
+        return f"{joint}({','.join(options)})"
     return joint
 
 
@@ -162,9 +162,9 @@ def joints_of(channels: Pairs) -> list[str]:
 def channel(joint: object, value: object) -> Channel:
     """Coerce a Channel, a dict of its fields, or None to a Channel."""
     if isinstance(value, Mapping):
-        known = {field.name: None for field in dataclasses.fields(Channel)}
+        fields = {field.name: None for field in dataclasses.fields(Channel)}
         for key in value:
-            find("field of a Channel", key, known)
+            find("field of a Channel", key, fields)
     coerced = value
     if value is None:
         coerced = Channel()
@@ -262,17 +262,17 @@ def measured_joints(
     """Return the names of the joints that are measured beside the channels; "base" is the model's
     only free joint.
     """
-    given = items_of("measured", measured)
-    if not all(isinstance(name, str) for name in given):
+    measured_names = items_of("measured", measured)
+    if not all(isinstance(name, str) for name in measured_names):
         raise ScenarioError(
-            f"measured is {shown(given)}: give joints' names, such as ['pole', 'base']"
+            f"measured is {shown(measured_names)}: give joints' names, such as ['pole', 'base']"
         )
     names = _joint_names(model)
     places = np.flatnonzero(model.jnt_type == FREE)
     free = [names[i] for i in places]
     taken = joints_of(channels)
     joints = []
-    for name in given:
+    for name in measured_names:
         joint = name
         if name == "base" and name not in names and len(free) == 1:
             joint = free[0]
@@ -356,8 +356,8 @@ def ranges(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Range, ...]:
             high = math.inf
         rows.append((joint.name, float(low), float(high)))
     flags = mujoco.mjtDisableBit
-    both = flags.mjDSBL_LIMIT.value | flags.mjDSBL_CONSTRAINT.value
-    off = model.opt.disableflags & both
+    limits_and_constraints = flags.mjDSBL_LIMIT.value | flags.mjDSBL_CONSTRAINT.value
+    off = model.opt.disableflags & limits_and_constraints
     if off or not any(math.isfinite(low) for _, low, _ in rows):
         return ()
     return tuple(rows)
@@ -393,10 +393,10 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> Floats:
     plain = (NO_DYNAMICS, mujoco.mjtDyn.mjDYN_FILTER.value, mujoco.mjtDyn.mjDYN_FILTEREXACT.value)
     for i in drives:
         name = model.actuator(i).name or f"number {i}"
-        known = model.actuator_dyntype[i] in plain and model.actuator_trnid[i, 1] < 0
-        known = known and not model.actuator_delay[i]
+        is_force = model.actuator_dyntype[i] in plain and model.actuator_trnid[i, 1] < 0
+        is_force = is_force and not model.actuator_delay[i]
         if (
-            not known
+            not is_force
             or model.actuator_gaintype[i] != FIXED
             or model.actuator_biastype[i] != NO_BIAS
         ):
@@ -503,7 +503,7 @@ class Motor(NamedTuple):
     limit: float  # bound on its force, N m or N
     replaced: tuple[int, ...]  # indices of the actuators that it replaces
     # of the file, as they are: its delay, and what takes another command than a force
-    kept: tuple[Actuator, ...] = ()
+    of_file: tuple[Actuator, ...] = ()
 
 
 def motor_of(
@@ -668,27 +668,27 @@ def add_motors(spec: mujoco.MjSpec, motors: Sequence[Motor]) -> None:
         else:
             actuator.name = f"{PASSIVE}smc:{i}"  # no joint has this name
     for motor in motors:  # named after joints: names of actuators may be missing
-        made = add_motor(spec, f"u:{motor.joint}", motor.joint)
+        actuator_added = add_motor(spec, f"u:{motor.joint}", motor.joint)
         limit = motor.limit if math.isfinite(motor.limit) else 0.0
-        made.forcelimited = limit > 0.0
-        made.forcerange = (-limit, limit)
+        actuator_added.forcelimited = limit > 0.0
+        actuator_added.forcerange = (-limit, limit)
 
 
 def add_motor(spec: mujoco.MjSpec, name: str, joint: str) -> mujoco.MjsActuator:
     """Add a motor of gear 1 without bounds to a joint, whatever the model's defaults are."""
-    made = spec.add_actuator(name=name, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-    made.set_to_motor()
-    made.gear = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    made.ctrllimited = False
-    made.forcelimited = False
-    made.ctrlrange = (0.0, 0.0)
-    made.forcerange = (0.0, 0.0)
-    made.armature = 0.0
-    made.damping = (0.0, 0.0, 0.0)
-    made.delay = 0.0
-    made.nsample = 0
-    made.group = MOTOR_GROUP
-    return made
+    motor = spec.add_actuator(name=name, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    motor.set_to_motor()
+    motor.gear = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    motor.ctrllimited = False
+    motor.forcelimited = False
+    motor.ctrlrange = (0.0, 0.0)
+    motor.forcerange = (0.0, 0.0)
+    motor.armature = 0.0
+    motor.damping = (0.0, 0.0, 0.0)
+    motor.delay = 0.0
+    motor.nsample = 0
+    motor.group = MOTOR_GROUP
+    return motor
 
 
 def goals(

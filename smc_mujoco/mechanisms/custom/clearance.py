@@ -71,21 +71,21 @@ def deepest(
     """
     moved = _moved(plant, model)
     counts = np.full(model.nbody, True) if ground else model.body_weldid != 0
-    found = Overlap()
+    overlap = Overlap()
     for contact in data.contact:
         geoms = contact.geom.tolist()
         bodies = model.geom_bodyid[geoms]
         if min(geoms) < 0 or not counts[bodies].all():
             continue
         meets = moved[bodies[0]] != moved[bodies[1]]
-        if meets and -contact.dist > found.depth:
+        if meets and -contact.dist > overlap.depth:
             names = tuple(map(model.body, bodies.tolist()))
             named = []
             for i, body in zip(geoms, names, strict=True):
                 named.append(model.geom(i).name or body.name or f"geom {i}")
             owners = tuple(body.name for body in names)
-            found = Overlap(-contact.dist, tuple(named), owners)
-    return found
+            overlap = Overlap(-contact.dist, tuple(named), owners)
+    return overlap
 
 
 def _moved(plant: Plant, model: mujoco.MjModel) -> Array:

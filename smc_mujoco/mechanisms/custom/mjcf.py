@@ -112,8 +112,8 @@ class ModelSource:
                 spec = mujoco.MjSpec.from_string(
                     self.text, include=included or None, assets=dict(self.assets)
                 )
-            elif made := urdf.read(Path(self.path)):
-                spec = made.spec()
+            elif from_urdf := urdf.read(Path(self.path)):
+                spec = from_urdf.spec()
             else:
                 spec = mujoco.MjSpec.from_file(self.path)
         except ValueError as error:
@@ -142,14 +142,14 @@ def _forget_defaults(spec: mujoco.MjSpec) -> None:
     add to it takes none of them.
     """
     fresh = mujoco.MjSpec()
-    classes = {found.name: found for found in (body.classname for body in spec.bodies)}
-    for found in (spec.default, *classes.values()):
+    classes = {default.name: default for default in (body.classname for body in spec.bodies)}
+    for default in (spec.default, *classes.values()):
         for kind in ADDED:
             plain = getattr(fresh.default, kind)
             for name in {*dir(plain)} - NO_VALUES:
                 value = getattr(plain, name)
                 if hasattr(value, "__int__"):  # a number, an array or a choice
-                    setattr(getattr(found, kind), name, value)
+                    setattr(getattr(default, kind), name, value)
 
 
 @functools.lru_cache(maxsize=MAX_KEPT)
@@ -191,10 +191,10 @@ def source(model: object, assets: Mapping[str, bytes | str] | None = None) -> Mo
         )
     path = Path(os.path.abspath(os.fspath(model)))  # pyright: ignore[reportArgumentType]
     try:
-        there = path.is_file()
+        exists = path.is_file()
     except (OSError, ValueError):  # not a valid file name
-        there = False
-    if not there:
+        exists = False
+    if not exists:
         raise ScenarioError(f"no model at {path}: give the path of an MJCF file (.xml)")
     if path.suffix == ".xacro":
         raise ScenarioError(
@@ -210,7 +210,7 @@ def _of_file(path: Path, sha256: str) -> ModelSource:
     return ModelSource(str(path), sha256)
 
 
-def found(name: str, sha256: str) -> ModelSource:
+def source_of_record(name: str, sha256: str) -> ModelSource:
     """Return the source of a file that a record names without its folder: where this process has
     read it, else in the current folder or in one within it.
     """
@@ -218,13 +218,14 @@ def found(name: str, sha256: str) -> ModelSource:
     places = [Path(name), *sorted(below)]
     if sha256 in _known:
         places.insert(0, _known[sha256])
-    there = list(filter(Path.is_file, places))
-    for place in there:
+    candidates = list(filter(Path.is_file, places))
+    for place in candidates:
         if digest(place) == sha256:
             return _of_file(Path(os.path.abspath(place)), sha256)
-    if there:
+    if candidates:
         raise ScenarioError(
-            f"its model {there[0]}, or a file that it names, has changed since the run: put it back"
+            f"its model {candidates[0]}, or a file that it names, has changed since the run: put "
+            "it back"
         )
     raise ScenarioError(f"its model {name} is not there: put it back, or run in its folder")
 
@@ -245,10 +246,10 @@ def _of_text(text: str, assets: Mapping[str, Any]) -> ModelSource:
         contents[name] = content.encode() if isinstance(content, str) else bytes(content)
         if name.lower().endswith(XML):
             texts.append(contents[name])
-    given = {PurePosixPath(name).name for name in contents}
+    asset_names = {PurePosixPath(name).name for name in contents}
     elements = itertools.chain.from_iterable(map(_elements, texts))
     for name in _files(elements):
-        if PurePosixPath(name).name not in given:
+        if PurePosixPath(name).name not in asset_names:
             cure = f"give assets={{{name!r}: its bytes}}, or the path of the model's file"
             raise ScenarioError(
                 f"the model names the file {shown(name)}, and a text has no folder: {cure}"
@@ -270,13 +271,13 @@ def _of_spec(spec: mujoco.MjSpec) -> ModelSource:
         text = _full_precision_xml(copied)
     except (ValueError, mujoco.FatalError) as error:
         raise broken("the MjSpec", str(error), "") from None
-    made = _of_text(text, _assets(spec, text))
-    if lost := _difference(model, made.compiled(made.spec())):
+    as_text = _of_text(text, _assets(spec, text))
+    if lost := _difference(model, as_text.compiled(as_text.spec())):
         raise ScenarioError(
             f"the MjSpec loses its {lost} when it is written as XML: "
             "write the file, and give its path"
         )
-    return made
+    return as_text
 
 
 def digest_of(spec: mujoco.MjSpec) -> str:
@@ -354,13 +355,13 @@ def pick(label: str, kind: str, name: object, names: Sequence[str]) -> int:
     """Return the index of a name among those of a model, or raise ScenarioError with the names that
     exist.
     """
-    there = {known: i for i, known in enumerate(names) if known}
-    if not there:
+    numbers = {present: i for i, present in enumerate(names) if present}
+    if not numbers:
         raise ScenarioError(
             f"unknown {kind} of {label} {shown(name)}: none has a name there, so give one of its "
             f"{kind}s a name, or another file if it has none, such as the one that includes it"
         )
-    return find(f"{kind} of {label}", name, there)
+    return find(f"{kind} of {label}", name, numbers)
 
 
 def digest(path: Path) -> str:
@@ -373,8 +374,8 @@ def _named_files(path: Path) -> list[Path]:
 
     If a name fits files in several folders, all of them count.
     """
-    if made := urdf.read(path):
-        return [path, *made.meshes.values()]
+    if from_urdf := urdf.read(path):
+        return [path, *from_urdf.meshes.values()]
     texts = [path]
     files = {path.resolve(): None}
     names = []
@@ -406,9 +407,9 @@ def _stamp(path: Path) -> Stamp:
 def _unchanged(source: ModelSource) -> bool:
     """Return whether a file and those that it names are as when they were hashed."""
     with contextlib.suppress(OSError):
-        known = _stamps.get(source.sha256, {})
-        same = bool(known)
-        for file, stamp in known.items():
+        stamps = _stamps.get(source.sha256, {})
+        same = bool(stamps)
+        for file, stamp in stamps.items():
             now = Path(file).stat()
             same = same and stamp == (now.st_mtime_ns, now.st_size)
         if same:
@@ -422,10 +423,10 @@ def _unchanged(source: ModelSource) -> bool:
 
 def _sha256(parts: Iterable[bytes]) -> str:
     """Hash the hashes of the parts."""
-    whole = hashlib.sha256()
+    total = hashlib.sha256()
     for part in parts:
-        whole.update(hashlib.sha256(part).digest())
-    return whole.hexdigest()
+        total.update(hashlib.sha256(part).digest())
+    return total.hexdigest()
 
 
 def _elements(model: Path | str | bytes) -> list[ET.Element]:

@@ -182,8 +182,8 @@ def _creeping(label: str, model: mujoco.MjModel, data: mujoco.MjData) -> list[st
         return []
     joints = model.dof_solref[model.dof_frictionloss > 0.0]
     tendons = model.tendon_solref_fri[model.tendon_frictionloss > 0.0]
-    every = np.vstack([joints, tendons])
-    of_file = not np.all(every == HARD_SOLREF)
+    solrefs = np.vstack([joints, tendons])
+    of_file = not np.all(solrefs == HARD_SOLREF)
     # what it holds once the soft constraints have given way
     model.dof_solimp[:, :2] = model.tendon_solimp_fri[:, :2] = HARD_SOLIMP[:2]
     mujoco.mj_forward(model, data)

@@ -59,19 +59,19 @@ def model_numbers(plant: Plant) -> dict[str, ModelNumber]:
     if not plant.is_user_model:
         return {}
     model = loaded(plant)
-    found = {}
+    numbers = {}
     for joint in all_joints(plant):
         slides = model.jnt_type[model.joint(joint).id] == SLIDE
         for name, kind in KINDS.items():
             values = getattr(model, kind.field)[_place(model, joint, name)]
             value = float(np.ravel(values)[0])
             unit = kind.slide if slides else kind.hinge
-            found[f"{joint}.{name}"] = ModelNumber(joint, name, value, unit)
+            numbers[f"{joint}.{name}"] = ModelNumber(joint, name, value, unit)
     for i in range(model.nbody):
         body = model.body(i).name
         if body and model.body_weldid[i] and not body.startswith((ROTOR, OWN)):
-            found[f"{body}.{PAYLOAD}"] = ModelNumber(body, PAYLOAD, 0.0, "kg")
-    return found
+            numbers[f"{body}.{PAYLOAD}"] = ModelNumber(body, PAYLOAD, 0.0, "kg")
+    return numbers
 
 
 def with_model_numbers(plant: Plant, names: Iterable[str]) -> Plant:
@@ -80,17 +80,17 @@ def with_model_numbers(plant: Plant, names: Iterable[str]) -> Plant:
     Raises:
       ScenarioError: no joint or body of the model has a number of this name.
     """
-    known = model_numbers(plant)
+    numbers = model_numbers(plant)
     added = {}
     for name in names:
         if name in plant.parameters:
             continue
-        if name not in known:
-            raise unknown(f"parameter of {plant.name}", name, [*plant.parameters, *known])
-        added[name] = known[name]
+        if name not in numbers:
+            raise unknown(f"parameter of {plant.name}", name, [*plant.parameters, *numbers])
+        added[name] = numbers[name]
     if not added:
         return plant
-    owned = tuple((one.owner, one.kind) for one in added.values())
+    owned = tuple((number.owner, number.kind) for number in added.values())
     fields = NumberFields(plant.fields, owned)
     nominal = plant.nominal
     if plant.by_mujoco:
@@ -98,12 +98,12 @@ def with_model_numbers(plant: Plant, names: Iterable[str]) -> Plant:
     absent = {}
     rubbing = []
     parameters = dict(plant.parameters)
-    for name, one in added.items():
-        parameters[name] = one.value
-        if not one.value:
-            absent[name] = one.unit
-        if one.kind == "frictionloss":
-            rubbing.append(one.owner)
+    for name, number in added.items():
+        parameters[name] = number.value
+        if not number.value:
+            absent[name] = number.unit
+        if number.kind == "frictionloss":
+            rubbing.append(number.owner)
     # only MuJoCo's constraints are as soft as the file says
     model = loaded(plant)
     soft = any(
@@ -134,12 +134,12 @@ class NumberFields:
             if kind == PAYLOAD:
                 yield Field("body_mass", model.body(owner).id, value, adds=True)
                 continue
-            at = _place(model, owner, kind)
-            yield Field(KINDS[kind].field, at, value)
+            place = _place(model, owner, kind)
+            yield Field(KINDS[kind].field, place, value)
             # dry friction that the model does not have yet is as hard as Coulomb's
-            if kind == "frictionloss" and tuple(model.dof_solref[at]) == SOFT_SOLREF:
-                yield Field("dof_solref", at, HARD_SOLREF)
-                yield Field("dof_solimp", at, HARD_SOLIMP)
+            if kind == "frictionloss" and tuple(model.dof_solref[place]) == SOFT_SOLREF:
+                yield Field("dof_solref", place, HARD_SOLREF)
+                yield Field("dof_solimp", place, HARD_SOLIMP)
 
 
 def _place(model: mujoco.MjModel, joint: str, kind: str) -> int:

@@ -338,52 +338,52 @@ def native_dynamics() -> CompiledFunction:
     full = _mujoco("mj_fullM", 1)
 
     def native(y, p, m, out):
-        at = dynamics_at(p, 0)
+        dynamics = dynamics_at(p, 0)
         read = seen_at(y, 0)
-        n = int(at.n)
-        nv = int(at.nv)
-        model = int(at.model)
-        data = int(at.data)
+        n = int(dynamics.n)
+        nv = int(dynamics.nv)
+        model = int(dynamics.model)
+        data = int(dynamics.data)
         x = pointer(read.x)
         v = pointer(read.v)
-        kept = pointer(int(at.v))
-        places = int(at.places)
-        qpos = pointer(int(at.qpos))
-        qvel = pointer(int(at.qvel))
-        bias = pointer(int(at.bias))
-        passive = pointer(int(at.passive))
-        actuator = pointer(int(at.actuator))
-        dense = carray(pointer(int(at.dense)), (nv, nv))
+        last_v = pointer(int(dynamics.v))
+        places = int(dynamics.places)
+        qpos = pointer(int(dynamics.qpos))
+        qvel = pointer(int(dynamics.qvel))
+        bias = pointer(int(dynamics.bias))
+        passive = pointer(int(dynamics.passive))
+        actuator = pointer(int(dynamics.actuator))
+        dense = carray(pointer(int(dynamics.dense)), (nv, nv))
         M = carray(pointer(out), (n, n))
         h = pointer(out + 8 * n * n)
         g = pointer(out + 8 * (n * n + n))
         for j in range(n):
-            kept[j] = v[j]
+            last_v[j] = v[j]
             g[j] = math.nan
             qpos[place_at(places, j).qpos] = x[j]
-        if at.quaternion >= 0.0:
-            first = int(at.quaternion)
+        if dynamics.quaternion >= 0.0:
+            first = int(dynamics.quaternion)
             qpos[first], qpos[first + 1], qpos[first + 2], qpos[first + 3] = rotation.quaternion(
                 x[3], x[4], x[5]
             )
-        if at.alone != 0.0:
+        if dynamics.alone != 0.0:
             kinematics(model, data)
             centres(model, data)
             inertia(model, data)
         else:
             positions(model, data)
-        full(model, data, int(at.dense))
+        full(model, data, int(dynamics.dense))
         for i in range(n):
             for j in range(n):
                 M[i, j] = dense[place_at(places, i).qvel, place_at(places, j).qvel]
         # g, then h, so that the last velocities are those of the sample
-        for part in range(0 if at.at_rest else 1, 2):
+        for part in range(0 if dynamics.at_rest else 1, 2):
             for j in range(n):
                 qvel[place_at(places, j).qvel] = part * v[j]
-            if at.alone != 0.0:
+            if dynamics.alone != 0.0:
                 rates(model, data)
                 passives(model, data)
-                newton_euler(model, data, 0, int(at.bias))
+                newton_euler(model, data, 0, int(dynamics.bias))
             else:
                 velocities(model, data)
                 actuation(model, data)
@@ -406,25 +406,25 @@ def native_coriolis() -> CompiledFunction:
     velocities = _mujoco("mj_fwdVelocity")
 
     def native(y, p, m, out):
-        at = dynamics_at(p, 0)
-        n = int(at.n)
-        model = int(at.model)
-        data = int(at.data)
+        dynamics = dynamics_at(p, 0)
+        n = int(dynamics.n)
+        model = int(dynamics.model)
+        data = int(dynamics.data)
         w = pointer(y)
         output = pointer(out)
-        v = pointer(int(at.v))
-        qvel = pointer(int(at.qvel))
-        bias = pointer(int(at.bias))
-        places = int(at.places)
+        v = pointer(int(dynamics.v))
+        qvel = pointer(int(dynamics.qvel))
+        bias = pointer(int(dynamics.bias))
+        places = int(dynamics.places)
         for j in range(n):
             output[j] = 0.0
         for part in range(2):
             sign = 1.0 - 2.0 * part
             for j in range(n):
                 qvel[place_at(places, j).qvel] = v[j] + sign * w[j]
-            if at.alone != 0.0:
+            if dynamics.alone != 0.0:
                 rates(model, data)
-                newton_euler(model, data, 0, int(at.bias))
+                newton_euler(model, data, 0, int(dynamics.bias))
             else:
                 velocities(model, data)
             for j in range(n):
@@ -442,18 +442,18 @@ def native_jacobian() -> CompiledFunction:
     of_site = _mujoco("mj_jacSite", 3)
 
     def native(y, p, m, out):
-        at = dynamics_at(p, 0)
-        n = int(at.n)
-        nv = int(at.nv)
-        site = int(at.site)
+        dynamics = dynamics_at(p, 0)
+        n = int(dynamics.n)
+        nv = int(dynamics.nv)
+        site = int(dynamics.site)
         output = carray(pointer(out), (3, n))
-        moves = carray(pointer(int(at.moves)), (3, nv))
+        moves = carray(pointer(int(dynamics.moves)), (3, nv))
         if site < 0:
             return 1
-        of_site(int(at.model), int(at.data), int(at.moves), 0, site)
+        of_site(int(dynamics.model), int(dynamics.data), int(dynamics.moves), 0, site)
         for i in range(3):
             for j in range(n):
-                output[i, j] = moves[i, place_at(int(at.places), j).qvel]
+                output[i, j] = moves[i, place_at(int(dynamics.places), j).qvel]
         return 0
 
     return CompiledFunction(native, Key("nominal-model", fingerprint.now(native)))
@@ -469,25 +469,25 @@ def native() -> CompiledFunction:
 
     def native(y, p, m, out):
         read = seen_at(y, 0)
-        at = nominal_at(p, 0)
+        nominal = nominal_at(p, 0)
         i = read.i
-        n = int(at.n)
-        driven = int(at.driven)
-        nv = int(at.nv)
+        n = int(nominal.n)
+        driven = int(nominal.driven)
+        nv = int(nominal.nv)
         x = pointer(read.x)
         v = pointer(read.v)
         u = pointer(read.u)
-        model = int(at.model)
-        data = int(at.data)
-        places = int(at.places)
-        qpos = pointer(int(at.qpos))
-        qvel = pointer(int(at.qvel))
-        ctrl = pointer(int(at.ctrl))
-        qacc = pointer(int(at.acceleration))
-        last_x = pointer(int(at.x))
-        last_v = pointer(int(at.v))
-        unit = pointer(int(at.unit))
-        moved = pointer(int(at.moved))
+        model = int(nominal.model)
+        data = int(nominal.data)
+        places = int(nominal.places)
+        qpos = pointer(int(nominal.qpos))
+        qvel = pointer(int(nominal.qvel))
+        ctrl = pointer(int(nominal.ctrl))
+        qacc = pointer(int(nominal.acceleration))
+        last_x = pointer(int(nominal.x))
+        last_v = pointer(int(nominal.v))
+        unit = pointer(int(nominal.unit))
+        moved = pointer(int(nominal.moved))
         fresh = False
         for j in range(n):
             # NaN, the initial value, differs from everything
@@ -511,7 +511,7 @@ def native() -> CompiledFunction:
         for j in range(nv):
             unit[j] = 0.0
         unit[place_at(places, i % driven).qvel] = 1.0
-        solve(model, data, int(at.moved), int(at.unit), 1)
+        solve(model, data, int(nominal.moved), int(nominal.unit), 1)
         output = pointer(out)
         dof = place_at(places, i).qvel
         output[0] = qacc[dof]

@@ -83,8 +83,8 @@ def at_start(
     if keyframe is not None:
         mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)
     data.qvel[:] = 0.0
-    known = starts(model, joints_of(channels), channels, keyframe)[0]
-    for joint, x in known.items():
+    start_positions = starts(model, joints_of(channels), channels, keyframe)[0]
+    for joint, x in start_positions.items():
         if model.joint(joint).type[0] != FREE:
             data.qpos[model.joint(joint).qposadr[0]] = x
     mujoco.mj_forward(model, data)
@@ -154,23 +154,23 @@ def _hold(
         kp = inertia[dof, dof] * HELD**2
         kd = 2.0 * inertia[dof, dof] * HELD
         load = data.qfrc_bias[dof] - data.qfrc_passive[dof]
-        made = add_motor(spec, f"{HOLD}{name}", name)
-        made.biastype = AFFINE
+        servo = add_motor(spec, f"{HOLD}{name}", name)
+        servo.biastype = AFFINE
         hold = kp * data.qpos[joint.qposadr[0]] + load
-        made.biasprm[:3] = hold, -kp, -kd
+        servo.biasprm[:3] = hold, -kp, -kd
 
 
 def _lock(
     spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData, joints: set[str]
 ) -> None:
     """Weld every body whose joints are no channels to its parent, by pose, where it starts."""
-    at = mujoco.MjData(model)
-    at.qpos[:] = data.qpos
+    drawn = mujoco.MjData(model)
+    drawn.qpos[:] = data.qpos
     for joint in map(model.joint, joints):  # so that the poses of their bodies stay the file's
         if joint.type[0] != FREE:
             place = joint.qposadr[0]
-            at.qpos[place] = model.qpos0[place]
-    mujoco.mj_kinematics(model, at)
+            drawn.qpos[place] = model.qpos0[place]
+    mujoco.mj_kinematics(model, drawn)
     bodies = list(spec.bodies)  # in the order of the model; their ids are -1 before compilation
     for i, body in enumerate(bodies):
         body.name = body.name or f"body:{i}"
@@ -182,14 +182,14 @@ def _lock(
     for i, body in enumerate(bodies):
         loose = [joint for joint in body.joints if joint.name not in joints]
         if loose:
-            _place(body, model.body_parentid[i], i, at)
+            _place(body, model.body_parentid[i], i, drawn)
         for joint in loose:
             spec.delete(joint)
         for joint in body.joints if loose else ():
             number = model.joint(joint.name).id
-            to_body = at.xmat[i].reshape(3, 3).T
-            joint.axis = to_body @ at.xaxis[number]
-            arm = at.xanchor[number] - at.xpos[i]
+            to_body = drawn.xmat[i].reshape(3, 3).T
+            joint.axis = to_body @ drawn.xaxis[number]
+            arm = drawn.xanchor[number] - drawn.xpos[i]
             joint.pos = to_body @ arm
     _delete_orphans(spec)
 
@@ -260,14 +260,14 @@ def _exclude(spec: mujoco.MjSpec, model: mujoco.MjModel, bodies: list[mujoco.Mjs
     """
     if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT.value:
         return
-    known = {frozenset((pair.bodyname1, pair.bodyname2)) for pair in spec.excludes}
+    excluded = {frozenset((pair.bodyname1, pair.bodyname2)) for pair in spec.excludes}
     weld = model.body_weldid
     above = weld[model.body_parentid[weld]]
     for i in np.flatnonzero(model.body_geomnum):
         for j in np.flatnonzero(model.body_geomnum[:i]):
             near = weld[i] == weld[j] or weld[i] == above[j] or weld[j] == above[i]
             pair = bodies[i].name, bodies[j].name
-            if near and weld[i] and weld[j] and frozenset(pair) not in known:
+            if near and weld[i] and weld[j] and frozenset(pair) not in excluded:
                 spec.add_exclude(bodyname1=pair[0], bodyname2=pair[1])
 
 
@@ -282,7 +282,7 @@ def _lost_a_joint(tendon: mujoco.MjsTendon) -> bool:
 
 def _delete_orphans(spec: mujoco.MjSpec) -> None:
     """Delete all keyframes, and what names a joint or a tendon that is gone."""
-    left = {"", *(joint.name for joint in spec.joints)}
+    joint_names = {"", *(joint.name for joint in spec.joints)}
     orphans = [*spec.keys]
     gone = set()
     for tendon in spec.tendons:
@@ -291,7 +291,7 @@ def _delete_orphans(spec: mujoco.MjSpec) -> None:
             gone.add(tendon.name)
     for actuator in spec.actuators:
         by_tendon = actuator.trntype == mujoco.mjtTrn.mjTRN_TENDON and actuator.target in gone
-        if by_tendon or target_of(actuator) not in left:
+        if by_tendon or target_of(actuator) not in joint_names:
             orphans.append(actuator)
     for orphan in reversed(orphans):  # a tendon after what names it
         spec.delete(orphan)

@@ -145,19 +145,19 @@ def plant_from(
     else:
         pairs = own.coerce(channels)
     measured = items_of("measured", () if measured is None else measured)
-    made = _plant(source, pairs, name, keyframe, tip, others or "", measured)
+    machine = _plant(source, pairs, name, keyframe, tip, others or "", measured)
     spec = source.spec()
     model = mjcf.unedited_model(source)
     read = urdf.read(Path(source.path))
     doubts = [
-        *_narrow_ranges(source.label, made, spec),
-        *_assumed_drives(source.label, made, pairs),
+        *_narrow_ranges(source.label, machine, spec),
+        *_assumed_drives(source.label, machine, pairs),
         *(read.notes(source.label, spec) if read else ()),
-        *softness_warnings(source.label, made),
+        *softness_warnings(source.label, machine),
     ]
     if touches(model):
-        doubts += _overlaps(source.label, made, of_urdf=read is not None)
-    _, outside = ((), []) if made.pose else own.goals(model, joints_of(pairs), keyframe)
+        doubts += _overlaps(source.label, machine, of_urdf=read is not None)
+    _, outside = ((), []) if machine.pose else own.goals(model, joints_of(pairs), keyframe)
     for joint in outside:
         doubts.append(
             f"{source.label} draws joint {joint!r} outside its range, so that the default goal is "
@@ -167,7 +167,7 @@ def plant_from(
     doubts += _doubts_of_others(source.label, spec, model, seen, others)
     for doubt in doubts:
         warnings.warn(doubt, ScenarioWarning, users_stacklevel())
-    return made
+    return machine
 
 
 def _narrow_ranges(label: str, made: Plant, spec: mujoco.MjSpec) -> Iterator[str]:
@@ -179,19 +179,19 @@ def _narrow_ranges(label: str, made: Plant, spec: mujoco.MjSpec) -> Iterator[str
             yield f"joint {joint!r} of {label} moves from {low:.3g} to {high:.3g} rad{hint}"
 
 
-def _assumed_drives(label: str, made: Plant, given: Pairs) -> Iterator[str]:
+def _assumed_drives(label: str, machine: Plant, pairs: Pairs) -> Iterator[str]:
     """Yield a sentence on each drive that the file decides, and that is no motor of the file."""
-    build: Any = made.build
-    meant = zip(given, build.channels, build.motors, made.units, strict=False)
-    for (joint, asked), (_, taken), motor, unit in meant:
-        if taken.motor and not asked.motor:
+    build: Any = machine.build
+    meant = zip(pairs, build.channels, build.motors, machine.units, strict=False)
+    for (joint, requested), (_, taken), motor, unit in meant:
+        if taken.motor and not requested.motor:
             yield (
                 f"{label} has no actuators, so joint {joint!r} gets an ideal motor, bounded as the "
                 f"joint is: {joint}(motor), or smc.Channel(motor=True), says so without this line"
             )
-        if taken.servo and asked.servo is None:
-            meaning = motor.kept[-1].meaning.format(x=unit)
-            if late := motor.kept[0].lateness:
+        if taken.servo and requested.servo is None:
+            meaning = motor.of_file[-1].meaning.format(x=unit)
+            if late := motor.of_file[0].lateness:
                 meaning += f", which it gets {1e3 * late:g} ms late"
             yield (
                 f"u of {joint!r} of {label} is {meaning}, as in the file: "
@@ -217,27 +217,27 @@ def _doubts_of_others(
         )
 
 
-def _overlaps(label: str, made: Plant, of_urdf: bool) -> list[str]:
+def _overlaps(label: str, machine: Plant, of_urdf: bool) -> list[str]:
     """Return a sentence on a start inside something from which the robot rises, or on a start or a
     goal where something presses. Raise ScenarioError for one inside something from which the robot
     does not rise.
     """
     # the goal first: another x0 does not help there
-    found = {"goal": overlap(made, made.origin), "start": overlap(made, made.x0)}
-    deep = [what for what, inside in found.items() if inside.depth > DEPTH]
-    if deep and all(rises(made, x) for x in dict.fromkeys((made.x0, made.origin))):
+    overlaps = {"goal": overlap(machine, machine.origin), "start": overlap(machine, machine.x0)}
+    deep = [what for what, inside in overlaps.items() if inside.depth > DEPTH]
+    if deep and all(rises(machine, x) for x in dict.fromkeys((machine.x0, machine.origin))):
         what = deep[-1]
         return [
-            f"the {what} of {label} has {found[what]}: it rises from there and stands, so its "
+            f"the {what} of {label} has {overlaps[what]}: it rises from there and stands, so its "
             "first moments are of that; give a keyframe that stands on the ground"
         ]
     if deep:
         what = deep[0]
-        cure = _cure_of_overlap(what, found[what], of_urdf)
-        raise ScenarioError(f"the {what} of {label} has {found[what]}: give {cure}")
-    if free_base(loaded(made)):  # on feet, which are soft
+        cure = _cure_of_overlap(what, overlaps[what], of_urdf)
+        raise ScenarioError(f"the {what} of {label} has {overlaps[what]}: give {cure}")
+    if free_base(loaded(machine)):  # on feet, which are soft
         return []
-    for what, inside in found.items():
+    for what, inside in overlaps.items():
         if inside.depth > TOUCH:
             first, second = map(repr, inside.geoms)
             cure = _cure_of_overlap(what, inside, of_urdf)
@@ -357,11 +357,11 @@ def _with_drives(
     channels = []
     for joint, channel in build.channels:
         ideal = build.with_motor(joint)
-        made = own.motor_of(label, model, joint, channel, goals[joint], ideal)
-        motors.append(made)
+        own_motor = own.motor_of(label, model, joint, channel, goals[joint], ideal)
+        motors.append(own_motor)
         # what the file decided is stated from now on, also in texts and records
-        motor = channel.motor or not made.replaced
-        servo = any(part.unit for part in made.kept)
+        motor = channel.motor or not own_motor.replaced
+        servo = any(part.unit for part in own_motor.of_file)
         stated = dataclasses.replace(channel, motor=motor, servo=servo)
         channels.append((joint, stated))
     limits = tuple(motor.limit for motor in motors)
@@ -409,7 +409,12 @@ def _places(
     names, units, x0 = own.places(model, joints, start, keyframe)
     unit_of = dict(zip(names, units, strict=True))
     named = [joint for joint, _, _ in checked]
-    check_ranges(plant, checked, [start[one] for one in named], [unit_of[one] for one in named])
+    check_ranges(
+        plant,
+        checked,
+        [start[channel] for channel in named],
+        [unit_of[channel] for channel in named],
+    )
     goals = _goals(model, alone, keyframe)
     rest = own.places(model, joints, goals, keyframe)[2]
     ranges = own.ranges(model, names)
@@ -440,13 +445,13 @@ def _kept(
     """Return what the actuators that stay as they are suggest to scenarios: themselves, and bounds
     on u where their channels give none.
     """
-    parts = tuple(motor.kept for motor in motors)
+    parts = tuple(motor.of_file for motor in motors)
     if not any(parts):
         return {}
     bounds = list(given.get("u_max", (None,) * len(motors)))
     for i, motor in enumerate(motors):
-        if bounds[i] is None and motor.kept and motor.kept[-1].unit:
-            bounds[i] = own.bound_of_kept(label, model, motor.joint, motor.kept[-1])
+        if bounds[i] is None and motor.of_file and motor.of_file[-1].unit:
+            bounds[i] = own.bound_of_kept(label, model, motor.joint, motor.of_file[-1])
     bounded = {"u_max": tuple(bounds)} if any(bounds) else {}
     return {"actuator": parts, **bounded}
 
@@ -454,7 +459,7 @@ def _kept(
 def _unmodelled(model: mujoco.MjModel, joints: list[str], motors: Sequence[Motor]) -> str:
     """Return why a plant has no nominal model; "" if it has one."""
     for motor in motors:
-        if any(isinstance(part, PositionServo) for part in motor.kept):
+        if any(isinstance(part, PositionServo) for part in motor.of_file):
             return SET_POINT
     return missing(model, joints, motors)
 
@@ -502,8 +507,8 @@ def restored(data: Mapping, name: str) -> Plant:
         assets = {name: base64.b64decode(content) for name, content in data["assets"].items()}
         source = mjcf.source(data["text"], assets)
     else:
-        source = mjcf.found(data["path"], data["sha256"])
-    others = data.get("others", "")
+        source = mjcf.source_of_record(data["path"], data["sha256"])
+    what_others_do = data.get("others", "")
     pairs = own.coerce(data["channels"])
     measured = data.get("measured", ())
-    return _plant(source, pairs, name, data["keyframe"], data.get("tip"), others, measured)
+    return _plant(source, pairs, name, data["keyframe"], data.get("tip"), what_others_do, measured)

@@ -41,14 +41,14 @@ def fastest_pole(plant: Plant, parts: tuple[Part, ...] = ()) -> float:
     state = state_with(model, moving_joints(model), plant.x0, 0.0)
     start = state[0]
     rng = np.random.default_rng(SEED)
-    found = 0.0
+    fastest = 0.0
     for k in range(POSES + 1 if model.nv + model.na else 0):
         mujoco.mj_resetData(model, data)
         data.qpos[:] = _drawn(model, start, rng) if k else start
         poles = np.linalg.eigvals(_linear(model, data))
         largest = float(np.abs(poles).max())
-        found = max(found, largest)
-    return found
+        fastest = max(fastest, largest)
+    return fastest
 
 
 def _model(plant: Plant, parts: Iterable[Part]) -> mujoco.MjModel:
@@ -71,14 +71,14 @@ def _drawn(model: mujoco.MjModel, start: Array, rng: np.random.Generator) -> Arr
     for i in range(model.njnt):
         if model.jnt_type[i] < mujoco.mjtJoint.mjJNT_SLIDE.value:  # free or ball
             continue
-        at = model.jnt_qposadr[i]
-        low = start[at] - REACH
-        high = start[at] + REACH
+        address = model.jnt_qposadr[i]
+        low = start[address] - REACH
+        high = start[address] + REACH
         if model.jnt_limited[i]:
             low, high = model.jnt_range[i]
-            low = max(low, start[at] - MAX_REACH)
-            high = min(high, start[at] + MAX_REACH)
-        qpos[at] = rng.uniform(low, max(low, high))
+            low = max(low, start[address] - MAX_REACH)
+            high = min(high, start[address] + MAX_REACH)
+        qpos[address] = rng.uniform(low, max(low, high))
     return qpos
 
 
@@ -131,12 +131,12 @@ def constraint_rate(plant: Plant) -> float:
         solrefs.append(model.eq_solref[model.eq_active0.astype(bool)])
     first, second = np.concatenate(solrefs).T
     # a time constant and a damping ratio, or a stiffness and a damping, both negative
-    given = first > 0.0
+    by_time = first > 0.0
     softness = np.maximum(np.abs(first * second), 1e-12)
-    stiffness = np.where(given, 1.0 / softness, 0.0)
+    stiffness = np.where(by_time, 1.0 / softness, 0.0)
     stiffness += np.sqrt(-np.minimum(first, 0.0))
     times = np.maximum(np.abs(first), 1e-12)
-    decay = np.where(given, 2.0 / times, -second)
+    decay = np.where(by_time, 2.0 / times, -second)
     rates = np.maximum(stiffness, decay)
     return float(np.max(rates, initial=0.0))
 

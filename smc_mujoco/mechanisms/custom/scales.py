@@ -190,9 +190,9 @@ def tips_over(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
     first = mujoco.MjData(model)
     first.qpos[:] = initial_pose(model)
     directions = []
-    for one in (first, data):
-        mujoco.mj_kinematics(model, one)
-        pose = one.xmat[base].reshape(3, 3)
+    for state in (first, data):
+        mujoco.mj_kinematics(model, state)
+        pose = state.xmat[base].reshape(3, 3)
         directions.append(model.opt.gravity @ pose)
     least = TIPPED * model.opt.gravity @ model.opt.gravity
     return bool(directions[0] @ directions[1] < least)
@@ -256,16 +256,16 @@ def needs(plant: Plant) -> Floats:
     """Return the force with which each driven joint arrives from its start and holds, N m or N,
     with two digits: 2 load + (60/s^2 M + 8/s D) X + 1.5 dry friction.
     """
-    at = at_goal(plant)
+    moments = at_goal(plant)
     apart = np.subtract(usual_start(plant), plant.origin)
     way = np.abs(apart)[: plant.driven]
     way = np.where(way > MAX_EXCESS, way, BESIDE)
-    diagonal = np.diag(at.D)[at.dofs]
+    diagonal = np.diag(moments.D)[moments.dofs]
     damping = np.maximum(diagonal, 0.0)
-    inertia = np.diag(at.M)[at.dofs]
+    inertia = np.diag(moments.M)[moments.dofs]
     moving = (STIFFNESS * inertia + DAMPING * damping) * way
-    load = 2.0 * np.abs(at.load)
-    need = load + moving + 1.5 * at.dry
+    load = 2.0 * np.abs(moments.load)
+    need = load + moving + 1.5 * moments.dry
     return tuple(float(f"{value:.2g}") for value in need)
 
 
@@ -275,16 +275,16 @@ def mobility(plant: Plant, u_max: float, reach: float) -> Floats:
     Other joints answer as they would in the time T in which the motor moves the joint by `reach`:
     one with a stiff servo is as good as locked, a limp one is free.
     """
-    at = at_goal(plant)
-    found = []
-    for i in at.dofs:
-        g = 1.0 / at.M[i, i]
-        unit = np.eye(len(at.M))[i]
+    moments = at_goal(plant)
+    mobilities = []
+    for i in moments.dofs:
+        g = 1.0 / moments.M[i, i]
+        unit = np.eye(len(moments.M))[i]
         for _ in range(ROUNDS):
             T = np.sqrt(reach / (g * u_max))
-            A = at.M + T * at.D + 0.5 * T * T * at.K
-            A[i] = at.M[i]
-            A[:, i] = at.M[:, i]
+            A = moments.M + T * moments.D + 0.5 * T * T * moments.K
+            A[i] = moments.M[i]
+            A[:, i] = moments.M[:, i]
             g = abs(np.linalg.solve(A, unit)[i])
-        found.append(float(g))
-    return tuple(found)
+        mobilities.append(float(g))
+    return tuple(mobilities)

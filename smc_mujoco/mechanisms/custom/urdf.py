@@ -122,17 +122,17 @@ def _mended(robot: ET.Element, file: Path) -> Urdf:
             if mesh is None:
                 continue
             name = mesh.get("filename", "")
-            found = _found(name, folder, file.parent)
-            if found is None:
+            mesh_file = _found(name, folder, file.parent)
+            if mesh_file is None:
                 link.remove(shape)
                 read.lost.append(name)
                 continue
-            stem = found.stem  # MuJoCo takes files with the same one for one mesh
-            while stems.setdefault(stem, found) != found:
+            stem = mesh_file.stem  # MuJoCo takes files with the same one for one mesh
+            while stems.setdefault(stem, mesh_file) != mesh_file:
                 stem += "_"
-            alias = stem + found.suffix.lower()
+            alias = stem + mesh_file.suffix.lower()
             mesh.set("filename", alias)
-            read.meshes[alias] = found
+            read.meshes[alias] = mesh_file
         inertia = link.find("inertial/inertia")
         if inertia is not None and _raised(inertia):
             read.raised.append(link.get("name", ""))

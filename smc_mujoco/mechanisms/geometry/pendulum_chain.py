@@ -96,15 +96,15 @@ def strip(source, pendulum):
 def stand(spec, n):
     """Add the body `machine`, two end posts and the shaft between them, and return it."""
     length = (n - 1) * PITCH
-    shown = min(length, 8 * PITCH)  # the camera frames nine pendulums at most
-    spec.stat.center = (0.0, shown / 2, HEIGHT)
-    spec.stat.extent = 1.2 + shown
+    in_view = min(length, 8 * PITCH)  # the camera frames nine pendulums at most
+    spec.stat.center = (0.0, in_view / 2, HEIGHT)
+    spec.stat.extent = 1.2 + in_view
     spec.stat.meansize = 0.1
-    distance = 1.6 + 0.9 * shown
+    distance = 1.6 + 0.9 * in_view
     machine = spec.worldbody.add_body(name="machine")
     machine.add_camera(
         name="look",
-        pos=(0.62 * distance, shown / 2 - 0.74 * distance, 0.62 + 0.26 * distance),
+        pos=(0.62 * distance, in_view / 2 - 0.74 * distance, 0.62 + 0.26 * distance),
         xyaxes=(0.767, 0.642, 0.0, -0.167, 0.199, 0.966),
     )
     bar(machine, "shaft", ((0.0, -PITCH, HEIGHT), (0.0, length + PITCH, HEIGHT)), 0.008, "steel")
@@ -263,10 +263,10 @@ def stand_row(spec, n, width):
         bar(machine, f"axle{i}", ((x, -0.03, HEIGHT), (x, BEAM_Y[0], HEIGHT)), 0.010, "steel")
     for side, x in (("left", -end), ("right", end)):
         post(machine, side, x, sum(BEAM_Y) / 2, HEIGHT + 0.045)
-    shown = min(width, 8 * ROW_PITCH)  # as the chain's camera, nine pendulums at most
+    in_view = min(width, 8 * ROW_PITCH)  # as the chain's camera, nine pendulums at most
     spec.stat.center = (0.0, 0.0, HEIGHT)
-    spec.stat.extent = 1.6 + shown
-    distance = 2.2 + 0.9 * shown
+    spec.stat.extent = 1.6 + in_view
+    distance = 2.2 + 0.9 * in_view
     camera = spec.camera("look")
     raised = HEIGHT - 0.05 + 0.176 * distance
     camera.pos = (-0.245 * distance, -0.953 * distance, raised)

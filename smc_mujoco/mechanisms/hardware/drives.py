@@ -190,9 +190,10 @@ class DCMotor(Actuator):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.ripple and self.delay:
-            both = f"ripple {self.ripple:g} and inductance {self.inductance:g} H"
+            numbers = f"ripple {self.ripple:g} and inductance {self.inductance:g} H"
             raise ScenarioError(
-                f"DCMotor has {both}, and ripple is of a current without delay: give inductance=0"
+                f"DCMotor has {numbers}, and ripple is of a current without delay: "
+                "give inductance=0"
             )
         if (
             not self.constant >= MIN_CONSTANT
@@ -408,7 +409,7 @@ class Series(Part):
     """The drives, in series, of joints that the callback simulates."""
 
     effect: DriveStep
-    of: tuple[int, ...]  # the channels
+    on_channels: tuple[int, ...]  # the channels
 
     is_drive = True
     memory = 3
@@ -426,7 +427,7 @@ class Series(Part):
         return [[*states, 0.0] for states in self.effect.start(np.array(run.v0)).T.tolist()]
 
     def channels(self, plant: Plant) -> Sequence[int]:
-        return self.of
+        return self.on_channels
 
     @staticmethod
     def act(sim, data, part):
@@ -435,22 +436,22 @@ class Series(Part):
         channel = channel_at(sim.channels, i)
         state = state_at(sim.states, i)
         factors = factors_at(part.function.parameters, 0)
-        kept = kept_at(part.function.memory, 0)
+        filters = kept_at(part.function.memory, 0)
         if sim.stage == 0:
             v = data.qvel[channel.shaft]
             scale = drive_at(sim.drives, i).scale
-            force = scale * advanced(factors, kept, state.delayed, v)
+            force = scale * advanced(factors, filters, state.delayed, v)
             if factors.ripple != 0.0:
                 force = rippled(factors, force, data.qpos[channel.shaft_qpos], v)
             if factors.rise_first != 0.0:
                 state.middle = force
-                kept.rise *= scale
-                force -= kept.rise
+                filters.rise *= scale
+                force -= filters.rise
             data.ctrl[channel.ctrl] = force
         elif factors.rise_first != 0.0:
             data.ctrl[channel.ctrl] = state.middle
             if sim.stage == 3:
-                data.ctrl[channel.ctrl] = state.middle + kept.rise
+                data.ctrl[channel.ctrl] = state.middle + filters.rise
                 # what the actuators did in the stage before, with the mean force
                 state.force += data.actuator_force[channel.force]
 
@@ -460,7 +461,10 @@ def in_series(chains: Sequence[tuple[Actuator, ...]], step: float, rk4: bool) ->
     for chain in dict.fromkeys(chains):
         effect = drive_step(chain, step, rk4)
         if effect is not None:
-            yield Series(effect, tuple(i for i, other in enumerate(chains) if other == chain))
+            yield Series(
+                effect,
+                tuple(i for i, chain_of_channel in enumerate(chains) if chain_of_channel == chain),
+            )
 
 
 def drive_step(actuator: tuple[Actuator, ...], step: float, rk4: bool) -> DriveStep | None:
@@ -482,10 +486,10 @@ def drive_step(actuator: tuple[Actuator, ...], step: float, rk4: bool) -> DriveS
     if not lags and motor is None and rate is None:
         return None
     a = lags[0] if lags else math.inf
-    made = DriveStep(force_first=_mean(a), first_left=math.exp(-a), lagged=float(bool(lags)))
+    effect = DriveStep(force_first=_mean(a), first_left=math.exp(-a), lagged=float(bool(lags)))
     if motor is not None and motor.ripple:
         n = motor.bars
-        return made._replace(
+        return effect._replace(
             ripple=motor.ripple,
             turns=n * motor.gear,
             angle=n * motor.brush,
@@ -496,16 +500,16 @@ def drive_step(actuator: tuple[Actuator, ...], step: float, rk4: bool) -> DriveS
             constant=motor.constant,
         )
     if rk4 and len(lags) == 1 and rate is None and motor is None:
-        made = made._replace(rise_first=_rise(a))
+        effect = effect._replace(rise_first=_rise(a))
     if rate is not None:
-        return made._replace(reach=rate * step)
+        return effect._replace(reach=rate * step)
     if motor is not None:
-        return _wound(made, motor, a, step, rk4)
+        return _wound(effect, motor, a, step, rk4)
     if len(lags) < 2:
-        return made
+        return effect
     b = lags[1]
     passed = _passed(a, b)
-    return made._replace(
+    return effect._replace(
         force_first=_mean(a) - passed / b,
         force_second=_mean(b),
         second_first=passed,
@@ -513,7 +517,7 @@ def drive_step(actuator: tuple[Actuator, ...], step: float, rk4: bool) -> DriveS
     )
 
 
-def _wound(made: DriveStep, motor: DCMotor, a: float, step: float, rk4: bool) -> DriveStep:
+def _wound(effect: DriveStep, motor: DCMotor, a: float, step: float, rk4: bool) -> DriveStep:
     """Return the effect of a step on a motor's winding behind a lag; the step is `a` of the lag's
     time constants long.
 
@@ -522,14 +526,14 @@ def _wound(made: DriveStep, motor: DCMotor, a: float, step: float, rk4: bool) ->
     lag's output within the step.
     """
     b = step / motor.delay
-    (drag, share), left = winding_step(b, rk4), math.exp(-b)
+    (drag, share), decay = winding_step(b, rk4), math.exp(-b)
     passed = 0.0 if a == math.inf else _passed(a, b)
     emf = motor.constant / motor.scale
-    return made._replace(
-        force_first=(made.force_first - passed / b) / drag,
+    return effect._replace(
+        force_first=(effect.force_first - passed / b) / drag,
         force_second=1.0 - drag,
         second_first=passed / -math.expm1(-b),
-        second_left=left,
+        second_left=decay,
         voltage=motor.voltage / motor.scale,
         drag=drag * emf,
         force_drag=(drag - share) * emf,

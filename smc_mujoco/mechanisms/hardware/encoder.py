@@ -155,17 +155,17 @@ class Encoder(OnJoints):
     def fields(self, model):
         """Yield the fields of delay and period of its channels' two sensors."""
         if model.nhistory:
-            at = sensor_ids(model)
-            of_each = moving_joints(model)[:, None] == model.sensor_objid[at, None]
+            sensors = sensor_ids(model)
+            of_each = moving_joints(model)[:, None] == model.sensor_objid[sensors, None]
             channels = of_each.any(axis=0).argmax(axis=1)
             if self.on:
                 named = np.isin(joint_ids(model), [model.joint(name).id for name in self.on])
-                at, channels = at[named[channels]], channels[named[channels]]
+                sensors, channels = sensors[named[channels]], channels[named[channels]]
             delays = self.delay + self.skew * channels
             yield Field(
-                "sensor_delay", at, np.maximum(0.0, delays - EARLY_SHARE * model.opt.timestep)
+                "sensor_delay", sensors, np.maximum(0.0, delays - EARLY_SHARE * model.opt.timestep)
             )
-            yield Field("sensor_interval", (at, 0), self.period or 0.0)
+            yield Field("sensor_interval", (sensors, 0), self.period or 0.0)
 
 
 def sensor_ids(model: mujoco.MjModel) -> np.ndarray:

@@ -134,25 +134,25 @@ def dry_step(v, smooth, sliding, starting, low, high, mobility, h):
       moment, see `drives._rise`; and the time for which it holds the joint at rest, s, which is the
       last of the step.
     """
-    left = h
+    remaining = h
     mean = 0.0
     moment = 0.0
     held = 0.0
-    while left > 0.0:
+    while remaining > 0.0:
         force = -smooth
-        span = left
+        span = remaining
         if v == 0.0 and low <= smooth <= high:
-            held = left
+            held = remaining
         else:
             force = sliding if v != 0.0 else starting
             direction = math.copysign(1.0, v if v != 0.0 else smooth + force)
             slowing = -direction * (smooth + force) * mobility
-            if abs(v) < slowing * left:
+            if abs(v) < slowing * remaining:
                 span = abs(v) / slowing
             v = 0.0
         mean += force * span
-        moment += force * span * (left - 0.5 * span)
-        left -= span
+        moment += force * span * (remaining - 0.5 * span)
+        remaining -= span
     mean = mean / h
     moment = moment / (h * h)
     return mean, 6.0 * (0.5 * mean - moment), held
@@ -263,9 +263,9 @@ class Bristles(Part):
         level = p.coulomb + (p.static - p.coulomb) * math.exp(-speed * speed)
         decay = -p.stiffness * abs(y.v) / level
         rate = decay * bend + y.v
-        kept = math.exp(decay * y.h)
-        reach = y.h if decay == 0.0 else (kept - 1.0) / decay
-        memory[0] = kept * bend + reach * y.v
+        decayed = math.exp(decay * y.h)
+        reach = y.h if decay == 0.0 else (decayed - 1.0) / decay
+        memory[0] = decayed * bend + reach * y.v
         return -(p.stiffness * bend + p.damping * rate)
 
 

@@ -18,7 +18,7 @@ from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Plant
 
 PerJoint = float | Sequence[float]  # one number for all joints, or one for each
-NumberPerJoint = Annotated[PerJoint, Each(one=Number(low=-MAX_PARAMETER, high=MAX_PARAMETER))]
+NumberPerJoint = Annotated[PerJoint, Each(item=Number(low=-MAX_PARAMETER, high=MAX_PARAMETER))]
 
 
 def of_joint(value: Any, i: int) -> float:
@@ -77,8 +77,8 @@ class JointForce(JointPart, Friction):
         """
         joints = self.joint_names(plant)
         for joint in joints:
-            if joint not in (known := channel_names(plant)):
-                raise unknown(f"joint of {type(self).__name__} on {plant.name}", joint, known)
+            if joint not in (names := channel_names(plant)):
+                raise unknown(f"joint of {type(self).__name__} on {plant.name}", joint, names)
         self.check_lengths(plant, len(joints))
 
 

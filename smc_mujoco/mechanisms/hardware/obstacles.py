@@ -79,9 +79,9 @@ class Stops(Obstacle):
         model = loaded(plant)
         single = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
         moving = np.isin(model.jnt_type, single)
-        known = _names(map(model.joint, np.flatnonzero(moving)))
+        names = _names(map(model.joint, np.flatnonzero(moving)))
         for joint in self.limits:
-            find(f"joint of {plant.name} in Stops", joint, known)
+            find(f"joint of {plant.name} in Stops", joint, names)
 
     def edit_on(self, plant: Plant, spec: mujoco.MjSpec) -> None:
         _enable(spec, "LIMIT")
@@ -122,21 +122,21 @@ class OfBody(Obstacle):
         """Check that the plant has the body, and that it is met."""
         model = loaded(plant)
         moving = (model.body_weldid > 0) & (model.body_geomnum > 0)
-        known = _names(map(model.body, np.flatnonzero(moving)))
-        find(f"body of {plant.name} in a {type(self).__name__}", self.body, known)
+        names = _names(map(model.body, np.flatnonzero(moving)))
+        find(f"body of {plant.name} in a {type(self).__name__}", self.body, names)
         _placed(self, plant)
 
     def edit_on(self, plant: Plant, spec: mujoco.MjSpec) -> None:
         model, place, geoms, _ = _placed(self, plant)
         _enable(spec, "CONTACT")
         _name_geoms(spec, self.body)
-        other = self.add(spec)
-        other.pos = place
+        shape = self.add(spec)
+        shape.pos = place
         # an estimate of `solref` is exact for a ball lighter than what it hits
         directions = 1.0 if self.loose else 3.0
         normal = solref(self.restitution, FIRM_IMPEDANCE, BLOW_DEPTH, directions)
         for geom in geoms:
-            names = model.geom(geom).name, other.name
+            names = model.geom(geom).name, shape.name
             contact.add_pair(spec, contact.HIT, names, normal, FIRM_IMPEDANCE, 0.0)
 
     def add(self, spec: mujoco.MjSpec) -> mujoco.MjsBody:
@@ -270,16 +270,16 @@ def _posts(stops: Stops, plant: Plant) -> list[tuple[str, Array]]:
     model = plant.load(spec=spec)
     posts = []
     for joint, ends in stops.limits.items():
-        of = model.joint(joint)
-        body = int(of.bodyid[0])
+        stopped = model.joint(joint)
+        body = int(stopped.bodyid[0])
         before = model.body_parentid[body]
         for end, side in zip(ends, (-1.0, 1.0), strict=True):
             data = posed(model, plant.x0)
-            data.qpos[of.qposadr[0]] = end
+            data.qpos[stopped.qposadr[0]] = end
             mujoco.mj_kinematics(model, data)
-            way = data.xaxis[of.id]
-            if of.type[0] == mujoco.mjtJoint.mjJNT_HINGE:
-                anchor = data.xanchor[of.id]
+            way = data.xaxis[stopped.id]
+            if stopped.type[0] == mujoco.mjtJoint.mjJNT_HINGE:
+                anchor = data.xanchor[stopped.id]
                 way = np.cross(way, data.xipos[body] - anchor)
             size = np.linalg.norm(way)
             if size < CLOSE or not model.body_geomnum[body]:
@@ -303,19 +303,19 @@ def _meeting(
     height = FAR * model.stat.extent
     for _ in range(MAX_MARCH):
         data.geom_xpos[shape] = data.xipos[body] + height * away
-        left = _distance(model, data, geoms, shape)
-        if left < CLOSE:
-            return data.geom_xpos[shape] - left * away
-        height -= left
+        gap = _distance(model, data, geoms, shape)
+        if gap < CLOSE:
+            return data.geom_xpos[shape] - gap * away
+        height -= gap
     return None
 
 
 def _geoms(model: mujoco.MjModel, body: int) -> list[int]:
     """Return the geoms of a body that collide; all if none does."""
     first = model.body_geomadr[body]
-    every = list(range(first, first + model.body_geomnum[body]))
+    geoms = list(range(first, first + model.body_geomnum[body]))
     masks = model.geom_contype | model.geom_conaffinity
-    return [geom for geom in every if masks[geom]] or every
+    return [geom for geom in geoms if masks[geom]] or geoms
 
 
 def _distance(model: mujoco.MjModel, data: mujoco.MjData, geoms: list[int], other: int) -> float:
@@ -325,7 +325,7 @@ def _distance(model: mujoco.MjModel, data: mujoco.MjData, geoms: list[int], othe
 
 def _names(things: Iterable) -> dict[str, None]:
     """Return the names of bodies or joints that have one."""
-    return dict.fromkeys(thing.name for thing in things if thing.name)
+    return dict.fromkeys(element.name for element in things if element.name)
 
 
 def _name_geoms(spec: mujoco.MjSpec, body: str) -> None:

@@ -251,11 +251,13 @@ def is_of_speed(function: Callable, numbers: Mapping[str, float]) -> bool:
     if not _levels(function, tuple(numbers), tuple(numbers.values())):
         return False
     state = code.co_varnames[0]
-    for one, following in itertools.pairwise(dis.get_instructions(code)):
-        names = one.argval if isinstance(one.argval, tuple) else (one.argval,)
+    for instruction, following in itertools.pairwise(dis.get_instructions(code)):
+        names = (
+            instruction.argval if isinstance(instruction.argval, tuple) else (instruction.argval,)
+        )
         if state not in names:
             continue
-        loads = one.opname.endswith(LOADS) and names.index(state) == len(names) - 1
+        loads = instruction.opname.endswith(LOADS) and names.index(state) == len(names) - 1
         if not (loads and following.opname == "LOAD_ATTR" and following.argval == "v"):
             return False
     return True
@@ -284,7 +286,7 @@ def _levels(function: Callable, names: Names, values: tuple) -> tuple[Floats, ..
     for value in values:
         if isinstance(value, tuple):
             joints = len(value)
-    found = []
+    levels_by_joint = []
     for i in range(joints):
         numbers = []
         for value in values:
@@ -298,8 +300,8 @@ def _levels(function: Callable, names: Names, values: tuple) -> tuple[Floats, ..
                 levels.append(float(level))
             except Exception:
                 return ()
-        found.append(tuple(levels))
-    return tuple(found)
+        levels_by_joint.append(tuple(levels))
+    return tuple(levels_by_joint)
 
 
 def _state(v: float, load: float) -> JointState:
@@ -317,23 +319,23 @@ def _beside_rest(
     for i in range(joints):
         p = named(part.names)(*(part.parameters(i) or (0.0,)))
 
-        def at(v: float, p: Any = p) -> Any:
-            found = function(_state(v, load), p, np.zeros(memory))
-            if np.shape(found) not in ((), (3,)) or not np.all(np.isreal(found)):
+        def level_at(v: float, p: Any = p) -> Any:
+            returned = function(_state(v, load), p, np.zeros(memory))
+            if np.shape(returned) not in ((), (3,)) or not np.all(np.isreal(returned)):
                 raise ScenarioError(
-                    f"friction {type(part).__name__} returns {shown(found)}: return its level, or "
-                    "F, low, high"
+                    f"friction {type(part).__name__} returns {shown(returned)}: return its level, "
+                    "or F, low, high"
                 )
-            return found
+            return returned
 
         try:
-            at(STICKING_SPEED)
-            at(0.0)
+            level_at(STICKING_SPEED)
+            level_at(0.0)
         except ScenarioError:
             raise
         except Exception:
             continue
-        yield at
+        yield level_at
 
 
 def _step(function: Callable[[float], float], ahead: float) -> bool:

@@ -209,10 +209,10 @@ class Friction(OnJoints):
     def joints(self, spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
         """Return the joints that it acts on."""
         named = [spec.joint(name) for name in self.on]
-        found = named or joints(spec)[: len(drive_actuators(spec))]
+        on_joints = named or joints(spec)[: len(drive_actuators(spec))]
         if self.side == "motor":
-            return [spec.joint(ROTOR + joint.name) for joint in found]
-        return found
+            return [spec.joint(ROTOR + joint.name) for joint in on_joints]
+        return on_joints
 
     def dofs(self, model: mujoco.MjModel) -> np.ndarray:
         """Return the degrees of freedom that it acts on."""
@@ -296,14 +296,14 @@ class Actuator(OnJoints):
 
     # whether it is that of the plant's file, which a scenario with another plant leaves behind; a
     # copy with other numbers is not
-    kept: bool = dataclasses.field(
+    is_of_file: bool = dataclasses.field(
         default=False, init=False, compare=False, repr=False, kw_only=True
     )
 
     def of_file(self, on: tuple[str, ...]) -> "Actuator":
         """Return a copy on these joints that is marked as that of the plant's file."""
         copy = dataclasses.replace(self, on=on)
-        object.__setattr__(copy, "kept", True)  # as a frozen class sets what is no argument
+        object.__setattr__(copy, "is_of_file", True)  # as a frozen class sets what is no argument
         return copy
 
     def drives_of(self, spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:
@@ -351,8 +351,8 @@ class Actuator(OnJoints):
 
 def chains(parts: Sequence[P], joints: Sequence[str]) -> list[tuple[P, ...]]:
     """Return those of the parts that each joint has."""
-    found = []
+    parts_by_joint = []
     for joint in joints:
         of_joint = tuple(part for part in parts if not part.on or joint in part.on)
-        found.append(of_joint)
-    return found
+        parts_by_joint.append(of_joint)
+    return parts_by_joint

@@ -102,10 +102,10 @@ class PositionServo(Actuator):
                 f"PositionServo has timeconst {self.timeconst:g}, and a servo with ki or slewmax "
                 "has no filter: give one of them"
             )
-        for name, of in (("imax", "ki"), ("integral", "ki"), ("euler", "timeconst")):
-            if getattr(self, name) and not getattr(self, of):
+        for name, base in (("imax", "ki"), ("integral", "ki"), ("euler", "timeconst")):
+            if getattr(self, name) and not getattr(self, base):
                 raise ScenarioError(
-                    f"PositionServo has {name}, which does nothing without {of}: give {of}, too"
+                    f"PositionServo has {name}, which does nothing without {base}: give {base}, too"
                 )
 
     @property
@@ -161,10 +161,10 @@ class PositionServo(Actuator):
         """
         bound = self.imax or math.inf
         errors = np.clip(self.goal + u[:-1], *self.ctrlrange) - 0.5 * (x[:-1] + x[1:])
-        found = np.zeros(len(u))
+        integrals = np.zeros(len(u))
         for k, error in enumerate(errors.tolist()):
-            found[k + 1] = min(max(found[k] + period * error, -bound), bound)
-        return found
+            integrals[k + 1] = min(max(integrals[k] + period * error, -bound), bound)
+        return integrals
 
     def suits(self, s: Any, chain: Sequence[Actuator]) -> None:
         drives = [part for part in chain if part.drives]

@@ -138,24 +138,24 @@ def _begin_step(sim, data, part):
     sags = False
     for j in range(sim.actuators):
         rotor = rotor_at(data.actuator_user, j)
-        kept = kept_at(part.function.memory, j)
+        speeds = kept_at(part.function.memory, j)
         if sim.now > 0:
-            kept.first = spun(rotor, kept.first, kept.second, sim.step)[0]
-        lifted += thrust_at(rotor, kept.first)
+            speeds.first = spun(rotor, speeds.first, speeds.second, sim.step)[0]
+        lifted += thrust_at(rotor, speeds.first)
         sags |= rotor.sag != 0.0
     _command(sim, data, part, lifted)
     if sags:  # by the thrust in the middle of the step
         lifted = 0.0
         for j in range(sim.actuators):
             rotor = rotor_at(data.actuator_user, j)
-            kept = kept_at(part.function.memory, j)
-            lifted += thrust_at(rotor, spun(rotor, kept.first, kept.second, 0.5 * sim.step)[0])
+            speeds = kept_at(part.function.memory, j)
+            lifted += thrust_at(rotor, spun(rotor, speeds.first, speeds.second, 0.5 * sim.step)[0])
         _command(sim, data, part, lifted)
     for j in range(sim.actuators):
         rotor = rotor_at(data.actuator_user, j)
-        kept = kept_at(part.function.memory, j)
+        speeds = kept_at(part.function.memory, j)
         if min(rotor.rise, rotor.fall) * sim.step > FAST_ROTOR:
-            kept.first = kept.second
+            speeds.first = speeds.second
 
 
 @njit(error_model="numpy")
@@ -197,8 +197,8 @@ class Rotors(Part):
             momentum = change = 0.0
         for j in range(sim.actuators if sim.stage != 2 else 0):
             rotor = rotor_at(data.actuator_user, j)
-            kept = kept_at(part.function.memory, j)
-            W, rate = spun(rotor, kept.first, kept.second, passed)
+            speeds = kept_at(part.function.memory, j)
+            W, rate = spun(rotor, speeds.first, speeds.second, passed)
             data.ctrl[channel_at(sim.channels, j).ctrl] = thrust_at(rotor, W)
             momentum += rotor.inertia * rotor.spin * W
             change += rotor.inertia * rotor.spin * rate

@@ -136,9 +136,9 @@ def servo(name: str, model: str = "m4", command: str = "torque") -> Servo:
         **SUPPLIES[name]._asdict(),
     )
     numbers = {}
-    for theirs, several in BAM_FIELDS.items():
+    for theirs, fields in BAM_FIELDS.items():
         if theirs in fitted:
-            for ours in several:
+            for ours in fields:
                 numbers[ours] = fitted[theirs]
     return Servo(motor, ServoFriction(**numbers))
 

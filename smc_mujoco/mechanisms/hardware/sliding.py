@@ -57,8 +57,8 @@ from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 STICKING_SPEED = 1e-4  # rad/s or m/s, chosen: a joint that becomes slower than this sticks
 MAX_EXPONENT = 700.0  # exp of more overflows
 
-NaturalPerJoint = Annotated[PerJoint, Each(one=Number(low=0.0, high=MAX_PARAMETER))]
-PositivePerJoint = Annotated[PerJoint, Each(one=Number(above=0.0, high=MAX_PARAMETER))]
+NaturalPerJoint = Annotated[PerJoint, Each(item=Number(low=0.0, high=MAX_PARAMETER))]
+PositivePerJoint = Annotated[PerJoint, Each(item=Number(above=0.0, high=MAX_PARAMETER))]
 
 # What a joint keeps: its speed at the step before, whether it is stuck and where; at stages of RK4
 # the same speed, whether it was held, and whether it slides. A step that slides keeps F and its
@@ -143,24 +143,24 @@ class Sliding(JointForce):
         if run.rk4:
             return {}
         model = run.model
-        found = _dry_joints(model)
+        dry_dofs = _dry_joints(model)
         if not self.zero:
             unsafe = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE.value
-            if unsafe or not {*run.dofs} <= {*found}:
+            if unsafe or not {*run.dofs} <= {*dry_dofs}:
                 raise ScenarioError(
                     "the model's flags turn off what holds a joint that "
                     f"{type(self).__name__} stops: take constraint, frictionloss and refsafe out "
                     "of its <flag>"
                 )
-            if run.jump_step > 0 and _dry_joints(run.load(run.jump_step)) != found:
+            if run.jump_step > 0 and _dry_joints(run.load(run.jump_step)) != dry_dofs:
                 raise ScenarioError(
                     "the jump takes all dry friction of a joint away beside "
                     f"{type(self).__name__}: give a factor such as 1e-9"
                 )
         rows = {}
         for i, dof in enumerate(run.dofs):
-            if dof in found:
-                rows[i] = found.index(dof)
+            if dof in dry_dofs:
+                rows[i] = dry_dofs.index(dof)
         return rows
 
 
@@ -178,7 +178,7 @@ class Formula(NamedTuple):
     first: Callable  # (y, v, p, memory) -> what it is at the speed v; moves its author's memory
     force: Callable  # (found, v) -> F, of what `first` has found
     bounds: Callable  # (found, y, v, p, memory) -> low and high, of what `first` has found
-    at: Callable  # (y, v, p, memory) -> F at another speed
+    force_at: Callable  # (y, v, p, memory) -> F at another speed
     beside: Callable  # (y, v, p, memory) -> F at STICKING_SPEED, in the direction of v
     seldom: bool  # whether it is called as seldom as it can be, and not at every stage of RK4
     module: str  # of the author
@@ -221,10 +221,10 @@ def _authored(formula: Formula, function: Callable) -> Callable:
 @functools.cache
 def _steady(formula: Formula) -> Callable:
     """Return the force that resists a joint at a steady speed, without a load."""
-    at = formula.at
+    force_at = formula.force_at
 
     def steady(y, p, memory):
-        return at(unloaded(y), y.v, p, memory)
+        return force_at(unloaded(y), y.v, p, memory)
 
     return _authored(formula, steady)
 
@@ -243,9 +243,9 @@ def _brake(formula: Formula) -> Callable:
     first, force, bounds, *_ = formula
 
     def brake(y, p, memory):
-        found = first(y, y.v, p, memory)
-        f = force(found, y.v)
-        low, high = bounds(found, y, y.v, p, memory)
+        level = first(y, y.v, p, memory)
+        f = force(level, y.v)
+        low, high = bounds(level, y, y.v, p, memory)
         slow = abs(y.v) < STICKING_SPEED or y.v * memory[SPEED] < 0.0
         memory[SPEED] = y.v
         if not low < high:  # nothing holds it
@@ -270,7 +270,7 @@ def _at_stages(formula: Formula) -> Callable:
     A formula that is called seldom is so at speed 0 alone where the joint is slow, and while the
     joint stops, F is that of the step's start.
     """
-    first, force, bounds, at, _, seldom, _ = formula
+    first, force, bounds, force_at, _, seldom, _ = formula
     starts = _starting(formula)
     later = _while_sliding(formula)
 
@@ -281,18 +281,18 @@ def _at_stages(formula: Formula) -> Callable:
             slower = memory[WAS_HELD] != 0.0 or abs(y.v) <= abs(memory[STAGE_SPEED])
             slow = slower and abs(y.v) < STICKING_SPEED
             speed = 0.0 if seldom and slow else y.v
-            found = first(y, speed, p, memory)
-            f = force(found, y.v)
+            level = first(y, speed, p, memory)
+            f = force(level, y.v)
             if not math.isfinite(f):  # which ends the run
                 return -f, 0.0
             memory[STAGE_SPEED] = y.v
             low = high = 0.0
             speed_lost = -math.copysign(y.h * y.mobility, y.v) * (smooth - f)
             if slow or y.v == 0.0 or abs(y.v) <= speed_lost:
-                low, high = bounds(found, y, speed, p, memory)
+                low, high = bounds(level, y, speed, p, memory)
             if not low < high:
                 if speed != y.v:
-                    f = at(y, y.v, p, memory)
+                    f = force_at(y, y.v, p, memory)
                 memory[SLIDES], memory[WAS_HELD], memory[RISE] = 1.0, 0.0, 0.0
                 memory[FRICTION] = f
                 return -f, 0.0
@@ -301,7 +301,7 @@ def _at_stages(formula: Formula) -> Callable:
             elif seldom:
                 sliding = -f
             else:
-                sliding = -at(y, 0.5 * y.v, p, memory)
+                sliding = -force_at(y, 0.5 * y.v, p, memory)
             start, starting = starts(y, p, memory, smooth, low, high)
             # friction that holds less than it exerts in motion would start no joint
             if start * (smooth + starting) <= 0.0:
@@ -341,7 +341,7 @@ def _while_sliding(formula: Formula) -> Callable:
     Of a formula that is called seldom, F at the last two stages is on the line through F at the
     first two.
     """
-    at = formula.at
+    force_at = formula.force_at
     seldom = formula.seldom
 
     @inlined
@@ -349,7 +349,7 @@ def _while_sliding(formula: Formula) -> Callable:
         change = y.v - memory[STAGE_SPEED]
         if seldom and y.stage > 1.0:
             return -memory[FRICTION] - memory[SLOPE] * change
-        f = at(y, y.v, p, memory)
+        f = force_at(y, y.v, p, memory)
         if seldom:
             memory[SLOPE] = (f - memory[FRICTION]) / change if change != 0.0 else 0.0
         return with_rise(y, memory, -f)
@@ -385,7 +385,7 @@ class Sigmoid(Sliding):
 
     p1: NaturalPerJoint
     p2: PositivePerJoint
-    p3: Annotated[PerJoint, Each(one=Number(low=-MAX_PARAMETER, high=MAX_PARAMETER))] = 0.0
+    p3: Annotated[PerJoint, Each(item=Number(low=-MAX_PARAMETER, high=MAX_PARAMETER))] = 0.0
     hold: NaturalPerJoint | None = None
 
     @staticmethod

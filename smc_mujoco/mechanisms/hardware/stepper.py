@@ -401,10 +401,10 @@ def field(g, p, queue, start, end):
         reached = g.until if g.slope != 0.0 else math.inf
         after = max(min(step_time, reached, end), t)
         span = after - t
-        left = end - t
+        remaining = end - t
         mean += span * (g.position + 0.5 * g.slope * span)
         moment += span * (
-            g.position * (left - 0.5 * span) + g.slope * span * (0.5 * left - span / 3.0)
+            g.position * (remaining - 0.5 * span) + g.slope * span * (0.5 * remaining - span / 3.0)
         )
         g.position += g.slope * span
         t = after

@@ -63,7 +63,7 @@ class Stribeck(Sliding):
     static: NaturalPerJoint | None = None
     stribeck: PositivePerJoint | None = None
     viscous: NaturalPerJoint = 0.0
-    offset: Annotated[PerJoint, Each(one=Number(low=-MAX_PARAMETER, high=MAX_PARAMETER))] = 0.0
+    offset: Annotated[PerJoint, Each(item=Number(low=-MAX_PARAMETER, high=MAX_PARAMETER))] = 0.0
     width: NaturalPerJoint = 0.0
 
     def __post_init__(self) -> None:
