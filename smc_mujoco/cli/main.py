@@ -1,7 +1,5 @@
 """The command line: smc-mujoco, whose commands are those of `commands`."""
 
-import atexit
-import gc
 import os
 import signal
 import sys
@@ -33,8 +31,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
 )
-# Python's last collections take .5 s, which Ctrl-C would wait for
-atexit.register(gc.freeze)
 DRAWN = ("film", "figure", "plot", "video")  # commands that do not exist, and that users try
 # heading in the help -> commands; the annexes add theirs
 GROUPS: dict[str, list[Callable[..., None]]] = {

@@ -11,6 +11,7 @@ import atexit
 import contextlib
 import gc
 import os
+import signal
 import sys
 import threading
 import time
@@ -77,12 +78,19 @@ def _wait(threads: Iterable[threading.Thread]) -> None:
         alive[0].join(rest)
 
 
+def _ignore_ctrl_c() -> None:
+    """Let a Ctrl-C from now on interrupt nothing. One that has come already may be raised here."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 @atexit.register  # when this is imported, so that it is called after the handlers of others
 def _end_with_python() -> None:
     """End the process at once if one of the threads does not end: it would crash in a Python that
     is half gone. Python's last collections are left out: they take .5 s, which Ctrl-C would wait
     for.
     """
+    _ignore_ctrl_c()
     gc.freeze()
     for stop in list(_running.values()):
         stop()
@@ -93,3 +101,7 @@ def _end_with_python() -> None:
             with contextlib.suppress(Exception):
                 stream.flush()
         os._exit(ENDED_BY_CTRL_C)
+
+
+# Called just before it: a Ctrl-C that is raised in there does not skip the end of the threads.
+atexit.register(_ignore_ctrl_c)

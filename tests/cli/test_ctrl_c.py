@@ -1,0 +1,55 @@
+"""Whoever presses Ctrl-C again and again while a command compiles or simulates ends it in order."""
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from smc_mujoco.common.attended import ENDED_BY_CTRL_C
+
+ROOT = Path(__file__).parents[2]
+BETWEEN_PRESSES = 0.02  # s
+ARM = """<mujoco><worldbody><body><joint name="j" axis="0 -1 0" damping="2"/>
+<geom type="capsule" fromto="0 0 0 .4 0 0" size=".03" mass="3" contype="0" conaffinity="0"/></body>
+</worldbody><actuator><motor joint="j" ctrlrange="-60 60"/></actuator></mujoco>"""
+COMMANDS = {
+    "run": ["run", str(ROOT / "scenes/duffing.py"), "--no-film"],
+    "film": ["run", str(ROOT / "scenes/duffing.py")],
+    "tune": ["tune", "duffing", "--law", "pid"],
+    "which": ["which", "duffing", "--minutes", "2"],
+    "identify": ["identify", "arm.xml:j", "log.csv", "--for", "j.damping"],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize("name", COMMANDS)
+def test_many_presses_of_ctrl_c_end_a_command_as_one_does(name, tmp_path):
+    (tmp_path / "arm.xml").write_text(ARM)
+    rows = [f"{0.01 * i},{math.sin(0.03 * i)},{math.cos(0.03 * i)}\n" for i in range(500)]
+    (tmp_path / "log.csv").write_text("t,x,u\n" + "".join(rows))
+    # nothing is compiled yet, and what compiles does not hear Ctrl-C
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    code += f"import sys; sys.argv[1:] = {COMMANDS[name]!r}\n"
+    code += "from smc_mujoco.cli.main import main; main()"
+    with subprocess.Popen(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env=environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    ) as command:
+        while command.poll() is None and not (tmp_path / "cache").exists():
+            time.sleep(BETWEEN_PRESSES)  # until it compiles
+        for _ in range(round(1.0 / BETWEEN_PRESSES)):
+            if command.poll() is not None:
+                break
+            command.send_signal(signal.SIGINT)
+            time.sleep(BETWEEN_PRESSES)
+        assert command.wait(60.0) == ENDED_BY_CTRL_C
