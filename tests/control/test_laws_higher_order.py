@@ -439,3 +439,32 @@ def test_laws_of_degree_3_settle_a_plant_behind_an_actuator_lag(plant, L, name):
     assert trace.failure is None
     assert score["ultimate_bound"] <= 0.02 * size
     assert score["settling_time"] < 6.0
+
+
+def third_order(L=1.0, **more):
+    """Third-order super-twisting with the gains of Levant's differentiator for |d''| <= L."""
+    gains = {"k1": 2.0 * L ** (1 / 3), "k2": 2.12 * L ** (2 / 3), "k3": 1.1 * L}
+    return law("third_order_super_twisting", **gains, **more)
+
+
+def test_third_order_super_twisting_is_of_third_order_and_its_integral_becomes_the_disturbance():
+    load = sine(1.0) + constant(0.5)  # |d''| <= 1
+    found, runs = powers(third_order(), load, plant_a, duration=20.0)
+    assert found[0] == pytest.approx(3.0, abs=0.25)
+    late = runs[2].t > 15.0
+    assert np.abs(runs[2].u + [load(t) for t in runs[2].t])[late].max() < 0.01
+
+
+def test_a_load_of_constant_rate_leaves_no_error_of_third_order_super_twisting_alone():
+    """k3 > 0 is all that it needs, where super-twisting needs k2 above the rate."""
+    for rule, stays in ((third_order(), False), (law("super_twisting", k1=3.0, k2=0.5), True)):
+        run = plant_a(rule, ramp(0.8), duration=20.0)
+        assert (run.residual() > 1e-3) == stays
+
+
+def test_the_clamp_of_third_order_super_twisting_holds_both_integrals():
+    run = plant_a(third_order(w_max=0.5), constant(0.8), duration=40.0)
+    assert np.abs(run.memory[:, 0]).max() <= 0.5
+    assert np.abs(run.memory[:, 1]).max() < 2.0
+    below = [plant_a(third_order(w_max=w), constant(0.3)).residual() for w in (0.5, math.inf)]
+    assert below[0] == pytest.approx(below[1], abs=1e-6)

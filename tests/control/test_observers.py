@@ -170,3 +170,25 @@ def test_with_the_model_gravity_and_the_reference_s_acceleration_are_fed_forward
         assert u == pytest.approx((2.0 + 3.0) / 4.0, abs=1e-12)
         assert s == 0.0
         assert abs(memory[ESTIMATE[name]]) < 1e-12
+
+
+def test_with_two_integrals_the_estimate_is_within_the_bound_of_the_second_derivative():
+    """|d - z| <= J / l^2, J = 2 omega^2, and what sampling adds."""
+    for speed, omega in ((20.0, 1.0), (60.0, 5.0)):
+        rule = observer("second_order_disturbance_observer", k=0.0, l=speed)
+        run = plant_b(rule, sine(2.0, omega))
+        miss = np.abs(2.0 * np.sin(omega * run.t[1:]) - run.memory[1:, 3])[3000:]
+        assert miss.max() <= 2.0 * omega**2 / speed**2 + 2.0 * omega * H
+
+
+def test_with_two_integrals_a_smaller_switching_gain_keeps_the_surface():
+    """k above J / l^2 does, where the observer of first order needs more than J' / l."""
+    load = sine(2.0, 2.0)
+    k = 1.5 * 8.0 / 20.0**2  # of J = 8 and l = 20
+    for name, stays in (
+        ("second_order_disturbance_observer", True),
+        ("disturbance_observer", False),
+    ):
+        rule = observer(name, k=k, l=20.0)
+        run = plant_b(rule, load, x=(0.0, 0.0), model=1.0, duration=20.0)
+        assert (np.abs(slid(run))[15000:].max() < 0.005) == stays

@@ -29,8 +29,31 @@ margins are worked out here.
 
 import math
 
+from numba import njit
+
 from smc_mujoco.control.law import assumed, clipped, law_function
 from smc_mujoco.control.units import ASSUMED_B, RATE, Gain
+
+
+@njit
+def estimated(y, l, memory):
+    """Return z for the next period. The memory is: started, the last rate, the known acceleration
+    of the last period, z, and r dt.
+    """
+    if memory[0] != 0.0:
+        pole = math.exp(-l * y.dt)
+        miss = (y.de - memory[1]) / y.dt - memory[2] - memory[3]
+        memory[4] += (1.0 - pole) * (1.0 - pole) * miss
+        memory[3] += memory[4] + (1.0 - pole * pole) * miss
+    return memory[3]
+
+
+@njit
+def remember(y, acceleration, memory):
+    """Keep for the next sample this one's rate, and the acceleration that the law knows of."""
+    memory[0] = 1.0
+    memory[1] = y.de
+    memory[2] = acceleration
 
 
 @law_function(
@@ -48,17 +71,9 @@ from smc_mujoco.control.units import ASSUMED_B, RATE, Gain
     relative_degree=2,
 )
 def hodob(y, gains, memory):
-    # memory: started, the last rate, the known acceleration of the last period, z of the next
-    # period, and r dt
     b, f = assumed(y, gains.b)
-    if memory[0] != 0.0:
-        pole = math.exp(-gains.l * y.dt)
-        miss = (y.de - memory[1]) / y.dt - memory[2] - memory[3]
-        memory[4] += (1.0 - pole) * (1.0 - pole) * miss
-        memory[3] += memory[4] + (1.0 - pole * pole) * miss
+    z = estimated(y, gains.l, memory)
     s = gains.wc * gains.wc * y.e + 2.0 * gains.wc * y.de
-    u = -(s + memory[3] + f) / b
-    memory[0] = 1.0
-    memory[1] = y.de
-    memory[2] = b * clipped(y, u) + f
+    u = -(s + z + f) / b
+    remember(y, b * clipped(y, u) + f, memory)
     return u, s
