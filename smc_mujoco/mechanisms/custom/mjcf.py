@@ -5,11 +5,12 @@ import dataclasses
 import functools
 import glob
 import hashlib
+import html
 import itertools
 import os
+import re
 import sys
 import threading
-import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -23,7 +24,13 @@ from smc_mujoco.mechanisms.custom import urdf
 from smc_mujoco.mechanisms.layout import LEAD, ROTOR
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER
 
-FOLDERS = ("meshdir", "texturedir", "assetdir")  # where a <compiler> may say that assets lie
+# Attributes that name files, and the folders where a <compiler> may say that they lie. They are
+# found in the text, as MuJoCo reads files that are no XML; those of a comment count, too.
+FILES = re.compile(rb"""\bfile\w*\s*=\s*(?:"([^"]*)"|'([^']*)')""")
+FOLDERS = re.compile(rb"""\b(?:mesh|texture|asset)dir\s*=\s*(?:"([^"]*)"|'([^']*)')""")
+OWN_NAME = re.compile(rb"""<mujoco\b[^>]*?\bmodel\s*=\s*(?:"([^"]*)"|'([^']*)')""")
+COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+BEFORE_XML = b"\xef\xbb\xbf \t\r\n"  # what may stand before it
 XML = (".xml", ".mjcf", ".urdf")
 DIGITS = 17  # of numbers in the XML of an MjSpec: enough for any float64
 ROUNDING = 1e-12  # relative and absolute: change of a model's numbers when it is written and read
@@ -82,8 +89,8 @@ class ModelSource:
         """The file's name; for a text, the name that the model gives itself, as a file's name."""
         if self.path:
             return Path(self.path).name
-        roots = _elements(self.text)[:1]
-        return f"{(roots and roots[0].get('model')) or 'model'}.xml"
+        names = _values(OWN_NAME, _encoded(self.text))
+        return f"{(names and names[0]) or 'model'}.xml"
 
     def spec(self) -> mujoco.MjSpec:
         """Return the model as an editable MjSpec of one's own.
@@ -115,6 +122,8 @@ class ModelSource:
             elif from_urdf := urdf.read(Path(self.path)):
                 spec = from_urdf.spec()
             else:
+                # whose cache takes a mesh that is written again in the same second for the old one
+                mujoco.mj_clearCache(mujoco.mj_getCache())
                 spec = mujoco.MjSpec.from_file(self.path)
         except ValueError as error:
             raise broken(self.path or self.label, str(error), self.path) from None
@@ -200,13 +209,14 @@ def source(model: object, assets: Mapping[str, bytes | str] | None = None) -> Mo
         raise ScenarioError(
             f"{path.name} is no model yet: give what xacro {path.name} > FILE.urdf writes"
         )
-    return _of_file(path, digest(path))
+    return _of_file(path)
 
 
-def _of_file(path: Path, sha256: str) -> ModelSource:
-    """Return the source of a file whose digest is known."""
+def _of_file(path: Path) -> ModelSource:
+    """Return the source of a file as it is now."""
+    sha256, stamp = digest(path)
     _known[sha256] = path
-    _stamps[sha256] = _stamp(path)
+    _stamps[sha256] = stamp
     return ModelSource(str(path), sha256)
 
 
@@ -220,8 +230,9 @@ def source_of_record(name: str, sha256: str) -> ModelSource:
         places.insert(0, _known[sha256])
     candidates = list(filter(Path.is_file, places))
     for place in candidates:
-        if digest(place) == sha256:
-            return _of_file(Path(os.path.abspath(place)), sha256)
+        now = _of_file(Path(os.path.abspath(place)))
+        if now.sha256 == sha256:
+            return now
     if candidates:
         raise ScenarioError(
             f"its model {candidates[0]}, or a file that it names, has changed since the run: put "
@@ -241,21 +252,20 @@ def _of_text(text: str, assets: Mapping[str, Any]) -> ModelSource:
             f"assets is {shown(assets)}: give names of files with their contents, as bytes or text"
         )
     contents = {}
-    texts = [text]
+    texts = [_encoded(text)]
     for name, content in assets.items():
         contents[name] = content.encode() if isinstance(content, str) else bytes(content)
         if name.lower().endswith(XML):
             texts.append(contents[name])
     asset_names = {PurePosixPath(name).name for name in contents}
-    elements = itertools.chain.from_iterable(map(_elements, texts))
-    for name in _files(elements):
+    for name in itertools.chain.from_iterable(map(_files, (COMMENT.sub(b"", t) for t in texts))):
         if PurePosixPath(name).name not in asset_names:
             cure = f"give assets={{{name!r}: its bytes}}, or the path of the model's file"
             raise ScenarioError(
                 f"the model names the file {shown(name)}, and a text has no folder: {cure}"
             )
     pairs = tuple(sorted(contents.items()))
-    parts = [text.encode(errors="surrogatepass")]
+    parts = [_encoded(text)]
     for name, content in pairs:
         parts += [name.encode(), content]
     return ModelSource("", _sha256(parts), text, pairs)
@@ -266,6 +276,7 @@ def _of_spec(spec: mujoco.MjSpec) -> ModelSource:
     names.
     """
     copied = spec.copy()
+    mujoco.mj_clearCache(mujoco.mj_getCache())
     try:
         model = mjcb.compiled(copied)
         text = _full_precision_xml(copied)
@@ -289,10 +300,9 @@ def digest_of(spec: mujoco.MjSpec) -> str:
 
 def _assets(spec: mujoco.MjSpec, text: str) -> dict[str, bytes]:
     """Return name -> content of each file that an MjSpec names, given its XML."""
-    elements = _elements(text)
-    inner = {"", *_folders(elements)}
+    inner = {"", *_values(FOLDERS, _encoded(text))}
     assets = dict(spec.assets)
-    for name in _files(elements):
+    for name in _files(_encoded(text)):
         for folder in sorted(inner):
             place = Path(spec.modelfiledir) / folder / name
             if name not in assets and place.is_file():
@@ -342,7 +352,7 @@ def broken(where: str, error: str, path: str) -> ScenarioError:
     """Return the error for MuJoCo's message about a model; path is that of its file, if any."""
     cure = next((CURES[words] for words in CURES if words in error), "")
     for file in sorted(Path(path).parent.glob("*.xml")) if path else ():
-        if not cure and any(part.get("file") == Path(path).name for part in _elements(file)):
+        if not cure and file.is_file() and Path(path).name in _files(file.read_bytes()):
             cure = f"give {file.name}, which includes it, or fix the file"
     if not cure:
         cure = "fix the file" if path else "fix it"
@@ -364,44 +374,42 @@ def pick(label: str, kind: str, name: object, names: Sequence[str]) -> int:
     return find(f"{kind} of {label}", name, numbers)
 
 
-def digest(path: Path) -> str:
-    """Hash the file and every file that it names: SHA-256, 64 hex digits."""
-    return _sha256(map(Path.read_bytes, _named_files(path)))
-
-
-def _named_files(path: Path) -> list[Path]:
-    """Return the file and every file that it names: includes, attached models, meshes, textures.
+def digest(path: Path) -> tuple[str, Stamp]:
+    """Return the hash of a file and every file that it names, SHA-256, 64 hex digits, with the
+    times of their last changes and their sizes, as they were when they were read.
 
     If a name fits files in several folders, all of them count.
     """
-    if from_urdf := urdf.read(path):
-        return [path, *from_urdf.meshes.values()]
-    texts = [path]
-    files = {path.resolve(): None}
-    names = []
-    folders = {}
-    inner = {"": None}
-    for text in texts:  # grows as files name further files
-        folders[text.parent] = None
-        elements = _elements(text)
-        names += _files(elements)
-        inner |= dict.fromkeys(_folders(elements))
-        for name, sub, folder in list(itertools.product(names, inner, folders)):
-            place = folder / sub / name
-            if place.is_file() and place.resolve() not in files:
-                files[place.resolve()] = None
-                if place.suffix.lower() in XML:
-                    texts.append(place)
-    return [*files]
+    contents = {}
+    stamp: Stamp = {}
 
-
-def _stamp(path: Path) -> Stamp:
-    """Return file -> time of its last change, ns, and size, of the file and all that it names."""
-    stamp = {}
-    for file in _named_files(path):
+    def read(file: Path) -> bytes:
         about = file.stat()
         stamp[str(file)] = about.st_mtime_ns, about.st_size
-    return stamp
+        contents[file] = file.read_bytes()
+        return contents[file]
+
+    if from_urdf := urdf.read(path):
+        for file in (path, *from_urdf.meshes.values()):
+            read(file)
+        return _sha256(contents.values()), stamp
+    names: dict[str, None] = {}
+    inner = {"": None}
+    folders = {}
+    files = {path.resolve(): None}
+    for file in (queue := [*files]):  # grows as files name further files
+        content = read(file)
+        if not content.lstrip(BEFORE_XML).startswith(b"<"):
+            continue
+        folders[file.parent] = None
+        names |= dict.fromkeys(_files(content))
+        inner |= dict.fromkeys(_values(FOLDERS, content))
+        for name, sub, folder in itertools.product(names, inner, folders):
+            place = folder / sub / name
+            if place.is_file() and (resolved := place.resolve()) not in files:
+                files[resolved] = None
+                queue.append(resolved)
+    return _sha256(contents.values()), stamp
 
 
 def _unchanged(source: ModelSource) -> bool:
@@ -414,10 +422,10 @@ def _unchanged(source: ModelSource) -> bool:
             same = same and stamp == (now.st_mtime_ns, now.st_size)
         if same:
             return True
-    path = Path(source.path)
-    if digest(path) != source.sha256:
+    sha256, stamp = digest(Path(source.path))
+    if sha256 != source.sha256:
         return False
-    _stamps[source.sha256] = _stamp(path)
+    _stamps[sha256] = stamp
     return True
 
 
@@ -429,32 +437,27 @@ def _sha256(parts: Iterable[bytes]) -> str:
     return total.hexdigest()
 
 
-def _elements(model: Path | str | bytes) -> list[ET.Element]:
-    """Return the elements of an XML file or text; [] if it cannot be parsed: MuJoCo says so."""
-    try:
-        text = model.read_bytes() if isinstance(model, Path) else model
-        return list(ET.fromstring(text).iter())
-    except (OSError, ValueError, ET.ParseError):
-        return []
+def _encoded(text: str) -> bytes:
+    return text.encode(errors="surrogatepass")
 
 
-def _files(elements: Iterable[ET.Element]) -> list[str]:
-    """Return the names of files in the attributes of elements."""
-    names = []
-    for element in elements:
-        for key, value in element.attrib.items():
-            if key.startswith("file"):
-                names.append(value)
-    return names
+def _values(attributes: re.Pattern[bytes], text: bytes) -> list[str]:
+    """Return the values of attributes in the text of a model."""
+    values = []
+    for double, single in attributes.findall(text):
+        values.append(html.unescape((double or single).decode(errors="surrogateescape")))
+    return values
 
 
-def _folders(elements: Iterable[ET.Element]) -> list[str]:
-    """Return the folders of files that the compiler elements name; "" for one that they do not."""
-    folders = []
-    for element in elements:
-        if element.tag == "compiler":
-            folders += [element.get(name, "") for name in FOLDERS]
-    return folders
+def _files(text: bytes) -> list[str]:
+    """Return the names of files in the text of a model, with and without their folders, which
+    MuJoCo may be told to leave out.
+    """
+    names: dict[str, None] = {}
+    for value in _values(FILES, text):
+        name = value.replace("\\", "/")
+        names |= dict.fromkeys([name, PurePosixPath(name).name])
+    return list(filter(None, names))
 
 
 def check_model(label: str, model: mujoco.MjModel) -> None:
