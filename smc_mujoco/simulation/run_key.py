@@ -101,19 +101,25 @@ def row(scenario: Scenario, plants: Hashes | None = None) -> Fields:
         "plant": scenario.plant.name,
         "law": scenario.law.name,
         "gains": to_json(dict(scenario.law.gains)),
-        **source(scenario),
-        "condition": condition(scenario, data),
         "seed": scenario.seed,
         "duration": scenario.duration,
         "versions": to_json(data["versions"]),
-        "scenario": to_json(data),
+        **labels(scenario, data),
     }
 
 
-def source(scenario: Scenario) -> dict[str, str | None]:
-    """Return the columns of a table that say where the run's gains come from."""
+def labels(scenario: Scenario, data: Fields | None = None) -> dict[str, str | None]:
+    """Return the columns of a table that two runs of one key may differ in: where the gains come
+    from, and how the condition is called.
+    """
+    data = data or description(scenario)
     about = scenario.law.source.about()
-    return {"source": about["kind"], "search": about["search"] and to_json(about["search"])}
+    return {
+        "source": about["kind"],
+        "search": about["search"] and to_json(about["search"]),
+        "condition": condition(scenario, data),
+        "scenario": to_json(data),
+    }
 
 
 def condition(scenario: Scenario, data: Fields | None = None) -> str:

@@ -15,7 +15,7 @@ import functools
 import hashlib
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -113,12 +113,12 @@ class Store:
             if (part := self._read(path)) is not None:
                 yield from part.take(indices).to_pylist()
 
-    def collect(self, hashes: Sequence[str], changes: Mapping[str, Data]) -> None:
+    def collect(self, hashes: Sequence[str], changes: Callable[[str], Data]) -> None:
         """Write the table of these finished runs, in this order.
 
-        `changes` is hash -> columns that replace those of the part: scores at half the step, what a
-        part does not tell, and the source of the gains, because the part may be from an earlier
-        study whose gains had another source.
+        `changes` gives for a hash the columns that replace those of the part: scores at half the
+        step, what a part does not tell, and what may be called otherwise in the earlier study that
+        the part is from.
         """
         import pyarrow as pa
 
@@ -138,14 +138,10 @@ class Store:
                 parts.append(part.take(places_in_part))
             order = np.argsort(np.concatenate(list(places.values())))
             data = pa.concat_tables(parts).take(order).combine_chunks()
-            changed = set()
-            for key in names:
-                changed.update(changes.get(key, ()))
-            for name in sorted(changed):
-                pairs = zip(names, data[name].to_pylist(), strict=True)
-                values = []
-                for key, value in pairs:
-                    values.append(changes.get(key, {}).get(name, value))
+            replaced = [changes(key) for key in names]
+            for name in sorted(set().union(*replaced)):
+                pairs = zip(replaced, data[name].to_pylist(), strict=True)
+                values = [columns.get(name, value) for columns, value in pairs]
                 column = pa.array(values, data.field(name).type)
                 data = data.set_column(data.column_names.index(name), data.field(name), column)
             return data
@@ -244,9 +240,14 @@ def study(
         kept = printable(str(store.parts))
         print(f"{done} of {len(every)} simulations{both} are in {kept}", file=sys.stderr)
     _compute(missing, store, plants, threads, progress, executor)
-    changes = {name: run_key.source(s) for name, s in by_key.items()}
-    for name, scores in _half_step_scores(repeated, store).items():
-        changes[name] = changes[name] | {"half_step": scores}
+    half_steps_of = _half_step_scores(repeated, store)
+
+    def changes(name: str) -> Data:
+        columns: dict[str, Any] = dict(run_key.labels(by_key[name]))
+        if name in half_steps_of:
+            columns["half_step"] = half_steps_of[name]
+        return columns
+
     store.collect(list(by_key), changes)
     return dataclasses.replace(Table.read(store.results), known=by_key)
 

@@ -313,3 +313,13 @@ def test_a_metric_of_a_piece_of_a_period_is_not_compared_and_the_board_says_why(
     (reason,) = boards.absent
     assert "ultimate_bound" in reason
     assert "duffing under slow" in reason
+
+
+def test_a_kept_run_is_called_as_the_study_calls_it(tmp_path, none_runs):
+    rubbing = scenario(friction=smc.Coulomb(0.1))
+    study([rubbing.named("nominal")], tmp_path)
+    none_runs()
+    for name in (None, "coulomb", "nominal"):
+        table = study([rubbing.named(name)], tmp_path)
+        assert table.column("condition")[0] == condition(rubbing.named(name))
+        assert Table.read(tmp_path / "results.parquet").scenario(0).condition == name

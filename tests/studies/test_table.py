@@ -124,7 +124,7 @@ def test_no_bit_that_flips_in_a_part_makes_other_rows(tmp_path):
             lost += 1
             continue
         assert len(store.where) == len(small())
-        store.collect([key(s) for s in small()], {})
+        store.collect([key(s) for s in small()], lambda name: {})
         assert repr(Table.read(tmp_path).rows()) == right
     assert lost > 8
 
