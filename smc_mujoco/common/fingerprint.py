@@ -3,8 +3,9 @@
     of(my_law.function)  # "5f0c..."; it changes with the function, and with every helper
 
 A function's hash covers its bytecode, constants, defaults, closure and everything that it reaches
-by a global name: constants by value, functions by their own code, objects by their class and by
-what pickle keeps of them. Functions and classes of Python and of the numerical packages count by
+by a global name or imports: constants by value, functions by their own code, objects by their class
+and by what pickle keeps of them. What it opens, or finds by a text, does not count: `unseen` names
+that. Functions and classes of Python and of the numerical packages count by
 name, since the versions of those packages are recorded. A law in C counts by its machine code, one
 in another file by its content. Names of files, line numbers, comments and docstrings do not count.
 Hashes hold for one version of Python.
@@ -12,15 +13,17 @@ Hashes hold for one version of Python.
 
 import contextlib
 import dataclasses
+import dis
 import functools
 import hashlib
 import io
+import itertools
 import math
 import pickle
 import struct
 import sys
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
@@ -53,6 +56,15 @@ VERSIONED = {
     "mujoco",
 }  # identified by their version
 LOCKS = type(threading.Lock()), type(threading.RLock())  # which no result depends on
+# Built-in functions, and functions of modules, that read what no name in the code leads to
+BY_TEXT = {"open", "globals", "locals", "vars", "getattr", "eval", "exec", "__import__"}
+READERS = {
+    "numpy": {"load", "loadtxt", "genfromtxt", "fromfile"},
+    "json": {"load"},
+    "pickle": {"load"},
+    "importlib": {"import_module"},
+}
+READING_METHODS = {"read_text", "read_bytes"}  # of paths
 VALUES = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.ndarray)
 VALUES += (tuple, list, set, frozenset, Mapping)
 
@@ -129,13 +141,24 @@ def keep(thing: Any) -> None:
 def now(thing: Any) -> str:
     """Return the hash of a thing as it is now; raises as `of`."""
     buffer = io.BytesIO()
+    pickler = _CodePickler(buffer, pickle.DEFAULT_PROTOCOL)
     try:
-        _CodePickler(buffer, pickle.DEFAULT_PROTOCOL).dump(thing)
+        pickler.dump(thing)
     except Exception as error:  # whatever an object's own methods raise
         why = " ".join(str(error).split())
         cure = "use plain functions and numbers"
         raise ScenarioError(f"cannot tell {shown(thing)} from others ({why}): {cure}") from None
-    return hashlib.sha256(buffer.getvalue()).hexdigest()
+    digest = hashlib.sha256(buffer.getvalue()).hexdigest()
+    if pickler.readers:
+        _readers[digest] = pickler.readers
+    return digest
+
+
+def unseen(digest: str) -> dict[str, list[str]]:
+    """Return function -> names of what it reads by, of the code of a hash that this process has
+    taken: what is read so does not count.
+    """
+    return _readers.get(digest, {})
 
 
 def variables(function: Any) -> dict[str, str]:
@@ -158,6 +181,7 @@ def variables(function: Any) -> dict[str, str]:
 
 
 _compiled_hashes: dict[Any, str] = {}  # function or class -> its hash when it was compiled
+_readers: dict[str, dict[str, list[str]]] = {}  # hash -> what `unseen` returns
 _cached = functools.cache(now)
 
 
@@ -173,6 +197,10 @@ class _CodePickler(pickle._Pickler):
 
     The result is never loaded.
     """
+
+    def __init__(self, *arguments: Any):
+        super().__init__(*arguments)
+        self.readers: dict[str, list[str]] = {}  # function -> what it reads by
 
     def memoize(self, obj: Any) -> None:
         """Note an object as written, except constants: whether equal ones are one object depends on
@@ -204,7 +232,7 @@ class _CodePickler(pickle._Pickler):
         kind = ""
         contents: Any = NotImplemented
         if isinstance(obj, FunctionType):
-            contents = _function_contents(obj)
+            contents = self._function_contents(obj)
         elif isinstance(obj, MethodType):
             contents = obj.__func__, obj.__self__
         elif isinstance(obj, CodeType):
@@ -230,6 +258,24 @@ class _CodePickler(pickle._Pickler):
             return contents
         return (str, (f"{type(obj).__name__} {kind}",), contents)
 
+    def _function_contents(self, function: FunctionType) -> list[Any]:
+        """Return everything that a function's result may depend on, and note how it reads what does
+        not count.
+        """
+        if not ours(function) and (readers := _reading(function)):
+            self.readers[function.__qualname__] = readers
+        names = names_in(function.__code__)
+        closure = list(map(_cell_contents, function.__closure__ or ()))
+        return [
+            _without_docstring(function),
+            function.__defaults__,
+            function.__kwdefaults__,
+            closure,
+            *_reached(function.__globals__, names.variables, names.attributes, set()),
+            *_imported(function, names.attributes),
+            *_overloads(function),
+        ]
+
 
 def _as_written(value: Any) -> Any:
     """Return the function that the user wrote, without its wrappers: compiled, static or cached."""
@@ -249,18 +295,47 @@ def _versioned(thing: Any) -> bool:
     )
 
 
-def _function_contents(function: FunctionType) -> list[Any]:
-    """Return everything that a function's result may depend on."""
+def _imported(function: FunctionType, attributes: set[str]) -> list[Any]:
+    """Return what a function reaches in the modules that it imports in its body, as `_reached`
+    does. They are imported now: it would do so when it is called.
+    """
+    if ours(function):
+        return []
+    parts: list[Any] = []
+    for code in _codes(function.__code__):
+        instructions = list(dis.get_instructions(code))
+        for i, instruction in enumerate(instructions):
+            if instruction.opname != "IMPORT_NAME":
+                continue
+            level, names = (before.argval for before in instructions[i - 2 : i])
+            try:
+                module = __import__(instruction.argval, function.__globals__, None, names, level)
+            except Exception:  # the call says what is wrong
+                continue
+            parts += _reached({instruction.argval: module}, {instruction.argval}, attributes, set())
+    return parts
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    """Yield the code of a function, and of those that are defined in it."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _codes(constant)
+
+
+def _reading(function: FunctionType) -> list[str]:
+    """Return the names by which a function reads what its names do not lead to, sorted."""
     names = names_in(function.__code__)
-    closure = list(map(_cell_contents, function.__closure__ or ()))
-    return [
-        _without_docstring(function),
-        function.__defaults__,
-        function.__kwdefaults__,
-        closure,
-        *_reached(function.__globals__, names.variables, names.attributes, set()),
-        *_overloads(function),
-    ]
+    space = function.__globals__
+    readers = {name for name in BY_TEXT & names.variables if name not in space}
+    for code in _codes(function.__code__):
+        for variable, attribute in itertools.pairwise(dis.get_instructions(code)):
+            if variable.opname == "LOAD_GLOBAL":
+                module = getattr(space.get(variable.argval), "__name__", "")
+                if attribute.argval in READERS.get(module, ()):
+                    readers.add(f"{variable.argval}.{attribute.argval}")
+    return sorted(readers | (READING_METHODS & names.attributes))
 
 
 def _without_docstring(function: FunctionType) -> CodeType:

@@ -3,6 +3,8 @@
 from typing import Any
 
 from smc_mujoco.common import fingerprint
+from smc_mujoco.common.errors import warn_once
+from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.custom.mjcf import digest_of
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.scenario import Scenario
@@ -31,7 +33,15 @@ def code_hashes(s: Scenario, plants: Hashes) -> list[str]:
             things.append(kind)
     if s.plant not in plants:
         plants[s.plant] = _plant_codes(s.plant)
-    return [*map(fingerprint.of, things), *plants[s.plant]]
+    hashes = [*map(fingerprint.of, things), *plants[s.plant]]
+    for digest in hashes:
+        for function, names in fingerprint.unseen(digest).items():
+            warn_once(
+                f"{function} reads by {joined(names)}, and what it reads so is not in the keys of "
+                "kept runs: after a change there a folder gives the old runs, so read it into a "
+                "global variable, or give a new folder"
+            )
+    return hashes
 
 
 def _plant_codes(plant: Plant) -> list[str]:

@@ -2,8 +2,13 @@
 
 import dataclasses
 import functools
+import importlib
+import math
 import shutil
+import sys
+import warnings
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -297,6 +302,56 @@ def package(factor: float) -> ModuleType:
 )
 def test_everything_that_a_law_reaches_is_in_its_fingerprint(made):
     assert fingerprint.of(made(1.0)) == fingerprint.of(made(1.0)) != fingerprint.of(made(2.0))
+
+
+IMPORTING = {
+    "a module": "import a_helper\n    return a_helper.factor(y.e), y.e",
+    "a name": "from a_helper import factor\n    return factor(y.e), y.e",
+    "in a function within": "def g(x):\n        from a_helper import factor as f\n"
+    "        return f(x)\n    return g(y.e), y.e",
+}
+
+
+@pytest.mark.parametrize("way", IMPORTING)
+def test_what_a_law_imports_in_its_body_is_in_its_fingerprint(way, tmp_path, monkeypatch):
+    """A kept run of an old helper was taken for that of the new one."""
+    monkeypatch.syspath_prepend(tmp_path)
+    hashes = []
+    for gain in (1.0, 1.0, 22.0):
+        (tmp_path / "a_helper.py").write_text(f"K = {gain}\ndef factor(x):\n    return K * x\n")
+        monkeypatch.delitem(sys.modules, "a_helper", raising=False)
+        importlib.invalidate_caches()
+        monkeypatch.setattr(sys, "dont_write_bytecode", True)
+        space: dict = {"__name__": "written"}
+        exec(f"def law(y, gains, memory):\n    {IMPORTING[way]}", space)
+        hashes.append(fingerprint.now(space["law"]))
+    monkeypatch.delitem(sys.modules, "a_helper")
+    assert hashes[0] == hashes[1] != hashes[2]
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("open('k.txt').read()", ["open"]),
+        ("globals()['K']", ["globals"]),
+        ("getattr(math, 'sin')(y.e)", ["getattr"]),
+        ("np.load('k.npy')[0]", ["np.load"]),
+        ("Path('k.txt').read_text()", ["read_text"]),
+        ("np.sin(y.load)", []),
+    ],
+)
+def test_what_a_law_reads_by_a_text_is_said_not_to_count(text, names):
+    space: dict = {"__name__": "written", "np": np, "math": math, "Path": Path}
+    exec(f"def mine(y, gains, memory): return {text}, y.e", space)
+    digest = fingerprint.now(space["mine"])
+    assert fingerprint.unseen(digest) == ({"mine": names} if names else {})
+    law = smc.law_function(gains={"k": 1.0})(space["mine"])()
+    with warnings.catch_warnings(record=True) as raised:
+        warnings.simplefilter("always")
+        key(scenario(law))
+    assert [str(w.message).partition(",")[0] for w in raised] == [
+        f"mine reads by {name}" for name in names
+    ]
 
 
 def test_an_object_that_changed_is_another():
