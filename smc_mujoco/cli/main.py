@@ -6,6 +6,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -66,6 +67,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     An error that the user can correct ends in one sentence and exit code 2.
     """
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by the shell, as by >&-
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         # a character that the terminal lacks is shown as ?
         stream.reconfigure(errors="replace")  # pyright: ignore[reportAttributeAccessIssue] Python made it a TextIOWrapper

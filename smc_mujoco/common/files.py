@@ -22,6 +22,7 @@ from smc_mujoco.common.aliases import AnyPath
 from smc_mujoco.common.errors import ScenarioError, shown
 
 MAX_NAME = 60  # bytes of a name in a file's name, which most file systems limit to 255
+CHANGED = "it is damaged, or was changed, since it was written"
 MAX_SIZE = 2 * 10**9  # bytes of a file that is read: chosen
 MAX_UNPACKED = 500_000_000  # bytes of an archive
 MAX_RATIO = 20  # of them per byte packed
@@ -261,6 +262,23 @@ def write_json(path: Path, data: Any, indent: int | None = 1) -> Path:
 def read_json(path: Path) -> Any:
     """Return the data in a JSON file, see `from_json`."""
     return from_json(path.read_text(encoding="utf-8"))
+
+
+def sealed(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the data of a JSON file with its seal: a hash of all the rest, 64 hex digits."""
+    return dict(data) | {"seal": _seal(data)}
+
+
+def unsealed(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the data of a JSON file; ScenarioError if it has a seal, and it is that of others."""
+    if "seal" in data and data["seal"] != _seal(data):
+        raise ScenarioError(CHANGED)
+    return dict(data)
+
+
+def _seal(data: Mapping[str, Any]) -> str:
+    rest = {name: value for name, value in data.items() if name != "seal"}
+    return hashlib.sha256(to_json(rest, sort_keys=True).encode()).hexdigest()
 
 
 def _part(path: Path) -> Path:

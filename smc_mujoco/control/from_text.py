@@ -23,7 +23,7 @@ from typing import Any
 from smc_mujoco.common import annexes
 from smc_mujoco.common.aliases import Data
 from smc_mujoco.common.errors import ScenarioError, find, shown, warn_once
-from smc_mujoco.common.files import read_json, reading
+from smc_mujoco.common.files import read_json, reading, unsealed
 from smc_mujoco.common.scripts import IN_FILE, execute, object_named
 from smc_mujoco.control import component_json, gain_sets
 from smc_mujoco.control.component import Component, GainValue, Template
@@ -247,7 +247,7 @@ def _tuned(path: str) -> Law:
 def _described(path: str) -> Data:
     """Return the scenario of a tuning, as data."""
     with _reading(path) as file:
-        return read_json(file)["scenario"]
+        return unsealed(read_json(file))["scenario"]
 
 
 def _reading(path: str) -> contextlib.AbstractContextManager[Path]:

@@ -2,6 +2,7 @@
 
 import csv
 import dataclasses
+import hashlib
 import math
 import os
 import warnings
@@ -24,7 +25,7 @@ from smc_mujoco.common.errors import (
     words,
 )
 from smc_mujoco.common.extras import package
-from smc_mujoco.common.files import as_path, from_json, reading, replacing, to_json
+from smc_mujoco.common.files import CHANGED, as_path, from_json, reading, replacing, to_json
 from smc_mujoco.mechanisms.layout import channel_names, column_ends
 from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.simulation import damping, scenario_json
@@ -197,6 +198,7 @@ class Trace:
                 f"than {MAX_TEXT:,} are not read back: give it shorter time series"
             )
         arrays: Fields = {"about": np.array(about)} | self.arrays()
+        arrays["seal"] = np.array(_seal(arrays))
         with replacing(path) as file:
             np.savez_compressed(file, **arrays)
         return path
@@ -492,7 +494,20 @@ def load(path: AnyPath) -> Trace:
             if f"{name}.npy" in members:
                 names.append(name)
         arrays = {name: _checked_array(archive, name, scenario) for name in names}
+        if "seal.npy" in members:  # those of older versions have none
+            content = {"about": _checked_array(archive, "about")} | arrays
+            if str(_checked_array(archive, "seal")) != _seal(content):
+                raise ScenarioError(CHANGED)
     return Trace(**arrays, scenario=scenario, **end)
+
+
+def _seal(arrays: Mapping[str, Array]) -> str:
+    """Return a hash of all arrays of a file, 64 hex digits."""
+    digest = hashlib.sha256()
+    for name, array in sorted(arrays.items()):
+        content = array.tobytes() if array.dtype.kind == "f" else str(array).encode()
+        digest.update(name.encode() + content)
+    return digest.hexdigest()
 
 
 def _checked_array(archive: zipfile.ZipFile, name: str, scenario: Scenario | None = None) -> Array:

@@ -33,9 +33,24 @@ import numpy as np
 
 from smc_mujoco.common import html
 from smc_mujoco.common.aliases import AnyPath, Fields
-from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
+from smc_mujoco.common.errors import (
+    ScenarioError,
+    find,
+    items_of,
+    printable,
+    shown,
+    warn_once,
+)
 from smc_mujoco.common.extras import package
-from smc_mujoco.common.files import MAX_RATIO, MAX_UNPACKED, from_json, reading, replacing, to_json
+from smc_mujoco.common.files import (
+    CHANGED,
+    MAX_RATIO,
+    MAX_UNPACKED,
+    from_json,
+    reading,
+    replacing,
+    to_json,
+)
 from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import counted, number, span
 from smc_mujoco.metrics.catalogue import CATALOGUE
@@ -151,7 +166,8 @@ def read(path: Path, sealed: bool = False) -> "pa.Table":
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    with pq.ParquetFile(path, page_checksum_verification=True) as file:
+    # opened here: pyarrow cannot open a path that is not UTF-8
+    with path.open("rb") as source, pq.ParquetFile(source, page_checksum_verification=True) as file:
         size = 0
         for i in range(file.num_row_groups):
             size += file.metadata.row_group(i).total_byte_size
@@ -172,7 +188,12 @@ def read(path: Path, sealed: bool = False) -> "pa.Table":
     for group in groups:
         digest.update(content(group))
     if written != digest.hexdigest().encode() and (sealed or written is not None):
-        raise ScenarioError("it is damaged, or was changed, since it was written")
+        raise ScenarioError(CHANGED)
+    if written is None:
+        warn_once(
+            f"another program wrote {printable(str(path))}, so nothing shows whether its numbers "
+            "are those of the runs: read the file that the study wrote"
+        )
     metadata.pop(b"ARROW:schema", None)
     return rows.replace_schema_metadata(metadata)
 

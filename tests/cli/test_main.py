@@ -584,6 +584,15 @@ def test_ctrl_c_in_mid_simulation_is_one_sentence_and_exit_code_130(call, folder
     assert list((folder / "videos" / "long").iterdir()) == []
 
 
+def test_a_command_runs_without_a_standard_output(monkeypatch):
+    """A shell closes it by >&-."""
+    monkeypatch.setattr(sys, "stdout", None)
+    with pytest.raises(SystemExit) as ended:
+        main.main(["--version"])
+    assert ended.value.code == 0
+    sys.stdout.close()
+
+
 def test_a_call_is_told_to_end_in_the_main_thread_alone(call, monkeypatch):
     """Python lets no other thread set what a signal does."""
     reported = []

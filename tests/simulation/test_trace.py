@@ -481,3 +481,20 @@ def test_a_free_joint_has_the_goal_of_its_plant_as_reference():
     )
     assert (trace.r == upright).all()
     assert smc.scores(trace)["free"]["ultimate_bound"] < 1e-9
+
+
+@pytest.mark.parametrize("changed", ["about", "x"])
+def test_a_file_whose_scenario_or_numbers_were_changed_is_refused(changed, trace, tmp_path):
+    path = trace.save(tmp_path / "run.npz")
+    content = dict(np.load(path))
+    if changed == "about":
+        content["about"] = np.array(str(content["about"]).replace('"duration"', ' "duration"'))
+        assert smc.load(path).scenario == trace.scenario
+    else:
+        content["x"][1, 0] += 1e-9
+    np.savez(path, **content)
+    with pytest.raises(smc.ScenarioError, match="changed, since it was written"):
+        smc.load(path)
+    del content["seal"]  # of an older version
+    np.savez(path, **content)
+    assert smc.load(path).scenario == trace.scenario

@@ -1,6 +1,8 @@
 """A study loses nothing: whatever befalls it, it ends with the same table, bit for bit."""
 
 import functools
+import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -323,3 +325,10 @@ def test_a_kept_run_is_called_as_the_study_calls_it(tmp_path, none_runs):
         table = study([rubbing.named(name)], tmp_path)
         assert table.column("condition")[0] == condition(rubbing.named(name))
         assert Table.read(tmp_path / "results.parquet").scenario(0).condition == name
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems' names are texts")
+def test_a_folder_may_have_a_name_that_is_no_text(tmp_path):
+    """All runs were made, and then the table could not be read."""
+    out = Path(os.fsdecode(bytes(tmp_path) + b"/\xe9tude"))
+    assert len(study([scenario()], out)) == len(Table.read(out)) == 1

@@ -11,7 +11,7 @@ from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, restore
 from smc_mujoco.common.aliases import AnyPath, Data, Fields
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.files import read_json, reading, with_ending, write_json
+from smc_mujoco.common.files import read_json, reading, sealed, unsealed, with_ending, write_json
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import counted
 from smc_mujoco.control import source
@@ -223,13 +223,13 @@ class Tuned(Tables):
             "record": self.record(),
             "searches": list(map(vars, self.searches)),
         }
-        return write_json(path, data)
+        return write_json(path, sealed(data))
 
 
 def load_tuned(path: AnyPath, plant: Plant | None = None) -> Tuned:
     """Read the tuning that `Tuned.save` wrote, of this plant if it is given."""
     with reading(path, "tuning", "give a .json file that Tuned.save wrote") as file:
-        data = read_json(file)
+        data = unsealed(read_json(file))
         scenario = scenario_json.restore(data["scenario"], plant)
         fields: Fields = {name: data[name] for name in SAVED_FIELDS}
         for name in ("bounds", "searched"):

@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from smc_mujoco.common import fingerprint
-from smc_mujoco.common.aliases import Data, Fields
+from smc_mujoco.common.aliases import Fields
 from smc_mujoco.common.data import attributes
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.files import read_json, reading, to_json
+from smc_mujoco.common.files import read_json, reading, sealed, unsealed
 from smc_mujoco.common.version import __version__
 from smc_mujoco.evidence.audit.paper import TEXT_FIELDS, Paper
 from smc_mujoco.evidence.audit.verdict import totals
@@ -49,10 +49,10 @@ def document(audit: Any) -> Fields:
                     about["scores"] = run.scores
                 if run.trace:
                     about["trace"] = run.trace
-    sealed = []
+    sealable = []
     for claim in audit.claims:
         if not audit.paper.claims[claim.id].varies:
-            sealed.append(claim)
+            sealable.append(claim)
     left_out = []
     for id in audit.paper.claims:
         if id not in audit.used:
@@ -71,20 +71,11 @@ def document(audit: Any) -> Fields:
         },
         "quick": audit.quick,
         "left_out": left_out,
-        "counts": dict(sorted(totals(sealed).items())),  # of the paper's own sentences
+        "counts": dict(sorted(totals(sealable).items())),  # of the paper's own sentences
         "claims": [_claim(audit, claim, names) for claim in audit.claims],
         "runs": dict(sorted(runs.items())),
     }
-    return data | {"seal": seal(data)}
-
-
-def seal(data: Data) -> str:
-    """Return the hash of all but the seal, 64 hex digits."""
-    rest = {}
-    for name, value in data.items():
-        if name != "seal":
-            rest[name] = value
-    return hashlib.sha256(to_json(rest, sort_keys=True).encode()).hexdigest()
+    return sealed(data)
 
 
 def check(path: str | Path) -> Fields:
@@ -97,9 +88,7 @@ def check(path: str | Path) -> Fields:
             raise ScenarioError(
                 f"its format is {data['format']!r}, and this version reads {FORMAT!r}"
             )
-        if data["seal"] != seal(data):
-            raise ScenarioError("its seal is broken: it was changed after it was written")
-    return data
+    return unsealed(data)
 
 
 def files(paper: Paper) -> dict[str, str]:
@@ -116,16 +105,16 @@ def files(paper: Paper) -> dict[str, str]:
 def _claim(audit: Any, claim: Any, names: Mapping[str, str]) -> Fields:
     """Return the part of a claim that is sealed."""
     entry = audit.paper.claims[claim.id]
-    sealed = attributes(claim, CLAIM_FIELDS)
+    fields = attributes(claim, CLAIM_FIELDS)
     if entry.immune:
-        sealed["immune"] = entry.immune
+        fields["immune"] = entry.immune
     if entry.varies:
-        return sealed | {"not_sealed": f"its numbers differ from audit to audit: {entry.varies}"}
+        return fields | {"not_sealed": f"its numbers differ from audit to audit: {entry.varies}"}
     runs = {}
     for name, used in audit.used[claim.id].items():
         runs[name] = sorted({names[key] for key in used})
     judged = ("numbers", "beside", "verdicts", "verdict", "flips", "note")
-    return sealed | {"runs": runs} | attributes(claim, judged)
+    return fields | {"runs": runs} | attributes(claim, judged)
 
 
 def _run(scenario: Scenario) -> Fields:

@@ -507,6 +507,9 @@ def test_a_tuning_is_saved_and_read_back_as_it_was(found, tmp_path):
     assert held["budget"] == 16
     assert list(found.gains.values()) in held["record"]["sets"]
     assert set(held["versions"]) == {"smc_mujoco", "mujoco", "numba", "numpy", "scipy", "cmaes"}
+    path.write_text(json.dumps(held | {"budget": 17}))
+    with pytest.raises(smc.ScenarioError, match="changed, since it was written"):
+        load_tuned(path)
 
 
 # bad input
