@@ -93,10 +93,10 @@ def good_numbers(one):
 
 def bad_by_channel(one):
     many = []
-    for value in bad(one.one):
+    for value in bad(one.item):
         if not isinstance(value, list):
-            many.append([good(one.one)[0], value])
-    return [*(value for value in bad(one.one) if value != []), [], *many]
+            many.append([good(one.item)[0], value])
+    return [*(value for value in bad(one.item) if value != []), [], *many]
 
 
 def bad_ranges(one):
@@ -114,7 +114,7 @@ def told_number(one):
 
 
 BAD = {  # of another kind, and just beyond each end
-    OrNone: lambda one: [value for value in bad(one.one) if value is not None],
+    OrNone: lambda one: [value for value in bad(one.item) if value is not None],
     Number: bad_numbers,
     Whole: lambda one: (
         [*NO_NUMBERS, math.nan, 2.5, one.low - 1, one.high + 1] + [math.inf] * (not one.infinite)
@@ -129,25 +129,25 @@ BAD = {  # of another kind, and just beyond each end
 }
 BAD[Available] = BAD[OneOf]
 GOOD = {  # a plain value, and the ends themselves
-    OrNone: lambda one: [*good(one.one), None],
+    OrNone: lambda one: [*good(one.item), None],
     Number: good_numbers,
     Whole: lambda one: [one.low, one.high, float(one.high // 2)] + [math.inf] * one.infinite,
     ExecutorAddress: lambda one: ["dask://host:8786", "tcp://127.0.0.1:1"],
     OneOf: lambda one: [*one.names],
     Flag: lambda one: [True, False],
-    Each: lambda one: [*good(one.one), (good(one.one)[0],) * 2],
+    Each: lambda one: [*good(one.item), (good(one.item)[0],) * 2],
     Range: lambda one: [(max(1.0, one.low),) * 2, (max(one.low, beyond(one.above), -9.0), 1e300)],
     FilePath: lambda one: [Path("a"), Path("b/c")],
     Called: lambda one: [print],
     Available: lambda one: ["cpu"],
 }
 TOLD = {
-    OrNone: lambda one: f"{reported(one.one)}, or None",
+    OrNone: lambda one: f"{reported(one.item)}, or None",
     Number: told_number,
     Whole: lambda one: f"whole {one.low} to {one.high}" + " or inf" * one.infinite,
     OneOf: lambda one: f"one of {', '.join(one.names)}",
     Flag: lambda one: "flag",
-    Each: lambda one: f"{reported(one.one)}, or one for each channel",
+    Each: lambda one: f"{reported(one.item)}, or one for each channel",
     Range: lambda one: f"range of {reported(Number(above=one.above, low=one.low))}",
     FilePath: lambda one: "path",
     ExecutorAddress: lambda one: "an executor, a dask client, or an address",

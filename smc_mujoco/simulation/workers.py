@@ -37,8 +37,9 @@ if TYPE_CHECKING:
 
 Result = TypeVar("Result")
 MAX_SENT = 1000  # calls with the workers at once; chosen
-ADDRESS = re.compile(r"(dask|tcp)://[^:/]+:\d{1,5}")  # of a dask scheduler
-TIMEOUT = 10.0  # s, for a scheduler, and for its first worker; chosen
+ADDRESS = re.compile(r"(dask|tcp|tls)://[^:/]+:\d{1,5}")  # of a dask scheduler
+TIMEOUT = 10.0  # s, for a scheduler; chosen
+FIRST_WORKER = 60.0  # s, for the first worker, which imports much on a busy machine; chosen
 # Modules that differ from process to process. Pickle names a function by its module, and a worker
 # has another `__main__` than the script that was started.
 SCRIPTS = ("__main__", "__mp_main__")
@@ -137,7 +138,7 @@ class ExecutorAddress(Constraint):
             return value
         raise ScenarioError(
             f"{what} is {shown(value)}: give a concurrent.futures.Executor, a dask Client or "
-            "'dask://HOST:PORT'"
+            "'dask://HOST:PORT' (tls://HOST:PORT with certificates)"
         )
 
 
@@ -173,9 +174,18 @@ def _client(address: str) -> "Iterator[Client]":
     """Yield a client of the dask scheduler at an address."""
     with extra("cluster", f"executor {address!r}"):
         from distributed import Client  # pyright: ignore[reportMissingImports]
-    url = f"tcp://{address.partition('://')[2]}"
+        from distributed.security import Security  # pyright: ignore[reportMissingImports]
+    url = re.sub("^dask:", "tcp:", address)
+    security = None
+    if url.startswith("tls:"):
+        security = Security(require_encryption=True)
+        if security.get_connection_args("client").get("ssl_context") is None:
+            raise ScenarioError(
+                f"dask at {address} wants certificates: name them in dask's configuration, "
+                "distributed.comm.tls, on every machine"
+            )
     try:
-        client = Client(url, timeout=TIMEOUT, set_as_default=False)
+        client = Client(url, timeout=TIMEOUT, set_as_default=False, security=security)
     except OSError as error:  # a timeout is one
         raise ScenarioError(
             f"no dask at {address} ({one_line(str(error))}): start `dask scheduler` and "
@@ -183,7 +193,7 @@ def _client(address: str) -> "Iterator[Client]":
         ) from None
     with client:
         with contextlib.suppress(TimeoutError):
-            client.wait_for_workers(1, timeout=TIMEOUT)
+            client.wait_for_workers(1, timeout=FIRST_WORKER)
         if not client.ncores():
             raise ScenarioError(
                 f"dask at {address} has no workers: start `dask worker` with its address"
