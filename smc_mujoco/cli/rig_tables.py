@@ -51,10 +51,10 @@ def identified(result: Identified, names: Sequence[str]) -> list[Table]:
     rows = list(zip(names, result.fits, beside, strict=True))
     if result.held_out:
         rows.append(("held out", result.held_out.fit, result.held_out.by_pieces))
-    for name, fit, other in rows:
+    for name, fit, fit_beside in rows:
         cells = [f"{value:.1f}" for value in fit.values()]
         for k, key in enumerate(fit):
-            if key in other:
-                cells[k] += f" ({other[key]:.1f})"
+            if key in fit_beside:
+                cells[k] += f" ({fit_beside[key]:.1f})"
         fits.add_row(name, *cells)
     return [values, fits]

@@ -15,8 +15,8 @@ def environment(plant: Any, *args: Any, **kwargs: Any) -> Any:
     from smc_mujoco.envs.flight_env import FlightEnv, PlantEnv
     from smc_mujoco.mechanisms.named import as_plant
 
-    made = FlightEnv if as_plant(plant).pose else PlantEnv
-    return made(plant, *args, **kwargs)
+    kind = FlightEnv if as_plant(plant).pose else PlantEnv
+    return kind(plant, *args, **kwargs)
 
 
 def environments(*args: Any, **kwargs: Any) -> Any:

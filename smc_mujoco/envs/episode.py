@@ -319,7 +319,7 @@ def bounded(observation: Array) -> Array:
 def _task(name: Any, plant: Plant, flies: bool) -> Task:
     """Return the task of a name. Raise ScenarioError if the plant does not have it."""
     task = find("task", name, TASKS)
-    known = FLIGHT_TASKS if flies else tasks(plant)
+    names = FLIGHT_TASKS if flies else tasks(plant)
     if plant.pose and not flies:
         raise ScenarioError(
             f"{plant.name} is a free body: make its environment by gymnasium.make, and copies "
@@ -327,9 +327,9 @@ def _task(name: Any, plant: Plant, flies: bool) -> Task:
         )
     if flies and not plant.pose:
         raise ScenarioError(f"{plant.name} is no free body: make its environment by gymnasium.make")
-    if not isinstance(name, str) or name not in known:
+    if not isinstance(name, str) or name not in names:
         raise ScenarioError(
-            f"task {shown(name)} is not for {plant.name}: choose from {', '.join(known)}"
+            f"task {shown(name)} is not for {plant.name}: choose from {', '.join(names)}"
         )
     return task
 
@@ -354,17 +354,17 @@ def _references(scenario: Resolved, samples: int) -> Array:
     if samples == 1:  # the task has none
         return np.zeros((1, 3))
     times = (np.arange(samples) * scenario.control_period).tolist()
-    several = isinstance(scenario.reference, PerChannel) or scenario.plant.rest
+    by_channel = isinstance(scenario.reference, PerChannel) or scenario.plant.rest
     columns = []
-    for signal in scenario.references[: scenario.plant.driven if several else 1]:
+    for signal in scenario.references[: scenario.plant.driven if by_channel else 1]:
         try:
             values = np.array([evaluate(signal, t) for t in times])
         except Failure as failure:
             raise ScenarioError(f"reference {failure}: give another") from None
         if not (finite := np.isfinite(values).all(axis=1)).all():
-            at = f"t = {times[np.argmin(finite)]:.6g} s"
+            moment = f"t = {times[np.argmin(finite)]:.6g} s"
             raise ScenarioError(
-                f"reference {shown(signal)} is not a finite number at {at}: give another"
+                f"reference {shown(signal)} is not a finite number at {moment}: give another"
             )
         columns.append(values)
     return np.stack(columns, axis=2).reshape(samples, -1)

@@ -135,17 +135,17 @@ class PlantEnv(Episode, gymnasium.Env):
 
         A copy of an episode with the callback repeats it.
         """
-        kept = self.__dict__ | {"renderer": None}
+        state = self.__dict__ | {"renderer": None}
         if self.setting.uses_callback:
-            kept |= {"runs": None, "data": None}
-        return kept
+            state |= {"runs": None, "data": None}
+        return state
 
     def __setstate__(self, state: Fields) -> None:
         vars(self).update(state)
         if self.setting.uses_callback:
             self.data = mujoco.MjData(self.setting.model)
-            told = self.commands_given
-            if self.episodes or told:
+            commands = self.commands_given
+            if self.episodes or commands:
                 self.begin_at_start(self.data)
-            for command in told:
+            for command in commands:
                 self.take(command)

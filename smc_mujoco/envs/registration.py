@@ -25,8 +25,8 @@ def register_when_imported() -> None:
         register()
     else:
         # finders of other packages; an earlier import of this module may have left its own
-        others = [finder for finder in sys.meta_path if type(finder).__module__ != __name__]
-        sys.meta_path[:] = [Importer(), *others]
+        finders = [finder for finder in sys.meta_path if type(finder).__module__ != __name__]
+        sys.meta_path[:] = [Importer(), *finders]
 
 
 class Importer:

@@ -186,8 +186,8 @@ class BatchEnv(VectorEnv):
         n).
         """
         times = self.samples * self.setting.scenario.control_period
-        known = np.ones(self.num_envs, bool)
-        return {"time": times, "_time": known, "error": e, "_error": known.copy()}
+        present = np.ones(self.num_envs, bool)
+        return {"time": times, "_time": present, "error": e, "_error": present.copy()}
 
     def state(self) -> ArrayPair:
         """Return positions and velocities of all copies, (num_envs, n) each."""

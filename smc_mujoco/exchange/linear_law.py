@@ -171,8 +171,8 @@ def law_from_control(
         or has other inputs than are named.
     """
     errors.name("name of the controller", name)
-    if inputs is None and (whole := _of_all_channels(K)) is not None:
-        return state_feedback(whole, name)
+    if inputs is None and (gain_matrix := _of_all_channels(K)) is not None:
+        return state_feedback(gain_matrix, name)
     system = _checked(_system(K))
     states = len(system.a)
     count = system.b.shape[1]
@@ -272,8 +272,8 @@ def _matrices(a: Any, b: Any, c: Any, d: Any, dt: Any) -> System:
     """
     try:
         arrays = []
-        for given in (a, b, c, d):
-            array = np.asarray(given)
+        for matrix in (a, b, c, d):
+            array = np.asarray(matrix)
             if np.iscomplexobj(array):
                 raise ValueError
             arrays.append(array.astype(float))

@@ -50,21 +50,21 @@ def runs(
     that `tuned` returns. `seeds`, `gains`, `duration` and `starts` are as in `smc.grid`; starts are
     by default within 20 % of the rig's x0.
     """
-    given = []
-    found = []
+    untuned = []
+    candidates = []
     for law in _chosen(rig, laws):
-        (found if isinstance(law, Candidate) else given).append(law)
+        (candidates if isinstance(law, Candidate) else untuned).append(law)
     around = _starts(rig, starts)
     nominal = [Condition("nominal", {})]
     scenarios = []
     for name, fields in _machines(rig).items():
         plant = fields.pop("plant")
         base = []
-        if given:
-            base += grid([plant], given, ["nominal"], seeds, gains, duration, around)
-        if found:
+        if untuned:
+            base += grid([plant], untuned, ["nominal"], seeds, gains, duration, around)
+        if candidates:
             base += all_combinations(
-                [plant], lambda _: found, nominal, range(seeds), duration, around
+                [plant], lambda _: candidates, nominal, range(seeds), duration, around
             )
         for scenario in base:
             scenarios.append(dataclasses.replace(scenario, **fields).named(name))
@@ -111,12 +111,12 @@ def tuned(
     """
     goal = objective(rig, starts)
     plant = _machines(rig)["set 1"]["plant"]
-    found = []
+    candidates = []
     for law in map(coerce.law, _chosen(rig, laws)):
         try:
             with warnings.catch_warnings():  # the remark says it
                 warnings.filterwarnings("ignore", "no set of gains tried", ScenarioWarning)
-                made = tune(
+                tuning = tune(
                     plant,
                     law,
                     budget,
@@ -129,10 +129,10 @@ def tuned(
         except BrokenLawError:
             raise
         except ScenarioError as error:
-            found.append(Candidate(law, (law,), f"{NOT_TUNED}{error}"))
+            candidates.append(Candidate(law, (law,), f"{NOT_TUNED}{error}"))
         else:
-            found.append(candidate_of(law, made))
-    return found
+            candidates.append(candidate_of(law, tuning))
+    return candidates
 
 
 def compare(
@@ -151,9 +151,9 @@ def compare(
 
     Arguments are as in `smc.compare`; `options` are those of `leaderboard`.
     """
-    found = []
+    candidates = []
     if searches is not None:
-        found = tuned(
+        candidates = tuned(
             rig,
             laws,
             searches,
@@ -163,9 +163,9 @@ def compare(
             progress=True,
         )
     length = FULL.duration if duration is None else duration
-    scenarios = runs(rig, found or laws, seeds, duration=length, starts=starts)
+    scenarios = runs(rig, candidates or laws, seeds, duration=length, starts=starts)
     table = study(scenarios, out, True, threads, progress=True, half_steps=True)
-    return table, leaderboard(table, **options), found
+    return table, leaderboard(table, **options), candidates
 
 
 def _chosen(rig: Rig, laws: Sequence[Any] | None) -> list[Any]:
@@ -176,12 +176,12 @@ def _chosen(rig: Rig, laws: Sequence[Any] | None) -> list[Any]:
             "qube_servo, or identify it from records and draw sets with Identified.drawn"
         )
     shipped = {law.name: law for law in rig.laws}
-    given = rig.laws if laws is None else laws
-    if not given:
+    compared = rig.laws if laws is None else laws
+    if not compared:
         raise ScenarioError(
             f"no laws have gains for {rig.name}: give some, such as pid(kp=30,kd=6)"
         )
-    return [shipped.get(law, law) if isinstance(law, str) else law for law in given]
+    return [shipped.get(law, law) if isinstance(law, str) else law for law in compared]
 
 
 def _starts(rig: Rig, starts: Starts | None) -> Starts:
@@ -190,14 +190,14 @@ def _starts(rig: Rig, starts: Starts | None) -> Starts:
 
 def _machines(rig: Rig) -> dict[str, Fields]:
     """Return set -> the fields of a Scenario that a rig's machine has, without where runs begin."""
-    found = {}
+    machines = {}
     for name, member in rig.members().items():
         fields: Fields = {"u_max": None, "physics_step": None}
         fields |= member.machine(Values(**member.values))
         for start in BY_STARTS:
             fields.pop(start, None)
-        found[name] = fields
-    return found
+        machines[name] = fields
+    return machines
 
 
 def verdict(boards: Sequence[Any]) -> str:
@@ -214,6 +214,6 @@ def verdict(boards: Sequence[Any]) -> str:
         words = []
         for law, number in wins.most_common():
             words.append(f"{law} on {number}")
-        others = ", ".join(words) or "none on any"
-        lines.append(f"{board.metric}: no law wins on all {count} parameter sets ({others})")
+        shared = ", ".join(words) or "none on any"
+        lines.append(f"{board.metric}: no law wins on all {count} parameter sets ({shared})")
     return "\n".join(lines)

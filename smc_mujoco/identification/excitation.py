@@ -170,8 +170,8 @@ class Excitation:
 
     def about(self) -> Fields:
         """Return what a log of each motion would tell as JSON data, best first."""
-        told = ("condition", "errors", "values", "largest_u", "largest_v", "worst_pair", "rest")
-        return {motion.name: attributes(motion, told) for motion in self.motions}
+        fields = ("condition", "errors", "values", "largest_u", "largest_v", "worst_pair", "rest")
+        return {motion.name: attributes(motion, fields) for motion in self.motions}
 
     def figure(self, path: AnyPath) -> list[Path]:
         """Draw the references of the motions beside their expected errors, as PATH.svg and
@@ -186,8 +186,8 @@ class Excitation:
         """Write the reference of a motion as CSV, the best by default: t, and r or r_JOINT, rad or
         m. Return the path.
         """
-        known = {motion.name: motion for motion in self.motions}
-        motion = self.motions[0] if name is None else find("motion", name, known)
+        motions = {motion.name: motion for motion in self.motions}
+        motion = self.motions[0] if name is None else find("motion", name, motions)
         with replacing(as_path(path)) as part, part.open("w", newline="", encoding="utf-8") as file:
             rows = csv.writer(file)
             rows.writerow(["t", *self.columns])
@@ -250,9 +250,9 @@ def excitation(
     shapes = candidate_shapes(rig.plant.driven, duration, rate)
     moved = _sized(rig, shapes, _ways(drives, amplitude), 1.0 / rate, forces, v_max)
     sensor = rig.base.sensor or Encoder(counts=counts)
-    found = _motions(rig, names, moved, 1.0 / rate, drives, (noise, sensor))
+    motions = _motions(rig, names, moved, 1.0 / rate, drives, (noise, sensor))
     return Excitation(
-        motions=tuple(sorted(found, key=lambda motion: motion.mean_share)),
+        motions=tuple(sorted(motions, key=lambda motion: motion.mean_share)),
         plant=rig.plant,
         assumed=_assumed(rig, names, rate, noise, sensor),
     )
@@ -274,19 +274,19 @@ def _assumed(rig: OwnRig, names: Sequence[str], rate: float, noise: float, senso
 
 def largest_forces(drives: Scenario) -> Array:
     """Return the largest force of each drive at rest, N m or N, (driven,)."""
-    found = []
+    forces = []
     for motor, bound in zip(drives.drive_train.motors, drives.limits, strict=True):
-        found.append(motor.force_at(bound))
-    return np.array(found)
+        forces.append(motor.force_at(bound))
+    return np.array(forces)
 
 
 def _ways(drives: Scenario, amplitude: float | Sequence[float] | None) -> Array:
     """Return the largest way of each driven joint to each side of its goal, (driven,)."""
     plant = drives.plant
     if amplitude is not None:
-        given: Any = [amplitude] if np.ndim(amplitude) == 0 else amplitude
+        amplitudes: Any = [amplitude] if np.ndim(amplitude) == 0 else amplitude
         ways = []
-        for way in items_of("amplitude", given):
+        for way in items_of("amplitude", amplitudes):
             ways.append(number("amplitude", way, above=0.0))
         if len(ways) not in (1, plant.driven):
             raise ScenarioError(f"amplitude has {len(ways)} values: give one, or {plant.driven}")
@@ -447,14 +447,14 @@ def _motions(
     scenarios = []
     for positions in moved.values():
         scenarios.append(_played(rig, positions, period, drives, measured))
-    found = []
+    motions = []
     for (name, positions), trace in zip(moved.items(), run(scenarios), strict=True):
         if not trace.failure:
-            told = _told(rig, names, trace)
+            expected = _told(rig, names, trace)
             values = {}
-            for one in names:
-                values[one] = rig.values[one]
-            found.append(
+            for quantity in names:
+                values[quantity] = rig.values[quantity]
+            motions.append(
                 ExcitingMotion(
                     name=name,
                     times=tuple(trace.t.tolist()),
@@ -463,14 +463,14 @@ def _motions(
                     largest_u=float(np.abs(trace.u).max()),
                     largest_v=float(np.abs(trace.v).max()),
                     rest=_rest(trace.v),
-                    **told,
+                    **expected,
                 )
             )
-    if not found:
+    if not motions:
         raise ScenarioError(
             f"{rig.name} follows none of {', '.join(moved)}: give a smaller amplitude"
         )
-    return found
+    return motions
 
 
 def _played(
@@ -513,11 +513,11 @@ def _commands(
     forces = motion_forces(rig, positions, period)
     times = np.arange(positions.shape[1])
     w = 2.0 * math.pi * BANDWIDTH
-    found = []
+    commands = []
     for i, motor in enumerate(drives.drive_train.motors):
         if isinstance(motor, PositionServo):
             set_point = positions[i] - motor.goal
-            found.append((as_recorded(), set_point))
+            commands.append((as_recorded(), set_point))
             continue
         kp = w * w * inertias[i]
         kd = 2.0 * DAMPING_RATIO * w * inertias[i]
@@ -525,8 +525,8 @@ def _commands(
         law = find_law("pid", kp=kp / gain, ki=0.0, kd=kd / gain)
         needed = np.interp(times, times[::FORCE_STRIDE], forces[i])
         lead = _led(needed / kp, kd / kp / period)
-        found.append((law, positions[i] + lead))
-    return found
+        commands.append((law, positions[i] + lead))
+    return commands
 
 
 def _free_inertias(rig: OwnRig) -> list[float]:
@@ -599,10 +599,10 @@ def _worst_pair(names: Sequence[str], correlations: Array) -> tuple[str, str, fl
     apart = correlations - np.eye(len(names))
     largest = int(np.argmax(np.abs(apart)))
     i, j = divmod(largest, len(names))
-    other = ""
+    second = ""
     if len(names) > 1:
-        other = names[j]
-    return names[i], other, float(apart[i, j])
+        second = names[j]
+    return names[i], second, float(apart[i, j])
 
 
 def _of_run(replays: Replays, rig: OwnRig, trace: Trace) -> Array:

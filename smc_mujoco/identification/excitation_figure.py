@@ -45,21 +45,21 @@ def excitation_figure(
         height = pages.head_height(style.FULL_WIDTH, handles) + ROW_HEIGHT * len(motions) + 0.4
         page = pages.blank(style.FULL_WIDTH, height)
         axes = page.subplots(len(motions), 2, squeeze=False, sharex="col", width_ratios=SHARES)
-        for (left, right), motion in zip(axes, motions, strict=True):
+        for (motion_axes, error_axes), motion in zip(axes, motions, strict=True):
             for row, look in zip(motion.positions, lines, strict=True):
-                left.plot(motion.times, row, **look)
-            left.set_title(motion.name)
-            left.set_ylabel(" and ".join(dict.fromkeys(units)))
+                motion_axes.plot(motion.times, row, **look)
+            motion_axes.set_title(motion.name)
+            motion_axes.set_ylabel(" and ".join(dict.fromkeys(units)))
             for k, look in enumerate(dots):
-                right.plot(100.0 * motion.share(names[k]), -k, **look)
-            right.set_title(f"geometric mean {100.0 * motion.mean_share:.2g} %")
-            right.set_yticks([])
-            right.set_ylim(-len(names), 1)
+                error_axes.plot(100.0 * motion.share(names[k]), -k, **look)
+            error_axes.set_title(f"geometric mean {100.0 * motion.mean_share:.2g} %")
+            error_axes.set_yticks([])
+            error_axes.set_ylim(-len(names), 1)
         shares = [motion.share(name) for motion in motions for name in names]
-        known = 100.0 * np.array(shares)[np.isfinite(shares)]
+        percents = 100.0 * np.array(shares)[np.isfinite(shares)]
         axes[-1, 0].set_xlabel("time (s)")
         axes[-1, 1].set_xscale("log")
-        axes[-1, 1].set_xlim(known.min() / ROOM, known.max() * ROOM)
+        axes[-1, 1].set_xlim(percents.min() / ROOM, percents.max() * ROOM)
         axes[-1, 1].xaxis.set_major_locator(LogLocator(subs=TICKS))
         axes[-1, 1].xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axes[-1, 1].xaxis.set_minor_formatter(NullFormatter())

@@ -119,9 +119,9 @@ def _guessed(
             gains.append(-moved)
         full = np.hstack([A, np.concatenate(gains)])
         b = np.concatenate(targets)
-        found, left = _weighted(full, b, rig.plant.n)
-        if best is None or left < best[0]:
-            best = left, late, found
+        solution, noise = _weighted(full, b, rig.plant.n)
+        if best is None or noise < best[0]:
+            best = noise, late, solution
     assert best is not None
     names = [*linear(rig), *found_gains]
     values = dict(zip(names, best[2].tolist(), strict=True))
@@ -150,15 +150,15 @@ def _commanded(log: Forces, k: int, gained: Sequence[int]) -> tuple[Array, Array
     """
     commands = log.commands[k]
     n = len(log.rigid) // len(commands)
-    every = np.zeros((len(commands), n))
-    every[:, : commands.shape[1]] = commands
+    commanded = np.zeros((len(commands), n))
+    commanded[:, : commands.shape[1]] = commands
     moved = np.zeros((len(log.rigid), len(gained)))
     for j, i in enumerate(gained):
-        alone = np.zeros_like(every)
+        alone = np.zeros_like(commanded)
         alone[:, i] = commands[:, i]
         moved[:, j] = alone.ravel()
-        every[:, i] = 0.0
-    return every.ravel(), moved
+        commanded[:, i] = 0.0
+    return commanded.ravel(), moved
 
 
 def _weighted(A: Array, b: Array, n: int) -> tuple[Array, float]:
@@ -168,23 +168,23 @@ def _weighted(A: Array, b: Array, n: int) -> tuple[Array, float]:
     A joint that nearly rests, or shakes under a noisy command, would else decide the delay of all.
     """
     sizes = np.ones(n)
-    found = np.zeros(A.shape[1])
+    solution = np.zeros(A.shape[1])
     for _ in range(WEIGHINGS):
         weights = np.tile(1.0 / sizes, len(b) // n)
-        found = _solved(A * weights[:, None], b * weights)
-        left = (b - A @ found).reshape(-1, n)
-        sizes = np.maximum(np.sqrt(np.mean(left**2, axis=0)), LEAST_NOISE * np.std(b))
-    return found, float(np.sum(np.log(sizes)))
+        solution = _solved(A * weights[:, None], b * weights)
+        residuals = (b - A @ solution).reshape(-1, n)
+        sizes = np.maximum(np.sqrt(np.mean(residuals**2, axis=0)), LEAST_NOISE * np.std(b))
+    return solution, float(np.sum(np.log(sizes)))
 
 
 def _solved(A: Array, b: Array) -> Array:
     """Return the least squares of A x = b, 0 for columns that are 0."""
     sizes = np.linalg.norm(A, axis=0)
     used = sizes > 1e-9 * max(sizes.max(initial=0.0), 1e-300)
-    found = np.zeros(A.shape[1])
+    solution = np.zeros(A.shape[1])
     scales = sizes[used]
-    found[used] = least_squares(A[:, used] / scales, b, 1e-6) / scales
-    return found
+    solution[used] = least_squares(A[:, used] / scales, b, 1e-6) / scales
+    return solution
 
 
 def _within(rig: OwnRig, values: Numbers, data: Sequence[Data]) -> OwnRig:
@@ -198,12 +198,12 @@ def _within(rig: OwnRig, values: Numbers, data: Sequence[Data]) -> OwnRig:
     inertia = float(np.min(rig.plant.load().dof_M0))
     changed = dict(rig.quantities)
     for name, value in values.items():
-        known = changed[name]
-        start = min(max(value, known.least), known.most)
-        if start <= known.least and known.least >= 0.0:
+        quantity = changed[name]
+        start = min(max(value, quantity.least), quantity.most)
+        if start <= quantity.least and quantity.least >= 0.0:
             small = SMALL * (inertia if name.endswith(".armature") else u)
-            start = known.value if known.value > known.least else small
-        changed[name] = dataclasses.replace(known, value=start, source="forces of the logs")
+            start = quantity.value if quantity.value > quantity.least else small
+        changed[name] = dataclasses.replace(quantity, value=start, source="forces of the logs")
     return dataclasses.replace(rig, quantities=changed)
 
 
@@ -293,13 +293,13 @@ def motion_forces(rig: OwnRig, record: Record, late: float) -> tuple[Array, Arra
 def _of_parts(rig: OwnRig, filtered: Filter, v: Array) -> Array:
     """Return the force of the frictions of the scenario at their own numbers, (M, n)."""
     count = len(filtered.low(v[:, 0]))
-    found = np.zeros((count, v.shape[1]))
+    friction = np.zeros((count, v.shape[1]))
     for part in rig.base.friction:
         for k, i in enumerate(part.joint_names(rig.plant)):
-            at = channel_names(rig.plant).index(i)
-            speeds = _smooth_speed(v[:, at])
-            found[:, at] += filtered.low(steady_force(part, speeds, k))
-    return found
+            channel = channel_names(rig.plant).index(i)
+            speeds = _smooth_speed(v[:, channel])
+            friction[:, channel] += filtered.low(steady_force(part, speeds, k))
+    return friction
 
 
 def _smooth_speed(v: Array) -> Array:
@@ -312,16 +312,16 @@ def _column(rig: OwnRig, name: str, filtered: Filter, motion: Sequence[Array]) -
     """Return how the forces of a motion depend on a linear quantity of joints, (M, n)."""
     x, v, a = motion
     count = len(filtered.low(v[:, 0]))
-    found = np.zeros((count, v.shape[1]))
+    slopes = np.zeros((count, v.shape[1]))
     names = channel_names(rig.plant)
     if name in rig.places:
         place = rig.places[name]
         part = getattr(rig.base, place.field)[place.part]
         for k, joint in enumerate(part.joint_names(rig.plant)):
             if place.joint in (-1, k):
-                at = names.index(joint)
-                found[:, at] = filtered.low(slope(part, place, v[:, at], k))
-        return found
+                channel = names.index(joint)
+                slopes[:, channel] = filtered.low(slope(part, place, v[:, channel], k))
+        return slopes
     joint, _, kind = name.rpartition(".")
     i = names.index(joint)
     slow = SLIDING * np.abs(v[:, i]).max() + 1e-12
@@ -332,24 +332,24 @@ def _column(rig: OwnRig, name: str, filtered: Filter, motion: Sequence[Array]) -
         "frictionloss": np.tanh(v[:, i] / slow),
         "offset": -np.ones(len(v)),
     }[kind]
-    found[:, i] = filtered.low(column)
-    return found
+    slopes[:, i] = filtered.low(column)
+    return slopes
 
 
 def _low_commands(rig: OwnRig, record: Record, filtered: Filter, late: float) -> Array:
     """Return the commands that reach the motors with a delay, low-passed, (M, driven). Each is held
     over a sample, so that it acts half a sample late.
     """
-    found = []
+    commands = []
     samples = cubic_samples(filtered.step)
     for name in rig.columns.inputs:
         u = record[name]
-        at = np.arange(len(u)) - late / filtered.step
-        delayed = np.interp(at, np.arange(len(u)), u)
+        samples_late = np.arange(len(u)) - late / filtered.step
+        delayed = np.interp(samples_late, np.arange(len(u)), u)
         held = 0.5 * (delayed + np.concatenate([delayed[:1], delayed[:-1]]))
         smooth = np.asarray(savgol_filter(held, samples, CUBIC_DEGREE))
-        found.append(filtered.low(smooth[:: filtered.stride]))
-    return np.column_stack(found)
+        commands.append(filtered.low(smooth[:: filtered.stride]))
+    return np.column_stack(commands)
 
 
 def check_columns(rig: OwnRig, data: Sequence[Record], logs: Sequence[Forces]) -> None:
@@ -400,11 +400,11 @@ def force_cosines(log: Forces) -> list[float]:
     """
     commands = log.commands[0]
     needed = log.rigid.reshape(len(commands), -1)
-    found = []
+    cosines = []
     for i in range(commands.shape[1]):
         sizes = np.linalg.norm(commands[:, i]) * np.linalg.norm(needed[:, i])
-        found.append(float(commands[:, i] @ needed[:, i] / max(sizes, 1e-300)))
-    return found
+        cosines.append(float(commands[:, i] @ needed[:, i] / max(sizes, 1e-300)))
+    return cosines
 
 
 def force_shares(rig: OwnRig, log: Forces) -> list[float]:
@@ -413,12 +413,12 @@ def force_shares(rig: OwnRig, log: Forces) -> list[float]:
     """
     commands = log.commands[0]
     needed = log.rigid.reshape(len(commands), -1)
-    found = []
+    shares = []
     for i in range(commands.shape[1]):
         takes = float(np.sqrt(np.mean(needed[:, i] ** 2)))
         size = float(np.sqrt(np.mean(commands[:, i] ** 2)))
-        found.append(size / max(takes, 1e-300))
-    return found
+        shares.append(size / max(takes, 1e-300))
+    return shares
 
 
 def _beyond_ranges(rig: OwnRig, record: Record) -> list[str]:

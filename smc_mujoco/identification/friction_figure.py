@@ -58,18 +58,18 @@ def friction_figure(
         forces = measured_friction(rig, log)
         for i, (name, joint) in enumerate(zip(rig.columns.x, joints, strict=True)):
             unit = rig.plant.units[i]
-            left, middle, right = axes[i]
-            left.plot(t, measured[name], color=style.INK, lw=LOG_WIDTH)
-            left.plot(t, predicted[name], color=colour, lw=1.2, ls=DASHES)
-            left.set_title(f"log in an open loop, fit {fit[name]:.1f} %")
-            left.set_ylabel(style.folded(f"{joint} ({unit})"))
+            position_axes, residual_axes, friction_axes = axes[i]
+            position_axes.plot(t, measured[name], color=style.INK, lw=LOG_WIDTH)
+            position_axes.plot(t, predicted[name], color=colour, lw=1.2, ls=DASHES)
+            position_axes.set_title(f"log in an open loop, fit {fit[name]:.1f} %")
+            position_axes.set_ylabel(style.folded(f"{joint} ({unit})"))
             speed = records.rate(measured[name], records.step_of(t))
-            middle.axhline(0.0, color=style.RULE, lw=0.8)
+            residual_axes.axhline(0.0, color=style.RULE, lw=0.8)
             residual = measured[name] - predicted[name]
             factor, short = style.prefixed(float(np.abs(residual).max()), unit)
-            middle.plot(speed, factor * residual, ".", ms=1.5, color=colour)
-            middle.set_title(f"residual ({short})")
-            _friction(right, rig, covariance, i, forces, colour)
+            residual_axes.plot(speed, factor * residual, ".", ms=1.5, color=colour)
+            residual_axes.set_title(f"residual ({short})")
+            _friction(friction_axes, rig, covariance, i, forces, colour)
         speed_label = f"speed ({rig.plant.units[-1]}/s)"
         for ax, label in zip(axes[-1], ("time (s)", speed_label, speed_label), strict=True):
             ax.set_xlabel(label)
@@ -99,12 +99,12 @@ def friction(rig: OwnRig, values: Numbers, i: int, v: Array) -> Array:
     """Return the friction of channel i at steady speeds v, (K,), by the model and the parts."""
     fields = rig.numbers_of(Values(**values))
     plant = fields["plant"]
-    found = friction_of_model(plant, i, v)
+    force = friction_of_model(plant, i, v)
     joint = channel_names(plant)[i]
     for part in fields.get("friction", ()):
         if joint in (names := part.joint_names(plant)):
-            found = found + steady_force(part, v, names.index(joint))
-    return found
+            force = force + steady_force(part, v, names.index(joint))
+    return force
 
 
 def friction_of_model(plant: Plant, i: int, v: Array) -> Array:

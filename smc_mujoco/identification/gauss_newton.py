@@ -64,14 +64,14 @@ def search(
     Further starts, of which the random ones have a `seed`, are only tried while none fits well.
     `most`: largest number of steps from the best start. `tolerance`: as of `refine`.
     """
-    if (other := _other_delay(replays, first, LAST_CHANGE)) is not None:
-        first = replays.slopes(other)
+    if (delayed := _other_delay(replays, first, LAST_CHANGE)) is not None:
+        first = replays.slopes(delayed)
     if starts == 1:
         best = refine(replays, first, most, tolerance)
         for _ in range(MOST_DELAYS):
-            if (other := _other_delay(replays, best, SMALL_CHANGE)) is None:
+            if (delayed := _other_delay(replays, best, SMALL_CHANGE)) is None:
                 break
-            tried = refine(replays, replays.slopes(other), most, tolerance)
+            tried = refine(replays, replays.slopes(delayed), most, tolerance)
             if tried.cost >= best.cost:
                 break
             best = tried
@@ -166,16 +166,16 @@ def extrapolated(replays: Replays, slopes: Slopes, most: int = 0) -> tuple[Slope
         ends = replays.slopes(ends.point)  # longer steps err by too much
     share = BETTER**2 / sum(map(len, ends.residuals))
     fine = LEAST_DELAY_MOVE * np.array([-2.0, -1.0, 1.0, 2.0])
-    other = _other_delay(replays, ends, share, fine) if most else None
-    if other is not None:  # then derivatives by the delay do not hold over such a move
-        (rows,) = replays.residuals([other])
-        ends = dataclasses.replace(ends, point=other, residuals=rows)
+    delayed = _other_delay(replays, ends, share, fine) if most else None
+    if delayed is not None:  # then derivatives by the delay do not hold over such a move
+        (rows,) = replays.residuals([delayed])
+        ends = dataclasses.replace(ends, point=delayed, residuals=rows)
     replays.limit = False
     if most:
         (full,) = replays.residuals([ends.point])
         ends, _, by_quarter = _without_steps(replays, ends, full)
         moved = np.maximum(moved, LEFT_BY_STEPS * _moves(slopes, by_quarter))
-    if other is not None:
+    if delayed is not None:
         k = replays.names.index(DELAY)
         moved[k] = max(moved[k], LEAST_DELAY_MOVE / replays.scales[k])
     return _solved(replays, ends), moved
@@ -203,10 +203,10 @@ def _without_steps(
     """
     (half,), (quarter,) = replays.by_steps([slopes.point], PARTS)
     residuals, by_half, by_quarter = [], [], []
-    for whole, halved, quartered in zip(full, half, quarter, strict=True):
+    for full_step, halved, quartered in zip(full, half, quarter, strict=True):
         residuals.append(2.0 * quartered - halved)
-        by_half.append(2.0 * (halved - whole))
-        by_quarter.append(2.0 * (quartered - halved) - (halved - whole))
+        by_half.append(2.0 * (halved - full_step))
+        by_quarter.append(2.0 * (quartered - halved) - (halved - full_step))
     return dataclasses.replace(slopes, residuals=residuals), by_half, by_quarter
 
 
@@ -293,11 +293,11 @@ def fit_starts(replays: Replays, most: int) -> Slopes:
     for velocity in KICKS if hard else ():
         kicked = trial.start
         kicked.states[:, -len(replays.twin.columns.x) :] += velocity
-        other = refine(trial, trial.slopes(kicked), most, SMALL_CHANGE)
+        kicked_fit = refine(trial, trial.slopes(kicked), most, SMALL_CHANGE)
         for i, k in enumerate(hard):
-            if cost([other.residuals[i]]) < cost([residuals[k]]):
-                residuals[k] = other.residuals[i]
-                states[k] = other.point.states[i]
+            if cost([kicked_fit.residuals[i]]) < cost([residuals[k]]):
+                residuals[k] = kicked_fit.residuals[i]
+                states[k] = kicked_fit.point.states[i]
     point = Point(reached.point.values, states)
     return dataclasses.replace(reached, point=point, residuals=residuals)
 

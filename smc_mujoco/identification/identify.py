@@ -407,7 +407,7 @@ def _expected_sets(twin: Rig, names: Sequence[str], most: int) -> int:
 
 def check(rig: Rig, log: Log, columns: Mapping[str, str] | None = None) -> HeldOutFit:
     """Return how well a rig repeats a log that its numbers were not found from."""
-    twin, data = rig.reading([records.given(log, columns)])
+    twin, data = rig.reading([records.as_columns(log, columns)])
     fit = twin.fits(data)[0]
     if twin.controller is not None or twin.dynamics is not None:
         return HeldOutFit(fit, {})
@@ -423,7 +423,7 @@ def _worst(fits: Sequence[Numbers]) -> float:
 
 def fits_by_pieces(replays: Replays, slopes: Slopes) -> list[dict[str, float]]:
     """Return the fit of each column of each record, percent, in pieces whose starts were found."""
-    found = []
+    fits = []
     for k in range(len(replays.data)):
         rows = []
         columns = {}
@@ -433,8 +433,8 @@ def fits_by_pieces(replays: Replays, slopes: Slopes) -> list[dict[str, float]]:
                 columns = piece.measured
         shares = np.linalg.norm(np.concatenate(rows), axis=0)
         percent = (100.0 * (1.0 - shares)).tolist()
-        found.append(dict(zip(columns, percent, strict=True)))
-    return found
+        fits.append(dict(zip(columns, percent, strict=True)))
+    return fits
 
 
 def _read(
@@ -448,7 +448,7 @@ def _read(
     many: Any = logs if isinstance(logs, (list, tuple)) else [logs]
     if not many:
         raise ScenarioError("there are no logs: give at least one")
-    read = [records.given(log, columns) for log in many]
+    read = [records.as_columns(log, columns) for log in many]
     line = _shell_line(machine, many, columns, condition)
     if isinstance(machine, str):
         machine = (
@@ -464,8 +464,8 @@ def _read(
         )
     twin, data = machine.reading(read)
     if isinstance(twin, OwnRig):
-        for given, record in zip(many, data, strict=True):
-            _check_log(twin, given, record)
+        for source, record in zip(many, data, strict=True):
+            _check_log(twin, source, record)
         check_named(twin, line)
         twin = first_guess.first_guess(twin, data)
     return twin, data
@@ -522,9 +522,9 @@ def _named_plant(text: str, logs: Sequence[Any], names: Sequence[str]) -> Plant:
             seen.append(name[2:])
     if seen and not driven:
         positions = joined(f"x_{joint}" for joint in seen)
-        wanted = joined(f"u_{joint}" for joint in seen)
+        commands = joined(f"u_{joint}" for joint in seen)
         raise ScenarioError(
-            f"the log has {positions} and no command: give {wanted}, the motors' commands, too"
+            f"the log has {positions} and no command: give {commands}, the motors' commands, too"
         )
     joints = list(driven)
     for joint in seen:

@@ -63,11 +63,11 @@ class Filter:
 
     def motion(self, names: Sequence[str]) -> list[Array]:
         """Return columns, their rates and their second derivatives, (N, n) each."""
-        found = []
+        derivatives = []
         for order in range(3):
             columns = [self.cubic(name, order) for name in names]
-            found.append(np.column_stack(columns))
-        return found
+            derivatives.append(np.column_stack(columns))
+        return derivatives
 
     def low(self, values: Array) -> Array:
         """Return the part of values (N,) below CUTOFF, without the ends."""
@@ -95,10 +95,10 @@ def times(data: Record, columns: Columns) -> Array:
 def measured(data: Record, columns: Columns) -> Record:
     """Return the recorded torque of each joint, below CUTOFF, N m."""
     filtered = Filter(data, columns)
-    found = {}
+    torque_columns = {}
     for name in columns.torque:
-        found[name] = filtered.low(filtered.cubic(name))
-    return found
+        torque_columns[name] = filtered.low(filtered.cubic(name))
+    return torque_columns
 
 
 def long_enough(data: Record, columns: Columns) -> bool:
@@ -119,14 +119,14 @@ def torques(plant: Plant, data: Record, columns: Columns, cutoff: float = CUTOFF
     dofs = dof_ids(model)
     x, v, a = filtered.motion(columns.x)
     forces = np.empty_like(x)
-    at = model.jnt_qposadr[joints]
+    places = model.jnt_qposadr[joints]
     for k in range(len(x)):
-        state.qpos[at] = x[k]
+        state.qpos[places] = x[k]
         state.qvel[dofs] = v[k]
         state.qacc[dofs] = a[k]
         mujoco.mj_inverse(model, state)
         forces[k] = state.qfrc_inverse[dofs]
-    found = {}
+    torque_columns = {}
     for i, name in enumerate(columns.torque):
-        found[name] = filtered.low(forces[:, i])
-    return found
+        torque_columns[name] = filtered.low(forces[:, i])
+    return torque_columns

@@ -132,7 +132,7 @@ def _shares(slopes: Slopes, lacks: Sequence[Lack]) -> list[Explained]:
     J = slopes.freed_slopes
     basis, _ = np.linalg.qr(J / np.maximum(np.linalg.norm(J, axis=0), 1e-300))
     r = slopes.freed_residuals
-    left = r - basis @ (basis.T @ r)
+    residuals = r - basis @ (basis.T @ r)
     starts = _starts(slopes)
     shares = []
     for lack in lacks:
@@ -142,13 +142,13 @@ def _shares(slopes: Slopes, lacks: Sequence[Lack]) -> list[Explained]:
         if power <= OWN_SHARE**2 * float(change @ change):
             shares.append(Explained())
             continue
-        size = -float(own @ left) / power
+        size = -float(own @ residuals) / power
         if lack.gives_way and size <= 0.0:
             shares.append(Explained())
             continue
-        pulls = np.add.reduceat(own * (left + size * own), starts)
+        pulls = np.add.reduceat(own * (residuals + size * own), starts)
         scatter = float(np.linalg.norm(pulls))
-        explained = size**2 * power / max(float(left @ left), 1e-300)
+        explained = size**2 * power / max(float(residuals @ residuals), 1e-300)
         shares.append(Explained(explained, abs(size) * power / max(scatter, 1e-300)))
     return shares
 

@@ -107,10 +107,10 @@ def lacking_forces(replays: Replays, slopes: Slopes) -> list[Lack]:
     texts = []
     pieces = list(replays.pieces)
     for i, joint in enumerate(driven_names(rig.plant)):
-        every = []
+        shapes_by_piece = []
         for motion in _motions(replays, slopes.point, i):
-            every.append([*shapes(motion), *left_out(motion, joint, replays.names)])
-        for of_pieces in zip(*every, strict=True):
+            shapes_by_piece.append([*shapes(motion), *left_out(motion, joint, replays.names)])
+        for of_pieces in zip(*shapes_by_piece, strict=True):
             words = of_pieces[0][0]
             texts.append(f"lack of fit: the model lacks a force on {joint} {words}")
             pieces += _pushed(replays.pieces, [force for _, force in of_pieces], i)

@@ -33,8 +33,8 @@ def doubts(rig: OwnRig, data: Sequence[Data]) -> list[str]:
 
 def _slow(rig: OwnRig, period: float) -> list[str]:
     """Return a sentence on a log that may lack commands of a faster loop."""
-    known = abs(period - rig.base.control_period) < SAME_PERIOD * period
-    if period <= LONG_PERIOD or known:
+    loop_known = abs(period - rig.base.control_period) < SAME_PERIOD * period
+    if period <= LONG_PERIOD or loop_known:
         return []
     late = ""
     if DELAY in rig.quantities:
@@ -55,10 +55,10 @@ def _spikes(record: Record, name: str, time: str, unit: str) -> list[str]:
     if not out.any():
         return []
     first = int(np.argmax(out))
-    at = record[time][first + 2]
+    time_of_first = record[time][first + 2]
     return [
         f"{int(out.sum())} of {len(x)} samples of {name} stick out from both their neighbours by "
-        f"more than {least:.2g} {unit}, the first at {at:.4g} s: interpolate over them"
+        f"more than {least:.2g} {unit}, the first at {time_of_first:.4g} s: interpolate over them"
     ]
 
 

@@ -96,21 +96,21 @@ class OwnRig(Rig):
 
     def values_of_plant(self, values: Numbers | None = None) -> dict[str, float]:
         """Return the parameters of the plant with some values, by default the rig's own."""
-        found = self.values if values is None else values
+        numbers = self.values if values is None else values
         parameters = dict(self.plant.parameters)
         for name in parameters:
-            if name in found:
-                parameters[name] = found[name]
+            if name in numbers:
+                parameters[name] = numbers[name]
         return parameters
 
     def numbers_of(self, values: Values) -> Fields:
         """Return the fields of a Scenario whose parts and plant have some values."""
-        found = vars(values)
-        parameters = self.values_of_plant(found)
+        numbers = vars(values)
+        parameters = self.values_of_plant(numbers)
         fields: Fields = {"plant": dataclasses.replace(self.plant, parameters=parameters)}
         fields |= {field: parts_of(self.base, field) for field in FIELDS}
         for name, place in self.places.items():
-            fields[place.field] = place.put(fields[place.field], found[name])
+            fields[place.field] = place.put(fields[place.field], numbers[name])
         return {name: value for name, value in fields.items() if value != ()}
 
     def checked(self, record: Data) -> Record:
@@ -151,10 +151,10 @@ class OwnRig(Rig):
             return log
         joint = channel_names(self.plant)[0]
         names = {f"{kind}_{joint}": kind for kind in "xu" if kind not in log}
-        found = {}
+        columns = {}
         for name, values in log.items():
-            found[names.get(name, name)] = values
-        return found
+            columns[names.get(name, name)] = values
+        return columns
 
     def part(
         self,
@@ -193,9 +193,9 @@ class OwnRig(Rig):
     def command(self, part: LogPart) -> Array:
         """Return the commands that reach the motors, at each of a replay's, (K, driven)."""
         late = self.values.get(DELAY, self.base.input_delay) / part.period
-        whole = math.floor(late)
-        share = late - whole
-        first = part.before - whole
+        samples = math.floor(late)
+        share = late - samples
+        first = part.before - samples
         count = len(part.u) - part.before
         u = (1.0 - share) * part.u[first : first + count]
         u = u + share * part.u[first - 1 : first - 1 + count]
@@ -224,21 +224,21 @@ class OwnRig(Rig):
     def _of_joints(self, joints: Sequence[str], kind: str, default: float) -> Array:
         """Return a quantity of each of some joints, (joints,)."""
         values = self.values
-        found = []
+        numbers = []
         for joint in joints:
-            found.append(values.get(f"{joint}.{kind}", default))
-        return np.array(found)
+            numbers.append(values.get(f"{joint}.{kind}", default))
+        return np.array(numbers)
 
     @property
     def integrators(self) -> dict[int, PositionServo]:
         """Driven channel -> its servo, where that integrates its error. What it has integrated is
         in no log: it is a free number of each piece, as velocities are, and starts from the log.
         """
-        found = {}
+        servos = {}
         for i, motor in enumerate(self.base.drive_train.motors):
             if isinstance(motor, PositionServo) and motor.ki:
-                found[i] = motor
-        return found
+                servos[i] = motor
+        return servos
 
     def _integrating(self, parts: Sequence[Actuator], integrals: Array) -> tuple[Actuator, ...]:
         """Return the actuators with the integrals of their servos, (q,)."""
@@ -246,16 +246,16 @@ class OwnRig(Rig):
         of_joint = {}
         for i, integral in zip(self.integrators, integrals.tolist(), strict=True):
             of_joint[joints[i]] = integral
-        found = []
+        actuators = []
         for part in parts:
             if not isinstance(part, PositionServo) or not part.ki:
-                found.append(part)
+                actuators.append(part)
                 continue
             for joint in part.joint_names(self.plant):
                 bound = part.imax or math.inf
                 integral = min(max(of_joint[joint], -bound), bound)
-                found.append(dataclasses.replace(part, on=(joint,), integral=integral))
-        return tuple(found)
+                actuators.append(dataclasses.replace(part, on=(joint,), integral=integral))
+        return tuple(actuators)
 
     @property
     def zeros(self) -> Array:
@@ -270,8 +270,8 @@ class OwnRig(Rig):
         fields = self.numbers_of(Values(**self.values))
         # the machine has had these commands, whatever its limits are
         fields["plant"] = dataclasses.replace(fields["plant"], limits=(), reach=None)
-        given = np.array(part.state if state is None else state, float)
-        integrals, motion = np.split(given, [len(self.integrators)])
+        start = np.array(part.state if state is None else state, float)
+        integrals, motion = np.split(start, [len(self.integrators)])
         if len(integrals):
             fields["actuator"] = self._integrating(fields["actuator"], integrals)
         x, v = np.split(motion, 2)
@@ -302,10 +302,10 @@ class OwnRig(Rig):
 
     def predicted(self, trace: Trace) -> Record:
         """Return the columns of a log that a replay gives, with the zeros of its encoders."""
-        found = records.positions(trace, self.columns)
+        positions = records.positions(trace, self.columns)
         for name, zero in zip(self.columns.x, self.zeros, strict=True):
-            found[name] = found[name] + zero
-        return found
+            positions[name] = positions[name] + zero
+        return positions
 
     @property
     def units(self) -> dict[str, str]:
@@ -411,10 +411,10 @@ def condition_fields(rig: OwnRig) -> Fields:
         change = value if name in rig.plant.added else value / before[name]
         if change != (0.0 if name in rig.plant.added else 1.0):
             mismatch[name] = change
-    kept = (*FIELDS, "fault", DELAY, "physics_step")
+    names = (*FIELDS, "fault", DELAY, "physics_step")
     bare = Scenario.recorded(plant=rig.plant, law="none")  # has the drives of the plant's file
-    found = {}
-    for name in kept:
+    changed = {}
+    for name in names:
         if name in fields and fields[name] != getattr(bare, name):
-            found[name] = fields[name]
-    return found | ({"mismatch": mismatch} if mismatch else {})
+            changed[name] = fields[name]
+    return changed | ({"mismatch": mismatch} if mismatch else {})

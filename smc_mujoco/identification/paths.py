@@ -82,8 +82,8 @@ def resolved(base: Scenario, names: Sequence[str]) -> Paths:
     places: dict[str, PartNumber] = {}
     for name in names:
         if name in of_joints:
-            known = of_joints[name]
-            quantities[name] = Quantity(known.value, known.unit, "the model", 0.0)
+            number = of_joints[name]
+            quantities[name] = Quantity(number.value, number.unit, "the model", 0.0)
         elif name in plant.parameters:
             least = _open(plant.constraint(name).low)
             if name in NATURAL:
@@ -182,10 +182,10 @@ def steady_force(part: Friction, v: np.ndarray, i: int) -> np.ndarray:
     fields = [(name, float) for name in part.names]
     p = np.rec.array([part.parameters(i)], dtype=fields)[0]
     memory = np.zeros(part.memory)
-    at = JointState(*[0.0] * 7)
+    state = JointState(*[0.0] * 7)
     forces = []
     for speed in v:
-        forces.append(part.steady(at._replace(v=float(speed)), p, memory))
+        forces.append(part.steady(state._replace(v=float(speed)), p, memory))
     return np.array(forces)
 
 

@@ -43,12 +43,12 @@ class PreslidingFields:
 
     def __call__(self, model: mujoco.MjModel, p: Parameters) -> Iterator[Field]:
         yield from self.inner(model, p)
-        every = np.arange(model.nv)
+        dofs = np.arange(model.nv)
         if self.bends:
-            yield Field("dof_frictionloss", every, 0.0)
+            yield Field("dof_frictionloss", dofs, 0.0)
             return
-        yield Field("dof_solref", every, SOFT_SOLREF)
-        yield Field("dof_solimp", every, SOFT_SOLIMP)
+        yield Field("dof_solref", dofs, SOFT_SOLREF)
+        yield Field("dof_solimp", dofs, SOFT_SOLIMP)
         model.opt.noslip_iterations = 0  # a number, which no Field can write
 
 
@@ -68,7 +68,7 @@ def presliding(replays: Replays, slopes: Slopes, integrator: str | None = None) 
     if integrator is not None:
         trial.steps["integrator"] = integrator
     (holding,) = trial.residuals([slopes.point])
-    found = []
+    lacks = []
     for way, yielding in _ways(rig).items():
         trial.twin = yielding
         (residuals,) = trial.residuals([slopes.point])
@@ -76,8 +76,8 @@ def presliding(replays: Replays, slopes: Slopes, integrator: str | None = None) 
         for after, before in zip(residuals, holding, strict=True):
             changes.append(after - before)
         text = f"presliding: in the logs dry friction gives way before it slides, {way}"
-        found.append(Lack(text, changes, gives_way=True))
-    return found
+        lacks.append(Lack(text, changes, gives_way=True))
+    return lacks
 
 
 def _ways(rig: OwnRig) -> dict[str, OwnRig]:
@@ -89,7 +89,7 @@ def _ways(rig: OwnRig) -> dict[str, OwnRig]:
     inertias = model.dof_M0[dofs].tolist()
     joints = channel_names(rig.plant)
     creeps = "as MuJoCo's default does: if a simulation made the logs, " + _softness(joints, levels)
-    found = {creeps: dataclasses.replace(rig, plant=_yielding(rig.plant, False))}
+    rigs = {creeps: dataclasses.replace(rig, plant=_yielding(rig.plant, False))}
     for bend in BENDS:
         bristles = []
         for joint, level, inertia in zip(joints, levels, inertias, strict=True):
@@ -99,8 +99,8 @@ def _ways(rig: OwnRig) -> dict[str, OwnRig]:
                 bristles.append(LuGre(level, level, SLIDES_AT, k, damping, on=(joint,)))
         base = dataclasses.replace(rig.base, friction=(*rig.base.friction, *bristles))
         way = f"as bristles that bend by {1e3 * bend:g} mrad (mm): {_with_bristles(rig, bristles)}"
-        found[way] = dataclasses.replace(rig, base=base, plant=_yielding(rig.plant, True))
-    return found
+        rigs[way] = dataclasses.replace(rig, base=base, plant=_yielding(rig.plant, True))
+    return rigs
 
 
 def _softness(joints: Sequence[str], levels: Sequence[float]) -> str:
@@ -116,10 +116,16 @@ def _with_bristles(rig: OwnRig, bristles: Sequence[LuGre]) -> str:
     """Return what to do, in the words of the command, where dry friction bends as bristles do."""
     parts = []
     paths = []
-    for one in bristles:
-        (joint,) = one.on
+    for bristle in bristles:
+        (joint,) = bristle.on
         texts = []
-        for value in (one.coulomb, one.static, one.stribeck, one.stiffness, one.damping):
+        for value in (
+            bristle.coulomb,
+            bristle.static,
+            bristle.stribeck,
+            bristle.stiffness,
+            bristle.damping,
+        ):
             texts.append(f"{value:.3g}")
         parts.append(f"'{joint}': LuGre({', '.join(texts)})")
         for name in FOUND:

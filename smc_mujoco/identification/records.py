@@ -47,7 +47,7 @@ class Columns:
     inputs: Names = ()  # commands of all motors of a machine with several; empty: u alone
     reference: str = "reference"  # of the driven joint, if the loop is closed
     feedforward: str = "feedforward"  # what is added to the controller's u; records may lack it
-    others: Names = ()  # references of the other joints; records may lack them
+    other_references: Names = ()  # of the joints that are not driven; records may lack them
     # positions, then velocities, without noise and offset; only simulated runs have them
     state: Names = ()
     # what is subtracted from each channel's column to get the plant's x; empty for 0
@@ -63,9 +63,9 @@ class Columns:
         return self.time, *self.x, *command
 
     @property
-    def known(self) -> Names:
+    def readable(self) -> Names:
         """All columns that a replay may read."""
-        more = *self.inputs, self.reference, *self.others, self.feedforward, *self.state
+        more = *self.inputs, self.reference, *self.other_references, self.feedforward, *self.state
         return tuple(dict.fromkeys((*self.needed(True), *more)))
 
 
@@ -93,13 +93,13 @@ def renamed(data: Data, columns: Mapping[str, str] | None, what: str) -> Record:
         raise ScenarioError(
             f"columns are {shown(columns)}: give our names with the log's, as {{'t': 'time'}}"
         )
-    found = dict(data)
+    columns_by_name = dict(data)
     for ours, theirs in columns.items():
-        found[ours] = find(f"column of {what}", theirs, data)
-    return found
+        columns_by_name[ours] = find(f"column of {what}", theirs, data)
+    return columns_by_name
 
 
-def given(record: Any, columns: Mapping[str, str] | None = None) -> Any:
+def as_columns(record: Any, columns: Mapping[str, str] | None = None) -> Any:
     """Return a record that a user gives as its columns, or as a trace: the path of a file, a trace,
     a data frame, or columns by name.
     """
@@ -185,7 +185,7 @@ def of_trace(trace: Trace, columns: Columns) -> Record:
 
 
 def checked(record: Data, columns: Columns, period: float | None, rig: str) -> Record:
-    """Return the record's known columns as float arrays, (K,) each. `rig`: its name, for errors.
+    """Return the record's readable columns as float arrays, (K,) each. `rig`: its name, for errors.
 
     `period`: s, of the rig's controller, at which a closed loop must be recorded. None for an open
     loop, whose columns are interpolated at the record's own median step.
@@ -205,7 +205,7 @@ def checked(record: Data, columns: Columns, period: float | None, rig: str) -> R
             f"--columns {missing[0]}=NAME (in Python columns={{{missing[0]!r}: 'NAME'}})"
         )
     data = {}
-    for name in columns.known:
+    for name in columns.readable:
         if name in record:
             data[name] = _numbers(name, record[name], rig)
     t = data[columns.time]

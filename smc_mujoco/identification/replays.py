@@ -103,8 +103,8 @@ class Slopes:
         """
         bases = []
         for S in self.by_states:
-            left, sizes, _ = np.linalg.svd(S, full_matrices=False)
-            bases.append(left[:, sizes > SINGULAR_RATIO * sizes.max(initial=0.0)])
+            vectors, sizes, _ = np.linalg.svd(S, full_matrices=False)
+            bases.append(vectors[:, sizes > SINGULAR_RATIO * sizes.max(initial=0.0)])
         return bases
 
     @cached_property
@@ -136,11 +136,11 @@ class Slopes:
         rows = []
         moves = []
         for r, J, S in zip(self.residuals, self.by_values, self.by_states, strict=True):
-            left, sizes, right = np.linalg.svd(S, full_matrices=False)
-            kept = sizes > noise
+            vectors, sizes, right = np.linalg.svd(S, full_matrices=False)
+            visible = sizes > noise
             moved = r + J @ step
-            within = left[:, kept].T @ moved
-            moves.append(-right[kept].T @ (within / sizes[kept]))
+            within = vectors[:, visible].T @ moved
+            moves.append(-right[visible].T @ (within / sizes[visible]))
             rows.append(moved + S @ moves[-1])
         point = Point(self.point.values + step, self.point.states + np.array(moves))
         return dataclasses.replace(self, point=point, residuals=rows)
@@ -185,15 +185,15 @@ class Replays:
         self.closed = closed
         self.report = report
         self.whole = whole or closed or not twin.window
-        self.known = []
+        self.quantities = []
         low = []
         high = []
         for name in names:
             quantity = twin.quantities[name]
-            self.known.append(quantity)
+            self.quantities.append(quantity)
             low.append(quantity.least)
             high.append(quantity.most)
-        self.scales = np.array(list(map(_scale, self.known)))
+        self.scales = np.array(list(map(_scale, self.quantities)))
         self.low = np.array(low) / self.scales
         self.high = np.array(high) / self.scales
         n = len(twin.columns.x)
@@ -220,11 +220,11 @@ class Replays:
 
     def values(self, point: Point) -> dict[str, float]:
         """Return the quantities at a point, cut to their ranges."""
-        found = {}
+        values = {}
         scaled = (point.values * self.scales).tolist()
-        for name, value, known in zip(self.names, scaled, self.known, strict=True):
-            found[name] = min(max(value, known.least), known.most)
-        return found
+        for name, value, quantity in zip(self.names, scaled, self.quantities, strict=True):
+            values[name] = min(max(value, quantity.least), quantity.most)
+        return values
 
     def rig(self, point: Point) -> Rig:
         """Return the rig at a point."""
@@ -274,14 +274,14 @@ class Replays:
         """Return `residuals` with each of some parts of the physics step, and commands as fine."""
         plain = self.rig(points[0]).repeated(self._part(0))
         steps, pieces = self.steps, self.pieces
-        found = []
+        residuals = []
         for part in parts:
             self.steps = {"physics_step": plain.resolved.physics_step / part}
             self.pieces = self._finer(round(part))
-            found.append(self._residuals(points))
+            residuals.append(self._residuals(points))
             self.pieces = pieces
         self.steps = steps
-        return found
+        return residuals
 
     def _residuals(self, points: Sequence[Point]) -> list[list[Array]]:
         relative = []
@@ -291,10 +291,10 @@ class Replays:
 
     def costs(self, points: Sequence[Point]) -> Array:
         """Return the sum of squares of each piece at each point, (points, pieces)."""
-        found = []
+        costs = []
         for by_piece in self.residuals(points):
-            found.append([cost([rows]) for rows in by_piece])
-        return np.array(found)
+            costs.append([cost([rows]) for rows in by_piece])
+        return np.array(costs)
 
     def predicted(self, points: Sequence[Point]) -> list[list[Record]]:
         """Return the predicted columns of each piece at each point."""
@@ -323,11 +323,11 @@ class Replays:
         if not (plain := rig.repeated(self._part(0))).realistic:
             return False
         self.steps = _steps(plain, 0)
-        found = []
+        predictions = []
         for k in (0, halvings - 1, halvings):
-            found += self._replayed([rig], [point], _steps(plain, k))
+            predictions += self._replayed([rig], [point], _steps(plain, k))
         self.corrections = []
-        for plain_steps, coarse, fine in zip(*found, strict=True):
+        for plain_steps, coarse, fine in zip(*predictions, strict=True):
             correction = {}
             for name in fine:
                 correction[name] = 2.0 * fine[name] - coarse[name] - plain_steps[name]
@@ -366,13 +366,13 @@ class Replays:
 
     def by_piece(self, rig: Rig, traces: Iterator[Trace]) -> list[Record]:
         """Return the columns of each piece that are compared, from the next replays of a rig."""
-        found = []
+        predictions = []
         for piece, trace in zip(self.pieces, traces, strict=False):
             columns = rig.predicted(trace)
             for name in columns:
                 columns[name] = columns[name][:: piece.stride][piece.skipped :]
-            found.append(columns)
-        return found
+            predictions.append(columns)
+        return predictions
 
     def relative(self, piece: Piece, predicted: Record) -> Array:
         """Return the residuals of a piece, sample by sample with all columns, (N,), divided by the
@@ -410,9 +410,9 @@ class Replays:
             columns = []
             for ahead, back, gap in zip(rows[:count], rows_behind, gaps, strict=True):
                 columns.append((ahead[k] - back[k]) / gap)
-            every = np.column_stack(columns)
-            by_values.append(every[:, :p])
-            by_states.append(every[:, p:])
+            derivatives = np.column_stack(columns)
+            by_values.append(derivatives[:, :p])
+            by_states.append(derivatives[:, p:])
         columns = len(self.pieces[0].measured)
         return Slopes(point, residuals, by_values, by_states, columns, len(self.data))
 

@@ -50,20 +50,20 @@ def residual_figure(
         height = pages.head_height(style.FULL_WIDTH, handles) + ROW_HEIGHT * len(measured)
         page = pages.blank(style.FULL_WIDTH, height)
         axes = page.subplots(len(measured), 2, squeeze=False, sharex=True, width_ratios=SHARES)
-        shown = next(iter(fits.values()))  # what tables call the columns
-        rows = zip(axes, measured.items(), shown, strict=True)
-        for (left, right), (name, values), column in rows:
+        labels = next(iter(fits.values()))  # what tables call the columns
+        rows = zip(axes, measured.items(), labels, strict=True)
+        for (column_axes, residual_axes), (name, values), column in rows:
             unit = units[name].replace(" ", "·")
-            left.set_ylabel(style.folded(f"{column} ({unit})"))
-            left.plot(t, values, **record)
+            column_axes.set_ylabel(style.folded(f"{column} ({unit})"))
+            column_axes.plot(t, values, **record)
             residuals = {}
             reached = {}
             for twin, look in looks.items():
                 residuals[twin] = values - predicted[twin][name]
                 reached[twin] = percent(fits[twin][column])
-                left.plot(t, predicted[twin][name], **look)
-            _entitle(left, "fit", reached, SHARES[0])
-            _draw_residuals(right, t, residuals, looks, unit)
+                column_axes.plot(t, predicted[twin][name], **look)
+            _entitle(column_axes, "fit", reached, SHARES[0])
+            _draw_residuals(residual_axes, t, residuals, looks, unit)
         for ax in axes[-1]:
             ax.set_xlabel("time (s)")
         pages.set_head(page, style.FULL_WIDTH, title, handles)
@@ -75,7 +75,7 @@ def _draw_residuals(
     ax: Axes, t: Array, residuals: Mapping[str, Array], looks: Mapping[str, Fields], unit: str
 ) -> None:
     """Draw the residuals of a column, twin -> (K,), with the prefix of their unit that suits."""
-    largest = max(float(np.abs(one).max()) for one in residuals.values())
+    largest = max(float(np.abs(error).max()) for error in residuals.values())
     factor, short = style.prefixed(largest, unit)
     ax.axhline(0.0, color=style.RULE, lw=0.8)
     for twin, residual in residuals.items():

@@ -61,9 +61,9 @@ class Fall(float):
     time: float  # s of the record, when a joint is first off by more than its measured range
 
     def __new__(cls, time: float) -> "Fall":
-        made = super().__new__(cls, -np.inf)
-        made.time = time
-        return made
+        fit = super().__new__(cls, -np.inf)
+        fit.time = time
+        return fit
 
     def __format__(self, spec: str) -> str:
         return f"falls at {self.time:.1f} s"
@@ -156,10 +156,10 @@ class Rig:
         """Return the rig with other values of some quantities, SI units, from a source."""
         changed = dict(self.quantities)
         for name, value in frozen(values).items():
-            known = find(f"quantity of {self.name}", name, changed)
-            new = number(f"{self.name}'s {name}", value, low=known.least, high=known.most)
-            if new != known.value:
-                changed[name] = dataclasses.replace(known, value=new, source=source)
+            quantity = find(f"quantity of {self.name}", name, changed)
+            new = number(f"{self.name}'s {name}", value, low=quantity.least, high=quantity.most)
+            if new != quantity.value:
+                changed[name] = dataclasses.replace(quantity, value=new, source=source)
         return dataclasses.replace(self, quantities=changed)
 
     def set(self, name: str) -> "Rig":
@@ -464,14 +464,14 @@ class Rig:
         """
         names = self.columns
         data = list(map(self.checked, many))
-        found = []
+        predictions = []
         if self.dynamics is not None:
             plant = self.dynamics(Values(**self.values))
             for columns in data:
                 measured = inverse_dynamics.measured(columns, names)
                 torques = inverse_dynamics.torques(plant, columns, names)
-                found.append((torques, measured, inverse_dynamics.times(columns, names)))
-            return found
+                predictions.append((torques, measured, inverse_dynamics.times(columns, names)))
+            return predictions
         parts = list(map(self.part, many))
         scenarios = []
         for part, state in zip(parts, states or [None] * len(many), strict=True):
@@ -493,8 +493,8 @@ class Rig:
             measured = {}
             for name in predicted:
                 measured[name] = columns[name][scored]
-            found.append((predicted, measured, columns[names.time][scored]))
-        return found
+            predictions.append((predicted, measured, columns[names.time][scored]))
+        return predictions
 
     def predicted(self, trace: Trace) -> Record:
         """Return the columns of a record that a replay gives, (K,) each, without the columns'

@@ -53,8 +53,8 @@ def _of_servo(names: tuple[str, str], x: Array, u: Array, rate: float, unit: str
     of_x, of_u = names
     reach = float(max(np.abs(x).max(), np.abs(u).max()))
     if unit == "rad" and reach > LARGEST_ANGLE:
-        both = f"{of_x} and {of_u}"
-        return [f"{both} reach {reach:.3g} rad: if that is in degrees, divide both by 57.3"]
+        columns = f"{of_x} and {of_u}"
+        return [f"{columns} reach {reach:.3g} rad: if that is in degrees, divide both by 57.3"]
     slow_x, slow_u = _slow(x, rate), _slow(u, rate)
     moved_x, moved_u = float(np.std(slow_x)), float(np.std(slow_u))
     if not (moved_x and moved_u > LEAST * np.std(u)):

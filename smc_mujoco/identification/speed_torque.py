@@ -68,9 +68,9 @@ class FrictionFit:
     def _values(self) -> tuple[tuple[str, ...], Array, float]:
         """The terms, their numbers, and the speed of one of them; 1 without one."""
         terms = MODELS[self.model]
-        every = list(self.numbers.values())
-        speed = every[len(terms)] if len(every) > len(terms) else 1.0
-        return terms, np.array(every[: len(terms)]), speed
+        numbers = list(self.numbers.values())
+        speed = numbers[len(terms)] if len(numbers) > len(terms) else 1.0
+        return terms, np.array(numbers[: len(terms)]), speed
 
     def force(self, v: Array) -> Array:
         """Return the friction at speeds v, (K,), N m (N)."""
@@ -149,8 +149,8 @@ class FrictionFound:
 
     def about(self) -> Fields:
         """Return the fits as JSON data."""
-        told = ("numbers", "errors", "rms", "held_out", "r2")
-        fits = {model: attributes(fit, told) for model, fit in self.fits.items()}
+        fields = ("numbers", "errors", "rms", "held_out", "r2")
+        fits = {model: attributes(fit, fields) for model, fit in self.fits.items()}
         return {"best": self.best.model, "fits": fits}
 
     def save(self, path: AnyPath) -> Path:
@@ -206,11 +206,11 @@ def identify_friction(speed: Any, torque: Any, held_out: Any = None) -> Friction
       ScenarioError: pairs that are no numbers, too few that move, or of one direction alone.
     """
     pairs = _moving(speed, torque, "the pairs")
-    other = None if held_out is None else _moving(held_out[0], held_out[1], "held_out")
+    held_out_pairs = None if held_out is None else _moving(held_out[0], held_out[1], "held_out")
     fits = {}
     errors = []
     for model, terms in MODELS.items():
-        fits[model], errors_of_blocks = _fitted(model, terms, pairs, other)
+        fits[model], errors_of_blocks = _fitted(model, terms, pairs, held_out_pairs)
         errors.append(errors_of_blocks)
     losses = np.array(errors)
     least = losses[int(losses.mean(axis=1).argmin())]
@@ -231,7 +231,7 @@ def read_pairs(path: AnyPath, columns: Mapping[str, str] | None = None) -> Pairs
     Raises:
       ScenarioError: the file has no such column.
     """
-    record: Any = records.given(path, columns)
+    record: Any = records.as_columns(path, columns)
     for name in ("speed", "torque"):
         if not isinstance(record, Mapping) or name not in record:
             has = ", ".join(map(str, record)) if isinstance(record, Mapping) else "a trace"
@@ -270,14 +270,14 @@ def _moving(speed: Any, torque: Any, what: str) -> Pairs:
 def _columns(terms: tuple[str, ...], v: Array, speed: float) -> Array:
     """Return what each term is at speeds v per unit of its number, (K, terms)."""
     sign = np.sign(v)
-    known = {
+    shapes = {
         "level": lambda: sign,
         "smooth": lambda: np.tanh(v / speed),
         "drop": lambda: sign * np.exp(-((v / speed) ** 2)),
         "viscous": lambda: v,
         "offset": lambda: np.ones_like(v),
     }
-    columns = [known[term]() for term in terms]
+    columns = [shapes[term]() for term in terms]
     return np.column_stack(columns)
 
 
@@ -315,8 +315,8 @@ def _speed(terms: tuple[str, ...], v: Array, force: Array) -> float:
     grid = np.linspace(np.log(low), np.log(max(high, 2.0 * low)), SCAN)
     best = int(np.argmin(list(map(loss, grid))))
     around = grid[max(best - 1, 0)], grid[min(best + 1, SCAN - 1)]
-    found: Any = minimize_scalar(loss, bounds=around, method="bounded")
-    return float(np.exp(found.x))
+    minimum: Any = minimize_scalar(loss, bounds=around, method="bounded")
+    return float(np.exp(minimum.x))
 
 
 def _fitted(
@@ -344,18 +344,18 @@ def _fitted(
         names.append("level" if term == "smooth" else term)
         if term in SPEED_OF:
             speeds.append(SPEED_OF[term])
-    found = dict(zip(names, numbers.tolist(), strict=True))
-    found |= dict.fromkeys(speeds, speed)
+    numbers_by_name = dict(zip(names, numbers.tolist(), strict=True))
+    numbers_by_name |= dict.fromkeys(speeds, speed)
     covariance, losses = _covariance(terms, pairs, numbers, speed)
     errors = np.sqrt(np.diag(covariance))
     zeros = []
     for name in names:
-        if name != "offset" and found[name] == 0.0:
+        if name != "offset" and numbers_by_name[name] == 0.0:
             zeros.append(name)
     fit = FrictionFit(
         model,
-        found,
-        dict(zip(found, errors.tolist(), strict=True)),
+        numbers_by_name,
+        dict(zip(numbers_by_name, errors.tolist(), strict=True)),
         float(np.sqrt(np.mean(residual**2))),
         float(np.sqrt(np.mean(rest**2))),
         float(np.mean(rest)),
@@ -393,21 +393,21 @@ def _covariance(
     residual = force - _columns(terms, v, speed) @ numbers
     free = np.any(slopes != 0.0, axis=0)
     free[: len(terms)] &= (numbers != 0.0) | (np.array(terms) == "offset")
-    kept = np.flatnonzero(free)
-    slopes = slopes[:, kept]
-    whole = slopes.T @ slopes
-    moved = np.zeros((BLOCKS, len(kept)))
+    free_numbers = np.flatnonzero(free)
+    slopes = slopes[:, free_numbers]
+    information = slopes.T @ slopes
+    moved = np.zeros((BLOCKS, len(free_numbers)))
     losses = np.zeros(BLOCKS)
     for b, block in enumerate(np.array_split(np.arange(len(v)), BLOCKS)):
-        own, left = slopes[block], residual[block]
-        moved[b] = -least_squares(whole - own.T @ own, own.T @ left)
-        losses[b] = np.mean((left - own @ moved[b]) ** 2)
+        own, block_residual = slopes[block], residual[block]
+        moved[b] = -least_squares(information - own.T @ own, own.T @ block_residual)
+        losses[b] = np.mean((block_residual - own @ moved[b]) ** 2)
     moved -= moved.mean(axis=0)
     by_blocks = (BLOCKS - 1) / BLOCKS * moved.T @ moved
-    degrees = max(len(v) - len(kept), 1)
-    white = np.sum(residual**2) / degrees * np.diag(np.linalg.pinv(whole))
+    degrees = max(len(v) - len(free_numbers), 1)
+    white = np.sum(residual**2) / degrees * np.diag(np.linalg.pinv(information))
     variance = np.diag(by_blocks)
     factors = np.sqrt(np.maximum(white / np.maximum(variance, 1e-300), 1.0))
     covariance = np.zeros((len(free), len(free)))
-    covariance[np.ix_(kept, kept)] = by_blocks * np.outer(factors, factors)
+    covariance[np.ix_(free_numbers, free_numbers)] = by_blocks * np.outer(factors, factors)
     return covariance, losses

@@ -82,9 +82,9 @@ def check_told_apart(replays: Replays, slopes: Slopes) -> None:
             )
     _, singular, rows = np.linalg.svd(J / sizes, full_matrices=False)
     if singular[-1] < SINGULAR_RATIO * singular[0]:
-        one, other = np.argsort(-np.abs(rows[-1]))[:2]
+        first, second = np.argsort(-np.abs(rows[-1]))[:2]
         raise ScenarioError(
-            f"the records of {replays.twin.name} cannot tell {names[one]} and {names[other]} "
+            f"the records of {replays.twin.name} cannot tell {names[first]} and {names[second]} "
             "apart: leave one out, or give a longer record or one of a richer motion"
         )
 
@@ -100,18 +100,18 @@ def between(slopes: Slopes, groups: Sequence[int]) -> Array:
     Survey Methodology 28(2), 2002 (CR2).
     """
     p = slopes.by_values[0].shape[1]
-    every = {group: (np.zeros((p, p)), np.zeros(p)) for group in groups}
+    sums = {group: (np.zeros((p, p)), np.zeros(p)) for group in groups}
     pieces = zip(groups, slopes.residuals, slopes.by_values, slopes.by_states, strict=True)
     for group, r, J, S in pieces:
         A, g = _normal(r, J, S)
-        every[group] = every[group][0] + A, every[group][1] + g
-    if len(every) < 2:
+        sums[group] = sums[group][0] + A, sums[group][1] + g
+    if len(sums) < 2:
         return np.zeros(p)
-    whole = np.sum([A for A, _ in every.values()], axis=0)
-    sizes, vectors = np.linalg.eigh(whole)
+    information = np.sum([A for A, _ in sums.values()], axis=0)
+    sizes, vectors = np.linalg.eigh(information)
     whiten = vectors / np.sqrt(np.maximum(sizes, SINGULAR_RATIO**2 * sizes[-1]))
     variance = np.zeros(p)
-    for A, g in every.values():
+    for A, g in sums.values():
         shares, axes = np.linalg.eigh(whiten.T @ A @ whiten)
         factors = 1.0 / np.sqrt(np.maximum(1.0 - shares, MIN_SHARE))
         pull = axes @ (factors * (axes.T @ (whiten.T @ g)))

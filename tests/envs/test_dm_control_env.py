@@ -35,9 +35,9 @@ from dm_control.utils import rewards  # noqa: E402
 
 @pytest.mark.parametrize(("plant", "task"), one_of_each(1))
 def test_a_law_as_an_agent_gives_the_trace_of_its_run(plant, task):
-    known = smc.plant(plant)
+    plant_named = smc.plant(plant)
     strong = smc.law(
-        "observer_free", lam=6.0 if known.rest else max((6.0, *known.limits)), k1=3.076
+        "observer_free", lam=6.0 if plant_named.rest else max((6.0, *plant_named.limits)), k1=3.076
     )
     if "hierarchical" in smc.laws(plant):
         law = smc.law("hierarchical")
@@ -138,12 +138,12 @@ def test_a_plant_of_one_s_own_starts_as_its_runs_do(tmp_path):
 
 
 def test_the_reward_is_dm_control_s_tolerance_in_closeness_and_calm():
-    found = Setting("duffing")
+    setting = Setting("duffing")
     random = np.random.default_rng(0)
     for x, v in random.normal(scale=(1.0, 5.0), size=(20, 2)):
         calm = rewards.tolerance(v, margin=5.0)
         expected = rewards.tolerance(x, margin=1.0) * (4.0 + calm) / 5.0
-        assert tasks.reward(*found.errors(np.array([x]), np.array([v]), 0)) == pytest.approx(
+        assert tasks.reward(*setting.errors(np.array([x]), np.array([v]), 0)) == pytest.approx(
             expected, rel=1e-12
         )
 
@@ -159,26 +159,27 @@ def test_the_reward_is_dm_control_s_tolerance_in_closeness_and_calm():
     ],
 )
 def test_the_reward_is_one_at_the_goal_and_small_far_from_it(plant, task, goal, miss):
-    found = Setting(plant, task)
+    setting = Setting(plant, task)
     still = np.zeros(len(goal))
-    assert tasks.reward(*found.errors(np.array(goal), still, 0)) == pytest.approx(1.0)
-    assert tasks.reward(*found.errors(np.array(miss), still, 0)) < 0.35
+    assert tasks.reward(*setting.errors(np.array(goal), still, 0)) == pytest.approx(1.0)
+    assert tasks.reward(*setting.errors(np.array(miss), still, 0)) < 0.35
     assert (
-        tasks.reward(*found.errors(np.array(goal), still + np.arange(len(goal)) + 50.0, 0)) < 0.999
+        tasks.reward(*setting.errors(np.array(goal), still + np.arange(len(goal)) + 50.0, 0))
+        < 0.999
         or task == "synchronise"
     )
 
 
 def test_tracking_is_rewarded_where_the_plant_follows():
-    found = Setting("cart_pole", "track", {"reference": smc.Sine(0.5, 2.0)})
-    r, dr, _ = found.reference(300)
+    setting = Setting("cart_pole", "track", {"reference": smc.Sine(0.5, 2.0)})
+    r, dr, _ = setting.reference(300)
     assert (r, dr) == pytest.approx((0.5 * np.sin(0.6), np.cos(0.6)))
     assert tasks.reward(
-        *found.errors(np.array([r, 0.0]), np.array([dr, 0.0]), 300)
+        *setting.errors(np.array([r, 0.0]), np.array([dr, 0.0]), 300)
     ) == pytest.approx(1.0)
     # the pole is to stand
-    assert tasks.reward(*found.errors(np.array([r, r]), np.array([dr, dr]), 300)) < 0.95
-    assert found.observe(np.zeros(2), np.zeros(2), 300).shape == (7,)
+    assert tasks.reward(*setting.errors(np.array([r, r]), np.array([dr, dr]), 300)) < 0.95
+    assert setting.observe(np.zeros(2), np.zeros(2), 300).shape == (7,)
 
 
 def test_tasks_are_for_the_plants_that_have_them():
@@ -238,8 +239,8 @@ class Checked(test_utils.EnvironmentTestMixin):
 def checker(plant, task):
     from absl.testing import absltest
 
-    made = type("Case", (Checked, absltest.TestCase), {"plant": plant, "task": task})
-    return [made(name) for name in absltest.TestLoader().getTestCaseNames(made)]
+    case = type("Case", (Checked, absltest.TestCase), {"plant": plant, "task": task})
+    return [case(name) for name in absltest.TestLoader().getTestCaseNames(case)]
 
 
 @pytest.mark.parametrize(("plant", "task"), one_of_each(0))
@@ -254,11 +255,11 @@ def test_it_runs_in_the_runtime_of_dm_control_s_viewer():
     from dm_control.viewer import runtime
 
     environment = suite.load("duffing", random=0)
-    shown = runtime.Runtime(environment, smc.envs.agent(LAW, environment))
+    viewed = runtime.Runtime(environment, smc.envs.agent(LAW, environment))
     faults = []
-    shown.on_error += faults.append
+    viewed.on_error += faults.append
     for _ in range(3):
-        shown.tick(0.02, paused=False)
+        viewed.tick(0.02, paused=False)
     assert not faults
     assert environment.physics.time() > 0.01
 

@@ -56,8 +56,8 @@ def test_thrusts_of_a_run_as_actions_give_its_motion():
     counted = [0, 1, 2, 5]
     e = info["error"][counted]
     w = observation[6:12] - observation[18:24]
-    wanted = Rotation.from_rotvec(observation[15:18]) * Rotation.identity()
-    w[3:] = observation[9:12] - (Rotation.from_rotvec(observation[3:6]).inv() * wanted).apply(
+    attitude = Rotation.from_rotvec(observation[15:18]) * Rotation.identity()
+    w[3:] = observation[9:12] - (Rotation.from_rotvec(observation[3:6]).inv() * attitude).apply(
         observation[21:24]
     )
     rms = lambda values: np.sqrt(np.mean(values**2))  # noqa: E731
@@ -90,19 +90,19 @@ def test_a_copy_flies_on_from_where_its_original_is(steps, copied):
     thrusts = np.random.default_rng(0).uniform(-1.0, 1.0, (steps + 3, 4))
     for action in thrusts[:steps]:
         original.step(action)
-    other = copied(original)
+    copy_of_it = copied(original)
     for action in thrusts[steps:]:
         expected = original.step(action)
-        np.testing.assert_array_equal(other.step(action)[0], expected[0])
-    np.testing.assert_array_equal(other.reset()[0], original.reset()[0])
+        np.testing.assert_array_equal(copy_of_it.step(action)[0], expected[0])
+    np.testing.assert_array_equal(copy_of_it.reset()[0], original.reset()[0])
 
 
 def test_what_is_no_free_body_or_wants_copies_is_told_where_to_go():
     with pytest.raises(smc.ScenarioError, match="duffing is no free body"):
         FlightEnv("duffing")
-    for other in (PlantEnv, BatchEnv):
+    for environment in (PlantEnv, BatchEnv):
         with pytest.raises(smc.ScenarioError, match=r"free body: .*gymnasium\.make"):
-            other("quadrotor")
+            environment("quadrotor")
     with pytest.raises(smc.ScenarioError, match=r"environment is .*: give one of"):
         smc.envs.agent("geometric", FlightEnv("quadrotor"))
     with pytest.raises(smc.ScenarioError, match="task 'swing_up' is not for quadrotor"):

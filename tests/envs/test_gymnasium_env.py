@@ -95,8 +95,8 @@ def test_a_copy_in_a_batch_moves_as_the_single_environment_does(plant, task):
         u = random.uniform(-1.5, 1.5, many.action_space.shape)
         o, r, terminated, truncated, _ = many.step(u)
         expected = []
-        for e, one in zip(singles, u, strict=True):
-            expected.append(e.step(one))
+        for e, action in zip(singles, u, strict=True):
+            expected.append(e.step(action))
         assert np.abs(o - [e[0] for e in expected]).max() < 1e-12
         assert np.abs(r - [e[1] for e in expected]).max() < 1e-12
         assert [*zip(terminated, truncated, strict=True)] == [e[2:4] for e in expected]
@@ -175,16 +175,16 @@ def test_episodes_begin_clear_of_obstacles_and_meet_them_as_runs_do(kind):
 
 
 class Giving(Batch):
-    """A Batch in which MuJoCo raises at the third call in the last simulation, which `asked` shows
+    """A Batch in which MuJoCo raises at the third call in the last simulation, which `stepped_ids` shows
     to be left alone.
     """
 
-    asked = ()
+    stepped_ids = ()
 
     def step(self, ids=None, nstep=1):  # pyright: ignore[reportIncompatibleMethodOverride]
-        self.asked = (*self.asked, list(range(self.nsim)) if ids is None else list(ids))
+        self.stepped_ids = (*self.stepped_ids, list(range(self.nsim)) if ids is None else list(ids))
         super().step(ids, nstep=nstep)
-        if len(self.asked) == 1:
+        if len(self.stepped_ids) == 1:
             raise SimulationError(np.array([self.nsim - 1]), "gave up")
 
 
@@ -204,16 +204,16 @@ def test_a_copy_that_mujoco_gives_up_leaves_its_neighbours_drives_alone(monkeypa
     assert np.abs(o[0] - single.step([0.5])[0]).max() < 1e-12
     o, *_ = many.step([[0.2], [0.2]])
     assert np.abs(o[0] - single.step([0.2])[0]).max() < 1e-12
-    assert many.batch.asked == ([0, 1], [0])  # pyright: ignore[reportAttributeAccessIssue]
+    assert many.batch.stepped_ids == ([0, 1], [0])  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def test_an_agent_that_joins_an_episode_late_has_no_old_memory():
-    one = PlantEnv("duffing", changes={"x0": 0.5, "duration": 0.1})
-    act = smc.envs.agent("adaptive", one)
+    environment = PlantEnv("duffing", changes={"x0": 0.5, "duration": 0.1})
+    act = smc.envs.agent("adaptive", environment)
     episodes = []
     for _ in range(2):
-        one.reset(seed=0)
-        observation = one.step([0.0])[0]
+        environment.reset(seed=0)
+        observation = environment.step([0.0])[0]
         episodes.append([act(observation).tolist() for _ in range(3)])
     assert episodes[0] == episodes[1]
     assert episodes[0][0] != episodes[0][2]  # it has a memory
@@ -222,14 +222,14 @@ def test_an_agent_that_joins_an_episode_late_has_no_old_memory():
 def test_a_start_from_options_is_the_start_that_the_scenario_sets():
     """The rotor behind a backlash starts with its joint."""
     loose = {"actuator": (smc.DCMotor(), smc.Backlash(0.01)), "duration": 0.1}
-    one, other = (
+    at_rest, started = (
         PlantEnv("inverted_pendulum", changes=loose | x) for x in ({}, {"x0": 0.3, "v0": 0.4})
     )
     assert np.array_equal(
-        one.reset(seed=0, options={"x0": 0.3, "v0": 0.4})[0], other.reset(seed=0)[0]
+        at_rest.reset(seed=0, options={"x0": 0.3, "v0": 0.4})[0], started.reset(seed=0)[0]
     )
     assert np.array_equal(
-        [one.step([0.5])[0] for _ in range(100)], [other.step([0.5])[0] for _ in range(100)]
+        [at_rest.step([0.5])[0] for _ in range(100)], [started.step([0.5])[0] for _ in range(100)]
     )
 
 
@@ -276,8 +276,8 @@ def test_a_model_of_one_s_own_keeps_its_floor_in_a_batch(tmp_path):
 def same(theirs, ours):
     """Whether two answers of a step or a reset agree, infos and all."""
     *values, infos = theirs
-    *found, reported = ours
-    for a, b in zip(values, found, strict=True):
+    *ours_values, reported = ours
+    for a, b in zip(values, ours_values, strict=True):
         np.testing.assert_allclose(b, a, atol=1e-12)
         assert a.dtype == b.dtype
     np.testing.assert_equal(reported, infos)
@@ -315,10 +315,10 @@ def test_an_episode_ends_where_a_run_diverges_with_an_observation_in_its_space()
     assert single.observation_space.contains(observation)
     assert single.data.qpos[0] > 1e6
     many.reset(seed=0)
-    observations, found, terminated, _, infos = many.step(np.zeros((2, 1)))
+    observations, rewards, terminated, _, infos = many.step(np.zeros((2, 1)))
     assert terminated.all()
     assert np.isnan(infos["error"]).all()
-    assert (found == 0.0).all()
+    assert (rewards == 0.0).all()
     assert many.observation_space.contains(observations)
 
 
@@ -331,47 +331,47 @@ def test_what_mujoco_says_of_an_episode_that_diverges_is_not_printed(capfd):
 
 
 def test_an_environment_is_copied_and_sent_away_as_it_stands():
-    one = PlantEnv("cart_pole", "swing_up", {"control_period": 0.01})
-    one.reset(seed=0)
-    one.step([0.5])
-    for other in (copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
-        assert np.array_equal(other.step([1.0])[0], copy.deepcopy(one).step([1.0])[0])
+    original = PlantEnv("cart_pole", "swing_up", {"control_period": 0.01})
+    original.reset(seed=0)
+    original.step([0.5])
+    for duplicate in (copy.deepcopy(original), pickle.loads(pickle.dumps(original))):
+        assert np.array_equal(duplicate.step([1.0])[0], copy.deepcopy(original).step([1.0])[0])
         # the generator of starts, too
-        assert np.array_equal(other.reset()[0], copy.deepcopy(one).reset()[0])
+        assert np.array_equal(duplicate.reset()[0], copy.deepcopy(original).reset()[0])
 
 
 def test_an_arm_tracks_a_reference_of_each_joint():
     """By default each swings about its pose at rest, within its range; or the user's own."""
     arm = smc.plant("panda")
-    one = PlantEnv(arm, "track", {"duration": 2.0})
-    found = one.setting
+    environment = PlantEnv(arm, "track", {"duration": 2.0})
+    setting = environment.setting
     rest = np.array(arm.rest)
-    observation, info = one.reset(seed=0)
-    assert observation.shape == found.observe(rest, 0 * rest, 0).shape == (14 + 21,)
+    observation, info = environment.reset(seed=0)
+    assert observation.shape == setting.observe(rest, 0 * rest, 0).shape == (14 + 21,)
     np.testing.assert_array_equal(
         info["error"], (observation[:7] - rest) - (observation[14:21] - rest)
     )
     assert info["time"] == 0.0
-    assert one.step(np.zeros(7))[-1]["time"] == 1e-3
-    r, dr, ddr = found.reference(300).reshape(3, 7)
+    assert environment.step(np.zeros(7))[-1]["time"] == 1e-3
+    r, dr, ddr = setting.reference(300).reshape(3, 7)
     swing = (r - rest) / np.sin(0.3)
     assert 0.05 < swing.min() < swing.max() <= 0.5 * (1 + 1e-12)
     np.testing.assert_allclose(dr, swing * np.cos(0.3))
     np.testing.assert_allclose(ddr, rest - r)
-    low, high = np.array([each[1:] for each in arm.ranges]).T
+    low, high = np.array([bounds[1:] for bounds in arm.ranges]).T
     assert np.all((low < rest - swing) & (rest + swing < high))
-    assert tasks.reward(*found.errors(r, dr, 300)) == pytest.approx(1.0)
+    assert tasks.reward(*setting.errors(r, dr, 300)) == pytest.approx(1.0)
     for i in range(7):
         off = np.eye(7)[i]
-        assert tasks.reward(*found.errors(r + off, dr, 300)) < 0.9
-        assert tasks.reward(*found.errors(r, dr + 5.0 * off, 300)) < 0.99
-    several = [smc.Sine(0.1 * i, 2.0, about="goal") for i in range(7)]
-    own = PlantEnv(arm, "track", {"reference": several, "duration": 0.5}).setting.reference(100)
+        assert tasks.reward(*setting.errors(r + off, dr, 300)) < 0.9
+        assert tasks.reward(*setting.errors(r, dr + 5.0 * off, 300)) < 0.99
+    sines = [smc.Sine(0.1 * i, 2.0, about="goal") for i in range(7)]
+    own = PlantEnv(arm, "track", {"reference": sines, "duration": 0.5}).setting.reference(100)
     np.testing.assert_allclose(own[:7], rest + 0.1 * np.arange(7) * np.sin(0.2))
-    both = PlantEnv(
+    shared = PlantEnv(
         arm, "track", {"reference": smc.Sine(0.1, 2.0, about="goal"), "duration": 0.5}
     ).setting.reference(100)
-    np.testing.assert_allclose(both[:7], rest + 0.1 * np.sin(0.2))
+    np.testing.assert_allclose(shared[:7], rest + 0.1 * np.sin(0.2))
 
 
 # what gymnasium has

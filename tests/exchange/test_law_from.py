@@ -119,9 +119,9 @@ def test_a_controller_of_opensmc_s_kind_is_a_law_in_one_line():
 
 def test_the_gain_of_an_lqr_is_a_law_in_one_line():
     trace = run(smc.law_from(np.array([[5.0, 2.0]])))  # u = -K x, as control.lqr returns K
-    asked = -(5.0 * trace.x[:, 0] + 2.0 * trace.v[:, 0])
-    np.testing.assert_allclose(trace.u[:, 0], asked.clip(-6.0, 6.0), rtol=1e-12, atol=1e-12)
-    assert np.abs(asked).min() < 6.0
+    unbounded = -(5.0 * trace.x[:, 0] + 2.0 * trace.v[:, 0])
+    np.testing.assert_allclose(trace.u[:, 0], unbounded.clip(-6.0, 6.0), rtol=1e-12, atol=1e-12)
+    assert np.abs(unbounded).min() < 6.0
 
 
 @pytest.mark.parametrize(
@@ -172,9 +172,9 @@ def test_a_law_s_file_counts_by_its_content_and_not_by_its_folder(made, monkeypa
     """Two people with one file in two folders get the same bytes of a table."""
     running = "smc_mujoco.exchange.fmu.law_from_fmu._running.by_number"
     monkeypatch.setattr(running, {1: ctypes.c_void_p()})  # which cannot be pickled
-    here, there, other = (
+    here, elsewhere, changed = (
         made(path=path, digest=digest)
         for path, digest in (("/anna/a.fmu", "1"), ("/bert/a.fmu", "1"), ("/anna/a.fmu", "2"))
     )
-    assert here == there != other
-    assert fingerprint.of(here) == fingerprint.of(there) != fingerprint.of(other)
+    assert here == elsewhere != changed
+    assert fingerprint.of(here) == fingerprint.of(elsewhere) != fingerprint.of(changed)

@@ -70,7 +70,7 @@ def test_an_array_of_gains_is_state_feedback_as_lqr_gives_it():
 )
 def test_a_loop_is_that_of_python_control(name, discrete):
     K = CONTROLLERS[name]
-    one = K.ninputs == 1
+    of_error_alone = K.ninputs == 1
     law = smc.exchange.law_from_control(sampled(K) if discrete else K)
     scenario = smc.Scenario(
         plant=LINEAR,
@@ -87,14 +87,14 @@ def test_a_loop_is_that_of_python_control(name, discrete):
     Kd = sampled(K)
     x = np.array([0.3, -0.4])
     w = np.zeros(Kd.nstates)
-    found = []
+    positions = []
     for _ in trace.t:
-        found.append(x[0])
-        e = -x[:1] if one else -x
+        positions.append(x[0])
+        e = -x[:1] if of_error_alone else -x
         u = Kd.C @ w + Kd.D @ e
         w, x = Kd.A @ w + Kd.B @ e, G.A @ x + G.B @ u
     assert not prepare(scenario).why_not
-    assert np.abs(trace.x[:, 0] - found).max() < 1e-8
+    assert np.abs(trace.x[:, 0] - positions).max() < 1e-8
 
 
 def test_a_step_of_the_reference_is_the_closed_loop_of_forced_response():
@@ -136,11 +136,11 @@ def test_its_c_gives_the_same_bits(tmp_path):
     (tmp_path / "law.c").write_text(smc.exchange.law_to_c(law))
     in_c = smc.exchange.law_from_c(tmp_path / "law.c")
     runs = []
-    for one in (law, in_c(), law.template(scale=0.5)):
+    for controller in (law, in_c(), law.template(scale=0.5)):
         runs.append(
             smc.Scenario(
                 plant="duffing",
-                law=one,
+                law=controller,
                 duration=1.0,
                 u_max=np.inf,
             )
@@ -199,9 +199,9 @@ def test_a_discrete_one_runs_at_its_own_period_only():
         smc.ScenarioError, match=r"is discretised for 0.01 s, and control_period is 0.001 s: give"
     ):
         smc.Scenario(plant="duffing", law=law)
-    every = sampled(LEAD)
-    every.dt = True
-    smc.Scenario(plant="duffing", law=smc.exchange.law_from_control(every))
+    sampled_lead = sampled(LEAD)
+    sampled_lead.dt = True
+    smc.Scenario(plant="duffing", law=smc.exchange.law_from_control(sampled_lead))
 
 
 # the linear model of a plant

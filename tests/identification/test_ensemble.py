@@ -85,12 +85,12 @@ def test_a_law_is_tuned_on_a_machine_and_compared_there(tmp_path, monkeypatch):
 
 def test_a_law_by_name_has_the_gains_of_the_rig():
     pid = next(law for law in PENDULUM.laws if law.name == "pid")
-    its = {}
+    laws_by_name = {}
     for run in ensemble.runs(PENDULUM, ["pid", "twisting"], seeds=1, duration=0.1):
-        its[run.law.name] = run.law
-    assert its["pid"] == pid
-    assert its["pid"].source.kind == "shipped"
-    assert its["twisting"].source.kind == "default"
+        laws_by_name[run.law.name] = run.law
+    assert laws_by_name["pid"] == pid
+    assert laws_by_name["pid"].source.kind == "shipped"
+    assert laws_by_name["twisting"].source.kind == "default"
 
 
 def test_the_command_identifies_from_files(tmp_path, monkeypatch):
@@ -109,8 +109,8 @@ def test_the_command_identifies_from_files(tmp_path, monkeypatch):
     done = CliRunner().invoke(app, [*words, "--json", str(tmp_path / "found.json")])
     assert done.exit_code == 0, done.output
     assert "mass" in done.output
-    found = json.loads((tmp_path / "found.json").read_text())
-    assert found["quantities"]["mass"]["value"] == pytest.approx(95.1089, rel=0.02)
+    written = json.loads((tmp_path / "found.json").read_text())
+    assert written["quantities"]["mass"]["value"] == pytest.approx(95.1089, rel=0.02)
     wrong = CliRunner().invoke(app, [*words, "--columns", "x"])
     assert wrong.exit_code == 2
     assert "columns 'x' cannot be read: write it as x_elbow=angle,t=time" in wrong.output

@@ -38,8 +38,8 @@ def carriage(x, v, force, time, m, b, dry, constant):
         else:
             stop = math.inf
         spent = min(time, stop)
-        left = math.exp(-spent / lag)
-        x, v = x + final * spent + (v - final) * lag * (1.0 - left), final + (v - final) * left
+        decay = math.exp(-spent / lag)
+        x, v = x + final * spent + (v - final) * lag * (1.0 - decay), final + (v - final) * decay
         v, time = (0.0 if spent == stop else v), time - spent
     return x, v
 
@@ -117,7 +117,7 @@ def test_equal_seeds_give_equal_results_and_another_seed_begins_elsewhere():
     """From a mass so far off that a random start is better, and with a single step from it."""
     far = AXIS.with_values({"mass": 2000.0})
     brief = smc.run(AXIS.scenario(duration=0.5, reference=smc.Sine(0.05, 8.0), x0=0.0))
-    one, again, other = (
+    seed_5, again, seed_6 = (
         smc.identify(
             far,
             brief,
@@ -128,11 +128,11 @@ def test_equal_seeds_give_equal_results_and_another_seed_begins_elsewhere():
         )
         for seed in (5, 5, 6)
     )
-    assert one.values == again.values
-    assert one.errors == again.errors
-    assert one.values != other.values
-    for found in (one, other):
-        assert found.values["mass"] == pytest.approx(AXIS.values["mass"], rel=0.02)
+    assert seed_5.values == again.values
+    assert seed_5.errors == again.errors
+    assert seed_5.values != seed_6.values
+    for identified in (seed_5, seed_6):
+        assert identified.values["mass"] == pytest.approx(AXIS.values["mass"], rel=0.02)
 
 
 @pytest.mark.slow
@@ -221,11 +221,11 @@ def test_records_of_two_kinds_and_none_are_refused(moved):
 
 def test_a_search_stays_within_its_ranges_to_the_last_bit():
     """1e-4 / 0.042 * 0.042 is less than 1e-4."""
-    known = dict(AXIS.quantities) | {"coulomb": Quantity(0.042, "N", "chosen", 1e-4, 1.0)}
-    twin = dataclasses.replace(AXIS, quantities=known)
-    made = Replays(twin, ["coulomb"], [], True, lambda count: None)
-    assert (made.low * made.scales)[0] < 1e-4
-    assert made.rig(Point(made.low, made.start.states)).values["coulomb"] == 1e-4
+    quantities = dict(AXIS.quantities) | {"coulomb": Quantity(0.042, "N", "chosen", 1e-4, 1.0)}
+    twin = dataclasses.replace(AXIS, quantities=quantities)
+    replays = Replays(twin, ["coulomb"], [], True, lambda count: None)
+    assert (replays.low * replays.scales)[0] < 1e-4
+    assert replays.rig(Point(replays.low, replays.start.states)).values["coulomb"] == 1e-4
 
 
 CARRIAGE = {
@@ -273,7 +273,7 @@ def least_errors(u):
     steps = 1e-4 * np.diag([*CARRIAGE.values(), 0.1, 0.1])
     ends = []
     for step in steps:
-        ends.append([positions(u, each[:4], *each[4:]) for each in (truth + step, truth - step)])
+        ends.append([positions(u, moved[:4], *moved[4:]) for moved in (truth + step, truth - step)])
     J = np.column_stack(
         [
             (ahead - back) / (2.0 * step.sum())
@@ -310,16 +310,16 @@ def test_standard_errors_cover_the_truth_from_any_start(start, seconds):
     record = pushed(2026, seconds)
     rare = math.erfc(4.0 / math.sqrt(2.0))
     axis = smc.plant("servo_axis", **CARRIAGE | start)
-    found = smc.identify(axis, record, list(CARRIAGE), corrected=True)
-    assert min(found.fits[0].values()) >= min(found.fits_before[0].values())
+    identified = smc.identify(axis, record, list(CARRIAGE), corrected=True)
+    assert min(identified.fits[0].values()) >= min(identified.fits_before[0].values())
     free = standard_errors.BLOCKS[0] - 1
     low, high = np.sqrt(chi2.ppf([rare / 2.0, 1.0 - rare / 2.0], free) / free) * [
         1.0,
         math.hypot(1.0, 0.5),
     ]
     for (name, truth), least in zip(CARRIAGE.items(), least_errors(record["u"]), strict=True):
-        assert abs(found.values[name] - truth) < 4.0 * found.errors[name]
-        assert low * least < found.errors[name] < high * least
+        assert abs(identified.values[name] - truth) < 4.0 * identified.errors[name]
+        assert low * least < identified.errors[name] < high * least
 
 
 @pytest.mark.slow
@@ -335,9 +335,9 @@ def test_shorter_steps_change_what_a_record_with_stops_says():
         if halvings:
             assert replays.correct(replays.start, halvings)
         slopes = replays.slopes(replays.start)
-        at = Point(np.zeros(0), replays.start.states + slopes.moves(np.zeros(0)))
+        point = Point(np.zeros(0), replays.start.states + slopes.moves(np.zeros(0)))
         residuals.append(
-            np.concatenate(replays.residuals([at])[0])
+            np.concatenate(replays.residuals([point])[0])
             * np.linalg.norm(record["x"] - record["x"].mean())
         )
     assert np.std(residuals[0]) > 1.3 * np.std(residuals[1])
@@ -346,7 +346,7 @@ def test_shorter_steps_change_what_a_record_with_stops_says():
 
 def test_masses_and_frictions_stay_physical():
     ranges = own_rig(smc.plant("servo_axis"), list(CARRIAGE)).quantities
-    assert {name: each.least for name, each in ranges.items()} == {
+    assert {name: quantity.least for name, quantity in ranges.items()} == {
         "M": 1e-6,
         "b": 0.0,
         "cf": 0.0,
@@ -381,16 +381,18 @@ def test_a_command_beyond_the_default_bound_is_replayed_as_it_was():
 
 
 def test_drawn_sets_have_the_errors_and_correlations_found(moved):
-    found = smc.identify(AXIS, moved, ["mass", "viscous"], starts=1, most=1)
-    rig = found.drawn(1000, seed=1, floor=0.0)
-    names = list(found.values)
-    sets = np.array([[each[name] for name in names] for each in rig.ensemble])
-    np.testing.assert_allclose(sets.std(axis=0), [found.errors[name] for name in names], rtol=0.1)
-    np.testing.assert_allclose(np.corrcoef(sets.T), found.correlations, atol=0.1)
-    assert rig.values == found.rig.values
-    assert found.drawn(3, seed=1, floor=0.0).ensemble == rig.ensemble[:3]
-    wide = np.array([each["mass"] for each in found.drawn(1000, seed=1).ensemble])
-    assert wide.std() == pytest.approx(0.05 * found.values["mass"], rel=0.1)
+    identified = smc.identify(AXIS, moved, ["mass", "viscous"], starts=1, most=1)
+    rig = identified.drawn(1000, seed=1, floor=0.0)
+    names = list(identified.values)
+    sets = np.array([[drawn[name] for name in names] for drawn in rig.ensemble])
+    np.testing.assert_allclose(
+        sets.std(axis=0), [identified.errors[name] for name in names], rtol=0.1
+    )
+    np.testing.assert_allclose(np.corrcoef(sets.T), identified.correlations, atol=0.1)
+    assert rig.values == identified.rig.values
+    assert identified.drawn(3, seed=1, floor=0.0).ensemble == rig.ensemble[:3]
+    wide = np.array([drawn["mass"] for drawn in identified.drawn(1000, seed=1).ensemble])
+    assert wide.std() == pytest.approx(0.05 * identified.values["mass"], rel=0.1)
 
 
 @pytest.mark.slow
@@ -406,7 +408,7 @@ def test_values_that_are_only_tried_warn_of_nothing(moved, recwarn):
         starts=6,
         most=2,
     )
-    assert not [each for each in recwarn if "DCMotor gives at most" in str(each.message)]
+    assert not [warning for warning in recwarn if "DCMotor gives at most" in str(warning.message)]
 
 
 def test_residuals_are_what_was_measured_less_what_was_predicted(tmp_path, monkeypatch):
@@ -417,11 +419,11 @@ def test_residuals_are_what_was_measured_less_what_was_predicted(tmp_path, monke
     twins = {"twin": {"x": t, "u": t}, "driver": {"x": 0.0 * t, "u": t}}
     fits = {"twin": {"x": 87.6, "u": 3.25}, "driver": dict.fromkeys("xu", Fall(8.44))}
     residual_figure("A", t, measured, twins, fits, {"x": "m", "u": "V"}, tmp_path / "a.png")
-    _, residuals, left, _ = drawn[0].axes
+    _, residuals, column_axes, _ = drawn[0].axes
     assert residuals.lines[1].get_ydata().tolist() == [1.0, 1.0, 4.0]
     assert residuals.lines[2].get_ydata().tolist() == [1.0, 2.0, 6.0]
-    assert left.get_title(loc="left") == "fit: twin 3.2 %, driver falls at 8.4 s"
-    assert left.get_ylabel() == "u (V)"
+    assert column_axes.get_title(loc="left") == "fit: twin 3.2 %, driver falls at 8.4 s"
+    assert column_axes.get_ylabel() == "u (V)"
     assert residuals.get_ylabel() == "residual (m)"
     assert residuals.get_title(loc="left") == "rms: twin 2.45, driver 3.7"
 
@@ -433,10 +435,10 @@ def test_small_residuals_have_the_prefix_of_their_unit(tmp_path, monkeypatch):
     measured = {"x": t + 2e-3}
     twins = {"twin": {"x": t}}
     residual_figure("A", t, measured, twins, {"twin": {"x": -16.62}}, {"x": "rad"}, tmp_path / "a")
-    left, right = drawn[0].axes
-    assert left.get_title(loc="left") == "fit: −16.6 %"
-    assert right.get_ylabel() == "residual (mrad)"
-    np.testing.assert_allclose(right.lines[1].get_ydata(), 2.0)
+    column_axes, residual_axes = drawn[0].axes
+    assert column_axes.get_title(loc="left") == "fit: −16.6 %"
+    assert residual_axes.get_ylabel() == "residual (mrad)"
+    np.testing.assert_allclose(residual_axes.lines[1].get_ydata(), 2.0)
 
 
 def test_files_of_columns_and_traces_are_read_alike(moved, tmp_path):

@@ -32,17 +32,17 @@ def lacking(size, one_sided=False):
 
 
 def test_a_lack_moves_a_number_by_what_the_number_has_absorbed():
-    found, absorbed = lacking(0.05)
-    assert found.told(np.full(1, 1e-3)) == ("b",)
-    assert found.moved[0] == pytest.approx(abs(absorbed), rel=0.05)
-    assert found.slopes.by_values[0].shape == (200, 2)
+    fit, absorbed = lacking(0.05)
+    assert fit.told(np.full(1, 1e-3)) == ("b",)
+    assert fit.moved[0] == pytest.approx(abs(absorbed), rel=0.05)
+    assert fit.slopes.by_values[0].shape == (200, 2)
 
 
 def test_noise_alone_shows_no_lack_and_changes_nothing():
-    found, _ = lacking(0.0)
-    assert not found.taken
-    assert found.moved.tolist() == [0.0]
-    assert found.slopes.by_values[0].shape == (200, 1)
+    fit, _ = lacking(0.0)
+    assert not fit.taken
+    assert fit.moved.tolist() == [0.0]
+    assert fit.slopes.by_values[0].shape == (200, 1)
 
 
 def test_a_lack_that_only_adds_is_not_taken_with_the_other_sign():
@@ -57,7 +57,7 @@ def test_levels_that_differ_between_directions_are_told_and_in_the_errors():
     motion = sines([0.0], [0.5, 0.3, 0.15], [0.4, 1.1, 2.7])
     arm = smc.plant_from(chain([0.4], [1.0]), ["j1"])
     run = log(chain([0.4], [1.0]), truth | {"j1.offset": 0.04}, motion, 20.0, 1.5, duration=3.0)
-    found = smc.identify(arm, run, list(truth))
-    assert any("find j1.offset" in note for note in found.notes)
+    identified = smc.identify(arm, run, list(truth))
+    assert any("find j1.offset" in note for note in identified.notes)
     for name, true in truth.items():
-        assert abs(found.values[name] - true) < 2.0 * found.errors[name], name
+        assert abs(identified.values[name] - true) < 2.0 * identified.errors[name], name

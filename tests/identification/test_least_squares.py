@@ -93,10 +93,10 @@ class Curve(Replays):
         error = self.lag * fields.get("physics_step", 0.0)
         return [
             [
-                {"y": curves(T[part]) @ one.values + one.states[k] + error * T[part]}
+                {"y": curves(T[part]) @ point.values + point.states[k] + error * T[part]}
                 for k, part in enumerate(self.parts)
             ]
-            for one in points
+            for point in points
         ]
 
     def at_rest(self, point):
@@ -109,17 +109,17 @@ class Bent(Curve):
     def _replayed(self, rigs, points, fields):
         step = fields.get("physics_step", 1e-3)
         self.replayed.append((step, len(points)))
-        every = []
-        for one in points:
-            a, b = one.values
+        predictions = []
+        for point in points:
+            a, b = point.values
             columns = []
             for k, part in enumerate(self.parts):
-                bent = curves(T[part]) @ [a + (a - TRUE[0]) ** 3, b] + one.states[k]
+                bent = curves(T[part]) @ [a + (a - TRUE[0]) ** 3, b] + point.states[k]
                 columns.append(
                     {"y": bent + 300.0 * step * (curves(T[part])[:, 0] + np.sqrt(T[part]))}
                 )
-            every.append(columns)
-        return every
+            predictions.append(columns)
+        return predictions
 
 
 class Jumpy(Curve):
@@ -144,16 +144,16 @@ class Jumpy(Curve):
             self.pieces.append(Piece(0, None, 0, measured, {"y": SPREAD}, np.ones(1)))
 
     def _replayed(self, rigs, points, fields):
-        every = []
-        for one in points:
-            a, late = one.values
+        predictions = []
+        for point in points:
+            a, late = point.values
             y = a * np.sin(9.0 * T) + self.command(late)
             columns = []
             for k, part in enumerate(self.parts):
-                fails = self.stuck and k == 1 and abs(one.states[k, 0]) > 0.01
-                columns.append({"y": y[part] + one.states[k] + 1e3 * fails})
-            every.append(columns)
-        return every
+                fails = self.stuck and k == 1 and abs(point.states[k, 0]) > 0.01
+                columns.append({"y": y[part] + point.states[k] + 1e3 * fails})
+            predictions.append(columns)
+        return predictions
 
     def at_rest(self, point):
         return Point(point.values, 0.0 * point.states + 1.0)
@@ -168,12 +168,12 @@ class Rough(Curve):
 
     def _replayed(self, rigs, points, fields):
         step = fields.get("physics_step", 1e-3)
-        found = super()._replayed(rigs, points, fields)
+        predictions = super()._replayed(rigs, points, fields)
         error = step * np.random.default_rng([self.seed, round(1e7 * step)]).normal(size=T.size)
-        for columns in found:
+        for columns in predictions:
             for part, column in zip(self.parts, columns, strict=True):
                 column["y"] = column["y"] + error[part]
-        return found
+        return predictions
 
 
 class Held(Curve):
@@ -194,11 +194,13 @@ class Held(Curve):
 
     def _replayed(self, rigs, points, fields):
         self.replayed.append(len(self.pieces))
-        every = []
-        for one in points:
-            offsets = np.sign(one.states[:, 0]) * np.maximum(np.abs(one.states[:, 0]) - 2.0, 0.0)
-            every.append([{"y": np.full(100, offset)} for offset in offsets])
-        return every
+        predictions = []
+        for point in points:
+            offsets = np.sign(point.states[:, 0]) * np.maximum(
+                np.abs(point.states[:, 0]) - 2.0, 0.0
+            )
+            predictions.append([{"y": np.full(100, offset)} for offset in offsets])
+        return predictions
 
 
 def block(k, rows):
@@ -265,23 +267,25 @@ def test_moves_of_the_states_are_what_the_quantities_leave():
     expected = []
     for share in (*gauss_newton.SHARES, 0.0):
         expected.append(share * np.array([0.3, -0.3, 0.15]))
-    np.testing.assert_allclose([one.states.ravel() for one in variants], expected, atol=1e-9)
+    np.testing.assert_allclose(
+        [variant.states.ravel() for variant in variants], expected, atol=1e-9
+    )
     curve.free = np.zeros(0, int)
     assert len(gauss_newton._variants(curve, slopes, TRUE)) == 1
 
 
 def test_a_search_reaches_least_squares_and_tries_no_rival_of_a_good_start():
     curve = Curve(noise=0.002)
-    found = gauss_newton.search(curve, curve.slopes(curve.start), 4, 0, 30, 1e-5)
+    reached = gauss_newton.search(curve, curve.slopes(curve.start), 4, 0, 30, 1e-5)
     rows = np.vstack([block(k, part) for k, part in enumerate(curve.parts)])
     y = np.concatenate([piece.measured["y"] for piece in curve.pieces]) / SPREAD
     exact = np.linalg.lstsq(-rows, y, rcond=None)[0]
-    np.testing.assert_allclose(found.point.values, exact[:2], rtol=1e-6)
-    np.testing.assert_allclose(found.point.states.ravel(), exact[2:], atol=1e-6)
-    assert found.fit > gauss_newton.GOOD_FIT
+    np.testing.assert_allclose(reached.point.values, exact[:2], rtol=1e-6)
+    np.testing.assert_allclose(reached.point.states.ravel(), exact[2:], atol=1e-6)
+    assert reached.fit > gauss_newton.GOOD_FIT
     assert curve.evaluations < 80
     none = gauss_newton.refine(curve, curve.slopes(curve.start), 0)
-    assert none.point is not found.point
+    assert none.point is not reached.point
     np.testing.assert_array_equal(none.point.values, curve.start.values)
 
 
@@ -291,28 +295,28 @@ def test_a_delay_is_found_from_samples_away_although_its_slopes_say_little(late)
     first = curve.slopes(curve.start)
     stalled = gauss_newton.refine(curve, first, 30)
     assert abs(stalled.point.values[1] - 3.0) > 0.3
-    found = gauss_newton.search(curve, first, 1, 0, 30, 1e-5)
-    np.testing.assert_allclose(found.point.values, [2.0, 3.0], atol=1e-3)
-    assert gauss_newton._other_delay(curve, found, 0.01) is None
+    reached = gauss_newton.search(curve, first, 1, 0, 30, 1e-5)
+    np.testing.assert_allclose(reached.point.values, [2.0, 3.0], atol=1e-3)
+    assert gauss_newton._other_delay(curve, reached, 0.01) is None
 
 
 def test_the_last_delay_is_the_one_that_fits_and_its_error_has_the_move():
     curve = Jumpy((2.0, 2.4))
     first = curve.slopes(curve.start)
     assert abs(gauss_newton._solved(curve, first).point.values[1] - 3.0) > 0.2
-    found, moved = gauss_newton.extrapolated(curve, first, 1)
-    assert abs(found.point.values[1] - 3.0) < 0.1
+    reached, moved = gauss_newton.extrapolated(curve, first, 1)
+    assert abs(reached.point.values[1] - 3.0) < 0.1
     assert moved[1] >= 0.25
-    there = curve.slopes(Point(np.array([2.0, 3.0]), curve.start.states))
-    found, moved = gauss_newton.extrapolated(curve, there, 1)
+    at_truth = curve.slopes(Point(np.array([2.0, 3.0]), curve.start.states))
+    reached, moved = gauss_newton.extrapolated(curve, at_truth, 1)
     assert moved[1] < 1e-6
 
 
 def test_a_piece_whose_start_may_not_move_does_not_stop_the_others():
     curve = Jumpy((1.0, 3.2), stuck=True)
-    found = gauss_newton.refine(curve, curve.slopes(curve.start), 30)
-    np.testing.assert_allclose(found.point.values, [2.0, 3.0], atol=1e-3)
-    assert found.point.states[1] == 0.0
+    reached = gauss_newton.refine(curve, curve.slopes(curve.start), 30)
+    np.testing.assert_allclose(reached.point.values, [2.0, 3.0], atol=1e-3)
+    assert reached.point.states[1] == 0.0
 
 
 def test_a_joint_that_shakes_does_not_decide_the_start_of_what_a_calm_one_tells():
@@ -320,10 +324,10 @@ def test_a_joint_that_shakes_does_not_decide_the_start_of_what_a_calm_one_tells(
     A = random.normal(size=(400, 2))
     A[0::2, 0] = 0.0  # the first number is that of the second joint, which is calm
     b = A @ [1.5, -2.0] + random.normal(size=400) * np.tile([5.0, 1e-3], 200)
-    found, left = first_guess._weighted(A, b, 2)
-    np.testing.assert_allclose(found, [1.5, -2.0], atol=1e-3)
-    rests = np.sqrt(np.mean((b - A @ found).reshape(-1, 2) ** 2, axis=0))
-    assert left == pytest.approx(np.log(rests).sum(), rel=1e-3)
+    solution, noise = first_guess._weighted(A, b, 2)
+    np.testing.assert_allclose(solution, [1.5, -2.0], atol=1e-3)
+    rests = np.sqrt(np.mean((b - A @ solution).reshape(-1, 2) ** 2, axis=0))
+    assert noise == pytest.approx(np.log(rests).sum(), rel=1e-3)
     exact, _ = first_guess._weighted(A, A @ [1.5, -2.0], 2)
     np.testing.assert_allclose(exact, [1.5, -2.0], atol=1e-9)
 
@@ -331,7 +335,7 @@ def test_a_joint_that_shakes_does_not_decide_the_start_of_what_a_calm_one_tells(
 def test_further_starts_are_the_best_of_many_within_ranges_and_two_decades():
     curve = Curve(start=(0.5, 30.0))
     points = gauss_newton._random(curve, 3, 7)
-    drawn = np.array([one.values for one in curve.tried])
+    drawn = np.array([point.values for point in curve.tried])
     assert len(drawn) == 3 * gauss_newton.CANDIDATES
     assert (drawn[:, 0] >= 0.01).all()
     assert (drawn[:, 0] > 10.0).any()
@@ -342,16 +346,16 @@ def test_further_starts_are_the_best_of_many_within_ranges_and_two_decades():
     costs = curve.costs(list(curve.tried)).sum(axis=1).tolist()
     assert curve.costs(points).sum(axis=1).tolist() == sorted(costs)[:3]
     again = gauss_newton._random(Curve(start=(0.5, 30.0)), 3, 7)
-    assert [one.values.tolist() for one in again] == [one.values.tolist() for one in points]
+    assert [point.values.tolist() for point in again] == [point.values.tolist() for point in points]
     assert gauss_newton.better(curve, points[2], points[0], points[1]) is points[0]
 
 
 def test_a_solution_that_is_worse_than_the_start_is_not_kept():
     curve = Curve(start=tuple(TRUE))
     bad = curve.slopes(Point(np.array([1.5, 3.0]), np.zeros((3, 1))))
-    kept = gauss_newton.not_worse(curve, bad)
-    np.testing.assert_allclose(kept.point.values, TRUE, atol=1e-6)
-    assert gauss_newton.not_worse(curve, kept) is kept
+    better = gauss_newton.not_worse(curve, bad)
+    np.testing.assert_allclose(better.point.values, TRUE, atol=1e-6)
+    assert gauss_newton.not_worse(curve, better) is better
 
 
 def test_a_jackknife_leaves_out_one_block_after_the_other():
@@ -366,14 +370,19 @@ def test_a_jackknife_leaves_out_one_block_after_the_other():
             for k, part in enumerate(curve.parts)
         ]
     )
-    found = np.array(
+    without_block = np.array(
         [
             np.linalg.lstsq(rows[blocks != b], y[blocks != b], rcond=None)[0][:2]
             for b in range(3 * parts)
         ]
     )
-    every = np.linalg.lstsq(rows, y, rcond=None)[0][:2]
-    expected = (len(found) - 1) / len(found) * (found - every).T @ (found - every)
+    solution = np.linalg.lstsq(rows, y, rcond=None)[0][:2]
+    expected = (
+        (len(without_block) - 1)
+        / len(without_block)
+        * (without_block - solution).T
+        @ (without_block - solution)
+    )
     np.testing.assert_allclose(standard_errors.jackknife(slopes), expected, rtol=1e-6)
     noise = 0.05 / SPREAD * np.sqrt(np.diag(np.linalg.inv(rows.T @ rows))[:2])
     np.testing.assert_allclose(np.sqrt(np.diag(expected)), noise, rtol=0.35)
@@ -415,21 +424,21 @@ def test_groups_that_agree_scatter_as_white_noise_and_one_that_does_not_widens_t
     random = np.random.default_rng(5)
     J = np.concatenate([np.full(50, 1.0), np.full(50, 1.0), np.full(50, 4.0)])[:, None]
     exact = 1.0 / np.linalg.norm(J)
-    found = []
+    deviations = []
     for _ in range(200):
-        found.append(_scatter(J, random.normal(size=150)))
-    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(exact, rel=0.25)
+        deviations.append(_scatter(J, random.normal(size=150)))
+    assert np.sqrt(np.mean(np.square(deviations))) == pytest.approx(exact, rel=0.25)
     odd = random.normal(size=150)
     odd[:50] += 5.0
     assert _scatter(J, odd) > 3.0 * exact
-    one = Slopes(Point(np.zeros(1), np.zeros((1, 0))), [odd], [J], [np.zeros((150, 0))], 1, 1)
-    assert standard_errors.between(one, [0]).tolist() == [0.0]
+    one_piece = Slopes(Point(np.zeros(1), np.zeros((1, 0))), [odd], [J], [np.zeros((150, 0))], 1, 1)
+    assert standard_errors.between(one_piece, [0]).tolist() == [0.0]
 
 
 def _scatter(J, noise):
     """Deviation of the slope of a line by the scatter between three groups."""
-    left = noise - J @ np.linalg.lstsq(J, noise, rcond=None)[0]
-    pieces = np.split(left, 3)
+    residuals = noise - J @ np.linalg.lstsq(J, noise, rcond=None)[0]
+    pieces = np.split(residuals, 3)
     none = [np.zeros((50, 0))] * 3
     slopes = Slopes(Point(np.zeros(1), np.zeros((3, 0))), pieces, np.split(J, 3), none, 1, 1)
     return standard_errors.between(slopes, [0, 1, 2])[0]
@@ -472,24 +481,28 @@ def test_replays_are_corrected_by_what_two_step_sizes_leave():
     assert curve.short_steps == {}
     exact, curve.lag = curve.predicted([curve.start]), 800.0
     assert curve.correct(curve.start, 2)
-    assert [one["physics_step"] for one in curve.replayed[-3:]] == [2.5e-4, 1.25e-4, 6.25e-5]
-    (found,) = curve.predicted([curve.start])
-    for one, other in zip(found, exact[0], strict=True):
-        np.testing.assert_allclose(one["y"], other["y"], atol=1e-12)
+    assert [columns["physics_step"] for columns in curve.replayed[-3:]] == [
+        2.5e-4,
+        1.25e-4,
+        6.25e-5,
+    ]
+    (predicted,) = curve.predicted([curve.start])
+    for columns, uncorrected in zip(predicted, exact[0], strict=True):
+        np.testing.assert_allclose(columns["y"], uncorrected["y"], atol=1e-12)
     assert curve.short_steps == {"integrator": "RK4", "physics_step": 6.25e-5}
     slopes = curve.slopes(curve.start)
     curve.replayed.clear()
     sharp = curve.sharpened(slopes)
-    assert {one["physics_step"] for one in curve.replayed} == {6.25e-5}
+    assert {columns["physics_step"] for columns in curve.replayed} == {6.25e-5}
     assert sharp.residuals is slopes.residuals
     assert curve.steps == {"integrator": "RK4", "physics_step": 2.5e-4}
     for closed in (
         {"closed": True},
         {"twin": SimpleNamespace(dynamics=None, columns=SimpleNamespace(state=("y",)))},
     ):
-        other = Curve()
-        vars(other).update(closed, lag=800.0)
-        assert not other.correct(other.start, 1)
+        uncorrected = Curve()
+        vars(uncorrected).update(closed, lag=800.0)
+        assert not uncorrected.correct(uncorrected.start, 1)
 
 
 def test_a_corrected_search_ends_when_a_halving_moves_nothing():
@@ -510,8 +523,8 @@ def test_replays_are_solved_for_steps_of_0_with_the_slopes_of_longer_ones():
     reached = gauss_newton.search(curve, curve.slopes(curve.start), 1, 0, 30, 1e-5)
     assert abs(reached.point.values[0] - TRUE[0]) > 0.1  # by the error of the steps
     curve.replayed.clear()
-    found, moved = gauss_newton.extrapolated(curve, reached, 30)
-    np.testing.assert_allclose(found.point.values, TRUE, atol=1e-5)
+    solved, moved = gauss_newton.extrapolated(curve, reached, 30)
+    np.testing.assert_allclose(solved.point.values, TRUE, atol=1e-5)
     assert (moved < 1e-3).all()
     assert max(count for _, count in curve.replayed) == len(gauss_newton.SHARES) + 1
     once, _ = gauss_newton.extrapolated(curve, reached)
@@ -522,21 +535,21 @@ def test_what_steps_leave_is_the_error_of_the_extrapolation_where_they_err_at_ra
     """The told deviation is that of 2 x(h/4) - x(h/2), in the mean over 200 draws: within 10 %, three
     deviations of that mean.
     """
-    off, told = [], []
+    off, expected = [], []
     for seed in range(200):
         curve = Rough(seed)
-        found, moved = gauss_newton.extrapolated(curve, curve.slopes(curve.start))
-        off.append(found.point.values - curve.start.values)
-        told.append(moved)
-    ratio = np.sqrt(np.mean(np.square(told)) / np.mean(np.square(off)))
+        solved, moved = gauss_newton.extrapolated(curve, curve.slopes(curve.start))
+        off.append(solved.point.values - curve.start.values)
+        expected.append(moved)
+    ratio = np.sqrt(np.mean(np.square(expected)) / np.mean(np.square(off)))
     assert 0.9 < ratio < 1.1
 
 
 def test_a_piece_that_is_held_at_its_start_is_fitted_from_other_velocities():
     curve = Held()
-    found = gauss_newton.fit_starts(curve, 12)
-    np.testing.assert_allclose(found.point.states.ravel(), [0.0, 3.0, -2.5], atol=1e-6)
-    assert found.cost < 1e-12
+    reached = gauss_newton.fit_starts(curve, 12)
+    np.testing.assert_allclose(reached.point.states.ravel(), [0.0, 3.0, -2.5], atol=1e-6)
+    assert reached.cost < 1e-12
     after = curve.replayed.index(2)
     assert set(curve.replayed[:after]) == {3}
     assert set(curve.replayed[after:]) == {2}
@@ -551,22 +564,22 @@ def test_a_record_is_cut_into_pieces_of_its_window():
         "u": np.cos(3.0 * t),
     }
     twin, data = own_rig(smc.plant("servo_axis"), ["M", "b"]), [record]
-    made = Replays(twin, ["M", "b"], data, False, lambda count: None)
-    assert [len(piece.measured["x"]) for piece in made.pieces] == [1101, 1101, 1101]
+    cut = Replays(twin, ["M", "b"], data, False, lambda count: None)
+    assert [len(piece.measured["x"]) for piece in cut.pieces] == [1101, 1101, 1101]
     scales = 0.05 * np.array([np.std(0.3 * np.sin(5.0 * t)), np.std(1.5 * np.cos(5.0 * t))])
     spread = np.linalg.norm(record["x"] - record["x"].mean())
-    for piece in made.pieces:
+    for piece in cut.pieces:
         np.testing.assert_allclose(piece.scales, scales, rtol=1e-4)
         assert piece.spread == {"x": pytest.approx(spread)}
         assert piece.skipped == 0
-    assert made.free.tolist() == [0, 1]
-    state = made.state(Point(made.start.values, np.tile([2.0, -1.0], (3, 1))), 1)
+    assert cut.free.tolist() == [0, 1]
+    state = cut.state(Point(cut.start.values, np.tile([2.0, -1.0], (3, 1))), 1)
     np.testing.assert_allclose(
         state, [0.3 * np.sin(5.5), 1.5 * np.cos(5.5)] + scales * [2.0, -1.0], rtol=1e-3
     )
-    rest = made.at_rest(made.start)
+    rest = cut.at_rest(cut.start)
     np.testing.assert_allclose(
-        np.array([made.state(rest, k) for k in range(3)])[:, 1], 0.0, atol=1e-12
+        np.array([cut.state(rest, k) for k in range(3)])[:, 1], 0.0, atol=1e-12
     )
     assert (
         len(
@@ -581,17 +594,27 @@ def test_a_record_is_cut_into_pieces_of_its_window():
         )
         == 1
     )
-    np.testing.assert_allclose(
-        made.start.values * made.scales, [twin.values["M"], twin.values["b"]]
-    )
-    np.testing.assert_allclose(made.low * made.scales, [1e-6, 0.0])
+    np.testing.assert_allclose(cut.start.values * cut.scales, [twin.values["M"], twin.values["b"]])
+    np.testing.assert_allclose(cut.low * cut.scales, [1e-6, 0.0])
 
 
 def test_residuals_are_shares_of_the_spread_up_to_the_worst():
     curve = Curve()
     piece = Piece(0, None, 0, {"y": np.zeros(4), "z": np.ones(4)}, {"y": 2.0, "z": 4.0}, np.ones(1))
-    given = {"y": np.array([1.0, -5.0, np.nan, np.inf]), "z": np.array([0.0, 1.0, 2.0, -np.inf])}
-    assert curve.relative(piece, given).tolist() == [-0.5, 0.25, 1.0, 0.0, 1.0, -0.25, -1.0, 1.0]
+    predicted = {
+        "y": np.array([1.0, -5.0, np.nan, np.inf]),
+        "z": np.array([0.0, 1.0, 2.0, -np.inf]),
+    }
+    assert curve.relative(piece, predicted).tolist() == [
+        -0.5,
+        0.25,
+        1.0,
+        0.0,
+        1.0,
+        -0.25,
+        -1.0,
+        1.0,
+    ]
     assert replays._norm(np.array([1.0, 3.0])) == pytest.approx(math.sqrt(2.0))
     assert replays._norm(np.ones(3)) == 1.0
 
@@ -601,17 +624,17 @@ def test_torques_above_5_hz_are_left_out_by_four_poles_forward_and_backward(hert
     t = 0.002 * np.arange(10_001)
     columns = records.Columns(torque=("tau",))
     data = {"t": t, "tau": np.sin(math.tau * hertz * t)}
-    (low,), at = (
+    (low,), times = (
         inverse_dynamics.measured(data, columns).values(),
         inverse_dynamics.times(data, columns),
     )
-    np.testing.assert_allclose(np.diff(at), 0.01, rtol=1e-9)
-    assert at[0] == pytest.approx(0.1)
-    assert at[-1] == pytest.approx(19.9)
+    np.testing.assert_allclose(np.diff(times), 0.01, rtol=1e-9)
+    assert times[0] == pytest.approx(0.1)
+    assert times[-1] == pytest.approx(19.9)
     _, gain = freqz(*np.array(butter(4, 5.0, fs=100.0)), worN=[hertz], fs=100.0)
     middle = slice(300, -300)
     np.testing.assert_allclose(
-        low[middle], abs(gain[0]) ** 2 * np.sin(math.tau * hertz * at[middle]), atol=6e-3
+        low[middle], abs(gain[0]) ** 2 * np.sin(math.tau * hertz * times[middle]), atol=6e-3
     )
 
 

@@ -49,9 +49,9 @@ def test_the_turns_of_a_fast_chirp_are_no_spikes(rig, rate):
     t = np.arange(0.0, 20.0, 1.0 / rate)
     chirp = 0.4 * np.sin(2.0 * np.pi * (0.2 * t + 0.5 * (2.8 / 20.0) * t**2))  # 0.2 to 3 Hz
     loop = smc.Scenario(plant=rig.plant, law="none", control_period=1.0 / rate)
-    known = own_rig(loop, ["j1.damping"])
+    slow_rig = own_rig(loop, ["j1.damping"])
     for x in (chirp, rounded(chirp)):
-        assert not log_quality.doubts(known, [{"t": t, "x": x, "u": np.sin(5.0 * t)}])
+        assert not log_quality.doubts(slow_rig, [{"t": t, "x": x, "u": np.sin(5.0 * t)}])
 
 
 def test_a_motion_of_few_counts_is_told(rig):
@@ -72,8 +72,8 @@ def test_a_log_that_may_lack_commands_is_told_unless_its_loop_is_known_to_be_as_
     assert "input_delay may be 5 ms off" in sentence
     (sentence,) = log_quality.doubts(rig, [slow])  # without a delay to find, too
     assert 'say so by --condition "loop: control_period=0.01"' in sentence
-    known = smc.Scenario(plant=rig.plant, law="none", control_period=0.01)
-    assert not log_quality.doubts(own_rig(known, ["input_delay"]), [slow])
+    slow_loop = smc.Scenario(plant=rig.plant, law="none", control_period=0.01)
+    assert not log_quality.doubts(own_rig(slow_loop, ["input_delay"]), [slow])
 
 
 @pytest.fixture(scope="module")

@@ -78,12 +78,12 @@ def test_the_bristles_of_a_lugre():
     bristles = smc.hardware.LuGre(0.3, 0.3, 1.0, stiffness=400.0, damping=2.0)
     # static, which is not asked for, follows coulomb
     machine = smc.Scenario(plant=arm, law="none", friction=(bristles, smc.Viscous(0.3)))
-    found = smc.identify(machine, run, list(truth))
+    identified = smc.identify(machine, run, list(truth))
     stiffness = truth.pop("friction.stiffness")
-    check(found, truth, 0.02)
+    check(identified, truth, 0.02)
     # pieces start with unbent bristles, so it is found badly, and its error says so
-    error = found.errors["friction.stiffness"]
-    assert abs(found.values["friction.stiffness"] - stiffness) < 2.0 * error
+    error = identified.errors["friction.stiffness"]
+    assert abs(identified.values["friction.stiffness"] - stiffness) < 2.0 * error
 
 
 @pytest.mark.slow
@@ -93,9 +93,9 @@ def test_a_gain_an_offset_and_where_the_encoder_reads_0():
     damped = ONE.replace('name="j1"', 'name="j1" damping=".3"')
     run = log(ONE, truth | {"j1.damping": 0.3}, MOTION, 20.0, 1.5, duration=4.0)
     run["x"] = run["x"] + truth["j1.zero"]
-    found = smc.identify(smc.plant_from(damped, ["j1"]), run, list(truth))
-    check(found, truth, 0.01)
-    assert any("j1.offset and j1.zero are hardly told apart" in note for note in found.notes)
+    identified = smc.identify(smc.plant_from(damped, ["j1"]), run, list(truth))
+    check(identified, truth, 0.01)
+    assert any("j1.offset and j1.zero are hardly told apart" in note for note in identified.notes)
 
 
 def bristled(level, stiffness, damping):
@@ -137,7 +137,7 @@ def test_friction_that_gives_way_is_in_the_errors_beside_other_parts(beside):
             return u + bristles(v, memory) - 0.3 * v - 0.1 * math.tanh(v / 1e-3)
 
     run = joint_log(inertia, torque, 20.0, 1.5)
-    found = smc.identify(machine, run, list(truth))
-    check(found, truth, 0.02)
-    assert abs(found.values["j1.frictionloss"] - 0.3) > 0.001  # the bristles are missed
-    assert any("presliding" in note for note in found.notes)
+    identified = smc.identify(machine, run, list(truth))
+    check(identified, truth, 0.02)
+    assert abs(identified.values["j1.frictionloss"] - 0.3) > 0.001  # the bristles are missed
+    assert any("presliding" in note for note in identified.notes)

@@ -76,8 +76,8 @@ def test_numbers_that_a_motion_tells_apart_are_no_pair_however_few_residuals_rem
     law = smc.law("pid", kp=20.0, ki=0.0, kd=1.5)
     case = smc.Scenario(**machine, **measured, law=law, reference=motion, duration=3.0)
     smc.run(case).export(tmp_path / "run.csv")
-    told = smc.identify(arm, tmp_path / "run.csv", list(TRUTH))
-    assert not [note for note in told.notes if "told apart" in note]
+    identified = smc.identify(arm, tmp_path / "run.csv", list(TRUTH))
+    assert not [note for note in identified.notes if "told apart" in note]
 
 
 def test_slow_residuals_that_nothing_explains_are_told(arm):
@@ -123,21 +123,23 @@ def test_friction_that_gives_way_before_it_slides_is_told_and_in_the_errors():
         )
     )
     for run, way in ((creeping, "MuJoCo's default does"), (bending, "bristles that bend by")):
-        found = smc.identify(machine, run, names)
-        assert SLOW not in found.notes  # what is slow in the residuals is told, and in the errors
+        identified = smc.identify(machine, run, names)
+        assert (
+            SLOW not in identified.notes
+        )  # what is slow in the residuals is told, and in the errors
         shares = []
         for name in names:
-            off = abs(found.values[name] - TRUTH[name])
+            off = abs(identified.values[name] - TRUTH[name])
             shares.append(off / TRUTH[name])
-            assert off < 2.0 * found.errors[name], (way, name, off)
+            assert off < 2.0 * identified.errors[name], (way, name, off)
         assert max(shares) > 0.01
-        (note,) = [note for note in found.notes if "gives way" in note]
+        (note,) = [note for note in identified.notes if "gives way" in note]
         assert way in note
     # what the note says to do can be done, and its numbers are near the bristles'
     (paths,) = re.findall(r"--for (\S+)", note)
     (text,) = re.findall(r'--condition "(.+?)"', note)
-    wanted = ["j1.armature", *paths.split(",")]
-    cured = smc.identify(arm, bending, wanted, condition=f"{text}, input_delay=0.004")
+    quantities = ["j1.armature", *paths.split(",")]
+    cured = smc.identify(arm, bending, quantities, condition=f"{text}, input_delay=0.004")
     assert cured.values["friction.j1.coulomb"] == pytest.approx(0.4, rel=0.01)
     assert cured.values["j1.armature"] == pytest.approx(TRUTH["j1.armature"], rel=0.02)
 
@@ -151,8 +153,8 @@ def test_commands_of_one_sample_break_a_joint_away_though_a_delay_is_between_sam
     part = rig.part({"t": t, "x": 0.1 * np.sin(10.0 * t), "u": u})
     trace = smc.run(rig.repeated(part, state=np.zeros(2)))
     inertia = float(arm.load().dof_M0[0]) + TRUTH["j1.armature"]
-    each = 0.5 * (force - level) * period**2 / inertia * force / level  # sped up, then stopped
-    assert trace.x[-1, 0] == pytest.approx(50.0 * each, rel=0.05)
+    travel = 0.5 * (force - level) * period**2 / inertia * force / level  # sped up, then stopped
+    assert trace.x[-1, 0] == pytest.approx(50.0 * travel, rel=0.05)
 
 
 @pytest.mark.parametrize(("late", "coarse"), [(0.003, 1.0), (0.0035, 0.48)])
@@ -165,17 +167,17 @@ def test_finer_commands_break_a_joint_away_though_a_delay_is_between_commands(ar
     part = rig.part({"t": t, "x": 0.1 * np.sin(10.0 * t), "u": u})
     finer = rig.finer(part, 4)
     inertia = float(arm.load().dof_M0[0]) + TRUTH["j1.armature"]
-    each = 0.5 * (force - level) * period**2 / inertia * force / level
-    for one, share in ((part, coarse), (finer, 1.0)):
-        trace = smc.run(rig.repeated(one, state=np.zeros(2)))
-        assert trace.x[-1, 0] == pytest.approx(50.0 * each * share, rel=0.05)
+    travel = 0.5 * (force - level) * period**2 / inertia * force / level
+    for commands, share in ((part, coarse), (finer, 1.0)):
+        trace = smc.run(rig.repeated(commands, state=np.zeros(2)))
+        assert trace.x[-1, 0] == pytest.approx(50.0 * travel * share, rel=0.05)
 
 
 def test_a_log_that_an_open_loop_leaves_is_told_apart_from_a_poor_fit(found):
-    left = tuple(dict.fromkeys(fit, -210.0) for fit in found.fits)
-    (note,) = dataclasses.replace(found, fits=left).notes
+    poor_fits = tuple(dict.fromkeys(fit, -210.0) for fit in found.fits)
+    (note,) = dataclasses.replace(found, fits=poor_fits).notes
     assert "judge by the pieces" in note
-    (note,) = dataclasses.replace(found, fits=left, by_pieces=left).notes
+    (note,) = dataclasses.replace(found, fits=poor_fits, by_pieces=poor_fits).notes
     assert note.startswith("the fit is poor")
 
 
@@ -218,9 +220,9 @@ def test_two_motors_in_one_log_with_a_gain_and_a_delay_between_samples():
     run = log(
         TWO, truth, motion, [40.0, 15.0], [3.0, 0.8], joints=("j1", "j2"), rate=250.0, duration=3.0
     )
-    found = smc.identify(smc.plant_from(TWO, ["j1", "j2"]), run, list(truth))
+    identified = smc.identify(smc.plant_from(TWO, ["j1", "j2"]), run, list(truth))
     for name, true in truth.items():
-        assert found.values[name] == pytest.approx(
+        assert identified.values[name] == pytest.approx(
             true, rel=0.04 if name == "input_delay" else 0.02
         )
 
@@ -252,7 +254,7 @@ def test_numbers_found_are_a_condition_that_files_and_runs_take(found, arm, tmp_
 
 def test_sets_differ_by_the_floor_where_the_errors_are_smaller(found):
     sets = found.drawn(400, seed=2).ensemble
-    damping = np.array([each["j1.damping"] for each in sets])
+    damping = np.array([drawn["j1.damping"] for drawn in sets])
     assert damping.std() == pytest.approx(0.05 * found.values["j1.damping"], rel=0.1)
 
 
@@ -276,12 +278,12 @@ def test_a_gearbox_that_warms_up_is_a_jump_of_its_joint_s_friction():
     cold, warm = {"j1.frictionloss": 0.8}, {"j1.frictionloss": 0.3, "j1.damping": 0.5}
     common = {"plant": arm, "law": "none", "u_max": 5.0}
     jump = smc.Jump(1.0, {"j1.frictionloss": warm["j1.frictionloss"] - 0.8, "j1.damping": 0.5})
-    whole = smc.Scenario(
+    jumping = smc.Scenario(
         **common, feedforward=smc.Sine(2.5, 3.0), mismatch=cold, jump=jump, duration=2.0
     )
-    first = smc.run(whole)
+    first = smc.run(jumping)
     np.testing.assert_array_equal(
-        first.x[:1001], smc.run(dataclasses.replace(whole, jump=None, duration=1.0)).x
+        first.x[:1001], smc.run(dataclasses.replace(jumping, jump=None, duration=1.0)).x
     )
     rest = smc.run(
         smc.Scenario(
@@ -294,7 +296,7 @@ def test_a_gearbox_that_warms_up_is_a_jump_of_its_joint_s_friction():
         )
     )
     np.testing.assert_allclose(first.x[1000:], rest.x, atol=1e-9)
-    assert "more than one equation a joint" in group.why_not(whole, ("itae",))
+    assert "more than one equation a joint" in group.why_not(jumping, ("itae",))
 
 
 @pytest.mark.filterwarnings("ignore:the dry friction of chain creeps")
@@ -325,7 +327,7 @@ def test_the_numbers_of_a_part_have_the_ranges_of_its_type(arm):
     servo = ServoFriction(kc=0.1, kcs=0.05, vs=0.3)
     machine = smc.Scenario(plant=arm, law="none", friction={"j1": servo}, actuator=smc.DCMotor())
     rig = own_rig(machine, ["friction.j1.kc", "friction.vs", "actuator.resistance", "j1.offset"])
-    ranges = {name: (one.value, one.least) for name, one in rig.quantities.items()}
+    ranges = {name: (quantity.value, quantity.least) for name, quantity in rig.quantities.items()}
     assert ranges["friction.j1.kc"] == (0.1, 0.0)
     assert ranges["friction.vs"] == (0.3, 1e-9)
     assert ranges["actuator.resistance"][1] == 1e-9
@@ -383,16 +385,16 @@ def test_a_column_that_is_missing_is_named_before_the_numbers_are_asked_for(run,
     words = ["identify", str(tmp_path / "arm.xml"), str(tmp_path / "run.csv")]
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 2
-    told = " ".join(done.output.split())
-    assert "has no column x (it has t, angle, u)" in told
-    assert "--columns x=NAME" in told
+    message = " ".join(done.output.split())
+    assert "has no column x (it has t, angle, u)" in message
+    assert "--columns x=NAME" in message
     done = CliRunner().invoke(app, [*words, "--columns", "x=angle"])
     assert done.exit_code == 2
-    told = " ".join(done.output.split())
-    assert "no number of arm is named. There are m, grav, input_delay, j1.damping" in told
-    wanted = ["j1.damping", "j1.frictionloss", "j1.armature", "input_delay"]
-    line = ["smc-mujoco", *words, "--columns", "x=angle", "--for", ",".join(wanted)]
-    assert told.endswith(f"write {' '.join(line)}")
+    message = " ".join(done.output.split())
+    assert "no number of arm is named. There are m, grav, input_delay, j1.damping" in message
+    usual = ["j1.damping", "j1.frictionloss", "j1.armature", "input_delay"]
+    line = ["smc-mujoco", *words, "--columns", "x=angle", "--for", ",".join(usual)]
+    assert message.endswith(f"write {' '.join(line)}")
 
 
 def test_the_friction_panel_of_a_servo_has_its_force_and_no_set_point():
@@ -464,11 +466,11 @@ def test_numbers_behind_a_pid_are_found_from_a_log_that_begins_in_its_course(ima
     """Two errors were fixed before. With integrals of 0 the damping was 0, and the delay 13 ms."""
     xml, truth, log = pid_log(imax, 2.0)
     arm = smc.plant_from(xml, {"j1": smc.Channel(servo=True, u_max=3.0)})
-    found = smc.identify(arm, log, list(truth))
+    identified = smc.identify(arm, log, list(truth))
     for name, true in truth.items():
-        assert abs(found.values[name] - true) < 2.0 * found.errors[name], name
-        assert found.errors[name] < 0.05 * true, name
-    assert not found.notes
+        assert abs(identified.values[name] - true) < 2.0 * identified.errors[name], name
+        assert identified.errors[name] < 0.05 * true, name
+    assert not identified.notes
 
 
 def test_a_motor_s_column_that_is_missing_is_named():
@@ -506,9 +508,9 @@ def test_a_command_in_milliamperes_is_doubted_unless_its_gain_is_asked_for(arm, 
     in_mA = run | {"u": run["u"] * 1e4}
     with pytest.raises(smc.ScenarioError, match="if it is not in N m but in mA"):
         smc.identify(arm, in_mA, ["j1.damping"])
-    found = smc.identify(arm, in_mA, ["j1.gain", *TRUTH], most=1)
-    assert found.values["j1.gain"] == pytest.approx(1e-4, rel=0.05)
-    assert any("relative to the model's mass" in note for note in found.notes)
+    identified = smc.identify(arm, in_mA, ["j1.gain", *TRUTH], most=1)
+    assert identified.values["j1.gain"] == pytest.approx(1e-4, rel=0.05)
+    assert any("relative to the model's mass" in note for note in identified.notes)
 
 
 def test_an_unknown_path_lists_what_there_is(arm, run):
@@ -517,9 +519,9 @@ def test_an_unknown_path_lists_what_there_is(arm, run):
     with pytest.raises(smc.ScenarioError, match=r"There are m, grav.*give names=\['j1\.damping'"):
         smc.identify(arm, run)
     loads = (smc.Constant(0.1), smc.Constant(0.2))
-    several = smc.Scenario(plant=arm, law="none", disturbance=loads)
+    two_loads = smc.Scenario(plant=arm, law="none", disturbance=loads)
     with pytest.raises(smc.ScenarioError, match="is a number of 2 parts"):
-        smc.identify(several, run, ["disturbance.amplitude"])
+        smc.identify(two_loads, run, ["disturbance.amplitude"])
 
 
 def test_what_has_no_slope_or_the_slope_of_another_is_named(arm, run):
@@ -546,16 +548,18 @@ def test_a_trace_counts_as_the_log_of_a_machine(arm):
             u_max=10.0,
         )
     )
-    found = smc.identify(arm, trace, ["j1.damping", "j1.frictionloss"])
-    assert found.values["j1.damping"] == pytest.approx(0.2, rel=0.02)
-    assert found.values["j1.frictionloss"] == pytest.approx(0.3, rel=0.02)
+    identified = smc.identify(arm, trace, ["j1.damping", "j1.frictionloss"])
+    assert identified.values["j1.damping"] == pytest.approx(0.2, rel=0.02)
+    assert identified.values["j1.frictionloss"] == pytest.approx(0.3, rel=0.02)
 
 
 def test_two_gains_are_left_out_of_runs_and_said_so(found):
     rig = own_rig(smc.plant_from(TWO, ["j1", "j2"]), ["j1.gain", "j2.gain"])
     assert rig.not_in_runs == ("j1.gain", "j2.gain")
-    told = dataclasses.replace(found, rig=rig, values={}, errors={}, correlations=np.zeros((0, 0)))
-    assert any("j1.gain, j2.gain" in note for note in told.notes)
+    without_numbers = dataclasses.replace(
+        found, rig=rig, values={}, errors={}, correlations=np.zeros((0, 0))
+    )
+    assert any("j1.gain, j2.gain" in note for note in without_numbers.notes)
 
 
 def test_a_chirp_is_recommended_and_a_staircase_is_last_because_it_rests(arm, tmp_path):
@@ -590,8 +594,8 @@ def test_expected_errors_follow_the_encoder_and_the_noise_which_are_said(arm):
     fine = smc.design.excitation(arm, ["j1.damping"], noise=0.0, counts=2**17, **fields)
     noisy = smc.design.excitation(arm, ["j1.damping"], noise=1e-3, counts=2**17, **fields)
     assert "noise of 0 rad (m), encoders of 131072 counts" in str(fine)
-    for other in (coarse, noisy):
-        assert other.motions[0].mean_share > 1.5 * fine.motions[0].mean_share
+    for worse in (coarse, noisy):
+        assert worse.motions[0].mean_share > 1.5 * fine.motions[0].mean_share
 
 
 @pytest.mark.slow
@@ -615,8 +619,8 @@ def test_the_motion_that_the_command_writes_is_read_back_with_its_log(tmp_path):
     run = log(ONE, TRUTH, reference, 20.0, 1.5, rate=250.0, duration=2.0)
     rows = np.column_stack([played["t"][:-1], played["r"][:-1], run["x"], run["u"]])
     np.savetxt(motion, rows, delimiter=",", header="t,r,x,u", comments="")
-    found = smc.identify(machine, motion, list(TRUTH), most=1)
-    assert found.values["j1.damping"] == pytest.approx(0.3, rel=0.1)
+    identified = smc.identify(machine, motion, list(TRUTH), most=1)
+    assert identified.values["j1.damping"] == pytest.approx(0.3, rel=0.1)
 
 
 def test_a_motion_stays_within_range_and_speed_and_an_unknown_one_is_refused(tmp_path):
@@ -630,11 +634,11 @@ def test_a_motion_stays_within_range_and_speed_and_an_unknown_one_is_refused(tmp
 
 def shares(told, expected):
     """Return told errors over expected ones, of numbers of joints."""
-    found = {}
+    ratios = {}
     for name, error in told.items():
         if name.endswith((".damping", ".frictionloss", ".armature")):
-            found[name] = error / expected[name]
-    return found
+            ratios[name] = error / expected[name]
+    return ratios
 
 
 @pytest.mark.slow
@@ -658,10 +662,10 @@ def test_expected_errors_of_two_joints_are_of_the_size_that_a_log_tells():
 
     fields = {"joints": ("j1", "j2"), "duration": 6.0, "seed": 3}
     run = log(two, truth, reference, [120.0, 18.0], [7.4, 1.2], **fields)
-    found = smc.identify(arm, run, list(truth))
-    for name, share in shares(found.errors, motion.errors).items():
+    identified = smc.identify(arm, run, list(truth))
+    for name, share in shares(identified.errors, motion.errors).items():
         assert 0.2 < share < 5.0, (name, share)
-        assert abs(found.values[name] - truth[name]) < 2.0 * found.errors[name], name
+        assert abs(identified.values[name] - truth[name]) < 2.0 * identified.errors[name], name
 
 
 @pytest.mark.slow
@@ -678,10 +682,10 @@ def test_a_servo_plays_a_motion_as_its_set_point_and_its_log_tells_the_expected_
         assert motion.largest_v < 2.0 * np.abs(rates).max(), motion.name
     best = advice.motions[0]
     run = servo_log(xml, truth, np.array(best.times), np.array(best.positions[0]))
-    found = smc.identify(arm, run, list(truth))
-    for name, share in shares(found.errors, best.errors).items():
+    identified = smc.identify(arm, run, list(truth))
+    for name, share in shares(identified.errors, best.errors).items():
         assert 0.5 < share < 2.0, (name, share)
-        assert abs(found.values[name] - truth[name]) < 2.0 * found.errors[name], name
+        assert abs(identified.values[name] - truth[name]) < 2.0 * identified.errors[name], name
 
 
 @pytest.mark.slow
@@ -691,19 +695,21 @@ def test_expected_errors_are_those_that_logs_of_the_motion_tell():
     """
     arm = smc.plant_from(ONE, ["j1"])
     advice = smc.design.excitation(arm, list(TRUTH), guess=TRUTH, u_max=20.0, duration=6.0)
-    motion = next(one for one in advice.motions if one.name.startswith("three sines"))
+    motion = next(
+        candidate for candidate in advice.motions if candidate.name.startswith("three sines")
+    )
     t, r = np.array(motion.times), np.array(motion.positions[0])
     dr = np.gradient(r, t)
 
     def reference(time):
         return np.array([np.interp(time, t, r)]), np.array([np.interp(time, t, dr)])
 
-    told = []
+    errors_by_seed = []
     for seed in range(3):
         run = log(ONE, TRUTH, reference, 40.0, 3.0, duration=6.0, seed=seed)
-        told.append(smc.identify(arm, run, list(TRUTH)).errors)
+        errors_by_seed.append(smc.identify(arm, run, list(TRUTH)).errors)
     for name, expected in motion.errors.items():
-        typical = np.median([errors[name] for errors in told])
+        typical = np.median([errors[name] for errors in errors_by_seed])
         assert 0.5 < typical / expected < 2.0, name
 
 
@@ -764,13 +770,13 @@ def test_the_delay_of_a_simulated_log_is_short_by_half_a_step_of_its_integrator(
     machine = {"plant": arm, "mismatch": true, "input_delay": 0.004, "control_period": 0.002}
     law = smc.law("pid", kp=20.0, ki=0.0, kd=1.5)
     motion = smc.Sine(0.5, 2.5) + smc.Sine(0.25, 9.0)
-    given = {"law": law, "reference": motion, "noise": smc.Noise(2e-5), "duration": 3.0}
-    run = smc.Scenario(**machine, **given, physics_step=step, integrator=integrator)
-    found = smc.identify(arm, smc.run(run), [*true, "input_delay"])
-    assert found.values["input_delay"] == pytest.approx(0.004 - lead * step, abs=0.01 * step)
+    loop = {"law": law, "reference": motion, "noise": smc.Noise(2e-5), "duration": 3.0}
+    run = smc.Scenario(**machine, **loop, physics_step=step, integrator=integrator)
+    identified = smc.identify(arm, smc.run(run), [*true, "input_delay"])
+    assert identified.values["input_delay"] == pytest.approx(0.004 - lead * step, abs=0.01 * step)
     # it also counts half of the damping of a step as inertia
     inertia = 0.02 + lead * step * 0.3
-    assert found.values["j1.armature"] == pytest.approx(inertia, abs=2e-5)
+    assert identified.values["j1.armature"] == pytest.approx(inertia, abs=2e-5)
 
 
 def test_the_start_knows_where_other_joints_are_held():
@@ -781,9 +787,9 @@ def test_the_start_knows_where_other_joints_are_held():
     true = {"j2.damping": 0.2, "j2.armature": 0.01}
     push = smc.Sine(1.0, 4.0) + smc.Sine(0.5, 11.0)
     run = smc.Scenario(plant=arm, mismatch=true, law="none", feedforward=push, duration=4.0)
-    found = smc.identify(arm, smc.run(run), list(true), most=1)
+    identified = smc.identify(arm, smc.run(run), list(true), most=1)
     for name, value in true.items():
-        assert found.before.values[name] == pytest.approx(value, rel=0.15), name
+        assert identified.before.values[name] == pytest.approx(value, rel=0.15), name
 
 
 @pytest.mark.slow
@@ -794,11 +800,11 @@ def test_the_dry_friction_of_a_public_double_pendulum_is_between_its_authors_fit
         pytest.skip("the public records are not at hand")
     arm = smc.plant_from(double_pendulum(), ["shoulder", "elbow"])
     logs = [double_pendulum_log(folder, name, 4.0) for name in ("03", "13")]
-    found = smc.identify(arm, logs, [f"{joint}.frictionloss" for joint in DRY])
+    identified = smc.identify(arm, logs, [f"{joint}.frictionloss" for joint in DRY])
     for joint, published in DRY.items():
         name = f"{joint}.frictionloss"
-        assert min(published) < found.values[name] < max(published), found
-        assert found.errors[name] < 0.1 * max(published), found
+        assert min(published) < identified.values[name] < max(published), identified
+        assert identified.errors[name] < 0.1 * max(published), identified
 
 
 @pytest.mark.slow

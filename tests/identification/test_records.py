@@ -23,7 +23,7 @@ NAMES = Columns(
     x=("x", "q"),
     reference="r",
     feedforward="f",
-    others=("rq",),
+    other_references=("rq",),
     offset=(0.25, -0.5),
 )
 
@@ -93,10 +93,10 @@ def test_times_are_those_of_a_record_up_to_each_bound(times, period, refused):
 def test_columns_that_a_replay_needs_and_knows():
     assert NAMES.needed(False) == ("t", "x", "q", "u")
     assert NAMES.needed(True) == ("t", "x", "q", "u", "r")
-    assert NAMES.known == ("t", "x", "q", "u", "r", "rq", "f")
+    assert NAMES.readable == ("t", "x", "q", "u", "r", "rq", "f")
     torques = dataclasses.replace(NAMES, torque=("a", "b"), state=("p", "v"))
     assert torques.needed(False) == torques.needed(True) == ("t", "x", "q", "a", "b")
-    assert torques.known == ("t", "x", "q", "a", "b", "r", "rq", "f", "p", "v")
+    assert torques.readable == ("t", "x", "q", "a", "b", "r", "rq", "f", "p", "v")
 
 
 def test_a_state_comes_from_a_cubic_about_it_and_at_the_start_from_the_first_sample():
@@ -106,16 +106,16 @@ def test_a_state_comes_from_a_cubic_about_it_and_at_the_start_from_the_first_sam
         "x": 1.0 + 2.0 * t - 3.0 * t**2 + 4.0 * t**3,
         "q": np.where(t > 0.505, 9.0, t),
     }
-    for at in (0, 3, 50, 99):
-        x, v = records.state(data, NAMES, 0.01, at)
-        assert x[0] == pytest.approx(data["x"][at])
-        assert v[0] == pytest.approx(2.0 - 6.0 * t[at] + 12.0 * t[at] ** 2)
+    for sample in (0, 3, 50, 99):
+        x, v = records.state(data, NAMES, 0.01, sample)
+        assert x[0] == pytest.approx(data["x"][sample])
+        assert v[0] == pytest.approx(2.0 - 6.0 * t[sample] + 12.0 * t[sample] ** 2)
     # 15 samples on each side, and no further
     assert records.state(data, NAMES, 0.01, 35)[1][1] == pytest.approx(1.0)
     assert abs(records.state(data, NAMES, 0.01, 36)[1][1] - 1.0) > 0.01
     np.testing.assert_allclose(records.rate(data["x"], 0.01), 2.0 - 6.0 * t + 12.0 * t**2)
-    known = dataclasses.replace(NAMES, state=("x", "q", "t", "t"))
-    x, v = records.state(data, known, 0.01, 50)
+    with_states = dataclasses.replace(NAMES, state=("x", "q", "t", "t"))
+    x, v = records.state(data, with_states, 0.01, 50)
     assert (*x, *v) == (data["x"][50], data["q"][50], t[50], t[50])
 
 
@@ -131,15 +131,18 @@ def test_a_run_becomes_the_record_that_the_machine_would_write():
     names = dataclasses.replace(NAMES, state=("px", "pq", "vx", "vq"))
     quantum = math.tau / 500
     noisy = dataclasses.replace(plain, noise=smc.Noise(0.05), seed=4)
-    found, other = (
-        records.of_trace(dataclasses.replace(trace, scenario=one), names) for one in (plain, noisy)
+    plain_record, noisy_record = (
+        records.of_trace(dataclasses.replace(trace, scenario=scenario), names)
+        for scenario in (plain, noisy)
     )
     for i, (name, offset) in enumerate(zip(("x", "q"), names.offset, strict=True)):
-        counts = (found[name] - offset) / quantum
+        counts = (plain_record[name] - offset) / quantum
         np.testing.assert_allclose(counts, np.round(counts), atol=1e-9)
-        np.testing.assert_allclose(found[name] - offset - 0.1, trace.x[:, i], atol=0.5001 * quantum)
-        assert np.std(other[name] - found[name]) == pytest.approx(0.05, rel=0.15)
-    noises = [other[name] - found[name] for name in ("x", "q")]
+        np.testing.assert_allclose(
+            plain_record[name] - offset - 0.1, trace.x[:, i], atol=0.5001 * quantum
+        )
+        assert np.std(noisy_record[name] - plain_record[name]) == pytest.approx(0.05, rel=0.15)
+    noises = [noisy_record[name] - plain_record[name] for name in ("x", "q")]
     assert abs(np.corrcoef(noises)[0, 1]) < 0.3  # each has its own noise
     for name, column in {
         "u": trace.u[:, 0],
@@ -147,8 +150,8 @@ def test_a_run_becomes_the_record_that_the_machine_would_write():
         "px": trace.x[:, 0],
         "pq": trace.x[:, 1],
     }.items():
-        np.testing.assert_array_equal(found[name], column)
-    np.testing.assert_allclose(found["f"], 0.3 * np.sin(9.0 * trace.t))
+        np.testing.assert_array_equal(plain_record[name], column)
+    np.testing.assert_allclose(plain_record["f"], 0.3 * np.sin(9.0 * trace.t))
 
 
 def found(twin=AXIS, correlation=0.0, **changes):
@@ -208,5 +211,5 @@ OPEN = {"twin": PENDULUM}  # its loop is not closed
 )
 def test_what_to_doubt_is_said_from_each_bound_on(quiet, loud, note):
     calm = found(**quiet).notes
-    assert not [one for one in calm if one.startswith(note)]
-    assert [one for one in found(**loud).notes if one.startswith(note)]
+    assert not [sentence for sentence in calm if sentence.startswith(note)]
+    assert [sentence for sentence in found(**loud).notes if sentence.startswith(note)]

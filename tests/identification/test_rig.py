@@ -8,14 +8,14 @@ import smc_mujoco as smc
 
 def test_a_pendulum_has_the_inertia_and_the_moment_of_its_rig():
     m, l = (PENDULUM.scenario("none").plant.parameters[name] for name in ("m", "l"))
-    found = PENDULUM.quantities["inertia"].value, PENDULUM.quantities["mass_moment"].value
-    assert (m * l * l, m * l) == pytest.approx(found)
+    inertias = PENDULUM.quantities["inertia"].value, PENDULUM.quantities["mass_moment"].value
+    assert (m * l * l, m * l) == pytest.approx(inertias)
 
 
 def test_a_changed_quantity_is_of_the_changed_machine_alone():
-    other = AXIS.with_values({"mass": 80.0})
-    assert other.scenario().plant.parameters["M"] == 80.0
-    assert other.quantities["mass"].source == "given"
+    lighter = AXIS.with_values({"mass": 80.0})
+    assert lighter.scenario().plant.parameters["M"] == 80.0
+    assert lighter.quantities["mass"].source == "given"
     assert AXIS.scenario().plant.parameters["M"] == AXIS.values["mass"]
 
 

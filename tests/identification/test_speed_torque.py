@@ -59,41 +59,41 @@ def test_neighbours_that_depend_on_each_other_count_once():
 
 @pytest.mark.parametrize("model", SHAPES)
 def test_the_model_that_made_the_pairs_is_taken_and_its_part_is_they(model):
-    found = smc.identify_friction(SPEED, pairs(model, noise=0.01))
-    assert found.best.model == model
-    assert found.best.rms == pytest.approx(0.01, rel=0.05)
-    assert found.best.held_out == pytest.approx(0.01, rel=0.05)
-    part = found.part
+    fits = smc.identify_friction(SPEED, pairs(model, noise=0.01))
+    assert fits.best.model == model
+    assert fits.best.rms == pytest.approx(0.01, rel=0.05)
+    assert fits.best.held_out == pytest.approx(0.01, rel=0.05)
+    part = fits.part
     p = SimpleNamespace(**dict(zip(part.names, part.parameters(0), strict=True)))
     force = [part.value(v, 0.0, 0.0, p)[0] for v in SPEED[1::97]]
     np.testing.assert_allclose(force, pairs(model, noise=0.0)[1::97], atol=0.02)
     for name, true in (("drop", 0.18), ("stribeck", 0.15), ("width", 0.2)):
-        if name in found.best.numbers:
-            error = found.best.errors[name]
-            assert found.best.numbers[name] == pytest.approx(true, abs=3.0 * error)
+        if name in fits.best.numbers:
+            error = fits.best.errors[name]
+            assert fits.best.numbers[name] == pytest.approx(true, abs=3.0 * error)
             assert error < 0.1 * true
     assert smc.run(smc.Scenario(plant="duffing", law="none", friction=part)).failure is None
 
 
 def test_held_out_is_of_the_other_log_by_the_numbers_of_this():
     model = "level, viscous, offset"
-    other = SPEED, pairs(model, noise=0.0) + 0.2
-    found = smc.identify_friction(SPEED, pairs(model, noise=0.0), other)
-    fit = found.fits[model]
+    second_log = SPEED, pairs(model, noise=0.0) + 0.2
+    friction = smc.identify_friction(SPEED, pairs(model, noise=0.0), second_log)
+    fit = friction.fits[model]
     assert fit.rms < 1e-9
     assert fit.held_out == pytest.approx(0.2)
-    assert "offset of the pairs held out differs by +0.2 N m" in str(found)
+    assert "offset of the pairs held out differs by +0.2 N m" in str(friction)
 
 
 def test_a_held_out_log_that_differs_by_more_than_its_offset_has_no_such_sentence():
     model = "level, viscous, offset"
-    for other in (pairs(model), 1.5 * pairs(model), pairs(model) + 0.001):
-        assert "offset of" not in str(smc.identify_friction(SPEED, pairs(model), (SPEED, other)))
+    for torques in (pairs(model), 1.5 * pairs(model), pairs(model) + 0.001):
+        assert "offset of" not in str(smc.identify_friction(SPEED, pairs(model), (SPEED, torques)))
 
 
 def test_what_would_be_negative_is_0_and_told():
-    found = smc.identify_friction(SPEED, 0.3 * SIGN - 0.05 * SPEED)
-    fit = found.fits["level, viscous, offset"]
+    friction = smc.identify_friction(SPEED, 0.3 * SIGN - 0.05 * SPEED)
+    fit = friction.fits["level, viscous, offset"]
     assert fit.numbers["viscous"] == 0.0
     assert fit.at_zero == ("viscous",)
     taken = smc.identify_friction(SPEED, 0.3 * SIGN - 0.05 * SPEED + 0.5)
@@ -102,11 +102,11 @@ def test_what_would_be_negative_is_0_and_told():
 
 def test_pairs_without_friction_are_told(refused):
     random = np.random.default_rng(0)
-    found = smc.identify_friction(SPEED, random.standard_normal(len(T)))
-    assert found.best.r2 < 0.5
-    assert "no friction in it" in str(found)
-    assert "explains nothing of the variation" in str(found)
-    refused(lambda: found.part, "no friction in it", "gravity")
+    friction = smc.identify_friction(SPEED, random.standard_normal(len(T)))
+    assert friction.best.r2 < 0.5
+    assert "no friction in it" in str(friction)
+    assert "explains nothing of the variation" in str(friction)
+    refused(lambda: friction.part, "no friction in it", "gravity")
 
 
 @pytest.mark.parametrize(
@@ -130,8 +130,8 @@ def test_the_error_of_the_curve_is_that_of_its_numbers():
     level, viscous = fit.numbers["level"], fit.numbers["viscous"]
     v = np.array([-2.0, 0.5])
     np.testing.assert_allclose(fit.force(v), level * np.sign(v) + viscous * v)
-    of_level, both, of_viscous = fit.covariance[0, 0], fit.covariance[0, 1], fit.covariance[1, 1]
-    variance = of_level + 2.0 * both * np.abs(v) + of_viscous * v**2
+    of_level, of_pair, of_viscous = fit.covariance[0, 0], fit.covariance[0, 1], fit.covariance[1, 1]
+    variance = of_level + 2.0 * of_pair * np.abs(v) + of_viscous * v**2
     np.testing.assert_allclose(fit.force_error(v), np.sqrt(variance))
     np.testing.assert_allclose(np.sqrt(np.diag(fit.covariance)), list(fit.errors.values()))
 
@@ -141,22 +141,22 @@ def test_the_command_says_what_the_function_says_and_writes_a_figure_and_a_condi
     table = np.column_stack([SPEED, torque])[::5]
     file = tmp_path / "pairs.csv"
     np.savetxt(file, table, delimiter=",", header="dq,tau", comments="")
-    found = smc.identify_friction(*table.T)
+    friction = smc.identify_friction(*table.T)
     columns = ["identify", "--pairs", str(file), "--columns", "speed=dq,torque=tau"]
     written = ["--figure", str(tmp_path / "friction"), "--out", str(tmp_path / "found.txt")]
     done = CliRunner().invoke(app, [*columns, *written])
     assert done.exit_code == 0, done.output
-    assert done.output.startswith(f"{found}\n")
+    assert done.output.startswith(f"{friction}\n")
     assert (tmp_path / "friction.png").stat().st_size > 10_000
     (read,) = from_file(tmp_path / "found.txt")
     assert isinstance(read.fields, dict)
-    assert read.fields["friction"].static == pytest.approx(found.part.static, rel=1e-6)
-    for given, words in (
+    assert read.fields["friction"].static == pytest.approx(friction.part.static, rel=1e-6)
+    for words_typed, words in (
         (columns[:3], "no column speed (it has dq, tau)"),
         ([*columns, "--for", "m"], "leave out the machine"),
         (["identify"], "needs a machine and its logs"),
     ):
-        wrong = CliRunner().invoke(app, given)
+        wrong = CliRunner().invoke(app, words_typed)
         assert wrong.exit_code == 2
         assert words in " ".join(wrong.output.split())
 

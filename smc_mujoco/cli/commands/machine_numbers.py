@@ -168,7 +168,7 @@ def identify(
     with delay_signals():
         from smc_mujoco.identification import identify as identification
 
-    found = identification.identify(
+    identified = identification.identify(
         machine,
         files,
         options.names(names) or None,
@@ -180,7 +180,7 @@ def identify(
         seed=seed,
         progress=True,
     )
-    _tell(found, list(map(str, files)), figure, out, terminal)
+    _tell(identified, list(map(str, files)), figure, out, terminal)
 
 
 def _alone(option: str, *others: Any) -> None:
@@ -227,10 +227,10 @@ def _from_pairs(
         from smc_mujoco.identification import speed_torque
 
     read = speed_torque.read_pairs
-    other = None if held_out is None else read(held_out, columns)
-    found = speed_torque.identify_friction(*read(file, columns), held_out=other)
-    terminal.note(str(found))
-    _write(found, figure, out, terminal)
+    held_out_pairs = None if held_out is None else read(held_out, columns)
+    friction = speed_torque.identify_friction(*read(file, columns), held_out=held_out_pairs)
+    terminal.note(str(friction))
+    _write(friction, figure, out, terminal)
 
 
 def excitation(

@@ -36,9 +36,12 @@ def functions(plant: Plant | None) -> dict[str, tuple[Callable[..., Any], list[K
 
     Without a plant there are no actuators.
     """
-    known = {"smc_pose": (pose, [Kind("real", (7,)), VECTOR]), "smc_errors": (errors, [VECTOR] * 6)}
+    table_of_c = {
+        "smc_pose": (pose, [Kind("real", (7,)), VECTOR]),
+        "smc_errors": (errors, [VECTOR] * 6),
+    }
     if plant is None:
-        return known
+        return table_of_c
     table = mixer(plant)
     rows = table.ravel()
     count = len(table)
@@ -50,4 +53,4 @@ def functions(plant: Plant | None) -> dict[str, tuple[Callable[..., Any], list[K
             command[i] = min(max(u[i], -y.limit[i]), y.limit[i])
         mix(y.x, command, rows, count, keeping, controls)
 
-    return {**known, "smc_actuators": (actuators, [Kind("y"), VECTOR, Kind("real", (count,))])}
+    return {**table_of_c, "smc_actuators": (actuators, [Kind("y"), VECTOR, Kind("real", (count,))])}

@@ -30,15 +30,15 @@ def compensate_of(scenario: Scenario) -> Compensate | None:
       ScenarioError: the law has one channel, but the compensation differs between the channels.
     """
     s = scenario.resolved
-    given = s.feedforward
-    if not isinstance(given, Feedforward):
+    feedforward = s.feedforward
+    if not isinstance(feedforward, Feedforward):
         return None
     terms: list[list[tuple]] = [[] for _ in range(s.plant.driven)]
     for part, i, numbers in compensations(scenario):
         p = jit.named(part.names)(*numbers)
         memory = max(part.memory, 1)
         terms[i].append((part.steady, p, memory))
-    speed = {"reference": of_reference, "speed": of_joint}[given.on]
+    speed = {"reference": of_reference, "speed": of_joint}[feedforward.on]
     gains = [nominal.gain for nominal in s.drive_train.nominal[: s.plant.driven]]
     if not s.law.joint:
         first = repr((terms[0], gains[0]))
@@ -48,12 +48,12 @@ def compensate_of(scenario: Scenario) -> Compensate | None:
                     "the scenario's Feedforward differs between its channels, but a law of one "
                     "channel is written once for all: give one that is the same for every channel"
                 )
-        added = _added(terms[0], speed, given.eps, gains[0])
+        added = _added(terms[0], speed, feedforward.eps, gains[0])
         return _of_channel(added)
     compensate: Compensate = add_nothing
     for i, (own, gain) in enumerate(zip(terms, gains, strict=True)):
         if own:
-            added = _added(own, speed, given.eps, gain)
+            added = _added(own, speed, feedforward.eps, gain)
             compensate = _with_joint(compensate, added, i)
     return compensate
 

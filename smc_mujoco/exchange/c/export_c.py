@@ -118,10 +118,10 @@ def number_of_joints(law: Component, joints: int | None) -> int:
 
     `joints`, or the number of values of a gain; 0 for one channel.
     """
-    several = {}
+    counts = {}
     for name, value in law.gains.items():
         if isinstance(value, tuple):
-            several[name] = len(value)
+            counts[name] = len(value)
     if not law.joint:
         if joints is not None:
             raise ScenarioError(
@@ -135,14 +135,14 @@ def number_of_joints(law: Component, joints: int | None) -> int:
                 f"joints={shown(joints)} out"
             )
         joints = len(PLACES)
-    if joints is None and not several:
+    if joints is None and not counts:
         raise ScenarioError(
             f"law {law.name!r} is of many joints: give their number, such as joints=7"
         )
     count = whole(
-        "joints", next(iter(several.values())) if joints is None else joints, 2, MAX_JOINTS
+        "joints", next(iter(counts.values())) if joints is None else joints, 2, MAX_JOINTS
     )
-    for name, values in several.items():
+    for name, values in counts.items():
         if values != count:
             raise ScenarioError(
                 f"gain {name} of {law.name} has {values} values, {gain_text(law.gains[name])}, for "
@@ -166,20 +166,20 @@ def translated(
     """
     if plant is not None and not plant.pose:
         plant = None
-    others = {}
+    functions = {}
     if plant is not None or (joints and getattr(component, "plants", ()) == (FREE_BODY,)):
-        others = body.functions(plant)
+        functions = body.functions(plant)
     what = f"{component.kind} {component.name!r}"
     if compensate:
         assert component.function is not None  # see `writable`
         what += " with the scenario's Feedforward"
-        others = others | compensation.function(compensate, joints)
+        functions = functions | compensation.function(compensate, joints)
         law = component.function
         assert law is not None  # `writable` refuses it
         together = compensation.compensated(law, compensate, joints)
         component = dataclasses.replace(component, function=together)
     try:
-        slots, code = translate(component, single, joints, others)
+        slots, code = translate(component, single, joints, functions)
     except Untranslatable as error:
         raise ScenarioError(f"{what} cannot be written in C: {error}") from None
     if plant is not None:

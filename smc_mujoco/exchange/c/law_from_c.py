@@ -81,8 +81,10 @@ class CLaw(AtAddress):
         )
         arrays = [np.ravel(getattr(y, name)).tolist() for name in ARRAYS]
         numbers = shared_library.stored(y[:3], requests, arrays)
-        each = np.concatenate([np.empty(0), *(np.broadcast_to(gain, n) for gain in gains)])
-        out = self._out(numbers, each.tolist(), memory, 2 * n)
+        gains_by_joint = np.concatenate(
+            [np.empty(0), *(np.broadcast_to(gain, n) for gain in gains)]
+        )
+        out = self._out(numbers, gains_by_joint.tolist(), memory, 2 * n)
         commands = np.array(out[:n])
         return commands, np.array(out[n:])
 
@@ -226,8 +228,8 @@ def check(
     for name, gain in about.gains.items():
         texts.append(f"{name} = {gain_text(gain.default)}")
     joints = f"{about.joints} joints; " if about.joints else ""
-    given = ", ".join(texts) or "none"
-    yield f"{source.name}: {symbol} is a law; {joints}gains {given}; memory {about.memory}"
+    gain_texts = ", ".join(texts) or "none"
+    yield f"{source.name}: {symbol} is a law; {joints}gains {gain_texts}; memory {about.memory}"
 
 
 @constrained

@@ -117,11 +117,11 @@ class ExportedLaw:
     def parts(self) -> dict[str, Component]:
         """Kind -> component, without those that are None."""
         parts = {"law": self.law, "surface": self.surface, "estimator": self.estimator}
-        given = {}
+        present = {}
         for kind, part in parts.items():
             if part is not None:
-                given[kind] = part
-        return given
+                present[kind] = part
+        return present
 
     @cached_property
     def code(self) -> dict[str, tuple[int, str]]:
@@ -149,11 +149,11 @@ class ExportedLaw:
 def variables(exported: ExportedLaw) -> list[Variable]:
     """Return the variables in the order of their value references."""
     places = exported.places
-    wanted = inputs(exported)
+    input_names = inputs(exported)
     listed = [Variable("time", "SMC_CLOCK", "time, s")]
     of_model = JOINT_INPUTS if exported.joints else CHANNEL_INPUTS
     for name, words in {**COMMON_INPUTS, **of_model}.items():
-        if name in wanted:
+        if name in input_names:
             for index, start in _starts(name, exported).items():
                 listed.append(Variable(name + index, "SMC_INPUT", words, start))
     computed = {"u": "command, within u_max, N or N m", "s": "sliding variable"}
@@ -223,18 +223,18 @@ def inputs(exported: ExportedLaw) -> set[str]:
     read = set[str]()
     for _, text in exported.code.values():
         read |= reads(text)
-    wanted = {"x", "r", "dr"}
+    names = {"x", "r", "dr"}
     if exported.estimator is None or "v" in reads(exported.code["estimator"][1]):
-        wanted.add("v")
+        names.add("v")
     if read & {"a", "ddr"}:  # a is ddr if no estimator gives it
-        wanted.add("ddr")
+        names.add("ddr")
     if exported.modelled:
-        wanted |= read & MODEL_INPUTS
+        names |= read & MODEL_INPUTS
         if "coriolis" in read:
-            wanted.add("C")
+            names.add("C")
         if "jacobian" in read:
-            wanted.add("J")
-    return wanted | (read & {"q", "dq"})
+            names.add("J")
+    return names | (read & {"q", "dq"})
 
 
 def reads(code: str) -> set[str]:
@@ -337,13 +337,13 @@ def helpers(exported: ExportedLaw) -> str:
     """Return the C functions that a law of many joints calls: coriolis, for C(x, v) w, and
     jacobian.
     """
-    wanted = inputs(exported)
+    input_names = inputs(exported)
     needs = reads(exported.code["law"][1])
     functions = ""
     if "coriolis" in needs:
         matrix = "(void)plant, (void)w"
         add = ""
-        if "C" in wanted:
+        if "C" in input_names:
             matrix = f"const double *C = (const double *)plant + {place('C[1,1]')}"
             term = "out[i] += C[i * SMC_JOINTS + j] * w[j];"
             add = f"\n        for (int j = 0; j < SMC_JOINTS; j++) {term}"
@@ -360,7 +360,7 @@ static void coriolis(void *plant, const double *w, double *out)
     if "jacobian" in needs:
         source = "NAN"
         unused = "    (void)plant;\n"
-        if "J" in wanted:
+        if "J" in input_names:
             source = f"((const double *)plant)[{place('J[1,1]')} + i]"
             unused = ""
         functions += f"""static void jacobian(void *plant, double *out)
@@ -377,7 +377,7 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
 
     What is of each joint is in a loop over j.
     """
-    wanted = inputs(exported)
+    input_names = inputs(exported)
     many = exported.joints
     j = ""
     u = "[0]"
@@ -391,7 +391,7 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
         moved = " + j"
 
     def value(name: str, absent: str = "0.0") -> str:
-        if name in COMMON_INPUTS | CHANNEL_INPUTS | JOINT_INPUTS and name not in wanted:
+        if name in COMMON_INPUTS | CHANNEL_INPUTS | JOINT_INPUTS and name not in input_names:
             return absent
         return f"value[{place(name + exported.places[0])}{moved}]"
 
@@ -412,7 +412,7 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
     yield from for_each(_measured(exported, value, j))
     if exported.of_body:
         yield "smc_errors(y.x, y.v, y.r, y.dr, y.e, y.de);"
-    if many and exported.modelled and "M" in wanted:
+    if many and exported.modelled and "M" in input_names:
         first = place("M[1,1]")
         yield f"for (int j = 0; j < SMC_JOINTS * SMC_JOINTS; j++) y.M[j] = value[{first} + j];"
     if exported.surface:
@@ -446,8 +446,8 @@ def _tables(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
                 elements *= exported.joints
             if element not in names:
                 elements = [element + place for place in exported.places]
-            for one in elements:
-                yield f"    number(value[{place(one)}]),"
+            for name_in_fmu in elements:
+                yield f"    number(value[{place(name_in_fmu)}]),"
         if not part.gains:
             yield "    0.0,"
         yield "};"

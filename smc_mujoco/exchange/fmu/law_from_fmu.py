@@ -100,25 +100,25 @@ class FmuLaw(Uncompiled):
         if memory[0] == 0.0:
             memory[0] = self._begin(y, gains, memory)
         running = _running.by_number[int(memory[0])]
-        every, length = steps(self.period, y.dt)
+        samples, length = steps(self.period, y.dt)
         done, due = running.steps
         passed = y.t - running.start
         k = math.floor(passed / y.dt + PERIOD_TOLERANCE)
         if k >= due:
             values = [getattr(y, ours) for ours, _ in self.inputs]
-            for _ in range(round(every * y.dt / length)):
+            for _ in range(round(samples * y.dt / length)):
                 running.last[: len(self.outputs)] = running.slave.step(
                     values, running.start + done * length, length
                 )
                 done += 1
-            running.steps[:] = done, every * (k // every + 1)
+            running.steps[:] = done, samples * (k // samples + 1)
         return running.last[0], running.last[1]
 
     def fixed(self, gains: Iterable[float]) -> dict[str, float]:
         """Return the FMU's name -> the value of each constant and parameter."""
         values = (max(-MAX_DOUBLE, min(float(gain), MAX_DOUBLE)) for gain in gains)
-        given = zip(self.parameters, values, strict=False)
-        return dict(self.constants) | dict(given)
+        parameters = zip(self.parameters, values, strict=False)
+        return dict(self.constants) | dict(parameters)
 
     def _begin(self, y: Measurement, gains: Sequence[float], memory: Array) -> int:
         """Start an instance, which ends when the memory of the run is freed. Return its number."""
@@ -213,11 +213,11 @@ def law_from_fmu(
         file.open("rb").close()
     digest = hashlib.sha256(file.read_bytes()).hexdigest()
     about = _description(file, digest)
-    known = {variable.name: variable for variable in about.modelVariables}
+    variables_by_name = {variable.name: variable for variable in about.modelVariables}
     held = frozen({} if constants is None else constants)
     chosen = frozen({} if variables is None else variables)
-    inputs, outputs = _meanings(file.name, known, chosen, held)
-    gains = _gains(known.values())
+    inputs, outputs = _meanings(file.name, variables_by_name, chosen, held)
+    gains = _gains(variables_by_name.values())
     law = FmuLaw(
         path=str(file.resolve()),
         digest=digest,
@@ -272,8 +272,8 @@ def _meanings(
         if ours not in (*INPUT_FIELDS, *OUTPUTS):
             raise unknown("meaning of a variable", ours, (*INPUT_FIELDS, *OUTPUTS))
         side = "output" if ours in OUTPUTS else "input"
-        there = dict.fromkeys(names[side], "")
-        errors.find(f"{side} of {file}", theirs, there)
+        candidates = dict.fromkeys(names[side], "")
+        errors.find(f"{side} of {file}", theirs, candidates)
     for theirs in constants:
         errors.find(f"input of {file}", theirs, dict.fromkeys(ins, ""))
     taken = {*chosen.values(), *constants}

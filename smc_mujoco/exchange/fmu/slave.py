@@ -46,7 +46,7 @@ class Slave:
         from fmpy.simulation import instantiate_fmu
 
         about = fmpy.read_model_description(folder, validate=False)
-        self.known = {variable.name: variable for variable in about.modelVariables}
+        self.variables = {variable.name: variable for variable in about.modelVariables}
         self.two = str(about.fmiVersion).startswith("2")
         self.said = list[str]()
         self.inputs = self._by_type(inputs)
@@ -57,12 +57,12 @@ class Slave:
         if self.two:
             self._called("fmi2SetupExperiment", self.fmu.setupExperiment, startTime=start)
         for name, value in fixed.items():
-            if self.known[name].causality != "input":
+            if self.variables[name].causality != "input":
                 self._set(self._by_type([name]), [value])
         begins = {} if self.two else {"startTime": start}
         self._called("initialization", self.fmu.enterInitializationMode, **begins)
         for name, value in fixed.items():
-            if self.known[name].causality == "input":
+            if self.variables[name].causality == "input":
                 self._set(self._by_type([name]), [value])
         self._called("initialization", self.fmu.exitInitializationMode)
 
@@ -88,10 +88,10 @@ class Slave:
         groups: dict[str, VariableGroup] = {}
         for place, name in enumerate(names):
             group = groups.setdefault(
-                kind := self.known[name].type, VariableGroup(kind, [], [], [])
+                kind := self.variables[name].type, VariableGroup(kind, [], [], [])
             )
             group.names.append(name)
-            group.references.append(self.known[name].valueReference)
+            group.references.append(self.variables[name].valueReference)
             group.places.append(place)
         return list(groups.values())
 

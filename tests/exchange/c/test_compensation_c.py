@@ -70,12 +70,12 @@ def test_u_has_the_bits_of_the_run_whose_feedforward_is_right(tmp_path, rubs, on
     if on == "reference":
         library: Any = getattr(ours.scenario.law.function, "library", None)
         assert theirs.compensation is not None
-        found = np.zeros(len(theirs.t))
+        added = np.zeros(len(theirs.t))
         for k, t in enumerate(theirs.t):
             y = dict.fromkeys(Measurement._fields, 0.0)
             y |= {"t": t, "dr": smc.Sine.value(t, REFERENCE)[1]}
-            library.smc_compensation(np.array([*y.values()]).ctypes, found[k:].ctypes)
-        np.testing.assert_array_equal(found, theirs.compensation[:, 0])
+            library.smc_compensation(np.array([*y.values()]).ctypes, added[k:].ctypes)
+        np.testing.assert_array_equal(added, theirs.compensation[:, 0])
 
 
 @pytest.mark.parametrize("on", ["reference", "speed"])
@@ -115,6 +115,6 @@ def test_what_cannot_be_written_is_refused(feedforward, more, words):
 
 
 def test_words_of_16_bits_have_none():
-    given = scenario(smc.Feedforward(smc.Coulomb(0.1)), law=smc.law("observer_free"))
+    compensated = scenario(smc.Feedforward(smc.Coulomb(0.1)), law=smc.law("observer_free"))
     with pytest.raises(smc.ScenarioError, match="Feedforward is not written in words"):
-        smc.exchange.law_to_c(given, "q15")
+        smc.exchange.law_to_c(compensated, "q15")

@@ -63,17 +63,17 @@ def compiled(folder):
         path.write_text(smc.exchange.law_to_c(name))
         return smc.exchange.law_from_c(path, flags=STRICT, plants=LAWS[name].plants, timeout=60.0)
 
-    made = dict(zip(LAWS, map(make, LAWS), strict=True))
+    laws_from_c = dict(zip(LAWS, map(make, LAWS), strict=True))
     for template in LAWS.values():
         cfunctions.compile_component(template())  # compiles
-    return made
+    return laws_from_c
 
 
 @pytest.fixture(scope="module")
 def traces(compiled):
     """(law, way) -> its trace, and that of its C, on one plant after the other."""
     pairs = {}
-    given = itertools.cycle(PLANTS)
+    plants = itertools.cycle(PLANTS)
     for name, template in LAWS.items():
         for way, more in enumerate(WAYS):
             if "surface" in more and (template.relative_degree != 1 or template.plants):
@@ -81,16 +81,16 @@ def traces(compiled):
             if template.plants:
                 plant = template.plants[0]
             else:
-                plant = next(given)
-            known = {}
-            for gain, its in template.gains.items():
-                if its.plant:
-                    known[gain] = OF_PLANT[its.plant]
+                plant = next(plants)
+            gains = {}
+            for gain, about in template.gains.items():
+                if about.plant:
+                    gains[gain] = OF_PLANT[about.plant]
             pairs[name, way] = [
-                scenario(law, plant, **more) for law in (template(**known), compiled[name](**known))
+                scenario(law, plant, **more) for law in (template(**gains), compiled[name](**gains))
             ]
-    found = iter(smc.run([s for pair in pairs.values() for s in pair]))
-    return {key: (next(found), next(found)) for key in pairs}
+    results_of_runs = iter(smc.run([s for pair in pairs.values() for s in pair]))
+    return {key: (next(results_of_runs), next(results_of_runs)) for key in pairs}
 
 
 def scenario(law, plant="duffing", **more) -> smc.Scenario:
@@ -107,18 +107,18 @@ def back(folder: Path, law, numbers="double", **more) -> CLaw:
     """A law's C, compiled without a warning, as a function (y, gains, memory) -> (u, s)."""
     path = folder / f"{law.name}-{numbers}.c"
     path.write_text(smc.exchange.law_to_c(law, numbers))
-    made = smc.exchange.law_from_c(
+    function = smc.exchange.law_from_c(
         path, flags=(*STRICT, *more.get("flags", ())), timeout=60.0
     ).function
-    assert isinstance(made, CLaw)
-    return made
+    assert isinstance(function, CLaw)
+    return function
 
 
 def measured(k: int, rng) -> list[float]:
     """Some measurement, with model and surface now and then."""
     e = 0.5 * math.cos(0.02 * k) + 0.01 * rng.normal()
     de = 0.05 * rng.normal() - 0.3 * math.sin(0.02 * k)
-    given = [
+    fields = [
         1e-3 * k,
         1e-3,
         e + 0.2,
@@ -134,7 +134,7 @@ def measured(k: int, rng) -> list[float]:
         6.0,
         float(k % 4 > 1),
     ]
-    return [*given, float(k % 5 == 0), de + e, -de, 0.1 * e, 0.1 * de, 0.3, -0.4]
+    return [*fields, float(k % 5 == 0), de + e, -de, 0.1 * e, 0.1 * de, 0.3, -0.4]
 
 
 # the same
@@ -292,12 +292,14 @@ def test_a_law_with_every_turn_of_python_gives_what_it_gives(folder):
     ours = back(folder, law)
     theirs = rebuild(law.function, lambda g: g)
     mine = np.zeros(4)
-    its = np.zeros(4)
+    python_memory = np.zeros(4)
     gains = gains_of(law)
     for k in range(300):
         y = Measurement(*measured(k, rng))
-        assert ours(y, gains, mine) == pytest.approx(theirs(y, gains, its), rel=1e-14, abs=1e-14)
-        np.testing.assert_allclose(mine, its, rtol=1e-14, atol=1e-14)
+        assert ours(y, gains, mine) == pytest.approx(
+            theirs(y, gains, python_memory), rel=1e-14, abs=1e-14
+        )
+        np.testing.assert_allclose(mine, python_memory, rtol=1e-14, atol=1e-14)
 
 
 def both(a):
@@ -370,11 +372,11 @@ def numpy_signs(a):
 @pytest.mark.parametrize("e", [math.nan, 0.0, -0.0, 1.0, -1.0])
 def test_numpy_s_sign_is_that_of_the_compiled_python(folder, e):
     y = Measurement(*[0.0] * 11)._replace(e=e, de=-e)
-    found = back(folder, signs())(y, (), np.zeros(1))
-    wanted = numpy_signs(e)
-    np.testing.assert_array_equal(found, wanted)
+    from_c = back(folder, signs())(y, (), np.zeros(1))
+    from_numpy = numpy_signs(e)
+    np.testing.assert_array_equal(from_c, from_numpy)
     if not math.isnan(e):  # whose sign no operation promises
-        np.testing.assert_array_equal(np.signbit(found), np.signbit(wanted))
+        np.testing.assert_array_equal(np.signbit(from_c), np.signbit(from_numpy))
 
 
 REFUSED = {
@@ -465,22 +467,22 @@ def test_gains_are_ready_to_be_passed(tmp_path, law, options, kind):
     n = options.get("joints", 1)
     values = []
     for gain in law.gains.values():
-        for one in gain if isinstance(gain, tuple) else [gain] * n:
-            values.append(one)
+        for number in gain if isinstance(gain, tuple) else [gain] * n:
+            values.append(number)
     assert [*(kind * len(values)).in_dll(library, "smc_law_defaults")] == [
-        kind(one).value for one in values
+        kind(number).value for number in values
     ]
 
 
 def test_the_command_writes_the_one_law_of_a_file(tmp_path, capsys):
-    one = "@smc.law_function(gains={'k': 2.0})\n"
-    one += "def mine(y, gains, memory):\n    return -gains.k * y.e, y.e\n"
-    (file := tmp_path / "mine.py").write_text(f"import smc_mujoco as smc\n{one}")
+    source = "@smc.law_function(gains={'k': 2.0})\n"
+    source += "def mine(y, gains, memory):\n    return -gains.k * y.e, y.e\n"
+    (file := tmp_path / "mine.py").write_text(f"import smc_mujoco as smc\n{source}")
     with pytest.raises(SystemExit) as end:
         cli.main(["export", str(file), str(tmp_path / "a.c"), "--gains", "k=4"])
     assert not end.value.code
     assert 'smc_law_gains[] = "k=4.0";' in (tmp_path / "a.c").read_text()
-    file.write_text(f"{file.read_text()}{one.replace('mine', 'other')}")
+    file.write_text(f"{file.read_text()}{source.replace('mine', 'other')}")
     with pytest.raises(SystemExit):
         cli.main(["export", str(file), str(tmp_path / "a.c")])
     assert f"{file} has several laws, mine, other: give one, as FILE.py:mine" in (

@@ -49,13 +49,18 @@ def traces(tmp_path_factory):
         (path := folder / f"{name}.c").write_text(smc.exchange.law_to_c(name))
         return smc.exchange.law_from_c(path, flags=STRICT, timeout=60.0, name=f"c {name}")
 
-    made = [*map(make, LAWS)]
-    found = iter(
+    laws_from_c = [*map(make, LAWS)]
+    runs = iter(
         smc.run(
-            [s for pair in zip(LAWS, made, strict=True) for law in pair for s in scenarios(law)]
+            [
+                s
+                for pair in zip(LAWS, laws_from_c, strict=True)
+                for law in pair
+                for s in scenarios(law)
+            ]
         )
     )
-    return {name: [*zip(*[[next(found), next(found)] for _ in "12"], strict=True)] for name in LAWS}
+    return {name: [*zip(*[[next(runs), next(runs)] for _ in "12"], strict=True)] for name in LAWS}
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -80,19 +85,19 @@ def test_firmware_gives_what_a_run_gives_from_what_was_measured_there(tmp_path, 
     subprocess.run(
         [*build.compiler(), *flags, "firmware.c", "-o", "firmware", "-lm"], cwd=tmp_path, check=True
     )
-    given = np.zeros(len(read), [("q", "f8", (7,)), ("y", MEASUREMENT)])
-    given["q"] = [
+    samples = np.zeros(len(read), [("q", "f8", (7,)), ("y", MEASUREMENT)])
+    samples["q"] = [
         (*x[:3], *np.multiply((1.0, -1.0)[k % 2], quaternion(*x[3:])))
         for k, x in enumerate(read["x"])
     ]
-    given["y"] = read
+    samples["y"] = read
     done = subprocess.run(
-        [tmp_path / "firmware"], input=given.tobytes(), capture_output=True, check=True
+        [tmp_path / "firmware"], input=samples.tobytes(), capture_output=True, check=True
     )
     numbers = np.frombuffer(done.stdout).reshape(len(trace.t), 34)
     x, u, s, controls, errors = np.split(numbers, [6, 12, 18, 22], axis=1)
     np.testing.assert_array_equal(errors, np.hstack([read["e"], read["de"]]))
-    np.testing.assert_array_equal(x, [(*q[:3], *rotation_vector(*q[3:])) for q in given["q"]])
+    np.testing.assert_array_equal(x, [(*q[:3], *rotation_vector(*q[3:])) for q in samples["q"]])
     np.testing.assert_array_equal(np.clip(u, -read["limit"], read["limit"]), trace.u)
     np.testing.assert_array_equal(s, trace.s)
     np.testing.assert_array_equal(controls, trace.applied[:, :4])

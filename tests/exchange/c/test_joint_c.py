@@ -117,10 +117,10 @@ def turns(y, gains, memory):
         )
     else:
         u = torque(y, -gains.k * s) - coriolis(y, np.array([s[0], 0.5, total / (1.0 + abs(total))]))
-    kept = u.copy()
-    kept[1] -= inside(kept, y.g)[2]
+    bent = u.copy()
+    bent[1] -= inside(bent, y.g)[2]
     u = (
-        kept
+        bent
         + gains.k * (memory[:, 2] - low)
         + table[0] * (twice - gains.all * np.ones(n))
         + solve(y.M, y.h)
@@ -181,7 +181,7 @@ def parts(y, gains, memory):
     n = len(y.x)
     s = y.de + gains.c * y.e
     u = np.zeros(n)
-    kept = memory[:, 0]
+    slot = memory[:, 0]
     table = np.zeros((3, n))
     q = s[0], 0.5, -s[2]
     q = q[1], q[2], q[0] + len(q)
@@ -200,16 +200,16 @@ def parts(y, gains, memory):
         shift(row, Pair(s[i], u[i]))
         u[i] += filtered(s[i], i, memory[:, 1])
         u[i] += 1e-2 * (row[0] - row[-1]) * pair[i % 2]
-    kept[:] = 0.5 * kept + u
-    kept[0], u[1] = 0.5 * kept[0], memory[0, 0]  # of before
-    memory[1:, 0] = memory[:2, 0] + kept[1:]
+    slot[:] = 0.5 * slot + u
+    slot[0], u[1] = 0.5 * slot[0], memory[0, 0]  # of before
+    memory[1:, 0] = memory[:2, 0] + slot[1:]
     bottom = table[1:]
     bottom[0] = s
     bottom[1, 1:] = table[1, :-1]
-    shift(table[2], Pair(kept[1], q[0]))
+    shift(table[2], Pair(slot[1], q[0]))
     for i in range(len(q)):
         u[-1] += 1e-2 * q[i]
-    return u + 0.1 * table[1] - gains.k * table[2], kept
+    return u + 0.1 * table[1] - gains.k * table[2], slot
 
 
 @pytest.fixture(scope="module")
@@ -230,7 +230,10 @@ def compiled(folder):
         (path := folder / f"{name}.c").write_text(smc.exchange.law_to_c(laws[name], joints=3))
         return smc.exchange.law_from_c(path, flags=STRICT, timeout=60.0, name=f"c {name}")
 
-    return {name: (laws[name], made()) for name, made in zip(laws, map(make, laws), strict=True)}
+    return {
+        name: (laws[name], law_from_c())
+        for name, law_from_c in zip(laws, map(make, laws), strict=True)
+    }
 
 
 def scenario(law, plant=None, **fields) -> smc.Scenario:
@@ -337,15 +340,15 @@ def test_in_single_precision_each_call_is_that_of_double_within_its_rounding(fol
         y = JointMeasurement(1e-3 * k, 1e-3, 1.0, Nothing(), *vectors, M, h, g)
         theirs.memory[:] = memory[:, : law.memory]
         expected = theirs.call_joint(y)
-        found = single(y, gains_of(law, 3), memory)
-        for ours, wanted in zip(found, expected, strict=True):
+        in_single = single(y, gains_of(law, 3), memory)
+        for ours, in_double in zip(in_single, expected, strict=True):
             # it divides a difference of velocities by dt
             if name == "time_delay_sliding":
                 scale = 1.0 / y.dt
             else:
                 scale = 1.0
             np.testing.assert_allclose(
-                ours, wanted, atol=1e-5 * scale * (1.0 + np.abs(wanted).max()), rtol=0
+                ours, in_double, atol=1e-5 * scale * (1.0 + np.abs(in_double).max()), rtol=0
             )
 
 
@@ -381,9 +384,9 @@ def test_zeros_and_nan_are_those_of_the_compiled_python(folder, x):
         v_ = np.array(v)
         y = JointMeasurement(0.0, 1e-3, 0.0, Nothing(), x_, v_, *[zero] * 7, np.eye(3), zero, zero)
         numbers = extremes(x_, v_)
-        found, _ = c(y, (), np.zeros((3, 8)))
-        np.testing.assert_array_equal(found, numbers)
-        np.testing.assert_array_equal(np.signbit(found[:2]), np.signbit(numbers[:2]))
+        from_c, _ = c(y, (), np.zeros((3, 8)))
+        np.testing.assert_array_equal(from_c, numbers)
+        np.testing.assert_array_equal(np.signbit(from_c[:2]), np.signbit(numbers[:2]))
 
 
 @njit

@@ -116,8 +116,8 @@ def test_it_runs_in_the_callback_without_a_word_and_on_threads_alike(file):
         for seed in range(4):
             sweep.append(scenario(mine(lam=lam), seed=seed, duration=0.1))
     # a PlainLoopWarning would be an error
-    one, two = smc.run(sweep, threads=1), smc.run(sweep, threads=2)
-    for a, b in zip(one, two, strict=True):
+    on_one_thread, on_two_threads = smc.run(sweep, threads=1), smc.run(sweep, threads=2)
+    for a, b in zip(on_one_thread, on_two_threads, strict=True):
         assert same(a, b)
 
 
@@ -199,10 +199,10 @@ def test_a_shared_library_is_taken_as_it_is_and_again_after_a_new_build(file, tm
 
 @pytest.mark.quick
 def test_two_laws_of_one_library_are_two_laws(file, tmp_path):
-    both = law("out[0] = -1.0 * y->e;").replace("smc_law(", "first(")
-    both += law("out[0] = -2.0 * y->e;").replace("smc_law(", "second(").partition("\n")[2]
+    source = law("out[0] = -1.0 * y->e;").replace("smc_law(", "first(")
+    source += law("out[0] = -2.0 * y->e;").replace("smc_law(", "second(").partition("\n")[2]
     target = tmp_path / "both.so"
-    shared(file(both, "both.c"), target)
+    shared(file(source, "both.c"), target)
     first, second = (
         scenario(smc.exchange.law_from_c(target, symbol=name)) for name in ("first", "second")
     )
@@ -218,21 +218,21 @@ def test_a_scenario_is_its_copies_equal_and_no_other_law_s(file):
         copy.deepcopy(first),
         scenario(smc.exchange.law_from_c(path)(lam=4.0)),
     ]
-    for each in copies:
-        assert each == first
-        assert hash(each.law.function) == hash(first.law.function)
+    for duplicate in copies:
+        assert duplicate == first
+        assert hash(duplicate.law.function) == hash(first.law.function)
     wider = smc.exchange.law_from_c(path, memory=20)
     renamed = smc.exchange.law_from_c(path, name="other")
     edited = smc.exchange.law_from_c(file(MINE.replace("out[1] = s", "out[1] = 0.5 + s")))
-    functions = {each.function for each in (first.law, wider(), renamed(), edited())}
+    functions = {duplicate.function for duplicate in (first.law, wider(), renamed(), edited())}
     assert len(functions) == 4
 
 
 def test_other_files_and_flags_come_along(file, tmp_path):
-    other = file("double twice(double a) { return 2.0 * a; }", "filter.c")
+    helper = file("double twice(double a) { return 2.0 * a; }", "filter.c")
     mine = file(law("out[0] = -K * twice(y->e);", "double twice(double a);"))
     trace = smc.run(
-        scenario(smc.exchange.law_from_c(mine, flags=["-DK=1.5", str(other)]), noise=None)
+        scenario(smc.exchange.law_from_c(mine, flags=["-DK=1.5", str(helper)]), noise=None)
     )
     assert trace.u[0, 0] == -3.0 * trace.x[0, 0]
 
@@ -252,14 +252,16 @@ def test_another_process_runs_what_was_loaded_here_whatever_the_file_holds_by_th
         )(k=4.0),
         noise=None,
     )
-    kept = pickle.dumps([first, first])
+    pickled = pickle.dumps([first, first])
     trace = smc.run(first)
     file(law("out[0] = y->e;"))
-    one, two = pickle.loads(kept)
-    assert str(one.law) == "mine(k=4)"
-    assert one.law.function is two.law.function is pickle.loads(kept)[0].law.function  # loaded once
-    assert same(smc.run(one), trace)
-    assert same(reference.run(one), trace)
+    unpickled, two = pickle.loads(pickled)
+    assert str(unpickled.law) == "mine(k=4)"
+    assert (
+        unpickled.law.function is two.law.function is pickle.loads(pickled)[0].law.function
+    )  # loaded once
+    assert same(smc.run(unpickled), trace)
+    assert same(reference.run(unpickled), trace)
     Path(tmp_path / "my_law.c").unlink()
     code = f"import pickle, smc_mujoco as smc; run = pickle.loads({pickle.dumps(first)!r})\n"
     code += "print(smc.run(run).u[:, 0].tolist())"
@@ -405,9 +407,9 @@ def test_the_docs_show_a_law_that_passes(file):
 
 
 def test_the_header_has_the_numbers_of_the_measurement_in_their_order():
-    one, many = re.findall(r"typedef struct \{(.*?)\}", HEADER, re.DOTALL)
-    assert tuple(re.findall(r"smc_real (\w+);", one)) == Measurement._fields
-    assert tuple(re.findall(r"smc_real (\w+)\[", many)) == joint_law.ARRAYS
+    channel, joints = re.findall(r"typedef struct \{(.*?)\}", HEADER, re.DOTALL)
+    assert tuple(re.findall(r"smc_real (\w+);", channel)) == Measurement._fields
+    assert tuple(re.findall(r"smc_real (\w+)\[", joints)) == joint_law.ARRAYS
     assert len(Measurement._fields) == build.MEASUREMENT_SIZE
 
 

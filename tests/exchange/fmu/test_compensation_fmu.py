@@ -41,14 +41,22 @@ def test_u_and_compensation_have_the_bits_of_a_run(tmp_path, way):
     trace = smc.run(scenario)
     fmu = Importer(path, tmp_path / "law")
     places = [f"[{i + 1}]" for i in range(trace.u.shape[1])] if scenario.law.joint else [""]
-    found = []
+    outputs = []
     for k, t in enumerate(trace.t):
         r, dr, ddr = smc.Sine.value(t, REFERENCE)
         for i, place in enumerate(places):
             inputs = {"x": trace.x[k, i], "v": trace.v[k, i], "r": r, "dr": dr, "ddr": ddr}
-            fmu.set(**{name + place: one for name, one in inputs.items() if name + place in fmu.at})
+            fmu.set(
+                **{
+                    name + place: number
+                    for name, number in inputs.items()
+                    if name + place in fmu.at
+                }
+            )
         fmu.fmu.doStep(t, 1e-3)
-        found.append(fmu.get(*(name + place for name in ("u", "compensation") for place in places)))
+        outputs.append(
+            fmu.get(*(name + place for name in ("u", "compensation") for place in places))
+        )
     assert fmu.said == []
-    np.testing.assert_array_equal(found, np.hstack([trace.u, trace.compensation]))
+    np.testing.assert_array_equal(outputs, np.hstack([trace.u, trace.compensation]))
     assert len(np.unique(trace.compensation)) > 50

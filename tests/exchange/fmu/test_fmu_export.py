@@ -74,7 +74,7 @@ def combined(folder):
     """Combination -> its FMU, compiled in a third of the time without optimisation, and its
     trace.
     """
-    scenarios = [scenario(*one) for one in COMBINED]
+    scenarios = [scenario(*combination) for combination in COMBINED]
     with ThreadPoolExecutor(2) as pool, pytest.MonkeyPatch.context() as patch:
         patch.setattr(build, "LIBRARY_FLAGS", ("-O0", *build.LIBRARY_FLAGS[1:]))
         paths = pool.map(
@@ -97,14 +97,14 @@ def twisting(folder):
 def seen(fmu: Importer, trace: smc.Trace, k: int) -> dict[str, float]:
     """The inputs of an FMU at a sample of a trace."""
     r, dr, ddr = type(REFERENCE).value(trace.t[k], REFERENCE)
-    every = {
+    inputs = {
         "x": trace.x[k, 0],
         "v": trace.v[k, 0],
         "r": r,
         "dr": dr,
         "ddr": ddr,
     }
-    return {name: value for name, value in every.items() if name in fmu.at}
+    return {name: value for name, value in inputs.items() if name in fmu.at}
 
 
 def wave(k: int) -> dict[str, float]:
@@ -125,19 +125,19 @@ def test_an_fmu_gives_the_bits_of_a_run(combined, folder, one):
     assert trace.failure is None
     assert validate_fmu(str(path)) == []
     fmu = Importer(path, folder / path.stem)
-    found = np.array([fmu.step(t, **seen(fmu, trace, k)) for k, t in enumerate(trace.t)])
+    stepped = np.array([fmu.step(t, **seen(fmu, trace, k)) for k, t in enumerate(trace.t)])
     assert fmu.said == []
-    np.testing.assert_array_equal(found[:, 0], trace.u[:, 0])
-    np.testing.assert_array_equal(found[:, 1], trace.s[:, 0])
-    assert len(set(found[:, 1])) > 50
+    np.testing.assert_array_equal(stepped[:, 0], trace.u[:, 0])
+    np.testing.assert_array_equal(stepped[:, 1], trace.s[:, 0])
+    assert len(set(stepped[:, 1])) > 50
     assert ("v" in fmu.at) == (one[2] == "measured")
 
 
 @pytest.mark.slow
 def test_the_sources_compiled_by_another_tool_give_the_same(combined, folder):
-    one = ("observer_free_third", None, "extended_state_observer")
-    trace = combined[one][1]
-    source = smc.exchange.law_to_fmu(scenario(*one), folder / "source.fmu", binary=False)
+    combination = ("observer_free_third", None, "extended_state_observer")
+    trace = combined[combination][1]
+    source = smc.exchange.law_to_fmu(scenario(*combination), folder / "source.fmu", binary=False)
     assert fmpy.supported_platforms(str(source)) == ["c-code"]
     files = Path(fmpy.extract(str(source), str(folder / "source")))
     from fmpy.build import build_platform_binary
@@ -145,13 +145,13 @@ def test_the_sources_compiled_by_another_tool_give_the_same(combined, folder):
     environment = [str(Path(sys.executable).parent)]  # of FMPy's cmake
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PATH", ":".join(environment), prepend=":")
-        (made := folder / "made").mkdir()
-        build_platform_binary(files, made, configuration="Release", all_warnings=True)
+        (build_folder := folder / "made").mkdir()
+        build_platform_binary(files, build_folder, configuration="Release", all_warnings=True)
     fmu = Importer(source, files)
-    found = []
+    commands = []
     for k, t in enumerate(trace.t):
-        found.append(fmu.step(t, **seen(fmu, trace, k))[0])
-    np.testing.assert_array_equal(found, trace.u[:, 0])
+        commands.append(fmu.step(t, **seen(fmu, trace, k))[0])
+    np.testing.assert_array_equal(commands, trace.u[:, 0])
 
 
 @pytest.mark.slow
@@ -186,16 +186,16 @@ def test_every_law_is_a_valid_fmu(folder):
     for name, template in catalogue().items():
         path = smc.exchange.law_to_fmu(template, folder / f"valid-{name}.fmu", binary=False)
         assert validate_fmu(str(path)) == []
-        known = {}
+        variables = {}
         for v in fmpy.read_model_description(str(path)).modelVariables:
-            known[v.name] = v
+            variables[v.name] = v
         for gain, about in template.gains.items():
-            one = known[f"law.{gain}"]
-            assert one.causality == "parameter"
-            assert one.variability == "tunable"
-            assert float(one.start) == min(about.default, sys.float_info.max)
-            assert (one.min is not None) == (about.positive or about.nonnegative)
-        assert ("g" in known) == template.requires_model, name
+            parameter = variables[f"law.{gain}"]
+            assert parameter.causality == "parameter"
+            assert parameter.variability == "tunable"
+            assert float(parameter.start) == min(about.default, sys.float_info.max)
+            assert (parameter.min is not None) == (about.positive or about.nonnegative)
+        assert ("g" in variables) == template.requires_model, name
 
 
 # instances
@@ -206,11 +206,11 @@ def test_instances_in_one_process_do_not_share_their_memory(twisting):
     expected = [alone.step(1e-3 * k, **wave(k)) for k in range(60)]
     first = Importer(*twisting)
     second = Importer(*twisting)
-    found = []
+    outputs = []
     for k in range(60):
-        found.append(first.step(1e-3 * k, **wave(k)))
+        outputs.append(first.step(1e-3 * k, **wave(k)))
         second.step(1e-3 * k, **wave(3 * k + 7))
-    assert found == expected
+    assert outputs == expected
     assert first.get("law.memory[1]", "estimator.memory[2]") != second.get(
         "law.memory[1]", "estimator.memory[2]"
     )
@@ -239,9 +239,9 @@ def test_a_state_that_was_saved_is_come_back_to(twisting):
     expected = [fmu.step(1e-3 * k, **wave(k)) for k in range(20, 50)]
     fmu.fmu.setFMUState(saved)
     assert [fmu.step(1e-3 * k, **wave(k)) for k in range(20, 50)] == expected
-    other = Importer(*twisting, begin=False)
-    other.fmu.setFMUState(other.fmu.deserializeFMUState(packed))
-    assert [other.step(1e-3 * k, **wave(k)) for k in range(20, 50)] == expected
+    restored = Importer(*twisting, begin=False)
+    restored.fmu.setFMUState(restored.fmu.deserializeFMUState(packed))
+    assert [restored.step(1e-3 * k, **wave(k)) for k in range(20, 50)] == expected
     fmu.fmu.freeFMUState(saved)
 
 
@@ -297,10 +297,10 @@ def test_a_long_step_is_its_samples_and_a_short_one_holds(twisting):
     expected = [fine.step(1e-3 * k, **x) for k in range(10)]
     assert long.step(0.0, 4e-3, **x) == expected[3]
     assert long.step(4e-3, 6e-3, **x) == expected[9]
-    found = []
+    outputs = []
     for k in range(40):
-        found.append(short.step(0.25e-3 * k, 0.25e-3, **x))
-    assert found[::4] == found[3::4] == expected
+        outputs.append(short.step(0.25e-3 * k, 0.25e-3, **x))
+    assert outputs[::4] == outputs[3::4] == expected
 
 
 def test_samples_are_counted_from_the_start_time(folder, combined):

@@ -347,8 +347,8 @@ def test_an_fmu_for_another_machine_is_refused_by_its_machines(foreign, tmp_path
 
 def test_a_slave_says_which_variable_it_could_not_set(foreign, tmp_path):
     files = fmpy.extract(str(foreign), str(tmp_path / "files"))
-    made = Slave(files, ["Plant.Theta"], ["torque"], {"gain.k": 5.0, "mode": 0.0})
-    assert made.step([0.5], 0.0, 0.01) == [-2.5]
+    slave = Slave(files, ["Plant.Theta"], ["torque"], {"gain.k": 5.0, "mode": 0.0})
+    assert slave.step([0.5], 0.0, 0.01) == [-2.5]
     with pytest.raises(Exception, match=r"the step from t = 0.01 s fails \(another step\)"):
-        made.step([0.5], 0.01, 0.02)
-    made.close()
+        slave.step([0.5], 0.01, 0.02)
+    slave.close()

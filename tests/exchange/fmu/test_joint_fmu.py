@@ -72,9 +72,9 @@ def seen(known, controller: Controller, trace: smc.Trace, k: int) -> dict[str, f
     y = controller.joint_measurement(trace.x[k], trace.v[k], trace.t[k], motion)
     vectors = {name: getattr(y, name) for name in ("x", "v", "r", "dr", "ddr", "h", "g")}
     values = {}
-    for name, each in vectors.items():
+    for name, vector in vectors.items():
         for i in JOINTS:
-            values[f"{name}[{i}]"] = float(each[i - 1])
+            values[f"{name}[{i}]"] = float(vector[i - 1])
     matrices = {"M": y.M, "C": np.column_stack([coriolis(y, unit) for unit in np.eye(3)])}
     if "J[1,1]" in known:
         matrices["J"] = jacobian(y)
@@ -93,13 +93,13 @@ def outputs(fmu: Importer) -> list[float]:
 
 def stepped(fmu: Importer, trace: smc.Trace, samples: int) -> np.ndarray:
     """u and s after each step, (samples, 6)."""
-    found = []
+    rows = []
     controller = Controller(trace.scenario)
     for k in range(samples):
         fmu.set(**seen(fmu.at, controller, trace, k))
         fmu.fmu.doStep(trace.t[k], 1e-3)
-        found.append(outputs(fmu))
-    return np.array(found)
+        rows.append(outputs(fmu))
+    return np.array(rows)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -111,14 +111,14 @@ def test_an_fmu_gives_what_a_run_gives(made, folder, name):
     assert trace.failure is None
     assert validate_fmu(str(path)) == []
     fmu = Importer(path, folder / name)
-    found = stepped(fmu, trace, len(trace.t))
+    u_and_s = stepped(fmu, trace, len(trace.t))
     expected = np.hstack([trace.u, trace.s])
     assert fmu.said == []
-    assert len(np.unique(found, axis=0)) > 50
+    assert len(np.unique(u_and_s, axis=0)) > 50
     if name == "passivity_based":
-        assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
+        assert np.abs(u_and_s - expected).max() <= 1e-12 * np.abs(expected).max()
     else:
-        np.testing.assert_array_equal(found, expected)
+        np.testing.assert_array_equal(u_and_s, expected)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -132,13 +132,13 @@ def test_its_inputs_are_those_that_the_law_reads(made, name):
         "time_delay_sliding": "x r dr ddr",
         "unit_vector": "x v r dr ddr M h",
     }[name]
-    known = {v.name: v for v in fmpy.read_model_description(str(made[name][0])).modelVariables}
+    variables = {v.name: v for v in fmpy.read_model_description(str(made[name][0])).modelVariables}
     inputs = set()
-    for one, v in known.items():
+    for input_name, v in variables.items():
         if v.causality == "input":
-            inputs.add(one.partition("[")[0])
+            inputs.add(input_name.partition("[")[0])
     assert inputs == set(read.split())
-    assert [n for n, v in known.items() if v.causality == "output"] == [
+    assert [n for n, v in variables.items() if v.causality == "output"] == [
         f"{n}[{i}]" for n in "us" for i in JOINTS
     ]
 
@@ -158,10 +158,10 @@ def test_gains_and_bounds_are_those_of_the_joints_and_change_while_it_runs(made,
     fmu = Importer(path, folder / "computed_torque_sliding")
     assert fmu.get("law.k[1]", "law.k[2]", "law.k[3]", "law.c[2]") == [10.0, 20.0, 5.0, 5.0]
     before = stepped(fmu, trace, 3)
-    other = Importer(
+    changed = Importer(
         path, folder / "computed_torque_sliding", **{"law__c[2]": 9.0, "u_max[3]": 0.25}
     )
-    after = stepped(other, trace, 3)
+    after = stepped(changed, trace, 3)
     same = np.all(before == after, axis=0)
     assert same[3:].tolist() == [True, False, True]  # s of the joint whose slope has changed
     np.testing.assert_array_equal(np.abs(after[:, 2]), np.minimum(np.abs(after[:, 2]), 0.25))
@@ -181,10 +181,10 @@ def test_each_joint_has_a_memory_of_its_own(made, folder):
     slots = []
     for i in JOINTS:
         slots.append(fmu.get(*(f"law.memory[{i},{k}]" for k in (1, 2, 3))))
-    np.testing.assert_array_equal([one[0] for one in slots], trace.u[2])
-    assert [one[2] for one in slots] == [1.0] * 3
+    np.testing.assert_array_equal([memory[0] for memory in slots], trace.u[2])
+    assert [memory[2] for memory in slots] == [1.0] * 3
     estimates = fmu.get(*(f"v_estimated[{i}]" for i in JOINTS))
-    assert [one[1] for one in slots] == estimates
+    assert [memory[1] for memory in slots] == estimates
     assert len(set(estimates)) == 3
 
 
@@ -202,20 +202,20 @@ def test_an_fmu_of_a_free_body_gives_the_actuators_their_controls(tmp_path):
             inputs[f"{name}[{i}]"] = (name, i - 1)
     inputs |= {f"M[{i},{j}]": ("M", i - 1, j - 1) for i in axes for j in axes}
     names = [f"{name}[{i}]" for name in "us" for i in axes] + [f"control[{i}]" for i in range(1, 5)]
-    known = {}
+    variables = {}
     for v in fmpy.read_model_description(str(path)).modelVariables:
-        known[v.name] = v
-    assert {name for name, v in known.items() if v.causality == "input"} == inputs.keys()
-    assert [name for name, v in known.items() if v.causality == "output"] == names
-    found = []
+        variables[v.name] = v
+    assert {name for name, v in variables.items() if v.causality == "input"} == inputs.keys()
+    assert [name for name, v in variables.items() if v.causality == "output"] == names
+    rows = []
     for k, t in enumerate(trace.t):
         fmu.set(
             **{name: float(read[field][(k, *place)]) for name, (field, *place) in inputs.items()}
         )
         fmu.fmu.doStep(t, 1e-3)
-        found.append(fmu.get(*names))
-    np.testing.assert_array_equal(found, np.hstack([trace.u, trace.s, trace.applied[:, :4]]))
-    assert len(np.unique(found, axis=0)) > 300
+        rows.append(fmu.get(*names))
+    np.testing.assert_array_equal(rows, np.hstack([trace.u, trace.s, trace.applied[:, :4]]))
+    assert len(np.unique(rows, axis=0)) > 300
 
 
 @pytest.mark.parametrize(
@@ -260,10 +260,12 @@ def test_the_command_takes_the_number_of_joints(tmp_path, capsys):
     with pytest.raises(SystemExit) as end:
         cli.main(["export", "unit_vector", str(out), "--gains", "c=4 6", "--no-binary"])
     assert not end.value.code
-    known = {}
+    variables = {}
     for v in fmpy.read_model_description(str(out)).modelVariables:
-        known[v.name] = v
-    assert [float(known[name].start) for name in ("law.c[1]", "law.c[2]", "M[2,2]", "M[1,2]")] == [
+        variables[v.name] = v
+    assert [
+        float(variables[name].start) for name in ("law.c[1]", "law.c[2]", "M[2,2]", "M[1,2]")
+    ] == [
         4.0,
         6.0,
         1.0,

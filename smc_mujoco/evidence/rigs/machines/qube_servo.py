@@ -244,7 +244,10 @@ QUBE_SERVO = Rig(
     machine=machine,
     controller=state_feedback(),
     columns=Columns(
-        x=("theta", "alpha"), u="plant_input", reference="target_theta", others=("target_alpha",)
+        x=("theta", "alpha"),
+        u="plant_input",
+        reference="target_theta",
+        other_references=("target_alpha",),
     ),
     commands=commands,
     zero=zero,

@@ -39,7 +39,7 @@ class Arrays(Constants):
     def number(self, node: ast.expr) -> Value:
         """Translate an expression that is a number, an array, or a tuple of these."""
         value = self.value(node)
-        if value.kind.of not in WIDTHS and not value.kind.shape:
+        if value.kind.sort not in WIDTHS and not value.kind.shape:
             raise refuse(node, f"{value.text or 'nothing'} as a number")
         return value
 
@@ -76,9 +76,9 @@ class Arrays(Constants):
         if not shapes:
             return values, ()
         for i, value in enumerate(values):
-            if value.kind.of == "memory":
+            if value.kind.sort == "memory":
                 self.program.claim(node, self.program.component.memory)
-                real = value.kind._replace(of="real")
+                real = value.kind._replace(sort="real")
                 values[i] = value._replace(kind=real)
             elif not value.kind.shape and "(" in value.text:
                 values[i] = self.stored(value)
@@ -114,37 +114,37 @@ class Arrays(Constants):
         if owner.items:
             number = self.index(node, places[0], len(owner.items), False)
             return owner.items[int(number.text)]
-        memory = owner.kind.of == "memory"
+        memory = owner.kind.sort == "memory"
         strides = [owner.kind.stride]
         if len(shape) == 2:
             strides = [str(shape[1]), "1"]
             if memory:
                 strides[0] = SLOTS
         tokens = (ROW, COLUMN)[: len(shape)]
-        made = owner
-        left = list[int]()
+        element = owner
+        dimensions = list[int]()
         stride = "1"
         for token, place, size, step in zip(tokens, places, shape, strides, strict=True):
             slots = memory and token == tokens[-1]
             if isinstance(place, ast.Slice):
                 part = self.part(node, place, size, slots)
-                kept = Value(tokens[len(left)], INT)
+                token_kept = Value(tokens[len(dimensions)], INT)
                 if part.start:
-                    kept = Value(f"{kept.text} + {part.start}", INT, SUM)
+                    token_kept = Value(f"{token_kept.text} + {part.start}", INT, SUM)
                 first = Value(str(part.start), INT)
-                made = indexed(made, token, kept, first, step)
-                left.append(len(part))
+                element = indexed(element, token, token_kept, first, step)
+                dimensions.append(len(part))
                 stride = step
             else:
                 index = self.index(node, place, size, slots)
-                made = indexed(made, token, index, index, step)
-        if not left:
-            return Value(made.text, owner.kind.number, owner.level)
-        if not owner.pointer or (len(left) == 2 and (memory or left[1] != shape[1])):
-            made = made._replace(pointer="")  # its numbers do not lie in a row
+                element = indexed(element, token, index, index, step)
+        if not dimensions:
+            return Value(element.text, owner.kind.number, owner.level)
+        if not owner.pointer or (len(dimensions) == 2 and (memory or dimensions[1] != shape[1])):
+            element = element._replace(pointer="")  # its numbers do not lie in a row
             stride = "1"
-        kind = Kind(owner.kind.number.of, tuple(left), owner.kind.fields and (), stride)
-        return made._replace(kind=kind)
+        kind = Kind(owner.kind.number.sort, tuple(dimensions), owner.kind.fields and (), stride)
+        return element._replace(kind=kind)
 
     def part(self, node: ast.Subscript, place: ast.Slice, size: int, slots: bool) -> range:
         """Return the indices of a slice of a dimension. `slots`: whether it is the memory's."""
@@ -153,12 +153,12 @@ class Arrays(Constants):
             bounds.append(self.whole(bound))
             if bound is not None and bounds[-1] is None:
                 raise refuse(node, "a length that is not known before the law runs")
-        found = range(size)[slice(*bounds)]
-        if place.step or not found:
+        indices = range(size)[slice(*bounds)]
+        if place.step or not indices:
             raise refuse(node, "a part of an array that is empty or has a step")
         if slots:
-            self.program.claim(node, found.stop)
-        return found
+            self.program.claim(node, indices.stop)
+        return indices
 
     def index(self, node: ast.Subscript, place: ast.expr, size: int, slots: bool) -> Value:
         """Return the index of an element. Python counts a negative one from the end."""
@@ -184,12 +184,12 @@ class Arrays(Constants):
             return False
         (array,) = value.sources
         first = re.findall(r"\w+", value.pointer)[0]
-        same = [n for n, known in self.names.items() if known.sources == value.sources]
+        same = [n for n, variable in self.names.items() if variable.sources == value.sources]
         if first not in map(self.c_name, same):
             return False
-        given = self.source.assignments[array]
+        assigned = self.source.assignments[array]
         lasts = array in self.parameters or (
-            len(given) == 1 and given[0] not in self.source.in_loops
+            len(assigned) == 1 and assigned[0] not in self.source.in_loops
         )
         return lasts and len(self.source.assignments[name]) == 1 and name not in self.parameters
 
@@ -206,8 +206,8 @@ def indexed(array: Value, token: str, index: Value, start: Value, stride: str) -
     """Return an array with an index in place of a token, and the pointer to where it starts."""
     text, *after = re.split(rf"(\[{token}\]|{token})", array.text)
     values = after[1::2]
-    for found, rest in zip(after[::2], values, strict=True):
-        text += f"[{index.text}]" if found[0] == "[" else index.within(PRODUCT)
+    for token_text, rest in zip(after[::2], values, strict=True):
+        text += f"[{index.text}]" if token_text[0] == "[" else index.within(PRODUCT)
         text += rest
     offset = f" + {start.within(PRODUCT)} * {stride}"
     if stride == "1":

@@ -85,7 +85,7 @@ class Program:
         self.texts: dict[str, str] = {}  # name of a function or a constant array -> text
         self.constants: dict[str, str] = {}  # content of a constant array -> name
         # what is translated -> the name in C, and the function; None while it is in progress
-        self.known: dict[tuple, tuple[str, Any] | None] = {}
+        self.functions: dict[tuple, tuple[str, Any] | None] = {}
         self.used_names = {self.symbol, *RESERVED}
         self.slots = 0  # of memory
 
@@ -110,9 +110,9 @@ class Program:
 
     def name_of(self, name: str, made: "Lines") -> str:
         """Return the name of a function: that of one which is the same, or a new one."""
-        for known, text in self.texts.items():
-            if made.text(known) == text:
-                return known
+        for same, text in self.texts.items():
+            if made.text(same) == text:
+                return same
         unique = self.unique_name(name)
         self.texts[unique] = made.text(unique)
         return unique
@@ -139,7 +139,7 @@ class Program:
                 None,
                 f"the constant {plain(name)}, which is not a one-dimensional array of numbers,",
             )
-        of = {"i": "int", "f": "real"}[data.dtype.kind]
+        sort = {"i": "int", "f": "real"}[data.dtype.kind]
         items = []
         for number in data.tolist():
             item = literal(number, self.single, ast.Constant(number))
@@ -148,9 +148,9 @@ class Program:
         if content not in self.constants:
             self.constants[content] = self.unique_name(name)
         name = self.constants[content]
-        self.texts[name] = f"static const {TYPES[of]} {name}{content}"
+        self.texts[name] = f"static const {TYPES[sort]} {name}{content}"
         fields = getattr(values, "_fields", ()) if isinstance(values, tuple) else None
-        return array_at(name, Kind(of, data.shape, fields))
+        return array_at(name, Kind(sort, data.shape, fields))
 
 
 class Lines:
@@ -195,7 +195,7 @@ class Lines:
         self.changed = set[str]()  # names of arrays whose elements it changes
         if self.entry:
             for name, kind in self.parameters.items():
-                if kind.of == "memory":
+                if kind.sort == "memory":
                     self.changed.add(name)
         self.copies = list[tuple[frozenset[str], ast.AST]]()  # which must not change
         self.returned = set[int]()  # positions of arguments whose numbers a result may have
@@ -231,22 +231,22 @@ class Lines:
         if self.entry:
             return f"int {name}({', '.join(arguments)}, smc_real *out)"
         if self.returns_scalar():
-            return f"static {TYPES[self.results[0].of]} {name}({', '.join(arguments) or 'void'})"
+            return f"static {TYPES[self.results[0].sort]} {name}({', '.join(arguments) or 'void'})"
         for i, kind in enumerate(self.results):
-            arguments.append(f"{TYPES[kind.of]} *out_{i}")
+            arguments.append(f"{TYPES[kind.sort]} *out_{i}")
         return f"static void {name}({', '.join(arguments)})"
 
     def pointer_to(self, name: str) -> str:
         """Return the type of an argument or of a pointer to an array."""
         kind = self.kinds[name]
-        if not kind.shape and kind.of in WIDTHS:
-            return f"{TYPES[kind.of]} "
-        of = TYPES[kind.of]
-        if kind.of == "y" and self.program.component.kind == "estimator":
-            of = "smc_reading"
+        if not kind.shape and kind.sort in WIDTHS:
+            return f"{TYPES[kind.sort]} "
+        type_name = TYPES[kind.sort]
+        if kind.sort == "y" and self.program.component.kind == "estimator":
+            type_name = "smc_reading"
         if self.names[name].sources <= self.parameters.keys() - self.changed:
-            of = f"const {of}"
-        return f"{of} *"
+            type_name = f"const {type_name}"
+        return f"{type_name} *"
 
     def returns_scalar(self) -> bool:
         """Return whether it returns one number."""
@@ -258,7 +258,7 @@ class Lines:
         if kind.shape:
             return array_at(self.c_name(name), kind, sources=[name])
         value = Value(self.c_name(name), kind)
-        if kind.of in WIDTHS:
+        if kind.sort in WIDTHS:
             return value
         return value._replace(sources=frozenset([name]))  # y and gains
 
@@ -270,12 +270,12 @@ class Lines:
 
     def origins(self, text: str) -> set[str]:
         """Return the names of the variables that some C mentions, and of the arrays they are."""
-        found = set[str]()
+        variables = set[str]()
         mentioned = words(re.sub(r"->\w+", "", text))
         for name, value in self.names.items():
             if self.c_name(name) in mentioned:
-                found |= {name, *value.sources}
-        return found
+                variables |= {name, *value.sources}
+        return variables
 
     def temporary(self, kind: Kind) -> Value:
         """Return a new variable."""
@@ -291,24 +291,24 @@ class Lines:
         """Return what a method makes of some code, and the lines that it writes."""
         before = self.lines
         self.lines = []
-        made = translate(node)
+        translated = translate(node)
         own = self.lines
         self.lines = before
-        return made, own
+        return translated, own
 
     def alone(self, translate: Callable[[Any], Any], node: ast.expr) -> Any:
         """Return what a method makes of some code that must need no line before it."""
-        made, lines = self.captured(translate, node)
+        translated, lines = self.captured(translate, node)
         if lines:
             raise refuse(node, "an array that is computed within a condition")
-        return made
+        return translated
 
 
 def declaration(name: str, kind: Kind) -> str:
     """Return the line that declares a variable."""
     if kind.shape:
-        return f"{TYPES[kind.of]} {name}[{math.prod(kind.shape)}];"
-    return f"{TYPES[kind.of]} {name} = 0;"
+        return f"{TYPES[kind.sort]} {name}[{math.prod(kind.shape)}];"
+    return f"{TYPES[kind.sort]} {name} = 0;"
 
 
 def plain(name: str) -> str:

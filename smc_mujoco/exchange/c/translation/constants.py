@@ -33,8 +33,8 @@ class Constants(Lines):
         match node:
             case ast.Call(func=ast.Name(id="len"), args=[array]):
                 return self.value(array).kind.shape[0]
-            case ast.Name(id=name) if given := self.source.assignments.get(name):
-                match given:
+            case ast.Name(id=name) if assigned := self.source.assignments.get(name):
+                match assigned:
                     case [ast.Assign(targets=[ast.Name()], value=value)]:
                         return self.whole(value)
                 return None

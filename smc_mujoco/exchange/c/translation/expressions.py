@@ -105,7 +105,7 @@ class Expressions(Arrays):
         value = self.number(node)
         if value.kind.shape:
             raise refuse(node, "an array as a condition")
-        if value.kind.of in WHOLE:
+        if value.kind.sort in WHOLE:
             return value.text
         return f"{value.within(UNARY)} != 0"
 
@@ -141,9 +141,9 @@ class Expressions(Arrays):
         if (constant := self.resolve(node)) is not None:
             return self.outer(node, constant)
         owner = self.value(node.value)
-        if owner.kind.of == "y":
+        if owner.kind.sort == "y":
             return self.measured(owner, node.attr)
-        if owner.kind.of == "gains":
+        if owner.kind.sort == "gains":
             return self.gain(owner, node.attr)
         if not owner.kind.fields:
             raise refuse(node, "an attribute")
@@ -184,8 +184,8 @@ class Expressions(Arrays):
         (value,), _ = self.matched(node, [node.operand])
         if not isinstance(node.op, ast.USub):
             raise refuse(node, "the operator")
-        of = value.kind.of.replace("bool", "int")
-        kind = value.kind._replace(of=of)
+        sort = value.kind.sort.replace("bool", "int")
+        kind = value.kind._replace(sort=sort)
         return Value(f"-{value.within(ATOM)}", kind, UNARY)
 
     def _binop(self, node: ast.BinOp) -> Value:
@@ -194,31 +194,31 @@ class Expressions(Arrays):
             return self.power(node)
         if sort is ast.MatMult:
             raise refuse(node, "the operator @")
-        (left, right), shape = self.matched(node, [node.left, node.right])
-        whole = left.kind.of in WHOLE and right.kind.of in WHOLE
-        if sort in BIT_OPERATORS and whole:
-            text = f"{left.within(ATOM)} {BIT_OPERATORS[sort]} {right.within(ATOM)}"
+        (before_sign, after_sign), shape = self.matched(node, [node.left, node.right])
+        integers = before_sign.kind.sort in WHOLE and after_sign.kind.sort in WHOLE
+        if sort in BIT_OPERATORS and integers:
+            text = f"{before_sign.within(ATOM)} {BIT_OPERATORS[sort]} {after_sign.within(ATOM)}"
             return Value(text, Kind("int", shape), LOOSE)
-        if sort is ast.Mod and whole:
-            text = f"{self.program.helper('modulo', 'int')}({left.text}, {right.text})"
+        if sort is ast.Mod and integers:
+            text = f"{self.program.helper('modulo', 'int')}({before_sign.text}, {after_sign.text})"
             return Value(text, Kind("int", shape))
         if sort not in OPERATORS:
             raise refuse(node, f"the operator {sort.__name__}")
         sign, level = OPERATORS[sort]
-        first = left.within(level)
-        of = widest(left.kind.of, right.kind.of)
-        if whole:
-            of = "int"
-        if whole and sign == "/":
-            of = "real"
-            first = f"(smc_real){left.within(UNARY)}"
-        return Value(f"{first} {sign} {right.within(level + 1)}", Kind(of, shape), level)
+        first = before_sign.within(level)
+        number = widest(before_sign.kind.sort, after_sign.kind.sort)
+        if integers:
+            number = "int"
+        if integers and sign == "/":
+            number = "real"
+            first = f"(smc_real){before_sign.within(UNARY)}"
+        return Value(f"{first} {sign} {after_sign.within(level + 1)}", Kind(number, shape), level)
 
     def power(self, node: ast.BinOp) -> Value:
         """Translate a power, as numba compiles it."""
         exponent = self.constant(node.right)
         (base, by), shape = self.matched(node, [node.left, node.right])
-        if base.kind.of in WHOLE:
+        if base.kind.sort in WHOLE:
             raise refuse(node, "a power of a whole number")
         if exponent == 1:
             return base
@@ -226,10 +226,10 @@ class Expressions(Arrays):
             return self.math("sqrt", [base], shape)
         if exponent == 2 or (isinstance(exponent, int) and exponent in POWERS):
             helper = self.program.helper(
-                f"power_{int(exponent)}", base.kind.of, POWERS[int(exponent)]
+                f"power_{int(exponent)}", base.kind.sort, POWERS[int(exponent)]
             )
-            return Value(f"{helper}({base.text})", Kind(base.kind.of, shape))
-        if by.kind.of in WHOLE:
+            return Value(f"{helper}({base.text})", Kind(base.kind.sort, shape))
+        if by.kind.sort in WHOLE:
             raise refuse(node, "a power with such an exponent")
         return self.math("pow", [base, by], shape)
 
@@ -238,8 +238,8 @@ class Expressions(Arrays):
             raise refuse(node, "the comparison")
         values, shape = self.matched(node, [node.left, *node.comparators])
         parts = []
-        for (left, right), sign in zip(itertools.pairwise(values), node.ops, strict=True):
-            parts.append(f"{left.within(SUM)} {COMPARISONS[type(sign)]} {right.within(SUM)}")
+        for (lower, upper), sign in zip(itertools.pairwise(values), node.ops, strict=True):
+            parts.append(f"{lower.within(SUM)} {COMPARISONS[type(sign)]} {upper.within(SUM)}")
         return Value(" && ".join(parts), Kind("bool", shape), LOOSE)
 
     def _boolop(self, node: ast.BoolOp) -> Value:
@@ -275,23 +275,23 @@ class Expressions(Arrays):
             return value._replace(pointer="", sources=frozenset())
         function = self.callee(node)
         if function is len:
-            made = Value(str(self.whole(node)), INT)
+            called = Value(str(self.whole(node)), INT)
         elif function in FILLED:
-            made = self.filled(function, node)
+            called = self.filled(function, node)
         elif function in REQUESTS:
-            made = self.requested(function, node)
+            called = self.requested(function, node)
         elif hasattr(function, "_fields"):
             items = map(self.number, node.args)
-            made = gathered([*items], function._fields)
+            called = gathered([*items], function._fields)
         elif function is np.array and isinstance(node.args[0], ast.List | ast.Tuple):
-            made = gathered([*map(self.number, node.args[0].elts)])
-            kind = made.kind._replace(fields=None)
-            made = self.stored(made._replace(kind=kind))
+            called = gathered([*map(self.number, node.args[0].elts)])
+            kind = called.kind._replace(fields=None)
+            called = self.stored(called._replace(kind=kind))
         elif self.calls_python(node):
-            made = self.results_of(node)
+            called = self.results_of(node)
         else:
-            made = self.built_in(function, node)
-        return made
+            called = self.built_in(function, node)
+        return called
 
     def requested(self, function: Any, node: ast.Call) -> Value:
         """Translate coriolis and jacobian, which the caller of the law provides."""
@@ -317,7 +317,7 @@ class Expressions(Arrays):
             return functools.reduce(functools.partial(self.lesser_or_greater, name), values)
         if function in CASTS and len(values) == 1:
             kind = Kind(CASTS[function])
-            return Value(f"({TYPES[kind.of]}){values[0].within(UNARY)}", kind, UNARY)
+            return Value(f"({TYPES[kind.sort]}){values[0].within(UNARY)}", kind, UNARY)
         if function in ROUNDING:
             text = self.math(ROUNDING[function], values).text
             return Value(f"(int32_t){text}", INT, UNARY)
@@ -327,23 +327,23 @@ class Expressions(Arrays):
 
     def lesser_or_greater(self, name: str, first: Value, second: Value) -> Value:
         """Translate Python's min or max of two numbers."""
-        of = widest(first.kind.of, second.kind.of)
-        helper = self.program.helper(f"{name}imum", of)
-        return Value(f"{helper}({first.text}, {second.text})", Kind(of))
+        sort = widest(first.kind.sort, second.kind.sort)
+        helper = self.program.helper(f"{name}imum", sort)
+        return Value(f"{helper}({first.text}, {second.text})", Kind(sort))
 
     def elementwise(self, function: Any, values: Sequence[Value], shape: tuple[int, ...]) -> Value:
         """Translate a call of a function of numpy, or of abs."""
         name = ELEMENTWISE[function]
-        if name == "fabs" and values[0].kind.of in WHOLE:
+        if name == "fabs" and values[0].kind.sort in WHOLE:
             name = "absolute"
         if name not in HELPERS:
             return self.math(name, values, shape)
-        of = functools.reduce(widest, [value.kind.of for value in values])
-        return Value(f"{self.program.helper(name, of)}({joined(values)})", Kind(of, shape))
+        sort = functools.reduce(widest, [value.kind.sort for value in values])
+        return Value(f"{self.program.helper(name, sort)}({joined(values)})", Kind(sort, shape))
 
     def math(self, name: str, values: Sequence[Value], shape: tuple[int, ...] = ()) -> Value:
         """Translate a call of a function of math.h, in the precision of its arguments."""
-        single = {value.kind.of for value in values} == {"single"}
+        single = {value.kind.sort for value in values} == {"single"}
         if single or self.program.single:
             name += "f"
         kind = Kind("single" if single else "real", shape)

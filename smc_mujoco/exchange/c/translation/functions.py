@@ -76,23 +76,23 @@ class Function(Statements):
         function = self.callee(call)
         values = [*map(self.argument, call.args)]
         literals = [*map(self.constant, call.args)]
-        name, made = self.called(function, values, literals)
-        self.check_changes(call, values, made)
+        name, callee = self.called(function, values, literals)
+        self.check_changes(call, values, callee)
         arguments = []
-        for parameter in made.parameters:
-            value = values[made.source.position[parameter]]
+        for parameter in callee.parameters:
+            value = values[callee.source.position[parameter]]
             arguments.append(value.pointer or value.text)
-        if made.returns_scalar():
-            value = Value(f"{name}({', '.join(arguments)})", made.results[0])
-            if made.changed & made.parameters.keys():
+        if callee.returns_scalar():
+            value = Value(f"{name}({', '.join(arguments)})", callee.results[0])
+            if callee.changed & callee.parameters.keys():
                 return self.stored(value)
             return value
         sources = frozenset[str]()
-        for i in made.returned:
+        for i in callee.returned:
             sources |= values[i].sources
-        items = self.results_in(made, arguments, sources)
+        items = self.results_in(callee, arguments, sources)
         self.lines.append(f"{name}({', '.join(arguments)});")
-        return items[0] if len(items) == 1 else gathered(items, made.fields)
+        return items[0] if len(items) == 1 else gathered(items, callee.fields)
 
     def results_in(
         self, made: "Function", arguments: list[str], sources: frozenset[str]
@@ -101,9 +101,9 @@ class Function(Statements):
         arguments. Numbers of one kind are in one array.
         """
         kinds = made.results
-        alike = len(kinds) > 1 and {*kinds} == {Kind(kinds[0].of)}
+        alike = len(kinds) > 1 and {*kinds} == {Kind(kinds[0].sort)}
         if alike:
-            own_kind = Kind(kinds[0].of, (len(kinds),), made.fields)
+            own_kind = Kind(kinds[0].sort, (len(kinds),), made.fields)
             array = self.temporary(own_kind)
             arguments.append(array.pointer)
             for i in range(1, len(kinds)):
@@ -134,22 +134,22 @@ class Function(Statements):
                 constants[name] = number
         kinds = tuple(value.kind for value in values)
         key = source.written, kinds, tuple(constants.items())
-        if key not in program.known:
-            program.known[key] = None
-            made = Function(program, source, kinds, constants)
-            own_name = program.name_of(source.tree.name, made)
-            program.known[key] = own_name, made
-        if (known := program.known[key]) is None:
+        if key not in program.functions:
+            program.functions[key] = None
+            callee = Function(program, source, kinds, constants)
+            own_name = program.name_of(source.tree.name, callee)
+            program.functions[key] = own_name, callee
+        if (translated := program.functions[key]) is None:
             raise refuse(None, f"{source.tree.name}, which calls itself,")
-        return known
+        return translated
 
     def check_changes(self, call: ast.Call, values: list[Value], made: "Function") -> None:
         """Refuse a call that changes an array in a way that C would not."""
         for name in made.changed & made.parameters.keys():
             i = made.source.position[name]
             self.check_argument(call.args[i], values[i])
-            others = values[:i] + values[i + 1 :]
-            if any(values[i].sources & other.sources for other in others):
+            siblings = values[:i] + values[i + 1 :]
+            if any(values[i].sources & sibling.sources for sibling in siblings):
                 raise refuse(call, "a call that gets an array twice and changes it")
             if self.reads_beside(call, values[i]):
                 what = "a call that changes an array which the rest of the line reads"

@@ -62,11 +62,11 @@ class PythonSource:
 
     def exponents(self) -> set[str]:
         """Return the names that are exponents of powers."""
-        found = set()
+        names = set()
         for node in inside(self.tree.body):
             if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
-                found.add(getattr(node.right, "id", ""))
-        return found
+                names.add(getattr(node.right, "id", ""))
+        return names
 
 
 def parsed(function: Any) -> tuple[FunctionType, ast.FunctionDef]:

@@ -42,10 +42,10 @@ class Statements(Expressions):
                 self.assign(target, value)
             case ast.AugAssign(target=target):
                 expression = ast.BinOp(target, node.op, node.value)
-                whole = self.value(expression)
-                if whole.kind.shape and isinstance(target, ast.Name):  # changes the array itself
+                assigned = self.value(expression)
+                if assigned.kind.shape and isinstance(target, ast.Name):  # changes the array itself
                     target = ast.Subscript(target, ast.Slice())
-                self.store(target, whole)
+                self.store(target, assigned)
             case ast.If():
                 self.branch(node)
             case ast.For(target=ast.Name(id=name), orelse=[]):
@@ -168,7 +168,7 @@ class Statements(Expressions):
         targets = target.elts
         value = self.value(node)
         values = value.elements()
-        if value.kind.of == "memory":
+        if value.kind.sort == "memory":
             self.program.claim(node, len(targets))
             values = values[: len(targets)]
         if len(values) != len(targets):
@@ -196,16 +196,16 @@ class Statements(Expressions):
             place = self.destination(target, value)
         else:
             place = self.changeable(target)
-            of_place = Kind(place.kind.of)
-            if wider(of_place, Kind(value.kind.of)).of != place.kind.of:
+            of_place = Kind(place.kind.sort)
+            if wider(of_place, Kind(value.kind.sort)).sort != place.kind.sort:
                 raise refuse(target, "real numbers for elements of an array of whole numbers")
             if value.kind.shape not in ((), place.kind.shape):
                 raise refuse(target, f"an array of shape {value.kind.shape} for one of another")
         if place is None or place.text == value.text:
             return
         if place.kind.shape:  # elements that it reads must not be those that the loop has changed
-            others = joined(value.items or (value,))
-            rest = others.replace(place.text, "")
+            read = joined(value.items or (value,))
+            rest = read.replace(place.text, "")
             if self.origins(rest) & self.origins(place.text):
                 value = self.stored(value)
         self.fill(place, value)
@@ -215,7 +215,7 @@ class Statements(Expressions):
         name = target.id
         kind = value.kind._replace(stride="1")
         before = self.kinds.get(name)
-        if name in self.constants or (before or kind).of not in WIDTHS or kind.of not in WIDTHS:
+        if name in self.constants or (before or kind).sort not in WIDTHS or kind.sort not in WIDTHS:
             raise refuse(target, "an assignment to this")
         if name in self.parameters and before and (before.shape or kind.shape):
             raise refuse(target, "an assignment to an argument that is an array")

@@ -46,7 +46,7 @@ LOOSE = 1
 class Kind(NamedTuple):
     """What a value is: a number, an array, a tuple, or y or gains of a component."""
 
-    of: str  # y, gains, memory, or one of WIDTHS
+    sort: str  # y, gains, memory, or one of WIDTHS
     shape: tuple[int, ...] = ()  # of an array or a tuple
     fields: Names | None = None  # of a tuple: their names, if it has some
     stride: str = "1"  # of a vector: from one number to the next
@@ -54,7 +54,7 @@ class Kind(NamedTuple):
     @property
     def number(self) -> "Kind":
         """The kind of its numbers."""
-        return REAL if self.of == "memory" else Kind(self.of)
+        return REAL if self.sort == "memory" else Kind(self.sort)
 
 
 INT = Kind("int")
@@ -93,7 +93,7 @@ def array_at(base: str, kind: Kind, offset: str = "", sources: Iterable[str] = (
     """Return the array that begins in another one, or at a pointer, from an offset on."""
     if len(kind.shape) == 2:
         width = str(kind.shape[1])
-        if kind.of == "memory":
+        if kind.sort == "memory":
             width = SLOTS
         place = f"{ROW} * {width} + {COLUMN}"
     elif kind.stride == "1":
@@ -109,8 +109,8 @@ def array_at(base: str, kind: Kind, offset: str = "", sources: Iterable[str] = (
 
 def gathered(items: Sequence[Value], fields: Names = ()) -> Value:
     """Return a tuple of values."""
-    of = functools.reduce(widest, [item.kind.of for item in items], "bool")
-    kind = Kind(of, (len(items),), fields)
+    sort = functools.reduce(widest, [item.kind.sort for item in items], "bool")
+    kind = Kind(sort, (len(items),), fields)
     return Value("", kind, items=tuple(items))
 
 
@@ -119,8 +119,8 @@ def chosen(test: Value, yes: Value, no: Value, shape: tuple[int, ...] | None = N
     if shape is None:
         kind = wider(yes.kind, no.kind)
     else:
-        of = widest(yes.kind.of, no.kind.of)
-        kind = Kind(of, shape)
+        sort = widest(yes.kind.sort, no.kind.sort)
+        kind = Kind(sort, shape)
     text = f"{test.within(SUM)} ? {yes.within(SUM)} : {no.within(SUM)}"
     return Value(text, kind, LOOSE)
 
@@ -130,7 +130,7 @@ def widest(first: str, second: str) -> str:
 
     An integer and a single give a real.
     """
-    pair = [WIDTHS.index(Kind(of).number.of) for of in (first, second)]
+    pair = [WIDTHS.index(Kind(sort).number.sort) for sort in (first, second)]
     if max(pair) == WIDTHS.index("single") != min(pair):
         return "real"
     return WIDTHS[max(pair)]
@@ -143,7 +143,7 @@ def wider(first: Kind, second: Kind) -> Kind:
     fields = first.fields
     if fields != second.fields:
         fields = ()
-    return Kind(widest(first.of, second.of), first.shape, fields)
+    return Kind(widest(first.sort, second.sort), first.shape, fields)
 
 
 def literal(value: Any, single: bool, node: ast.AST) -> Value:
@@ -164,7 +164,7 @@ def literal(value: Any, single: bool, node: ast.AST) -> Value:
         text = "NAN"
     elif math.isinf(value):
         text = "INFINITY" if value > 0.0 else "-INFINITY"
-    elif single or kind.of == "single":
+    elif single or kind.sort == "single":
         text += "f"
     return signed(text, kind)
 
