@@ -270,7 +270,9 @@ class Episode:
         setting = self.setting
         mujoco.mj_resetData(setting.model, data)
         data.warning.number[:] = 1  # MuJoCo tells only the first: `diverged` says it
-        data.qpos[:], data.qvel[:] = models.state_with(setting.model, setting.joints, *self.start)
+        data.qpos[:], data.qvel[:] = models.started(
+            setting.model, setting.joints, setting.scenario, *self.start
+        )
         if setting.uses_callback:
             self.callback_records = Records(setting, 1)
             data.userdata[:] = self.callback_records.begin(0, *self.start)

@@ -22,7 +22,7 @@ from smc_mujoco.envs.gymnasium_env import action_space, observation_space
 from smc_mujoco.envs.tasks import reward
 from smc_mujoco.mechanisms.custom.model_constraints import smooth
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Plant
-from smc_mujoco.simulation.model import state_with, without_scenery
+from smc_mujoco.simulation.model import started, without_scenery
 from smc_mujoco.simulation.run import cores  # also imports mujoco.batch without a callback
 
 # isort: split
@@ -156,7 +156,10 @@ class BatchEnv(VectorEnv):
             self.batch.bind("act")[ids] = self.setting.activations
         for i in ids.tolist():
             start = self.setting.draw_start(self.randoms[i], options)
-            self.qpos[i], self.qvel[i] = state_with(self.setting.model, self.setting.joints, *start)
+            setting = self.setting
+            self.qpos[i], self.qvel[i] = started(
+                setting.model, setting.joints, setting.scenario, *start
+            )
             if self.setting.uses_callback:
                 self.userdata[i] = self.callback_records.begin(i, *start)
         self.samples[mask] = 0

@@ -36,7 +36,6 @@ from smc_mujoco.identification.lack_of_fit import lack_of_fit
 from smc_mujoco.identification.own_rig import (
     LogPart,
     OwnRig,
-    as_recorded,
     check_named,
     own_rig,
 )
@@ -56,6 +55,7 @@ from smc_mujoco.mechanisms.layout import (
 )
 from smc_mujoco.mechanisms.named import jointed
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.readings import as_recorded
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Noise

@@ -48,6 +48,7 @@ SAMPLES_A_PERIOD, FASTEST = 40.0, 10.0
 SMALL = (
     0.02  # of the command's deviation, or of the inertia: start of what would be negative; chosen
 )
+APART = 1.05  # the level of a friction at rest over that while sliding, at the start; chosen
 SHIFT = 0.01  # of a parameter, for the slope of forces by it
 LARGEST_ANGLE = 3.0 * math.pi  # rad: a larger one may be in degrees; chosen
 MAX_BEYOND = 0.1  # of a joint's range, by which a log may pass it, as stops are soft; chosen
@@ -204,7 +205,8 @@ def _within(rig: OwnRig, values: Numbers, data: Sequence[Data]) -> OwnRig:
             small = SMALL * (inertia if name.endswith(".armature") else u)
             start = quantity.value if quantity.value > quantity.least else small
         changed[name] = dataclasses.replace(quantity, value=start, source="forces of the logs")
-    return dataclasses.replace(rig, quantities=changed)
+    guessed = dataclasses.replace(rig, quantities=changed)
+    return guessed.with_values(guessed.in_order(guessed.values, APART), "forces of the logs")
 
 
 def linear(rig: OwnRig) -> list[str]:

@@ -40,6 +40,8 @@ KEPT_PROMISE = 0.5  # of the decrease that derivatives promise: less calls for d
 # s, by which other delays differ that are tried; chosen: with a command that jumps at each sample
 # derivatives by the delay hold for about a sample
 DELAY_MOVES = -8e-3, -4e-3, -2e-3, -1e-3, 1e-3, 2e-3, 4e-3, 8e-3
+# of a stiffness, that are tried; chosen
+SPRING_FACTORS = 0.1, 0.2, 0.35, 0.6, 0.8, 1.25, 1.7, 3.0, 5.0, 10.0
 LEAST_DELAY_MOVE = 2.5e-4  # s, at the solution; chosen
 BETTER = 3.0  # deviations of noise, by which another delay must fit better there; chosen
 MOST_DELAYS = 3  # other delays, at most, from which a search starts again; chosen
@@ -69,9 +71,10 @@ def search(
     if starts == 1:
         best = refine(replays, first, most, tolerance)
         for _ in range(MOST_DELAYS):
-            if (delayed := _other_delay(replays, best, SMALL_CHANGE)) is None:
+            point = _other_spring(replays, best) or _other_delay(replays, best, SMALL_CHANGE)
+            if point is None:
                 break
-            tried = refine(replays, replays.slopes(delayed), most, tolerance)
+            tried = refine(replays, replays.slopes(point), most, tolerance)
             if tried.cost >= best.cost:
                 break
             best = tried
@@ -87,6 +90,35 @@ def search(
     return refine(replays, best, most, tolerance)
 
 
+def _other_spring(replays: Replays, slopes: Slopes) -> Point | None:
+    """Return the point with the stiffness of a spring that leaves least of what no quantity can
+    cause, by the slopes; None if that is the present one. The cost has a valley for each frequency
+    of a resonance.
+    """
+    best, least = slopes.point, (1.0 - LAST_CHANGE) * _left(slopes, slopes.residuals)
+    for k, name in enumerate(replays.names):
+        if name not in replays.twin.springs:
+            continue
+        points = []
+        for factor in SPRING_FACTORS:
+            values = slopes.point.values.copy()
+            values[k] = np.clip(factor * values[k], replays.low[k], replays.high[k])
+            points.append(Point(values, slopes.point.states))
+        costs = [_left(slopes, rows) for rows in replays.residuals(points)]
+        if min(costs) < least:
+            least = min(costs)
+            best = points[costs.index(least)]
+    return None if best is slopes.point else best
+
+
+def _left(slopes: Slopes, rows: list[Array]) -> float:
+    """Return the sum of squares of residuals without what quantities can cause, by the slopes."""
+    J = slopes.freed_slopes
+    basis, _ = np.linalg.qr(J / np.maximum(np.linalg.norm(J, axis=0), MIN_SIZE))
+    freed = np.concatenate(slopes.freed(rows))
+    return cost([freed - basis @ (basis.T @ freed)])
+
+
 def _other_delay(
     replays: Replays, slopes: Slopes, share: float, moves: Sequence[float] | Array = DELAY_MOVES
 ) -> Point | None:
@@ -96,14 +128,7 @@ def _other_delay(
     if DELAY not in replays.names:
         return None
     k = replays.names.index(DELAY)
-    J = slopes.freed_slopes
-    basis, _ = np.linalg.qr(J / np.maximum(np.linalg.norm(J, axis=0), MIN_SIZE))
-
-    def left(rows: list[Array]) -> float:
-        freed = np.concatenate(slopes.freed(rows))
-        return cost([freed - basis @ (basis.T @ freed)])
-
-    best, least = slopes.point, (1.0 - share) * left(slopes.residuals)
+    best, least = slopes.point, (1.0 - share) * _left(slopes, slopes.residuals)
     while True:
         points = []
         for move in moves:
@@ -112,7 +137,7 @@ def _other_delay(
                 values[k] + move / replays.scales[k], replays.low[k], replays.high[k]
             )
             points.append(Point(values, best.states))
-        lefts = list(map(left, replays.residuals(points)))
+        lefts = [_left(slopes, rows) for rows in replays.residuals(points)]
         if min(lefts) >= least:
             return None if best is slopes.point else best
         least = min(lefts)

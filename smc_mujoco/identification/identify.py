@@ -368,7 +368,7 @@ def identify(
         lacking = _lacking(replays, slopes)
         by_model = np.hypot(by_steps, lacking.moved)
         errors, correlations = statistics(replays, slopes, by_model)
-    values = replays.values(slopes.point)
+    values = twin.in_order(replays.values(slopes.point))
     fitted = twin.with_values(values, "identified from records")
     states = _starting_states(fitted, data, replays, slopes.point)
     steps = replays.short_steps
@@ -594,6 +594,7 @@ def _solved(
     extrapolates = twin.controller is None and not corrected
     tolerance = gauss_newton.SMALL_CHANGE if extrapolates else gauss_newton.COST_TOLERANCE
     reached = gauss_newton.search(pieces, first, starts, seed, most, tolerance)
+    reached = pieces.in_order(reached)
     if twin.controller is None:
         if not corrected:
             return pieces, *gauss_newton.extrapolated(pieces, reached, most)

@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.aliases import Array, Data, Fields, Names, Numbers
+from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.data import frozen_data, keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.control.law import law_function
 from smc_mujoco.identification import records
+from smc_mujoco.identification.hidden_starts import HiddenStart, begun, hidden_starts
 from smc_mujoco.identification.paths import (
     DELAY,
     FIELDS,
@@ -32,10 +33,10 @@ from smc_mujoco.identification.paths import (
 )
 from smc_mujoco.identification.records import Columns, Record
 from smc_mujoco.identification.rig import RecordPart, Rig, Source, Values
-from smc_mujoco.mechanisms.hardware.part import Actuator
-from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
+from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
 from smc_mujoco.mechanisms.layout import channel_names, column_ends, driven_names
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.readings import as_recorded, rotors_read
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Fault
 from smc_mujoco.simulation.time_series import TimeSeries
@@ -46,12 +47,6 @@ SLOWEST = 40.0  # Hz: a log of fewer samples a second misses too much of the com
 STILL = 3.0  # deviations of the noise, or steps of the sensor: less is no motion; chosen
 RUN_STEP = 2.5e-4  # s, longest physics step of runs with a delay, which it divides
 SETTINGS = "control_period", "u_max", "mechanism", "velocity", "model"  # of a scenario, kept
-
-
-@law_function(family="baseline", continuous=True, accuracy=0, label="As recorded", colour="#6E7781")
-def as_recorded(y, gains, memory):
-    """u is the reference: a recorded command."""
-    return y.r, 0.0
 
 
 @frozen_data
@@ -105,7 +100,7 @@ class OwnRig(Rig):
 
     def numbers_of(self, values: Values) -> Fields:
         """Return the fields of a Scenario whose parts and plant have some values."""
-        numbers = vars(values)
+        numbers = self.in_order(vars(values))
         parameters = self.values_of_plant(numbers)
         fields: Fields = {"plant": dataclasses.replace(self.plant, parameters=parameters)}
         fields |= {field: parts_of(self.base, field) for field in FIELDS}
@@ -168,10 +163,9 @@ class OwnRig(Rig):
         data = self.checked(record)
         period = self.step(data)
         hidden = []
-        for i, servo in self.integrators.items():
-            x = data[self.columns.x[i]] - self.zeros[i]
-            integrals = servo.integrals(data[self.columns.inputs[i]], x, period)
-            hidden.append(integrals[self._first(start, period)])
+        for unknown in self.hidden:
+            guesses = unknown.guesses(*self._of_channel(data, unknown), period)
+            hidden.append(guesses[self._first(start, period)])
         stride = math.ceil(period / MAX_PERIOD - 1e-9)
         first = self._first(start, period)
         count = round(plain.fields["duration"] / period) + 1
@@ -230,32 +224,45 @@ class OwnRig(Rig):
         return np.array(numbers)
 
     @property
-    def integrators(self) -> dict[int, PositionServo]:
-        """Driven channel -> its servo, where that integrates its error. What it has integrated is
-        in no log: it is a free number of each piece, as velocities are, and starts from the log.
-        """
-        servos = {}
-        for i, motor in enumerate(self.base.drive_train.motors):
-            if isinstance(motor, PositionServo) and motor.ki:
-                servos[i] = motor
-        return servos
+    def hidden(self) -> list[HiddenStart]:
+        """What no log has at the start of a piece."""
+        return hidden_starts(self.base)
 
-    def _integrating(self, parts: Sequence[Actuator], integrals: Array) -> tuple[Actuator, ...]:
-        """Return the actuators with the integrals of their servos, (q,)."""
-        joints = driven_names(self.plant)
-        of_joint = {}
-        for i, integral in zip(self.integrators, integrals.tolist(), strict=True):
-            of_joint[joints[i]] = integral
-        actuators = []
-        for part in parts:
-            if not isinstance(part, PositionServo) or not part.ki:
-                actuators.append(part)
-                continue
-            for joint in part.joint_names(self.plant):
-                bound = part.imax or math.inf
-                integral = min(max(of_joint[joint], -bound), bound)
-                actuators.append(dataclasses.replace(part, on=(joint,), integral=integral))
-        return tuple(actuators)
+    def hidden_spreads(self, record: Record, period: float) -> list[float]:
+        """Return how far each hidden number varies in a log."""
+        return [start.spread(*self._of_channel(record, start), period) for start in self.hidden]
+
+    def _of_channel(self, record: Record, start: HiddenStart) -> tuple[Array, Array]:
+        """Return the command and the position of the channel of a hidden number, (K,) each."""
+        i = start.channel
+        return record[self.columns.inputs[i]], record[self.columns.x[i]] - self.zeros[i]
+
+    @property
+    def springs(self) -> list[str]:
+        names = []
+        for name, place in self.places.items():
+            part = parts_of(self.base, place.field)[place.part]
+            if isinstance(part, ElasticJoint) and place.name == "stiffness":
+                names.append(name)
+        return names
+
+    def in_order(self, values: Numbers, apart: float = 1.0) -> dict[str, float]:
+        """Return values in which the level at rest of a friction is at least that while sliding,
+        times `apart`, where both are found: a search may pass from either side to the other.
+        """
+        ordered = dict(values)
+        paths = {place: name for name, place in self.places.items()}
+        for name, place in self.places.items():
+            parts = parts_of(self.base, place.field)
+            at_rest = place.partner(parts)
+            if (
+                at_rest is not None
+                and at_rest in paths
+                and place.name == parts[place.part].ordered[0]
+            ):
+                sliding, resting = sorted((values[name], values[paths[at_rest]]))
+                ordered |= {name: sliding, paths[at_rest]: max(resting, apart * sliding)}
+        return ordered
 
     @property
     def zeros(self) -> Array:
@@ -271,11 +278,17 @@ class OwnRig(Rig):
         # the machine has had these commands, whatever its limits are
         fields["plant"] = dataclasses.replace(fields["plant"], limits=(), reach=None)
         start = np.array(part.state if state is None else state, float)
-        integrals, motion = np.split(start, [len(self.integrators)])
-        if len(integrals):
-            fields["actuator"] = self._integrating(fields["actuator"], integrals)
+        hidden, motion = np.split(start, [len(self.hidden)])
         x, v = np.split(motion, 2)
         x = x - self.zeros
+        if self.hidden:
+            fields["actuator"] = begun(fields["actuator"], self.plant, self.hidden, hidden)
+            for unknown, value in zip(self.hidden, hidden.tolist(), strict=True):
+                if unknown.channel in self.rotors_read:  # the joint lags behind what is read
+                    if unknown.field == "lead":
+                        x[unknown.channel] -= value
+                    elif unknown.field == "lead_rate":
+                        v[unknown.channel] -= value
         if sensors := fields.get("sensor"):
             plant = fields["plant"]
             for sensor in sensors:
@@ -306,6 +319,11 @@ class OwnRig(Rig):
         for name, zero in zip(self.columns.x, self.zeros, strict=True):
             positions[name] = positions[name] + zero
         return positions
+
+    @cached_property
+    def rotors_read(self) -> tuple[int, ...]:
+        """The channels whose encoder reads the rotor."""
+        return rotors_read(self.base)
 
     @property
     def units(self) -> dict[str, str]:

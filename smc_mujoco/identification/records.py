@@ -16,9 +16,9 @@ import numpy as np
 from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair, Data, Floats, Names
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import csv_rows, reading
-from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import trace as traces
 from smc_mujoco.simulation.python_functions import evaluate
+from smc_mujoco.simulation.readings import readings
 from smc_mujoco.simulation.trace import Trace
 
 Record = dict[str, np.ndarray]  # column -> values, (K,)
@@ -144,25 +144,8 @@ def _cell(text: str) -> float:
 
 
 def positions(trace: Trace, columns: Columns, noisy: bool = False) -> Record:
-    """Return a run's positions by column, with the encoder's bias and rounding and, if `noisy`, the
-    run's noise.
-    """
-    s = trace.scenario
-    by_column = {}
-    for i, name in enumerate(columns.x):
-        x = trace.x[:, i]
-        sensor = s.encoder(i)
-        if sensor is not None:
-            x = x + sensor.bias
-        if noisy and s.noise.position:
-            normals = []
-            for k in range(len(x)):
-                normals.append(philox.normals(s.seed, i, philox.MEASUREMENT, k)[0])
-            x = x + s.noise.position * np.array(normals)
-        if sensor is not None and (quantum := sensor.quantum(s.plant.units[i] == "rad")):
-            x = quantum * np.floor(x / quantum + 0.5)
-        by_column[name] = x
-    return by_column
+    """Return a run's positions by column, as encoders read them, see `readings`."""
+    return dict(zip(columns.x, readings(trace, noisy).T, strict=False))
 
 
 def of_trace(trace: Trace, columns: Columns) -> Record:

@@ -1,11 +1,12 @@
 """Residuals of records and their slopes: what a twin predicts at trial values, in pieces that have
 states of their own.
 
-A piece of a record is replayed from positions and velocities at its start, and from what servos
-have integrated by then. These are free numbers of the search, one set for each piece (multiple
-shooting), because a few samples give them too poorly. They enter almost linearly, so each step of
-the search moves them by linear least squares, and only the quantities remain. Source: H. G. Bock,
-"Recent advances in parameter identification techniques for ODE", 1983.
+A piece of a record is replayed from positions and velocities at its start, and from what no record
+has, such as what servos have integrated by then, see hidden_starts.py. These are free numbers of
+the search, one set for each piece (multiple shooting), because a few samples give them too poorly.
+They enter almost linearly, so each step of the search moves them by linear least squares, and only
+the quantities remain. Source: H. G. Bock, "Recent advances in parameter identification techniques
+for ODE", 1983.
 
 MuJoCo's steps are of first order where there is dry friction or a motor, and their error biases the
 quantities by many standard errors. So replays of measured open loops are corrected by what short
@@ -197,7 +198,7 @@ class Replays:
         self.low = np.array(low) / self.scales
         self.high = np.array(high) / self.scales
         n = len(twin.columns.x)
-        self.free = np.arange(len(twin.integrators) + 2 * n)
+        self.free = np.arange(len(twin.hidden) + 2 * n)
         if closed:  # the controller has read the first positions as they were measured
             self.free = self.free[-n:]
         forgotten = closed and twin.score_from > twin.start
@@ -226,6 +227,17 @@ class Replays:
             values[name] = min(max(value, quantity.least), quantity.most)
         return values
 
+    def in_order(self, slopes: Slopes) -> Slopes:
+        """Return slopes at the point whose quantities are in the order in which they are reported;
+        it has the same residuals.
+        """
+        values = self.values(slopes.point)
+        ordered = self.twin.in_order(values)
+        if ordered == values:
+            return slopes
+        scaled = np.array([ordered[name] for name in self.names]) / self.scales
+        return self.slopes(Point(scaled, slopes.point.states))
+
     def rig(self, point: Point) -> Rig:
         """Return the rig at a point."""
         return self.twin.with_values(self.values(point))
@@ -235,8 +247,8 @@ class Replays:
         return self.pieces[k].part
 
     def state(self, point: Point, k: int) -> Array | None:
-        """Return integrals of servos, positions and velocities at the start of piece k, (q + 2n,);
-        None if they are not free.
+        """Return hidden numbers, positions and velocities at the start of piece k, (q + 2n,); None
+        if they are not free.
         """
         if not len(self.free):
             return None
@@ -446,9 +458,7 @@ class Replays:
         ends = np.linspace(first, last, count + 1).round().astype(int)
         x = [data[name] for name in twin.columns.x]
         rates = [records.rate(column, period) for column in x]
-        varied = []
-        for joint, servo in twin.integrators.items():  # by its force
-            varied.append(servo.kp / servo.ki * (x[joint].std() or 1.0))
+        varied = twin.hidden_spreads(data, period)
         for column in (*x, *rates):
             varied.append(column.std() or 1.0)
         names = [*twin.columns.x]

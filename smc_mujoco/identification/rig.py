@@ -79,7 +79,7 @@ class RecordPart:
     """What a replay takes from a record, whatever the quantities of the rig."""
 
     fields: Data  # of the replay's Scenario: law, duration, signals
-    # integrals of servos, positions and velocities at the start, (q + 2n,), see `Rig.integrators`
+    # hidden numbers, positions and velocities at the start, (q + 2n,), see `Rig.hidden`
     state: Array
     largest_u: float  # of the recorded command, in the unit of u
     zero: Numbers  # quantities that the record determines, see `Rig.zero`
@@ -272,11 +272,23 @@ class Rig:
         )
 
     @property
-    def integrators(self) -> Mapping[int, Any]:
-        """Driven channel -> its servo, where that integrates its error; none of a published
-        machine.
-        """
-        return {}
+    def hidden(self) -> Sequence[Any]:
+        """What no record has at the start of a piece; nothing of a published machine."""
+        return ()
+
+    def hidden_spreads(self, record: Record, period: float) -> list[float]:
+        """Return how far each hidden number varies in a record."""
+        del record, period
+        return []
+
+    @property
+    def springs(self) -> Sequence[str]:
+        """The quantities that are the stiffness of a spring before a joint."""
+        return ()
+
+    def in_order(self, values: Numbers) -> dict[str, float]:
+        """Return values as they are reported: those of which one is the larger are in order."""
+        return dict(values)
 
     def finer(self, part: RecordPart, times: int) -> RecordPart:
         """Return a part with that many times as many commands, where a delay needs them."""

@@ -17,6 +17,7 @@ from collections.abc import Collection, Hashable
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.aliases import Floats
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import joined
@@ -427,8 +428,25 @@ def field_values(base: mujoco.MjModel, scenario: Scenario, step: int) -> dict[st
 
 
 def initial_state(model: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
-    """Return qpos and qvel at t = 0, see `state_with`."""
-    return state_with(model, moving_joints(model), scenario.resolved.x0, scenario.resolved.v0)
+    """Return qpos and qvel at t = 0, see `started`."""
+    start = scenario.resolved.x0, scenario.resolved.v0
+    return started(model, moving_joints(model), scenario, *start)
+
+
+def started(
+    model: mujoco.MjModel,
+    joints: np.ndarray,
+    scenario: Scenario,
+    x: Floats | np.ndarray,
+    v: Floats | np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return qpos and qvel at the start of a run from x and v, see `state_with`, with rotors where
+    their parts put them.
+    """
+    qpos, qvel = state_with(model, joints, x, v)
+    for part in scenario.actuator:
+        part.place(model, qpos, qvel)
+    return qpos, qvel
 
 
 def initial_activations(model: mujoco.MjModel, scenario: Scenario) -> np.ndarray:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.constraints import Number, of_fields
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.common.text import counted
@@ -37,21 +38,29 @@ class PartNumber(NamedTuple):
         """Return the parts with another number, unchecked: a search keeps within its range. A level
         at rest follows one while sliding that would pass it, and the other way round.
         """
-        changed = copy.copy(parts[self.part])
-        self._set(changed, self.name, value)
-        ordered = getattr(changed, "ordered", ())  # of frictions
-        if ordered and self.name in ordered and getattr(changed, ordered[1]) is not None:
-            low, high = (np.ravel(getattr(changed, name))[max(self.joint, 0)] for name in ordered)
+        part = copy.copy(parts[self.part])
+        self._set(part, self.name, value)
+        if partner := self.partner(parts):
+            ordered: Names = getattr(part, "ordered", ())
+            low, high = (np.ravel(getattr(part, name))[max(self.joint, 0)] for name in ordered)
             if low > high:
-                (partner,) = set(ordered) - {self.name}
-                self._set(changed, partner, value)
+                self._set(part, partner.name, value)
         after = parts[self.part + 1 :]
-        return *parts[: self.part], changed, *after
+        return *parts[: self.part], part, *after
 
-    def _set(self, made: Any, name: str, value: float) -> None:
+    def partner(self, parts: Sequence[Any]) -> "PartNumber | None":
+        """Return the other one of the two levels that a friction keeps in order; None without."""
+        part = parts[self.part]
+        ordered: Any = getattr(part, "ordered", ())
+        if self.name not in ordered or getattr(part, ordered[1]) is None:
+            return None
+        (name,) = set(ordered) - {self.name}
+        return self._replace(name=name)
+
+    def _set(self, part: Any, name: str, value: float) -> None:
         """Set a number of a part, of this joint where each has one."""
-        within = self.within(getattr(made, name), value)
-        object.__setattr__(made, name, within)
+        within = self.within(getattr(part, name), value)
+        object.__setattr__(part, name, within)
 
     def within(self, every: Any, value: float) -> Any:
         """Return the part's field `every` with this number: one, or a tuple with one a joint."""

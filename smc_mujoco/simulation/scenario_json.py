@@ -33,7 +33,7 @@ FOLDERS = (
 )  # of the parts and signals of this package
 # Fields that older records lack -> their defaults, which are not written either
 LATER = {"fault": None, "tracks": "position"}
-LATER_OF_PARTS = ("side",)
+LATER_OF_PARTS = ("side", "lead", "lead_rate")
 RUN_FILE = "<run_path>"  # the module of what runpy runs
 RESOLVED = tuple(
     Resolved.__annotations__

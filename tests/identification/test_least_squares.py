@@ -65,7 +65,9 @@ class Curve(Replays):
         self.closed = False
         self.report = lambda count: None
         columns = SimpleNamespace(state=(), x=("y",))
-        self.twin = SimpleNamespace(dynamics=None, columns=columns, finer=lambda part, times: part)
+        self.twin = SimpleNamespace(
+            dynamics=None, springs=(), columns=columns, finer=lambda part, times: part
+        )
         self.replayed = []
         self.lag = 0.0
 
@@ -498,7 +500,7 @@ def test_replays_are_corrected_by_what_two_step_sizes_leave():
     assert curve.steps == {"integrator": "RK4", "physics_step": 2.5e-4}
     for closed in (
         {"closed": True},
-        {"twin": SimpleNamespace(dynamics=None, columns=SimpleNamespace(state=("y",)))},
+        {"twin": SimpleNamespace(dynamics=None, springs=(), columns=SimpleNamespace(state=("y",)))},
     ):
         uncorrected = Curve()
         vars(uncorrected).update(closed, lag=800.0)

@@ -97,6 +97,9 @@ def why_not_sampled(s: Resolved, metrics: Sequence[str], device: str) -> str:
         ),
         "a disturbance acts on a body": any(map(_on_a_body, s.disturbance)),
         "numbers of its parts jump": len(s.machines) > 1,
+        "its rotors do not start beside their joints": any(
+            isinstance(part, BesideJoint) and (part.lead or part.lead_rate) for part in s.actuator
+        ),
         "its law does not compile": any(isinstance(part.function, Uncompiled) for part in parts),
     }
     moving = not all(isinstance(signal, Constant) for signal in s.references)

@@ -9,9 +9,10 @@ from typing import Annotated, ClassVar
 import mujoco
 
 from smc_mujoco.common.constraints import Number
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.beside_joint import MIN_INERTIA, BesideJoint
 from smc_mujoco.mechanisms.hardware.moments import Run
-from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF, Natural
+from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF, Natural, Offset
 from smc_mujoco.mechanisms.layout import ROTOR
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
 
@@ -37,6 +38,10 @@ class Backlash(BesideJoint):
       rotor_inertia: kg m^2 (kg) at the joint, 1e-9 or more; that of a DCMotor is added. The default
         is chosen: 1 % of the pendulums' 0.125.
       rotor_damping: N m s/rad (N s/m), 0 or more.
+      lead, lead_rate: where in the play the rotor starts, rad (m) from its middle, and its rate.
+
+    Raises:
+      ScenarioError: a number out of its range, or a lead beyond the play.
     """
 
     smooth = False
@@ -47,6 +52,16 @@ class Backlash(BesideJoint):
     gap: Natural
     rotor_inertia: Annotated[float, Number(low=MIN_INERTIA, high=MAX_PARAMETER)] = 1e-3
     rotor_damping: Natural = 0.0
+    lead: Offset = dataclasses.field(default=0.0, kw_only=True)
+    lead_rate: Offset = dataclasses.field(default=0.0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if abs(self.lead) > 0.5 * self.gap:
+            raise ScenarioError(
+                f"Backlash's lead {self.lead:g} is beyond its play, {0.5 * self.gap:g} to each "
+                "side: give one within it"
+            )
 
     def longest_step(self, plant: Plant) -> float:
         return PLAY_STEP

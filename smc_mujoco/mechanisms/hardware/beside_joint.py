@@ -29,13 +29,21 @@ class BesideJoint(Actuator):
     Attributes:
       rotor_inertia: kg m^2 (kg) at the joint; that of a DCMotor is added.
       rotor_damping: N m s/rad (N s/m), of the rotor's bearings.
+      lead, lead_rate: rotor - joint at the start of a run, rad (m), and its rate, rad/s (m/s).
     """
 
     drives = False
-    units: ClassVar[Mapping[str, str]] = {"rotor_inertia": "{m}", "rotor_damping": "{f} s/{x}"}
+    units: ClassVar[Mapping[str, str]] = {
+        "rotor_inertia": "{m}",
+        "rotor_damping": "{f} s/{x}",
+        "lead": "{x}",
+        "lead_rate": "{x}/s",
+    }
 
     rotor_inertia: float
     rotor_damping: float
+    lead: float
+    lead_rate: float
 
     def couple(self, tendon: mujoco.MjsTendon) -> None:
         """Make of a tendon what is between rotor and joint."""
@@ -72,6 +80,12 @@ class BesideJoint(Actuator):
         rotors = self.rotors(model)
         yield Field("dof_armature", rotors, self.rotor_inertia, adds=True)
         yield Field("dof_damping", rotors, self.rotor_damping)
+
+    def place(self, model: mujoco.MjModel, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        if self.lead or self.lead_rate:
+            rotors = self.rotors(model)
+            qpos[model.jnt_qposadr[model.dof_jntid[rotors]]] += self.lead
+            qvel[rotors] += self.lead_rate
 
     def _names(self, model: mujoco.MjModel) -> list[str]:
         """Return the names of its joints."""

@@ -19,7 +19,7 @@ from smc_mujoco.common.constraints import Number
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.beside_joint import MIN_INERTIA, BesideJoint
 from smc_mujoco.mechanisms.hardware.moments import Run
-from smc_mujoco.mechanisms.hardware.part import Actuator, Natural, Positive
+from smc_mujoco.mechanisms.hardware.part import Actuator, Natural, Offset, Positive
 from smc_mujoco.mechanisms.layout import dof_ids, loaded
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
 
@@ -39,7 +39,8 @@ class ElasticJoint(BesideJoint):
 
     x is the joint's position, behind the spring; so are v, errors and scores. The law reads the
     joint too, or the rotor through an `Encoder(side="motor")`. The law's model does not know the
-    spring. The rotor starts beside the joint, at rest against it, with the spring unbent.
+    spring. The rotor starts beside the joint, at rest against it, with the spring unbent, unless
+    `lead` and `lead_rate` say otherwise.
 
     The default physics step follows the fastest oscillation, to 0.01 ms. A stiffness for which
     that is too long is refused, as is a `physics_step` of your own that does not resolve it.
@@ -51,6 +52,7 @@ class ElasticJoint(BesideJoint):
       rotor_inertia: kg m^2 (kg) at the joint, which is gear^2 times that at the motor; 1e-9 or
         more; that of a DCMotor is added. The default is chosen: 1 % of the pendulums' 0.125.
       rotor_damping: N m s/rad (N s/m) of the rotor's bearings, 0 or more.
+      lead, lead_rate: by which the spring is bent at the start of a run, rad (m), and its rate.
     """
 
     units: ClassVar[Mapping[str, str]] = {
@@ -64,6 +66,8 @@ class ElasticJoint(BesideJoint):
     damping: Natural = 0.0
     rotor_inertia: Annotated[float, Number(low=MIN_INERTIA, high=MAX_PARAMETER)] = 1e-3
     rotor_damping: Natural = 0.0
+    lead: Offset = dataclasses.field(default=0.0, kw_only=True)
+    lead_rate: Offset = dataclasses.field(default=0.0, kw_only=True)
 
     def fastest_pole(self, plant: Plant) -> float:
         """Return the largest |pole| of rotor and joint, 1/s, where the model has all joints at 0

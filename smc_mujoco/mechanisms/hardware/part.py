@@ -113,6 +113,9 @@ class Part:
         actuators, (na,).
         """
 
+    def place(self, model: mujoco.MjModel, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        """Move what it has beside joints, from where these are at the start of a run."""
+
     def structure(self) -> Hashable:
         """Return a key that is equal for parts whose `edit` does the same: their simulations share
         a model.
