@@ -14,7 +14,8 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.source import DEFAULT
 from smc_mujoco.mechanisms.hardware.friction import LuGre
-from smc_mujoco.mechanisms.layout import channel_names, loaded
+from smc_mujoco.mechanisms.hardware.joint_force import of_joint
+from smc_mujoco.mechanisms.layout import channel_names, driven_names, loaded
 from smc_mujoco.simulation.signals import Constant, Step
 
 LOST_SHARE = 0.05  # of a duration that is no whole number of periods, before it is told; chosen
@@ -23,6 +24,12 @@ MAX_ANGLE = (
     3.0 * math.pi
 )  # rad: chosen; swing-ups stay below 1.5 turns, and a larger number may be degrees
 MAX_DEGREES = 720.0  # chosen; a number above this is not taken for degrees
+FAR_START = (
+    10.0,
+    10.0,
+)  # m, and times the plant's usual start: chosen; farther from the goal may be mm
+MAX_MILLIMETRES = 1e4  # chosen; a number above this is not taken for mm
+LEVELS = "static", "coulomb", "level"  # of a friction at rest: the first that it has
 LONG_TIME = 1.0  # s; chosen: an input delay or a control period that is as long may be in ms
 LARGE_FACTORS = 15.0, 1000.0  # chosen: a mismatch between them may be in percent
 
@@ -124,6 +131,37 @@ def _degrees(s: Any) -> Iterator[str]:
                 yield f"{fact}: if it is {value:g} degrees, give math.radians({value:g})"
 
 
+def _far_starts(s: Any) -> Iterator[str]:
+    """Yield a sentence about each start so far away that it may be in mm."""
+    if s.plant.pose:
+        return
+    least, share = FAR_START
+    goal = constant_goal(s) or s.plant.origin
+    for unit, x, usual, end in zip(s.plant.units, s.x0, s.plant.x0, goal, strict=False):
+        near = max(least, share * abs(usual))
+        if unit == "m" and near < abs(x - end) <= MAX_MILLIMETRES:
+            yield (
+                f"x0 is {x:g} m, and runs of {s.plant.name} usually start at {usual:g} m: if it is "
+                f"{x:g} mm, give {x / 1e3:g}"
+            )
+
+
+def _holding_friction(s: Any) -> Iterator[str]:
+    """Yield a sentence about each dry friction that no command can overcome."""
+    forces = dict(zip(driven_names(s.plant), s.drive_train.forces, strict=True))
+    for part in s.friction:
+        values = [getattr(part, name, None) for name in LEVELS]
+        level = next((value for value in values if value is not None), 0.0)
+        for i, joint in enumerate(part.joint_names(s.plant)):
+            force = forces.get(joint, math.inf)
+            if part.side == "link" and of_joint(level, i) >= force:
+                yield (
+                    f"{type(part).__name__} holds joint {joint!r} with {of_joint(level, i):g}, and "
+                    f"its motor gives at most {force:g}: no command moves it, so give less "
+                    "friction, or more u_max"
+                )
+
+
 def _weak_motors(s: Any) -> Iterator[str]:
     """Yield a sentence about each motor that cannot hold its joint at the start."""
     for i, chain in enumerate(s.drive_train.chains):
@@ -153,6 +191,8 @@ def of_values(s: Any) -> Iterator[str]:
     yield from _unreachable_goals(s)
     yield from _positions_for_speeds(s)
     yield from _degrees(s)
+    yield from _far_starts(s)
+    yield from _holding_friction(s)
     yield from _weak_motors(s)
 
 

@@ -41,6 +41,7 @@ from smc_mujoco.common.errors import (
     one_line,
     shown,
     users_stacklevel,
+    warn_once,
     whole,
 )
 from smc_mujoco.common.frozen import frozen
@@ -71,6 +72,7 @@ from smc_mujoco.simulation.signals import Noise, Sine
 LawOfSeed = Callable[[int], Law]  # seed -> the law of that run
 MAX_REST_ACCELERATION = 1e-9  # rad/s^2 or m/s^2; chosen: rounding stays below
 SPREAD = 0.2  # of x0, to either side; chosen
+MAX_SPREAD = 2.0  # chosen; a larger one may be in percent
 GRID_SEEDS = 2**52  # number of a grid's seeds; tuning takes larger ones
 # beyond the channels, whose starts are drawn with their index
 ERROR_STREAM = 2**31
@@ -211,12 +213,20 @@ def starts(
 
     Raises:
       ScenarioError: a number out of its range.
+
+    Warns:
+      ScenarioWarning: a spread that may be in percent.
     """
     middle = None
     if isinstance(x0, Sequence) and not isinstance(x0, str):
         middle = tuple(number("x0", item) for item in items_of("x0", x0))
     elif x0 is not None:
         middle = (number("x0", x0),)
+    if spread > MAX_SPREAD:
+        warn_once(
+            f"spread is {spread:g}, so starts lie up to {spread:g} times as far from the goal as "
+            f"x0 to either side: if it is {spread:g} %, give {spread / 100.0:g}"
+        )
     return Starts(x0=middle, spread=spread, by=by)
 
 

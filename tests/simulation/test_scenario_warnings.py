@@ -95,7 +95,7 @@ def test_turns_ramps_places_and_what_is_no_angle_are_no_degrees():
         {"reference": smc.signals.Ramp(100.0)},
     ):
         dataclasses.replace(PENDULUM, **fields)
-    smc.Scenario(plant="duffing", law="none", x0=30.0)
+    smc.Scenario(plant="duffing", law="none", x0=9.0)
     smc.Scenario(
         plant="cart_pole",
         law="none",
@@ -178,3 +178,24 @@ def test_a_law_that_cannot_see_the_pole_is_named_when_it_runs():
     ):
         smc.run(smc.Scenario(law="pid", **fields))
     smc.run([smc.Scenario(law=law, **fields) for law in ("hierarchical", "none")])
+
+
+def duffing(**fields) -> smc.Scenario:
+    return smc.Scenario(plant="duffing", law="none", **fields)
+
+
+@pytest.mark.parametrize(
+    ("make", "cure"),
+    [
+        (lambda: duffing(x0=30.0), "give 0.03"),
+        (lambda: duffing(friction=smc.Coulomb(100.0), u_max=6.0), "give less friction"),
+        (lambda: smc.starts(spread=20.0), "give 0.2"),
+    ],
+)
+def test_a_size_that_no_machine_has_is_told(make, cure):
+    with pytest.warns(smc.errors.ScenarioWarning, match=cure):
+        make()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        duffing(x0=9.0, friction=smc.Coulomb(5.0), u_max=6.0)
+        smc.starts(spread=2.0)

@@ -20,7 +20,7 @@ import numpy as np
 
 from smc_mujoco.common import libmujoco, mjcb, process
 from smc_mujoco.common.errors import ScenarioError, find, shown
-from smc_mujoco.mechanisms.custom import urdf
+from smc_mujoco.mechanisms.custom import file_numbers, urdf
 from smc_mujoco.mechanisms.layout import LEAD, ROTOR
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER
 
@@ -109,24 +109,33 @@ class ModelSource:
             )
 
     def read(self) -> mujoco.MjSpec:
-        """Parse the model; a free joint without a name has its body's."""
+        """Parse the model, and check its numbers; a free joint without a name has its body's."""
+        included = {}
+        for name, content in self.assets:
+            if name.lower().endswith(XML):
+                included[name] = content
+        texts = [_encoded(self.text), *included.values()]
+        if self.path:
+            contents = map(Path.read_bytes, map(Path, _stamps[self.sha256]))
+            texts = [content for content in contents if _is_text(content)]
+        file_numbers.check_texts(self.label, texts)
         try:
             if not self.path:
-                included = {}
-                for name, content in self.assets:
-                    if name.lower().endswith(XML):
-                        included[name] = content
                 spec = mujoco.MjSpec.from_string(
                     self.text, include=included or None, assets=dict(self.assets)
                 )
             elif from_urdf := urdf.read(Path(self.path)):
+                file_numbers.check_urdf(self.label, from_urdf.text)
                 spec = from_urdf.spec()
             else:
                 # whose cache takes a mesh that is written again in the same second for the old one
                 mujoco.mj_clearCache(mujoco.mj_getCache())
                 spec = mujoco.MjSpec.from_file(self.path)
+        except ScenarioError:
+            raise
         except ValueError as error:
             raise broken(self.path or self.label, str(error), self.path) from None
+        file_numbers.check(self.label, spec)
         taken = {joint.name for joint in spec.joints}
         for joint in spec.joints:
             if (
@@ -399,7 +408,7 @@ def digest(path: Path) -> tuple[str, Stamp]:
     files = {path.resolve(): None}
     for file in (queue := [*files]):  # grows as files name further files
         content = read(file)
-        if not content.lstrip(BEFORE_XML).startswith(b"<"):
+        if not _is_text(content):
             continue
         folders[file.parent] = None
         names |= dict.fromkeys(_files(content))
@@ -435,6 +444,11 @@ def _sha256(parts: Iterable[bytes]) -> str:
     for part in parts:
         total.update(hashlib.sha256(part).digest())
     return total.hexdigest()
+
+
+def _is_text(content: bytes) -> bool:
+    """Return whether the content of a file is a model or a part of one, and no mesh or picture."""
+    return content.lstrip(BEFORE_XML).startswith(b"<")
 
 
 def _encoded(text: str) -> bytes:
