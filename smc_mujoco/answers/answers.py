@@ -4,12 +4,15 @@ A line has a label of one or two words and a text. Numbers have three digits at 
 """
 
 import math
+import shlex
 import textwrap
 from collections.abc import Iterable, Sequence
 
 from smc_mujoco.answers.facts import (
     Beware,
+    Caution,
     Lead,
+    Level,
     More,
     NextStep,
     Open,
@@ -18,8 +21,9 @@ from smc_mujoco.answers.facts import (
     Trails,
     Unranked,
     Use,
+    WhichFacts,
 )
-from smc_mujoco.common.text import joined, number
+from smc_mujoco.common.text import counted, joined, number
 
 WIDTH = 80  # characters of a line
 LINES = 24  # of a screen
@@ -154,3 +158,220 @@ def more(fact: More) -> Labelled:
     if fact.words:
         places.append(f"smc-mujoco explain {fact.words[0]}")
     return "more", "; ".join(places)
+
+
+# which
+
+MORE_MINUTES = 30  # of a next step, where the time that is needed is not known
+# kind of a caution -> its label, and what to know and do
+CAUTIONS = {
+    "unsettled": ("beware", "{count} of {of} runs settle under {where}"),
+    "leans": ("beware", "u stays at its bound under {where}: more force, or an easier goal"),
+    "together": ("beware", "{where}: {count} of {of} runs settle; if yours has all, ask for that"),
+    "lower": ("beware", "{where} has the lower J, and settles too seldom"),
+    "shakes": (
+        "at rest",
+        "u swings by {value:.3g} {unit} ({share:.2g} % of its bound) at {frequency:.3g} Hz under "
+        "{where}: --need calm",
+    ),
+    "overshoots": ("overshoot", "{value:.3g} % under {where}: --need 'overshoot<10'"),
+    "breaks": ("overshoot", "{value:.3g} % under {where}, above the limit of {most:g} %"),
+    "no room": ("no room", "tuned at a delay of {ms:g} ms, it fails at {most_ms:g} ms"),
+    "no margin": ("margins", "none: the error does not end below 5 % of its start"),
+    "helped": ("friction", "a load helps {where}; from the other side it withstands {side}"),
+    "at bound": ("gains", "{where} at an end of its search: a value beyond may do better"),
+    "needless": ("without", "all runs settle with u = 0 under {where}: no law is needed there"),
+    "unsearched": ("no time", "for {where}"),
+    "left out": ("left out", "{where}: {reason}"),
+}
+KINDS_OF_LEVELS = {
+    "delay": "delay",
+    "friction": "friction",
+    "disturbance": "force",
+    "mass": "mass",
+    "blow": "blow",
+}
+
+
+def which_lines(facts: WhichFacts, step: NextStep | None) -> list[str]:
+    """Return the answer to which law suits a plant, its first line first."""
+    pairs = [
+        _first_line(facts),
+        *_evidence_of_law(facts),
+        *map(_caution, facts.cautions),
+    ]
+    if step:
+        pairs.append(next_step(step))
+    if facts.folder:
+        pairs.append(more(More(f"{facts.folder}/report.html", "", ("J",))))
+    return labelled(pairs)
+
+
+def _first_line(facts: WhichFacts) -> Labelled:
+    """Return what to do, in one of five forms."""
+    size = facts.size
+    part = f" ({size.raced} of {size.named} laws tried)" if size.raced < size.named else ""
+    if facts.form == "untried":
+        needs = ""
+        if not math.isnan(facts.minutes_needed):
+            needs = f": this machine needs {_minutes(facts.minutes_needed)} for one law"
+        return "Open", f"No law was tried to the end{needs}"
+    if facts.form == "unneeded":
+        below = f", and J is {_below(facts.lead)}" if facts.lead else ""
+        return "No law", f"needed: u = 0 settles {_counts(facts.runs.runs)} runs{below}{part}"
+    if facts.form == "unsettled":
+        where = joined([c.where for c in facts.cautions if c.kind == "unsettled"])
+        return "No law", f"settles under {where}; the nearest is {facts.law}{part}"
+    if facts.form == "undecided":
+        words = _sets(facts)
+        if len(facts.undecided) > 1:
+            words += f" open between {joined(facts.undecided)};"
+        return "Undecided", f"{words} for now {facts.law}"
+    return f"Use {facts.law}", _gains(facts)
+
+
+def _sets(facts: WhichFacts) -> str:
+    """Return how many sets of gains a verdict needs."""
+    size = facts.size
+    kind = "shorter set" if size.shorter else "set"
+    of = f"{size.raced} of {size.named} laws" if size.raced < size.named else "each law"
+    words = f"{of} got {counted(size.sets, kind)}"
+    if facts.sets_needed > size.sets:
+        words += f"; deciding takes {facts.sets_needed}"
+        if not math.isnan(facts.minutes_needed):
+            words += f" ({_minutes(facts.minutes_needed)} more)"
+    elif not facts.sets_needed:
+        words += ", too close for more to tell"
+    return f"{words};"
+
+
+def _evidence_of_law(facts: WhichFacts) -> list[Labelled]:
+    """Return the gains of the law, and what the runs say of it."""
+    if facts.form == "untried":
+        return []
+    size = facts.size
+    pairs = []
+    if facts.gains and facts.form in ("undecided", "unsettled"):
+        pairs.append((facts.law, _gains(facts)))
+    if facts.form == "law" and facts.lead:
+        how = "with these gains"
+        if facts.over_sets and size.searched:
+            how = f"after {size.sets} searches of each"
+        rivals = counted(facts.rivals + 1, "law")
+        pairs.append((f"best of {rivals}", f"J {_below(facts.lead)}, {how} (95 %)"))
+    settles = f"{_counts(facts.runs.runs)} runs"
+    if not math.isnan(facts.runs.first):
+        first, last = number(facts.runs.first), number(facts.runs.last)
+        settles += f", in {first} s" if first == last else f", in {first} to {last} s"
+    if facts.runs.together:
+        settles += f"; all conditions at once {_counts(facts.runs.together)}"
+    pairs.append(("settles", settles))
+    levels = [_level(level) for level in facts.levels if not math.isnan(level.value)]
+    if levels or facts.untried:
+        text = ", ".join(levels)
+        if facts.untried:
+            text += f"{'; ' if text else ''}no time for {joined(facts.untried)}"
+        pairs.append(("withstands", text))
+    if facts.without and facts.form != "unneeded":
+        text = f"{_counts(facts.without.runs)} runs settle"
+        if facts.over_none and not math.isnan(facts.over_none.low):
+            text += f"; the law's J is {percent(facts.over_none.low, facts.over_none.high)} below"
+        pairs.append(("without a law", text))
+    return pairs
+
+
+def _gains(facts: WhichFacts) -> str:
+    """Return the gains of the law, and the file that has them."""
+    unit = f" for u in {facts.unit}" if facts.unit else ""
+    file = f"   {facts.file}" if facts.file else ""
+    return f"{facts.gains}{unit}{file}"
+
+
+def _below(lead: Lead) -> str:
+    """Return by how much J is below a rival's."""
+    if lead.gaps:
+        return f"below {lead.rival}'s, which fails or breaks a limit in {lead.gaps} runs"
+    return f"{percent(lead.low, lead.high)} below {lead.rival}"
+
+
+def _counts(fact: Settles) -> str:
+    """Return a count of runs, such as "all 24" or "3 of 24"."""
+    return f"{fact.count} of {fact.of}"
+
+
+def _level(level: Level) -> str:
+    """Return a level that is withstood, such as "mass x 1.6"."""
+    least = "≥ " if level.open else ""
+    name = KINDS_OF_LEVELS[level.kind]
+    if level.unit == "1":
+        return f"{name} x {least}{number(level.value)}"
+    if level.unit == "s":
+        return f"{name} {least}{number(1e3 * level.value)} ms"
+    return f"{name} {least}{number(level.value)} {level.unit}"
+
+
+def _caution(fact: Caution) -> Labelled:
+    """Return what to know before the law is used, and what to do."""
+    kind = "breaks" if fact.kind == "overshoots" and fact.most else fact.kind
+    label, template = CAUTIONS[kind]
+    side = "none" if math.isnan(fact.value) else f"{number(fact.value)} {fact.unit}"
+    text = template.format(
+        where=fact.where,
+        value=fact.value,
+        most=fact.most or math.nan,
+        ms=1e3 * fact.value,
+        most_ms=1e3 * (fact.most or math.nan),
+        unit=fact.unit,
+        share=100 * fact.share,
+        frequency=fact.frequency,
+        count=fact.count,
+        of=fact.of,
+        reason=fact.reason,
+        side=side,
+    )
+    return label, text
+
+
+def _minutes(minutes: float) -> str:
+    """Return a time as text, such as "80 minutes"."""
+    return counted(math.ceil(minutes), "minute")
+
+
+def which_next(facts: WhichFacts, call: Sequence[str]) -> NextStep:
+    """Return the one thing to do next, given the command of the call without its minutes: more sets
+    of gains, the conditions all at once, the laws that were not tried, or the law's code.
+    """
+    size = facts.size
+    needed = facts.minutes_needed
+    minutes = MORE_MINUTES if math.isnan(needed) else max(1, math.ceil(1.2 * needed))
+    longer = [*_without(call, "--minutes"), "--minutes", f"{minutes}"]
+    if facts.form in ("undecided", "untried") or size.raced < size.named:
+        if facts.sets_needed:
+            return NextStep(shlex.join(longer), "goes on from the sets that there are")
+        return NextStep(shlex.join(_compared(facts, call)), "shows where the laws differ")
+    if any(caution.kind == "together" for caution in facts.cautions):
+        combined = [*_without(call, "--condition"), "--condition", "+".join(facts.conditions)]
+        return NextStep(shlex.join(combined), "searches gains for all conditions at once")
+    if size.untried:
+        wide = [*_without(_without(call, "--law"), "--minutes"), "--minutes", f"{MORE_MINUTES}"]
+        return NextStep(shlex.join(wide), f"tries the usual ones of {size.untried} other laws, too")
+    law = facts.file or f"{facts.law}({facts.gains.replace(' ', '')})"
+    return NextStep(shlex.join(["smc-mujoco", "export", law, "controller"]), "writes it as C")
+
+
+def _compared(facts: WhichFacts, call: Sequence[str]) -> list[str]:
+    """Return the command that compares the laws that may be best."""
+    words = _without(_without(call, "--minutes"), "--law")
+    command, _, *rest = words
+    return [command, "compare", *rest, "--law", ",".join(facts.undecided)]
+
+
+def _without(call: Sequence[str], option: str) -> list[str]:
+    """Return the words of a command without an option and its value."""
+    words = []
+    skip = False
+    for word in call:
+        if not skip and word != option:
+            words.append(word)
+        skip = word == option
+    return words

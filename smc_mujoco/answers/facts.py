@@ -96,3 +96,94 @@ class Beware:
 
     about: str  # one or two words, the label of the line
     sentence: str
+
+
+# which
+
+
+@frozen_data
+class SettledRuns:
+    """In how many runs a law settles, from when to when, s, and in how many under all conditions at
+    once.
+    """
+
+    runs: Settles
+    first: float  # s, NaN where none settles
+    last: float
+    together: Settles | None = None
+
+
+@frozen_data
+class Level:
+    """A level that a law withstands, and the least one tried that it does not."""
+
+    kind: str  # a kind of margins
+    value: float  # NaN where not even the unchanged run holds
+    beyond: float
+    unit: str
+    open: bool  # whether the search ended there
+
+
+@frozen_data
+class WithoutLaw:
+    """How many runs settle with u = 0, and J over that of the law; NaN where runs fail."""
+
+    runs: Settles
+    times: float
+
+
+@frozen_data
+class RaceSize:
+    """How large a race was."""
+
+    raced: int  # laws with a set of gains
+    named: int  # laws that were to race
+    sets: int  # of gains, of each law
+    searched: bool  # whether sets are of searches; else they are runs with the same gains
+    shorter: bool  # whether the first sets are from shorter searches
+    untried: int  # further laws of the package that suit
+
+
+@keyword_dataclass
+class Caution:
+    """What to know before a law is used: a kind of `answers.CAUTIONS`, and its numbers."""
+
+    kind: str
+    where: str = ""  # a condition, or names
+    value: float = math.nan
+    most: float | None = None
+    unit: str = ""
+    share: float = math.nan
+    frequency: float = math.nan  # Hz
+    count: int = 0
+    of: int = 0
+    reason: str = ""  # in the words of an error
+
+
+@keyword_dataclass
+class WhichFacts:
+    """The answer to which law suits a plant."""
+
+    form: str  # "law", "undecided", "unneeded", "unsettled" or "untried"
+    law: str
+    gains: str
+    unit: str  # of u, where it is no force
+    file: str  # with the gains; "" if they were given
+    size: RaceSize
+    lead: Lead | None  # of the law over its nearest rival
+    over_sets: bool  # whether sets of gains name the law, and not only runs with its gains
+    rivals: int  # laws that the lead is over
+    over_none: Lead | None
+    undecided: Names  # the laws that may be best
+    sets_needed: int  # that decide; 0 if more do not help
+    minutes_needed: float  # for the missing sets; NaN where that is not known
+    runs: SettledRuns
+    conditions: Names  # asked for
+    levels: tuple[Level, ...]
+    beside: str  # the condition beside which the levels are
+    untried: Names  # kinds of margins without time
+    without: WithoutLaw | None
+    cautions: tuple[Caution, ...]
+    bounds: str  # on u, in words
+    second: str
+    folder: str

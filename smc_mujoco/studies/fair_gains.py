@@ -22,6 +22,7 @@ from smc_mujoco.analysis.ranking import needed_to_win
 from smc_mujoco.analysis.step_halving import doubled
 from smc_mujoco.analysis.tuning import quick_search, result, search, search_space
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Objective, objectives
+from smc_mujoco.analysis.tuning.run_limits import RunLimit, shows_limits
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import AnyPath
 from smc_mujoco.common.cache import cached
@@ -335,9 +336,10 @@ class Trial(NamedTuple):
                 "or defaults=True (--allow-defaults) for default gains"
             )
 
-    def asked_goal(self, plant: Plant) -> Objective:
+    def asked_goal(self, plant: Plant, limits: tuple[RunLimit, ...] = ()) -> Objective:
         """Return the objective under the trial's conditions, and noise where none of them has any,
-        in shorter runs. Events are at half of these, too.
+        in shorter runs, with limits; and without a condition where none of these shows a limit.
+        Events are at half of these runs, too.
         """
         conditions = list(self.conditions)
         noisy = any("noise" in condition.on(plant, self.duration) for condition in conditions)
@@ -347,12 +349,16 @@ class Trial(NamedTuple):
         duration = SEARCHED * self.duration
         for condition in conditions:
             _check_events(condition.name, condition.on(plant, duration), duration)
-        return dataclasses.replace(
+        goal = dataclasses.replace(
             usual,
             conditions=tuple(conditions),
             starts=self.starts or usual.starts,
             duration=duration,
+            limits=limits,
         )
+        if limits and not shows_limits(goal.scenarios(plant, coerce.law("none"))):
+            goal = dataclasses.replace(goal, conditions=(NAMED["nominal"], *goal.conditions))
+        return goal
 
     def _goal(self, plant: Plant, starts: Starts | None) -> Objective:
         """Return the objective of whole searches on a plant."""

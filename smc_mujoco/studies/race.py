@@ -1,24 +1,30 @@
 """A race: sets of gains in turn over the laws, until one law wins, on one plant.
 
 Every law gets its first set of gains, then every law its second, so that laws have equal numbers
-wherever the race stops. A law for whose first set there is no time does not race. J of a set is
-that of unseen runs of all conditions, in one number, so that neither more laws nor more conditions
-ask for more sets. This is a race in the sense of O. Maron, A. W. Moore, "Hoeffding races" (NIPS 6,
-1994), by the tests of `analysis.ranking`.
+wherever the race stops. Where time is short the first sets come from shorter searches, so that
+every law has one; a law whose search the clock ends does not race. J of a set is that of unseen
+runs of all conditions, in one number, so that neither more laws nor more conditions ask for more
+sets. This is a race in the sense of O. Maron, A. W. Moore, "Hoeffding races" (NIPS 6, 1994), by the
+tests of `analysis.ranking`.
 
+- u = 0, the law "none", races too, and wins if it wins.
 - After three sets a law is dropped whose best J is more than twice the worst one of the law that
-  leads. It is not tested against the others. Two laws always stay.
+  leads. It is not tested against the others. Two laws beside "none" always stay.
 - A search is made once more, from another draw, if its J in training is more than twice the least
   of its law's others: it was stuck. The better of both is the set.
 - The laws are judged after 7 sets, and if none wins, after 12, unless the 7 say that probably
   more than 24 are needed. Each look has half of the errors: one of two equal laws wins in at most
   5 % of races, one of more laws in fewer, and the best law is taken for a worse one in at most 5 %.
   A race that does not go on makes errors only rarer.
+
+The folder keeps each search and each judgement.
 """
 
+import json
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -28,15 +34,18 @@ from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.signed_rank import units_needed
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.tuning.evaluator import with_gains
-from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective, objectives
+from smc_mujoco.analysis.tuning.objective import Objective, objectives
 from smc_mujoco.analysis.tuning.result import SearchResult
+from smc_mujoco.analysis.tuning.run_limits import LIMIT_COST
 from smc_mujoco.common.aliases import Array
+from smc_mujoco.common.cache import CachedResult
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.files import writable
 from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation import run_key
 from smc_mujoco.simulation.workers import called, opened
 from smc_mujoco.studies.answer_time import AnswerTime
 from smc_mujoco.studies.fair_gains import Candidate, Trial
@@ -48,6 +57,9 @@ TIMED = 2  # sets after which the number of sets that fit is known: the first co
 FIRST = 3  # sets after which a law may be dropped; chosen
 FAR = 2.0  # times the leader's worst J, above which it is; chosen
 STUCK = 2.0  # times the least J of its law's others, above which a search is made again; chosen
+SHORTER = (1, 2, 4)  # by which the evaluations of a first search may be divided; chosen
+DECIDED_RUNS = 3  # sets of gains that a quick search runs as a judgement does
+WITHOUT = "none"  # the law u = 0
 
 
 class Unseen(NamedTuple):
@@ -57,55 +69,112 @@ class Unseen(NamedTuple):
     half: float  # at half the physics step, NaN where it was not computed
 
 
+class OutOfTime(Exception):
+    """The time of a search is over."""
+
+
 class Entrant:
-    """A law in a race: its sets of gains, which searches find or which are known, and their J."""
+    """A law in a race with the J of its sets of gains."""
 
-    def __init__(self, known: Candidate | None, task: search.TuningTask | None):
-        self.known = known
-        self.task = task
-        self.law: Component = known.law if known else task.law  # pyright: ignore[reportOptionalMemberAccess]
-        self.found: list[SearchResult] = []
-        self.again: set[int] = set()  # searches that were made once more
+    searched = False
+
+    def __init__(self, law: Component):
+        self.law = law
         self.J: list[Unseen | None] = []
-
-    @cached_property
-    def failure(self) -> str:
-        """How its first run failed, see `search.failure_of_law`."""
-        assert self.task is not None
-        return search.failure_of_law(self.task)
 
     def gains(self, k: int) -> Component:
         """Return the law with set k of its gains."""
-        if self.task is None:
-            return self.known(k)  # pyright: ignore[reportOptionalCall]
-        return with_gains(self.task.law, tuple(self.task.box), self.found[k].best.gains)
-
-    def search(self, k: int, draw: int) -> SearchResult:
-        """Make search k, from a draw."""
-        assert self.task is not None
-        return self.task.search(k, self.failure, lambda count: None, draw)
-
-    def call(self, k: int, draw: int) -> tuple:
-        """Return the arguments with which a worker makes search k."""
-        assert self.task is not None
-        return self.task.call(k, self.failure, draw)
+        raise NotImplementedError
 
     @property
     def count(self) -> int:
         """The number of sets that differ; 1 for a law with given gains."""
-        return len(self.found) if self.task else len(self.known.sets)  # pyright: ignore[reportOptionalMemberAccess]
+        raise NotImplementedError
 
     @property
     def values(self) -> list[float]:
         """J of each set."""
-        return [unseen_J.value for unseen_J in self.J if unseen_J]
+        return [of_set.value for of_set in self.J if of_set]
+
+
+class ReadyEntrant(Entrant):
+    """A law whose sets of gains are known: given, shipped or default ones, which it takes in turn;
+    or one without gains.
+    """
+
+    def __init__(self, candidate: Candidate):
+        super().__init__(candidate.law)
+        self.candidate = candidate
+
+    def gains(self, k: int) -> Component:
+        """Return the law with set k of its gains."""
+        return self.candidate(k)
+
+    @property
+    def count(self) -> int:
+        """The number of sets that differ."""
+        return len(self.candidate.sets)
+
+
+class SearchedEntrant(Entrant):
+    """A law whose sets of gains searches find."""
+
+    searched = True
+
+    def __init__(self, task: search.TuningTask):
+        super().__init__(task.law)
+        self.task = task
+        self.results: list[SearchResult] = []
+        self.again: set[int] = set()  # searches that were made once more
+        self.share = 1  # by which the evaluations of the first search are divided
+
+    @cached_property
+    def failure(self) -> str:
+        """How its first run failed, see `search.failure_of_law`."""
+        return search.failure_of_law(self.task)
+
+    def gains(self, k: int) -> Component:
+        """Return the law with set k of its gains."""
+        return with_gains(self.task.law, tuple(self.task.box), self.results[k].best.gains)
+
+    @property
+    def count(self) -> int:
+        """The number of sets."""
+        return len(self.results)
+
+    def task_of(self, k: int) -> search.TuningTask:
+        """Return the task of search k, of which the first may be a shorter one."""
+        if k or self.share == 1:
+            return self.task
+        return self.task._replace(budget=max(1, self.task.budget // self.share))
+
+    def search(self, k: int, draw: int, ends: float) -> SearchResult:
+        """Make search k, from a draw. Raise OutOfTime when the time is over."""
+
+        def report(count: int) -> None:
+            if time.monotonic() > ends:
+                raise OutOfTime
+
+        return self.task_of(k).search(k, self.failure, report, draw)
+
+    def call(self, k: int, draw: int) -> tuple:
+        """Return the arguments with which a worker makes search k."""
+        return self.task_of(k).call(k, self.failure, draw)
+
+
+class RaceSearch(NamedTuple):
+    """A search of a race."""
+
+    entrant: SearchedEntrant
+    k: int
+    draw: int = 0
 
 
 class Race(NamedTuple):
     """How laws stand after a race."""
 
     entrants: Mapping[str, Entrant]  # by name, those that were dropped, too
-    unsearched: Sequence[str]  # the laws for whose first set there was no time
+    unsearched: Sequence[str]  # the laws whose first search the clock ended or did not begin
     # law -> its best J over the worst of the leader's, of laws that were dropped
     dropped: Mapping[str, float]
     comparison: Comparison | None  # of the others, by J of their sets; None for one law
@@ -113,12 +182,18 @@ class Race(NamedTuple):
     looked: int  # at how many of them the comparison looks: a third look would have no error left
     stopped: bool  # whether the time was over before a winner or the last look
     seconds: float  # that a set of each law takes together; 0 if none was searched in this call
+    shorter: bool = False  # whether a first set is from a shorter search
 
     @property
     def running(self) -> list[str]:
         """The laws that were not dropped, those of lower J first."""
         names = [name for name in self.entrants if name not in self.dropped]
         return sorted(names, key=lambda name: (float(np.median(self.entrants[name].values)), name))
+
+    @property
+    def laws(self) -> list[str]:
+        """The laws that raced beside "none"."""
+        return [name for name in self.entrants if name != WITHOUT]
 
     @property
     def winner(self) -> str | None:
@@ -136,102 +211,150 @@ class Race(NamedTuple):
         return [law for law in self.running if not beaten[law]]
 
 
-def race(
-    trial: Trial,
-    plant: Plant,
-    entrants: Sequence[Entrant],
-    goal: Objective,
-    clock: AnswerTime,
-    relevant: float,
-) -> Race:
-    """Race laws on a plant by J of `goal`, as long as the clock lets it. `relevant` is as in
+class RaceCourse(NamedTuple):
+    """What a race is run on."""
+
+    trial: Trial
+    plant: Plant
+    goal: Objective
+    clock: AnswerTime
+
+
+def race(course: RaceCourse, entrants: Sequence[Entrant], relevant: float) -> Race:
+    """Race laws by J of the course's goal, as long as its clock lets it. `relevant` is as in
     `ranking`.
 
-    The folder of the trial keeps each search. Sets that it has are taken even if the time is over.
+    Sets that the folder has are taken even if the time is over.
     """
+    clock = course.clock
     dropped: dict[str, float] = {}
     comparison, looked = None, 0
     stopped = False
-    begin = time.monotonic()
-    from_folder = _kept(trial, [(entrant, 0, 0) for entrant in entrants if entrant.task])
-    with bar(
-        "set of gains", LOOKS[0] * len(entrants), trial.progress, counted=True
-    ) as progress_bar:
-        progress_bar.latest = clock.ends
-        everyone = _first_sets(trial, plant, entrants, goal, clock, progress_bar)
+    laws = [entrant for entrant in entrants if entrant.searched]
+    count = len(entrants)
+    with bar("set of gains", LOOKS[0] * count, course.trial.progress, counted=True) as progress:
+        progress.latest = clock.ends
+        begin = time.monotonic()
+        in_folder = _are_kept(course, [RaceSearch(entrant, 0) for entrant in searched(entrants)])
+        everyone = _first_sets(course, entrants, progress)
         running = dict(everyone)
         # s that a law took in each round
-        rounds = [] if from_folder else [(time.monotonic() - begin) / len(running)]
+        rounds = [] if in_folder else [(time.monotonic() - begin) / max(1, len(laws))]
         for k in range(1, LOOKS[-1]):
-            _expect(progress_bar, k, len(running))
-            start = time.monotonic()
-            pieces = [(entrant, k, 0) for entrant in running.values() if entrant.task]
             count = len(running)
-            over = start + count * _expected(rounds) > clock.race_ends(count)
-            if k == TIMED and rounds:
-                _tell_if_short(progress_bar, k, (clock.race_ends(count) - start) / count, rounds)
-            from_folder = _kept(trial, pieces)
-            progress_bar.latest = clock.race_ends(count)
-            if over and not from_folder:
+            _expect(progress, k, count)
+            start = time.monotonic()
+            pieces = [RaceSearch(entrant, k) for entrant in searched(running.values())]
+            ends = clock.race_ends(count)
+            over = start + len(pieces) * _expected(rounds) > ends
+            if k == TIMED and rounds and pieces:
+                _tell_if_short(progress, k, (ends - start) / len(pieces), rounds)
+            in_folder = _are_kept(course, pieces)
+            progress.latest = ends
+            if (over and not in_folder) or not _search_round(course, pieces, ends, progress):
                 stopped = True
                 break
-            for i, result in _searched(trial, pieces):
-                pieces[i][0].found.append(result)
-                progress_bar.advance(1.0)
-            _again(trial, list(running.values()))
-            clock.judged(*_judge(trial, plant, list(running.values()), goal, k + 1))
-            if not from_folder:
-                rounds.append((time.monotonic() - start) / len(running))
+            _again(course, list(searched(running.values())), ends)
+            _judge(course, list(running.values()), k + 1)
+            if not in_folder and pieces:
+                rounds.append((time.monotonic() - start) / len(pieces))
             if k + 1 == FIRST:
                 values = {name: entrant.values for name, entrant in running.items()}
                 dropped = hopeless(values)
                 for name in dropped:
                     del running[name]
                 if dropped:
-                    progress_bar.says(f"{joined(dropped)} dropped: set of gains")
+                    progress.says(f"{joined(dropped)} dropped: set of gains")
             if k + 1 in LOOKS:
-                comparison, looked = judged(running, goal, relevant), k + 1
+                comparison, looked = judged(running, course.goal, relevant), k + 1
                 if comparison is None or comparison.winners[0] or needed(comparison) > WITHIN:
                     break
     count = len(next(iter(running.values())).J)
     if count < LOOKS[0]:
-        comparison, looked = judged(running, goal, relevant), count
+        comparison, looked = judged(running, course.goal, relevant), count
     unsearched = [entrant.law.name for entrant in entrants if entrant.law.name not in everyone]
-    seconds = (len(running) + len(unsearched)) * _expected(rounds)
-    return Race(everyone, unsearched, dropped, comparison, count, looked, stopped, seconds)
+    pieces = [*searched(running.values()), *unsearched]
+    return Race(
+        entrants=everyone,
+        unsearched=unsearched,
+        dropped=dropped,
+        comparison=comparison,
+        sets=count,
+        looked=looked,
+        stopped=stopped,
+        seconds=len(pieces) * _expected(rounds),
+        shorter=any(entrant.share > 1 for entrant in searched(everyone.values())),
+    )
+
+
+def searched(entrants: Iterable[Entrant]) -> Iterator[SearchedEntrant]:
+    """Yield the laws whose gains are searched."""
+    for entrant in entrants:
+        if isinstance(entrant, SearchedEntrant):
+            yield entrant
 
 
 def _first_sets(
-    trial: Trial,
-    plant: Plant,
-    entrants: Sequence[Entrant],
-    goal: Objective,
-    clock: AnswerTime,
-    shown: Bar,
+    course: RaceCourse, entrants: Sequence[Entrant], progress: Bar
 ) -> dict[str, Entrant]:
     """Search the first set of each law and judge it at once, so that the time of what follows is
-    known. Return the laws that have one, by name: those for which there was time, and at least one.
+    known. Return the laws that have one, by name.
     """
-    ready = [entrant for entrant in entrants if entrant.task is None]
-    pieces = [(entrant, 0, 0) for entrant in entrants if entrant.task]
-    taken: list[float] = []  # s of each law
-    last = time.monotonic()
-    if ready:
-        _judge(trial, plant, ready, goal, 1)
-
-    def over() -> bool:
-        end = last + _expected(taken or [0.0])
-        return bool(ready) and end > clock.race_ends(len(ready) + 1, first=True)
-
-    for i, result in _searched(trial, pieces, over):
-        entrant = pieces[i][0]
-        entrant.found.append(result)
-        clock.judged(*_judge(trial, plant, [entrant], goal, 1))
+    clock = course.clock
+    ready = [entrant for entrant in entrants if not entrant.searched]
+    progress.says("runs without a law, and with given gains: set of gains")
+    _judge(course, ready, 1)
+    progress.says("set of gains", float(len(ready)))
+    pieces = [RaceSearch(entrant, 0) for entrant in searched(entrants)]
+    start = time.monotonic()
+    for i, result in _made(course, pieces, clock.ends, shorten=True):
+        entrant = pieces[i].entrant
+        entrant.results.append(result)
+        spent = time.monotonic() - start
+        clock.searched(_work(course, entrant), spent)
+        _judge(course, [entrant], 1)
         ready.append(entrant)
-        shown.advance(1.0)
-        taken.append(time.monotonic() - last)
-        last = time.monotonic()
+        progress.advance(1.0)
+        start = time.monotonic()
     return {entrant.law.name: entrant for entrant in entrants if entrant in ready}
+
+
+def _work(course: RaceCourse, entrant: SearchedEntrant) -> float:
+    """Return the work of a law's first search: coarse runs, and those of the sets that it decides
+    as a judgement does.
+    """
+    task = entrant.task_of(0)
+    coarse = 0.0
+    for case in task.cases(0):
+        coarse += case.samples * case.plant.n
+    return DECIDED_RUNS * course.clock.unit + task.size * coarse
+
+
+def _shorten(course: RaceCourse, entrant: SearchedEntrant, waiting: int) -> None:
+    """Divide the evaluations of a law's first search so that it and others that are `waiting` end
+    in time, as far as it may.
+    """
+    clock = course.clock
+    room = (clock.race_ends(waiting + 1, first=True) - time.monotonic()) / waiting
+    for share in SHORTER:
+        entrant.share = share
+        if clock.search_seconds(_work(course, entrant)) <= room:
+            return
+
+
+def _search_round(
+    course: RaceCourse, pieces: Sequence[RaceSearch], ends: float, progress: Bar
+) -> bool:
+    """Make one search of each law, and return whether all ended in time; else none counts."""
+    results = {}
+    for i, result in _made(course, pieces, ends):
+        results[i] = result
+        progress.advance(1.0)
+    if len(results) < len(pieces):
+        return False
+    for i, piece in enumerate(pieces):
+        piece.entrant.results.append(results[i])
+    return True
 
 
 def _expected(rounds: Sequence[float]) -> float:
@@ -241,34 +364,33 @@ def _expected(rounds: Sequence[float]) -> float:
     return max(rounds[1:] or rounds, default=0.0)
 
 
-def _expect(shown: Bar, done: int, laws: int) -> None:
+def _expect(progress: Bar, done: int, laws: int) -> None:
     """Set the work done and the whole work of the bar before a round, in sets of gains of laws that
     go on.
     """
     last = next(look for look in LOOKS if look > done)
-    shown.reached(done * laws, last * laws)
+    progress.reached(done * laws, last * laws)
 
 
-def _tell_if_short(shown: Bar, done: int, left: float, rounds: Sequence[float]) -> None:
-    """Say beside the bar if the time that is left for each law, s, is too short for the first
-    look.
-    """
-    fit = done + left / _expected(rounds)
+def _tell_if_short(progress: Bar, done: int, seconds: float, rounds: Sequence[float]) -> None:
+    """Say beside the bar if the time that each law has, s, is too short for the first look."""
+    fit = done + seconds / _expected(rounds)
     if fit < LOOKS[0]:
         enough = f"{LOOKS[0]} can name a winner"
-        shown.what = f"about {math.floor(fit)} sets of each law fit, and {enough}: set of gains"
+        progress.what = f"about {math.floor(fit)} sets of each law fit, and {enough}: set of gains"
 
 
 def hopeless(J: Mapping[str, Sequence[float]]) -> dict[str, float]:
     """Return the laws to drop, law -> its least J over the largest one of the law that leads, which
-    is more than FAR. Two laws stay.
+    is more than FAR. Two laws beside "none" stay.
     """
     lead = min(map(max, J.values()))
     shares = {}
     for law, values in J.items():
         shares[law] = min(values) / lead
     order = sorted(shares, key=lambda law: (shares[law], law))
-    return {law: shares[law] for law in order[2:] if shares[law] > FAR}
+    stay = [law for law in order if law != WITHOUT][:2]
+    return {law: shares[law] for law in order if shares[law] > FAR and law not in stay}
 
 
 def stuck(J: Sequence[float]) -> list[int]:
@@ -296,7 +418,7 @@ def judged(running: Mapping[str, Entrant], goal: Objective, relevant: float) -> 
         values[name] = np.array(full_step)
         halves[name] = np.array(halved)
         numbers[name] = np.arange(len(full_step)) % entrant.count
-        fine[name] = values[name] < FAILURE_COST
+        fine[name] = values[name] < LIMIT_COST
     return compared(values, goal, halves, numbers, fine, relevant, looks=len(LOOKS))
 
 
@@ -341,95 +463,129 @@ def compared(
     )
 
 
-def _kept(trial: Trial, pieces: Sequence[tuple[Entrant, int, int]]) -> bool:
+def _are_kept(course: RaceCourse, pieces: Sequence[RaceSearch]) -> bool:
     """Return whether there are searches, and the folder has them all."""
-    return bool(pieces) and all(_file(trial, *piece).read() for piece in pieces)
+    return bool(pieces) and all(_file(course, piece).read() for piece in pieces)
 
 
-def _file(trial: Trial, one: Entrant, k: int, draw: int):
+def _file(course: RaceCourse, piece: RaceSearch) -> CachedResult[SearchResult]:
     """Return the file of a search."""
-    assert one.task is not None
-    return one.task.file(k, trial.folder / "gains" / "searches", draw)
+    folder = course.trial.folder / "gains" / "searches"
+    return piece.entrant.task_of(piece.k).file(piece.k, folder, piece.draw)
 
 
-def _searched(
-    trial: Trial,
-    pieces: Sequence[tuple[Entrant, int, int]],
-    over: Callable[[], bool] = lambda: False,
+def _made(
+    course: RaceCourse, pieces: Sequence[RaceSearch], ends: float, shorten: bool = False
 ) -> Iterator[tuple[int, SearchResult]]:
-    """Yield the number and the result of each search, given by its law, its k and its draw: those
-    that the folder has first, then the others, in turn or as workers end them, until `over`.
+    """Yield the number and the result of each search: those that the folder has first, then the
+    others, in turn or as workers end them, until the time `ends`.
     """
-    files = {}
+    missing = []
     for i, piece in enumerate(pieces):
-        file = _file(trial, *piece)
-        result = file.read()
-        if result is None:
-            files[i] = file
-            writable(file.path)
-        else:
+        file = _file(course, piece)
+        if result := file.read():
             yield i, result
-    missing = list(files)
-    if trial.executor is None:
-        for i in missing:
-            if over():
-                return
-            entrant, k, draw = pieces[i]
-            yield i, files[i].keep(entrant.search(k, draw))
+        else:
+            missing.append(i)
+            writable(file.path)
+    if course.trial.executor is None:
+        yield from _made_here(course, pieces, missing, ends, shorten)
     elif missing:
         calls = []
         for i in missing:
-            entrant, k, draw = pieces[i]
-            calls.append(entrant.call(k, draw))
-        with opened(trial.executor) as pool:
+            calls.append(pieces[i].entrant.call(pieces[i].k, pieces[i].draw))
+        with opened(course.trial.executor) as pool:
             for j, result in called(pool, search.searched, calls):
-                yield missing[j], files[missing[j]].keep(result)
-                if over():
+                yield missing[j], _file(course, pieces[missing[j]]).keep(result)
+                if time.monotonic() > ends:
                     return
 
 
-def _again(trial: Trial, running: Sequence[Entrant]) -> None:
-    """Make stuck searches once more, and keep the better ones."""
+def _made_here(
+    course: RaceCourse,
+    pieces: Sequence[RaceSearch],
+    missing: Sequence[int],
+    ends: float,
+    shorten: bool,
+) -> Iterator[tuple[int, SearchResult]]:
+    """Make searches one after the other until the time `ends`; if they may be shorter, take those
+    that the folder has after that, too.
+    """
+    for count, i in enumerate(missing):
+        piece = pieces[i]
+        if shorten and math.isfinite(ends):
+            _shorten(course, piece.entrant, len(missing) - count)
+        file = _file(course, piece)
+        result = file.read()
+        if result is None and time.monotonic() < ends:
+            try:
+                result = file.keep(piece.entrant.search(piece.k, piece.draw, ends))
+            except OutOfTime:
+                continue
+        if result is not None:
+            yield i, result
+
+
+def _again(course: RaceCourse, running: Sequence[SearchedEntrant], ends: float) -> None:
+    """Make stuck searches once more, and take the better ones."""
     pieces = []
     for entrant in running:
-        for k in stuck([result.best.objective for result in entrant.found]):
+        for k in stuck([result.best.objective for result in entrant.results]):
             if k not in entrant.again:
-                entrant.again.add(k)
-                pieces.append((entrant, k, 1))
-    for i, result in _searched(trial, pieces):
+                pieces.append(RaceSearch(entrant, k, 1))
+    for i, result in _made(course, pieces, ends):
         entrant, k, _ = pieces[i]
-        if result.best.objective < entrant.found[k].best.objective:
-            entrant.found[k] = result
+        entrant.again.add(k)
+        if result.best.objective < entrant.results[k].best.objective:
+            entrant.results[k] = result
             if k < len(entrant.J):
                 entrant.J[k] = None
 
 
-def _judge(
-    trial: Trial,
-    plant: Plant,
-    running: Sequence[Entrant],
-    goal: Objective,
-    count: int,
-) -> tuple[int, float]:
-    """Compute J of the first sets, on unseen runs, where it is not known. Return the number of
-    `judgements` that this was, and how long it took, s.
+def _judge(course: RaceCourse, running: Sequence[Entrant], count: int) -> None:
+    """Compute J of the first sets, on unseen runs, where it is not known, and tell the clock how
+    long that took.
     """
     unjudged = []
-    laws = []
-    numbers = []
+    files = []
     for entrant in running:
         entrant.J += [None] * (count - len(entrant.J))
         for k in range(count):
             if entrant.J[k] is None:
-                unjudged.append((entrant, k))
-                laws.append(entrant.gains(k))
-                numbers.append(k)
+                file = _judgement(course, entrant, k)
+                entrant.J[k] = file.read()
+                if entrant.J[k] is None:
+                    unjudged.append((entrant, k))
+                    files.append(file)
+    if not unjudged:
+        return
+    numbers = [k for _, k in unjudged]
+    laws = [entrant.gains(k) for entrant, k in unjudged]
     start = time.monotonic()
-    values, halves = unseen(trial, plant, laws, goal, numbers)
-    spent = time.monotonic() - start
-    for (entrant, k), value, half in zip(unjudged, values.tolist(), halves.tolist(), strict=True):
-        entrant.J[k] = Unseen(value, half)
-    return judgements(numbers), spent
+    values, halves = unseen(course.trial, course.plant, laws, course.goal, numbers)
+    course.clock.judged(judgements(numbers), time.monotonic() - start)
+    for (entrant, k), value, half, file in zip(
+        unjudged, values.tolist(), halves.tolist(), files, strict=True
+    ):
+        writable(file.path)
+        entrant.J[k] = file.keep(Unseen(value, half))
+
+
+def _judgement(course: RaceCourse, entrant: Entrant, k: int) -> CachedResult[Unseen]:
+    """Return the file of J of a law's set k."""
+    trial, plant, goal, _ = course
+    (first,) = trial.seeds(1)
+    case = goal.holdout(plant, entrant.gains(k), first + k)[0]
+    path = trial.folder / "unseen" / f"{plant.name}-{entrant.law.name}-set-{k}.json"
+
+    def save(J: Unseen, file: Path) -> None:
+        file.write_text(json.dumps([J.value, None if math.isnan(J.half) else J.half]))
+
+    def load(file: Path) -> Unseen:
+        value, half = json.loads(file.read_text())
+        return Unseen(value, math.nan if half is None else half)
+
+    return CachedResult(path, [run_key.key(case), goal.describe(), first + k, k], save, load)
 
 
 def judgements(numbers: Sequence[int]) -> int:

@@ -1,10 +1,11 @@
-"""Recommend a law within minutes: a race over sets of gains, then runs with the gains to use.
+"""Recommend a law: a race over sets of gains, then runs with the gains to use.
 
 The race says which law has the lowest J however it is tuned. Of each law that may be the best, the
 three sets of the lowest J run on the same two unseen instances, which choose one. Eight others say
 which law has the lowest J with these gains, as their units are runs. The tables, the share of runs
-that settle, and the margins are of these gains, too, on runs of their own. Under RK4 all these runs
-have twice the usual physics step, where that fits.
+that settle, how the law rests, and the margins are of these gains, too, on runs of their own. Under
+RK4 all these runs have twice the usual physics step, where that fits. Each part is left out for
+which there is no time, the film and the margins first.
 """
 
 import dataclasses
@@ -12,6 +13,7 @@ import functools
 import math
 import operator
 from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +23,7 @@ from smc_mujoco.analysis.step_halving import doubled, halved
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective, weighed
 from smc_mujoco.analysis.tuning.result import Tuned
+from smc_mujoco.analysis.tuning.run_limits import CALM, LIMIT_COST, overshoot, swing
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
@@ -35,13 +38,34 @@ from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.doubts import constant_goal
 from smc_mujoco.simulation.force_bounds import default_u_max
 from smc_mujoco.simulation.prepare import prepare
+from smc_mujoco.simulation.run import run_unjudged
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import Noise
+from smc_mujoco.simulation.signals import Constant, Noise
 from smc_mujoco.studies.answer_time import FEWEST_SEEDS, SHOWN, AnswerTime
 from smc_mujoco.studies.fair_gains import NOT_TUNED, Candidate, Laws, Trial, default_of
 from smc_mujoco.studies.leaderboard import leaderboard
-from smc_mujoco.studies.race import Entrant, Race, compared, judgements, race, unseen
-from smc_mujoco.studies.recommendation import RELIABLE, NoLaw, RaceRecommendation
+from smc_mujoco.studies.race import (
+    WITHOUT,
+    Entrant,
+    Race,
+    RaceCourse,
+    ReadyEntrant,
+    SearchedEntrant,
+    compared,
+    hopeless,
+    judgements,
+    race,
+    unseen,
+)
+from smc_mujoco.studies.recommendation import (
+    RELIABLE,
+    AddedNoise,
+    AtRest,
+    NoLaw,
+    Recommendation,
+    Settled,
+    Tolerance,
+)
 from smc_mujoco.studies.table import Table
 
 BY = "plant", "condition"  # what the runs of a table have in common
@@ -55,63 +79,63 @@ LIGHT = 0.01  # of the bound on u: a smaller load pushes nothing; chosen
 TRIED = 15  # runs that a coarse margin takes, on average; chosen
 # judgements of each law after a race: of the sets considered, and of the one chosen
 AFTER = CONSIDERED * len(CHOOSING) + judgements(DECIDING)
-Settled = dict[str, dict[str, tuple[int, int]]]
+
+
+class Question(NamedTuple):
+    """What a recommendation is asked, beside the course of its race."""
+
+    laws: Laws
+    metrics: Sequence[str]  # of the tables
+    seeds: int  # of the tables, if the time allows it
+    relevant: float  # as in `ranking`
+    untried_laws: Sequence[str]  # further laws of the package that suit
 
 
 def recommend(
-    trial: Trial,
-    plant: Plant,
-    laws: Laws,
-    metrics: Sequence[str],
-    seeds: int,
-    clock: AnswerTime,
-    relevant: float,
-    untried_laws: Sequence[str],
-) -> RaceRecommendation:
-    """Race laws on a plant and recommend one of them, all as long as the clock lets it; `metrics`
-    are those of the tables, from that many seeds, and `untried_laws` further laws that suit.
-    """
-    goal = trial.asked_goal(plant)
-    entrants, left_out = _entrants(trial, plant, laws)
-    table_work = sum(
-        _coarse(trial, plant, "none", condition).work for condition in trial.conditions
-    )
+    trial: Trial, plant: Plant, question: Question, goal: Objective, clock: AnswerTime
+) -> Recommendation:
+    """Race laws on a plant and recommend one of them, all as long as the clock lets it."""
+    course = RaceCourse(trial, plant, goal, clock)
+    entrants, left_out = _entrants(trial, plant, question.laws, goal)
+    table_work = _work_of_tables(course)
     kinds = len(KINDS) + 1  # friction from two sides
-    margins_work = TRIED * kinds * _coarse(trial, plant, "none", trial.conditions[0]).work
-    clock.unit = _work_of_judgement(plant, goal)
-    few = min(seeds, FEWEST_SEEDS)
+    margins_work = TRIED * kinds * _coarse(trial, plant, WITHOUT, trial.conditions[0]).work
+    clock.unit = _work_of_judgement(course)
+    few = min(question.seeds, FEWEST_SEEDS)
     clock.table, clock.choice = few * table_work, AFTER * clock.unit
     clock.after = margins_work + 2 * len(BESIDE_NONE) * clock.unit
-    raced = race(trial, plant, entrants, goal, clock, relevant)
-    chosen, tuned = _chosen(trial, plant, raced, _shown(raced), goal)
+    raced = race(course, entrants, question.relevant)
+    chosen, tunings = _chosen(course, raced, _shown(raced))
     fixed = None
-    if clock.work_left >= len(chosen) * (judgements(DECIDING) * clock.unit + few * table_work):
+    if clock.fits(len(chosen) * (judgements(DECIDING) * clock.unit + few * table_work)):
         rivals = [*chosen][: max(2, len(raced.first))]
-        fixed = _fixed(trial, plant, {law: chosen[law] for law in rivals}, goal, relevant)
+        fixed = _fixed(course, {law: chosen[law] for law in rivals}, question.relevant)
     candidates = [Candidate(law, (law,)) for law in chosen.values()]
-    count = clock.seeds(seeds, len(chosen) * table_work, margins_work)
-    table = trial.run({plant.name: candidates}, count, coarse=True)
+    count = clock.seeds(question.seeds, len(chosen) * table_work, margins_work)
+    with clock.timed(count * len(chosen) * table_work):
+        table = trial.run({plant.name: candidates}, count, coarse=True)
     settled = _settled(table)
-    least = {law: _least_share(settled[law]) for law in chosen}
-    order = in_order({law: settled[law] for law in chosen}, fixed, raced.winner)
-    compared_metrics = list(metrics)
-    if min(least.values()) < 1.0 and SETTLES not in compared_metrics:
-        compared_metrics.append(SETTLES)
-    boards = leaderboard(table, compared_metrics, BY, defaults=True, relevant=relevant)
+    rests = {name: _at_rest(course, law) for name, law in chosen.items()}
+    shaky = [name for name, rest in rests.items() if rest and rest.share > CALM]
+    order = in_order({law: settled[law] for law in chosen}, fixed, raced, shaky)
+    metrics = list(question.metrics)
+    least = {law: least_share(settled[law]) for law in chosen}
+    if min(least.values()) < 1.0 and SETTLES not in metrics:
+        metrics.append(SETTLES)
+    boards = leaderboard(table, metrics, BY, defaults=True, relevant=question.relevant)
     if not boards:
         raise ScenarioError(f"no need has a number in any run on {plant.name}: ask for others")
-    ordered = tuple(chosen[law] for law in order)
-    first = ordered[0]
-    together = _together(trial, plant, first, count)
-    weighs, no_law = _weighed(trial, plant, first, goal, clock)
+    first = chosen[order[0]]
+    together = _together(course, first, count)
+    weighs, no_law = _weighed(course, first)
     base = _base_of_margins(trial, plant, first)
     helped = helped_joints(base)
     margins, untried = _margins(trial, base, clock)
     opposed = _opposed(trial, base, helped, clock)
-    return RaceRecommendation(
+    return Recommendation(
         table=table,
         leaderboard=boards,
-        laws=ordered,
+        laws=tuple(chosen[law] for law in order),
         settles=least,
         race=raced,
         fixed=fixed,
@@ -119,18 +143,23 @@ def recommend(
         together=together,
         weighs=weighs,
         no_law=no_law,
-        assumed=_assumed(trial, plant, goal),
-        margins=margins,
-        beside=str(base.condition),
-        untried=untried,
-        helped=[driven_names(plant)[i] for i in helped],
-        opposed=opposed,
-        seeds=seeds,
+        rests=rests,
+        limits=goal.limits,
+        noises=_noises(course),
+        tolerance=Tolerance(
+            margins=margins,
+            beside=str(base.condition),
+            untried=untried,
+            helped=[driven_names(plant)[i] for i in helped],
+            opposed=opposed,
+        ),
+        seeds=question.seeds,
         worst_run=_worst_run(table, first.name),
-        tuned=tuned.get(first.name),
+        tuned=tunings.get(first.name),
         left_out=left_out,
-        untried_laws=untried_laws,
-        judged=f"over {joined(_judged(trial, goal))} on {plant.name}",
+        untried_laws=question.untried_laws,
+        judged=_judged(trial, goal),
+        folder=trial.folder,
     )
 
 
@@ -141,80 +170,115 @@ def _coarse(
     return doubled(trial.case(plant, law, condition))
 
 
-def _least_share(settled: Mapping[str, tuple[int, int]]) -> float:
+def _work_of_tables(course: RaceCourse) -> float:
+    """Return the work of a law's runs from one seed."""
+    trial, plant, *_ = course
+    return sum(_coarse(trial, plant, WITHOUT, condition).work for condition in trial.conditions)
+
+
+def least_share(settled: Mapping[str, tuple[int, int]]) -> float:
     """Return the least share of a condition's runs that settle, of (settled, all) by condition."""
     return min(count / runs for count, runs in settled.values())
 
 
 def _shown(raced: Race) -> list[str]:
-    """Return the laws that tables show: those that may be the best, then the others of lowest J."""
-    rest = [law for law in raced.running if law not in raced.first]
-    return [*raced.first, *rest][:SHOWN]
+    """Return the laws that tables show: those that may be the best, then the others of lowest J; no
+    law only where it may be the best.
+    """
+    values = {name: raced.entrants[name].values for name in raced.running}
+    first = [law for law in raced.first if law != WITHOUT or law not in hopeless(values)]
+    rest = [law for law in raced.running if law not in first and law != WITHOUT]
+    return [*first, *rest][:SHOWN]
 
 
-def _entrants(trial: Trial, plant: Plant, laws: Laws) -> tuple[list[Entrant], dict[str, str]]:
-    """Return the laws that race, and why others cannot be tuned, by name."""
+def _entrants(
+    trial: Trial, plant: Plant, laws: Laws, goal: Objective
+) -> tuple[list[Entrant], dict[str, str]]:
+    """Return the laws that race, "none" first, and why others cannot be tuned, by name."""
     candidates = trial.known(plant, laws)
     rule = trial.rule(plant, candidates)
-    entrants = []
+    entrants: list[Entrant] = []
+    if all(coerce.law(law).name != WITHOUT for law in laws):
+        entrants.append(ReadyEntrant(default_of(coerce.law(WITHOUT))))
     left_out: dict[str, str] = {}
     for law, candidate in zip(laws, candidates, strict=True):
+        if candidate:
+            entrants.append(ReadyEntrant(candidate))
+            continue
         bound = coerce.law(law)
-        task = None
-        if candidate is None:
-            try:
-                task = search.task_of(plant, bound, rule.goal, rule.budget, 0, trial.threads)
-                task = task._replace(quick=rule.quick, device=trial.device)
-            except BrokenLawError:
-                raise
-            except ScenarioError as error:
-                left_out[bound.name] = f"{NOT_TUNED}{error}"
-        if candidate or task:
-            entrants.append(Entrant(candidate, task))
-        elif trial.defaults or len(laws) == 1:
-            entrants.append(Entrant(default_of(law), None))
+        try:
+            sought = dataclasses.replace(
+                rule.goal, limits=tuple(limit.for_search for limit in goal.limits)
+            )
+            task = search.task_of(plant, bound, sought, rule.budget, 0, trial.threads)
+            entrants.append(SearchedEntrant(task._replace(quick=rule.quick, device=trial.device)))
+        except BrokenLawError:
+            raise
+        except ScenarioError as error:
+            left_out[bound.name] = f"{NOT_TUNED}{error}"
+            if trial.defaults or len(laws) == 1:
+                entrants.append(ReadyEntrant(default_of(law)))
     return entrants, left_out
 
 
-def in_order(settled: Settled, fixed: Comparison | None, winner: str | None) -> list[str]:
+def in_order(
+    settled: Mapping[str, Mapping[str, tuple[int, int]]],
+    fixed: Comparison | None,
+    raced: Race | None,
+    shaky: Sequence[str] = (),
+) -> list[str]:
     """Return the laws, the one to use first: those that settle reliably, then those that settle in
-    some run, and among equals the one that runs name where sets of gains name no winner.
+    some run. Among equals the one that runs name where sets of gains name no winner; where nothing
+    does, those that rest before the `shaky`, of the laws that may be the best.
     """
+    winner = raced.winner if raced else None
     better = fixed.winners[0] if fixed and not winner else None
+    undecided = raced.first if raced and not winner and not better else []
 
-    def place(law: str) -> tuple[bool, bool, bool]:
+    def place(law: str) -> tuple[bool, ...]:
         of_law = settled[law]
         never = not any(done for done, _ in of_law.values())
-        return _least_share(of_law) < RELIABLE, never, law != better
+        behind = bool(undecided) and law not in undecided
+        shakes = bool(undecided) and law in shaky
+        return least_share(of_law) < RELIABLE, never, law != better, behind, shakes
 
     return sorted(settled, key=place)
 
 
 def _chosen(
-    trial: Trial, plant: Plant, raced: Race, names: Sequence[str], goal: Objective
+    course: RaceCourse, raced: Race, names: Sequence[str]
 ) -> tuple[dict[str, Component], dict[str, Tuned]]:
     """Return the laws with the set of gains that has the lowest J on the same unseen instances, and
-    their searches.
+    their searches. Without time, the set is that of the lowest J so far.
     """
     chosen, tunings = {}, {}
-    for name in _counted(f"choosing gains of {joined(names)}: law", names, trial):
+    for name in _counted(f"choosing gains of {joined(names)}: law", names, course.trial):
         entrant = raced.entrants[name]
         law = entrant.gains(0)
         if entrant.count > 1:
-            order = np.argsort(entrant.values[: entrant.count], kind="stable")[:CONSIDERED].tolist()
-            sets = list(map(entrant.gains, order))
-            laws = []
-            for tried in sets:
-                laws += [tried] * len(CHOOSING)
-            J, _ = unseen(trial, plant, laws, goal, [*CHOOSING] * len(sets))
-            logarithms = np.log(J).reshape(len(sets), -1)
-            law = sets[int(logarithms.sum(axis=1).argmin())]
-        if entrant.task:
-            tuned = search.result_of(entrant.task, tuple(entrant.found)).sourced()
+            law = _best_set(course, entrant)
+        if isinstance(entrant, SearchedEntrant):
+            tuned = search.result_of(entrant.task, tuple(entrant.results)).sourced()
             law = law.sourced(source.TUNED, tuned.search)
             tunings[name] = tuned.of_law(law)
         chosen[name] = law
     return chosen, tunings
+
+
+def _best_set(course: RaceCourse, entrant: Entrant) -> Component:
+    """Return a law with the set of its gains that `_chosen` takes."""
+    order = np.argsort(entrant.values[: entrant.count], kind="stable")[:CONSIDERED].tolist()
+    sets = list(map(entrant.gains, order))
+    work = len(sets) * len(CHOOSING) * course.clock.unit
+    if not course.clock.fits(work):
+        return sets[0]
+    laws = []
+    for of_set in sets:
+        laws += [of_set] * len(CHOOSING)
+    with course.clock.timed(work):
+        J, _ = unseen(course.trial, course.plant, laws, course.goal, [*CHOOSING] * len(sets))
+    logarithms = np.log(J).reshape(len(sets), -1)
+    return sets[int(logarithms.sum(axis=1).argmin())]
 
 
 def _counted(what: str, names: Sequence[str], trial: Trial) -> Iterator[str]:
@@ -226,25 +290,26 @@ def _counted(what: str, names: Sequence[str], trial: Trial) -> Iterator[str]:
 
 
 def _fixed(
-    trial: Trial,
-    plant: Plant,
-    chosen: Mapping[str, Component],
-    goal: Objective,
-    relevant: float,
+    course: RaceCourse, chosen: Mapping[str, Component], relevant: float
 ) -> Comparison | None:
-    """Return the comparison of laws with these gains; None for one law."""
-    if len(chosen) < 2:
+    """Return the comparison of laws with these gains, u = 0 among them; None for one law."""
+    laws = dict(chosen) | {WITHOUT: coerce.law(WITHOUT)}
+    if len(laws) < 2:
         return None
     J = {}
     halves = {}
     set_numbers = {}
     fine = {}
-    for name in _counted("unseen runs of law", [*chosen], trial):
-        law = chosen[name]
-        J[name], halves[name] = unseen(trial, plant, [law] * len(DECIDING), goal, DECIDING)
+    work = judgements(DECIDING) * course.clock.unit
+    for name in _counted("unseen runs of law", [*laws], course.trial):
+        repeated = [laws[name]] * len(DECIDING)
+        with course.clock.timed(work):
+            J[name], halves[name] = unseen(
+                course.trial, course.plant, repeated, course.goal, DECIDING
+            )
         set_numbers[name] = np.zeros(len(DECIDING))
-        fine[name] = J[name] < FAILURE_COST
-    return compared(J, goal, halves, set_numbers, fine, relevant)
+        fine[name] = J[name] < LIMIT_COST
+    return compared(J, course.goal, halves, set_numbers, fine, relevant)
 
 
 def _settled(table: Table) -> Settled:
@@ -257,34 +322,76 @@ def _settled(table: Table) -> Settled:
     return counts
 
 
-def _together(trial: Trial, plant: Plant, law: Component, seeds: int) -> tuple[int, int] | None:
-    """Return in how many runs a law settles under all conditions asked for at once, and how many
-    there are; None for a single condition, or for some that exclude each other.
+def _at_rest(course: RaceCourse, law: Component) -> AtRest | None:
+    """Return how a law ends its runs without noise and without disturbances that vary, in the
+    condition in which u swings most, and its largest overshoot there before any event; None without
+    time or a goal to rest at.
     """
+    trial, plant, _, clock = course
+    if not clock.fits(_work_of_tables(course)):
+        return None
+    cases = [_quiet(_coarse(trial, plant, law, condition)) for condition in trial.conditions]
+    traces = run_unjudged(cases, trial.threads)
+    largest, where = None, ""
+    most, where_most = math.nan, ""
+    for condition, case, trace in zip(trial.conditions, cases, traces, strict=True):
+        if trace.failure is not None or trace.diverged_at is not None:
+            continue
+        of_run = swing(case, trace.u)
+        if not math.isnan(of_run.share) and (largest is None or of_run.share > largest.share):
+            largest, where = of_run, condition.name
+        percent = overshoot(case, trace.x)
+        if not math.isnan(percent) and not percent <= most:
+            most, where_most = percent, condition.name
+    if largest is None:
+        return None
+    size, frequency, share, channel = largest
+    return AtRest(size, frequency, share, cases[0].efforts[channel], where, most, where_most)
+
+
+def _quiet(case: Scenario) -> Scenario:
+    """Return a run without noise and without disturbances that vary from its start."""
+    disturbance = []
+    for part in case.disturbance:
+        if isinstance(part, Constant) or getattr(part, "time", 0.0) > 0.0:
+            disturbance.append(part)
+    return dataclasses.replace(case, noise=Noise(), disturbance=tuple(disturbance))
+
+
+def _together(course: RaceCourse, law: Component, seeds: int) -> tuple[int, int] | None:
+    """Return in how many runs a law settles under all conditions asked for at once, and how many
+    there are; None for a single condition, for some that exclude each other, or without time.
+    """
+    trial, plant, _, clock = course
     if len(trial.conditions) < 2:
         return None
     combined = functools.reduce(operator.add, trial.conditions)
     try:
-        trial.case(plant, law, combined)  # parts may exclude each other, such as two drives
+        case = _coarse(trial, plant, law, combined)  # parts may exclude each other, as two drives
     except ScenarioError:
         return None
+    if not clock.fits(seeds * case.work):
+        return None
     at_once = trial._replace(conditions=[combined], folder=trial.folder / "together")
-    table = at_once.run({plant.name: [Candidate(law, (law,))]}, seeds, coarse=True)
+    with clock.timed(seeds * case.work):
+        table = at_once.run({plant.name: [Candidate(law, (law,))]}, seeds, coarse=True)
     return _settled(table)[law.name][combined.name]
 
 
-def _weighed(
-    trial: Trial, plant: Plant, law: Component, goal: Objective, clock: AnswerTime
-) -> tuple[dict[str, float], NoLaw]:
-    """Return condition -> its share in J of a law, and how no law does on the same instances, of
-    which there is at least one.
+def _weighed(course: RaceCourse, law: Component) -> tuple[dict[str, float], NoLaw | None]:
+    """Return condition -> its share in J of a law, and how no law does on the same instances; {}
+    and None without time.
     """
-    fit = min(len(BESIDE_NONE), clock.work_left / (2 * clock.unit))
-    instances = BESIDE_NONE[: max(1, int(fit))]
+    trial, plant, goal, clock = course
+    count = int(min(len(BESIDE_NONE), clock.work_left / (2 * clock.unit)))
+    if not count:
+        return {}, None
+    instances = BESIDE_NONE[:count]
     names = [condition.name for condition in goal.conditions]
-    costs, settled = weighed(plant, law, goal, instances, trial.threads)
-    none = coerce.law("none")
-    without_costs, settled_without = weighed(plant, none, goal, instances, trial.threads)
+    with clock.timed(2 * count * clock.unit):
+        costs, settled = weighed(plant, law, goal, instances, trial.threads)
+        none = coerce.law(WITHOUT)
+        without_costs, settled_without = weighed(plant, none, goal, instances, trial.threads)
     total = costs.sum(axis=0)
     parts = (total / total.sum()).tolist()
     ratios = without_costs.sum(axis=1) / costs.sum(axis=1)
@@ -301,46 +408,24 @@ def _weighed(
     )
 
 
-def _judged(trial: Trial, goal: Objective) -> list[str]:
-    """Return the conditions that J is of, with a word on those that were not asked for."""
+def _judged(trial: Trial, goal: Objective) -> dict[str, bool]:
+    """Return the conditions that J is of, and whether each was asked for."""
     by_user = {condition.name for condition in trial.conditions}
-    names = []
-    for condition in goal.conditions:
-        added = "" if condition.name in by_user else " (added, see Assumed)"
-        names.append(f"{condition.name}{added}")
-    return names
+    return {condition.name: condition.name in by_user for condition in goal.conditions}
 
 
-def _assumed(trial: Trial, plant: Plant, goal: Objective) -> str:
-    """Return how often u changes and what it is made from, and each noise, in words; of noise that
-    no condition asked for has, that it is added.
-    """
-    period = 1e3 * trial.case(plant, "none", "nominal").control_period
-    parts = [
-        f"u changes every {period:g} ms and is computed from measured positions and velocities, "
-        "unless a condition says otherwise"
-    ]
+def _noises(course: RaceCourse) -> list[AddedNoise]:
+    """Return the noise of each condition that has some."""
+    trial, plant, goal, _ = course
     by_user = {condition.name for condition in trial.conditions}
-    for condition in trial.conditions:
-        velocity = trial.case(plant, "none", condition).resolved.velocity
-        if velocity.name != "measured":
-            parts.append(f"under {condition.name} the velocity is {velocity} of the positions")
     units = " or ".join(dict.fromkeys(plant.units[: plant.driven]))
+    noises = []
     for condition in goal.conditions:
         noise = condition.on(plant, goal.duration).get("noise")
         if isinstance(noise, Noise):
-            parts.append(
-                f"under {condition.name} the measured positions carry noise of "
-                f"{noise.position:g} {units} and the measured velocities noise of "
-                f"{noise.velocity:g} {units}/s (standard deviations)"
-            )
-            if condition.name not in by_user:
-                parts[-1] += (
-                    ". None of your conditions has noise, so the condition "
-                    f"{condition.name} was added: to replace it, give a condition with "
-                    "noise=Noise(...)"
-                )
-    return "; ".join(parts)
+            added = condition.name not in by_user
+            noises.append(AddedNoise(condition.name, noise.position, noise.velocity, units, added))
+    return noises
 
 
 def _worst_run(table: Table, law: str) -> Scenario:
@@ -416,12 +501,14 @@ def _opposed(
         return margins_of([mirrored], ["friction"], COARSE, trial.threads, drawn.reached)[0]
 
 
-def _work_of_judgement(plant: Plant, goal: Objective) -> float:
+def _work_of_judgement(course: RaceCourse) -> float:
     """Return the work of the runs that judge one set of gains, at twice their step where they may
     have it. Their models are compiled here, so that the first judgement takes as long as others.
     """
-    cases = list(map(doubled, goal.holdout(plant, coerce.law("none"), 0)))
-    for case in cases:
-        prepare(case)
-        prepare(halved(case))
+    cases = list(map(doubled, course.goal.holdout(course.plant, coerce.law(WITHOUT), 0)))
+    with bar("preparing runs", 2 * len(cases), course.trial.progress, counted=True) as drawn:
+        for case in cases:
+            for prepared in (case, halved(case)):
+                prepare(prepared)
+                drawn.advance(1.0)
     return sum(case.work for case in cases)

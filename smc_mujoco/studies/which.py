@@ -1,24 +1,18 @@
-"""Which law suits a plant: a comparison by the rules of `compare`, and an answer of four lines.
+"""Which law suits a plant: a race of laws by J, until one has the lowest or the time is over.
 
-A need is a metric to compare, such as "fast", or a property that each law must have, such as
-"continuous". A law that settles in less than half as many runs of a condition as the law that
-settles most often is not compared, because a law that does nothing would be the calmest. The others
-stand by the number of their runs that fail, then by their mean rank over all needs and conditions,
-see `Boards.order`. This order is not tested; the last line of the answer says how sure it is.
-
-Within minutes the laws race instead, see `race` and `recommend`.
+A need is a metric to show, such as "fast"; a limit that searches keep, such as "overshoot<10"; or a
+property that each law must have, such as "continuous". See `race` and `recommend`.
 """
 
+import dataclasses
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
-
 from smc_mujoco.analysis.engine import Device
-from smc_mujoco.analysis.paired_runs import SETTLES, values
 from smc_mujoco.analysis.ranking import RELEVANT, Relevant
+from smc_mujoco.analysis.tuning.run_limits import RunLimit, limits_in
 from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.control import gain_sets
@@ -32,27 +26,28 @@ from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import Starts, listed, listed_laws
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.workers import Workers
-from smc_mujoco.studies.answer_time import FILMED, FILMED_SHARE, AnswerTime
+from smc_mujoco.studies.answer_time import AnswerTime
 from smc_mujoco.studies.compare import DrawSeed
 from smc_mujoco.studies.fair_gains import Laws, Trial, law_or_template
-from smc_mujoco.studies.leaderboard import leaderboard
-from smc_mujoco.studies.recommend import recommend
+from smc_mujoco.studies.race import WITHOUT
+from smc_mujoco.studies.recommend import Question, recommend
 from smc_mujoco.studies.recommendation import Recommendation
-from smc_mujoco.studies.table import Table
 
 NEEDS: Mapping[str, str] = {metric.need: metric.name for metric in metrics() if metric.need}
-DEFAULT_NEEDS = ("fast", "accurate", "calm")
+DEFAULT_NEEDS = ("fast", "accurate", "calm")  # which are shown; none is a limit
 DEFAULT_CONDITIONS = ("nominal", "noise", "sine")
-MIN_SETTLED = 0.5  # of the share of runs that settle under the best law; chosen
-SEEDS, RACE_SEEDS = 24, 14  # runs of a law in each condition, of a whole comparison and of a race
+DURATION = 3.0  # of a run, s
+SEEDS = 14  # runs of a law in each condition
 QUICK_MINUTES = 10.0
+# Those that a person would try, first: with little time, they are searched
+NATURAL = ("pid", "super_twisting", "adrc", *gain_sets.COMPARED)
 
 
 @constrained
 def which(
     plant: str | Plant,
     conditions: str | Condition | Sequence[str | Condition] | None = None,
-    needs: str | Sequence[str] = DEFAULT_NEEDS,
+    needs: str | Sequence[str] | None = None,
     laws: str | Component | Template | Sequence[str | Component | Template] | None = None,
     seeds: Annotated[int, Whole(low=1, high=10_000)] | None = None,
     duration: Positive | None = None,
@@ -69,46 +64,49 @@ def which(
     falling: Boolean = False,
     minutes: Positive | None = None,
 ) -> Recommendation:
-    """Recommend a law for a plant: compare the laws that suit, with gains for the plant, and say
-    how certain the answer is.
+    """Recommend a law for a plant: laws race by J until one has the lowest, and the answer says how
+    certain that is.
 
         recommended = smc.which("duffing", "friction", laws=["pid", "adrc"], minutes=1)
         print(recommended)
         print(recommended.law)
 
+    The gains of the laws are searched under the conditions asked for and noise, a quarter as long
+    as by `tune`, in turn over the laws until one has the lowest J, at most 12 sets a law. On a
+    plant for which the package ships gains, laws have these. u = 0 races, too, and is the answer
+    where it is the best.
+
     Args:
       plant: a name, a Plant, or your own MJCF and its joints, as "arm.xml:shoulder,elbow".
       conditions: names, texts or Conditions, see `condition`. Each is tried alone; "noise +
         coulomb" is one that has both. Default: nominal, noise and sine.
-      needs: the scores to compare: "fast", "accurate" (at the end), "on-track" (on the way),
-        "calm", "gentle", "frugal", "no-overshoot"; by default fast, accurate and calm. With
-        minutes they are only shown: the laws are compared by J. And what every law must have:
-        "continuous" and the other names of `smc_mujoco.control.properties.PROPERTIES`.
+      needs: limits that the gains keep: "no-overshoot", "overshoot<10" (in % of the way to the
+        goal) and "calm" (u rests where nothing moves). What every law must have: "continuous" and
+        the other names of `smc_mujoco.control.properties.PROPERTIES`. And scores that tables show:
+        "fast", "accurate" (at the end), "on-track" (on the way), "gentle", "frugal"; by default
+        fast, accurate and calm, without a limit.
       laws: the laws to compare, by name or with your own gains. Default: all that suit; of
-        these the usual ones on your own model within minutes. The answer says how many were not
-        tried.
-      seeds: runs of a law in each condition, each with another start and other noise. Default: 24,
-        or 14 with minutes.
-      duration: of a run, s. Default: 5, or 3 with minutes.
-      out: folder for gains and runs, which another call reads.
+        these the usual ones on your own model. The answer says how many were not tried.
+      seeds: runs of a law in each condition, each with another start and other noise. Default: 14.
+      duration: of a run, s. Default: 3.
+      out: folder for gains, runs and the report, which another call reads.
       quick: the same as minutes=10.
-      defaults: whether a law may win over rivals whose gains are their defaults.
+      defaults: whether a law that cannot be tuned may race with its default gains.
       falling: whether to go on where the base of your model falls while its joints are held, so
         that no law of a joint can be judged.
-      minutes: how long the whole may take. Then laws race: their gains are searched under the
-        conditions asked for and noise, a quarter as long, in turn over the laws until one has the
-        lowest J, at most 12 sets a law. The race leaves time for the tables, the margins and a
-        film, which are shorter where there is little; margins go before a film. Laws for whose
-        first set there is no time are in `race.unsearched`. The clock may change which laws, sets,
-        runs and margins there are, and with them the answer; with the same ones it is the same to
-        the last bit. After a stop, the same call goes on with the sets that the folder has. The
-        `RaceRecommendation` that comes back has the `margins` of the first law and its `worst_run`,
-        too. Default: a whole comparison, which no clock stops.
+      minutes: how long the whole may take. Every law gets a first set of gains, from a shorter
+        search where that is short; laws whose search the clock ends are in `race.unsearched`.
+        Tables, margins and a film then take what is left, the film last. The clock may change which
+        laws, sets, runs and margins there are, and with them the answer; with the same ones it is
+        the same to the last bit. After a stop, the same call goes on with the sets that the folder
+        has. Default: no limit.
       starts, relevant, threads, progress, seed, device, executor: as in `compare`.
 
     Returns:
-      A `Recommendation`, which prints as tables and lines: `law` has the gains to use, `second` is
-      the next law, `table` has a row a run.
+      A `Recommendation`, which prints as an answer of one screen: `law` has the gains to use,
+      `second` is the next law, `margins` what the first withstands, `worst_run` its worst run,
+      `table` has a row a run, and `full` all tables. The folder has `report.html`, and
+      `recommended.json` where gains were searched.
 
     Raises:
       ScenarioError: an unknown name, no law that suits, a need without a number on this plant, or
@@ -120,75 +118,113 @@ def which(
     machine = as_plant(plant)
     if not falling and (why := falls(machine)):
         raise ScenarioError(f"{why}; falling=True (--falling) goes on all the same")
-    metrics_asked, properties = _metrics_and_properties(needs)
+    asked_metrics, properties, limits = _read_needs(needs)
     chosen = _suited(machine, properties, laws)
-    if minutes and machine.is_user_model and laws is None:
+    if machine.is_user_model and laws is None:
         chosen = [law for law in chosen if law.name in gain_sets.COMPARED] or chosen
     trial = Trial.of(
         [machine],
         conditions,
         DEFAULT_CONDITIONS,
-        duration or (3.0 if minutes else 5.0),
+        duration or DURATION,
         out,
         starts=starts,
         threads=threads,
         progress=progress,
         defaults=defaults,
         seed=seed,
-        quick=minutes is not None,
+        quick=True,
         device=device,
         executor=executor,
     )
     trial.check({machine.name: chosen})
-    compared = _with_values(trial.case(machine, "none", trial.conditions[0]), metrics_asked)
+    shown_metrics = _with_values(
+        trial.case(machine, WITHOUT, trial.conditions[0]), asked_metrics, needs is None
+    )
+    names = {law.name for law in chosen}
+    untried = [law.name for law in _of_package(machine, properties) if law.name not in names]
+    question = Question(chosen, shown_metrics, seeds or SEEDS, relevant, untried)
+    goal = trial.asked_goal(machine, limits)
+    recommendation = recommend(trial, machine, question, goal, AnswerTime.within(began, minutes))
+    call = _call(plant, conditions, laws, needs, starts, trial.folder, minutes)
+    recommendation = dataclasses.replace(recommendation, call=call)
+    recommendation.save()
+    return recommendation
+
+
+def _call(
+    plant: object,
+    conditions: object,
+    laws: object,
+    needs: object,
+    starts: Starts | None,
+    out: Path,
+    minutes: float | None,
+) -> list[str]:
+    """Return the words of a call as a command, for a next step; [] if a plant or starts have no
+    text.
+    """
+    if not isinstance(plant, str) or (starts and (starts.x0 is None or starts.by)):
+        return []
+    words = ["smc-mujoco", "which", plant]
+    for option, values in (("--condition", conditions), ("--law", laws), ("--need", needs)):
+        if values is not None:
+            items = [values] if isinstance(values, str) else listed(option, values)
+            if all(isinstance(item, str) for item in items) and option != "--condition":
+                words += [option, ",".join(items)]
+                continue
+            for item in items:
+                words += [option, str(item)]
+    if starts:
+        words.append(f"--x0={','.join(f'{x:g}' for x in starts.x0 or ())}")
+    if out != Path("which"):
+        words += ["--out", str(out)]
     if minutes:
-        spare = 60.0 * min(FILMED, FILMED_SHARE * minutes)
-        clock = AnswerTime(began + 60.0 * minutes - spare, spare)
-        names = {law.name for law in chosen}
-        untried = [law.name for law in _of_package(machine, properties) if law.name not in names]
-        return recommend(
-            trial, machine, chosen, compared, seeds or RACE_SEEDS, clock, relevant, untried
-        )
-    count = seeds or SEEDS
-    candidates = trial.candidates({machine.name: chosen}, count)
-    table = trial.run(candidates, count)
-    settles, fit = _fit(table)
-    boards = leaderboard(table.select(law=fit), compared, defaults=defaults, relevant=relevant)
-    if not boards:
-        raise ScenarioError(f"no need has a number in any run on {machine.name}: ask for others")
-    found = {law.name: law for law, *_ in candidates[machine.name]}
-    ordered = tuple(found[name] for name in boards.order)
-    return Recommendation(table=table, leaderboard=boards, laws=ordered, settles=settles)
+        words += ["--minutes", f"{minutes:g}"]
+    return words
 
 
-def _metrics_and_properties(needs: str | Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the metrics and the properties among the needs; without metrics, DEFAULT_NEEDS."""
+def _read_needs(
+    needs: str | Sequence[str] | None,
+) -> tuple[list[str], list[str], tuple[RunLimit, ...]]:
+    """Return the metrics, the properties and the limits that needs are; without metrics,
+    DEFAULT_NEEDS.
+    """
+    if needs is None:
+        needs = DEFAULT_NEEDS
+        limits = ()
+    else:
+        needs = needs.split(",") if isinstance(needs, str) else listed("needs", needs)
+        limits = limits_in(needs)
     compared, properties = [], []
-    listed_needs = needs.split(",") if isinstance(needs, str) else listed("needs", needs)
-    for need in listed_needs:
+    for need in needs:
         name = need.strip() if isinstance(need, str) else need
+        if limits and limits_in([name]):
+            name = "calm" if name == "calm" else "no-overshoot"
         find("need", name, {**NEEDS, **PROPERTIES})
         if name in NEEDS:
             compared.append(NEEDS[name])
         else:
             properties.append(name)
-    return compared or [NEEDS[name] for name in DEFAULT_NEEDS], properties
+    return compared or [NEEDS[name] for name in DEFAULT_NEEDS], properties, limits
 
 
-def _with_values(run: Scenario, asked: Sequence[str]) -> list[str]:
-    """Return those of the default metrics that have one value in a run. Raise ScenarioError for
-    others that have none, as where motors have different units.
+def _with_values(run: Scenario, compared: Sequence[str], by_default: bool) -> list[str]:
+    """Return those of the metrics that have one value in a run. Raise ScenarioError for others that
+    were asked for and have none, as where motors have different units.
     """
-    if list(asked) != [NEEDS[name] for name in DEFAULT_NEEDS]:
-        for metric in asked:
+    if not by_default:
+        for metric in compared:
             metric_of(run, metric)
-    return [metric for metric in asked if not CATALOGUE[metric].refusal(run)]
+    return [metric for metric in compared if not CATALOGUE[metric].refusal(run)]
 
 
 def _suited(plant: Plant, properties: Sequence[str], laws: object) -> Laws:
-    """Return the laws to compare. Those without given gains are templates."""
+    """Return the laws to compare, in the order in which a person would try them; those of the user
+    in their own. Those without given gains are templates.
+    """
     if laws is None:
-        chosen = _of_package(plant, properties)
+        chosen = sorted(_of_package(plant, properties), key=_place)
     else:
         chosen = []
         for law in map(law_or_template, listed_laws(laws)):
@@ -206,25 +242,13 @@ def _suited(plant: Plant, properties: Sequence[str], laws: object) -> Laws:
     return chosen
 
 
+def _place(law: Component | Template) -> tuple[int, str]:
+    """Return the place of a law of the package in the order of trying."""
+    place = NATURAL.index(law.name) if law.name in NATURAL else len(NATURAL)
+    return place, law.name
+
+
 def _of_package(plant: Plant, properties: Sequence[str]) -> list[Component | Template]:
     """Return the package's laws that suit a plant, each once."""
-    left_out = {"none", *gain_sets.ALIASES}  # whose gains are those of laws that are there
+    left_out = {WITHOUT, *gain_sets.ALIASES}  # whose gains are those of laws that are there
     return [law for law in suitable(properties, plant) if law.name not in left_out]
-
-
-def _fit(table: Table) -> tuple[dict[str, float], list[str]]:
-    """Return the least share of a law's runs that settle in a condition, and the laws that settle
-    often enough to be compared; all if none does.
-    """
-    laws = table.column("law")
-    conditions = table.column("condition")
-    settled = 1.0 - values(table, SETTLES)
-    names = sorted(set(laws.tolist()))
-    tested = sorted(set(conditions.tolist()))
-    shares = np.empty((len(names), len(tested)))
-    for i, law in enumerate(names):
-        for k, condition in enumerate(tested):
-            shares[i, k] = settled[(laws == law) & (conditions == condition)].mean()
-    enough = np.all(shares >= MIN_SETTLED * shares.max(axis=0), axis=1)
-    least = dict(zip(names, shares.min(axis=1).tolist(), strict=True))
-    return least, np.array(names)[enough].tolist() or names

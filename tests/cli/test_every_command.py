@@ -62,9 +62,9 @@ CALLS = {
     "which duffing --need calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 "
     "--x0 0.4 "
     "--relevant 0.05 --out there --allow-defaults --seed 5 --json w.json --threads 2 --device cuda "
-    "--executor dask://h:1 --minutes 2 --no-film --falling": ["studies.which.which"],
+    "--executor dask://h:1 --minutes 2 --no-film --falling --full": ["studies.which.which"],
     "tune duffing --law pid": ["analysis.tuning.search.tune"],
-    "tune duffing --law pid --device cuda --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
+    "tune duffing --law pid --need calm --device cuda --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
     "--condition noise --x0 0.4 --json j.json --threads 2": ["analysis.tuning.search.tune"],
     "margins": ["robustness.margins.margins"],
     "margins --quick": ["robustness.margins.margins"],
@@ -202,10 +202,10 @@ FLAGS = {
     "--quick",
     "--allow-defaults",
 }
-FLAGS |= {"--no-binary"}
+FLAGS |= {"--no-binary", "--full", "--falling"}
 # which function does the work; --need and --plant of `list`
 SWITCHES = {"--rig", "--need", "--plant", "--no-film"}
-AFTER = {"--figure", "--latex", "--json", "--out"}  # of what is done after the function
+AFTER = {"--figure", "--latex", "--json", "--out", "--full"}  # of what is done after the function
 FOLDERS = {"run", "compare", "which"}  # whose --out is a folder
 ALIASES = {
     "--allow-defaults": "defaults",  # option -> arguments that it may change, besides the one of its name
@@ -350,7 +350,7 @@ FILES = {
     line: [
         word
         for word in line.split()
-        if word in AFTER and not (word == "--out" and line.split()[0] in FOLDERS)
+        if word in AFTER - FLAGS and not (word == "--out" and line.split()[0] in FOLDERS)
     ]
     for line in CALLS
 }

@@ -15,7 +15,7 @@ from smc_mujoco.analysis.tuning.result import SearchResult
 from smc_mujoco.common.progress import Bar
 from smc_mujoco.studies import race as module
 from smc_mujoco.studies.answer_time import FEWEST_SEEDS, AnswerTime
-from smc_mujoco.studies.fair_gains import Candidate
+from smc_mujoco.studies.fair_gains import default_of
 from smc_mujoco.studies.recommend import in_order
 
 GOAL = Objective(conditions=("nominal",), duration=1.0)
@@ -29,12 +29,12 @@ def drawn(random, lead):
     return math.exp(trained), math.exp(trained + 0.1 * random.standard_normal())
 
 
-class Drawn(module.Entrant):
+class Drawn(module.SearchedEntrant):
     """A law whose searches are random numbers, each with its J on unseen runs."""
 
     def __init__(self, name, lead, random):
-        super().__init__(Candidate(smc.law("none").named(name), (smc.law("none"),)), None)
-        self.task = object()
+        self.law = smc.law("none").named(name)
+        self.J, self.results, self.again, self.share = [], [], set(), 1
         self.lead, self.random = lead, random
         self.outcome = {}
 
@@ -42,22 +42,26 @@ class Drawn(module.Entrant):
     def wait(seconds):
         """What lets time pass while a law is searched or judged."""
 
-    def search(self, k, draw):
-        self.wait(10.0)
+    def search(self, k, draw, ends):
+        self.wait(10.0 / self.share)
+        if module.time.monotonic() > ends:
+            raise module.OutOfTime
         trained, J = drawn(self.random, self.lead)
         self.outcome[k, trained] = J
         best = Evaluation((1.0,), trained, trained, 0.0)
         return SearchResult(best=best, history=(best,), evaluations=1, engine="")
 
     def gains(self, k):
-        return self.outcome[k, self.found[k].best.objective]
+        return self.outcome[k, self.results[k].best.objective]
 
 
 @pytest.fixture
 def run(monkeypatch):
     """Return what races laws, name -> lead, whose searches are drawn."""
-    nothing = types.SimpleNamespace(read=lambda: None, keep=lambda found: found, path=None)
+    nothing = types.SimpleNamespace(read=lambda: None, keep=lambda result: result, path=None)
     monkeypatch.setattr(module, "_file", lambda *piece: nothing)
+    monkeypatch.setattr(module, "_judgement", lambda *piece: nothing)
+    monkeypatch.setattr(module, "_work", lambda course, entrant: 10.0 / entrant.share)
     monkeypatch.setattr(module, "writable", lambda *paths: None)
 
     def unseen(trial, plant, values, goal, numbers):
@@ -65,14 +69,18 @@ def run(monkeypatch):
         return np.array(values), np.full(len(values), math.nan)
 
     monkeypatch.setattr(module, "unseen", unseen)
-    trial = types.SimpleNamespace(progress=False, executor=None)
 
     def raced(leads, seed=0, clock=None):
         random = np.random.default_rng(seed)
         entrants = [Drawn(name, lead, random) for name, lead in leads.items()]
-        return module.race(trial, None, entrants, GOAL, clock or AnswerTime(), RELEVANT)
+        return module.race(course(clock), entrants, RELEVANT)
 
     return raced
+
+
+def course(clock=None):
+    trial = types.SimpleNamespace(progress=False, executor=None)
+    return module.RaceCourse(trial, None, GOAL, clock or AnswerTime())
 
 
 @pytest.fixture
@@ -94,6 +102,8 @@ def test_a_law_that_cannot_win_any_more_is_dropped_and_two_stay():
     assert module.hopeless(J | {"b": [2.39, 9.0, 9.0]}) == {}
     assert module.hopeless({"a": [1.0] * 3, "b": [9.0] * 3}) == {}
     assert module.hopeless({"a": [1.0] * 3, "b": [9.0] * 3, "c": [5.0] * 3}) == {"b": 9.0}
+    assert module.hopeless({"a": [1.0] * 3, "none": [5.0] * 3, "c": [9.0] * 3}) == {"none": 5.0}
+    assert module.hopeless({"a": [9.0] * 3, "b": [9.0] * 3, "none": [1.0] * 3}) == {}
 
 
 def test_a_search_is_stuck_beside_the_others_of_its_law():
@@ -108,7 +118,7 @@ def test_laws_have_equal_numbers_of_sets_and_a_clear_lead_ends_the_race_at_the_f
     assert raced.winner == "a"
     assert raced.first == ["a"]
     assert [*raced.dropped] == ["c"]
-    assert {name: len(one.found) for name, one in raced.entrants.items()} == {
+    assert {name: len(one.results) for name, one in raced.entrants.items()} == {
         "a": 7,
         "b": 7,
         "c": 3,
@@ -122,7 +132,7 @@ def test_a_stuck_search_is_made_once_more_and_the_better_one_is_judged(run):
     for seed in range(10):
         for one in run({"a": 0.0, "b": 0.3}, seed).entrants.values():
             again += len(one.again)
-            for k, made in enumerate(one.found):
+            for k, made in enumerate(one.results):
                 tried = [trained for number, trained in one.outcome if number == k]
                 assert len(tried) == 1 + (k in one.again)
                 assert made.best.objective == min(tried)
@@ -148,7 +158,7 @@ def test_the_clock_ends_a_race_between_two_rounds(run, now):
     raced = run({"a": 0.0, "b": 2.0}, clock=AnswerTime(110.0))
     assert raced.stopped
     assert 1 < raced.sets < module.LOOKS[0]
-    assert {len(one.found) for one in raced.entrants.values()} == {raced.sets}
+    assert {len(one.results) for one in raced.entrants.values()} == {raced.sets}
     assert raced.winner is None
     assert raced.first == raced.running == ["a", "b"]
 
@@ -225,16 +235,44 @@ def test_a_race_leaves_the_time_that_the_runs_after_it_take(run, now):
     assert sets[0] > sets[1] > sets[2] == 1
 
 
-def test_laws_for_whose_first_set_there_is_no_time_are_named_and_at_least_one_is_searched(run, now):
-    laws = dict.fromkeys("abcdefghijklm", 0.0)
-    raced = run(laws, clock=AnswerTime(105.0, after=1.0, table=4.0, choice=50.0, unit=1.0))
-    assert [*raced.entrants] == [*"abcdef"]
-    assert raced.unsearched == [*"ghijklm"]
-    assert now[0] == 6 * 13.0 <= 105.0 - 21.0
-    assert raced.stopped
-    alone = run(laws, clock=AnswerTime(now[0]))
-    assert [*alone.entrants] == ["a"]
-    assert len(alone.unsearched) == 12
+def test_every_law_gets_a_first_set_from_a_shorter_search_where_time_is_short(run, now):
+    """Before the time of tables; a search that the clock ends does not count."""
+    laws = dict.fromkeys("abcdefgh", 0.0)
+    clock = AnswerTime(100.0, after=1.0, table=4.0, choice=50.0, unit=1.0)
+    raced = run(laws, clock=clock)
+    assert [*raced.entrants] == [*laws]
+    assert raced.shorter
+    assert {entrant.share for entrant in raced.entrants.values()} <= {1, 2, 4}
+    assert now[0] <= 100.0
+    assert not run(laws, clock=AnswerTime(now[0] + 1000.0)).shorter
+    late = run(laws, clock=AnswerTime(now[0] + 12.0))
+    assert [*late.entrants][:1] == ["a"]
+    assert {*late.entrants} | {*late.unsearched} == {*laws}
+    assert late.stopped
+
+
+def test_an_interrupted_round_does_not_count(run, now):
+    """So that laws have equal numbers of sets."""
+    raced = run({"a": 0.0, "b": 0.0}, clock=AnswerTime(48.0))
+    assert {len(entrant.results) for entrant in raced.entrants.values()} == {raced.sets}
+    assert now[0] <= 48.0 + 10.0
+
+
+def test_no_law_races_and_wins_where_it_is_best(run, monkeypatch):
+    monkeypatch.setattr(
+        module,
+        "unseen",
+        lambda *given: (
+            np.array([value if isinstance(value, float) else 0.1 for value in given[2]]),
+            np.full(len(given[2]), math.nan),
+        ),
+    )
+    none = module.ReadyEntrant(default_of(smc.law("none")))
+    random = np.random.default_rng(0)
+    worse = Drawn("a", 5.0, random)
+    raced = module.race(course(), [none, worse], RELEVANT)
+    assert raced.winner == "none"
+    assert raced.laws == ["a"]
 
 
 def test_tables_have_fewer_runs_in_a_short_time_but_some(monkeypatch):
@@ -266,8 +304,7 @@ def test_the_same_searches_under_two_names_have_no_winner(run, monkeypatch):
         randoms = [np.random.default_rng(seed) for _ in "ab"]
         pairs = zip("ab", randoms, strict=True)
         entrants = [Drawn(name, 0.0, random) for name, random in pairs]
-        trial = types.SimpleNamespace(progress=False, executor=None)
-        raced = module.race(trial, None, entrants, GOAL, AnswerTime(), RELEVANT)
+        raced = module.race(course(), entrants, RELEVANT)
         assert raced.winner is None
         assert raced.sets == module.LOOKS[-1]
         assert raced.first == ["a", "b"]
@@ -321,5 +358,14 @@ def test_the_law_to_use_is_the_one_that_runs_name_where_sets_name_none():
         (1, 0, None, ["a", "b"]),
     ):
         settled = {"a": {"noise": (of_a, 10)}, "b": {"noise": (of_b, 10)}}
-        assert in_order(settled, fixed, winner) == order
+        raced = types.SimpleNamespace(winner=winner, first=["a", "b"])
+        assert in_order(settled, fixed, raced) == order
     assert in_order({"a": {"noise": (10, 10)}}, None, None) == ["a"]
+
+
+def test_where_nothing_decides_a_law_that_rests_comes_before_one_that_shakes():
+    settled = {law: {"noise": (10, 10)} for law in "abc"}
+    undecided = types.SimpleNamespace(winner=None, first=["a", "b"])
+    assert in_order(settled, None, undecided, ["a"]) == ["b", "a", "c"]
+    decided = types.SimpleNamespace(winner="a", first=["a"])
+    assert in_order(settled, None, decided, ["a"]) == ["a", "b", "c"]

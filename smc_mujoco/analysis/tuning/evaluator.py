@@ -80,7 +80,8 @@ class Evaluator:
             return
         members: dict[tuple[Hashable, Hashable], list[int]] = {}
         for i, item in enumerate(prepared):
-            fast = equation.key_of(self.cases[i], device) if by_equation else None
+            logless = by_equation and not goal.limits  # which need a log
+            fast = equation.key_of(self.cases[i], device) if logless else None
             own_key = None if fast else item.key
             members.setdefault((fast, own_key), []).append(i)
         self.engine = MUJOCO
@@ -161,7 +162,8 @@ class Evaluator:
         distances = np.abs(log["x"][0]).tolist()
         start = sum(distances)
         itae, tv = over_log((ITAE, TV), log, case.plant.driven, case.control_period)
-        return self.goal.terms_of_sums(case, itae, start, tv)
+        tracking, variation = self.goal.terms_of_sums(case, itae, start, tv)
+        return tracking + self.goal.cost_of_limits(case, log["x"], log["u"]), variation
 
 
 def with_gains(law: Component, names: Sequence[str], values: Sequence[float]) -> Component:

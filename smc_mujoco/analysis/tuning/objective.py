@@ -20,7 +20,8 @@ instances that no search has seen either.
 
 A failed run has no ITAE. It costs FAILURE_COST (2 - t / duration), with t the time of the failure.
 This is more than any other run costs, and decreases with t. With a bound on predicted chattering,
-gains beyond it cost more than that.
+gains beyond it cost more than that. A run that breaks a limit costs less, but more than any that
+keeps it, see `run_limits`.
 """
 
 import dataclasses
@@ -31,6 +32,7 @@ import numpy as np
 
 from smc_mujoco.analysis import step_halving
 from smc_mujoco.analysis.chattering import predict
+from smc_mujoco.analysis.tuning.run_limits import RunLimit
 from smc_mujoco.common.aliases import Array, ArrayPair, Data, Fields, Floats, Pair
 from smc_mujoco.common.constraints import Natural, Positive, Whole, constrain
 from smc_mujoco.common.data import keyword_dataclass
@@ -106,6 +108,7 @@ class Objective:
     # bound on |u|, the same for every law, N or N m; default: as in a grid
     u_max: Positive | None = None
     chattering: Positive | None = None
+    limits: tuple[RunLimit, ...] = ()  # what every run must keep
 
     def __post_init__(self):
         conditions = listed_conditions(self.conditions)
@@ -124,6 +127,8 @@ class Objective:
             bound += f", u_max = {self.u_max:g}"
         if self.chattering is not None:
             bound += f", predicted chattering of s <= {self.chattering:g}"
+        for limit in self.limits:
+            bound += f", {limit}"
         return (
             f"sum over {conditions} of ITAE/|x0| + {self.weight:g} TV/(u_max {self.duration:g} s)"
             f"{bound}"
@@ -134,10 +139,12 @@ class Objective:
         values = {}
         for f in dataclasses.fields(self):
             values[f.name] = getattr(self, f.name)
-        return values | {
+        limits = [dataclasses.asdict(limit) for limit in values.pop("limits")]
+        values |= {
             "conditions": [condition.text(files=False) for condition in self.conditions],
             "starts": dataclasses.asdict(self.starts),
         }
+        return values | ({"limits": limits} if limits else {})
 
     def scenarios(
         self, plant: Plant | str, law: Component, seed: int = 0, search: int = 0
@@ -191,9 +198,22 @@ class Objective:
             return self.terms_of_failure(trace.diverged_at)
         if trace.scenario.plant.pose:
             return self.terms_of_pose(trace.scenario, trace.x, trace.r, trace.u)
-        return self.terms_of_sums(
-            trace.scenario, metrics.itae(trace), np.abs(trace.x[0]).sum(), metrics.tv(trace)
+        case = trace.scenario
+        if metrics.CATALOGUE["tv"].refusal(case):  # each channel over its own bound
+            room = np.array(case.limits) * self.duration
+            shares = metrics.TV.channels(trace.t, trace.u) / room
+            tracking, _ = self.terms_of_sums(
+                case, metrics.itae(trace), np.abs(trace.x[0]).sum(), 0.0
+            )
+            return tracking + self.cost_of_limits(case, trace.x, trace.u), float(shares.max())
+        tracking, variation = self.terms_of_sums(
+            case, metrics.itae(trace), np.abs(trace.x[0]).sum(), metrics.tv(trace)
         )
+        return tracking + self.cost_of_limits(case, trace.x, trace.u), variation
+
+    def cost_of_limits(self, case: Scenario, x: Array, u: Array) -> float:
+        """Return what a run costs that breaks limits, s^2, given x and u, (K + 1, n) each."""
+        return sum(limit.cost(case, x, u) for limit in self.limits)
 
     def terms_of_sums(self, case: Scenario, itae: float, start: float, tv: float) -> Pair:
         """Return the terms of a run with this ITAE, sum |x0| and TV; x0 of a user's model counts
@@ -256,8 +276,10 @@ def restore(data: Data) -> Objective:
     starts = dict(data.get("starts", {}))
     if starts.get("x0") is not None:
         starts["x0"] = tuple(starts["x0"])
+    limits = tuple(RunLimit(**limit) for limit in data.get("limits", ()))
     return Objective(
-        **dict(data) | {"conditions": tuple(data["conditions"]), "starts": Starts(**starts)}
+        **dict(data)
+        | {"conditions": tuple(data["conditions"]), "starts": Starts(**starts), "limits": limits}
     )
 
 

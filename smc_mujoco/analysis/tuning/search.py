@@ -56,6 +56,7 @@ from smc_mujoco.analysis.tuning.objective import (
     Searches,
 )
 from smc_mujoco.analysis.tuning.result import SearchResult, Tuned, load_search
+from smc_mujoco.analysis.tuning.run_limits import LIMIT_COST, only_limits, shows_limits
 from smc_mujoco.analysis.tuning.search_space import Box
 from smc_mujoco.analysis.tuning.stages import (
     DRAWS,
@@ -137,6 +138,7 @@ def tune(
     device: Device = "cpu",
     executor: Workers | None = None,
     quick: Boolean = False,
+    needs: str | Sequence[str] | None = None,
 ) -> Tuned:
     """Find gains of a law on the plant by independent searches, by the rule that is the same for
     every law.
@@ -167,6 +169,8 @@ def tune(
         which is faster. One such search with 16 evaluations a gain may end at gains that are worse
         than the law's own: give several searches, or a larger budget, and compare `objective` with
         `before` of the answer.
+      needs: limits that the gains keep, one or several: "no-overshoot", "overshoot<10" (in % of the
+        way to the goal) or "calm" (u rests where nothing moves). Searches keep four fifths of them.
 
     Returns:
       A `Tuned`: `law` has the gains of the least J that was found, which the law's own gains may
@@ -180,17 +184,17 @@ def tune(
 
     Warns:
       ScenarioWarning: a gain of unknown unit, which is searched about its default; the law's
-        original gains are better than any that were tried; or all chatter more than is wanted.
+        original gains are better than any that were tried; all break a limit; or all chatter more
+        than is wanted.
     """
+    limits = None if needs is None else tuple(limit.for_search for limit in only_limits(needs))
     changes = {"conditions": conditions, "starts": starts, "chattering": chattering}
+    changes["limits"] = limits
     if isinstance(objective, Objective):
         goal = objective
     else:
         goal = find("objective", objective, OBJECTIVES)
-    replaced = {}
-    for name, value in changes.items():
-        if value is not None:
-            replaced[name] = value
+    replaced = {name: value for name, value in changes.items() if value is not None}
     goal = dataclasses.replace(goal, **replaced)
     own = checked_name(coerce.law(law))
     task = task_of(plant, own, goal, budget, seed, threads, outside_theorem)
@@ -439,6 +443,12 @@ def task_of(
 ) -> TuningTask:
     """Return what the searches of a tuning share: plant, bound on u, and search space."""
     first, *further = goal.scenarios(plant, law, seed)
+    if goal.limits and not shows_limits([first, *further]):
+        raise ScenarioError(
+            f"no run shows whether {joined([*map(str, goal.limits)])} is kept, as noise, a "
+            "reference or a disturbance moves in each: give a condition without these, such as "
+            "nominal"
+        )
     if len(units := sorted({scenario.efforts[0] for scenario in (first, *further)})) > 1:
         two_units = f"{units[0]} and {units[1]}"
         raise ScenarioError(
@@ -627,6 +637,11 @@ def _warn_of_result(tuned: Tuned) -> None:
         _warn(
             f"no set of gains {tried} is better than the law's own, with an objective of "
             f"{tuned.objective:.3g} s² instead of {tuned.before:.3g} s²: give a larger budget"
+        )
+    if LIMIT_COST <= tuned.objective < FAILURE_COST:
+        limits = joined([*map(str, tuned.definition.limits)])
+        _warn(
+            f"no set of gains {tried} keeps {limits} in every run: allow more, or a larger budget"
         )
     first, *_ = tuned.definition.scenarios(tuned.plant, tuned.law, tuned.seed)
     if tuned.plant.is_user_model:

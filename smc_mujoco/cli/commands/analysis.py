@@ -64,6 +64,14 @@ Out = Annotated[
     ),
 ]
 Condition = Annotated[list[str] | None, options.conditions_by_default("the seven named above")]
+Limits = Annotated[
+    str | None,
+    typer.Option(
+        "--need",
+        help="Limits that the gains keep, separated by commas: no-overshoot, overshoot<10 (in % of "
+        "the way to the goal), calm (u rests where nothing moves).",
+    ),
+]
 
 
 def tune(
@@ -79,6 +87,7 @@ def tune(
     json: options.Json = None,
     threads: options.Threads = None,
     device: options.Device = "cpu",
+    needs: Limits = None,
 ) -> None:
     """Tune a law for a plant, by a rule that is the same for every law.
 
@@ -116,6 +125,7 @@ def tune(
         searches=searches,
         folder=folder,
         device=device,
+        needs=needs,
     )
     terminal.print(tuned)
     terminal.note(f"{terminal.seconds:.0f} s", "dim")

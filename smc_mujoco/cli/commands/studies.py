@@ -1,6 +1,6 @@
 """smc-mujoco compare, which: questions that many runs of many laws answer."""
 
-import shlex
+import math
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,11 +12,11 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_signals
-from smc_mujoco.common.text import counted, joined
+from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
-    from smc_mujoco.studies.recommendation import RaceRecommendation
+    from smc_mujoco.studies.recommendation import Recommendation
     from smc_mujoco.studies.table import Table
 
 # pictures a second of the film; the largest is enough to follow a run, the smallest to see it
@@ -27,28 +27,24 @@ Seed = Annotated[int, typer.Option(min=0, help="Seed of initial states, noise an
 
 
 Needs = Annotated[
-    str,
+    str | None,
     typer.Option(
         "--need",
-        help="The scores to compare, separated by commas: fast (settling time), accurate (ultimate "
-        "bound), on-track (ITAE), calm (TV rate of u), gentle (largest u), frugal (integral of "
-        "u^2), no-overshoot. With --minutes or --quick they are only shown: the laws are compared "
-        "by J, and those that settle reliably come first. You can also name properties that the "
-        "law must have, such as no-velocity; `smc-mujoco list --help` lists them under --need.",
+        help="What the law must keep, and what tables show, separated by commas. Limits, which "
+        "searches keep: no-overshoot, overshoot<10 (in % of the way to the goal), calm (u rests "
+        "where nothing moves). Properties, such as no-velocity; `smc-mujoco list --help` lists "
+        "them under --need. Scores to show: fast (settling time), accurate (ultimate bound), "
+        "on-track (ITAE), gentle (largest u), frugal (integral of u^2). Laws are compared by J, "
+        "and those that settle reliably come first.",
     ),
 ]
 WhichCondition = Annotated[
     list[str] | None, options.conditions_by_default("nominal, noise and sine")
 ]
 WhichSeeds = Annotated[
-    int | None,
-    typer.Option(
-        min=1, help="Runs of each law in each condition; default 24, or 14 with --minutes."
-    ),
+    int | None, typer.Option(min=1, help="Runs of each law in each condition; default 14.")
 ]
-WhichDuration = Annotated[
-    float | None, typer.Option(help="Duration of a run, s; default 5, or 3 with --minutes.")
-]
+WhichDuration = Annotated[float | None, typer.Option(help="Duration of a run, s; default 3.")]
 WhichQuick = Annotated[
     bool, typer.Option("--quick", help="Answer within ten minutes, as --minutes 10 does.")
 ]
@@ -62,19 +58,16 @@ Minutes = Annotated[
     float | None,
     typer.Option(
         help="Answer within so many minutes, with a film, or a still if there is no time for a "
-        "film. Laws without shipped gains are tuned, and all laws are compared, under the "
-        "conditions asked for, and under noise if none of them has noise, until one law is shown "
-        "to have the lowest J. Laws that could not be tuned in time are listed."
+        "film. Each law gets a first set of gains, from a shorter search where time is short. "
+        "Default: until one law is shown to have the lowest J, or more searches would not tell."
     ),
 ]
-Film = Annotated[
-    bool, typer.Option(help="Whether to film the recommended law's worst run, with --minutes.")
-]
+Film = Annotated[bool, typer.Option(help="Whether to film the law's worst run.")]
 
 
 def which(
     plant: options.PlantName,
-    needs: Needs = "fast,accurate,calm",
+    needs: Needs = None,
     condition: WhichCondition = None,
     law: options.Laws = None,
     quick: WhichQuick = False,
@@ -92,32 +85,29 @@ def which(
     falling: Falling = False,
     minutes: Minutes = None,
     film: Film = True,
+    full: options.Full = False,
 ) -> None:
-    """Recommend a law for a plant. Report its gains, the second-best law, and how certain the
-    choice is.
+    """Recommend a law for a plant: its gains, by how much it is better, and what it withstands.
 
-    All laws that suit the plant are compared by the same rules as in smc-mujoco compare, with the
-    package's gains or with gains that are tuned now. --law names the laws to try. On a model of
-    your own, tuning takes minutes for each law. --quick takes at most ten minutes for all laws
-    together; on your own model it tries only the usual laws, unless --law names others, and says
-    how many it did not try. With --quick or --minutes it also writes the gains, and a figure and a
-    film of the worst run; where time is short, a still of the machine in place of the film. A
-    stopped command resumes when you start it again.
+    Laws race by J under the conditions asked for, and noise, with the package's gains or with gains
+    that are searched now, until one is shown to have the lowest. u = 0 races, too. --law names the
+    laws to try; without it, those that suit the plant are tried, the usual ones first, and on a
+    model of your own only these. The folder has the report, the gains and a film of the worst run.
+    A stopped command resumes when you start it again.
 
     Example: smc-mujoco which duffing --condition noise,coulomb --need calm,fast
 
     Example: smc-mujoco which arm.xml:shoulder --x0 0.5 --condition noise,friction --condition
-    "worn: friction=Coulomb(0.05), sensor=Encoder(counts=4096)" --need accurate
+    "worn: friction=Coulomb(0.05), sensor=Encoder(counts=4096)" --need "overshoot<10" --minutes 5
     """
     began = time.monotonic()
     with delay_signals():
-        from smc_mujoco.studies.recommendation import RaceRecommendation
         from smc_mujoco.studies.which import QUICK_MINUTES
         from smc_mujoco.studies.which import which as recommend
 
     terminal = Terminal(json)
-    whole = QUICK_MINUTES if quick and minutes is None else minutes
-    if film and whole:
+    length = QUICK_MINUTES if quick and minutes is None else minutes
+    if film:
         from smc_mujoco.draw.film.film import missing
 
         if why := missing():
@@ -141,59 +131,16 @@ def which(
         device=device,
         executor=executor,
         falling=falling,
-        minutes=whole,
+        minutes=length,
     )
-    terminal.print(recommendation)
-    if isinstance(recommendation, RaceRecommendation):
-        _save(recommendation, out, terminal)
-        if recommendation.untried:
-            terminal.note(_margins_command(recommendation, plant, condition, x0, out), wrap=True)
-        if film and whole:
-            _film(recommendation, out, began + 60.0 * whole, terminal)
+    terminal.answer(recommendation, full)
+    if film:
+        ends = began + 60.0 * length if length else math.inf
+        _film(recommendation, out, ends, terminal)
     _finish(recommendation.table, out, terminal)
 
 
-def _save(recommendation: "RaceRecommendation", out: Path, terminal: Terminal) -> None:
-    """Write the gains of the first law of a race, and a figure of its worst run."""
-    from smc_mujoco.draw import figure, page
-
-    if recommendation.tuned:
-        file = recommendation.tuned.save(out / "recommended.json")
-        terminal.wrote(file)
-        name = recommendation.law.name
-        terminal.note(f"To use {name} with these gains, give --law {file}")
-        terminal.note(f"smc-mujoco list {name} has their units")
-    figure.figure(
-        [recommendation.worst_trace], out / "worst_run", title=_worst_title(recommendation)
-    )
-    terminal.wrote(*page.files(out / "worst_run"))
-    terminal.note(f"The figure shows {recommendation.worst_words}.", wrap=True)
-
-
-def _margins_command(
-    recommendation: "RaceRecommendation",
-    plant: str,
-    condition: list[str] | None,
-    x0: str | None,
-    out: Path,
-) -> str:
-    """Return which margins were left out, and the command that makes them."""
-    law = str(recommendation.law)
-    if recommendation.tuned:
-        law = str(out / "recommended.json")
-    words = ["smc-mujoco", "margins", plant, "--law", law]
-    words += ["--kind", ",".join(recommendation.untried), "--quick"]
-    if recommendation.beside != "nominal":
-        for one in options.conditions(condition):
-            if one.name == recommendation.beside:
-                words += ["--condition", str(one)]
-    if x0:
-        words += [f"--x0={x0}"]
-    late = joined(recommendation.untried)
-    return f"There was no time for margins of {late}. This makes them: {shlex.join(words)}"
-
-
-def _worst_title(recommendation: "RaceRecommendation") -> str:
+def _worst_title(recommendation: "Recommendation") -> str:
     """Return the title of a figure or a film of the worst run of a race's first law."""
     from smc_mujoco.draw import style
 
@@ -201,12 +148,15 @@ def _worst_title(recommendation: "RaceRecommendation") -> str:
     return f"Worst run, {run.condition}: {style.head([run])}"
 
 
-def _film(recommendation: "RaceRecommendation", out: Path, ends: float, terminal: Terminal) -> None:
+def _film(recommendation: "Recommendation", out: Path, ends: float, terminal: Terminal) -> None:
     """Film the worst run of the first law of a race until a time of `time.monotonic`, s, with as
     many pictures a second as can be made by then; if these are too few, write one picture.
     """
     from smc_mujoco.draw.film import film as films
 
+    if time.monotonic() >= ends:
+        terminal.note("no time for a film; the same command with more --minutes makes it")
+        return
     run = [recommendation.worst_trace]
     title = _worst_title(recommendation)
     try:
@@ -224,16 +174,15 @@ def _film(recommendation: "RaceRecommendation", out: Path, ends: float, terminal
             frames = films.Frames(run, title=title, size=films.FULL_SIZE, fps=fps)
             fps = min(fps, fps * fit / len(frames))
         if fps >= MIN_FPS:
-            terminal.wrote(films.film(run, out / "worst_run.mp4", title=title, fps=fps))
+            terminal.wrote(films.film(run, out / "worst.mp4", title=title, fps=fps))
         else:
-            file = out / "worst_run_machine.png"
+            file = out / "worst.png"
             at = _worst_time(recommendation.worst_trace)
             terminal.wrote(films.film(run, file, title=title, at=at))
             needed = first - begun + MIN_FPS * each * len(frames) / frames.fps
             terminal.note(
-                f"This picture stands in place of a film, which would take {needed:.0f} s. The "
-                "same command with more --minutes judges the kept gains once more, which takes "
-                "minutes, and makes the film.",
+                f"This picture stands in place of a film, which would take {needed:.0f} s: the "
+                "same command with more --minutes makes it.",
                 wrap=True,
             )
     except ScenarioError as error:  # the answer stands without it
