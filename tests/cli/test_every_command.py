@@ -421,7 +421,7 @@ def test_the_least_number_that_an_option_takes_is_the_least_that_its_function_ta
         declared = of_parameters(getattr(importlib.import_module(module), name))
         for one, info in parameters(COMMANDS[line][1]).values():
             bound = declared.get(one.name)
-            low = getattr(getattr(bound, "one", bound), "low", None)
+            low = getattr(getattr(bound, "item", bound), "low", None)
             if isinstance(info, OptionInfo) and info.min is not None and low is not None:
                 assert info.min == low, (line, one.name)
                 compared += 1
