@@ -3,30 +3,46 @@
 A line has a label of one or two words and a text. Numbers have three digits at most.
 """
 
+import dataclasses
+import itertools
 import math
 import shlex
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
+from smc_mujoco.answers.command import PROGRAM
 from smc_mujoco.answers.facts import (
+    Barred,
     Beware,
     Caution,
+    CompareFacts,
+    Contest,
     Lead,
     Level,
     More,
     NextStep,
+    NotRanked,
     Open,
+    Sample,
     Settles,
     Tied,
     Trails,
-    Unranked,
     Use,
+    Verdict,
     WhichFacts,
 )
 from smc_mujoco.common.text import counted, joined, number
 
 WIDTH = 80  # characters of a line
 LINES = 24  # of a screen
+MAX_CONTESTS = 5  # that have a block each; more have one table of winners
+MAX_NAMED = 8  # conditions that a verdict names; chosen
+HEADING = 12  # characters of a line of a heading; chosen
+NAMES = 24  # characters of a plant and a condition beside winners; chosen
+LARGEST = 0.995  # a share that is printed: of the leads that might not show; chosen
+SHARE = "settled runs"  # the metric that is a share
+ON_PLANT = "J"  # the metric that is of all conditions of a plant
 Labelled = tuple[str, str]  # the label of a line, and its text
 
 
@@ -57,76 +73,202 @@ def labelled(pairs: Iterable[Labelled], width: int = WIDTH) -> list[str]:
 
 def percent(low: float, high: float = math.nan) -> str:
     """Return shares as text: "21 to 25 %", "21 %", "at least 21 %"."""
-    least, most = (f"{100 * share:.2g}" if abs(share) < 0.995 else "100" for share in (low, high))
+    least, most = (f"{100 * share:.2g}" if abs(share) < LARGEST else "100" for share in (low, high))
     if math.isnan(high):
         return f"at least {least} %"
     return f"{least} %" if least == most else f"{least} to {most} %"
 
 
+# comparisons
+
+
 def use(fact: Use) -> str:
-    """Return "Use adrc (wc=30), unless settling first matters most: then my_law."."""
+    """Return "Use adrc (wc=30), unless settling time matters most: then my_law."."""
     gains = f" ({fact.gains})" if fact.gains else ""
-    laws_by_aim: dict[str, list[str]] = {}
+    aims_by_law: dict[str, list[str]] = {}
     for aim, law in fact.unless:
-        laws_by_aim.setdefault(law, []).append(aim)
+        aims_by_law.setdefault(law, []).append(aim)
     exceptions = []
-    for law, aims in laws_by_aim.items():
-        matters = "matters" if len(aims) == 1 else "matter"
-        exceptions.append(f"{joined(aims)} {matters} most: then {law}")
+    for law, aims in aims_by_law.items():
+        exceptions.append(f"{joined(aims, 'or')} matters most: then {law}")
     unless = f", unless {'; or '.join(exceptions)}" if exceptions else ""
+    if fact.rivals:
+        undecided = f"Undecided by {fact.metric} between {joined(fact.rivals)}."
+        return f"{undecided} For now {fact.law}{gains}{unless}."
     return f"Use {fact.law}{gains}{unless}."
 
 
 def leads(facts: Sequence[Lead]) -> list[Labelled]:
     """Return a line for each law: by how much it leads, and over which runner-up."""
-    parts_by_law: dict[str, list[str]] = {}
-    by_rival: dict[tuple[str, str], list[Lead]] = {}
+    by_rival: dict[tuple[str, str], list[str]] = {}
     for fact in facts:
-        by_rival.setdefault((fact.law, fact.rival), []).append(fact)
-    for (law, rival), of_rival in by_rival.items():
-        shares = []
-        for fact in of_rival:
-            if fact.gaps:
-                shares.append(f"{fact.metric} defined in all runs, not in {fact.gaps}")
-            else:
-                shares.append(f"{fact.metric} {percent(fact.low, fact.high)}")
-        parts_by_law.setdefault(law, []).append(f"{joined(shares)} below {rival}")
+        by_rival.setdefault((fact.law, fact.rival), []).append(lead_size(fact))
+    parts_by_law: dict[str, list[str]] = {}
+    for (law, rival), sizes in by_rival.items():
+        parts_by_law.setdefault(law, []).append(f"{joined(sizes)} below {rival or 'every rival'}")
     return [(law, "; ".join(parts)) for law, parts in parts_by_law.items()]
+
+
+def lead_size(fact: Lead) -> str:
+    """Return "J 21 to 25 %"; in words where no share is known."""
+    if fact.gaps:
+        return f"{fact.metric} (which {fact.rival} lacks in {fact.gaps} runs)"
+    if math.isnan(fact.low):
+        return fact.metric
+    differ = " (not its median)" if fact.medians_differ else ""
+    return f"{fact.metric} {percent(fact.low, fact.high)}{differ}"
 
 
 def trails(fact: Trails) -> Labelled:
     """Return by how much a law is behind: "J 1.78 times adrc's; behind adrc and pid"."""
-    times = f"{fact.metric} {number(fact.times)} times {fact.leader}'s"
-    others = [law for law in fact.ahead if law != fact.leader]
-    behind = f"; behind {joined(others)} too" if others else ""
-    return fact.law, times + behind
+    parts = []
+    if not math.isnan(fact.times):
+        parts.append(f"{fact.metric} {number(fact.times)} times {fact.leader}'s")
+    if not parts or len(fact.ahead) > 1:
+        parts.append(f"behind {joined(fact.ahead)}")
+    return fact.law, "; ".join(parts)
 
 
 def ties(facts: Sequence[Tied]) -> list[Labelled]:
-    """Return the line of laws that are level, by metric."""
-    parts = []
+    """Return the line of laws that are level or below a floor, by metric."""
+    metrics_by_laws: dict[tuple[str, ...], list[str]] = {}
     for fact in facts:
-        floor = f" (below {fact.floor})" if fact.floor else ""
-        parts.append(f"{fact.metric}{floor}: {', '.join(fact.laws)}")
+        metrics_by_laws.setdefault(fact.laws, []).append(fact.metric)
+    parts = [f"{joined(names)}: {', '.join(laws)}" for laws, names in metrics_by_laws.items()]
     return [("tied", "; ".join(parts))] if parts else []
 
 
 def opens(facts: Sequence[Open]) -> list[Labelled]:
     """Return the line of laws of which none is shown to be better, by metric."""
-    parts = []
+    alike: dict[tuple[tuple[str, ...], int, str], list[Open]] = {}
     for fact in facts:
-        doubt = ""
-        if fact.sets_needed:
-            doubt = f" (needs {fact.sets_needed} sets of gains)"
-        elif fact.hidden < 1:
-            doubt = f" (a lead below {percent(fact.hidden, fact.hidden)} would not show)"
-        parts.append(f"{fact.metric}: {', '.join(fact.laws)}{doubt}")
+        alike.setdefault((fact.laws, fact.needed, fact.unit), []).append(fact)
+    parts = []
+    for (laws, _, _), of_laws in alike.items():
+        metrics = joined([fact.metric for fact in of_laws])
+        parts.append(f"{metrics}: {', '.join(laws)}{doubt(of_laws)}")
     return [("open", "; ".join(parts))] if parts else []
 
 
-def unranked(fact: Unranked) -> Labelled:
-    """Return why no law can win in a metric."""
-    return "no winner", f"{fact.metric}: {fact.reason}"
+def doubt(facts: Sequence[Open]) -> str:
+    """Return what it takes to decide, or which leads would not have been seen."""
+    fact = facts[0]
+    if fact.needed:
+        return f" (deciding takes {fact.needed} {fact.unit})"
+    hidden = max(fact.hidden for fact in facts)
+    if math.isnan(hidden):
+        return ""
+    if hidden >= LARGEST:
+        return " (no lead would show)"
+    return f" (leads below {percent(hidden, hidden)} might not show)"
+
+
+def not_ranked(facts: Sequence[NotRanked]) -> list[Labelled]:
+    """Return the line of laws with too few samples to be ranked."""
+    laws_by_cause: dict[tuple[int, int, str], dict[str, None]] = {}
+    for fact in facts:
+        laws_by_cause.setdefault((fact.samples, fact.needed, fact.unit), {})[fact.law] = None
+    parts = []
+    for (samples, needed, unit), laws in laws_by_cause.items():
+        parts.append(f"{joined(laws)}: {samples} {unit}, of {needed} that it takes")
+    return [("not ranked", "; ".join(parts))] if parts else []
+
+
+def barred(facts: Sequence[Barred]) -> list[Labelled]:
+    """Return the line of metrics in which no law may win."""
+    defaults: dict[tuple[str, ...], list[str]] = {}
+    lost = []
+    for fact in facts:
+        if fact.defaults:
+            defaults.setdefault(fact.laws, []).append(fact.metric)
+        else:
+            lost.append(fact.metric)
+    parts = []
+    for laws, metrics in defaults.items():
+        parts.append(f"{joined(metrics)}: no law may win over the default gains of {joined(laws)}")
+    if lost:
+        parts.append(f"{joined(lost)}: every law has runs that fail or do not arrive")
+    return [("no winner", "; ".join(parts))] if parts else []
+
+
+def verdict(fact: Verdict) -> str:
+    """Return one fact as a line of evidence, with its ratio, interval and samples."""
+    match fact:
+        case Lead():
+            ((law, text),) = leads([fact])
+            numbers = []
+            if not math.isnan(fact.ratio):
+                ends = f"{number(1 - fact.high)} to {number(1 - fact.low)}"
+                numbers.append(f"ratio {number(fact.ratio)}, {ends}")
+            if fact.floor:
+                numbers.append(f"below the floor of {fact.floor}")
+            if fact.samples:
+                numbers.append(f"ahead in {fact.ahead} of {fact.samples} {fact.unit}")
+            evidence = f" ({'; '.join(numbers)})" if numbers else ""
+            return f"{law} wins: {text}{evidence}"
+        case Tied():
+            ((_, text),) = ties([fact])
+            return f"tied in {text}{f', below the floor of {fact.floor}' if fact.floor else ''}"
+        case Open():
+            ((_, text),) = opens([fact])
+            charge = f"; {percent(fact.charged, fact.charged)} is taken off the lead"
+            return f"open in {text}{charge if fact.charged > 0.0 else ''}"
+        case Barred():
+            ((_, text),) = barred([fact])
+            return f"no winner in {text}"
+
+
+def verdicts(fact_by_condition: Mapping[str, Verdict | None]) -> list[str]:
+    """Return the verdicts of a metric, condition -> fact: what several conditions share, once."""
+    facts = list(filter(None, fact_by_condition.values()))
+    if len(fact_by_condition) == 1:
+        return list(map(verdict, facts))
+    conditions_by_text: dict[str, list[str]] = {}
+    for condition, fact in fact_by_condition.items():
+        if isinstance(fact, Lead):
+            text = f"{fact.law} wins in {fact.metric}"
+        elif fact:
+            text = verdict(fact)
+        else:
+            continue
+        conditions_by_text.setdefault(text, []).append(condition)
+    lines = []
+    for text, conditions in conditions_by_text.items():
+        names = joined(conditions)
+        if len(conditions) > MAX_NAMED:
+            names = f"{len(conditions)} conditions"
+        lines.append(f"{text} under {names}")
+    won = [fact for fact in facts if isinstance(fact, Lead) and fact.rival]
+    if len(won) == len(fact_by_condition) and len({fact.law for fact in won}) == 1:
+        lines.append(f"at worst {verdict(min(won, key=lambda fact: fact.low))}")
+    return lines
+
+
+def printed_verdicts(facts: Sequence[Verdict], name: Callable[[str], str]) -> str:
+    """Return what a table in print says below itself: who wins in what, what is level, what might
+    go undetected. `name` has a law's name in print.
+    """
+    metrics_by_law: dict[str, list[str]] = {}
+    level = []
+    unseen = []
+    for fact in facts:
+        match fact:
+            case Lead():
+                metrics_by_law.setdefault(name(fact.law), []).append(fact.metric)
+            case Tied() if not fact.floor and fact.metric != SHARE:
+                level.append(fact.metric)
+            case Open() if fact.hidden < LARGEST:
+                unseen.append(f"{percent(fact.hidden, fact.hidden)} in {fact.metric}")
+            case _:
+                pass
+    sentences = [f"{law} wins: {joined(metrics)}." for law, metrics in metrics_by_law.items()]
+    if not sentences:
+        sentences.append("No law wins.")
+    if level:
+        sentences.append(f"The best laws are level within 10 %: {joined(level)}.")
+    if unseen:
+        sentences.append(f"Leads below {joined(unseen)} might go undetected.")
+    return " ".join(sentences)
 
 
 def settled(facts: Sequence[tuple[str, Settles]]) -> str:
@@ -136,9 +278,136 @@ def settled(facts: Sequence[tuple[str, Settles]]) -> str:
     if count == total:
         return f"All {total} runs settled."
     if not count:
-        return f"None of {total} runs settled."
+        return f"No run of {total} settled."
     short = [f"{law} {fact.count} of {fact.of}" for law, fact in facts if fact.count < fact.of]
-    return f"Settled: {joined(short)}; all runs of the others."
+    others = "" if len(short) == len(facts) else ", all of the others"
+    return f"Settled runs: {', '.join(short)}{others}."
+
+
+def sample(fact: Sample) -> str:
+    """Return what a number of a table is of: "12 runs a law, gains of 12 searches"."""
+    runs = f"{counted(fact.seeds, 'run')} a law"
+    if fact.runs < fact.seeds:
+        runs += f" ({fact.runs} distinct)"
+    if fact.sets < 2:
+        return f"{runs}, one set of gains"
+    gains = f"gains of {'at least ' if fact.more else ''}{fact.sets} searches"
+    return f"{runs}, {gains}{' (some laws: one set)' if fact.one else ''}"
+
+
+def grid(contest: Contest, width: int = WIDTH) -> tuple[list[str], list[str]]:
+    """Return a table of numbers, a star at each winner's, and the metrics that have no room."""
+    columns = [["", "", "", *(law for law, _ in contest.rows)]]
+    omitted = []
+    for i, (name, unit) in enumerate(contest.columns):
+        words = textwrap.wrap(name, HEADING)[:2]
+        column = [f"{part} " for part in ([""] * (2 - len(words)) + words + [unit])]
+        for law, numbers in contest.rows:
+            column.append(numbers[i] + ("*" if law == contest.winners[i] else " "))
+        if sum(map(_width, columns)) + _width(column) + len(columns) > width + 1:
+            omitted.append(name)
+        else:
+            columns.append(column)
+    lines = []
+    for law, *numbers in zip(*columns, strict=True):
+        cells = [law.ljust(_width(columns[0]))]
+        for text, column in zip(numbers, columns[1:], strict=True):
+            cells.append(text.rjust(_width(column)))
+        lines.append(" ".join(cells).rstrip())
+    return list(filter(None, lines)), omitted
+
+
+def _width(column: Sequence[str]) -> int:
+    return max(map(len, column))
+
+
+def contest_lines(contest: Contest) -> list[str]:
+    """Return the block of a plant in a condition: the table, the law to use, who leads."""
+    heading = f"{contest.plant} under {contest.condition}: {sample(contest.sample)}"
+    table, omitted = grid(contest)
+    notes = ["Lower is better."]
+    if any(contest.winners):
+        notes.insert(0, "* best of these laws (95 % sure).")
+    if contest.settled:
+        notes.append(settled(contest.settled))
+    if omitted:
+        notes.append(f"In the report: {joined(omitted)}.")
+    lines = [*textwrap.wrap(heading, WIDTH), *table, *textwrap.wrap(" ".join(notes), WIDTH)]
+    if contest.use:
+        lines += ["", *textwrap.wrap(use(contest.use), WIDTH, break_on_hyphens=False)]
+    facts_of: dict[type, list[Any]] = {Lead: [], Tied: [], Open: [], Barred: []}
+    for fact in contest.verdicts:
+        facts_of[type(fact)].append(fact)
+    texts_by_law: dict[str, list[str]] = {}
+    for law, text in [*leads(facts_of[Lead]), *map(trails, contest.trails)]:
+        texts_by_law.setdefault(law, []).append(text)
+    pairs = [(law, "; ".join(texts)) for law, texts in texts_by_law.items()]
+    pairs += [*ties(facts_of[Tied]), *opens(facts_of[Open]), *barred(facts_of[Barred])]
+    return [*lines, *labelled([*pairs, *not_ranked(contest.not_ranked)])]
+
+
+def winners_lines(contests: Sequence[Contest]) -> list[str]:
+    """Return one table of the winners on many plants in many conditions, and what holds on each
+    plant.
+    """
+    names = [name for name, _ in contests[0].columns if name != ON_PLANT]
+    head = min(NAMES, max(len(f"{one.plant} {one.condition}") for one in contests))
+    room = (WIDTH - head) // max(len(names), 1) - 1
+    rows = [("", [textwrap.wrap(name, room) for name in names])]
+    of_plants: dict[str, str] = {}
+    for contest in contests:
+        fact_of = {fact.metric: fact for fact in contest.verdicts}
+        cells = []
+        for name in names:
+            text = winner(fact_of[name], len(contest.rows)) if name in fact_of else ""
+            cells.append(textwrap.wrap(text, room))
+        rows.append((f"{contest.plant} {contest.condition}", cells))
+        if ON_PLANT in fact_of and contest.plant not in of_plants:
+            of_plants[contest.plant] = verdict(fact_of[ON_PLANT])
+            if contest.use:
+                whole = dataclasses.replace(contest.use, unless=())
+                of_plants[contest.plant] = f"{use(whole)} {of_plants[contest.plant]}."
+    lines = [f"{len(contests)} plants and conditions: {sample(contests[0].sample)}"]
+    for label, cells in rows:
+        names_and_cells = textwrap.wrap(label, head) or [""], *cells
+        for name, *parts in itertools.zip_longest(*names_and_cells, fillvalue=""):
+            texts = [part.ljust(room) for part in parts]
+            lines.append(" ".join([name.ljust(head), *texts]).rstrip())
+    lines += ["The winner and its least lead, or the laws that are tied or open.", ""]
+    return lines + labelled(of_plants.items())
+
+
+def winner(fact: Verdict, count: int) -> str:
+    """Return a cell of the table of winners, of that many laws."""
+    match fact:
+        case Lead():
+            least = "" if math.isnan(fact.low) else f" {percent(fact.low, fact.low)}"
+            return f"{fact.law}{least}"
+        case Tied():
+            return f"tied: {'all' if len(fact.laws) == count else ', '.join(fact.laws)}"
+        case Open():
+            return f"open: {'all' if len(fact.laws) == count else ', '.join(fact.laws)}"
+        case Barred():
+            return "none"
+
+
+def compare_lines(facts: CompareFacts) -> list[str]:
+    """Return a comparison: a block for each plant and condition, or one table of winners."""
+    lines: list[str] = []
+    if len(facts.contests) > MAX_CONTESTS:
+        lines += winners_lines(facts.contests)
+    else:
+        for contest in facts.contests:
+            lines += [*([""] if lines else []), *contest_lines(contest)]
+    pairs = list(map(beware, facts.bewares))
+    if facts.next:
+        pairs.append(next_step(facts.next))
+    if facts.more:
+        pairs.append(more(facts.more))
+    return [*lines, *([""] if lines and pairs else []), *labelled(pairs)]
+
+
+# lines that all answers have
 
 
 def beware(fact: Beware) -> Labelled:
@@ -147,8 +416,19 @@ def beware(fact: Beware) -> Labelled:
 
 
 def next_step(fact: NextStep) -> Labelled:
-    """Return the one next step: a whole command, and what it is for."""
-    return "next", f"{fact.command}\n{fact.purpose}"
+    """Return the one next step: a whole command to paste, and what it does."""
+    indent = len("next  ")
+    purpose = f"{fact.purpose[:1].upper()}{fact.purpose[1:]}." if fact.purpose else ""
+    if not fact.command.startswith(PROGRAM):
+        return "next", f"{fact.command}: {fact.purpose}"
+    lines = [""]
+    for word in map(shlex.quote, shlex.split(fact.command)):
+        if lines[-1] and indent + len(f"{lines[-1]} {word} \\") > WIDTH:
+            lines[-1] += " \\"
+            lines.append(f"  {word}")
+        else:
+            lines[-1] = f"{lines[-1]} {word}".strip() if len(lines) == 1 else f"{lines[-1]} {word}"
+    return "next", "\n".join([*lines, purpose])
 
 
 def more(fact: More) -> Labelled:

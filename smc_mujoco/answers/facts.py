@@ -11,11 +11,18 @@ class Lead:
     """How far a law's value is below a rival's, as a share of the rival's, over an interval."""
 
     law: str
-    rival: str
+    rival: str  # the runner-up, over which the lead is least; "" if no ratio is known
     metric: str  # as a reader says it, such as "J"
-    low: float  # a share; the least that the interval holds
+    low: float = math.nan  # a share; the least that the interval holds
     high: float = math.nan  # a share; NaN where the value is below its floor: no ratio is known
     gaps: str = ""  # in how many runs the rival has no value, such as "5 of 24"
+    floor: str = ""  # in words, if the value is below it and the rival's is not
+    ratio: float = math.nan  # of the law's value to the rival's, the pseudo-median of the pairs
+    ahead: int = 0  # number of samples in which the law is better by what counts
+    samples: int = 0
+    unit: str = "runs"  # what a sample is
+    # whether the ratio of the medians in the table lies on the other side of 1
+    medians_differ: bool = False
 
 
 @keyword_dataclass
@@ -25,7 +32,7 @@ class Trails:
     law: str
     leader: str
     metric: str
-    times: float  # the middle of the ratio in paired runs
+    times: float  # the middle of the ratio in paired runs; NaN where none is known
     ahead: Names  # the laws that beat it, the first one among them
 
 
@@ -45,15 +52,43 @@ class Open:
     metric: str
     laws: Names
     hidden: float = math.nan  # a share: a smaller lead would not have been seen
-    sets_needed: int = 0  # sets of gains with which a verdict is possible; 0 if these suffice
+    charged: float = 0.0  # a share that is taken off a lead for what changes late or at half a step
+    needed: int = 0  # samples with which a verdict is possible; 0 if these suffice
+    unit: str = "runs"  # what a sample is
 
 
 @keyword_dataclass
-class Unranked:
-    """Why no law can win in a metric, or which laws are not ranked, in the field's words."""
+class Barred:
+    """Laws that keep any rival from winning: by default gains, or as none of all laws arrives."""
 
     metric: str
-    reason: str
+    laws: Names
+    defaults: bool  # whether by their default gains
+
+
+@keyword_dataclass
+class NotRanked:
+    """A law with too few samples to be ranked beside the others."""
+
+    metric: str
+    law: str
+    samples: int
+    needed: int
+    unit: str
+
+
+Verdict = Lead | Tied | Open | Barred
+
+
+@keyword_dataclass
+class Sample:
+    """What a number of a table is of."""
+
+    seeds: int
+    runs: int  # distinct ones
+    sets: int  # the least number of sets of gains of a law that has several
+    more: bool  # whether some laws have more sets
+    one: bool  # whether a law has one set of gains
 
 
 @frozen_data
@@ -71,6 +106,8 @@ class Use:
     law: str
     gains: str  # as a user writes them, "k1=41.2, k2=310"; "" for a law without gains
     unless: tuple[tuple[str, str], ...] = ()  # (what matters most, the law then)
+    rivals: Names = ()  # the laws between which it is undecided; () for a winner
+    metric: str = "J"  # in which
 
 
 @frozen_data
@@ -187,3 +224,33 @@ class WhichFacts:
     bounds: str  # on u, in words
     second: str
     folder: str
+
+
+# compare
+
+
+@keyword_dataclass
+class Contest:
+    """Laws compared on a plant in a condition."""
+
+    plant: str
+    condition: str
+    sample: Sample
+    columns: tuple[tuple[str, str], ...]  # a metric as a reader says it, and its unit
+    rows: tuple[tuple[str, tuple[str, ...]], ...]  # a law and its numbers
+    winners: Names  # of each column, "" where none wins
+    settled: tuple[tuple[str, Settles], ...]  # by law
+    use: Use | None  # None if no law is to be preferred
+    verdicts: tuple[Verdict, ...]
+    trails: tuple[Trails, ...] = ()
+    not_ranked: tuple[NotRanked, ...] = ()
+
+
+@keyword_dataclass
+class CompareFacts:
+    """What a comparison says on one screen."""
+
+    contests: tuple[Contest, ...]
+    bewares: tuple[Beware, ...] = ()
+    next: NextStep | None = None
+    more: More | None = None

@@ -75,7 +75,10 @@ class Terminal(Console):
     def answer(self, result: Answer, full: bool = False) -> None:
         """Print a result's answer, or with `full` its evidence; remember it for `finish`."""
         self.printed.append(result)
-        super().print(result.full if full else result, crop=False)
+        if full:
+            super().print(result.full)
+        else:
+            self.note(str(result))
 
     def note(self, text: str, style: str | None = None, wrap: bool = False) -> None:
         """Print text without coloured numbers, on one line unless `wrap`."""

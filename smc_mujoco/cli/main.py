@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from smc_mujoco.answers import command
 from smc_mujoco.cli.commands import (
     analysis,
     glossary,
@@ -57,9 +58,9 @@ for annex in sorted(filter(annexes.installed, annexes.ANNEXES)):
     for group, commands in more.items():
         GROUPS.setdefault(group, []).extend(commands)
 for group, commands in GROUPS.items():
-    for command in commands:
-        name = command.__name__.strip("_").replace("_", "-")  # list_ -> list, export_c -> export-c
-        app.command(name, rich_help_panel=group)(errors_as_sentences()(command))
+    for function in commands:
+        name = function.__name__.strip("_").replace("_", "-")  # list_ -> list, export_c -> export-c
+        app.command(name, rich_help_panel=group)(errors_as_sentences()(function))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -85,7 +86,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 f"no command {given[0]!r}: `smc-mujoco run SCENE` writes figures and a film, and "
                 "smc.figure and smc.film draw any traces in Python"
             )
-    app(arguments, prog_name="smc-mujoco")
+    command.remember(given)
+    app(arguments, prog_name=command.PROGRAM)
 
 
 def _showing_once() -> Callable[..., None]:

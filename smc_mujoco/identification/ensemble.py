@@ -25,7 +25,7 @@ from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.grid import Starts, all_combinations, grid
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.board import Boards
+from smc_mujoco.studies.board_tables import Boards
 from smc_mujoco.studies.fair_gains import NOT_TUNED, Candidate, candidate_of
 from smc_mujoco.studies.leaderboard import leaderboard
 from smc_mujoco.studies.study import FULL, study

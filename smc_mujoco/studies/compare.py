@@ -1,5 +1,6 @@
 """Comparison of laws on plants in conditions, in one call: gains, runs, tables and verdicts."""
 
+import contextlib
 import dataclasses
 import itertools
 import math
@@ -12,8 +13,12 @@ import numpy as np
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.law_time import LawTime, law_time
-from smc_mujoco.analysis.ranking import RELEVANT, Relevant
+from smc_mujoco.analysis.ranking import RELEVANT, Relevant, needed_to_win
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Budget, Searches
+from smc_mujoco.answers import answers
+from smc_mujoco.answers.answer import Answer
+from smc_mujoco.answers.command import again
+from smc_mujoco.answers.facts import Barred, Beware, CompareFacts, Contest, More, NextStep, Open
 from smc_mujoco.common import html
 from smc_mujoco.common.aliases import AnyPath, Fields
 from smc_mujoco.common.cached import cached_property
@@ -21,8 +26,8 @@ from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, co
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown, warn_once
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import replacing
-from smc_mujoco.common.tabular import Tables, Tabular, commented, plain
-from smc_mujoco.common.text import joined, number, span
+from smc_mujoco.common.tabular import Tabular, commented, plain
+from smc_mujoco.common.text import counted, joined, number, span
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Template, gains_text
 from smc_mujoco.control.law import Law, catalogue, suits
@@ -35,12 +40,14 @@ from smc_mujoco.robustness.uncertainty import Uncertainty
 from smc_mujoco.robustness.worst_case import DURATION, WorstCase, WorstCases
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.force_bounds import bounds_in_words
-from smc_mujoco.simulation.grid import Starts, case, listed, listed_laws
+from smc_mujoco.simulation.grid import Starts, case, listed, listed_conditions, listed_laws
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.simulation.workers import Workers
-from smc_mujoco.studies.board import Boards, unit_of
+from smc_mujoco.studies.board_numbers import unit_of
+from smc_mujoco.studies.board_tables import Boards
+from smc_mujoco.studies.contests import contests
 from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, Holdout, leaderboard, objective_boards
 from smc_mujoco.studies.race import LOOKS, STUCK
@@ -79,9 +86,20 @@ BEST_SET = (
 )
 
 
+# what a machine has all at once: a condition and the field of a scenario that it sets
+TOGETHER = {"friction": "friction", "encoder": "sensor", "delay_10ms": "input_delay"}
+MOST_TOGETHER = 3  # conditions that were tried one by one; of more not all are of one machine
+RIVALS = ("pid", "adrc", "super_twisting")  # to add to a single law
+REPORT = "report.html"
+CONTENTS = "intervals, gains, figure"
+EXPLAINED = ("lead",)
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Compared(Tables):
-    """Laws compared on plants in conditions. `print` and notebooks show its tables and verdicts."""
+class Compared(Answer):
+    """Laws compared on plants in conditions. `print` and notebooks show the answer, `full` all
+    tables.
+    """
 
     table: Table  # a row for each run, with all its scores, as `smc.study` returns it
     # plant -> the laws with all sets of gains that their runs used, and remarks on them
@@ -95,6 +113,95 @@ class Compared(Tables):
     worst: Mapping[str, Mapping[str, WorstCase]]
     # plant -> law -> time of its compiled code a sample, on this machine; in no file
     times: Mapping[str, Mapping[str, LawTime]]
+    report: str = ""  # the page that was written; "" for none
+
+    @property
+    def lines(self) -> list[str]:
+        """The answer on one screen."""
+        if not self._contests:
+            return self.leaderboard.lines
+        return answers.compare_lines(
+            CompareFacts(
+                contests=self._contests,
+                bewares=(*self._defaults, *self.leaderboard.bewares),
+                next=self._next,
+                more=More(self.report, CONTENTS if self.report else "", EXPLAINED),
+            )
+        )
+
+    @property
+    def _defaults(self) -> list[Beware]:
+        """The laws that ran with the gains of their own files."""
+        laws = {}
+        for candidates in self.candidates.values():
+            for law, *_ in candidates:
+                if law.source.kind == source.DEFAULT and law.gains:
+                    laws[law.name] = None
+        return [Beware("gains", f"the defaults of {joined(laws)}, not searched")] if laws else []
+
+    @cached_property
+    def _contests(self) -> tuple[Contest, ...]:
+        """What is said of each plant in each condition."""
+        gains: dict[str, dict[str, str]] = {}
+        own = {}
+        for plant, candidates in self.candidates.items():
+            of_plant = gains.setdefault(plant, {})
+            for law, *_ in candidates:
+                finite = {k: v for k, v in law.gains.items() if v != math.inf}
+                of_plant[law.name] = ", ".join(f"{k}={number(v)}" for k, v in finite.items())
+                if law.name not in catalogue():
+                    own[law.name] = None
+        return contests(self.leaderboard, gains, tuple(own))
+
+    @property
+    def _next(self) -> NextStep | None:
+        """What to do next: the first step of these that applies."""
+        facts = [fact for contest in self._contests for fact in contest.verdicts]
+        needed = max((fact.needed for fact in facts if isinstance(fact, Open)), default=0)
+        laws = dict.fromkeys(itertools.chain.from_iterable(self.gains.values()))
+        seeds = max(contest.sample.seeds for contest in self._contests)
+        barred = any(isinstance(fact, Barred) and fact.defaults for fact in facts)
+        undecided = any(contest.use and contest.use.rivals for contest in self._contests)
+        steps = [
+            (not facts, {"--law": ",".join(laws | dict.fromkeys(RIVALS))}, "adds rivals"),
+            (needed, _sets(needed), "makes enough runs for a winner"),
+            (barred, {"--allow-defaults": ""}, "lets a law win over default gains"),
+            (undecided, _sets(2 * max(SEARCHES, seeds)), "shows smaller leads"),
+            (self._together, {"--condition": self._together}, "tries them all at once"),
+            (not self.worst, {"--worst": ""}, "searches the worst case of each law"),
+        ]
+        for applies, options, purpose in steps:
+            if applies:
+                return NextStep(again(options), purpose)
+        return None
+
+    @property
+    def _together(self) -> str:
+        """The conditions that were asked for and those that a machine has, as one; "" if one of
+        them was all that, or some do not suit the plants.
+        """
+        names = dict.fromkeys(itertools.chain.from_iterable(self.conditions.values()))
+        names.pop("nominal", None)
+        first = next(iter(self._first_runs.values()))
+        if len(names) > MOST_TOGETHER:
+            return ""
+        with contextlib.suppress(ScenarioError):
+            fields: set[str] = set()
+            for condition in listed_conditions(list(names)):
+                fields |= condition.on(first.plant, first.duration).keys()
+            names |= {name: None for name, field in TOGETHER.items() if field not in fields}
+            for condition in listed_conditions("+".join(names)):
+                for scenario in self._first_runs.values():
+                    self._in(condition, scenario)
+            if len(names) > 1:
+                return "+".join(names)
+        return ""
+
+    @staticmethod
+    def _in(condition: Condition, run: Scenario) -> Scenario:
+        """Return a run's plant without a law in a condition, which may refuse it."""
+        fields = condition.on(run.plant, run.duration)
+        return Scenario.recorded(plant=run.plant, law="none", duration=run.duration, **fields)
 
     @property
     def gains(self) -> dict[str, dict[str, Law]]:
@@ -123,10 +230,10 @@ class Compared(Tables):
 
     @property
     def verdicts(self) -> list[str]:
-        """A sentence for each metric on each plant in each condition: the winner, or why there is
-        none.
+        """A line for each metric on each plant in each condition: who wins and by how much, or why
+        nobody does.
         """
-        return [board.verdict for board in self.leaderboard]
+        return list(map(repr, self.leaderboard))
 
     @property
     def remarks(self) -> list[str]:
@@ -185,7 +292,9 @@ class Compared(Tables):
             where = f" on {joined(on)}" if len(on) < len(self.conditions) else ""
             notes.append(f"{name}{where}: {words}")
         units = f"{SI} {COUNTS}" if "counts=" in "".join(notes) else SI
-        return Tabular(headings=RUNS, rows=rows, title="Runs", notes=[*notes, units], left=3)
+        failed = len(self.table) - self.table.data["failure"].null_count
+        count = f"{counted(len(self.table), 'run')}, {failed} stopped early."
+        return Tabular(headings=RUNS, rows=rows, title="Runs", notes=[*notes, units, count], left=3)
 
     def _runs(self, plant: str, law: str) -> list[Scenario]:
         """Return the runs of a law on a plant; other laws have the same but for their own law."""
@@ -255,36 +364,21 @@ class Compared(Tables):
                 file.write_text(text, encoding="utf-8")
         return text
 
-    def to_html(self, path: AnyPath) -> Path:
-        """Write the comparison as one page that needs no other file: the figure of `plot` with
-        every metric compared, tables and verdicts.
-
-        The page suits a phone, and follows the browser's dark mode.
-
-            compared.to_html("compared.html")
-
-        Args:
-          path: of the file.
-
-        Returns:
-          The path.
-
-        Raises:
-          ScenarioError: a file that cannot be written.
-        """
-        about = "Medians with their intervals by condition, as in the tables"
-        figure = html.picture(
-            lambda file, size: self.plot(file, self._metrics, size=size, format="svg"), about
-        )
+    @property
+    def title(self) -> str:
+        """The title of the page: the laws and the plants."""
         laws = dict.fromkeys(itertools.chain.from_iterable(self.gains.values()))
-        title = f"{joined([*map(style.law_name, laws)])} on {joined(self._plant_names)}"
-        parts: list[str] = [figure]
-        for table in self.tables:
-            parts.append(table._repr_html_())
-        page = html.page(title, parts)
-        with replacing(Path(path)) as file:
-            file.write_text(page, encoding="utf-8")
-        return Path(path)
+        return f"{joined([*map(style.law_name, laws)])} on {joined(self._plant_names)}"
+
+    @property
+    def pictures(self) -> list[html.Html]:
+        """The figure of `plot` with every metric compared."""
+        about = "Medians with their intervals by condition, as in the tables"
+        return [
+            html.picture(
+                lambda file, size: self.plot(file, self._metrics, size=size, format="svg"), about
+            )
+        ]
 
     def to_pandas(self) -> "pandas.DataFrame":
         """Return a pandas DataFrame with a row for each law, plant, condition and metric.
@@ -376,6 +470,11 @@ class Compared(Tables):
         return dot_plot.plot(self.table, path, names, winners=self.leaderboard.winners, **options)
 
 
+def _sets(count: int) -> dict[str, str]:
+    """Return the options for so many sets of gains and runs."""
+    return {"--seeds": f"{count}", "--searches": f"{count}"}
+
+
 @constrained
 def compare(
     laws: str | Law | Template | Sequence[str | Law | Template] | None = None,
@@ -432,12 +531,13 @@ def compare(
       starts: where runs begin, see `starts`. Default: within 20 % of the plant's own x0.
       gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
       searches: independent searches of a tuning. Laws with fewer shipped sets of gains are tuned
-        too; of laws with more, that many sets run. Default: 12, or 7 if quick, from which few
-        verdicts follow but that on J, and shipped sets as they are. With fewer than seven
-        searches or seeds hardly any law can win; the answer says how many it takes.
+        too; of laws with more, that many sets run. Default: 12; if quick as many as can name a
+        winner in each of these plants and conditions, 7 or more, and shipped sets as they are.
+        With fewer than seven searches or seeds hardly any law can win; the answer says how many it
+        takes.
       budget: largest number of sets of gains that a search tries, for each gain. With less than the
         default, or more, a remark says that a law may trail, or lead, because of its search.
-      quick: runs of 3 s and seven searches, unless you give other numbers; by default three plants
+      quick: runs of 3 s and fewer searches, unless you give other numbers; by default three plants
         and three conditions, which take some minutes of processor time. On a plant for which no law
         has shipped gains, the searches are those of `which` within minutes, under the conditions
         asked for.
@@ -450,8 +550,9 @@ def compare(
         as in `study`. The numbers are the same.
 
     Returns:
-      A `Compared`, which prints its tables, verdicts and gains: `table` has a row a run, `plot`,
-      `to_latex` and `to_html` write files, `traces` are runs to draw and film.
+      A `Compared`, which prints who is best, by how much and what to do next; `full` has all
+      tables, as the folder's report.html. `table` has a row a run, `plot`, `to_latex` and
+      `to_html` write files, `traces` are runs to draw and film.
 
     Raises:
       ScenarioError: an unknown name, or arguments that `grid`, `study` or `leaderboard` refuse.
@@ -484,6 +585,9 @@ def compare(
         device=device,
         executor=executor,
     )
+    if quick:  # as many as can name a winner in each block
+        least = needed_to_win(len(machines) * len(trial.conditions))
+        trial = trial._replace(usual=max(QUICK_SEARCHES, least))
     chosen: dict[str, list[Law | Template]] = {}
     if laws is None:
         of_all = None
@@ -507,14 +611,17 @@ def compare(
     for p in holdout:
         sources[p] = {law.name: (law.source,) for law, *_ in candidates[p]}
     boards[:0] = objective_boards(holdout, sources, defaults, relevant)
-    return Compared(
+    compared = Compared(
         table=table,
         candidates=candidates,
         leaderboard=boards,
         conditions=_in_words(trial, length),
         worst=worst_cases,
         times=_times(trial, candidates),
+        report=str(trial.folder / REPORT),
     )
+    compared.to_html(compared.report)
+    return compared
 
 
 def _in_words(trial: Trial, duration: float) -> dict[str, dict[str, str]]:

@@ -7,6 +7,7 @@ the plants and conditions of the table, over initial states and noise, and over 
 the laws ran.
 """
 
+import dataclasses
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -33,7 +34,8 @@ from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.board import Block, Board, BoardEntry, Boards, LeastLead
+from smc_mujoco.studies.board import Behind, Block, Board, BoardEntry, LeastLead
+from smc_mujoco.studies.board_tables import Boards
 
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 MAX_RATIO = 4.0  # of the ends of a median's interval, above which it says too little; chosen
@@ -265,7 +267,8 @@ def _board(
         floor = paired_runs.floor_words(ran[k], metric)
         if floor and len(scores.blocks) > 1:
             floor += f" under {group.blocks[k][1]}"
-        blocks.append(_block(group.blocks[k], group.seeds[k], comparison, at, untuned, floor))
+        block = _block(group.blocks[k], group.seeds[k], comparison, at, untuned, floor)
+        blocks.append(dataclasses.replace(block, bound=_bound(ran[k])))
     repeated = not np.isnan(comparison.halves).all()
     return Board(
         group=group.name,
@@ -278,6 +281,13 @@ def _board(
         by_step=not repeated and any(map(repeats_every_run, filter(None, ran))),
         x=paired_runs.unit_of_x(group.name["plant"], ran),
     )
+
+
+def _bound(scenario: Scenario | None) -> float:
+    """Return the bound on |u|; NaN where it is not one finite number for all joints."""
+    bounds = set() if scenario is None else set(scenario.limits)
+    bound = bounds.pop() if len(bounds) == 1 else math.nan
+    return bound if math.isfinite(bound) else math.nan
 
 
 def _unit(metric: str, ran: Sequence[Scenario | None]) -> str:
@@ -373,6 +383,7 @@ def _block(
         worse=tuple(laws[comparison.worse[:, at]].tolist()),
         ahead=winner,
         lead=_lead(comparison, at, ranked, floor, unit),
+        behind=_behind(comparison, at, order),
         level=bool(comparison.level[at][np.ix_(best, best)].all()),
         resolves=resolves,
         charged=charged,
@@ -410,6 +421,26 @@ def _lead(
     if lacking[b]:
         lost = f"{lacking[b]} of {comparison.seeds[at]}"
     return LeastLead(first, rival, effect, floor if effect.below else "", unit, lost)
+
+
+def _behind(comparison: Comparison, at: int, order: Sequence[str]) -> dict[str, Behind]:
+    """Return the laws of a block that others are better than; the law in front is first in
+    `order`.
+    """
+    better = comparison.better[at]
+    behind = {}
+    for law in order[1:]:
+        b = comparison.laws.index(law)
+        ahead = tuple(rival for rival in order if better[comparison.laws.index(rival), b])
+        if not ahead:
+            continue
+        times = math.nan
+        if not comparison.shares:
+            effect = comparison.effect(at, ahead[0], law)
+            if not effect.below and effect.value > 0.0:
+                times = 1.0 / effect.value
+        behind[law] = Behind(ahead[0], ahead, times if math.isfinite(times) else math.nan)
+    return behind
 
 
 def _resolves(comparison: Comparison, at: int, unbeaten: Sequence[str]) -> tuple[float, float]:

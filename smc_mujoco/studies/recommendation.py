@@ -38,7 +38,7 @@ from smc_mujoco.simulation.force_bounds import bounds_in_words
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.board import Boards
+from smc_mujoco.studies.board_tables import Boards
 from smc_mujoco.studies.race import LOOKS, WITHOUT, Race, needed
 from smc_mujoco.studies.table import Table
 

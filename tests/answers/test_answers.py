@@ -2,6 +2,7 @@
 
 import math
 import re
+import shlex
 
 import pytest
 from helpers.words import words
@@ -60,7 +61,7 @@ def test_settled_runs_are_counted_by_law():
     assert "b 7 of 12" in answers.settled(all_but_one)
     assert "a " not in answers.settled(all_but_one)
     assert "24" in answers.settled([("a", Settles(12, 12)), ("b", Settles(12, 12))])
-    assert "None" in answers.settled([("a", Settles(0, 12))])
+    assert "No run of 12" in answers.settled([("a", Settles(0, 12))])
 
 
 def test_a_law_that_loses_has_its_ratio_and_who_is_ahead():
@@ -74,11 +75,11 @@ def test_a_law_that_loses_has_its_ratio_and_who_is_ahead():
 
 def test_what_is_tied_and_what_is_open_stand_on_lines_of_their_own():
     ((label, text),) = answers.ties([Tied(metric="J", laws=("a", "b"), floor="0.1 mrad")])
-    assert (label, "0.1 mrad" in text) == ("tied", True)
+    assert (label, text) == ("tied", "J: a, b")
     ((label, text),) = answers.opens(
         [
             Open(metric="J", laws=("a", "b"), hidden=0.12),
-            Open(metric="ITAE", laws=("a", "b"), sets_needed=8),
+            Open(metric="ITAE", laws=("a", "b"), needed=8, unit="sets"),
         ]
     )
     assert label == "open"
@@ -87,14 +88,18 @@ def test_what_is_tied_and_what_is_open_stand_on_lines_of_their_own():
     assert answers.ties([]) == answers.opens([]) == []
 
 
-def test_a_line_is_at_most_80_wide_but_a_command_stays_whole():
-    command = f"smc-mujoco compare {'x' * 90}"
+def test_a_line_is_at_most_80_wide_and_a_command_can_be_pasted():
+    words = ["smc-mujoco", "compare", *["a b"] * 3, *["x" * 20] * 5]
     lines = answers.labelled(
-        [("adrc", "J 21 to 25 % below the rest " * 9), answers.next_step(NextStep(command))]
+        [
+            ("adrc", "J 21 to 25 % below the rest " * 9),
+            answers.next_step(NextStep(shlex.join(words))),
+        ]
     )
-    assert max(map(len, lines[:-1])) <= answers.WIDTH
+    assert max(map(len, lines)) <= answers.WIDTH
     assert lines[1].startswith(" " * 6)
-    assert lines[-1] == f"next  {command}"
+    pasted = "\n".join(lines).partition("next")[2].replace("\\\n", "")
+    assert shlex.split(pasted) == words
 
 
 class Sample(Answer):

@@ -44,7 +44,7 @@ CALLS = {
     "--worst --quick --metric itae "
     "--gains default --duration 2 --x0 0.4 --relevant 0.05 --allow-defaults --out there --searches 2 "
     "--figure f "
-    "--latex t.tex --seed 5 --json c.json --threads 2 --device cuda --executor dask://h:1": [
+    "--latex t.tex --seed 5 --json c.json --threads 2 --device cuda --executor dask://h:1 --full": [
         "studies.compare.compare"
     ],
     "compare --law all": ["studies.compare.compare"],

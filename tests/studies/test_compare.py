@@ -26,7 +26,7 @@ from smc_mujoco.control import gain_sets
 from smc_mujoco.control.units import FORCE, RATE, Gain
 from smc_mujoco.robustness import worst_case
 from smc_mujoco.studies import batches, compare, fair_gains
-from smc_mujoco.studies.board import UNDER
+from smc_mujoco.studies.board_tables import UNDER
 from smc_mujoco.studies.leaderboard import METRICS, Holdout
 
 SHORT = {"duration": 0.5, "budget": 16, "progress": False}
@@ -150,7 +150,7 @@ def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
     assert [board.metric for board in boards] == [*METRICS]
     assert len(found.leaderboard) == len(METRICS) * 4 + 2  # and J on unseen runs on each plant
     summed = ", unseen runs under nominal, noise, delay_10ms, sine, constant, light and heavy: "
-    assert found.leaderboard[0].tables[0].title.startswith(f"{found.leaderboard[0].about}{summed}")
+    assert found.tables[0].title.startswith(f"{found.leaderboard[0].about}{summed}")
     frame = found.to_pandas()
     assert len(frame) == len(found.verdicts) * 3
     frame = frame[(frame["metric"] == "itae") & (frame["law"] == "pid")]
@@ -162,7 +162,7 @@ def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
     rows = last.to_latex().partition("\nPID & ")[2].splitlines()
     assert rows[1].startswith(r"\footnotesize given & ")
     assert f"{UNDER['shipped']} {UNDER['tuned here']}" in last.under[-1]
-    assert found.to_latex().count(UNDER["ITAE"]) == 2  # once as a comment, and once in print
+    assert found.to_latex().count(UNDER["ITAE"]) == 1
     assert found.to_latex().count(r"\begin{tabular}") == 6  # J on each plant, too
     assert found._repr_html_().count("<table") == 9  # times, runs and gains
     assert len(found.plot().axes) == 10  # of all five metrics, on both plants
@@ -299,6 +299,12 @@ def test_two_calls_write_the_same_bytes_whenever_wherever_and_with_any_threads(
     first, second = written
     assert {"compared/results.parquet", "which/results.parquet", "tables.tex"} <= set(first)
     assert first.keys() == second.keys()
+    report = "compared/report.html"  # with times of this machine
+    pages = [
+        re.sub(rf"<section>[^\n]*{compare.TIMES}.*", "", one.pop(report).decode())
+        for one in written
+    ]
+    assert pages[0] == pages[1]
     for name, content in first.items():
         assert content == second[name], name
 
@@ -430,11 +436,13 @@ def test_one_command_runs_tables_and_draws(tmp_path, monkeypatch, capsys):
         main.main(words)
     assert end.value.code in (0, None)
     printed = capsys.readouterr().out
-    assert "16 runs, 0 stopped early" in printed
+    assert "the defaults of mine, not searched" in " ".join(printed.split())
+    page = Path("results/report.html").read_text()
+    assert "16 runs, 0 stopped early" in page
+    assert "mine on inverted_pendulum and duffing: default gains" in page
     table = smc.Table.read("results")
     assert set(table.column("condition")) == {"friction", "worn"}
     assert set(table.column("seed")) == {2_000_000, 2_000_001}
-    assert "mine on inverted_pendulum and duffing: default gains" in " ".join(printed.split())
     assert max(map(len, printed.splitlines())) <= 80
     assert Path("fig.svg").exists()
     assert Path("table.tex").read_text().count(r"\toprule") == 6

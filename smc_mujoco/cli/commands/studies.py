@@ -298,6 +298,7 @@ def compare(
     threads: options.Threads = None,
     device: options.Device = "cpu",
     executor: options.Executor = None,
+    full: options.Full = False,
 ) -> None:
     """Compare control laws on plants in conditions. Tune laws where needed, run every law, and
     report which law is best and how certain the answer is.
@@ -342,7 +343,7 @@ def compare(
     if rig is not None:
         without = "comparisons without --rig, which brings its own plant and gains: leave it out"
         options.only_for(ctx, NOT_OF_RIGS, False, without)
-        _compare_on_rig(rig, law, seeds, shared, terminal)
+        _compare_on_rig(rig, law, seeds, shared, terminal, full)
         return
     latex = latex and with_ending(latex, ".tex")
     options.check_files(None, latex, *pictures)
@@ -361,18 +362,23 @@ def compare(
         executor=executor,
         **shared,
     )
-    terminal.print(comparison)
+    terminal.answer(comparison, full)
     if latex:
         comparison.to_latex(latex)
         terminal.wrote(latex)
     if figure:
         comparison.plot(figure)
         terminal.wrote(*pictures)
-    _finish(comparison.table, out, terminal)
+    terminal.finish()
 
 
 def _compare_on_rig(
-    name: str, law: list[str] | None, seeds: int, shared: dict[str, Any], terminal: Terminal
+    name: str,
+    law: list[str] | None,
+    seeds: int,
+    shared: dict[str, Any],
+    terminal: Terminal,
+    full: bool,
 ) -> None:
     """Compare laws on the parameter sets of a rig. `shared`: what other comparisons take, too."""
     from smc_mujoco.identification import ensemble
@@ -381,7 +387,7 @@ def _compare_on_rig(
     machine = rig(name)
     chosen = options.laws(law, of_rig=machine.laws) or None
     table, boards, found = ensemble.compare(machine, chosen, seeds, **shared)
-    terminal.print(boards)
+    terminal.answer(boards, full)
     for candidate in found:
         terminal.note(f"{candidate.law} {candidate.remark}".strip(), wrap=True)
     terminal.note(ensemble.verdict(boards))

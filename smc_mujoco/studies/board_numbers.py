@@ -1,0 +1,77 @@
+"""The numbers of boards as text, with their headings and units, and the order of laws."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+from smc_mujoco.analysis.bootstrap import Interval
+from smc_mujoco.analysis.paired_runs import OBJECTIVE, SETTLED, SETTLES
+from smc_mujoco.common.aliases import Pair
+from smc_mujoco.common.text import LEAST_PRINTED, ends, in_one_notation, number
+from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.metrics.conventions import Metric
+from smc_mujoco.studies.board import Board
+
+
+def in_order(boards: Sequence[Board]) -> list[str]:
+    """Return the laws of boards by place in the first one, those of one place by their median in
+    it, then by the next ones.
+    """
+    places: dict[str, list[Pair]] = {}
+    for board in boards:
+        for entry in board.entries:
+            standing = entry.rank.place, entry.interval.median
+            places.setdefault(entry.law, []).append(standing)
+    return sorted(places, key=lambda law: (places[law], law))
+
+
+def size(value: float, metric: str) -> str:
+    """Return a median as text: "" for NaN, a share in percent."""
+    if math.isnan(value):
+        return ""
+    if metric == OBJECTIVE:
+        return number(value)
+    if metric == SETTLES:
+        return f"{100 * value:.0f}"
+    return CATALOGUE[metric].text(value)
+
+
+def sizes(values: Sequence[float], metric: str) -> list[str]:
+    """Return numbers of one cell as text, each as `size` does, in one notation."""
+    texts = []
+    for value, text in zip(values, in_one_notation(values), strict=True):
+        other = metric == SETTLES or not math.isfinite(value)
+        texts.append(size(value, metric) if other else text)
+    return texts
+
+
+def spread(interval: Interval, low: str, high: str) -> str:
+    """Return the ends of an interval, from their texts; "" if they are not known, both infinite, or
+    both below 1e-9, which the median says.
+    """
+    if math.isnan(interval.low) or math.isinf(interval.low):
+        return ""
+    if 0.0 < interval.high < LEAST_PRINTED:
+        return ""
+    return ends(low, high)
+
+
+def heading(board: Board) -> str:
+    """Return a metric's label with its unit, if that is known."""
+    if board.metric == SETTLES:
+        return SETTLED
+    if board.metric == OBJECTIVE:
+        return "J (s^2)"
+    return _in_unit(board).heading(board.x)
+
+
+def unit_of(board: Board) -> str:
+    """Return the unit of a board's medians; "" for a share, or where positions have none."""
+    if board.metric not in CATALOGUE or not board.x:
+        return "" if "{" in board.unit else board.unit
+    return _in_unit(board).unit_for(board.x)
+
+
+def _in_unit(board: Board) -> Metric:
+    """Return the metric of a board, in the board's unit: in V for voltages."""
+    return dataclasses.replace(CATALOGUE[board.metric], unit=board.unit)

@@ -1,0 +1,170 @@
+"""What a comparison says of each plant in each condition on one screen: facts of its boards."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+from smc_mujoco.analysis.paired_runs import OBJECTIVE, SETTLES
+from smc_mujoco.answers.facts import (
+    Contest,
+    Lead,
+    NotRanked,
+    Open,
+    Settles,
+    Tied,
+    Trails,
+    Use,
+    Verdict,
+)
+from smc_mujoco.common.aliases import Names
+from smc_mujoco.studies.board import Block, Board
+from smc_mujoco.studies.board_numbers import in_order, size, unit_of
+
+# what one screen calls a metric, in plainer words than a table
+PLAIN = {"ultimate_bound": "final error", "tv_rate": "variation of u"}
+RATE = "tv_rate"  # the metric that is also given as a share of the bound on u
+Column = tuple[Board, Block]  # a metric, in one condition
+Gains = Mapping[str, Mapping[str, str]]  # plant -> law -> its best gains as text
+
+
+def contests(boards: Sequence[Board], gains: Gains, own: Names) -> tuple[Contest, ...]:
+    """Return a contest for each plant in each condition.
+
+    Args:
+      boards: those of J, if any, and of the metrics.
+      gains: of the laws that may be recommended.
+      own: the laws of which it is said how far they trail.
+    """
+    objectives: dict[str, Column] = {}
+    columns_of: dict[tuple[str, str], list[Column]] = {}
+    for board in boards:
+        for block in board.blocks:
+            if board.metric == OBJECTIVE:
+                objectives[block.plant] = board, block
+            else:
+                columns_of.setdefault((block.plant, block.condition), []).append((board, block))
+    made = []
+    for (plant, _), of_metrics in columns_of.items():
+        of_plant = [objectives[plant]] if plant in objectives else []
+        made.append(_contest([*of_plant, *of_metrics], gains.get(plant, {}), own))
+    return tuple(made)
+
+
+def _contest(columns: Sequence[Column], gains: Mapping[str, str], own: Names) -> Contest:
+    """Return the facts of a plant in a condition."""
+    _, last = columns[-1]
+    verdicts: list[Verdict] = []
+    not_ranked: list[NotRanked] = []
+    for board, block in columns:
+        fact = board.verdict(block, name(board))
+        # that all laws settle in the same runs is seen in the number of runs that settle
+        if fact and not (board.metric == SETTLES and isinstance(fact, Tied)):
+            verdicts.append(fact)
+        not_ranked += board.not_ranked
+    with_numbers = [column for column in columns if column[0].metric != SETTLES]
+    rows = []
+    for law in in_order([board for board, _ in columns]):
+        rows.append((law, tuple(_number(board, block, law) for board, block in with_numbers)))
+    return Contest(
+        plant=last.plant,
+        condition=last.condition,
+        sample=last.sample,
+        columns=tuple((name(board), _unit(board)) for board, _ in with_numbers),
+        rows=tuple(rows),
+        winners=tuple(block.winner or "" for _, block in with_numbers),
+        settled=_settled(columns),
+        use=_use(columns, verdicts, gains),
+        verdicts=tuple(verdicts),
+        trails=tuple(_trails(*columns[0], own)),
+        not_ranked=tuple(not_ranked),
+    )
+
+
+def name(board: Board) -> str:
+    """Return what a screen calls the metric of a board."""
+    return PLAIN.get(board.metric, board.label)
+
+
+def _unit(board: Board) -> str:
+    """Return the unit below a heading."""
+    unit = unit_of(board).replace("^2", "²")
+    return f"{unit} (of bound)" if _has_share(board) else unit
+
+
+def _has_share(board: Board) -> bool:
+    return board.metric == RATE and not any(math.isnan(block.bound) for block in board.blocks)
+
+
+def _number(board: Board, block: Block, law: str) -> str:
+    """Return the median of a law in a block; of one below its floor, the floor."""
+    if law not in block.medians:
+        return ""
+    median = block.medians[law]
+    if law in block.below and block.floor:
+        return f"<{block.floor.split()[0]}"
+    text = size(median, board.metric)
+    if _has_share(board) and math.isfinite(median):
+        return f"{text} ({float(f'{100.0 * median / block.bound:.2g}'):g} %)"
+    return text
+
+
+def _settled(columns: Sequence[Column]) -> tuple[tuple[str, Settles], ...]:
+    """Return how many runs of each law settle; () if that was not asked."""
+    for board, block in columns:
+        if board.metric == SETTLES:
+            facts = []
+            for law, share in block.medians.items():
+                facts.append((law, Settles(round((1.0 - share) * block.runs), block.runs)))
+            return tuple(facts)
+    return ()
+
+
+def _trails(board: Board, block: Block, own: Names) -> list[Trails]:
+    """Return how far own laws are behind the law in front of a block."""
+    facts = []
+    for law, behind in block.behind.items():
+        if law in own:
+            facts.append(
+                Trails(
+                    law=law,
+                    leader=behind.leader,
+                    metric=name(board),
+                    times=behind.times,
+                    ahead=behind.ahead,
+                )
+            )
+    return facts
+
+
+def _use(
+    columns: Sequence[Column], verdicts: Sequence[Verdict], gains: Mapping[str, str]
+) -> Use | None:
+    """Return the law to use: the one that is best in the first metric, or of those that may be
+    best there, the first; without the first metric's verdict, none. A law with a run that does not
+    arrive in this condition is not recommended.
+    """
+    if not verdicts:
+        return None
+    lost = {law for _, block in columns for law in block.away}
+    first = verdicts[0]
+    rivals: Names = ()
+    match first:
+        case Lead():
+            law = first.law
+        case Open() | Tied():
+            fine = [law for law in in_order([columns[0][0]]) if law in first.laws]
+            law, rivals = fine[0], first.laws
+        case _:
+            return None
+    if law in lost:
+        return None
+    unless = []
+    for fact in verdicts[1:]:
+        if isinstance(fact, Lead) and fact.law != law and fact.law not in lost:
+            unless.append((fact.metric, fact.law))
+    return Use(
+        law=law,
+        gains=gains.get(law, ""),
+        unless=tuple(unless),
+        rivals=rivals if len(rivals) > 1 else (),
+        metric=first.metric,
+    )
