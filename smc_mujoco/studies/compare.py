@@ -372,7 +372,9 @@ class Compared(Answer):
 
     @property
     def pictures(self) -> list[html.Html]:
-        """The figure of `plot` with every metric compared."""
+        """The figure of `plot` with every metric compared; none without a metric."""
+        if not self._metrics:
+            return []
         about = "Medians with their intervals by condition, as in the tables"
         return [
             html.picture(

@@ -204,8 +204,8 @@ FLAGS = {
 }
 FLAGS |= {"--no-binary", "--full", "--falling"}
 # which function does the work; --need and --plant of `list`
-SWITCHES = {"--rig", "--need", "--plant", "--no-film"}
-AFTER = {"--figure", "--latex", "--json", "--out", "--full"}  # of what is done after the function
+SWITCHES = {"--rig", "--need", "--plant", "--no-film", "--full"}
+AFTER = {"--figure", "--latex", "--json", "--out"}  # of what is done after the function
 FOLDERS = {"run", "compare", "which"}  # whose --out is a folder
 ALIASES = {
     "--allow-defaults": "defaults",  # option -> arguments that it may change, besides the one of its name
@@ -493,7 +493,7 @@ def test_what_a_command_prints_fits_and_what_it_writes_is_parsed_as_ever(
         if path.is_file() and path.parent.name != "parts":
             files.add(path.relative_to(folder))
     reported = [Path(name) for name in re.findall(r"^wrote (\S+)", out, re.MULTILINE)]
-    beside = {"one.npz", "classical.fmu"}
+    beside = {"one.npz", "classical.fmu", "report.html", "results.parquet"}
     untold = {
         file
         for file in files - set(reported)

@@ -5,6 +5,7 @@ law wins is said.
 import dataclasses
 import math
 import re
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -228,7 +229,8 @@ def test_only_what_no_law_beats_is_marked(boards):
     assert blind[0].needed(block) == 0
     assert len(blind[0].best) == 3
     assert not any(map(any, marked(blind)))
-    assert blind[0].verdict(block).hidden > 0.995
+    fact: Any = blind[0].verdict(block)
+    assert fact.hidden > 0.995
     some = made()  # the first median is known within a factor of 10, the others within 1.2
     random = np.random.default_rng(3)
     some.columns["itae"] = np.exp(np.repeat([2.5, 0.1, 0.1], 20) * random.normal(size=60))
@@ -237,7 +239,7 @@ def test_only_what_no_law_beats_is_marked(boards):
     assert EVIL in board.best
     cells = {row[0].text: row[1] for row in Boards([board]).tables[0].rows}
     assert [cells[law].strong for law in LAWS] == [False, True, True]
-    fact = board.verdict(board.blocks[0])
+    fact: Any = board.verdict(board.blocks[0])
     assert fact == Open(metric="ITAE", laws=board.best, hidden=board.blocks[0].resolves)
     seen = f"{100 * fact.hidden:.2g}"
     assert f"{seen} %" in repr(board)
@@ -260,7 +262,7 @@ def test_a_law_that_wins_is_marked_and_its_ratio_is_a_number(never, spread, cond
     assert board.winner == "third"
     assert found.tables[0].rows[0][1].strong
     for block in board.blocks:
-        fact = board.verdict(block)
+        fact: Any = board.verdict(block)
         assert (fact.law, fact.metric, fact.samples) == ("third", "settling time", 20)
         if never:
             assert re.fullmatch(r"\d+ of 20", fact.gaps)
@@ -531,7 +533,8 @@ def test_few_sets_are_no_reason_where_every_run_settles(boards):
     assert settles.verdict(block) == Tied(metric="settled runs", laws=LAWS)
     shares = dict(zip(LAWS, (0.0, 0.5, 1.0), strict=True))
     apart = dataclasses.replace(block, medians=shares)
-    assert settles.verdict(apart).needed == 6  # of one block
+    fact: Any = settles.verdict(apart)
+    assert fact.needed == 6  # of one block
 
 
 LEADS = {  # a least lead -> the fields of its fact
@@ -568,7 +571,7 @@ def test_a_lead_has_its_interval_as_shares_and_says_where_medians_differ(case, m
 
 def test_over_several_conditions_each_verdict_stands_once(pair):
     assert repr(pair).count("under nominal and noise") == 1
-    fact = pair.verdict(pair.blocks[0])
+    fact: Any = pair.verdict(pair.blocks[0])
     assert f"ratio {number(fact.ratio)}" in repr(pair)
     assert "at worst" in repr(pair)
     first, second = pair.blocks
