@@ -1,0 +1,217 @@
+"""What an entry reached in a suite of tracking problems, as a file, and who leads in each problem.
+
+    results/smc-friction@1/pid.json
+
+An entry has two searches in each problem. What counts for it is its worse search where it leads,
+and its better one where it trails: one law leads another if it is better in every pairing of their
+searches, by the test of `analysis.ranking` over the instances. So a lead is none of a lucky search.
+"""
+
+import datetime
+import functools
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from smc_mujoco.analysis.ranking import Comparison
+from smc_mujoco.common import fingerprint
+from smc_mujoco.common.aliases import AnyPath, Names
+from smc_mujoco.common.cache import CachedResult
+from smc_mujoco.common.data import keyword_dataclass
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import read_json, reading, replacing, slug, write_json
+from smc_mujoco.common.progress import bar
+from smc_mujoco.common.version import versions
+from smc_mujoco.problems.tracking import TrackingSuite, tracking_suite
+from smc_mujoco.problems.tracking_entry import tracking_entry
+from smc_mujoco.problems.tracking_search import SEARCHES, SETS, Found, search_problem
+
+SHIPPED = Path(__file__).parent / "boards"
+FLOOR = 0.5  # counts: smaller errors count as equal, as no encoder shows them
+SAME = 1.1  # an error is not of the load where that without it is no more than so many times less
+
+
+def enter_tracking(
+    text: str,
+    suite: str,
+    out: AnyPath = "results",
+    threads: int | None = None,
+    progress: bool = False,
+) -> Path:
+    """Search for an entry's gains in every problem of a suite. Return the file of its result.
+
+    Problems that are done are kept beside it, and a call that was stopped goes on with the others.
+
+    Raises:
+      ScenarioError: a text that is no entry, or an entry that the suite cannot run.
+    """
+    entry = tracking_entry(text)
+    chosen = tracking_suite(suite)
+    for problem in chosen.problems:
+        entry.beside(problem)  # refuses what does not suit before anything is searched
+    target = Path(out) / suite / f"{slug(entry.name)}.json"
+    parts = target.with_suffix("")
+    parts.mkdir(parents=True, exist_ok=True)
+    searched = {}
+    whole = len(chosen.problems) * SEARCHES * SETS
+    with bar(f"sets of gains of {entry.name}", whole, progress) as shown_bar:
+        for problem in chosen.problems:
+            depends = [problem.name, str(problem), entry.name, fingerprint.of(entry.law.function)]
+            file = CachedResult(parts / f"{problem.name}.json", depends, _write, read_json)
+            kept = file.read()
+            if kept is None:
+                results = search_problem(problem, entry, threads, shown_bar.advance)
+                kept = file.keep([result._asdict() for result in results])
+            else:
+                shown_bar.advance(SEARCHES * SETS)
+            searched[problem.name] = kept
+    about = {
+        "suite": suite,
+        "entry": text,
+        "name": entry.name,
+        "law": entry.law.name,
+        "date": datetime.date.today().isoformat(),
+        "versions": versions(),
+        "problems": searched,
+    }
+    with replacing(target) as file:
+        file.write_text(_compact(about), encoding="utf-8")
+    for kept in parts.iterdir():
+        kept.unlink()
+    parts.rmdir()
+    return target
+
+
+def _write(results: list, path: Path) -> None:
+    write_json(path, results)
+
+
+def _compact(about: Mapping) -> str:
+    """Return a result as JSON with a line for each search."""
+    problems = []
+    for name, searches in about["problems"].items():
+        lines = ",\n".join(json.dumps(search) for search in searches)
+        problems.append(f"{json.dumps(name)}: [\n{lines}]")
+    head = json.dumps({key: value for key, value in about.items() if key != "problems"})
+    joined = ",\n".join(problems)
+    return f'{head[:-1]},\n"problems": {{\n{joined}}}}}\n'
+
+
+@keyword_dataclass
+class EntryResult:
+    """An entry's result in a suite."""
+
+    name: str
+    text: str  # the entry
+    law: str  # its name
+    date: str
+    searches: Mapping[str, tuple[Found, ...]]  # problem -> of each search
+
+
+@functools.cache
+def read_result(path: Path) -> EntryResult:
+    """Return the result in a file. Raise ScenarioError for a file that is none."""
+    with reading(path, "result of an entry", "enter the law again") as file:
+        about = read_json(file)
+        searches = {}
+        for problem, results in about["problems"].items():
+            searches[problem] = tuple(Found(**result) for result in results)
+        return EntryResult(
+            name=about["name"],
+            text=about["entry"],
+            law=about["law"],
+            date=about["date"],
+            searches=searches,
+        )
+
+
+@keyword_dataclass
+class ProblemBoard:
+    """The entries of a suite in one problem."""
+
+    problem: str
+    names: Names  # least error first
+    errors: Mapping[
+        str, tuple[float, float]
+    ]  # medians over instances, counts: better, worse search
+    without: Mapping[str, float]  # of the worse search without the load
+    leaders: Names  # the entries that no other leads
+    told_apart: float  # share of the pairs in which one leads the other
+
+    def of_load(self, name: str) -> bool:
+        """Return whether an entry's error is of the load, and not the same without it."""
+        return self.errors[name][1] > SAME * self.without[name]
+
+
+class TrackingBoard:
+    """The entries of a suite: those that are shipped, and those of a folder of results."""
+
+    def __init__(self, suite: TrackingSuite, results: Sequence[EntryResult]):
+        if not results:
+            raise ScenarioError(
+                f"no law has entered {suite.name}: smc-mujoco enter pid --suite {suite.name}"
+            )
+        self.suite = suite
+        self.entries = {result.name: result for result in results}
+
+    def problem(self, name: str) -> ProblemBoard:
+        """Return who stands where in a problem."""
+        better, worse, without = {}, {}, {}
+        for entry, result in self.entries.items():
+            if name in result.searches:
+                logs = sorted(result.searches[name], key=lambda found: np.median(found.errors))
+                better[entry] = np.array(logs[0].errors)
+                worse[entry] = np.array(logs[-1].errors)
+                without[entry] = float(np.median(logs[-1].without))
+        comparison = Comparison(worse, FLOOR, halves=better)
+        medians = {}
+        for entry, errors in worse.items():
+            medians[entry] = float(np.median(better[entry])), float(np.median(errors))
+        order = sorted(medians, key=lambda entry: medians[entry][1])
+        leads = comparison.better[0]
+        pairs = len(order) * (len(order) - 1) / 2
+        beaten = dict(zip(comparison.laws, leads.any(axis=0).tolist(), strict=True))
+        return ProblemBoard(
+            problem=name,
+            names=tuple(order),
+            errors=medians,
+            without=without,
+            leaders=tuple(entry for entry in order if not beaten[entry]),
+            told_apart=float((leads | leads.T).sum() / 2 / pairs) if pairs else 0.0,
+        )
+
+    @functools.cached_property
+    def problems(self) -> list[ProblemBoard]:
+        """The boards of all problems."""
+        return [self.problem(problem.name) for problem in self.suite.problems]
+
+    def shares(self) -> dict[str, float]:
+        """Return entry -> the share of the problems in which no other leads it, most first."""
+        counts = dict.fromkeys(self.entries, 0)
+        for board in self.problems:
+            for entry in board.leaders:
+                counts[entry] += 1
+        ordered = sorted(counts, key=lambda entry: (-counts[entry], entry))
+        return {entry: counts[entry] / len(self.problems) for entry in ordered}
+
+
+def tracking_board(suite: str, folder: AnyPath | None = None) -> TrackingBoard:
+    """Return the board of a suite.
+
+    Args:
+      suite: its name.
+      folder: of results, whose entries stand beside those that are shipped, and in place of those
+        of the same name.
+
+    Raises:
+      ScenarioError: an unknown suite, a broken result, or no entry at all.
+    """
+    chosen = tracking_suite(suite)
+    files: dict[str, Path] = {}
+    folders = [SHIPPED] if folder is None else [SHIPPED, Path(folder)]
+    for place in folders:
+        for path in sorted((place / suite).glob("*.json")):
+            files[path.stem] = path
+    return TrackingBoard(chosen, [read_result(path) for path in files.values()])

@@ -1,0 +1,191 @@
+"""The search of a suite for an entry's gains, alike for all entries, and its unseen runs.
+
+Two searches of a problem have nothing in common but the problem. Each draws some of its sets of
+gains over the box of a tuning; from the best of these CMA-ES goes on, also a decade beyond the box.
+A set is judged by the worst of CHOOSING instances and one without the load: by its error, times
+(rate / limit)^4 where the rate is beyond the limit, so that the search comes to good sets from the
+side of those that vary too much. Chosen is the least error within the limit, of sets within the
+law's theorem. With gains of four digits it then runs on UNSEEN other instances, with and without
+the load. The time constant of the estimator of velocities is a gain of every entry.
+
+The fast engine makes all runs.
+"""
+
+import zlib
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from cmaes import CMA
+
+from smc_mujoco.analysis.engine.form import FAILURE, SCORES, SETTING
+from smc_mujoco.analysis.engine.group import FormGroup, why_not
+from smc_mujoco.analysis.tuning import search_space
+from smc_mujoco.analysis.tuning.evaluator import with_gains
+from smc_mujoco.common.aliases import Array, Numbers
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.control.component import Component
+from smc_mujoco.problems.tracking import TrackingProblem, filtered_difference
+from smc_mujoco.problems.tracking_entry import TrackingEntry
+from smc_mujoco.simulation import state
+from smc_mujoco.simulation.scenario import Scenario
+
+SEARCHES = 2
+SETS = 720  # of gains, of a search
+DRAWN = 360  # the first of them
+POPULATION = 12  # of CMA-ES
+SPREAD = 0.6  # of its first population, of the logarithm of gains
+CHOOSING, UNSEEN = 2, 24  # instances
+FIRST_UNSEEN = 1000
+MARGIN = 0.97  # of the limit, within which sets are chosen, so that unseen runs stay about it
+POWER = 4.0  # of the rate over its limit, beyond the limit: by it a search's cost grows
+LARGEST = 1e30  # cost of a run that fails, and of a set outside the law's theorem
+TAUS = (1.0, 30.0)  # control periods: range of the estimator's time constant
+METRICS = ("rms_error", "tv_rate")
+TAU = "velocity.tau"  # name of the estimator's gain among those of an entry
+
+
+class Found(NamedTuple):
+    """What a search chose in a problem, and its unseen runs; errors in counts."""
+
+    gains: Numbers
+    errors: list[float]  # (UNSEEN,), inf for a run that failed
+    without: list[float]  # the same without the load
+    rates: list[float]  # bounds a second
+
+
+class Trials:
+    """The runs of an entry in a problem, as rows of the fast engine."""
+
+    def __init__(self, problem: TrackingProblem, entry: TrackingEntry, threads: int | None):
+        self.problem = problem
+        self.law = entry.law_on(problem)
+        self.beside = entry.beside(problem)
+        self.threads = threads
+        scales = search_space.scales(problem.machine, problem.bound, problem.start, 1.0)
+        box = search_space.box(self.law, scales)
+        self.names = tuple(box)
+        taus = [share * problem.period for share in TAUS]
+        self.box = np.log([*box.values(), taus])  # (gains, 2)
+        self.bounds = np.log([*search_space.widened(box).values(), taus])
+        runs = [(instance, True) for instance in range(CHOOSING)]
+        self.choosing = self._group([*runs, (CHOOSING, False)])
+
+    def _scenario(self, instance: int, loaded: bool) -> Scenario:
+        velocity = filtered_difference(self.problem.period)
+        return self.problem.scenario(self.law, velocity, self.beside, instance, loaded)
+
+    def _group(self, instances: Sequence[tuple[int, bool]]) -> FormGroup:
+        """Return instances, with or without the load, as rows whose metrics are of the problem's
+        window.
+        """
+        runs = [self._scenario(*instance) for instance in instances]
+        if why := why_not(runs[0], METRICS):
+            raise ScenarioError(f"the suite cannot run {self.law.name}: {why}")
+        group = FormGroup(runs, METRICS)
+        late = group.rows[:, SETTING.samples] - self.problem.late
+        group.rows[:, SETTING.early] = late + 1
+        group.rows[:, SETTING.late] = late
+        return group
+
+    def run(self, group: FormGroup, gains: Array) -> Array:
+        """Return error, counts, and rate, 1/s, of sets of gains, (sets, instances, 2); inf where a
+        run fails.
+        """
+        count = len(group.rows)
+        rows = np.tile(group.rows, (len(gains), 1))
+        for name, values in zip(self.names, gains.T, strict=False):
+            rows[:, group.gain_columns(name)] = np.repeat(values, count)[:, None]
+        rows[:, group.layout.estimator.numbers] = np.repeat(gains[:, -1], count)
+        scores = group.run(rows, self.threads)
+        fine = scores[:, [FAILURE]] == state.FINE
+        measured = np.where(fine, scores[:, SCORES:], np.inf)
+        measured[:, 0] /= self.problem.count
+        measured[:, 1] /= self.problem.bound
+        return np.nan_to_num(measured, nan=np.inf).reshape(len(gains), count, 2)
+
+    def judged(self, logs: Array) -> tuple[Array, Array]:
+        """Return what a search minimises of logarithms of gains, (sets, gains), and which sets are
+        within the limit and the law's theorem.
+        """
+        worst = self.run(self.choosing, np.exp(logs)).max(axis=1)
+        excess = np.maximum(worst[:, 1] / (MARGIN * self.problem.limit), 1.0)
+        with np.errstate(over="ignore"):
+            costs = np.minimum(worst[:, 0] * excess**POWER, LARGEST)
+        within = self._within_theorem(logs)
+        return np.where(within, costs, LARGEST), within & (excess <= 1.0)
+
+    def _within_theorem(self, logs: Array) -> Array:
+        """Return which sets of gains meet the conditions of the law's theorem."""
+        template = self.law.template
+        if template is None or not template.conditions:
+            return np.ones(len(logs), bool)
+        met = []
+        for values in np.exp(logs).tolist():
+            named = dict(zip(self.names, values, strict=False))
+            met.append(not template.unmet({**self.law.gains, **named}))
+        return np.array(met)
+
+    def searched(self, number: int, advance: Callable[[float], None]) -> Numbers:
+        """Return the gains that a search chooses, by name, of four digits."""
+        seed = [number, zlib.crc32(f"{self.problem.name} {self.law.name}".encode())]
+        rng = np.random.default_rng(seed)
+        chosen, least = None, LARGEST
+
+        def judge(logs: Array) -> Array:
+            nonlocal chosen, least
+            costs, allowed = self.judged(logs)
+            errors = np.where(allowed, costs, LARGEST)
+            if errors.min() < least:
+                chosen, least = logs[np.argmin(errors)], errors.min()
+            advance(len(logs))
+            return costs
+
+        logs = rng.uniform(*self.box.T, (DRAWN, len(self.box)))
+        best = logs[np.argmin(judge(logs))]
+        cma = CMA(best, SPREAD, self.bounds, seed=number, population_size=POPULATION)
+        for _ in range(DRAWN, SETS, POPULATION):
+            logs = np.array([cma.ask() for _ in range(POPULATION)])
+            cma.tell(list(zip(logs, judge(logs), strict=True)))
+        values = np.exp(best if chosen is None else chosen).tolist()
+        names = (*self.names, TAU)
+        return {name: float(f"{value:.4g}") for name, value in zip(names, values, strict=True)}
+
+    def unseen(self, gains: Numbers) -> Found:
+        """Return what gains reach on instances that chose nothing."""
+        values = np.array([list(gains.values())])
+        instances = range(FIRST_UNSEEN, FIRST_UNSEEN + UNSEEN)
+        runs = [(instance, loaded) for loaded in (True, False) for instance in instances]
+        errors, rates = self.run(self._group(runs), values)[0].T
+        parts = errors[:UNSEEN], errors[UNSEEN:], rates[:UNSEEN]
+        return Found(gains, *map(_digits, parts))
+
+
+def _digits(values: Array) -> list[float]:
+    """Return numbers of four digits."""
+    return [float(f"{value:.4g}") for value in values.tolist()]
+
+
+def search_problem(
+    problem: TrackingProblem,
+    entry: TrackingEntry,
+    threads: int | None = None,
+    advance: Callable[[float], None] = lambda work: None,
+) -> list[Found]:
+    """Return what each search for an entry's gains found in a problem."""
+    trials = Trials(problem, entry, threads)
+    return [trials.unseen(trials.searched(number, advance)) for number in range(SEARCHES)]
+
+
+def scenario_of(
+    problem: TrackingProblem,
+    entry: TrackingEntry,
+    gains: Numbers,
+    instance: int,
+    loaded: bool = True,
+) -> Scenario:
+    """Return a run with the gains of an entry, as `smc.run` takes it."""
+    own = {name: value for name, value in gains.items() if name != TAU}
+    law: Component = with_gains(entry.law_on(problem), tuple(own), tuple(own.values()))
+    velocity = filtered_difference(gains[TAU])
+    return problem.scenario(law, velocity, entry.beside(problem), instance, loaded)
