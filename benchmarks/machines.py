@@ -27,6 +27,7 @@ from twin_figures import Order, TwinFigure
 
 import smc_mujoco as smc
 from smc_mujoco.common.version import versions
+from smc_mujoco.identification.published_rig import PublishedRig
 from smc_mujoco.identification.rig import Rig, percentages
 from smc_mujoco.simulation.time_series import TimeSeries
 
@@ -72,7 +73,9 @@ def size(values: np.ndarray) -> float:
     return float(np.std(values))
 
 
-def of_record(rig: Rig, name: str, law: str, file: Path, published: str) -> Iterator[TwinFigure]:
+def of_record(
+    rig: PublishedRig, name: str, law: str, file: Path, published: str
+) -> Iterator[TwinFigure]:
     """Yield the rows of a record: one for each signal."""
     record = dict(np.load(file))
     members = list(rig.members().values())

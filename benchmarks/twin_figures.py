@@ -30,7 +30,7 @@ from smc_mujoco.common.errors import find
 from smc_mujoco.common.files import read_json
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
-from smc_mujoco.identification.rig import catalogue
+from smc_mujoco.identification.published_rig import catalogue
 
 FILE = Path(__file__).with_suffix(".json")
 UNFITTED = "unfitted"

@@ -26,8 +26,8 @@ from smc_mujoco.evidence.audit.audit import claims as claims
 from smc_mujoco.exchange.law_from import law_from as law_from
 from smc_mujoco.exchange.policy import policy as policy
 from smc_mujoco.identification.identify import identify as identify
-from smc_mujoco.identification.rig import rig as rig
-from smc_mujoco.identification.rig import rigs as rigs
+from smc_mujoco.identification.published_rig import rig as rig
+from smc_mujoco.identification.published_rig import rigs as rigs
 from smc_mujoco.identification.speed_torque import identify_friction as identify_friction
 from smc_mujoco.mechanisms.custom.plant_from import Channel as Channel
 from smc_mujoco.mechanisms.custom.plant_from import plant_from as plant_from

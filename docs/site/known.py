@@ -41,6 +41,7 @@ OTHERS = {  # title -> names of modules that are no public names
     studies.scene.Outcome
     draw.film.film.Frames
     identification.rig.Rig
+    identification.published_rig.PublishedRig
     envs.flight_env.FlightEnv
     studies.which.Recommendation
     analysis.tuning.result.Tuned

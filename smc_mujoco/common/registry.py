@@ -46,7 +46,7 @@ KINDS = {  # group of entry points -> what an entry is, and how one makes it
         "a function decorated with smc.estimator_function",
     ),
     "smc_mujoco.plants": ("plant", "a smc_mujoco.mechanisms.plant.Plant"),
-    "smc_mujoco.rigs": ("rig", "a smc_mujoco.identification.rig.Rig"),
+    "smc_mujoco.rigs": ("rig", "a smc_mujoco.identification.published_rig.PublishedRig"),
     "smc_mujoco.scenes": ("scene", "a module that declares a `scene`"),
     "smc_mujoco.papers": ("paper", "a package with paper.toml and claims.py"),
 }

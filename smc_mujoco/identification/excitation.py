@@ -33,12 +33,8 @@ from smc_mujoco.control.from_text import law as find_law
 from smc_mujoco.control.law import Law
 from smc_mujoco.identification import gauss_newton
 from smc_mujoco.identification.lack_of_fit import lack_of_fit
-from smc_mujoco.identification.own_rig import (
-    LogPart,
-    OwnRig,
-    check_named,
-    own_rig,
-)
+from smc_mujoco.identification.log_rig import LogPart
+from smc_mujoco.identification.own_rig import OwnRig, own_rig
 from smc_mujoco.identification.paths import DELAY, named_once
 from smc_mujoco.identification.presliding import presliding
 from smc_mujoco.identification.replays import Point, Replays, Slopes
@@ -243,7 +239,7 @@ def excitation(
     base = machine if isinstance(machine, Scenario) else jointed(machine, "excitation")
     names = named_once(names)
     rig = own_rig(base, names)
-    check_named(rig, ["smc-mujoco", "excitation", machine] if isinstance(machine, str) else [])
+    rig.check_named(["smc-mujoco", "excitation", machine] if isinstance(machine, str) else [])
     drives = rig.drives(u_max)
     forces = largest_forces(drives)
     rig = rig.with_values(typical(rig, forces) | dict(guess or {}), "typical")
@@ -562,7 +558,8 @@ def _told(rig: OwnRig, names: list[str], trace: Trace) -> dict[str, Any]:
     (residuals,) = replays.residuals([true])
     slopes = dataclasses.replace(slopes, residuals=residuals)
     solved, by_steps = gauss_newton.extrapolated(replays, slopes)
-    may_lack = lack_of_fit(solved, presliding(replays, solved, INTEGRATOR))
+    solved_rig = rig.with_values(replays.values(solved.point))
+    may_lack = lack_of_fit(solved, presliding(solved_rig, replays, solved, INTEGRATOR))
     by_model = np.hypot(by_steps, may_lack.moved)
     errors, correlations = statistics(replays, solved, by_model)
     for name, error in errors.items():

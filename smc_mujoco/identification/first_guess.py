@@ -25,7 +25,7 @@ from smc_mujoco.identification.inverse_dynamics import (
     cubic_samples,
 )
 from smc_mujoco.identification.least_squares import least_squares
-from smc_mujoco.identification.own_rig import OwnRig, moves
+from smc_mujoco.identification.log_rig import LogRig, moves
 from smc_mujoco.identification.paths import DELAY, MAX_DELAY, slope, steady_force
 from smc_mujoco.identification.records import Columns, Record, stacked, step_of
 from smc_mujoco.mechanisms.custom.model_numbers import KINDS, PAYLOAD
@@ -67,7 +67,7 @@ class Forces(NamedTuple):
     commands: list[Array]  # for each delay the commands, (M, driven)
 
 
-def first_guess(rig: OwnRig, data: Sequence[Data]) -> OwnRig:
+def first_guess(rig: LogRig, data: Sequence[Data]) -> LogRig:
     """Return the rig with values from least squares of the forces of its logs.
 
     Raises:
@@ -88,7 +88,7 @@ def first_guess(rig: OwnRig, data: Sequence[Data]) -> OwnRig:
     return guessed
 
 
-def _usable(rig: OwnRig, data: Sequence[Data]) -> list[Record]:
+def _usable(rig: LogRig, data: Sequence[Data]) -> list[Record]:
     """Return the logs whose forces can be compared: none where the command is no force."""
     columns = dataclasses.replace(rig.columns, torque=rig.columns.x)
     usable = []
@@ -100,8 +100,8 @@ def _usable(rig: OwnRig, data: Sequence[Data]) -> list[Record]:
 
 
 def _guessed(
-    rig: OwnRig, data: Sequence[Data], logs: Sequence[Forces], delays: Sequence[float]
-) -> OwnRig:
+    rig: LogRig, data: Sequence[Data], logs: Sequence[Forces], delays: Sequence[float]
+) -> LogRig:
     """Return the rig with the values of least squares, and the delay whose residual is least."""
     gained = []
     found_gains = []
@@ -188,7 +188,7 @@ def _solved(A: Array, b: Array) -> Array:
     return solution
 
 
-def _within(rig: OwnRig, values: Numbers, data: Sequence[Data]) -> OwnRig:
+def _within(rig: LogRig, values: Numbers, data: Sequence[Data]) -> LogRig:
     """Return the rig with values cut to their ranges; one that would be 0 or less starts small, as
     the search takes steps by factors.
     """
@@ -209,17 +209,17 @@ def _within(rig: OwnRig, values: Numbers, data: Sequence[Data]) -> OwnRig:
     return guessed.with_values(guessed.in_order(guessed.values, APART), "forces of the logs")
 
 
-def linear(rig: OwnRig) -> list[str]:
+def linear(rig: LogRig) -> list[str]:
     """Return the quantities in which the forces are linear, in the order of their columns."""
     return [name for name in rig.quantities if _is_linear(rig, name)]
 
 
-def starts_from_zero(rig: OwnRig, name: str) -> bool:
+def starts_from_zero(rig: LogRig, name: str) -> bool:
     """Return whether the slopes' base has this quantity at 0; else it has its own value."""
     return (name in rig.plant.parameters and "." in name) or name.endswith((".offset", ".gain"))
 
 
-def _is_linear(rig: OwnRig, name: str) -> bool:
+def _is_linear(rig: LogRig, name: str) -> bool:
     if name in rig.places:
         place = rig.places[name]
         part = getattr(rig.base, place.field)[place.part]
@@ -229,7 +229,7 @@ def _is_linear(rig: OwnRig, name: str) -> bool:
     return of_joint or _of_inertia(rig, name)
 
 
-def _of_inertia(rig: OwnRig, name: str) -> bool:
+def _of_inertia(rig: LogRig, name: str) -> bool:
     """Return whether a quantity is a parameter of which the forces of a rigid motion depend: one
     of the plant's own, or a payload.
     """
@@ -237,7 +237,7 @@ def _of_inertia(rig: OwnRig, name: str) -> bool:
     return name in rig.plant.parameters and (not owner or kind == PAYLOAD)
 
 
-def forces(rig: OwnRig, record: Record, delays: Sequence[float]) -> Forces:
+def forces(rig: LogRig, record: Record, delays: Sequence[float]) -> Forces:
     """Return what a log says about forces."""
     columns = dataclasses.replace(rig.columns, torque=rig.columns.x)
     limit = cutoff(record, columns)
@@ -276,7 +276,7 @@ def cutoff(record: Record, columns: Columns) -> float:
     return min(max(CUTOFF, rate / SAMPLES_A_PERIOD), FASTEST)
 
 
-def motion_forces(rig: OwnRig, record: Record, late: float) -> tuple[Array, Array, Array, Array]:
+def motion_forces(rig: LogRig, record: Record, late: float) -> tuple[Array, Array, Array, Array]:
     """Return positions, speeds, the forces that the motion takes by the rig's own numbers, and the
     commands that reach the motors, (M, n) each but the last, (M, driven), below 5 Hz.
     """
@@ -292,7 +292,7 @@ def motion_forces(rig: OwnRig, record: Record, late: float) -> tuple[Array, Arra
     return np.column_stack(positions), np.column_stack(speeds), forces, commands
 
 
-def _of_parts(rig: OwnRig, filtered: Filter, v: Array) -> Array:
+def _of_parts(rig: LogRig, filtered: Filter, v: Array) -> Array:
     """Return the force of the frictions of the scenario at their own numbers, (M, n)."""
     count = len(filtered.low(v[:, 0]))
     friction = np.zeros((count, v.shape[1]))
@@ -310,7 +310,7 @@ def _smooth_speed(v: Array) -> Array:
     return v * np.tanh((v / slow) ** 2)
 
 
-def _column(rig: OwnRig, name: str, filtered: Filter, motion: Sequence[Array]) -> Array:
+def _column(rig: LogRig, name: str, filtered: Filter, motion: Sequence[Array]) -> Array:
     """Return how the forces of a motion depend on a linear quantity of joints, (M, n)."""
     x, v, a = motion
     count = len(filtered.low(v[:, 0]))
@@ -338,7 +338,7 @@ def _column(rig: OwnRig, name: str, filtered: Filter, motion: Sequence[Array]) -
     return slopes
 
 
-def _low_commands(rig: OwnRig, record: Record, filtered: Filter, late: float) -> Array:
+def _low_commands(rig: LogRig, record: Record, filtered: Filter, late: float) -> Array:
     """Return the commands that reach the motors with a delay, low-passed, (M, driven). Each is held
     over a sample, so that it acts half a sample late.
     """
@@ -354,7 +354,7 @@ def _low_commands(rig: OwnRig, record: Record, filtered: Filter, late: float) ->
     return np.column_stack(commands)
 
 
-def check_columns(rig: OwnRig, data: Sequence[Record], logs: Sequence[Forces]) -> None:
+def check_columns(rig: LogRig, data: Sequence[Record], logs: Sequence[Forces]) -> None:
     """Raise ScenarioError where angles are in degrees, and where a column has the wrong sign."""
     for record, log in zip(data, logs, strict=True):
         shares = force_shares(rig, log)
@@ -373,7 +373,7 @@ def check_columns(rig: OwnRig, data: Sequence[Record], logs: Sequence[Forces]) -
                 )
 
 
-def _check_angle(rig: OwnRig, record: Record, i: int, share: float, stopped: bool) -> None:
+def _check_angle(rig: LogRig, record: Record, i: int, share: float, stopped: bool) -> None:
     """Raise ScenarioError where the angle of a joint, with the share of the recorded force in the
     force that its motion takes, is in degrees: it is larger than a turn and a half, or the recorded
     forces agree with the motion if it is.
@@ -409,7 +409,7 @@ def force_cosines(log: Forces) -> list[float]:
     return cosines
 
 
-def force_shares(rig: OwnRig, log: Forces) -> list[float]:
+def force_shares(rig: LogRig, log: Forces) -> list[float]:
     """Return for each motor the recorded force over that which the motion of its joint takes by the
     model's inertia and gravity.
     """
@@ -423,7 +423,7 @@ def force_shares(rig: OwnRig, log: Forces) -> list[float]:
     return shares
 
 
-def _beyond_ranges(rig: OwnRig, record: Record) -> list[str]:
+def _beyond_ranges(rig: LogRig, record: Record) -> list[str]:
     """Return sentences on joints that leave their range in a log."""
     said = []
     ranges = zip(rig.columns.x, rig.plant.ranges, rig.plant.units, strict=False)
@@ -447,7 +447,7 @@ def _in_degrees(low: float, x: float, high: float, unit: str) -> str:
     return ", or, if the log is in degrees, divide the column by 57.3"
 
 
-def doubts(rig: OwnRig, data: Sequence[Data]) -> list[str]:
+def doubts(rig: LogRig, data: Sequence[Data]) -> list[str]:
     """Return sentences on columns that may be in another unit."""
     said = []
     for record in map(rig.checked, data):

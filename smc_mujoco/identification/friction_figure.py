@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from smc_mujoco.common.aliases import Array, Numbers
+from smc_mujoco.common.aliases import AnyPath, Array, Numbers
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.identification import first_guess, records
-from smc_mujoco.identification.own_rig import OwnRig
+from smc_mujoco.identification.log_rig import LogRig
 from smc_mujoco.identification.paths import DELAY, steady_force
 from smc_mujoco.identification.records import Record
 from smc_mujoco.identification.rig import Values
@@ -29,12 +29,12 @@ SPEEDS = 200  # of the friction's curve, on each side of 0
 
 
 def friction_figure(
-    rig: OwnRig,
+    rig: LogRig,
     covariance: Array,
     log: Record,
     prediction: tuple[Record, Record, Array],
     fit: Numbers,
-    path: str | Path,
+    path: AnyPath,
 ) -> list[Path]:
     """Draw a log of a machine: measured and predicted positions, residuals, frictions. Write
     PATH.svg and PATH.png.
@@ -79,7 +79,7 @@ def friction_figure(
 
 
 def _friction(
-    ax: Axes, rig: OwnRig, covariance: Array, i: int, forces: tuple[Array, Array], colour: str
+    ax: Axes, rig: LogRig, covariance: Array, i: int, forces: tuple[Array, Array], colour: str
 ) -> None:
     """Draw the friction of a joint, with two standard errors, over that of the log."""
     speeds, points = forces
@@ -95,7 +95,7 @@ def _friction(
     ax.set_title(f"friction ({effort})")
 
 
-def friction(rig: OwnRig, values: Numbers, i: int, v: Array) -> Array:
+def friction(rig: LogRig, values: Numbers, i: int, v: Array) -> Array:
     """Return the friction of channel i at steady speeds v, (K,), by the model and the parts."""
     fields = rig.numbers_of(Values(**values))
     plant = fields["plant"]
@@ -116,7 +116,7 @@ def friction_of_model(plant: Plant, i: int, v: Array) -> Array:
     return model.dof_damping[dof] * v + model.dof_frictionloss[dof] * np.sign(v)
 
 
-def curve_error(rig: OwnRig, covariance: Array, i: int, v: Array) -> Array:
+def curve_error(rig: LogRig, covariance: Array, i: int, v: Array) -> Array:
     """Return the standard error of a joint's friction at steady speeds v, (K,), at first order."""
     values = rig.values
     plain = friction(rig, values, i, v)
@@ -129,7 +129,7 @@ def curve_error(rig: OwnRig, covariance: Array, i: int, v: Array) -> Array:
     return np.sqrt(np.maximum(np.einsum("pk,pq,qk->k", J, covariance, J), 0.0))
 
 
-def measured_friction(rig: OwnRig, record: Record) -> tuple[Array, Array]:
+def measured_friction(rig: LogRig, record: Record) -> tuple[Array, Array]:
     """Return speeds, and the forces of a log less those of inertia, gravity and springs, (M, n)
     each, below 5 Hz: what is left is friction.
     """
@@ -158,7 +158,7 @@ def measured_friction(rig: OwnRig, record: Record) -> tuple[Array, Array]:
     return v, points
 
 
-def _motors(rig: OwnRig) -> list[Actuator]:
+def _motors(rig: LogRig) -> list[Actuator]:
     """Return the motor of each driven joint, with the rig's values."""
     drives = rig.numbers_of(Values(**rig.values)).get("actuator")
     return Scenario.recorded(plant=rig.plant, law="none", actuator=drives).drive_train.motors

@@ -31,28 +31,19 @@ from smc_mujoco.common.files import write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.identification import (
-    first_guess,
     gauss_newton,
-    log_quality,
     number_text,
     records,
-    servo_columns,
 )
-from smc_mujoco.identification.lack_of_fit import LackOfFit, lack_of_fit
-from smc_mujoco.identification.lacking_forces import lacking_forces
-from smc_mujoco.identification.own_rig import (
-    SETTINGS,
-    OwnRig,
-    check_named,
-    condition_fields,
-    own_rig,
-)
+from smc_mujoco.identification.lack_of_fit import lack_of_fit
+from smc_mujoco.identification.log_rig import SETTINGS
+from smc_mujoco.identification.own_rig import own_rig
 from smc_mujoco.identification.paths import DELAY, named_once
-from smc_mujoco.identification.presliding import presliding
+from smc_mujoco.identification.published_rig import rig as find_rig
+from smc_mujoco.identification.published_rig import rigs
 from smc_mujoco.identification.records import Record
 from smc_mujoco.identification.replays import Point, Replays, Slopes
-from smc_mujoco.identification.rig import Fall, Rig, Source, rigs
-from smc_mujoco.identification.rig import rig as find_rig
+from smc_mujoco.identification.rig import Fall, Rig, Source
 from smc_mujoco.identification.standard_errors import (
     BLOCKS,
     MAX_CORRELATION,
@@ -80,10 +71,6 @@ Count = Annotated[int, Whole(low=1, high=1000)]
 SLOW = (
     "the residuals are slow, for example by a force that was not recorded, friction that drops "
     "with speed, a softness, or a log whose u is late: true errors may be many standard errors"
-)
-RELATIVE = (
-    "with a gain free, forces and inertias are relative to the model's mass: if the model is too "
-    "light, gain, damping, friction and armature are too small by the same share"
 )
 LEFT = (
     "a whole log is left in an open loop, as an arm under gravity leaves it however good its "
@@ -150,23 +137,16 @@ class Identified:
                 notes.append(f"{name} is at the end of its range")
             elif self.errors[name] > abs(value):
                 notes.append(f"{name} may as well be 0")
-        for lack in self.lacks:
-            notes.append(f"{lack}; the errors include what that may change")
         worst = _worst(self.by_pieces or self.fits)
+        for lack in self.lacks if worst < PERFECT_FIT else ():
+            notes.append(f"{lack}; the errors include what that may change")
         if self.independent < BLOCKS[0] and worst < PERFECT_FIT and self.rig.controller is None:
             notes.append(SLOW)
         if worst < POOR_FIT:
             notes.append(POOR)
         elif self.by_pieces and _worst(self.fits) < POOR_FIT:
             notes.append(LEFT)
-        if isinstance(self.rig, OwnRig) and any(name.endswith(".gain") for name in self.values):
-            notes.append(RELATIVE)
-        if isinstance(self.rig, OwnRig) and (absent := self.rig.not_in_runs):
-            notes.append(
-                f"replays have {', '.join(absent)}, and runs of the machine leave it out: "
-                "a scenario has one Fault, and zeros of encoders are of their log"
-            )
-        return notes
+        return notes + self.rig.cautions
 
     @constrained
     def drawn(self, count: Count = 8, seed: Seed = 0, floor: Natural = FLOOR) -> Rig:
@@ -198,11 +178,7 @@ class Identified:
         Raises:
           ScenarioError: the rig is a published machine, whose scenarios are `rig.scenario(law)`.
         """
-        if not isinstance(self.rig, OwnRig):
-            raise ScenarioError(
-                f"{self.rig.name} is a rig: take rig.scenario(law), or compare(rig=...)"
-            )
-        return conditions.condition(name, **condition_fields(self.rig))
+        return conditions.condition(name, **self.rig.condition_fields())
 
     def __repr__(self) -> str:
         values = []
@@ -268,22 +244,10 @@ class Identified:
         the friction of each joint, as PATH.svg and PATH.png.
         """
         whole("record", record, 0, len(self.fits) - 1)
-        if isinstance(self.rig, OwnRig):
-            from smc_mujoco.identification.friction_figure import friction_figure
-
-            errors = np.array(list(self.errors.values()))
-            covariance = self.correlations * np.outer(errors, errors)
-            log = self.rig.checked(self.data[record])
-            return friction_figure(
-                self.rig, covariance, log, self.predictions[record], self.fits[record], path
-            )
-        from smc_mujoco.identification.residual_figure import residual_figure
-
-        predicted, measured, t = self.predictions[record]
-        fits = {"twin": self.fits[record]}
-        return residual_figure(
-            self.rig.label, t, measured, {"twin": predicted}, fits, self.rig.units, path
-        )
+        errors = np.array(list(self.errors.values()))
+        covariance = self.correlations * np.outer(errors, errors)
+        prediction, fit = self.predictions[record], self.fits[record]
+        return self.rig.figure(covariance, self.data[record], prediction, fit, path)
 
 
 @constrained
@@ -351,10 +315,7 @@ def identify(
     twin, data = _read(machine, logs, listed, columns, condition)
     names = _checked_names(twin, listed)
     fits_before = twin.fits(data)  # also refuses records that are too short
-    doubts = []
-    if isinstance(twin, OwnRig):
-        doubts = first_guess.doubts(twin, data) + servo_columns.doubts(twin, data)
-        doubts += log_quality.doubts(twin, data)
+    doubts = twin.doubts(data)
     expected = _expected_sets(twin, names, most)
     with bar(f"identify {twin.name}", expected, shown=progress) as drawn:
 
@@ -365,7 +326,7 @@ def identify(
         replays, slopes, by_steps = _solved(
             twin, names, data, doubts, starts, seed, most, corrected, report
         )
-        lacking = _lacking(replays, slopes)
+        lacking = lack_of_fit(slopes, twin.lacks(replays, slopes))
         by_model = np.hypot(by_steps, lacking.moved)
         errors, correlations = statistics(replays, slopes, by_model)
     values = twin.in_order(replays.values(slopes.point))
@@ -462,13 +423,13 @@ def _read(
         raise ScenarioError(
             f"cannot identify {shown(machine)}: give a plant, a scenario, or a rig or its name"
         )
+    if machine.quantities:  # of a machine whose numbers are not named its log is checked first
+        _checked_names(machine, None if names is None else list(names))
     twin, data = machine.reading(read)
-    if isinstance(twin, OwnRig):
-        for source, record in zip(many, data, strict=True):
-            _check_log(twin, source, record)
-        check_named(twin, line)
-        twin = first_guess.first_guess(twin, data)
-    return twin, data
+    for source, record in zip(many, data, strict=True):
+        _check_log(twin, source, record)
+    twin.check_named(line)
+    return twin.guessed(data), data
 
 
 def _shell_line(machine: Any, logs: Sequence[Any], columns: Any, condition: Any) -> list[str]:
@@ -550,7 +511,7 @@ def _named_plant(text: str, logs: Sequence[Any], names: Sequence[str]) -> Plant:
     return as_plant(f"{text}:{'+'.join(joints)}")
 
 
-def _check_log(twin: OwnRig, given: Any, record: Data) -> None:
+def _check_log(twin: Rig, given: Any, record: Data) -> None:
     """Raise ScenarioError for a log that cannot be used. It names the log's file, if it has one."""
     try:
         twin.checked(record)
@@ -608,14 +569,6 @@ def _solved(
     slopes = gauss_newton.refine(closed, begin, most)
     closed.evaluations += pieces.evaluations
     return closed, slopes, np.zeros(len(names))
-
-
-def _lacking(replays: Replays, slopes: Slopes) -> LackOfFit:
-    """Return what the model lacks; of a published machine nothing is looked for."""
-    lacks = []
-    if isinstance(replays.twin, OwnRig):
-        lacks = lacking_forces(replays, slopes) + presliding(replays, slopes)
-    return lack_of_fit(slopes, lacks)
 
 
 def _starting_states(

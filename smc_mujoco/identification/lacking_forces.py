@@ -16,7 +16,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.identification.lack_of_fit import Lack
-from smc_mujoco.identification.own_rig import LogPart, OwnRig
+from smc_mujoco.identification.log_rig import LogPart, LogRig
 from smc_mujoco.identification.paths import DELAY
 from smc_mujoco.identification.replays import Piece, Point, Replays, Slopes
 from smc_mujoco.mechanisms.layout import driven_names
@@ -99,16 +99,15 @@ def left_out(motion: JointMotion, joint: str, names: Sequence[str]) -> Iterator[
             yield f"{LEFT_OUT[kind]}: find {joint}.{kind}", force
 
 
-def lacking_forces(replays: Replays, slopes: Slopes) -> list[Lack]:
-    """Return what forces of many shapes would change in the residuals, for each motor."""
-    rig = replays.rig(slopes.point)
-    if not isinstance(rig, OwnRig):
-        return []
+def lacking_forces(rig: LogRig, replays: Replays, slopes: Slopes) -> list[Lack]:
+    """Return what forces of many shapes would change in the residuals, for each motor. `rig`: with
+    the values of the slopes.
+    """
     texts = []
     pieces = list(replays.pieces)
     for i, joint in enumerate(driven_names(rig.plant)):
         shapes_by_piece = []
-        for motion in _motions(replays, slopes.point, i):
+        for motion in _motions(rig, replays, slopes.point, i):
             shapes_by_piece.append([*shapes(motion), *left_out(motion, joint, replays.names)])
         for of_pieces in zip(*shapes_by_piece, strict=True):
             words = of_pieces[0][0]
@@ -129,10 +128,8 @@ def lacking_forces(replays: Replays, slopes: Slopes) -> list[Lack]:
     return lacks
 
 
-def _motions(replays: Replays, point: Point, i: int) -> list[JointMotion]:
+def _motions(rig: LogRig, replays: Replays, point: Point, i: int) -> list[JointMotion]:
     """Return the motion of joint i in each piece, as it is predicted."""
-    rig = replays.rig(point)
-    assert isinstance(rig, OwnRig)
     late = rig.values.get(DELAY, rig.base.input_delay)
     (predicted,) = replays.predicted([point])
     x, v, a = [], [], []

@@ -8,7 +8,7 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array, Data
 from smc_mujoco.identification import records
-from smc_mujoco.identification.own_rig import OwnRig, moves
+from smc_mujoco.identification.log_rig import LogRig, moves
 from smc_mujoco.identification.paths import DELAY
 from smc_mujoco.identification.records import Record
 
@@ -20,7 +20,7 @@ LONG_PERIOD = 0.0051  # s: loops of machines are seldom slower; chosen
 SAME_PERIOD = 0.02  # of a period, by which a loop's own may differ from the log's; chosen
 
 
-def doubts(rig: OwnRig, data: Sequence[Data]) -> list[str]:
+def doubts(rig: LogRig, data: Sequence[Data]) -> list[str]:
     """Return sentences on what is doubtful in logs."""
     said = []
     for record in map(rig.checked, data):
@@ -31,7 +31,7 @@ def doubts(rig: OwnRig, data: Sequence[Data]) -> list[str]:
     return list(dict.fromkeys(said))
 
 
-def _slow(rig: OwnRig, period: float) -> list[str]:
+def _slow(rig: LogRig, period: float) -> list[str]:
     """Return a sentence on a log that may lack commands of a faster loop."""
     loop_known = abs(period - rig.base.control_period) < SAME_PERIOD * period
     if period <= LONG_PERIOD or loop_known:

@@ -16,7 +16,7 @@ import numpy as np
 
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.identification.lack_of_fit import Lack
-from smc_mujoco.identification.own_rig import RUN_STEP, OwnRig
+from smc_mujoco.identification.log_rig import RUN_STEP, LogRig
 from smc_mujoco.identification.replays import Replays, Slopes
 from smc_mujoco.identification.rig import Values
 from smc_mujoco.mechanisms.custom.model_constraints import SOFT_SOLIMP, SOFT_SOLREF
@@ -52,13 +52,15 @@ class PreslidingFields:
         model.opt.noslip_iterations = 0  # a number, which no Field can write
 
 
-def presliding(replays: Replays, slopes: Slopes, integrator: str | None = None) -> list[Lack]:
+def presliding(
+    rig: LogRig, replays: Replays, slopes: Slopes, integrator: str | None = None
+) -> list[Lack]:
     """Return the ways in which dry friction may give way in the logs, as what the model lacks.
 
-    `integrator`: of the replays; None for that of each scenario.
+    `rig`: with the values of the slopes. `integrator`: of the replays; None for that of each
+    scenario.
     """
-    rig = replays.rig(slopes.point)
-    if not isinstance(rig, OwnRig) or not rig.plant.rubs:
+    if not rig.plant.rubs:
         return []
     if not all(part.drives for part in rig.base.actuator):  # rotors beside joints
         return []
@@ -80,7 +82,7 @@ def presliding(replays: Replays, slopes: Slopes, integrator: str | None = None) 
     return lacks
 
 
-def _ways(rig: OwnRig) -> dict[str, OwnRig]:
+def _ways(rig: LogRig) -> dict[str, LogRig]:
     """Return how friction gives way, and what to do -> the rig with such friction."""
     fields = rig.numbers_of(Values(**rig.values))
     model = fields["plant"].load()
@@ -112,7 +114,7 @@ def _softness(joints: Sequence[str], levels: Sequence[float]) -> str:
     return f"write {', '.join(lines)} into the file, and find the numbers again"
 
 
-def _with_bristles(rig: OwnRig, bristles: Sequence[LuGre]) -> str:
+def _with_bristles(rig: LogRig, bristles: Sequence[LuGre]) -> str:
     """Return what to do, in the words of the command, where dry friction bends as bristles do."""
     parts = []
     paths = []

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from smc_mujoco.common.aliases import Array, Fields, Numbers
+from smc_mujoco.common.aliases import AnyPath, Array, Fields, Numbers
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.identification.records import Record
@@ -31,7 +31,7 @@ def residual_figure(
     predicted: Mapping[str, Record],
     fits: Mapping[str, Numbers],
     units: Mapping[str, str],
-    path: str | Path,
+    path: AnyPath,
 ) -> list[Path]:
     """Draw each column of a record, measured and predicted, beside its residuals.
 

@@ -1,5 +1,5 @@
 """A rig: a real machine as data, which makes scenarios of that machine and repeats its records in
-simulation.
+simulation. A published machine is a PublishedRig, a user's own an OwnRig.
 
     rig = smc.rig("qube_servo")
     rig.scenario(law="none", duration=5.0)         # a Scenario of that machine
@@ -11,29 +11,25 @@ scenarios, runs and traces.
 """
 
 import dataclasses
-import functools
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Self
 
 import numpy as np
 
-from smc_mujoco.common import annexes
-from smc_mujoco.common.aliases import Array, Data, Fields, Floats, Names, Numbers
+from smc_mujoco.common.aliases import AnyPath, Array, Data, Fields, Floats, Names, Numbers
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.data import frozen_data, keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, number
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.registry import Catalogue, added, discover, imported
 from smc_mujoco.control.law import Law
 from smc_mujoco.identification import inverse_dynamics, records
 from smc_mujoco.identification.records import Columns, Record
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation.force_bounds import default_u_max
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.time_series import TimeSeries
 from smc_mujoco.simulation.trace import Trace
 
 Values = SimpleNamespace  # quantities by name
@@ -81,14 +77,15 @@ class RecordPart:
     fields: Data  # of the replay's Scenario: law, duration, signals
     # hidden numbers, positions and velocities at the start, (q + 2n,), see `Rig.hidden`
     state: Array
-    largest_u: float  # of the recorded command, in the unit of u
-    zero: Numbers  # quantities that the record determines, see `Rig.zero`
+    largest_u: float = 0.0  # of the recorded command, in the unit of u
+    # quantities that the record determines, see `PublishedRig.zero`
+    zero: Numbers = dataclasses.field(default_factory=dict)
     stride: int = 1  # control periods of the replay for each sample of the record
 
 
 @keyword_dataclass
 class Rig:
-    """A real machine.
+    """A real machine, and what identification asks of it.
 
     Attributes:
       name, label: as in `smc.rigs()`, and what it is, in a line.
@@ -97,27 +94,18 @@ class Rig:
         actuator, sensor, ...
       controller: the rig's own law, if it is known. Closed-loop records are replayed with it.
       columns: names of its records' columns.
-      commands: function of a record and the index of the start, that returns what the rig adds to
-        its controller's u from there on, (K,). None: only the column of the feedforward, if there
-        is one.
-      zero: function of the quantities, by name, and a record that returns quantities which differ
-        between records, such as angles from where an encoder was switched on.
       start, score_from: s after a record's first sample, at which a replay starts, and from which
         its fit counts.
       dynamics: function of the quantities, by name, that returns a plant with the joints of the
         record, for records whose torques are predicted from the measured motion. None: records are
         replayed.
-      identified_from: names of the records that its quantities were identified from.
       free: names of the quantities that its records determine, which `smc.identify` finds by
         default.
       window: s, of the pieces in which identification first repeats a record; each starts from its
         measured state.
-      published: name of a parameter set -> its values of quantities by name, and its source under
-        "source".
       ensemble: other parameter sets that fit about as well, each by name.
       laws: laws with gains for this machine, which a ranking compares by default.
       x0: middle of the initial states of a ranking, rad or m, (n,); None: the plant's own.
-      about: licence and history of the data, and what the twin predicts well or badly.
     """
 
     name: str
@@ -126,23 +114,17 @@ class Rig:
     machine: Callable[[Values], Fields]
     controller: Law | None = None
     columns: Columns = dataclasses.field(default_factory=Columns)
-    commands: Callable[[Record, int], Array] | None = None
-    zero: Callable[[Values, Record], dict[str, float]] | None = None
     start: float = 0.0
     score_from: float = 0.0
     dynamics: Callable[[Values], Plant] | None = None
-    identified_from: Names = ()
     free: Names = ()
     window: float = 1.0
-    published: Mapping[str, Data] = dataclasses.field(default_factory=dict)
     ensemble: tuple[Numbers, ...] = ()
     laws: tuple[Law, ...] = ()
     x0: Floats | None = None
-    about: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("quantities", "published"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
+        object.__setattr__(self, "quantities", frozen(self.quantities))
 
     def __repr__(self) -> str:
         return f"rig({self.name!r})"
@@ -161,11 +143,6 @@ class Rig:
             if new != quantity.value:
                 changed[name] = dataclasses.replace(quantity, value=new, source=source)
         return dataclasses.replace(self, quantities=changed)
-
-    def set(self, name: str) -> "Rig":
-        """Return the rig with a published parameter set."""
-        chosen = dict(find(f"parameter set of {self.name}", name, self.published))
-        return self.with_values(chosen, chosen.pop("source"))
 
     def members(self) -> dict[str, "Rig"]:
         """Return name -> the rig with one of its parameter sets: "set 1" for its own, then those of
@@ -186,26 +163,15 @@ class Rig:
         controlled: Fields = {"law": law or self.controller}
         return Scenario(**self.machine(Values(**self.values)) | controlled | fields)
 
-    def replay(
-        self, record: Data, start: float | None = None, duration: float | None = None
-    ) -> Scenario:
-        """Return the scenario that repeats a record from its measured state on.
+    # How records are repeated: what an implementation gives
 
-        With the rig's own controller the loop is closed: only references and feedforward come from
-        the record, and u is the controller's. Without one, the recorded command is the feedforward
-        of the law "none". The encoder does not round, because the sample in which a count changes
-        cannot be predicted.
+    def reading(self, many: Sequence[Source]) -> tuple["Rig", list[Data]]:
+        """Return the rig that repeats records, and these as columns."""
+        raise NotImplementedError
 
-        Args:
-          record: column -> values, (K,); see `columns`.
-          start: s after the first sample; None: the rig's `start`.
-          duration: s; None: to the end of the record.
-
-        Raises:
-          ScenarioError: a start before the record, fewer than 50 samples to repeat, or what `fit`
-            raises of a record.
-        """
-        return self.repeated(self.part(record, start, duration))
+    def checked(self, record: Data) -> Record:
+        """Return the columns of a record that a replay reads, (K,) each. Raises as `fit`."""
+        raise NotImplementedError
 
     def part(
         self,
@@ -218,47 +184,95 @@ class Rig:
 
         If not `closed`, it has the recorded command in any case.
         """
-        if self.dynamics is not None:
-            raise ScenarioError(
-                f"records of {self.name} are not replayed, as their torques are predicted: use fit"
-            )
-        data = self.checked(record)
-        names = self.columns
+        raise NotImplementedError
+
+    def repeated(
+        self, part: RecordPart, rounded: bool = False, state: Array | None = None, **changes: Any
+    ) -> Scenario:
+        """Return the scenario that repeats a part of a record.
+
+        `rounded`: whether the encoder rounds to counts. `state`: at the start, in place of that of
+        the part. `changes`: fields of the Scenario that differ.
+        """
+        raise NotImplementedError
+
+    def predicted(self, trace: Trace) -> Record:
+        """Return the columns of a record that a replay gives, (K,) each."""
+        raise NotImplementedError
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each column that `fit` compares."""
+        raise NotImplementedError
+
+    # What identification asks of it
+
+    def guessed(self, data: Sequence[Data]) -> "Rig":
+        """Return the rig with the values from which a search begins."""
+        del data
+        return self
+
+    def check_named(self, line: Sequence[str]) -> None:
+        """Raise ScenarioError if no quantity to find is named, with the cure in the words of a
+        shell's `line`, if it has any.
+        """
+
+    def doubts(self, data: Sequence[Data]) -> list[str]:
+        """Return sentences on what may be wrong with columns of records."""
+        del data
+        return []
+
+    def lacks(self, replays: Any, slopes: Any) -> list[Any]:
+        """Return what the model may lack, each a Lack, by replays at a solution."""
+        del replays, slopes
+        return []
+
+    @property
+    def cautions(self) -> list[str]:
+        """Sentences on what the quantities mean."""
+        return []
+
+    def condition_fields(self) -> Fields:
+        """Return the fields of a condition under which a machine has the rig's values."""
+        raise ScenarioError(f"{self.name} is a rig: take rig.scenario(law), or compare(rig=...)")
+
+    def figure(
+        self,
+        covariance: Array,
+        record: Data,
+        prediction: tuple[Record, Record, Array],
+        fit: Numbers,
+        path: AnyPath,
+    ) -> list[Path]:
+        """Draw what was identified from a record, see `Identified.figure`."""
+        raise NotImplementedError
+
+    @cached_property
+    def period(self) -> float | None:
+        """The control period of closed-loop records, s; None for records of an open loop, whose
+        rate is their own.
+        """
+        return None if self.controller is None else self.scenario().control_period
+
+    def step(self, data: Record) -> float:
+        """Return the time between samples of a record, as `checked` returns it, s: in a closed loop
+        the period.
+        """
+        return self.period or records.step_of(data[self.columns.time])
+
+    def span(self, data: Record, start: float | None, duration: float | None) -> tuple[int, int]:
+        """Return the first and the last sample of a part of a record."""
         period = self.step(data)
-        first = self._first(start, period)
-        last = len(data[names.time]) - 1
+        first = self.first(start, period)
+        last = len(data[self.columns.time]) - 1
         if duration is not None:
             shortest = round(records.MIN_SAMPLES * period, 9)
             last = min(last, first + round(number("duration", duration, low=shortest) / period))
         if last - first < records.MIN_SAMPLES:
             raise self._too_short(data, "repeat", first + records.MIN_SAMPLES + 1)
-        times = (period * np.arange(last + 1 - first)).tolist()
+        return first, last
 
-        def signal(values: Array) -> TimeSeries:
-            return TimeSeries(times, values[: len(times)].tolist())
-
-        fields: Fields = {"duration": times[-1]}
-        if self.controller is not None and closed:
-            if self.commands is not None:
-                fed = self.commands(data, first)
-            else:
-                fed = data.get(names.feedforward, np.zeros(last + 1))[first:]
-            reference = signal(data[names.reference][first:])
-            fields |= {"law": self.controller, "reference": reference, "feedforward": signal(fed)}
-        else:
-            command = signal(data[names.u][first:])
-            fields |= {"law": "none", "feedforward": command, "control_period": period}
-        zero = {}
-        if self.zero:
-            zero = self.zero(Values(**self.values), data)
-        return RecordPart(
-            fields=fields,
-            state=np.concatenate(records.state(data, names, period, first)),
-            largest_u=float(np.abs(data[names.u][first : last + 1]).max()),
-            zero=zero,
-        )
-
-    def _first(self, start: float | None, period: float) -> int:
+    def first(self, start: float | None, period: float) -> int:
         """Return the sample at which a replay starts."""
         return round((self.start if start is None else number("start", start, low=0.0)) / period)
 
@@ -294,131 +308,10 @@ class Rig:
         """Return a part with that many times as many commands, where a delay needs them."""
         return part
 
-    def repeated(
-        self, part: RecordPart, rounded: bool = False, state: Array | None = None, **changes: Any
-    ) -> Scenario:
-        """Return the scenario that repeats a part of a record.
-
-        `rounded`: whether the encoder rounds to counts. `state`: at the start, (2n,), in place of
-        the measured one. `changes`: fields of the Scenario that differ.
-        """
-        fields = self.machine(Values(**self.values | dict(part.zero)))
-        sensor = fields.get("sensor")
-        x, v = np.split(part.state if state is None else state, 2)
-        if sensor is not None:
-            if not rounded:
-                fields["sensor"] = dataclasses.replace(sensor, counts=np.inf)
-            if not self.columns.state:
-                x = x - sensor.bias
-        if self.controller is None:
-            fields.pop("physics_step", None)
-            if fields.get("actuator") is None and fields.get("u_max") is None:
-                # the machine has had this command
-                fields["u_max"] = max(part.largest_u, default_u_max(fields["plant"]))
-        return Scenario.recorded(
-            **fields | dict(part.fields) | {"x0": tuple(x), "v0": tuple(v)} | changes
-        )
-
-    def measured(
-        self, record: Data, start: float | None = None, duration: float | None = None
-    ) -> Trace:
-        """Return a record as a trace of the machine, for figures and films beside those of twins;
-        see `replay`.
-
-        x and u are measured, v follows from cubics through the positions, and what was not measured
-        is 0.
-        """
-        scenario = self.replay(record, start, duration)
-        data = self.checked(record)
-        names = self.columns
-        period = scenario.control_period
-        count = scenario.samples + 1
-        first = self._first(start, period)
-        part = slice(first, first + count)
-        x, v, u, r, nothing = np.zeros((5, count, scenario.plant.n))
-        for i, name in enumerate(names.x):
-            x[:, i] = data[name][part]
-            v[:, i] = records.rate(data[name], period)[part]
-        if scenario.sensors:
-            x -= scenario.sensors[0].bias  # of all joints
-        u[:, 0] = data[names.u][part]
-        if names.reference in data:
-            r[:, 0] = data[names.reference][part]
-        zero: Fields = dict.fromkeys(("s", "d", "force", "reaction"), nothing)
-        t = period * np.arange(count)
-        return Trace(t=t, x=x, v=v, u=u, applied=u.copy(), r=r, **zero, scenario=scenario)
-
     @property
     def needed(self) -> Names:
         """The columns that a record must have."""
         return self.columns.needed(self.controller is not None)
-
-    def checked(self, record: Data) -> Record:
-        """Return the columns of a record that a replay reads, (K,) each. Raises as `fit`."""
-        return records.checked(record, self.columns, self.period, self.name)
-
-    @property
-    def units(self) -> dict[str, str]:
-        """The unit of each column that `fit` compares."""
-        if self.dynamics is not None:
-            return dict.fromkeys(self.columns.torque, "N m")
-        scenario = self.scenario("none")
-        joints = dict(zip(self.columns.x, scenario.plant.units, strict=False))
-        return joints | {self.columns.u: scenario.efforts[0]}
-
-    @cached_property
-    def period(self) -> float | None:
-        """The control period of closed-loop records, s; None for records of an open loop, whose
-        rate is their own.
-        """
-        if self.controller is None:
-            return None
-        return self.scenario().control_period
-
-    def step(self, data: Record) -> float:
-        """Return the time between samples of a record, as `checked` returns it, s: in a closed loop
-        the period.
-        """
-        return self.period or records.step_of(data[self.columns.time])
-
-    def reading(self, many: Sequence[Source]) -> tuple["Rig", list[Data]]:
-        """Return the rig that repeats records, and these as columns.
-
-        It repeats a trace by its law, from its start.
-        """
-        traces = []
-        logs = []
-        for record in many:
-            if isinstance(record, Trace):
-                traces.append(record)
-            else:
-                logs.append(record)
-        if not traces:
-            return self, logs
-        law = traces[0].scenario.law
-        if logs or any(trace.scenario.law != law for trace in traces):
-            raise ScenarioError(
-                "records are traces of one law, or columns: give one kind at a time"
-            )
-        plant = self.machine(Values(**self.values))["plant"].name
-        for trace in traces:
-            if trace.scenario.plant.name != plant:
-                raise ScenarioError(
-                    f"the trace is one of {trace.scenario.plant.name} and the plant of {self.name} "
-                    f"is {plant}: give one of its own"
-                )
-        positions = tuple(f"position of {name}" for name in self.columns.x)
-        rates = tuple(f"velocity of {name}" for name in self.columns.x)
-        rig = dataclasses.replace(
-            self,
-            controller=None if law.name == "none" else law,
-            commands=None,
-            dynamics=None,
-            start=0.0,
-            score_from=0.0,
-            columns=dataclasses.replace(self.columns, state=positions + rates, torque=()),
-        )
-        return rig, [records.of_trace(trace, rig.columns) for trace in traces]
 
     def fit(self, record: Source) -> dict[str, float]:
         """Return how well the twin repeats a record: 100 (1 - |y - yhat| / |y - mean y|), percent.
@@ -508,15 +401,6 @@ class Rig:
             predictions.append((predicted, measured, columns[names.time][scored]))
         return predictions
 
-    def predicted(self, trace: Trace) -> Record:
-        """Return the columns of a record that a replay gives, (K,) each, without the columns'
-        offset.
-        """
-        by_column = records.positions(trace, self.columns)
-        if trace.scenario.law.name != "none":
-            by_column[self.columns.u] = trace.u[:, 0]
-        return by_column
-
 
 def percentages(predicted: Record, measured: Record) -> dict[str, float]:
     """Return the fit of each column, percent: 100 (1 - |y - yhat| / |y - mean y|)."""
@@ -543,38 +427,3 @@ def fallen(predicted: Record, measured: Record, t: Array) -> Fall | None:
         if error.max() > FALL_RANGES * span > 0.0:
             return Fall(float(t[np.argmax(error > span)]))
     return None
-
-
-@functools.cache
-def catalogue() -> Catalogue[Rig]:
-    """Return every rig of smc_mujoco.evidence.rigs.machines and of other packages, by name."""
-    machines = {}
-    if annexes.installed("evidence"):
-        machines = discover("smc_mujoco.evidence.rigs.machines", Rig)
-    return Catalogue(machines, added("smc_mujoco.rigs", imported(Rig, lambda rig: True)))
-
-
-def rig(name: str, **values: float) -> Rig:
-    """Return the rig `name`, with some of its quantities changed.
-
-        rig = smc.rig("emps")
-        print(rig)
-
-    Returns:
-      A `Rig`: its `quantities`, and the plant and the parts that they make.
-
-    Raises:
-      ScenarioError: an unknown rig or quantity, or a value out of its range.
-    """
-    return find("rig", name, catalogue()).with_values(values)
-
-
-def rigs() -> list[str]:
-    """List the names that `rig` knows.
-
-        smc.rigs()
-
-    Returns:
-      Names, in alphabetical order.
-    """
-    return list(catalogue())

@@ -13,7 +13,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array, Data
 from smc_mujoco.identification import records
 from smc_mujoco.identification.first_guess import LARGEST_ANGLE
-from smc_mujoco.identification.own_rig import OwnRig
+from smc_mujoco.identification.log_rig import LogRig
 from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
 from smc_mujoco.mechanisms.layout import dof_ids, driven_names
 
@@ -26,7 +26,7 @@ FOLLOWS = 0.3  # of the slow u, that the slow x must have: else friction holds t
 DEGREES = 20.0, 150.0  # about 57.3, of one slow part over the other; chosen
 
 
-def doubts(rig: OwnRig, data: Sequence[Data]) -> list[str]:
+def doubts(rig: LogRig, data: Sequence[Data]) -> list[str]:
     """Return sentences on the columns of joints with a servo."""
     inertias = rig.plant.load().dof_M0[dof_ids(rig.plant.load())]
     said = []

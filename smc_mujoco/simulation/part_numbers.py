@@ -196,4 +196,4 @@ def ranges(constraint: Any) -> Iterator[Number]:
     while constraint is not None:
         if isinstance(constraint, Number):
             yield constraint
-        constraint = getattr(constraint, "one", None)
+        constraint = getattr(constraint, "item", None)

@@ -330,13 +330,12 @@ class Trace:
             variables, coords, about | ({"failure": self.failure} if self.failure else {})
         )
 
-    def export(self, path: AnyPath, readings: bool = False) -> Path:
+    def export(self, path: AnyPath) -> Path:
         """Write the trace to a .csv, .parquet or .mat (MATLAB 5) file, without losing a bit.
 
         CSV: a header line with units, "t [s]", "x [rad]", ..., then a line per sample, with the
         fewest digits that identify each number (0.1, not 0.10000000000000001), and nan after a
-        failure. x and v are the true ones; with `readings` x is what the encoders read, with counts
-        and noise, as a log of the machine has it. Parquet: the `columns`; the
+        failure. x and v are the true ones, not what a sensor read. Parquet: the `columns`; the
         metadata of each column has its "unit", and that of the schema the "scenario", as JSON. MAT:
         the arrays by name, (K + 1, n), a struct `units` with the unit of each ("m, rad" if channels
         differ), and `scenario`.
@@ -349,13 +348,8 @@ class Trace:
             raise ScenarioError(
                 f"cannot export to {path.name!r}: end the name in .csv, .mat or .parquet"
             )
-        trace = self
-        if readings:
-            from smc_mujoco.simulation.readings import readings as read
-
-            trace = dataclasses.replace(self, x=read(self))
         with replacing(path) as file:
-            _WRITERS[path.suffix](trace, file)
+            _WRITERS[path.suffix](self, file)
         return path
 
 

@@ -25,7 +25,7 @@ from smc_mujoco.analysis import engine
 from smc_mujoco.cli import main
 from smc_mujoco.common import gl
 from smc_mujoco.common.constraints import of_parameters
-from smc_mujoco.identification import rig
+from smc_mujoco.identification import published_rig as rig
 
 # command line -> the functions that it calls, of which the last does the work; not for audits
 CALLS = {

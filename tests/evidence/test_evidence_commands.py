@@ -116,6 +116,7 @@ def identified(count):
         predictions=((columns, columns, t),) * count,
         evaluations=41,
         independent=100.0,
+        data=(columns,) * count,
     )
 
 
@@ -183,10 +184,10 @@ STUBS = {  # of each command: the functions replaced, and what they give
     },
     "identify": {
         "identification.identify.identify": lambda of, many, *_, **__: identified(len(many)),
-        "identification.residual_figure.residual_figure": [Path("run.svg")],
+        "identification.published_rig.residual_figure": [Path("run.svg")],
     },
     "rig": {
-        "identification.rig.rig": repeated,
+        "identification.published_rig.rig": repeated,
         "identification.records.load_record": lambda file, names: {"t": np.array([3.0, 4.0])},
         "identification.residual_figure.residual_figure": [Path("run.svg")],
         "simulation.run.run": lambda runs: runs,

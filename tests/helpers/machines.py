@@ -12,8 +12,9 @@ from smc_mujoco.control.estimator import estimator
 from smc_mujoco.control.law import law, law_function
 from smc_mujoco.control.source import SHIPPED
 from smc_mujoco.control.units import Gain
+from smc_mujoco.identification.published_rig import PublishedRig
 from smc_mujoco.identification.records import Columns
-from smc_mujoco.identification.rig import Quantity, Rig
+from smc_mujoco.identification.rig import Quantity
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
@@ -63,7 +64,7 @@ def _first_command(record, first):
     return u
 
 
-AXIS = Rig(
+AXIS = PublishedRig(
     name="axis",
     label="A carriage on a ball screw",
     quantities={
@@ -95,7 +96,7 @@ def _pendulum(q):
     }
 
 
-PENDULUM = Rig(
+PENDULUM = PublishedRig(
     name="lifted_pendulum",
     label="A pendulum on a motor that takes torques",
     quantities={
@@ -123,6 +124,6 @@ PENDULUM = Rig(
 )
 
 
-def catalogue() -> Catalogue[Rig]:
+def catalogue() -> Catalogue[PublishedRig]:
     """Return both, by name."""
     return Catalogue({one.name: one for one in (AXIS, PENDULUM)})

@@ -10,7 +10,8 @@ from typer.testing import CliRunner
 
 import smc_mujoco as smc
 from smc_mujoco.cli.main import app
-from smc_mujoco.identification import ensemble, records, rig
+from smc_mujoco.identification import ensemble, records
+from smc_mujoco.identification import published_rig as rig
 
 LAWS = (smc.law("pid", kp=30.0, kd=6.0), smc.law("super_twisting"))
 

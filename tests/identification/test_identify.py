@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from scipy.stats import chi2
 
 import smc_mujoco as smc
+from smc_mujoco.identification import published_rig as rigs
 from smc_mujoco.identification import records, standard_errors
-from smc_mujoco.identification import rig as rigs
 from smc_mujoco.identification.own_rig import own_rig
 from smc_mujoco.identification.replays import Point, Replays
 from smc_mujoco.identification.residual_figure import residual_figure

@@ -25,7 +25,7 @@ from smc_mujoco.errors import ScenarioWarning
 from smc_mujoco.identification.first_guess import first_guess
 from smc_mujoco.identification.friction_figure import curve_error, friction, measured_friction
 from smc_mujoco.identification.identify import SLOW, check
-from smc_mujoco.identification.own_rig import condition_fields, own_rig
+from smc_mujoco.identification.own_rig import own_rig
 from smc_mujoco.mechanisms.hardware.servos import ServoFriction
 from smc_mujoco.simulation.conditions import from_file
 
@@ -827,7 +827,7 @@ def test_a_condition_that_was_found_has_no_servo_of_the_file_so_it_suits_ideal_m
     mixed = smc.plant_from(TWO.replace('<motor joint="j2"/>', servo), joints)
     numbers = {"j1.damping": 0.3, "input_delay": 0.004}
     rig = own_rig(mixed, list(numbers)).with_values(numbers, "by hand")
-    fields = condition_fields(rig)
+    fields = rig.condition_fields()
     assert fields.keys() == {"mismatch", "input_delay", "physics_step"}
     alone = smc.plant_from(TWO, ["j1"], others="held")
     assert smc.condition("found", **fields).on(alone, 1.0)["mismatch"] == {"j1.damping": 0.3}

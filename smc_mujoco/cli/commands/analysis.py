@@ -418,8 +418,8 @@ def _attacked_cases(
     """
     from smc_mujoco.control import gain_sets
     from smc_mujoco.identification import ensemble
-    from smc_mujoco.identification.rig import rig as find_rig
-    from smc_mujoco.identification.rig import rigs
+    from smc_mujoco.identification.published_rig import rig as find_rig
+    from smc_mujoco.identification.published_rig import rigs
     from smc_mujoco.mechanisms.named import as_plant
 
     if plant in rigs():

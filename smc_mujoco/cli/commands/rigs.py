@@ -90,7 +90,7 @@ def _list(terminal: Terminal) -> None:
     """List the rigs."""
     with delay_signals():
         from smc_mujoco.cli import tables
-        from smc_mujoco.identification.rig import catalogue
+        from smc_mujoco.identification.published_rig import catalogue
 
     rows = []
     for name, known in catalogue().items():
@@ -114,8 +114,8 @@ def _repeat(
         from smc_mujoco.cli import rig_tables
         from smc_mujoco.cli.run_scene import filmed
         from smc_mujoco.common.files import with_ending, writable
+        from smc_mujoco.identification.published_rig import rig as find_rig
         from smc_mujoco.identification.records import load_record
-        from smc_mujoco.identification.rig import rig as find_rig
         from smc_mujoco.simulation.run import run
         from smc_mujoco.simulation.trace import Trace
 

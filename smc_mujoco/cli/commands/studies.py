@@ -382,7 +382,7 @@ def _compare_on_rig(
 ) -> None:
     """Compare laws on the parameter sets of a rig. `shared`: what other comparisons take, too."""
     from smc_mujoco.identification import ensemble
-    from smc_mujoco.identification.rig import rig
+    from smc_mujoco.identification.published_rig import rig
 
     machine = rig(name)
     chosen = options.laws(law, of_rig=machine.laws) or None

@@ -10,7 +10,8 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.control.component import Component
-from smc_mujoco.identification.rig import Quantity, Rig, Values
+from smc_mujoco.identification.published_rig import PublishedRig
+from smc_mujoco.identification.rig import Quantity, Values
 from smc_mujoco.mechanisms.plant import Plant
 
 pytestmark = pytest.mark.quick
@@ -67,7 +68,7 @@ def lines(rig):
     for name, one in rig.quantities.items():
         sources.setdefault(one.source, []).append(f"{name} {reported(one)}")
     yield from (f"{source}: {'; '.join(known)}" for source, known in sources.items())
-    for field in dataclasses.fields(Rig):
+    for field in dataclasses.fields(PublishedRig):
         value = getattr(rig, field.name)
         if field.name not in ("quantities", "machine") and value:
             if field.name in ("ensemble", "laws", "reached"):

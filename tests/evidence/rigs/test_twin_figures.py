@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 import smc_mujoco as smc
 from benchmarks import programs, twin_figures
 from benchmarks.twin_figures import TwinFigure
-from smc_mujoco.identification import rig
+from smc_mujoco.identification import published_rig as rig
 
 DATA = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.evidence.rigs.controllers import cascade
+from smc_mujoco.identification.published_rig import PublishedRig
 from smc_mujoco.identification.records import Columns, Record
-from smc_mujoco.identification.rig import Quantity, Rig
+from smc_mujoco.identification.rig import Quantity
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import plant
@@ -64,7 +65,7 @@ def commands(record: Record, first: int) -> np.ndarray:
     return u
 
 
-EMPS = Rig(
+EMPS = PublishedRig(
     name="emps",
     label="EMPS, an electro-mechanical positioning system",
     quantities={

@@ -9,7 +9,8 @@ records of one machine. The dead bands of the amplifiers are left out.
 import math
 
 from smc_mujoco.evidence.rigs import controllers
-from smc_mujoco.identification.rig import Quantity, Rig
+from smc_mujoco.identification.published_rig import PublishedRig
+from smc_mujoco.identification.rig import Quantity
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import LuGre
@@ -107,7 +108,7 @@ def quantities(source, **values):
     return found
 
 
-QUBE_SERVO_2 = Rig(
+QUBE_SERVO_2 = PublishedRig(
     name="qube_servo_2",
     label="QUBE-Servo 2 with rotary pendulum, by its published parameters",
     quantities=quantities(
@@ -157,7 +158,7 @@ QUBE_3_SETS = (
 # V/rad and V s/rad: the surface of least quadratic cost of the first set, with the weights of
 # `rotary_swing_up`
 QUBE_3_SURFACE = {"c1": -4.48198, "c2": -44.6088, "c3": -1.99339, "c4": -3.83042}
-QUBE_SERVO_3 = Rig(
+QUBE_SERVO_3 = PublishedRig(
     name="qube_servo_3",
     label="QUBE-Servo 3 with rotary pendulum, identified from public records",
     quantities=quantities(
@@ -209,7 +210,7 @@ QUBE_SERVO_3 = Rig(
         "not how the cable works. The thesis measured half of both at rest."
     ),
 )
-SRV02_PENDULUM = Rig(
+SRV02_PENDULUM = PublishedRig(
     name="srv02",
     label="SRV02 with rotary pendulum, by its published parameters",
     quantities=quantities(

@@ -12,8 +12,9 @@ import numpy as np
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.evidence.rigs.controllers import rotary, state_feedback
+from smc_mujoco.identification.published_rig import PublishedRig
 from smc_mujoco.identification.records import STATE_SAMPLES, Columns, Record, rate
-from smc_mujoco.identification.rig import Quantity, Rig
+from smc_mujoco.identification.rig import Quantity
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import plant
@@ -208,7 +209,7 @@ ENSEMBLE = (
     (0.116028, 0.081595, 0.00012604, 0.000278892, 2.15922e-06, 0.00502255, 0.0516399, -0.00693806,
      0.00737641, -0.00311616),
 )  # fmt: skip
-QUBE_SERVO = Rig(
+QUBE_SERVO = PublishedRig(
     name="qube_servo",
     label="QUBE-Servo with rotary pendulum, identified from public records",
     quantities={

@@ -9,8 +9,9 @@ machine, models 1.0 to 3.0, disagree.
 import math
 
 from smc_mujoco.common.data import attributes
+from smc_mujoco.identification.published_rig import PublishedRig
 from smc_mujoco.identification.records import Columns
-from smc_mujoco.identification.rig import Quantity, Rig
+from smc_mujoco.identification.rig import Quantity
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import plant
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_0, MODEL_1_1
@@ -120,14 +121,14 @@ COMMON = {
         "determine only moments."
     ),
 }
-PENDUBOT = Rig(
+PENDUBOT = PublishedRig(
     name="realaigym_pendubot",
     label="RealAIGym's double pendulum, driven at the shoulder",
     quantities=quantities(),
     machine=lambda q: fields("pendubot", q),
     **COMMON,
 )
-ACROBOT = Rig(
+ACROBOT = PublishedRig(
     name="realaigym_acrobot",
     label="RealAIGym's double pendulum, driven at the elbow",
     quantities=quantities(),

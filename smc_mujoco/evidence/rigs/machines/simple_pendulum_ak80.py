@@ -9,8 +9,9 @@ import math
 
 from smc_mujoco.control.law import law
 from smc_mujoco.control.source import SHIPPED, GainSearch
+from smc_mujoco.identification.published_rig import PublishedRig
 from smc_mujoco.identification.records import Columns
-from smc_mujoco.identification.rig import Quantity, Rig
+from smc_mujoco.identification.rig import Quantity
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import plant
@@ -43,7 +44,7 @@ LAWS = (
     law("super_twisting", k1=1.283, k2=6.288, c=6.356).sourced(SHIPPED, SEARCH),
     law("pid", kp=341.0, ki=1107.0, kd=4.143, tt=0.1287).sourced(SHIPPED, SEARCH),
 )
-SIMPLE_PENDULUM = Rig(
+SIMPLE_PENDULUM = PublishedRig(
     name="simple_pendulum_ak80",
     label="Torque-limited simple pendulum with an AK80-6 motor",
     quantities={

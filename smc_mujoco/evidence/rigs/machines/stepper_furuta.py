@@ -18,8 +18,9 @@ from smc_mujoco.evidence.rigs.firmware import (
     TWO_STATES,
     firmware,
 )
+from smc_mujoco.identification.published_rig import PublishedRig
 from smc_mujoco.identification.records import Columns
-from smc_mujoco.identification.rig import Quantity, Rig
+from smc_mujoco.identification.rig import Quantity
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.stepper import of_rig
 from smc_mujoco.mechanisms.plant import plant
@@ -145,7 +146,7 @@ QUANTITIES = {
     "queue": Quantity(0.02, "s", LIBRARY, 0.0, 1.0),
     "refill": Quantity(4.096e-3, "s", LIBRARY, 0.0, 1.0),
 }
-STEPPER_FURUTA = Rig(
+STEPPER_FURUTA = PublishedRig(
     name="stepper_furuta",
     label="Rotary pendulum on a stepper motor",
     quantities=QUANTITIES,
