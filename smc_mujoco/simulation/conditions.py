@@ -219,7 +219,9 @@ def condition(name: str, **fields: Any) -> Condition:
     fault; `smc-mujoco list` has all.
 
     Args:
-      name: its name in tables and figures; not a name of the suite.
+      name: its name in tables and figures; not a name of the suite. Or, without fields, the text of
+        a condition, such as "dry: friction=Coulomb(0.05)", or names of the suite's, such as
+        "noise+encoder".
       fields: fields of a Scenario, such as friction=smc.Coulomb(0.05), except plant, law, model,
         surface, seed and duration.
 
@@ -230,6 +232,8 @@ def condition(name: str, **fields: Any) -> Condition:
       ScenarioError: the name is one of the suite's, a field does not exist or belongs to no
         condition, or there is no field at all.
     """
+    if isinstance(name, str) and set(":+") & set(name) and not fields:
+        return find_condition(name)
     if errors.name("a condition's name", name) in NAMED:
         raise ScenarioError(f"condition {name!r} is a name of the suite: give another")
     if set(":+,") & set(name):

@@ -399,3 +399,9 @@ def test_the_phase_of_a_sine_is_of_the_seed_alike_for_all_laws_and_that_of_seed_
     assert len(set(phases)) == 4
     assert all(run.condition == "push" for run in runs)
     assert {run.disturbance[1] for run in runs} == {smc.Constant(0.1)}
+
+
+def test_a_condition_may_be_written_as_everywhere_else():
+    dry = smc.condition("dry", friction=smc.Coulomb(0.1), noise=smc.Noise(position=1e-3))
+    assert smc.condition("dry: friction=Coulomb(0.1), noise=Noise(position=1e-3)") == dry
+    assert str(smc.condition("noise+encoder")) == str(smc.condition("noise + encoder"))

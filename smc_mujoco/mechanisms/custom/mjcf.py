@@ -49,6 +49,7 @@ CURES = {  # words of MuJoCo's message on a file -> what to do
     "must be positive in geom": "give its shapes sizes above 0, or delete them",
     "positive eigenvalues": "give that body three moments of inertia above 0",
 }
+FROM_MUJOCO = ValueError, RuntimeError, mujoco.FatalError  # what it raises on a model
 OF_A_PART = "not found", "invalid qpos size", "mujocoinclude"  # words on a file that is no model
 
 # kinds of elements that parts add, and attributes that a default has not, on which MuJoCo fails
@@ -133,7 +134,7 @@ class ModelSource:
                 spec = mujoco.MjSpec.from_file(self.path)
         except ScenarioError:
             raise
-        except ValueError as error:
+        except FROM_MUJOCO as error:
             raise broken(self.path or self.label, str(error), self.path) from None
         file_numbers.check(self.label, spec)
         taken = {joint.name for joint in spec.joints}
@@ -151,7 +152,7 @@ class ModelSource:
         """Return the spec of this model, compiled."""
         try:
             return mjcb.compiled(spec, _built)
-        except ValueError as error:
+        except FROM_MUJOCO as error:
             raise broken(self.path or self.label, str(error), self.path) from None
 
 
@@ -289,7 +290,7 @@ def _of_spec(spec: mujoco.MjSpec) -> ModelSource:
     try:
         model = mjcb.compiled(copied)
         text = _full_precision_xml(copied)
-    except (ValueError, mujoco.FatalError) as error:
+    except FROM_MUJOCO as error:
         raise broken("the MjSpec", str(error), "") from None
     as_text = _of_text(text, _assets(spec, text))
     if lost := _difference(model, as_text.compiled(as_text.spec())):
