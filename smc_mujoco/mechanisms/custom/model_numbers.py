@@ -19,6 +19,7 @@ from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import unknown
 from smc_mujoco.mechanisms.custom.model_constraints import SOFT_SOLREF, sets_friction_solref
+from smc_mujoco.mechanisms.custom.user_model import with_compensation
 from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF
 from smc_mujoco.mechanisms.layout import OWN, ROTOR, all_joints, loaded
 from smc_mujoco.mechanisms.plant import Field, Plant, Values
@@ -128,6 +129,9 @@ class NumberFields:
     numbers: tuple[tuple[str, str], ...]  # joint or body, and kind, of each
 
     def __call__(self, model: mujoco.MjModel, p: Values) -> Iterator[Field]:
+        yield from with_compensation(model, self._changed(model, p))
+
+    def _changed(self, model: mujoco.MjModel, p: Values) -> Iterator[Field]:
         yield from self.inner(model, p)
         for owner, kind in self.numbers:
             value = vars(p)[f"{owner}.{kind}"]

@@ -2,6 +2,7 @@
 
 import base64
 import dataclasses
+from collections.abc import Iterable, Iterator
 
 import mujoco
 import numpy as np
@@ -126,6 +127,25 @@ class UserModel:
         return data
 
 
+def with_compensation(model: mujoco.MjModel, fields: Iterable[Field]) -> Iterator[Field]:
+    """Yield fields, and one that leaves the gravity compensation of a file (gravcomp) at the
+    weights of the file: a machine compensates what its maker knew of.
+    """
+    masses = model.body_mass.copy()
+    gravity = model.opt.gravity.copy()
+    changed = {"body_mass": masses, "opt.gravity": gravity}
+    for field in fields:
+        yield field
+        if field.name in changed:
+            values = changed[field.name]
+            values[field.place] = field.value + (values[field.place] if field.adds else 0.0)
+    if model.ngravcomp:
+        weights = masses * np.linalg.norm(gravity)
+        known_weights = model.body_mass * np.linalg.norm(model.opt.gravity)
+        share = np.divide(known_weights, weights, out=np.ones(model.nbody), where=weights > 0.0)
+        yield Field("body_gravcomp", slice(None), model.body_gravcomp * share)
+
+
 @frozen_data
 class UserFields:
     """The fields that m and grav set: Plant.fields. They scale all masses and inertias, and
@@ -136,6 +156,9 @@ class UserFields:
     gravity: float
 
     def __call__(self, model, p):
+        yield from with_compensation(model, self._scaled(model, p))
+
+    def _scaled(self, model, p):
         scale = np.ones(model.nbody)
         for i in range(model.nbody):
             if not model.body(i).name.startswith((ROTOR, OWN)):

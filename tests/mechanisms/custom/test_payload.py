@@ -3,6 +3,7 @@ it.
 """
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -91,3 +92,46 @@ def test_figures_tell_a_run_with_a_payload_from_one_without(arm):
     told = [style.differences(trace, [empty, loaded]) for trace in (empty, loaded)]
     assert told == ["", "hand.payload = 0.4"]
     assert "hand.payload = 0.4" in style.differences(loaded, [loaded, heavy])
+
+
+COMPENSATED = """<mujoco model="rz"><compiler angle="radian"/><worldbody>
+<body name="link" gravcomp="1"><joint name="j" axis="0 -1 0" damping="2" armature=".05"/>
+<geom type="capsule" fromto="0 0 0 .4 0 0" size=".03" mass="3" contype="0" conaffinity="0"/>
+<body name="hand" pos=".4 0 0" gravcomp="1"><geom size=".03" mass=".5" contype="0"
+conaffinity="0"/></body></body></worldbody><actuator><motor joint="j" ctrlrange="-60 60"/></actuator>
+</mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("mismatch", "moment"),
+    [
+        ({}, 0.0),
+        ({"hand.payload": 1.0}, 9.81 * 0.4),
+        ({"mass": 1.3}, 0.3 * 9.81 * (3.0 * 0.2 + 0.5 * 0.4)),
+        ({"grav": 1.2}, 0.2 * 9.81 * (3.0 * 0.2 + 0.5 * 0.4)),
+        ({"hand.payload": 1.0, "mass": 0.9}, 9.81 * (0.4 - 0.1 * (3.0 * 0.2 + 0.5 * 0.4))),
+    ],
+)
+def test_a_compensation_of_gravity_compensates_what_its_maker_knew(mismatch, moment):
+    """MuJoCo compensates the true masses: an unknown load was carried for nothing."""
+    plant = smc.plant_from(COMPENSATED, ["j"], name="rz")
+    law = smc.law("pid", kp=200.0, kd=20.0, ki=0.0)
+    start = {"duration": 3.0, "x0": 0.0, "control_period": 1e-3}
+    trace = smc.run(smc.Scenario(plant=plant, law=law, mismatch=mismatch, **start))
+    lean = trace.x[-1, 0]
+    assert trace.u[-1, 0] == pytest.approx(moment * math.cos(lean), abs=1e-3)
+    jump = smc.Jump(time=1e-3, factors=mismatch) if mismatch else None
+    jumped = smc.run(smc.Scenario(plant=plant, law=law, jump=jump, **start))
+    assert jumped.x[-1, 0] == pytest.approx(lean, abs=1e-6)
+
+
+def test_a_law_that_knows_the_true_machine_knows_what_is_not_compensated():
+    plant = smc.plant_from(COMPENSATED, ["j"], name="rz")
+    law = smc.law("computed_torque", kp=100.0, kd=20.0)
+    trace = smc.run(
+        smc.Scenario(
+            plant=plant, law=law, model="true", mismatch={"mass": 1.3}, x0=0.0, duration=1.0
+        )
+    )
+    assert abs(trace.x[-1, 0]) < 1e-9
+    assert trace.u[-1, 0] == pytest.approx(0.3 * 9.81 * (3.0 * 0.2 + 0.5 * 0.4))
