@@ -132,8 +132,10 @@ def _degrees(s: Any) -> Iterator[str]:
 
 
 def _far_starts(s: Any) -> Iterator[str]:
-    """Yield a sentence about each start so far away that it may be in mm."""
-    if s.plant.pose:
+    """Yield a sentence about each start so far away that it may be in mm. What joints' limits allow
+    is not questioned.
+    """
+    if s.plant.pose or s.plant.ranges:
         return
     least, share = FAR_START
     goal = constant_goal(s) or s.plant.origin

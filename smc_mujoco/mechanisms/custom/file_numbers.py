@@ -34,8 +34,6 @@ NATURAL = (
     FileNumber("actuators", "delay"),
 )
 OF_OPTION = ("density", "viscosity")
-# Of an actuator whose force falls with the position, and with the speed
-SERVO = (("kp", 1), ("kv", 2))
 # Pairs of numbers, the lower one first
 ORDERED = (
     FileNumber("joints", "range"),
@@ -106,11 +104,10 @@ def _wrong(spec: mujoco.MjSpec) -> Iterator[str]:
         if (value := getattr(spec.option, name)) < 0.0:
             yield f"{name} {value:g} of its <option>: give 0 or more"
     for actuator in spec.actuators:
-        for name, place in SERVO:
-            value = -float(actuator.biasprm[place])
-            if actuator.biastype == mujoco.mjtBias.mjBIAS_AFFINE and value < 0.0:
-                called = _called(FileNumber("actuators", ""), actuator)
-                yield f"{name} {value:g} of {called}, which drives it away: give 0 or more"
+        kp = -float(actuator.biasprm[1])
+        if actuator.biastype == mujoco.mjtBias.mjBIAS_AFFINE and kp < 0.0:
+            called = _called(FileNumber("actuators", ""), actuator)
+            yield f"kp {kp:g} of {called}, which drives it away: give 0 or more"
     for row in ORDERED:
         for element in getattr(spec, row.elements):
             low, high = map(float, getattr(element, row.field))

@@ -31,6 +31,7 @@ from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant
 STEP = 1e-5  # rad or m, and rad/s or m/s, of central differences
 BESIDE = 0.3  # rad or m: how far beside its goal a joint starts by default
 ROOM = 0.6  # of the way to a limit, at most
+POSES_OF_LOAD = 9  # from the start to the goal, and between the limits, in which the load is taken
 HALVINGS = 5  # of this way, where it ends inside something
 FARTHEST = 1.2  # of this way: where the runs of a grid start, which spread by 20 %
 HOLD = 2.0  # s for which a plant on a free base is held; its load is that of the second half
@@ -254,7 +255,8 @@ def _clear_start(plant: Plant, x0: Floats, i: int, down: float, up: float) -> Fl
 @functools.lru_cache(maxsize=32)
 def needs(plant: Plant) -> Floats:
     """Return the force with which each driven joint arrives from its start and holds, N m or N,
-    with two digits: 2 load + (60/s^2 M + 8/s D) X + 1.5 dry friction.
+    with two digits: 2 load + (60/s^2 M + 8/s D) X + 1.5 dry friction; at least twice the largest
+    load between its start, its goal and its limits.
     """
     moments = at_goal(plant)
     apart = np.subtract(usual_start(plant), plant.origin)
@@ -265,8 +267,35 @@ def needs(plant: Plant) -> Floats:
     inertia = np.diag(moments.M)[moments.dofs]
     moving = (STIFFNESS * inertia + DAMPING * damping) * way
     load = 2.0 * np.abs(moments.load)
-    need = load + moving + 1.5 * moments.dry
+    need = np.maximum(load + moving, 2.0 * _largest_loads(plant)) + 1.5 * moments.dry
     return tuple(float(f"{value:.2g}") for value in need)
+
+
+def _largest_loads(plant: Plant) -> Array:
+    """Return the largest load of each driven joint on its way from the start to the goal, and
+    between its limits with the others at the goal, (driven,) N m or N. 0 on a free base, which
+    stands at its goal alone.
+    """
+    model, data = _at(plant, plant.origin)
+    largest = np.zeros(plant.driven)
+    if free_base(model):
+        return largest
+    goal = np.array(plant.origin)
+    dofs = dof_ids(model)[: plant.driven]
+    places = model.jnt_qposadr[driven_ids(model)]
+    shares = np.linspace(0.0, 1.0, POSES_OF_LOAD)
+    way = np.subtract(usual_start(plant), goal)[: plant.driven]
+    poses = [goal[: plant.driven] + share * way for share in shares]
+    for i, (_, low, high) in enumerate(plant.ranges[: plant.driven]):
+        if math.isfinite(low) and math.isfinite(high):
+            for x in low + shares * (high - low):
+                pose = goal[: plant.driven].copy()
+                pose[i] = x
+                poses.append(pose)
+    for pose in poses:
+        data.qpos[places] = pose
+        largest = np.maximum(largest, np.abs(_forces(model, data)[dofs]))
+    return largest
 
 
 def mobility(plant: Plant, u_max: float, reach: float) -> Floats:

@@ -29,12 +29,6 @@ WRONG = [  # in the file, in its place, what the sentence says
     (MJCF, 'name="t"', 'name="t" stiffness="-4"', "stiffness -4 of tendon 't'"),
     (MJCF, 'viscosity="0"', 'viscosity="-5"', "viscosity -5"),
     (MJCF, 'kp="3"', 'kp="-3"', "kp -3 of actuator"),
-    (
-        MJCF,
-        "<position joint",
-        '<general joint="j" biastype="affine" biasprm="0 -3 .2"/><position joint',
-        "kv -0.2 of actuator",
-    ),
     (MJCF, 'range="-3 3"', 'range="3 -3"', "range 3 -3 of joint 'j'"),
     (MJCF, 'ctrlrange="-5 5"', 'ctrlrange="5 -5"', "ctrlrange 5 -5 of actuator"),
     (MJCF, 'forcerange="-9 9"', 'forcerange="9 -9"', "forcerange 9 -9 of actuator"),

@@ -624,3 +624,17 @@ def test_a_tie_to_what_is_locked_is_cut_and_told_with_a_cure(tie):
         assert smc.plant_from(text, {"a": motor}, others="locked").unmodelled == ""
     for joints, mode in (("a", "held"), ("ab", "locked")):
         assert smc.plant_from(text, dict.fromkeys(joints, motor), others=mode).load().neq == 1
+
+
+@pytest.mark.filterwarnings("ignore:.*(is assumed|ideal motor|give way by)")
+@pytest.mark.parametrize("length", [0.04, 0.08, 0.3])
+def test_an_assumed_bound_holds_a_joint_wherever_its_limits_let_it_be(length):
+    """A light link that stands at its goal needs nothing there, and its weight elsewhere."""
+    weight = 0.02 * 9.81 * length
+    text = f"""<mujoco><compiler angle="radian"/><worldbody><body><joint name="j" axis="0 1 0"
+     range="0 1.57"/><geom pos="0 0 {length}" size=".005" mass=".02" contype="0" conaffinity="0"/>
+     </body></worldbody></mujoco>"""
+    made = smc.plant_from(text, {"j": smc.Channel(motor=True)})
+    assert scales.needs(made)[0] == pytest.approx(2.0 * weight, rel=0.06)
+    law = smc.law("pid", kp=5.0, kd=0.02, ki=0.0)
+    assert abs(smc.run(smc.Scenario(plant=made, law=law, x0=0.3, duration=2.0)).x[-1, 0]) < 0.01

@@ -942,7 +942,7 @@ def test_a_broken_file_that_is_included_is_one_sentence(arm, tmp_path):
 HARM = {  # what the model has, and words of the sentence
     "nan": (
         '<default><joint damping="nan"/></default>',
-        r"arm.xml is nan: give finite numbers",
+        r'arm.xml has damping="nan": give a number',
     ),
     "mass": (
         '<default><geom density="1e300"/></default>'
