@@ -18,6 +18,7 @@ from smc_mujoco.answers.facts import (
     Caution,
     CompareFacts,
     Contest,
+    IdentifyFacts,
     Lead,
     Level,
     More,
@@ -655,3 +656,49 @@ def _without(call: Sequence[str], option: str) -> list[str]:
             words.append(word)
         skip = word == option
     return words
+
+
+# identify
+
+
+def identify_lines(facts: IdentifyFacts) -> list[str]:
+    """Return the numbers with their errors, the fit, and what to doubt; what does not fit on the
+    screen is counted.
+    """
+    columns = []
+    for field in ("name", "value", "error", "unit"):
+        texts = [getattr(fact, field) for fact in facts.numbers]
+        columns.append((texts, max(map(len, texts), default=0)))
+    lines = []
+    for name, value, error, unit in zip(
+        *([text.ljust(width) for text in texts] for texts, width in columns), strict=True
+    ):
+        lines.append(f"{name}  {value}  ± {error}  {unit}".rstrip())
+    of = "pieces of 1 s" if facts.by_pieces else "whole logs"
+    held_out = "" if facts.held_out is None else f", held out {_fit(facts.held_out)}"
+    lines.append(f"fits {_fit(facts.fit)}{held_out} ({of}, worst column)")
+    for k, doubt in enumerate(facts.doubts):
+        below = labelled([("doubt", doubt)])
+        later = len(facts.doubts) - k - 1
+        if len(lines) + len(below) + (later > 0) > IDENTIFY_LINES:
+            count = counted(later + 1, "further doubt")
+            return [*lines, *labelled([("doubt", f"{count}, all in the report and by --full")])]
+        lines += below
+    return lines
+
+
+IDENTIFY_LINES = LINES - 2  # one below is for the files
+
+
+def _fit(percent_of_log: float) -> str:
+    """Return "99.4 %", or when a twin falls."""
+    text = f"{percent_of_log:.1f}"
+    return text if text.startswith("falls") else f"{text} %"
+
+
+def identify_files(condition: str, figure: str, report: str) -> str:
+    """Return the line of the files that `identify` has written; "" for none."""
+    parts = [figure, f"report {report}" if report else ""]
+    if condition:
+        parts.insert(0, f"{condition} (--condition {condition})")
+    return "     ".join(filter(None, parts))

@@ -254,3 +254,27 @@ class CompareFacts:
     bewares: tuple[Beware, ...] = ()
     next: NextStep | None = None
     more: More | None = None
+
+
+# identify
+
+
+@frozen_data
+class IdentifiedNumber:
+    """A number of a machine, with its standard error, both as text."""
+
+    name: str
+    value: str
+    error: str
+    unit: str
+
+
+@keyword_dataclass
+class IdentifyFacts:
+    """What an identification says on one screen."""
+
+    numbers: tuple[IdentifiedNumber, ...]
+    fit: float  # percent: the worst of all columns of all logs
+    by_pieces: bool  # whether that is of pieces of 1 s
+    held_out: float | None  # the same of the log that was kept aside
+    doubts: tuple[str, ...]  # each says what to do

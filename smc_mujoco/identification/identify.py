@@ -18,17 +18,23 @@ encoders and delays, and needs ten more packages.
 import dataclasses
 import itertools
 import os
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
+from smc_mujoco.answers import answers
+from smc_mujoco.answers.answer import Answer
+from smc_mujoco.answers.facts import IdentifiedNumber, IdentifyFacts
+from smc_mujoco.common import html
 from smc_mujoco.common.aliases import AnyPath, Array, Data, Fields, Numbers
 from smc_mujoco.common.constraints import Natural, Seed, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import write_json
 from smc_mujoco.common.progress import bar
+from smc_mujoco.common.tabular import Tabular
 from smc_mujoco.common.text import joined
 from smc_mujoco.identification import (
     gauss_newton,
@@ -60,6 +66,7 @@ from smc_mujoco.simulation.conditions import DURATION, Condition, find_condition
 from smc_mujoco.simulation.part_numbers import FIELDS
 from smc_mujoco.simulation.scenario import Scenario
 
+SHORT_TIME = 0.1  # s: a shorter one is printed in ms; chosen
 POOR_FIT = 80.0  # percent: a fit below may mean that the search ended in a wrong place; chosen
 PERFECT_FIT = 99.99  # percent: residuals beyond it are the simulation's; chosen
 FLOOR = 0.05  # of a value, by which drawn sets differ at least; chosen: friction warms up by more
@@ -92,7 +99,7 @@ class HeldOutFit:
 
 
 @dataclasses.dataclass(frozen=True)
-class Identified:
+class Identified(Answer):
     """The numbers of a machine that were found from logs, and how well they fit.
 
     Fits are those of `Rig.fit`, in an open loop with short steps; for `fits` the states at the
@@ -171,6 +178,11 @@ class Identified:
         sets = tuple(dict(zip(names, row, strict=True)) for row in draws.tolist())
         return dataclasses.replace(self.rig, ensemble=sets)
 
+    @property
+    def is_condition(self) -> bool:
+        """Whether `condition` has one: not of a published machine."""
+        return self.rig.is_own
+
     def condition(self, name: str = "identified") -> Condition:
         """Return a condition of the user's own machine, for `compare`, `which`, `tune`, `grid`: the
         true machine has the numbers found, and a law's model those of the file.
@@ -186,23 +198,86 @@ class Identified:
             values.append(f"{name} = {value:.4g} ± {self.errors[name]:.1g}")
         return f"identified({self.rig.name!r}, {', '.join(values)})"
 
-    def __str__(self) -> str:
-        """Return the numbers as a table, the fits and the notes."""
-        units = {}
-        for name in self.values:
-            units[name] = self.rig.quantities[name].unit
+    @property
+    def lines(self) -> list[str]:
+        """The answer: numbers with errors and units, the fit, and what to doubt."""
+        numbers = []
+        for name, value in self.values.items():
+            numbers.append(self._number(name, value))
+        held_out = None
+        if self.held_out:
+            held_out = _worst([self.held_out.by_pieces or self.held_out.fit])
+        return answers.identify_lines(
+            IdentifyFacts(
+                numbers=tuple(numbers),
+                fit=_worst(self.by_pieces or self.fits),
+                by_pieces=bool(self.by_pieces),
+                held_out=held_out,
+                doubts=tuple(self.notes),
+            )
+        )
+
+    def _number(self, name: str, value: float) -> IdentifiedNumber:
+        """Return a number as text; a short time is in ms."""
+        unit = self.rig.quantities[name].unit
+        scale = 1.0
+        if unit == "s" and abs(self.values[name]) < SHORT_TIME:
+            unit, scale = "ms", 1e3
+        error = scale * self.errors[name]
+        return IdentifiedNumber(
+            name, number_text.to_error(scale * value, error), f"{error:.2g}", unit
+        )
+
+    @property
+    def title(self) -> str:
+        """The machine."""
+        return self.rig.label
+
+    @property
+    def pictures(self) -> list[html.Html]:
+        """The figure of each log."""
+        return [self._drawn(k) for k in range(len(self.data))]
+
+    def _drawn(self, record: int) -> html.Html:
+        """Return the figure of a log."""
+        with tempfile.TemporaryDirectory() as folder:
+            svg, *_ = self.figure(Path(folder) / "log.svg", record)
+            return html.embedded(svg.read_bytes(), "image/svg+xml")
+
+    @property
+    def tables(self) -> list[Tabular]:
+        """The numbers, the fits of all logs, and correlations."""
+        numbers = []
+        for name, value in self.values.items():
+            number = self._number(name, value)
+            before = self._number(name, self.before.values[name])
+            scatter = f"{self.scatter[name]:.2g}" if self.scatter else ""
+            numbers.append([name, number.value, number.error, number.unit, before.value, scatter])
         heads = [f"log {i}" for i in range(1, len(self.fits) + 1)]
-        fits = list(self.fits)
-        pieces = list(self.by_pieces or [{}] * len(fits))
+        whole, pieces = list(self.fits), list(self.by_pieces or [{}] * len(self.fits))
         if self.held_out:
             heads.append("held out")
-            fits.append(self.held_out.fit)
+            whole.append(self.held_out.fit)
             pieces.append(self.held_out.by_pieces)
-        lines = number_text.table(self.values, self.errors, units)
-        lines += ["", *number_text.fits(heads, fits, pieces)]
-        for note in self.notes:
-            lines.append(f"note: {note}")
-        return "\n".join(lines)
+        fits = []
+        for head, of_log, of_pieces in zip(heads, whole, pieces, strict=True):
+            for column, fit in of_log.items():
+                in_pieces = f"{of_pieces[column]:.2f}" if column in of_pieces else ""
+                fits.append([head, column, f"{fit:.2f}", in_pieces])
+        rows = []
+        for name, row in zip(self.values, self.correlations.tolist(), strict=True):
+            rows.append([name, *(f"{value:.2f}" for value in row)])
+        heads_of_numbers = ("number", "value", "±", "unit", "start", "scatter between logs")
+        return [
+            Tabular(headings=heads_of_numbers, rows=numbers, title=self.title, notes=self.notes),
+            Tabular(
+                headings=("log", "column", "fit, %", "in pieces of 1 s, %"),
+                rows=fits,
+                title="Fits",
+                left=2,
+            ),
+            Tabular(headings=("", *self.values), rows=rows, title="Correlations of the errors"),
+        ]
 
     def about(self) -> Fields:
         """Return values, errors, correlations and fits as JSON data."""

@@ -80,6 +80,8 @@ class LogRig(Rig):
       places: quantity -> where it is in a part of the scenario.
     """
 
+    is_own = True
+
     base: Scenario
     plant: Plant
     places: Mapping[str, PartNumber]

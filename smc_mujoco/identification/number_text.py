@@ -1,12 +1,8 @@
-"""Identified numbers as text: each with the digits that its error leaves, a table, fits, and a
-condition below them.
-"""
+"""Identified numbers as text, with the digits that their errors leave, and above a condition."""
 
 import math
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from smc_mujoco.common.aliases import Numbers
 from smc_mujoco.common.files import replacing
 from smc_mujoco.simulation.conditions import Condition
 
@@ -22,43 +18,9 @@ def to_error(value: float, error: float) -> str:
     return f"{value:#.{min(max(digits, 4), 12)}g}"
 
 
-def table(values: Numbers, errors: Numbers, units: Mapping[str, str]) -> list[str]:
-    """Return lines with each number, its value, standard error and unit."""
-    rows = [("number", "value", "±", "unit")]
-    for name, value in values.items():
-        rows.append((name, to_error(value, errors[name]), f"{errors[name]:.2g}", units[name]))
-    widths = []
-    for column in zip(*rows, strict=True):
-        widths.append(max(map(len, column)))
-    lines = []
-    for name, value, error, unit in rows:
-        line = f"{name:<{widths[0]}}  {value:>{widths[1]}}  {error:>{widths[2]}}  {unit}"
-        lines.append(line.rstrip())
-    return lines
-
-
-def fits(heads: Sequence[str], whole: Sequence[Numbers], pieces: Sequence[Numbers]) -> list[str]:
-    """Return a line with the fit of each log: of all of it, and of its pieces, if there are any."""
-    lines = []
-    for head, of_log, of_pieces in zip(heads, whole, pieces, strict=True):
-        line = f"{head}: fit {_percent(of_log)}"
-        if of_pieces:
-            line += f"; in pieces of 1 s {_percent(of_pieces)}"
-        lines.append(line)
-    return lines
-
-
 def save_condition(file: Path, text: str, condition: Condition) -> Path:
     """Write a condition with what was found as comments above it. Return the path."""
     with replacing(file) as part:
         comments = "".join(f"# {line}\n" for line in text.splitlines())
         part.write_text(f"{comments}{condition}\n", encoding="utf-8")
     return file
-
-
-def _percent(fit: Numbers) -> str:
-    """Return the fit of each column, such as "x 99.1 %"."""
-    texts = []
-    for name, value in fit.items():
-        texts.append(f"{name} {value:.1f} %")
-    return ", ".join(texts)

@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -206,6 +206,8 @@ class Rig:
         raise NotImplementedError
 
     # What identification asks of it
+
+    is_own: ClassVar[bool] = False  # whether a condition can have its values
 
     def guessed(self, data: Sequence[Data]) -> "Rig":
         """Return the rig with the values from which a search begins."""

@@ -194,12 +194,7 @@ STUBS = {  # of each command: the functions replaced, and what they give
         "cli.run_scene.filmed": [Path("film.mp4")],
     },
 }
-AXIS = (
-    "mass 120.500 0.021 95.1 kg",
-    "offset 6.000 7 -3.16 N",
-    "a.csv 99.0 (99.0) 81.0 (81.5)",
-    "(correlation -0.999)",
-)
+AXIS = ("mass 120.500 ± 0.021 kg", "offset 6.000 ± 7 N", "(correlation -0.999)")
 AXIS += ("viscous is at the end of its range", "offset may as well be 0")
 GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces aside
     "claims 3 --gains study,tuned --quick --threads 2": (
@@ -264,9 +259,9 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
             "identify('emps', [Path(a.csv), Path(b.csv), Path(c.csv)], ['mass', 'offset'], "
             "held_out=Path(d.csv), columns={x: 'position'}, condition=None, corrected=True, starts=2, seed=3",
             *AXIS,
-            "c.csv falls at 8.4 s (falls at 8.4 s)",
+            "fits falls at 8.4 s (whole logs, worst column)",
             "the fit is poor",
-            "41 parameter sets",
+            "run.svg report run/report.html",
         ],
     ),
     "identify duffing a.csv b.csv --json found.json --figure fit": (
@@ -276,8 +271,9 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
             "condition=None, corrected=False, starts=1",
             "{twin: {x: 99.04, u: 81.0}}, {x: 'm', u: 'V'}, Path(fit))",
             *AXIS,
+            "fits 60.0 %",
             "the fit is poor",
-            "wrote run.svg",
+            "run.svg report run/report.html",
             "wrote found.json",
             '"mass": {"value": 120.5, "error": 0.0213, "unit": "kg"}',
             '"fits_before": [{"x": 99.0,',
@@ -319,6 +315,7 @@ def called(tmp_path, monkeypatch, capsys):
 
     def run(line):
         monkeypatch.chdir(tmp_path)
+        (tmp_path / "run.svg").write_text("<svg/>")  # what a figure's stub says it has written
         monkeypatch.setenv("COLUMNS", "80")
         monkeypatch.setattr("warnings.showwarning", None)
         notes, (command, *_) = Notes(), line.split()

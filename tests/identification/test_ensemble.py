@@ -16,6 +16,12 @@ from smc_mujoco.identification import published_rig as rig
 LAWS = (smc.law("pid", kp=30.0, kd=6.0), smc.law("super_twisting"))
 
 
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path, monkeypatch):
+    """The command writes into the present folder."""
+    monkeypatch.chdir(tmp_path)
+
+
 @pytest.fixture(scope="module")
 def boards(tmp_path_factory):
     runs = ensemble.runs(PENDULUM, LAWS, seeds=16, duration=0.75, starts=smc.starts(0.3))

@@ -35,6 +35,12 @@ TWO = chain([0.35, 0.3], [1.2, 0.6])
 MOTION = sines([0.0], [0.5, 0.3, 0.15], [0.4, 1.1, 2.7])
 
 
+@pytest.fixture(autouse=True)
+def _in_a_folder_of_its_own(tmp_path, monkeypatch):
+    """The command writes into the present folder."""
+    monkeypatch.chdir(tmp_path)
+
+
 @pytest.fixture(scope="module")
 def arm():
     """An arm of one joint, whose file knows neither friction nor delay."""
@@ -719,12 +725,24 @@ def test_the_command_takes_joints_from_a_log_and_writes_a_figure_and_a_condition
     np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header="t,x_j1,u_j1", comments="")
     files = [str(tmp_path / name) for name in ("arm.xml", "run.csv")]
     options = ["--for", "j1.damping,j1.frictionloss,input_delay", "--held-out", files[1]]
-    written = ["--figure", str(tmp_path / "fit"), "--out", str(tmp_path / "found.txt")]
-    done = CliRunner().invoke(app, ["identify", *files, *options, *written])
+    done = CliRunner().invoke(app, ["identify", *files, *options])
     assert done.exit_code == 0, done.output
-    assert "held out" in done.output
-    assert (tmp_path / "fit.png").stat().st_size > 10_000
-    assert "input_delay=" in (tmp_path / "found.txt").read_text()
+    rows = re.findall(r"^(\S+) +(\S+) +± (\S+) +(.+)$", done.output, re.MULTILINE)
+    assert [(name, unit) for name, _, _, unit in rows] == [
+        ("j1.damping", "N m s/rad"),
+        ("j1.frictionloss", "N m"),
+        ("input_delay", "ms"),
+    ]
+    (condition,) = from_file(tmp_path / "found.txt")
+    late = condition.fields["input_delay"]
+    assert float(rows[2][1]) == pytest.approx(1e3 * late, abs=0.13)  # whole steps of 0.25 ms
+    assert re.search(r"fits (\S+) %, held out (\S+) %", done.output)
+    assert max(map(len, done.output.splitlines())) <= 80
+    assert len(done.output.splitlines()) <= 24
+    page = (tmp_path / "fit" / "report.html").read_text()
+    assert "Correlations of the errors" in page
+    assert "data:image/svg+xml" in page
+    assert (tmp_path / "fit.svg").stat().st_size > 10_000
     wrong = CliRunner().invoke(app, ["identify", *files, "--for", "nothing.here"])
     assert wrong.exit_code == 2
     assert "choose from grav, input_delay, j1.armature" in " ".join(wrong.output.split())

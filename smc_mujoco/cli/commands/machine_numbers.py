@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
+from smc_mujoco.answers.answers import identify_files
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.errors import ScenarioError
@@ -56,7 +57,8 @@ FoundFigure = Annotated[
 FoundFile = Annotated[
     Path | None,
     typer.Option(
-        help="Also write the result as a condition, FILE.txt, for --condition of other commands."
+        help="File for the result as a condition, for --condition of other commands; a name that "
+        "does not end in .txt gets JSON. Default: found.txt."
     ),
 ]
 Beside = Annotated[
@@ -109,6 +111,8 @@ LogCounts = Annotated[
 MotionsFigure = Annotated[
     Path | None, options.picture("the motions and the expected errors of each")
 ]
+FIGURE = Path("fit")
+FOUND = Path("found.txt")
 MotionFile = Annotated[
     Path | None, typer.Option(help="CSV file of the best motion: t, and r or r_JOINT.")
 ]
@@ -127,6 +131,7 @@ def identify(
     corrected: Corrected = False,
     starts: Starts = 1,
     seed: StartsSeed = 0,
+    full: options.Full = False,
     json: options.Json = None,
 ) -> None:
     """Estimate a machine's parameters from its logs: friction, armature, delay, masses and more.
@@ -142,8 +147,9 @@ def identify(
     where the model counts 0. The delay from command to force is input_delay. A plant's own
     parameters keep the names that they have in the plant, such as m (mass) and grav (gravity); m of
     your own model is the mass of all that moves, in kg. Parameters of a part that --condition adds
-    are named FIELD.NAME, such as friction.coulomb. The command prints a table of the parameters
-    with their standard errors. Notes below the table say what the logs cannot determine.
+    are named FIELD.NAME, such as friction.coulomb. The command prints each with its standard error,
+    how well the logs are repeated, and what to doubt. It writes found.txt, which --condition of
+    other commands takes, the figure fit.svg, and all of it as fit/report.html.
 
     With --pairs you need no machine: give the speed (rad/s or m/s) and torque (N m or N) of one
     joint, in time order. The torque must be that of friction alone, so subtract gravity and inertia
@@ -180,7 +186,16 @@ def identify(
         seed=seed,
         progress=True,
     )
-    _tell(identified, list(map(str, files)), figure, out, terminal)
+    terminal.answer(identified, full)
+    picture = identified.figure(figure or FIGURE)[0]
+    report = identified.to_html(picture.with_suffix("") / "report.html")
+    condition = ""
+    if out is None and identified.is_condition:
+        out = FOUND
+    if out is not None:
+        condition = str(identified.save(out))
+    terminal.note(identify_files(condition, str(picture), str(report)))
+    terminal.finish(identified.about())
 
 
 def _alone(option: str, *others: Any) -> None:
@@ -191,27 +206,13 @@ def _alone(option: str, *others: Any) -> None:
         )
 
 
-def _tell(
-    found: Any, files: list[str], figure: Path | None, out: Path | None, terminal: Terminal
-) -> None:
-    """Print what was found in logs, and write it."""
-    from smc_mujoco.cli import rig_tables
-
-    for table in rig_tables.identified(found, files):
-        terminal.print(table)
-    for note in found.notes:
-        terminal.note(note, wrap=True)
-    terminal.note(f"{found.evaluations} parameter sets, {terminal.seconds:.0f} s")
-    _write(found, figure, out, terminal)
-
-
-def _write(found: Any, figure: Path | None, out: Path | None, terminal: Terminal) -> None:
-    """Write the figure and the file of what was found, and end."""
+def _write(friction: Any, figure: Path | None, out: Path | None, terminal: Terminal) -> None:
+    """Write the figure and the file of a friction, and end."""
     if figure:
-        terminal.wrote(*found.figure(figure))
+        terminal.wrote(*friction.figure(figure))
     if out:
-        terminal.wrote(found.save(out))
-    terminal.finish(found.about())
+        terminal.wrote(friction.save(out))
+    terminal.finish(friction.about())
 
 
 def _from_pairs(
