@@ -484,7 +484,7 @@ def actuator(name: str, value: Actuators | None, s: Any) -> tuple[Actuator, ...]
         before = []
         after = []
         for part in items:
-            if part.leads:
+            if any(part.before(drive) for drive in of_file):
                 before.append(part)
             else:
                 after.append(part)
@@ -501,7 +501,7 @@ def actuator(name: str, value: Actuators | None, s: Any) -> tuple[Actuator, ...]
             raise ScenarioError(
                 f"{name} has {joined(beside)}, and a joint has one rotor beside it: give one"
             )
-        if len(drives) > 2 or (len(drives) == 2 and not drives[0].leads):
+        if len(drives) > 2 or (len(drives) == 2 and not drives[0].before(drives[1])):
             raise ScenarioError(_too_many(name, drives, of_file))
     return tuple(sorted(items, key=lambda part: not part.drives))
 

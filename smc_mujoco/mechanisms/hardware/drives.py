@@ -90,8 +90,11 @@ class RateLimit(Actuator):
     in which the force meets the lag's output, at most by the change of that output in the step:
     little, if the step is short beside tau.
 
+    Before a position servo it limits the set-point, which starts at the goal: the profile velocity
+    of hobby servos. A `<pid>` of a file does this itself, by its slewmax.
+
     Attributes:
-      rate: N m/s (N/s), greater than 0; math.inf for no limit.
+      rate: N m/s (N/s), or rad/s (m/s) of a set-point; greater than 0; math.inf for no limit.
     """
 
     in_callback: ClassVar[bool] = True
@@ -104,6 +107,9 @@ class RateLimit(Actuator):
     def limited(self) -> bool:
         """Whether the rate is finite."""
         return self.rate < math.inf
+
+    def before(self, drive: Actuator) -> bool:
+        return drive.unit == "{x}"  # a set-point
 
 
 @frozen_data

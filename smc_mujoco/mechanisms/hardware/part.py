@@ -309,6 +309,11 @@ class Actuator(OnJoints):
         object.__setattr__(copy, "is_of_file", True)  # as a frozen class sets what is no argument
         return copy
 
+    def before(self, drive: "Actuator") -> bool:
+        """Return whether it may stand before a drive of the same joint."""
+        del drive
+        return self.leads
+
     def drives_of(self, spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:
         """Return the actuators that it changes."""
         if not self.on:

@@ -47,7 +47,8 @@ class PositionServo(Actuator):
     own `<position>`. The set-point is clipped to `ctrlrange`, the force to `forcerange`. u is 0 at
     the goal, so that one bound on |u| reaches equally far to both sides of it. An `input_delay`
     delays only the set-point. Behind a `timeconst` MuJoCo filters the clipped set-point, from the
-    goal at the start. A `Lag` may stand before it. A law has no nominal model of it.
+    goal at the start. A `Lag` or a `RateLimit` may stand before it. A law has no nominal model of
+    it.
 
     With `ki` or `slewmax` it is MuJoCo's `<pid>`, whose speed set-point stays 0. MuJoCo integrates
     the error of the position from `integral`, and the set-point follows the command from the goal.
@@ -169,17 +170,18 @@ class PositionServo(Actuator):
     def suits(self, s: Any, chain: Sequence[Actuator]) -> None:
         drives = [part for part in chain if part.drives]
         before = [type(part).__name__ for part in drives if part is not self]
-        if before == ["Lag"] and self.step:
+        leader = "".join(before)
+        if leader in ("Lag", "RateLimit") and self.step:
             raise ScenarioError(
                 f"a PositionServo rounds its set-point to steps of {self.step:g}, and not behind a "
-                "Lag: leave one of them out"
+                f"{leader}: leave one of them out"
             )
-        if before == ["Lag"] and self.by_pid:
+        if leader in ("Lag", "RateLimit") and self.by_pid:
             raise ScenarioError(
                 "a PositionServo with ki or slewmax takes its set-point from the command, and not "
-                "from a Lag: leave one of them out"
+                f"from a {leader}: leave one of them out; slewmax limits the rate of the set-point"
             )
-        if before not in ([], ["Lag"], ["CommandDelay"]):
+        if leader not in ("", "Lag", "RateLimit", "CommandDelay"):
             raise ScenarioError(
                 f"a PositionServo is a drive of its own, and so is {joined(before)}: leave that "
                 "out, or give smc.Channel(motor=True) for an ideal motor instead"

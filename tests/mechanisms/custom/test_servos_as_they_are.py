@@ -243,7 +243,6 @@ BESIDE = {
     "nominal": ({"model": "nominal"}, "give model='none'"),
     "of_model": ({"law": "mpc"}, "give model=.none."),
     "two": ({"actuator": (smc.Lag(0.01), RateLimit(9.0))}, "keeps the PositionServo"),
-    "rate": ({"actuator": RateLimit(9.0)}, "RateLimit, and the joint keeps the PositionServo"),
     "motor": ({"actuator": smc.DCMotor()}, "DCMotor, and the joint keeps the PositionServo"),
     "fault": ({"fault": smc.Fault(at=1.0, gain=0.5)}, "stuck=True"),
 }
@@ -376,6 +375,11 @@ def test_predicted_chattering_has_the_servo_s_spring(law, late):
     assert predicted.frequency == pytest.approx(1e3 * np.diff(turns).mean() ** -1, rel=0.02)
 
 
+@smc.law_function(gains={"one": 1.0})
+def follow(y, gains, memory):
+    return gains.one * y.r, y.e
+
+
 def test_a_lag_before_a_servo_filters_its_set_point():
     tau, fine = 0.05, 1e-5
     fields = {"reference": smc.Sine(0.6, 5.0), "x0": 0.5, "duration": 1.0, "control_period": 5e-3}
@@ -394,6 +398,28 @@ def test_a_lag_before_a_servo_filters_its_set_point():
             mujoco.mj_step(model, data)
     with pytest.raises(ScenarioError, match=r"steps of 0\.1, and not behind a Lag"):
         smc.Scenario(plant=servo(BARE, set_point_step=0.1), law="pid", actuator=smc.Lag(tau))
+
+
+def test_a_rate_limit_before_a_servo_is_its_profile_velocity():
+    """As a file's own slewmax, and as MuJoCo alone moves with a set-point that is moved by hand."""
+    fields = {"reference": smc.Constant(1.0), "x0": 0.0, "duration": 3.0, "control_period": 5e-3}
+    fields |= {"law": follow()}
+    limited = run(plant=servo(BARE), actuator=RateLimit(0.48), **fields)
+    model = mujoco.MjModel.from_xml_string(BARE)
+    model.opt.timestep = fine = 1e-4
+    data = mujoco.MjData(model)
+    for k in range(len(limited.t) - 1):
+        assert abs(data.qpos[0] - limited.x[k, 0]) < 1e-4
+        for i in range(50):
+            data.ctrl[:] = min(1.0, 0.48 * (limited.t[k] + fine * (i + 0.5)))
+            mujoco.mj_step(model, data)
+    by_file = BARE.replace("<position", "<pid").replace('kv=".1"', 'kv=".1" slewmax=".48"')
+    slewed = run(plant=servo(by_file), **fields)
+    assert np.abs(slewed.x - limited.x).max() < 1e-3
+    assert 1.5 < limited.t[np.argmax(limited.x[:, 0] > 0.9)] < 2.1
+    for plant in (servo(BARE, set_point_step=0.1), servo(by_file)):
+        with pytest.raises(ScenarioError, match="RateLimit: leave one of them out"):
+            smc.Scenario(plant=plant, law="pid", actuator=RateLimit(0.48))
 
 
 def test_predicted_chattering_has_the_filter_of_a_servo_once():
@@ -431,7 +457,7 @@ def test_gains_tables_figures_and_files_have_the_unit_of_the_set_point(tmp_path)
     labels = [ax.get_xlabel().replace("\n", " ") for ax in smc.plot(table).axes]
     assert "TV rate (rad/s)" in labels
     said = "u of 'j' of hobby is the set-point of its servo, in rad from its goal at 0."
-    printed = str(smc.leaderboard(table, ["tv_rate"])).replace("\n", " ")
+    printed = " ".join(str(smc.leaderboard(table, ["tv_rate"])).split())
     assert said in printed
     assert "Default gains are for a force: tune them for this u first." in printed
 
