@@ -29,6 +29,7 @@ FAR_START = (
     10.0,
 )  # m, and times the plant's usual start: chosen; farther from the goal may be mm
 MAX_MILLIMETRES = 1e4  # chosen; a number above this is not taken for mm
+HOLDING = 2.0  # times the force of a motor: friction above it may be in another unit; chosen
 LEVELS = "static", "coulomb", "level"  # of a friction at rest: the first that it has
 LONG_TIME = 1.0  # s; chosen: an input delay or a control period that is as long may be in ms
 LARGE_FACTORS = 15.0, 1000.0  # chosen: a mismatch between them may be in percent
@@ -156,7 +157,7 @@ def _holding_friction(s: Any) -> Iterator[str]:
         level = next((value for value in values if value is not None), 0.0)
         for i, joint in enumerate(part.joint_names(s.plant)):
             force = forces.get(joint, math.inf)
-            if part.side == "link" and of_joint(level, i) >= force:
+            if part.side == "link" and of_joint(level, i) > HOLDING * force:
                 yield (
                     f"{type(part).__name__} holds joint {joint!r} with {of_joint(level, i):g}, and "
                     f"its motor gives at most {force:g}: no command moves it, so give less "
