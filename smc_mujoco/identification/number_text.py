@@ -1,8 +1,12 @@
-"""Identified numbers as text, with the digits that their errors leave, and above a condition."""
+"""Identified numbers as text: with the digits that their errors leave, a table, and a condition
+below them.
+"""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
+from smc_mujoco.common.aliases import Numbers
 from smc_mujoco.common.files import replacing
 from smc_mujoco.simulation.conditions import Condition
 
@@ -16,6 +20,21 @@ def to_error(value: float, error: float) -> str:
         size = math.floor(math.log10(abs(value)))
         digits = size - math.floor(math.log10(error)) + 2
     return f"{value:#.{min(max(digits, 4), 12)}g}"
+
+
+def table(values: Numbers, errors: Numbers, units: Mapping[str, str]) -> list[str]:
+    """Return lines with each number, its value, standard error and unit."""
+    rows = [("number", "value", "±", "unit")]
+    for name, value in values.items():
+        rows.append((name, to_error(value, errors[name]), f"{errors[name]:.2g}", units[name]))
+    widths = []
+    for column in zip(*rows, strict=True):
+        widths.append(max(map(len, column)))
+    lines = []
+    for name, value, error, unit in rows:
+        line = f"{name:<{widths[0]}}  {value:>{widths[1]}}  {error:>{widths[2]}}  {unit}"
+        lines.append(line.rstrip())
+    return lines
 
 
 def save_condition(file: Path, text: str, condition: Condition) -> Path:

@@ -734,7 +734,7 @@ def test_the_command_takes_joints_from_a_log_and_writes_a_figure_and_a_condition
         ("input_delay", "ms"),
     ]
     (condition,) = from_file(tmp_path / "found.txt")
-    late = condition.fields["input_delay"]
+    late = dict(condition.fields)["input_delay"]  # pyright: ignore[reportArgumentType, reportCallIssue]
     assert float(rows[2][1]) == pytest.approx(1e3 * late, abs=0.13)  # whole steps of 0.25 ms
     assert re.search(r"fits (\S+) %, held out (\S+) %", done.output)
     assert max(map(len, done.output.splitlines())) <= 80
