@@ -404,20 +404,27 @@ def with_package(line: str, package: str) -> str:
 
 
 def margins(kind: str, results: Sequence[Margin]) -> Table:
-    """Return the results of one kind: a line for each plant and law."""
-    numbers = number_columns(("margin", "to within", "theory"), no_wrap=True)
+    """Return the results of one kind: a line for each plant and law, with a column of the range
+    over shipped sets of gains, and of theory, where a line has one.
+    """
+    of_kind = [margin for margin in results if margin.kind == kind]
+    over_sets = any(margin.over_sets for margin in of_kind)
+    in_theory = any(margin.theory is not None for margin in of_kind)
+    heads = ["margin", "to within", *["all sets"] * over_sets, *["theory"] * in_theory]
+    numbers = number_columns(heads, no_wrap=True)
     table = titled(f"largest {kind} tolerated", "plant", "law", *numbers, "unit")
     last = None
-    for margin in results:
-        if margin.kind != kind:
-            continue
-        theory = ""
-        if margin.theory is not None:
-            theory = "any" if margin.theory == math.inf else number(margin.theory)
+    for margin in of_kind:
+        columns = []
+        if over_sets:
+            columns.append(margin.over_sets)
+        if in_theory:
+            of_theory = "" if margin.theory is None else number(margin.theory)
+            columns.append("any" if margin.theory == math.inf else of_theory)
         plant = "" if margin.plant == last else margin.plant
         law = Text(margin.law, style=style.law_colour(margin.law))
         within = number(margin.resolution) if margin.resolution else ""
-        table.add_row(plant, law, margin.text, within, theory, margin.unit)
+        table.add_row(plant, law, margin.text, within, *columns, margin.unit)
         last = margin.plant
     return table
 

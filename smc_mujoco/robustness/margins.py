@@ -17,6 +17,11 @@ reference.
 All searches advance together, a batch of runs per round. The fast engine runs what it can, but
 in quick searches. MuJoCo then runs both ends of what it found, and searches again where it does not
 agree.
+
+A law of the package has the gains of its first search, and shipped ones have several. The others
+run at both ends of the interval that was found; those that tolerate less, or more, are searched
+further together for the least and the largest margin of all sets, as if each tolerated all levels
+below its margin.
 """
 
 import dataclasses
@@ -38,7 +43,8 @@ from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.common.text import number
 from smc_mujoco.control import gain_sets as sets
-from smc_mujoco.control.component import Template
+from smc_mujoco.control import source
+from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
@@ -160,6 +166,7 @@ class MarginKind:
         scenarios = []
         with warnings.catch_warnings():  # a level is no slip of a unit
             warnings.filterwarnings("ignore", "the true .* times the nominal", ScenarioWarning)
+            warnings.filterwarnings("ignore", ".* no command moves it", ScenarioWarning)
             for value in levels:
                 scenarios.append(self.put(base, value))
         return scenarios
@@ -378,6 +385,20 @@ class Margin:
         float  # largest level of the search; if it is the value, all that were tried are tolerated
     )
     theory: float | None  # the margin by linear theory
+    sets: int = 1  # shipped sets of gains of the law; the value is of the first
+    # the least and the largest margin over these sets; NaN for one set, and where the unchanged run
+    # of the first is not tolerated. low is NaN where that of another is not
+    low: float = math.nan
+    high: float = math.nan
+
+    @property
+    def over_sets(self) -> str:
+        """The range over all sets, as "0.179 to 0.221" or "fails to 0.2"; "" for one set."""
+        if math.isnan(self.high):
+            return ""
+        least = "fails" if math.isnan(self.low) else number(self.low)
+        most = f"{'≥ ' if self.high == self.searched else ''}{number(self.high)}"
+        return least if least == most else f"{least} to {most}"
 
     @property
     def open(self) -> bool:
@@ -460,7 +481,8 @@ def margins(
     Returns:
       `Margins`, a list of `Margin`: `value` in `unit`, nan where even the unchanged run fails;
       `text` is the value as printed, "0.035", or "≥ 0.5" if the largest level that was tried is
-      tolerated. Its `figure("margins.svg")` draws them.
+      tolerated. Of a law with several shipped sets of gains it is that of the first, and `low` to
+      `high` is the range over all `sets`. Its `figure("margins.svg")` draws them.
 
     Raises:
       ScenarioError: an unknown plant, law, kind, set or condition, or runs that start at their
@@ -470,9 +492,12 @@ def margins(
         raise ScenarioError("margins are of plants and laws, not of a scenario: give their names")
     duration = QUICK_DURATION if quick else DURATION
     bases = []
+    siblings = []
     for plant in listed("plants", plants):
         for law in listed_laws(laws):
-            bases.append(case(plant, law, condition, duration, gains, starts=starts))
+            base = case(plant, law, condition, duration, gains, starts=starts)
+            bases.append(base)
+            siblings.append(_other_sets(base, law, gains))
     for base in bases:
         if base.resolved.x0 == constant_goal(base):
             raise ScenarioError(
@@ -480,7 +505,24 @@ def margins(
                 f"{START_CURE}"
             )
     resolution = COARSE if quick else FINE
-    return margins_of(bases, listed("kinds", kinds), resolution, threads, report, device)
+    names = listed("kinds", kinds)
+    return margins_of(bases, names, resolution, threads, report, device, siblings)
+
+
+def _other_sets(base: Scenario, law: object, gains: str) -> list[Scenario]:
+    """Return a run with each other set of gains that is shipped for its law; none of a law that was
+    given with gains.
+    """
+    if gains not in sets.OBJECTIVES or base.law.source.kind != source.SHIPPED:
+        return []
+    if isinstance(law, Component) and law.source.kind != source.DEFAULT:
+        return []
+    count = len(sets.tuned(base.plant, base.law.name, gains).sets)
+    others = []
+    for seed in range(1, count):
+        of_set = sets.law(base.plant, base.law.name, gains, seed)
+        others.append(dataclasses.replace(base, law=of_set).named(base.condition))
+    return others
 
 
 def margins_of(
@@ -490,8 +532,11 @@ def margins_of(
     threads: int | None = None,
     report: Report = lambda done, whole: None,
     device: str = "cpu",
+    siblings: Sequence[Sequence[Scenario]] = (),
 ) -> Margins:
-    """Return the margins of any scenarios, as `margins` does; the resolution is FINE or COARSE."""
+    """Return the margins of any scenarios, as `margins` does; the resolution is FINE or COARSE.
+    `siblings` are the runs of each with other sets of gains.
+    """
     cells = Cells(bases, kinds, resolution, report)
     # a coarse search by MuJoCo takes less time than compiling its law for the fast engine
     runs = ScoredRuns({REST_SHARE.name: REST_SHARE.of}, device, threads, resolution != COARSE)
@@ -508,6 +553,9 @@ def margins_of(
         if good != (level == going[i].low):
             again[i] = cells.begin(i)
     find_boundaries(again, lambda tried: cells.tolerated(tried, runs.by_mujoco))
+    ranges = {}
+    if any(siblings):
+        ranges = OverSets(cells, siblings, len(kinds), runs.scored).ranges(going)
     warn_of_broken(runs.broken)
     margins = Margins()
     for i, ((base, kind), search) in enumerate(zip(cells.pairs, cells.searches, strict=True)):
@@ -520,7 +568,10 @@ def margins_of(
             resolution=search.high - search.low if search.high < math.inf else 0.0,
             searched=search.levels[-1],
             theory=kind.expected(base),
+            sets=1 + len(siblings[i // len(kinds)]) if siblings else 1,
         )
+        if i in ranges:
+            margin = dataclasses.replace(margin, low=ranges[i][0], high=ranges[i][1])
         margins.append(margin)
     return margins
 
@@ -586,3 +637,90 @@ class Cells:
                 if inside and covers(kind.scenarios(base, level)[0]):
                     ends.append((i, level))
         return ends
+
+
+class OverSets:
+    """The least and the largest margin of each cell over several sets of gains.
+
+    `cells` have been searched with the first set, `siblings` are the runs of each scenario with the
+    others.
+    """
+
+    def __init__(
+        self,
+        cells: Cells,
+        siblings: Sequence[Sequence[Scenario]],
+        kinds: int,
+        runner: Callable,
+    ):
+        self.cells = cells
+        self.siblings = siblings
+        self.kinds = kinds  # of each scenario
+        self.runner = runner
+
+    def ranges(self, cells: Iterable[int]) -> dict[int, tuple[float, float]]:
+        """Return the range over all sets of each of these cells that has several."""
+        several = [i for i in cells if self.siblings[i // self.kinds]]
+        ends: dict[tuple[int, str], float | None] = {}
+        for i in several:
+            search = self.cells.searches[i]
+            ends |= {(i, "none"): None, (i, "low"): search.low}
+            if search.high < math.inf:
+                ends[i, "high"] = search.high
+        everyone = {key: range(len(self.siblings[key[0] // self.kinds])) for key in ends}
+        holding = self.held(ends, everyone)
+        ranges: dict[int, list[float]] = {}
+        groups: dict[tuple[int, str], list[int]] = {}  # sets that hold less, or more
+        for i in several:
+            value = self.cells.searches[i].low
+            steady = bool(holding[i, "none"].all())
+            ranges[i] = [value if steady else math.nan, value]
+            if steady and not holding[i, "low"].all():
+                groups[i, "less"] = np.flatnonzero(~holding[i, "low"]).tolist()
+            if (i, "high") in holding and holding[i, "high"].any():
+                groups[i, "more"] = np.flatnonzero(holding[i, "high"]).tolist()
+        searches = {}
+        for i, side in groups:
+            own = self.cells.searches[i]
+            base, kind = self.cells.pairs[i]
+            begin = {"high": own.low} if side == "less" else {"low": own.high}
+            fresh = kind.search(base, self.cells.resolution)
+            searches[i, side] = dataclasses.replace(fresh, **begin)
+
+        def tolerated(tried: list[tuple[tuple[int, str], float]]) -> list[bool]:
+            held = self.held(dict(tried), groups)
+            results = []
+            for key, _ in tried:
+                more = key[1] == "more"
+                results.append(bool(held[key].any() if more else held[key].all()))
+                # only those that hold least, or most, are searched further
+                ahead = np.array(groups[key])[held[key] == more].tolist()
+                groups[key] = ahead or groups[key]
+            return results
+
+        find_boundaries(searches, tolerated)
+        for (i, side), search in searches.items():
+            ranges[i][side == "more"] = search.low
+        return {i: (low, high) for i, (low, high) in ranges.items()}
+
+    def held(
+        self,
+        levels: Mapping[tuple[int, str], float | None],
+        numbers: Mapping[tuple[int, str], Sequence[int]],
+    ) -> dict[tuple[int, str], np.ndarray]:
+        """Return (cell, word) -> whether the sets of these numbers tolerate its level."""
+        scenarios = []
+        owners = []
+        results = {}
+        for key, level in levels.items():
+            _, kind = self.cells.pairs[key[0]]
+            results[key] = np.ones(len(numbers[key]), bool)
+            for place, k in enumerate(numbers[key]):
+                base = self.siblings[key[0] // self.kinds][k]
+                of_level = [base] if level is None else kind.scenarios(base, level)
+                scenarios += of_level
+                owners += [(key, place)] * len(of_level)
+        scores = self.runner(scenarios, lambda work: None)
+        for (key, place), ((share,), _) in zip(owners, scores, strict=True):
+            results[key][place] &= share <= TOLERATED_ERROR
+        return results

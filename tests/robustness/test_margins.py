@@ -115,6 +115,43 @@ def test_a_margin(tolerated, value, words, monkeypatch):
     assert (margin.open, margin.resolution == 0.0) == (value == 4.0,) * 2
 
 
+def test_the_range_over_sets_is_that_of_their_own_margins(monkeypatch):
+    """Of a first set of 1.3, beside sets that hold less, the same and more; open, and failing."""
+    laws = [smc.law("observer_free", lam=lam, k1=2.0) for lam in (1.3, 0.4, 1.3, 2.7, 1.31)]
+
+    def put(base, level):
+        return dataclasses.replace(pushed(level <= base.law.gains["lam"]), law=base.law)
+
+    monkeypatch.setitem(margins.MARGIN_KINDS, "push", kind_of(put))
+    first, *others = (dataclasses.replace(pushed(True), law=law) for law in laws)
+
+    def found(siblings):
+        return margins.margins_of([first], ["push"], siblings=[siblings])[0]
+
+    own = [margins.margins_of([base], ["push"])[0] for base in (first, *others)]
+    margin = found(others)
+    assert margin.value == own[0].value
+    assert margin.sets == 5
+    assert margin.low == pytest.approx(min(one.value for one in own), rel=2 * FINE)
+    assert margin.high == pytest.approx(max(one.value for one in own), rel=2 * FINE)
+    same = found(others[1:2])
+    assert (same.low, same.high) == (margin.value, margin.value)
+    assert found([]).over_sets == ""
+    wide = dataclasses.replace(others[0], law=smc.law("observer_free", lam=9.0, k1=2.0))
+    assert found([wide]).over_sets.endswith(" to ≥ 4.00")
+    broken = dataclasses.replace(others[0], disturbance=(smc.Constant(50.0),))
+    assert found([broken]).over_sets == f"fails to {margin.text}"
+
+
+def test_other_sets_are_the_shipped_ones_of_a_law_that_was_named():
+    base = smc.grid("duffing", "classical")[0]
+    others = margins._other_sets(base, "classical", "tuned")
+    sets = {tuple(run.law.gains.values()) for run in (base, *others)}
+    assert len(sets) == len(others) + 1 == 12
+    assert margins._other_sets(base, base.law, "tuned") == []
+    assert margins._other_sets(base, "classical", "default") == []
+
+
 @pytest.mark.slow
 def test_both_signs_of_a_disturbance_are_tolerated(monkeypatch):
     onesided = kind_of(lambda base, level: pushed(level > -1.5))

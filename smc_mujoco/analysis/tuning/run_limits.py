@@ -83,8 +83,8 @@ def limits_in(needs: str | Sequence[str]) -> tuple[RunLimit, ...]:
         name, less, number = str(text).partition("<")
         if name.strip() == OVERSHOOT:
             limits.append(RunLimit(OVERSHOOT, _percent(text, less, number)))
-        elif text.strip() in NEEDS:
-            limits.append(RunLimit(*NEEDS[text.strip()]))
+        elif name.strip() in NEEDS and not less:
+            limits.append(RunLimit(*NEEDS[name.strip()]))
     return tuple(limits)
 
 

@@ -175,6 +175,8 @@ def margins(
     period. Missed is the share of samples that are missed. Loss is the fraction of its force that
     each actuator loses. For laws that can be linearised, the column "theory" has the stability
     limit of the linear loop. A law may tolerate more than that, with a small sustained oscillation.
+    A law of the package has the gains of its first search; "all sets" is the range over those of
+    all its searches.
 
     Without --law, every law with shipped gains is tried. On a model of your own, give laws with
     their gains. A law from your own file has its default gains, so tune it first (smc-mujoco tune).
