@@ -1,11 +1,11 @@
 """A race: sets of gains in turn over the laws, until one law wins, on one plant.
 
 Every law gets its first set of gains, then every law its second, so that laws have equal numbers
-wherever the race stops. Where time is short the first sets come from shorter searches, so that
-every law has one; a law whose search the clock ends does not race. J of a set is that of unseen
-runs of all conditions, in one number, so that neither more laws nor more conditions ask for more
-sets. This is a race in the sense of O. Maron, A. W. Moore, "Hoeffding races" (NIPS 6, 1994), by the
-tests of `analysis.ranking`.
+wherever the race stops. Where time is short the first sets come from shorter searches, which the
+clock may end, so that every law has one; a law for which not even that fits does not race. J of a
+set is that of unseen runs of all conditions, in one number, so that neither more laws nor more
+conditions ask for more sets. This is a race in the sense of O. Maron, A. W. Moore, "Hoeffding
+races" (NIPS 6, 1994), by the tests of `analysis.ranking`.
 
 - u = 0, the law "none", races too, and wins if it wins.
 - After three sets a law is dropped whose best J is more than twice the worst one of the law that
@@ -35,6 +35,7 @@ from smc_mujoco.analysis.signed_rank import units_needed
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.tuning.evaluator import with_gains
 from smc_mujoco.analysis.tuning.objective import Objective, objectives
+from smc_mujoco.analysis.tuning.quick_search import OutOfTime
 from smc_mujoco.analysis.tuning.result import SearchResult
 from smc_mujoco.analysis.tuning.run_limits import LIMIT_COST
 from smc_mujoco.common.aliases import Array
@@ -57,6 +58,7 @@ TIMED = 2  # sets after which the number of sets that fit is known: the first co
 FIRST = 3  # sets after which a law may be dropped; chosen
 FAR = 2.0  # times the leader's worst J, above which it is; chosen
 STUCK = 2.0  # times the least J of its law's others, above which a search is made again; chosen
+LAST_ROOM = 0.7  # of the time left, which first searches take before tables; chosen
 SHORTER = (1, 2, 4)  # by which the evaluations of a first search may be divided; chosen
 DECIDED_RUNS = 3  # sets of gains that a quick search runs as a judgement does
 WITHOUT = "none"  # the law u = 0
@@ -67,10 +69,6 @@ class Unseen(NamedTuple):
 
     value: float
     half: float  # at half the physics step, NaN where it was not computed
-
-
-class OutOfTime(Exception):
-    """The time of a search is over."""
 
 
 class Entrant:
@@ -149,13 +147,18 @@ class SearchedEntrant(Entrant):
         return self.task._replace(budget=max(1, self.task.budget // self.share))
 
     def search(self, k: int, draw: int, ends: float) -> SearchResult:
-        """Make search k, from a draw. Raise OutOfTime when the time is over."""
+        """Make search k, from a draw. At the time `ends` the first one ends with what it has; of
+        others, or without anything, raise OutOfTime.
+        """
 
         def report(count: int) -> None:
             if time.monotonic() > ends:
                 raise OutOfTime
 
-        return self.task_of(k).search(k, self.failure, report, draw)
+        result = self.task_of(k).search(k, self.failure, report, draw)
+        if k or draw:
+            report(0)
+        return result
 
     def call(self, k: int, draw: int) -> tuple:
         """Return the arguments with which a worker makes search k."""
@@ -330,16 +333,18 @@ def _work(course: RaceCourse, entrant: SearchedEntrant) -> float:
     return DECIDED_RUNS * course.clock.unit + task.size * coarse
 
 
-def _shorten(course: RaceCourse, entrant: SearchedEntrant, waiting: int) -> None:
+def _shorten(course: RaceCourse, entrant: SearchedEntrant, waiting: int) -> float:
     """Divide the evaluations of a law's first search so that it and others that are `waiting` end
-    in time, as far as it may.
+    in time, as far as it may, and return when it must end.
     """
     clock = course.clock
-    room = (clock.race_ends(waiting + 1, first=True) - time.monotonic()) / waiting
+    now = time.monotonic()
+    room = max(clock.race_ends(waiting + 1, first=True) - now, LAST_ROOM * clock.left) / waiting
     for share in SHORTER:
         entrant.share = share
         if clock.search_seconds(_work(course, entrant)) <= room:
-            return
+            break
+    return now + room
 
 
 def _search_round(
@@ -513,13 +518,14 @@ def _made_here(
     """
     for count, i in enumerate(missing):
         piece = pieces[i]
+        last = ends
         if shorten and math.isfinite(ends):
-            _shorten(course, piece.entrant, len(missing) - count)
+            last = _shorten(course, piece.entrant, len(missing) - count)
         file = _file(course, piece)
         result = file.read()
         if result is None and time.monotonic() < ends:
             try:
-                result = file.keep(piece.entrant.search(piece.k, piece.draw, ends))
+                result = file.keep(piece.entrant.search(piece.k, piece.draw, last))
             except OutOfTime:
                 continue
         if result is not None:

@@ -13,9 +13,10 @@ for laws that do not compile. J is that of
 
 import dataclasses
 import warnings
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from smc_mujoco.analysis.engine.scores import over_log
@@ -36,6 +37,7 @@ from smc_mujoco.simulation.run import (
 )
 from smc_mujoco.simulation.scenario import Scenario
 
+LARGE_MODELS = 16 * 2**20  # bytes of a search's models, as with meshes; chosen
 MUJOCO, EQUATION, PYTHON = "MuJoCo", "the equation", "Python"  # engines
 # a case, when it failed, s, (K + 1, n) LOG -> tracking and variation
 Terms = Callable[[Scenario, float | None, np.ndarray], Pair]
@@ -71,10 +73,13 @@ class Evaluator:
         self.names = tuple(names)
         self.threads = cores(threads)
         self._options = threads, by_equation, off, slots, device
+        self._off, self._slots, self._device = off, slots, device
         prepared = []
         for case in self.cases:
             prepared.append(prepare(case))
-        self._runs: list[tuple[list[int], Any]] = []  # indices of cases, and what runs them
+        self._prepared = prepared
+        self._members: list[tuple[Hashable, list[int]]] = []  # key of the equation, and cases
+        self._runners: list[Any] = []  # of each of these
         if any(item.why_not for item in prepared):
             self.engine = PYTHON
             return
@@ -85,25 +90,45 @@ class Evaluator:
             own_key = None if fast else item.key
             members.setdefault((fast, own_key), []).append(i)
         self.engine = MUJOCO
-        # as many candidates at once as fit the memory of a batch
-        of_one = sum(item.bytes for item in prepared)
-        slots = max(1, min(slots, BATCH_BYTES // of_one))
-        with memory_for(prepared), callback.installed():
-            for (fast, _), indices in members.items():
-                if fast:
-                    self.engine = EQUATION
-                    of_group = [self.cases[i] for i in indices]
-                    runner = equation.Equations(goal, of_group, self.names, self.threads, device)
-                else:
-                    batch = [prepared[i] for i in indices]
-                    runner = _RepeatedBatch(batch, names, self.threads, off, slots)
-                self._runs.append((indices, runner))
+        for (fast, _), indices in members.items():
+            if fast:
+                self.engine = EQUATION
+            self._members.append((fast, indices))
+
+    def _runner(self, fast: Hashable, indices: Sequence[int]) -> Any:
+        """Return what runs these cases, as many candidates at once as fit the memory of a batch."""
+        of_one = sum(item.bytes for item in self._prepared)
+        slots = max(1, min(self._slots, BATCH_BYTES // of_one))
+        with memory_for(self._prepared), callback.installed():
+            if fast:
+                cases = [self.cases[i] for i in indices]
+                return equation.Equations(self.goal, cases, self.names, self.threads, self._device)
+            batch = [self._prepared[i] for i in indices]
+            return _RepeatedBatch(batch, self.names, self.threads, self._off, slots)
+
+    def _each_runner(self) -> Iterator[tuple[Sequence[int], Any]]:
+        """Yield the indices of cases and what runs them, which is kept for the next candidates; of
+        large models, which a batch has twice, one after the other is made and freed.
+        """
+        models = {id(item.mechanism): item.mechanism.model for item in self._prepared}
+        if sum(map(mujoco.mj_sizeModel, models.values())) > LARGE_MODELS:
+            for member in self._members:
+                yield member[1], self._runner(*member)
+            return
+        if not self._runners:
+            self._runners = [self._runner(*member) for member in self._members]
+        for (_, indices), runner in zip(self._members, self._runners, strict=True):
+            yield indices, runner
+
+    def release(self) -> None:
+        """Free the memory of the runs, which the next call makes again."""
+        self._runners = []
 
     def __call__(self, candidates: Sequence[Floats]) -> list[Evaluation]:
         """Return the evaluations of sets of gains."""
         size = len(self.cases)
         terms = [(0.0, 0.0)] * (size * len(candidates))
-        for indices, engine in self._runs:
+        for indices, engine in self._each_runner():
             for k, costs in enumerate(engine(candidates, self._terms)):
                 row, column = divmod(k, len(indices))
                 terms[row * size + indices[column]] = costs

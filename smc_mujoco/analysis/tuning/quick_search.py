@@ -42,6 +42,10 @@ RULE = (
 )
 
 
+class OutOfTime(Exception):
+    """The time of a search is over: it ends with the best sets so far."""
+
+
 class SearchSpace(NamedTuple):
     """Where a search looks for gains."""
 
@@ -59,6 +63,7 @@ def search(
     """
     usual = int(SCREENED_SHARE * size)
     hypercube(alone, space.box, random, WIDER * usual, space.inside)
+    alone.cheap.release()
     spent = round(alone.count / len(every.cheap.cases))
     count = max(FEWEST, int(KEPT * usual))
     decided = alone.decided.values()

@@ -391,7 +391,7 @@ class TuningTask(NamedTuple):
         self, by_equation: Evaluator, random: np.random.Generator, report: Report, failure: str
     ) -> SearchResult:
         """Make a search by the rule of `quick_search`, all cases by the equation or at one step a
-        control period.
+        control period. A `report` that raises OutOfTime ends it with the best set so far.
         """
         if by_equation.engine == EQUATION:
             coarse = by_equation
@@ -401,10 +401,20 @@ class TuningTask(NamedTuple):
             accurate = by_equation
         first = coarse.of_first()
         trials = self._trials(coarse, coarse, report)
-        alone = self._trials(first, first, lambda count: None)
+        alone = self._trials(first, first, lambda count: report(0))
         space = quick_search.SearchSpace(self.box, self.searched, self.inside)
-        spent = quick_search.search(alone, trials, space, random, self.size)
-        decided = accurate([evaluation.gains for evaluation in quick_search.first(trials)])
+        spent = 0
+        to_decide = quick_search.DECIDED
+        try:
+            spent = quick_search.search(alone, trials, space, random, self.size)
+        except quick_search.OutOfTime:
+            to_decide = 1
+            if not (trials.decided or alone.decided):
+                raise
+        if coarse is not accurate:
+            coarse.release()
+        best_first = quick_search.first(trials) or quick_search.first(alone)
+        decided = accurate([evaluation.gains for evaluation in best_first[:to_decide]])
         best = min(decided, key=lambda evaluation: evaluation.objective)
         self._refuse_broken(best, failure)
         count = spent + trials.count + len(decided)

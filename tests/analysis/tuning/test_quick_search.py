@@ -86,3 +86,21 @@ def test_another_draw_is_another_search_on_the_same_runs(task, tmp_path):
     stems = {task.file(1, tmp_path, draw).stem for draw in (0, 1)}
     assert len(stems) == 2
     assert np.isfinite(again.best.objective)
+
+
+@pytest.mark.parametrize("last", [0, 3, 6])
+def test_a_search_whose_time_is_over_ends_with_the_best_set_so_far(last):
+    """After so many reports; before the first evaluation it has none."""
+    task = search.task_of("duffing", smc.law("pid"), GOAL, 4, 0, 1)._replace(quick=True)
+    reports = []
+
+    def report(count):
+        reports.append(count)
+        if len(reports) > last:
+            raise quick_search.OutOfTime
+
+    result = task.search(0, "", report)
+    whole = task.search(0, "", lambda count: None)
+    assert result.evaluations <= whole.evaluations
+    assert len(result.history) == 1
+    assert result.best.objective >= 0.5 * whole.best.objective
