@@ -6,26 +6,76 @@ Here `s` is a Scenario, which imports this module.
 import math
 from typing import Any
 
+import numpy as np
+
 from smc_mujoco.common.text import joined, number
 from smc_mujoco.mechanisms.layout import driven_names
 from smc_mujoco.mechanisms.plant import Plant
 
+SET_POINT = "{x}"  # the unit of u before a position servo
+INSTANTS = 101  # of a run, in which its reference is looked at
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
 
 
 def default_bound(s: Any) -> float | tuple[float, ...]:
     """Return the default of u_max: of each joint that of its motor, or what the plant suggests."""
     suggested = suggested_u_max(s.plant)
-    if not any(part.bound is not None for part in s.actuator):
+    if not any(part.bound is not None or part.unit == SET_POINT for part in s.actuator):
         return suggested
     bounds = list(suggested) if isinstance(suggested, tuple) else [suggested] * s.plant.driven
+    own = s.plant.suggested.get("u_max", (None,) * s.plant.driven)
     # what the plant suggests is for the servos that it keeps
-    none = ((),) * s.plant.driven
-    drives_of_file = s.plant.suggested.get("actuator", none)
     for i, motor in enumerate(s.drive_train.motors):
-        if motor.bound is not None and not any(part.unit for part in drives_of_file[i]):
+        if servo_of(s.plant, i) is not None:
+            if own[i] is None and motor.unit == SET_POINT:
+                bounds[i] = min(bounds[i], _asked(s, i, motor))
+        elif motor.bound is not None and not any(part.unit for part in drives_of_file(s.plant, i)):
             bounds[i] = motor.bound
     return tuple(bounds) if len(set(bounds)) > 1 else bounds[0]
+
+
+def drives_of_file(plant: Plant, i: int) -> tuple[Any, ...]:
+    """Return the actuators of a file that a plant keeps at its driven channel i."""
+    return plant.suggested.get("actuator", ((),) * plant.driven)[i]
+
+
+def servo_of(plant: Plant, i: int) -> Any:
+    """Return the position servo that a plant keeps at its driven channel i, or None."""
+    return next((part for part in drives_of_file(plant, i) if part.unit == SET_POINT), None)
+
+
+def _reach(plant: Plant, i: int, servo: Any) -> float:
+    """Return how far from the goal a file lets the set-point of a servo be, rad (m)."""
+    if servo.bound is not None:
+        return servo.bound
+    _, low, high = plant.ranges[i]
+    return max(high - servo.goal, servo.goal - low)
+
+
+def _asked(s: Any, i: int, servo: Any) -> float:
+    """Return how far from the goal a run asks for the set-point of a servo, rad (m), with two
+    digits: as far as the joint starts and its reference goes, and farther by what makes the servo
+    give all its force there, or what it needs to move and to hold, but by no less than the way
+    from the start.
+    """
+    from smc_mujoco.mechanisms.custom.scales import FARTHEST, needs, usual_start
+    from smc_mujoco.simulation.coerce import suggested_reference
+    from smc_mujoco.simulation.python_functions import evaluate
+
+    starts = [usual_start(s.plant)[i] - servo.goal]
+    starts += [] if s.x0 is None else [s.x0[i] - servo.goal]
+    way = FARTHEST * max(map(abs, starts))
+    reference = suggested_reference(s.plant) if s.reference is None else s.reference
+    signal = getattr(reference, "signals", (reference,) * s.plant.driven)[i]
+    farthest = way
+    lead = 0.0
+    for t in np.linspace(0.0, s.duration, INSTANTS):
+        r, dr, _ = evaluate(signal, float(t))
+        farthest = max(farthest, abs(r - servo.goal))
+        lead = max(lead, servo.kv * abs(dr) / servo.kp)
+    stall = math.inf if servo.stall is None else servo.stall
+    need = needs(s.plant)[i] / servo.kp
+    return float(f"{farthest + lead + min(stall / servo.kp, max(way, need)):.2g}")
 
 
 def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:
@@ -38,8 +88,12 @@ def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:
     if _unbounded(plant):
         limits = _limits(plant)
     bounds = []
-    for limit, bound in zip(limits, suggested, strict=True):
-        bounds.append(limit if bound is None else bound)
+    for i, (limit, bound) in enumerate(zip(limits, suggested, strict=True)):
+        servo = servo_of(plant, i)
+        if bound is not None:
+            bounds.append(bound)
+        else:
+            bounds.append(limit if servo is None else _reach(plant, i, servo))
     return tuple(bounds) if len(set(bounds)) > 1 else bounds[0]
 
 

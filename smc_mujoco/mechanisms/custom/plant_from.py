@@ -451,7 +451,9 @@ def _kept(
     bounds = list(given.get("u_max", (None,) * len(motors)))
     for i, motor in enumerate(motors):
         if bounds[i] is None and motor.of_file and motor.of_file[-1].unit:
-            bounds[i] = own.bound_of_kept(label, model, motor.joint, motor.of_file[-1])
+            bound = own.bound_of_kept(label, model, motor.joint, motor.of_file[-1])
+            if not isinstance(motor.of_file[-1], PositionServo):  # whose bound a run asks for
+                bounds[i] = bound
     bounded = {"u_max": tuple(bounds)} if any(bounds) else {}
     return {"actuator": parts, **bounded}
 

@@ -131,10 +131,8 @@ def test_a_bound_and_a_goal_follow_from_the_file():
         (-0.5, 1.0),
         0.2,
     )
-    assert smc.Scenario(plant=arm, law="pid").limits == (
-        0.8,
-        2.4,
-    )  # ctrlrange or range, about the goal
+    far = smc.Scenario(plant=arm, law="pid", reference=[smc.Constant(2.0), smc.Constant(-2.0)])
+    assert far.limits == (0.8, 2.4)  # ctrlrange or range, about the goal
     assert b.kp == 20.0
     assert b.kv > 0.0
     assert b.bound is None
@@ -360,7 +358,7 @@ STRONG = BARE.replace('forcerange="-2.94 2.94"', "")
     [(smc.law("classical", k=0.2, c=8.0), 0.01), (smc.law("super_twisting", k1=0.5, k2=0.5), 0.02)],
 )
 def test_predicted_chattering_has_the_servo_s_spring(law, late):
-    fields = {"law": law, "x0": 0.1, "duration": 6.0, "input_delay": late}
+    fields = {"law": law, "x0": 0.1, "duration": 6.0, "input_delay": late, "u_max": 1.9}
     scenario = smc.Scenario(plant=servo(STRONG), **fields)
     predicted = smc.design.chattering(scenario)
     ideal = smc.plant_from(BARE, {"j": smc.Channel(motor=True)})
@@ -555,3 +553,24 @@ def test_traces_in_a_list_are_to_be_scored_one_at_a_time():
         smc.score([trace])
     with pytest.raises(ScenarioError, match=r"in Python smc.law\('pid'\)"):
         smc.grid(servo(HOBBY % POSITION), ["pid"])
+
+
+@pytest.mark.parametrize(
+    ("fields", "farthest", "lead"),
+    [
+        ({}, 1.2 * 0.3, 0.0),
+        ({"x0": -0.6}, 1.2 * 0.6, 0.0),
+        ({"reference": smc.Constant(1.0)}, 1.0, 0.0),
+        ({"reference": smc.Sine(0.5, 2.0)}, 0.5, 0.1 * 1.0 / KP),
+    ],
+)
+def test_a_set_point_goes_no_farther_by_default_than_a_run_asks_for(fields, farthest, lead):
+    """Beyond the farthest place of the joint by 2.94 N m / kp the servo gives all its force, so a
+    law that drives the set-point on only winds it up: 1.9 rad past the goal in a step of 0.3.
+    """
+    plant = servo(HOBBY % POSITION)
+    scenario = smc.Scenario(plant=plant, law="pid", duration=4.0, **fields)
+    assert scenario.limits[0] == pytest.approx(farthest + lead + 2.94 / KP, rel=0.04)  # two digits
+    own = servo(HOBBY % POSITION, u_max=1.7)
+    assert smc.Scenario(plant=own, law="pid", **fields).limits == (1.7,)
+    assert smc.Scenario(plant=plant, law="pid", u_max=1.6, **fields).limits == (1.6,)
