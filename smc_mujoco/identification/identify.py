@@ -65,6 +65,7 @@ from smc_mujoco.simulation import conditions
 from smc_mujoco.simulation.conditions import DURATION, Condition, find_condition
 from smc_mujoco.simulation.part_numbers import FIELDS
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.signals import Noise
 
 SHORT_TIME = 0.1  # s: a shorter one is printed in ms; chosen
 POOR_FIT = 80.0  # percent: a fit below may mean that the search ended in a wrong place; chosen
@@ -190,7 +191,18 @@ class Identified(Answer):
         Raises:
           ScenarioError: the rig is a published machine, whose scenarios are `rig.scenario(law)`.
         """
-        return conditions.condition(name, **self.rig.condition_fields())
+        fields = self.rig.condition_fields()
+        if noise := self.noise:
+            fields["noise"] = Noise(noise)
+        return conditions.condition(name, **fields)
+
+    @property
+    def noise(self) -> float:
+        """The standard deviation of the white noise of the logs' positions, rad or m: of the
+        quietest column of each, in the median, to two digits.
+        """
+        deviations = [records.noise(dict(log), self.rig.columns) for log in self.data]
+        return float(f"{np.median(deviations):.1e}") if deviations else 0.0
 
     def __repr__(self) -> str:
         values = []
@@ -306,10 +318,15 @@ class Identified(Answer):
         return about
 
     def save(self, path: str | Path) -> Path:
-        """Write a file, and return its path. FILE.txt is the condition, with values and errors as
-        comments, for --condition of compare, which and tune. Any other is `about` as JSON.
+        """Write a file, and return its path.
+
+        FILE.txt is the condition, with values and errors as comments, for --condition of compare,
+        which and tune. FILE.xml is your model as MJCF with the numbers found, and FILE.urdf as the
+        URDF that it was. Any other is `about` as JSON.
         """
         file = Path(path)
+        if file.suffix.lower() in (".xml", ".urdf"):
+            return self.rig.save_model(file)
         if file.suffix != ".txt":
             return write_json(file, self.about())
         return number_text.save_condition(file, str(self), self.condition())

@@ -9,7 +9,7 @@ from pathlib import Path
 from smc_mujoco.common.aliases import AnyPath, Array, Data, Fields, Numbers
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.identification import first_guess, log_quality, servo_columns
+from smc_mujoco.identification import first_guess, log_quality, model_file, servo_columns
 from smc_mujoco.identification.lack_of_fit import Lack
 from smc_mujoco.identification.lacking_forces import lacking_forces
 from smc_mujoco.identification.log_rig import LogRig, of_runs
@@ -55,6 +55,10 @@ class OwnRig(LogRig):
         """
         solved = self.with_values(replays.values(slopes.point))
         return lacking_forces(solved, replays, slopes) + presliding(solved, replays, slopes)
+
+    def save_model(self, path: Path) -> Path:
+        """Write the machine's model file with the rig's values, and return the path."""
+        return model_file.save_model(self, path)
 
     def figure(
         self,

@@ -8,6 +8,7 @@ its search starts and within which range.
     hand.payload              kg, a point mass at the centre of mass of a body of the model
     m, grav                   kg and m/s^2: the mass of all that moves, and gravity; or other
                               parameters of a plant of the library
+    elbow.kp, .kv, .ki        of the joint's position servo in the model
     friction.elbow.kc         a number of a part of the scenario: FIELD.JOINT.NAME, or FIELD.NAME
 
 Dry friction with another level in each direction is frictionloss and offset: the levels are
@@ -28,6 +29,7 @@ from smc_mujoco.mechanisms.custom.model_numbers import model_numbers, with_model
 from smc_mujoco.mechanisms.custom.plant_from import PARAMETER_UNITS
 from smc_mujoco.mechanisms.hardware.moments import JointState
 from smc_mujoco.mechanisms.hardware.part import Friction, Part
+from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
 from smc_mujoco.mechanisms.layout import channel_names, driven_names
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.part_numbers import (
@@ -42,6 +44,7 @@ from smc_mujoco.simulation.part_numbers import (
 from smc_mujoco.simulation.scenario import Scenario
 
 DELAY = "input_delay"
+SERVO = "kp", "kv", "ki"  # of a position servo
 MAX_DELAY = 0.05  # s, up to which a delay is looked for; chosen
 MAX_ZERO = 0.5  # rad or m, of an encoder; chosen
 MIN_GAIN = 1e-6  # chosen: a motor that does nothing cannot be found
@@ -92,8 +95,8 @@ def resolved(base: Scenario, names: Sequence[str]) -> Paths:
             quantities[name] = Quantity(plant.parameters[name], unit, "the plant", least)
         elif quantity := _of_signals(base, str(name)):
             quantities[name] = quantity
-        elif is_path(str(name)):
-            places[name], quantities[name] = _of_part(base, name)
+        elif path := _path_of_part(base, str(name)):
+            places[name], quantities[name] = _of_part(base, path)
         else:
             raise unknown(f"number of {plant.name}", name, known_paths(base))
     return Paths(with_model_numbers(plant, of_joints.keys() & quantities), quantities, places)
@@ -106,6 +109,9 @@ def known_paths(base: Scenario) -> list[str]:
     for joint in driven_names(plant):
         paths += [f"{joint}.gain", f"{joint}.offset"]
     paths += [f"{joint}.zero" for joint in channel_names(plant)]
+    for joint, motor in zip(driven_names(plant), base.drive_train.motors, strict=True):
+        if isinstance(motor, PositionServo):
+            paths += [f"{joint}.{kind}" for kind in SERVO]
     for field in FIELDS:
         paths += paths_of_parts(base, field)
     return paths
@@ -143,6 +149,20 @@ def _of_signals(base: Scenario, name: str) -> Quantity | None:
         unit = base.plant.units[channel_names(base.plant).index(joint)]
         return Quantity(0.0, unit, "nominal", -MAX_ZERO, MAX_ZERO)
     return None
+
+
+def _path_of_part(base: Scenario, name: str) -> str:
+    """Return the path of a part's number: a name that is one, or JOINT.kp of a joint's servo; ""
+    for another name.
+    """
+    if is_path(name):
+        return name
+    joint, _, kind = name.rpartition(".")
+    if kind in SERVO and joint in driven_names(base.plant):
+        motor = base.drive_train.motors[driven_names(base.plant).index(joint)]
+        if isinstance(motor, PositionServo):
+            return f"actuator.{joint}.{kind}"
+    return ""
 
 
 def _of_part(base: Scenario, path: str) -> tuple[PartNumber, Quantity]:

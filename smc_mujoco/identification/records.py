@@ -16,6 +16,7 @@ import numpy as np
 from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair, Data, Floats, Names
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import csv_rows, reading
+from smc_mujoco.identification import column_units
 from smc_mujoco.simulation import trace as traces
 from smc_mujoco.simulation.python_functions import evaluate
 from smc_mujoco.simulation.readings import readings
@@ -32,6 +33,7 @@ MAX_PERIOD = 0.2
 MAX_GAP = 10
 MAX_GAP_CLOSED = 1.5  # periods: the same for a closed loop, of which no sample may be missing
 NORMAL_MEDIAN = 0.6745  # median of |z| for a standard normal z
+UNITS_READ = "s, ms, rad, deg, m, mm, N m, N, V and their like"
 ROUNDING = 1e-9  # of the largest value: a smaller difference of two is rounding; chosen
 RESOLUTION = 1e-6  # s, to which the period of an open-loop record is rounded
 
@@ -108,8 +110,11 @@ def as_columns(record: Any, columns: Mapping[str, str] | None = None) -> Any:
     if hasattr(record, "to_dict") and hasattr(record, "columns"):  # a data frame
         frame = record
         record = {}
-        for name in frame.columns:
-            record[str(name)] = np.asarray(frame[name])
+        names, factors = column_units.headings(list(map(str, frame.columns)), "the data frame")
+        for k, (name, factor) in enumerate(zip(names, factors, strict=True)):
+            record[name] = np.asarray(frame.iloc[:, k] if hasattr(frame, "iloc") else frame[:, k])
+            if factor != 1.0:
+                record[name] = factor * record[name]
     if isinstance(record, Mapping):
         return renamed(record, columns, "the record")
     return record
@@ -122,9 +127,7 @@ def _csv(file: Path) -> Record:
         raise ScenarioError(
             f"{file} has {len(rows)} lines: give a first line with the columns' names, and samples"
         )
-    heads = []
-    for name in rows[0]:
-        heads.append(name.split("[")[0].strip().lstrip("# "))
+    heads, factors = column_units.headings(rows[0], str(file))
     values = []
     for number, row in enumerate(rows, 1):
         if len(row) != len(heads):
@@ -133,7 +136,7 @@ def _csv(file: Path) -> Record:
                 "give one for each"
             )
         values.append(list(map(_cell, row)))
-    return dict(zip(heads, np.array(values[1:]).T, strict=True))
+    return dict(zip(heads, (np.array(values[1:]) * factors).T, strict=True))
 
 
 def _cell(text: str) -> float:
@@ -177,16 +180,7 @@ def checked(record: Data, columns: Columns, period: float | None, rig: str) -> R
         raise ScenarioError(
             f"record is {shown(record)}: give a mapping of columns, such as numpy.load(file)"
         )
-    missing = []
-    for name in columns.needed(period is not None):
-        if name not in record:
-            missing.append(name)
-    if missing:
-        raise ScenarioError(
-            f"the record of {rig} has no column {', '.join(missing)} "
-            f"(it has {', '.join(map(str, record)) or 'none'}): add it, or say which it is, as "
-            f"--columns {missing[0]}=NAME (in Python columns={{{missing[0]!r}: 'NAME'}})"
-        )
+    _check_columns(record, columns.needed(period is not None), rig)
     data = {}
     for name in columns.readable:
         if name in record:
@@ -207,6 +201,31 @@ def checked(record: Data, columns: Columns, period: float | None, rig: str) -> R
     for name, offset in zip(columns.x, columns.offset, strict=False):
         data[name] = data[name] - offset
     return data
+
+
+def _check_columns(record: Data, needed: Names, rig: str) -> None:
+    """Raise ScenarioError for a column that a record lacks, or has in a unit that is not known."""
+    missing = []
+    for name in needed:
+        if name not in record:
+            missing.append(name)
+    if missing:
+        if column := column_units.with_unit(missing[0], list(map(str, record))):
+            cure = ""
+            if missing[0].startswith("u"):
+                cure = (
+                    f", or name it by --columns '{missing[0]}={column}' (in Python columns="
+                    f"{{{missing[0]!r}: {column!r}}}) and find the joint's gain, JOINT.gain"
+                )
+            raise ScenarioError(
+                f"column {column!r} of {rig} has a unit that is none of {UNITS_READ}: give "
+                f"{missing[0]} in such a unit{cure}"
+            )
+        raise ScenarioError(
+            f"the record of {rig} has no column {', '.join(missing)} "
+            f"(it has {', '.join(map(str, record)) or 'none'}): add it, or say which it is, as "
+            f"--columns {missing[0]}=NAME (in Python columns={{{missing[0]!r}: 'NAME'}})"
+        )
 
 
 def _checked_step(t: Array, period: float | None, rig: str) -> float:

@@ -234,6 +234,10 @@ class Rig:
         """Sentences on what the quantities mean."""
         return []
 
+    def save_model(self, path: Path) -> Path:
+        """Write the machine's model file with the rig's values, and return the path."""
+        raise ScenarioError(f"{self.name} has no model file: cannot save {path.name}")
+
     def condition_fields(self) -> Fields:
         """Return the fields of a condition under which a machine has the rig's values."""
         raise ScenarioError(f"{self.name} is a rig: take rig.scenario(law), or compare(rig=...)")

@@ -242,6 +242,9 @@ def test_numbers_found_are_a_condition_that_files_and_runs_take(found, arm, tmp_
     path = found.save(tmp_path / "found.txt")
     (read,) = from_file(path)
     assert read.on(arm, 1.0) == fields
+    assert fields.pop("noise").position == found.noise
+    rounding = 2.0 * np.pi / 4096 / np.sqrt(12.0)
+    assert found.noise == pytest.approx(np.hypot(2e-4, rounding), rel=0.15)
     law = smc.law("pid", kp=20.0, ki=0.0, kd=1.5)
     common = {"plant": arm, "law": law, "duration": 0.5, "x0": 0.5, "u_max": 10.0}
     by_parts = smc.Scenario(
@@ -734,7 +737,7 @@ def test_the_command_takes_joints_from_a_log_and_writes_a_figure_and_a_condition
         ("input_delay", "ms"),
     ]
     (condition,) = from_file(tmp_path / "found.txt")
-    late = dict(condition.fields)["input_delay"]  # pyright: ignore[reportArgumentType, reportCallIssue]
+    late = condition.on(smc.plant_from(ONE, ["j1"]), 1.0)["input_delay"]
     assert float(rows[2][1]) == pytest.approx(1e3 * late, abs=0.13)  # whole steps of 0.25 ms
     assert re.search(r"fits (\S+) %, held out (\S+) %", done.output)
     assert max(map(len, done.output.splitlines())) <= 80

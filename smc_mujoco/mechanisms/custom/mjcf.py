@@ -289,7 +289,7 @@ def _of_spec(spec: mujoco.MjSpec) -> ModelSource:
     mujoco.mj_clearCache(mujoco.mj_getCache())
     try:
         model = mjcb.compiled(copied)
-        text = _full_precision_xml(copied)
+        text = full_precision_xml(copied)
     except FROM_MUJOCO as error:
         raise broken("the MjSpec", str(error), "") from None
     as_text = _of_text(text, _assets(spec, text))
@@ -303,7 +303,7 @@ def _of_spec(spec: mujoco.MjSpec) -> ModelSource:
 
 def digest_of(spec: mujoco.MjSpec) -> str:
     """Hash an MjSpec as it is now, and the files that it names: SHA-256, 64 hex digits."""
-    text = _full_precision_xml(spec)
+    text = full_precision_xml(spec)
     assets = dict(sorted(_assets(spec, text).items()))
     return _sha256([text.encode(), *assets.values()])
 
@@ -320,7 +320,7 @@ def _assets(spec: mujoco.MjSpec, text: str) -> dict[str, bytes]:
     return assets
 
 
-def _full_precision_xml(spec: mujoco.MjSpec) -> str:
+def full_precision_xml(spec: mujoco.MjSpec) -> str:
     """Return the XML of a compiled spec, with all digits if this MuJoCo can write them."""
     library = libmujoco.library()
     try:
