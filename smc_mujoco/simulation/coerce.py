@@ -401,13 +401,15 @@ def friction(name: str, value: Frictions | None, s: Any) -> tuple[Friction, ...]
     """
     items = _by_joint(name, value, s, Friction, "smc.Coulomb(0.05)", all_joints)
     for part, another in itertools.combinations(items, 2):
+        if part.side != another.side:  # of a spring or a play: two bodies
+            continue
         same = type(part) is type(another) and part.on == another.on
         first_joints = part.joint_names(s.plant)
         shared = {*first_joints} & {*another.joint_names(s.plant)}
         if same or (part.keeps_state and another.keeps_state and shared):
             kinds = f"{type(part).__name__} and {type(another).__name__}"
             raise ScenarioError(f"{name} has {kinds} on the same joint: give one of them")
-    ordered = sorted(items, key=lambda part: (type(part).__name__, part.on))
+    ordered = sorted(items, key=lambda part: (type(part).__name__, part.on, part.side))
     return tuple(ordered)
 
 

@@ -277,3 +277,44 @@ def test_the_page_has_what_a_spring_does_to_the_order_of_laws():
         (row,) = re.findall(rf"^\| `{law}` \| (.*) \|$", page, re.MULTILINE)
         cells = row.replace("*", "").split(" | ")
         assert values == pytest.approx(list(map(float, cells)), rel=0.2)
+
+
+FREE_HINGE = """<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="j" axis="0 0 1"/>
+<geom type="box" size=".1 .1 .1" mass="3" contype="0" conaffinity="0"/></body></worldbody>
+<actuator><motor joint="j" ctrlrange="-10 10"/></actuator></mujoco>"""
+OF_BOTH = 3.0 * 2.0 * 0.2**2 / 12.0 + 0.01  # kg m^2, with the rotor
+
+
+@smc.law_function(gains={"u": 1.0})
+def pushed(y, gains, memory):
+    return gains.u, y.e
+
+
+@pytest.mark.parametrize(
+    "part",
+    [smc.hardware.ElasticJoint(500.0, 0.5, 0.01), smc.Backlash(0.01, rotor_inertia=0.01)],
+    ids=["spring", "play"],
+)
+def test_friction_of_one_kind_acts_on_both_sides(part):
+    """Closed forms of both bodies together; it was refused as one friction given twice."""
+    fields = {
+        "plant": smc.plant_from(FREE_HINGE, ["j"]),
+        "actuator": part,
+        "x0": 0.0,
+        "duration": 2.0,
+    }
+
+    def end(u, *friction):
+        return smc.run(smc.Scenario(law=pushed(u=u), friction=friction, **fields)).v[-1, 0]
+
+    assert end(0.5, smc.Viscous(0.4), smc.Viscous(0.6, side="motor")) == pytest.approx(0.5)
+    dry = smc.Coulomb(0.2, side="motor"), smc.Coulomb(0.1)
+    assert end(0.5, *dry) == pytest.approx(0.2 / OF_BOTH * 2.0, rel=0.01)
+    assert abs(end(0.29, *dry)) < 1e-6
+    assert end(0.31, *dry) > 0.5
+
+
+def test_two_frictions_of_one_kind_on_one_side_are_refused(refused):
+    fields = {"plant": "inverted_pendulum", "law": "pid", "actuator": smc.Backlash(0.01)}
+    twice = smc.Coulomb(0.1, side="motor"), smc.Coulomb(0.2, side="motor")
+    refused(lambda: smc.Scenario(friction=twice, **fields), "give one of them")
