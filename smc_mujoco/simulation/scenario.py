@@ -100,8 +100,10 @@ class Scenario:
       feedforward: what is added to the law's u before its bound: a Feedforward, which compensates
         friction; or a known signal, the same for every driven channel, such as an excitation, or
         the command of a recorded experiment (with the law "none"). None: nothing is added.
-      disturbance: d(t) on every driven channel: one signal, or several to be added, or None. On one
-        joint acts a Fault's bias, on a body a Push.
+      disturbance: d(t) on every driven channel: one signal, or several to be added, or None. Of
+        your own model it acts on the joint alone, as its motor does; of a plant of the library on
+        the body that the joint carries, so that it moves other joints, too. On one joint acts a
+        Fault's bias, on a body a Push.
       noise: measurement noise, or None. With an Encoder it is added to the position before that is
         rounded to counts.
       input_delay: s; a whole number of physics steps. Before the first command arrives, u is 0.

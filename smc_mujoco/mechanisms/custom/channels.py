@@ -25,6 +25,7 @@ from smc_mujoco.common.errors import (
     shown,
     users_stacklevel,
 )
+from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.custom.actuator_kinds import filters, gear_of, no_motor
 from smc_mujoco.mechanisms.custom.kept_actuators import (
     ctrlrange_of,
@@ -525,9 +526,11 @@ def motor_of(
         bounds.append(_together(model, actuators))
     elif not actuators:
         if not bounds or _has_actuators(model):
+            pulled = pulled_by(model, joint)
+            left_out = f", which leaves out that {joined(pulled)} pull at it" if pulled else ""
             raise ScenarioError(
-                f"no actuator of {label} drives joint {joint!r} alone: {cure}; without a u_max its "
-                "bound is what the joint's load and travel need"
+                f"no actuator of {label} drives joint {joint!r} alone: {cure}{left_out}; without a "
+                "u_max its bound is what the joint's load and travel need"
             )
     elif len(actuators) > 1:
         raise ScenarioError(f"joint {joint!r} of {label} has the actuators {names}: {cure}")
@@ -590,6 +593,26 @@ def bound_of_kept(label: str, model: mujoco.MjModel, joint: str, part: Actuator)
         f"the servo of joint {joint!r} of {label} has no ctrlrange, and the joint has no range: "
         f"{cure} on the distance of the set-point from the goal"
     )
+
+
+def pulled_by(model: mujoco.MjModel, joint: str) -> list[str]:
+    """Return the actuators of tendons that act on a joint at the model's default pose, quoted."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    moments = np.zeros((model.nu, model.nv))
+    mujoco.mju_sparse2dense(
+        moments,
+        data.actuator_moment,
+        data.moment_rownnz,
+        data.moment_rowadr,
+        data.moment_colind,
+    )
+    names = []
+    for i in np.flatnonzero(moments[:, model.joint(joint).dofadr[0]]):
+        if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_TENDON:
+            tendon = model.tendon(model.actuator_trnid[i, 0]).name
+            names.append(repr(model.actuator(i).name or tendon or f"number {i}"))
+    return names
 
 
 def _on_joint(model: mujoco.MjModel, joint_id: int) -> list[int]:

@@ -165,6 +165,7 @@ def plant_from(
         )
     seen = [*joints_of(pairs), *measured]
     doubts += _doubts_of_others(source.label, spec, model, seen, others)
+    doubts += _left_out_cables(source.label, model, pairs)
     for doubt in doubts:
         warnings.warn(doubt, ScenarioWarning, users_stacklevel())
     return machine
@@ -197,6 +198,17 @@ def _assumed_drives(label: str, machine: Plant, pairs: Pairs) -> Iterator[str]:
                 f"u of {joint!r} of {label} is {meaning}, as in the file: "
                 f"{joint}(servo), or smc.Channel(servo=True), says so without this line, and "
                 f"{joint}(motor), or motor=True, puts an ideal motor there, whose u is a force"
+            )
+
+
+def _left_out_cables(label: str, model: mujoco.MjModel, pairs: Pairs) -> Iterator[str]:
+    """Yield a sentence on each joint whose ideal motor stands for cables that pull at it."""
+    for joint, channel in pairs:
+        if channel.motor and (pulled := own.pulled_by(model, joint)):
+            yield (
+                f"the ideal motor of joint {joint!r} of {label} leaves out that {joined(pulled)} "
+                "pull at it: it may push, and no tension is bounded, so its runs are of another "
+                "machine"
             )
 
 

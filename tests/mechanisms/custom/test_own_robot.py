@@ -267,3 +267,22 @@ def test_a_xacro_is_refused_with_its_command(folder):
         smc.plant_from("arm.urdf.xacro", ["j1"])
     with pytest.raises(smc.ScenarioError, match=r"xacro FILE > FILE.urdf"):
         as_plant("arm.urdf.xacro:j1")
+
+
+CABLES = """<mujoco model="cables"><worldbody><site name="a" pos="-1 0 2"/><site name="b" pos="1 0 2"/>
+<body pos="0 0 1"><joint name="x" type="slide" axis="1 0 0"/><geom size=".05" mass="2"/>
+<site name="p"/><body pos="0 1 0"><joint name="y" axis="0 0 1"/><geom size=".05"/></body></body>
+</worldbody><tendon><spatial name="c1"><site site="a"/><site site="p"/></spatial>
+<spatial name="c2"><site site="b"/><site site="p"/></spatial></tendon><actuator>
+<motor name="left" tendon="c1" ctrlrange="0 100" gear="-1"/>
+<motor tendon="c2" ctrlrange="0 100" gear="-1"/></actuator></mujoco>"""
+
+
+def test_an_ideal_motor_in_place_of_cables_is_said_to_leave_them_out(refused):
+    refused(lambda: smc.plant_from(CABLES, ["x"]), "leaves out that 'left' and 'c2' pull at it")
+    with pytest.warns(ScenarioWarning, match="leaves out that 'left' and 'c2' pull at it"):
+        smc.plant_from(CABLES, {"x": smc.Channel(motor=True)})
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", ".*pull at it")
+        warnings.filterwarnings("ignore", ".*nothing commands")
+        smc.plant_from(CABLES, {"y": smc.Channel(motor=True)})
