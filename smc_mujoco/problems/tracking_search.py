@@ -31,11 +31,11 @@ from smc_mujoco.simulation import state
 from smc_mujoco.simulation.scenario import Scenario
 
 SEARCHES = 2
-SETS = 720  # of gains, of a search
-DRAWN = 360  # the first of them
+SETS = 960  # of gains, of a search
+DRAWN = 480  # the first of them
 POPULATION = 12  # of CMA-ES
 SPREAD = 0.6  # of its first population, of the logarithm of gains
-CHOOSING, UNSEEN = 2, 24  # instances
+CHOOSING, UNSEEN = 4, 24  # instances
 FIRST_UNSEEN = 1000
 MARGIN = 0.97  # of the limit, within which sets are chosen, so that unseen runs stay about it
 POWER = 4.0  # of the rate over its limit, beyond the limit: by it a search's cost grows

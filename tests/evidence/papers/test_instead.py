@@ -18,7 +18,7 @@ from smc_mujoco.simulation.force_bounds import U_MAX
 pytestmark = pytest.mark.quick
 
 CLAIMS = paper("gaber").claims
-PAGE = (ROOT / "docs" / "what_the_author_may_claim.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "theorem_of_the_observer_free_law.md").read_text(encoding="utf-8")
 VERDICTS = json.loads((Path(__file__).parent / "quick_verdicts.json").read_text())["gaber"]
 X = np.linspace(1e-4, 10.0, 20_000)  # rad or m
 
