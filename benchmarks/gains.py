@@ -29,7 +29,7 @@ from smc_mujoco.simulation.gaber_study import PLANTS
 
 PROCESSES = 2
 # with as many searches as the usual laws: a board of all of them has no place for one more, see
-# `analysis.ranking`, but docs/where_sliding_mode_loses.md ranks it
+# `analysis.ranking`, but the boards of problems rank it
 RANKED = (*gain_sets.COMPARED, "hodob")
 # searches of a law that is not on the first page, and of the set "tracking": too few for a verdict
 OTHERS = 3

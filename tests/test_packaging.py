@@ -85,8 +85,7 @@ def test_the_wheel_holds_the_package_its_data_and_nothing_else(wheel):
             names.add(name)
     assert names == shipped("smc_mujoco") | {
         f"smc_mujoco/{name}"
-        for name in shipped("models", "scenes", "benchmarks/papers")
-        | {"docs/where_sliding_mode_loses.svg", "docs/words.md"}
+        for name in shipped("models", "scenes", "benchmarks/papers") | {"docs/words.md"}
     }
 
 

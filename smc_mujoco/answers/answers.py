@@ -18,6 +18,7 @@ from smc_mujoco.answers.facts import (
     Caution,
     CompareFacts,
     Contest,
+    EnteredFacts,
     IdentifyFacts,
     Lead,
     Level,
@@ -702,3 +703,28 @@ def identify_files(condition: str, figure: str, report: str) -> str:
     if condition:
         parts.insert(0, f"{condition} (--condition {condition})")
     return "     ".join(filter(None, parts))
+
+
+# the boards of tracking problems
+
+
+def entered_lines(facts: EnteredFacts) -> list[str]:
+    """Return where an entry stands in a suite: a line a problem."""
+    level = sum(standing.level for standing in facts.standings)
+    of = f"{level} of {len(facts.standings)} problems"
+    lines = [
+        f"{facts.entry} in {facts.suite}: not led by any of {facts.entries - 1} others in {of}",
+        "",
+    ]
+    rows = [("problem", "place", "error", "first", "its error")]
+    for standing in facts.standings:
+        place = f"{standing.place}{'*' if standing.level else ''}"
+        rows.append((standing.problem, place, standing.error, standing.first, standing.least))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        cells = []
+        for cell, width in zip(row, widths, strict=True):
+            cells.append(cell.ljust(width))
+        lines.append("  ".join(cells).rstrip())
+    lines += ["* no other entry leads. Errors are in counts; lower is better.", ""]
+    return [*lines, *labelled([("more", facts.page)])]

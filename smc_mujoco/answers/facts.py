@@ -278,3 +278,29 @@ class IdentifyFacts:
     by_pieces: bool  # whether that is of pieces of 1 s
     held_out: float | None  # the same of the log that was kept aside
     doubts: tuple[str, ...]  # each says what to do
+
+
+# the boards of tracking problems
+
+
+@keyword_dataclass
+class Standing:
+    """Where an entry stands in a problem."""
+
+    problem: str
+    place: int
+    level: bool  # whether no other entry leads it
+    error: str  # in counts
+    first: str  # the entry with the least error
+    least: str  # its error
+
+
+@keyword_dataclass
+class EnteredFacts:
+    """An entry in a suite, beside those that entered before."""
+
+    entry: str
+    suite: str
+    entries: int  # in all
+    standings: tuple[Standing, ...]  # one for each problem
+    page: str  # the file of the board

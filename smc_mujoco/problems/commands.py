@@ -51,7 +51,10 @@ def enter(
 ) -> None:
     """Enter a law in a benchmark: run it on a suite of problems, and say where it stands.
 
-    FOLDER has one law, law.py, law.c or law.fmu, and entry.toml:
+    In the suites smc-load@1 and smc-friction@1 the law is a name, FILE.py or either beside a
+    compensation, "pid + Feedforward(1)". The command searches for its gains, which takes minutes,
+    and writes the board with its row. In the other suites it is a FOLDER that has one law, law.py,
+    law.c or law.fmu, and entry.toml:
 
         name = "soft relay"
         authors = ["A. Author"]
@@ -68,8 +71,15 @@ def enter(
     A law is a program: read a stranger's before you run it. The pages of --site need no network and
     no server.
 
+    Example: smc-mujoco enter my_law.py --suite smc-friction@1
+
     Example: smc-mujoco enter entries/soft_relay --site
     """
+    with delay_signals():
+        from smc_mujoco.problems.tracking import tracking_suites
+    if suite in tracking_suites():
+        _enter_tracking(folder, suite, results)
+        return
     with delay_signals():
         from smc_mujoco.problems import enter as entering
         from smc_mujoco.problems.results import results as load
@@ -94,6 +104,20 @@ def enter(
         terminal.print(str(changes))
         if changes.worse:
             raise typer.Exit(1)
+
+
+def _enter_tracking(text: str, suite: str, results: Path) -> None:
+    """Search for an entry's gains in a suite of tracking problems, and print where it stands."""
+    from smc_mujoco.answers.answers import entered_lines
+    from smc_mujoco.problems import tracking_page, tracking_results
+
+    terminal = Terminal()
+    target = tracking_results.enter_tracking(text, suite, results, progress=True)
+    board = tracking_results.tracking_board(suite, results)
+    entry = tracking_results.read_result(target).name
+    page = tracking_page.write(board, target.parent / "board.md")
+    for line in entered_lines(board.standing(entry, str(page))):
+        terminal.note(line)
 
 
 def _places(found: "Results", entry: str) -> Iterator[str]:

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from smc_mujoco.analysis.ranking import Comparison
+from smc_mujoco.answers.facts import EnteredFacts, Standing
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import AnyPath, Names
 from smc_mujoco.common.cache import CachedResult
@@ -23,6 +24,7 @@ from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, reading, replacing, slug, write_json
 from smc_mujoco.common.progress import bar
+from smc_mujoco.common.text import number
 from smc_mujoco.common.version import versions
 from smc_mujoco.problems.tracking import TrackingSuite, tracking_suite
 from smc_mujoco.problems.tracking_entry import tracking_entry
@@ -186,6 +188,29 @@ class TrackingBoard:
     def problems(self) -> list[ProblemBoard]:
         """The boards of all problems."""
         return [self.problem(problem.name) for problem in self.suite.problems]
+
+    def standing(self, entry: str, page: str) -> EnteredFacts:
+        """Return where an entry stands, and the file of the board."""
+        standings = []
+        for board in self.problems:
+            first = board.names[0]
+            standings.append(
+                Standing(
+                    problem=board.problem,
+                    place=1 + board.names.index(entry),
+                    level=entry in board.leaders,
+                    error=number(board.errors[entry][1]),
+                    first=first,
+                    least=number(board.errors[first][1]),
+                )
+            )
+        return EnteredFacts(
+            entry=entry,
+            suite=self.suite.name,
+            entries=len(self.entries),
+            standings=tuple(standings),
+            page=page,
+        )
 
     def shares(self) -> dict[str, float]:
         """Return entry -> the share of the problems in which no other leads it, most first."""

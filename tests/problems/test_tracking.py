@@ -1,0 +1,199 @@
+"""Suites of tracking problems: what is searched, run and compared is what a board prints."""
+
+import dataclasses
+import json
+import math
+import shutil
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.problems import tracking_page, tracking_results, tracking_search
+from smc_mujoco.problems.tracking import TrackingProblem, tracking_suite, tracking_suites
+from smc_mujoco.problems.tracking_entry import tracking_entry
+from smc_mujoco.problems.tracking_results import TrackingBoard, enter_tracking, read_result
+from smc_mujoco.problems.tracking_search import TAU, Trials, scenario_of
+from smc_mujoco.simulation.signals import Sine
+
+SUITES = pytest.mark.parametrize("name", tracking_suites())
+GAINS = {"kp": 40.0, "ki": 60.0, "kd": 12.0, "tt": 0.5, TAU: 0.01}
+
+
+def problem(suite, name) -> TrackingProblem:
+    (chosen,) = [each for each in tracking_suite(suite).problems if each.name == name]
+    return chosen
+
+
+def rms(trace, problem):
+    error = (trace.x - trace.r)[-problem.late :, 0]
+    return float(np.sqrt(np.mean(error**2)) / problem.count)
+
+
+@SUITES
+def test_a_window_is_whole_periods_of_what_is_periodic_and_of_control(name):
+    for each in tracking_suite(name).problems:
+        assert each.window / each.period == pytest.approx(each.late, abs=1e-6)
+        omegas = [each.omega] if each.swing else []
+        for signal in np.atleast_1d(np.array(each.fields.get("disturbance", ()), object)):
+            if isinstance(signal, Sine):
+                omegas.append(signal.omega)
+        for omega in omegas:
+            periods = each.window * omega / math.tau
+            assert periods == pytest.approx(round(periods), abs=2e-3)
+            assert periods > 0.99
+
+
+@SUITES
+def test_without_the_load_only_its_forces_differ(name):
+    entry = tracking_entry("pid")
+    for each in tracking_suite(name).problems:
+        loaded, free = (scenario_of(each, entry, GAINS, 3, loaded) for loaded in (True, False))
+        changed = set()
+        for field in dataclasses.fields(loaded):
+            if getattr(loaded, field.name) != getattr(free, field.name):
+                changed.add(field.name)
+        assert changed == {"friction" if each.friction else "disturbance"}
+
+
+@pytest.mark.parametrize(
+    ("suite", "name", "text"),
+    [
+        ("smc-load@1", "duffing-wind", "pid"),
+        ("smc-friction@1", "link-10", "pid + Feedforward(0.7)"),
+    ],
+)
+def test_mujoco_gives_the_error_and_the_rate_that_the_search_sees(suite, name, text):
+    each = problem(suite, name)
+    entry = tracking_entry(text)
+    trials = Trials(each, entry, 1)
+    values = np.array([list(GAINS.values())])
+    error, rate = trials.run(trials.choosing, values)[0, 0]
+    trace = smc.run(scenario_of(each, entry, GAINS, 0))
+    changes = np.abs(np.diff(trace.u[-each.late - 1 :, 0])).sum()
+    assert rms(trace, each) == pytest.approx(error, rel=1e-9)
+    assert changes / each.window / each.bound == pytest.approx(rate, rel=1e-9)
+
+
+def test_a_search_keeps_the_limit_and_the_theorem_and_is_the_same_again(monkeypatch):
+    for name, value in (("SETS", 48), ("DRAWN", 24)):
+        monkeypatch.setattr(tracking_search, name, value)
+    each = problem("smc-load@1", "pendulum-middle")
+    trials = Trials(each, tracking_entry("classical"), 1)
+    steps = []
+    gains = trials.searched(0, steps.append)
+    assert sum(steps) == 48
+    assert gains == trials.searched(0, steps.append)
+    assert gains != trials.searched(1, steps.append)
+    logs = np.log([list(gains.values())])
+    _, allowed = trials.judged(logs)
+    worst = trials.run(trials.choosing, np.exp(logs)).max(axis=1)
+    assert bool(allowed[0]) == (worst[0, 1] <= tracking_search.MARGIN * each.limit)
+
+
+@pytest.mark.parametrize(
+    ("text", "about"),
+    [
+        ("pid + Feedforward(1)", "has none"),
+        ("pid + Feedback(1)", "Feedforward"),
+        ("pidd", "pidd"),
+    ],
+)
+def test_what_is_no_entry_is_refused_before_anything_is_searched(text, about, tmp_path):
+    with pytest.raises(ScenarioError, match=about):
+        enter_tracking(text, "smc-load@1", tmp_path)
+    assert not list(tmp_path.rglob("*.json"))
+
+
+def result(name, levels, spread=0.02, seed=0):
+    """An entry whose medians in a problem are these, of two searches."""
+    rng = np.random.default_rng(seed)
+    searches = {}
+    for problem_name, pair in levels.items():
+        results = []
+        for level in pair:
+            errors = (level * np.exp(rng.normal(0.0, spread, 24))).tolist()
+            free = [0.3] * 24
+            results.append(tracking_search.Found({"k": 1.0}, errors, free, [5.0] * 24))
+        searches[problem_name] = tuple(results)
+    return tracking_results.EntryResult(
+        name=name, text=name, law=name, date="2026-11-30", searches=searches
+    )
+
+
+def board_of(*results):
+    suite = tracking_suite("smc-load@1")
+    suite = dataclasses.replace(suite, problems=suite.problems[:2])
+    return TrackingBoard(suite, results)
+
+
+def test_an_entry_leads_only_if_it_is_better_in_every_pairing_of_the_searches():
+    a, b = [each.name for each in tracking_suite("smc-load@1").problems[:2]]
+    lucky = result("pid", {a: (1.0, 9.0), b: (1.0, 1.1)}, seed=1)
+    steady = result("adrc", {a: (3.0, 3.1), b: (3.0, 3.1)}, seed=2)
+    boards = board_of(lucky, steady).problems
+    assert boards[0].leaders == ("adrc", "pid")
+    assert boards[0].told_apart == 0.0
+    assert boards[1].leaders == ("pid",)
+    assert boards[1].told_apart == 1.0
+    assert boards[0].errors["pid"] == pytest.approx((1.0, 9.0), rel=0.05)
+    assert board_of(lucky, steady).shares() == {"pid": 1.0, "adrc": 0.5}
+
+
+def test_errors_below_the_floor_are_level_and_one_that_is_the_same_without_is_marked():
+    a, b = [each.name for each in tracking_suite("smc-load@1").problems[:2]]
+    fine = result("pid", {a: (0.1, 0.1), b: (0.31, 0.31)}, seed=3)
+    finer = result("adrc", {a: (0.2, 0.2), b: (5.0, 5.0)}, seed=4)
+    boards = board_of(fine, finer).problems
+    assert {*boards[0].leaders} == {"pid", "adrc"}
+    assert not boards[1].of_load("pid")
+    assert boards[1].of_load("adrc")
+
+
+def test_an_entry_changes_a_page_by_its_row_and_what_it_tops_alone():
+    a, b = [each.name for each in tracking_suite("smc-load@1").problems[:2]]
+    first = result("pid", {a: (1.0, 1.1), b: (1.0, 1.1)}, seed=1)
+    last = result("hodob", {a: (7.0, 7.1), b: (7.0, 7.1)}, seed=2)
+    before = tracking_page.page(board_of(first), "p.svg").splitlines()
+    after = tracking_page.page(board_of(first, last), "p.svg").splitlines()
+    added = [line for line in after if line not in before]
+    assert sum("`hodob`" in line for line in added) == 2  # a row in each problem
+    row = next(line for line in before if line.startswith("| `pid` |"))
+    assert row in after
+
+
+@pytest.mark.slow
+def test_a_law_of_ones_own_enters_and_the_same_command_goes_on(tmp_path, monkeypatch):
+    for name, value in (("SETS", 24), ("DRAWN", 12)):
+        monkeypatch.setattr(tracking_search, name, value)
+    law = tmp_path / "my_law.py"
+    law.write_text(
+        "import smc_mujoco as smc\n"
+        "from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain\n"
+        "@smc.law_function(gains={'p': Gain(9.0, FORCE_PER_POSITION), "
+        "'d': Gain(3.0, FORCE_PER_SPEED)})\n"
+        "def mine(y, gains, memory):\n"
+        "    return -gains.p * y.e - gains.d * y.de, y.e\n"
+    )
+    searched = []
+    search = tracking_results.search_problem
+
+    def counted(chosen, *rest):
+        if len(searched) == 2:
+            searched.append(None)
+            raise KeyboardInterrupt
+        searched.append(chosen.name)
+        return search(chosen, *rest)
+
+    monkeypatch.setattr(tracking_results, "search_problem", counted)
+    with pytest.raises(KeyboardInterrupt):
+        enter_tracking(str(law), "smc-load@1", tmp_path, 1)
+    file = enter_tracking(str(law), "smc-load@1", tmp_path, 1)
+    assert len(searched) == 1 + len(tracking_suite("smc-load@1").problems)
+    entered = read_result(file)
+    assert entered.name == "mine"
+    assert {*json.loads(file.read_text())["problems"]} == {
+        each.name for each in tracking_suite("smc-load@1").problems
+    }
+    shutil.rmtree(tmp_path / "smc-load@1")
