@@ -284,7 +284,7 @@ class IdentifyFacts:
 
 
 @keyword_dataclass
-class Standing:
+class ProblemStanding:
     """Where an entry stands in a problem."""
 
     problem: str
@@ -302,5 +302,5 @@ class EnteredFacts:
     entry: str
     suite: str
     entries: int  # in all
-    standings: tuple[Standing, ...]  # one for each problem
+    standings: tuple[ProblemStanding, ...]  # one for each problem
     page: str  # the file of the board

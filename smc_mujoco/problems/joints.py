@@ -29,7 +29,7 @@ MODEL = """
 """
 
 
-def build(kind: str, off: float, n: int) -> mujoco.MjSpec:
+def _build(kind: str, off: float, n: int) -> mujoco.MjSpec:
     """Return the mechanism: a slide, or a link that hangs at x = -off."""
     del n
     numbers = {"axis": "1 0 0", "x": 0.0, "z": 0.0}
@@ -38,18 +38,18 @@ def build(kind: str, off: float, n: int) -> mujoco.MjSpec:
     return mujoco.MjSpec.from_string(MODEL.format(kind=kind, **numbers))
 
 
-def slide_fields(model, p):
+def _slide_fields(model, p):
     yield Field("body_mass", 1, p.M)
     yield Field("dof_damping", 0, p.D)
 
 
-def hinge_fields(model, p):
+def _hinge_fields(model, p):
     yield Field("body_mass", 1, p.G / (GRAVITY * ARM))
     yield Field("dof_armature", 0, p.M - p.G * ARM / GRAVITY)
     yield Field("dof_damping", 0, p.D)
 
 
-def nominal(x, v, i, p):
+def _nominal(x, v, i, p):
     return (-p.G * math.sin(x[i] + p.off) - p.D * v[i]) / p.M, 1.0 / p.M
 
 
@@ -59,9 +59,9 @@ RAIL = Plant(
     mass="M",
     unit="m",
     x0=(0.1,),
-    build=partial(build, "slide", 0.0),
-    fields=slide_fields,
-    nominal=nominal,
+    build=partial(_build, "slide", 0.0),
+    fields=_slide_fields,
+    nominal=_nominal,
 )
 LINK = Plant(
     name="link",
@@ -69,9 +69,9 @@ LINK = Plant(
     mass="M",
     unit="rad",
     x0=(0.5,),
-    build=partial(build, "hinge", 0.8),
-    fields=hinge_fields,
-    nominal=nominal,
+    build=partial(_build, "hinge", 0.8),
+    fields=_hinge_fields,
+    nominal=_nominal,
 )
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from smc_mujoco.analysis.ranking import Comparison
-from smc_mujoco.answers.facts import EnteredFacts, Standing
+from smc_mujoco.answers.facts import EnteredFacts, ProblemStanding
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import AnyPath, Names
 from smc_mujoco.common.cache import CachedResult
@@ -102,7 +102,7 @@ def _compact(about: Mapping) -> str:
 
 
 @keyword_dataclass
-class EntryResult:
+class TrackingResult:
     """An entry's result in a suite."""
 
     name: str
@@ -113,14 +113,14 @@ class EntryResult:
 
 
 @functools.cache
-def read_result(path: Path) -> EntryResult:
+def read_result(path: Path) -> TrackingResult:
     """Return the result in a file. Raise ScenarioError for a file that is none."""
     with reading(path, "result of an entry", "enter the law again") as file:
         about = read_json(file)
         searches = {}
         for problem, results in about["problems"].items():
             searches[problem] = tuple(Found(**result) for result in results)
-        return EntryResult(
+        return TrackingResult(
             name=about["name"],
             text=about["entry"],
             law=about["law"],
@@ -150,7 +150,7 @@ class ProblemBoard:
 class TrackingBoard:
     """The entries of a suite: those that are shipped, and those of a folder of results."""
 
-    def __init__(self, suite: TrackingSuite, results: Sequence[EntryResult]):
+    def __init__(self, suite: TrackingSuite, results: Sequence[TrackingResult]):
         if not results:
             raise ScenarioError(
                 f"no law has entered {suite.name}: smc-mujoco enter pid --suite {suite.name}"
@@ -195,7 +195,7 @@ class TrackingBoard:
         for board in self.problems:
             first = board.names[0]
             standings.append(
-                Standing(
+                ProblemStanding(
                     problem=board.problem,
                     place=1 + board.names.index(entry),
                     level=entry in board.leaders,

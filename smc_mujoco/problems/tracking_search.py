@@ -54,7 +54,7 @@ class Found(NamedTuple):
     rates: list[float]  # bounds a second
 
 
-class Trials:
+class GainTrials:
     """The runs of an entry in a problem, as rows of the fast engine."""
 
     def __init__(self, problem: TrackingProblem, entry: TrackingEntry, threads: int | None):
@@ -141,7 +141,7 @@ class Trials:
             advance(len(logs))
             return costs
 
-        logs = rng.uniform(*self.box.T, (DRAWN, len(self.box)))
+        logs = rng.uniform(self.box[:, 0], self.box[:, 1], (DRAWN, len(self.box)))
         best = logs[np.argmin(judge(logs))]
         cma = CMA(best, SPREAD, self.bounds, seed=number, population_size=POPULATION)
         for _ in range(DRAWN, SETS, POPULATION):
@@ -173,7 +173,7 @@ def search_problem(
     advance: Callable[[float], None] = lambda work: None,
 ) -> list[Found]:
     """Return what each search for an entry's gains found in a problem."""
-    trials = Trials(problem, entry, threads)
+    trials = GainTrials(problem, entry, threads)
     return [trials.unseen(trials.searched(number, advance)) for number in range(SEARCHES)]
 
 

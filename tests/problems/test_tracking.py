@@ -14,7 +14,7 @@ from smc_mujoco.problems import tracking_page, tracking_results, tracking_search
 from smc_mujoco.problems.tracking import TrackingProblem, tracking_suite, tracking_suites
 from smc_mujoco.problems.tracking_entry import tracking_entry
 from smc_mujoco.problems.tracking_results import TrackingBoard, enter_tracking, read_result
-from smc_mujoco.problems.tracking_search import TAU, Trials, scenario_of
+from smc_mujoco.problems.tracking_search import TAU, GainTrials, scenario_of
 from smc_mujoco.simulation.signals import Sine
 
 SUITES = pytest.mark.parametrize("name", tracking_suites())
@@ -67,7 +67,7 @@ def test_without_the_load_only_its_forces_differ(name):
 def test_mujoco_gives_the_error_and_the_rate_that_the_search_sees(suite, name, text):
     each = problem(suite, name)
     entry = tracking_entry(text)
-    trials = Trials(each, entry, 1)
+    trials = GainTrials(each, entry, 1)
     values = np.array([list(GAINS.values())])
     error, rate = trials.run(trials.choosing, values)[0, 0]
     trace = smc.run(scenario_of(each, entry, GAINS, 0))
@@ -80,7 +80,7 @@ def test_a_search_keeps_the_limit_and_the_theorem_and_is_the_same_again(monkeypa
     for name, value in (("SETS", 48), ("DRAWN", 24)):
         monkeypatch.setattr(tracking_search, name, value)
     each = problem("smc-load@1", "pendulum-middle")
-    trials = Trials(each, tracking_entry("classical"), 1)
+    trials = GainTrials(each, tracking_entry("classical"), 1)
     steps = []
     gains = trials.searched(0, steps.append)
     assert sum(steps) == 48
@@ -117,7 +117,7 @@ def result(name, levels, spread=0.02, seed=0):
             free = [0.3] * 24
             results.append(tracking_search.Found({"k": 1.0}, errors, free, [5.0] * 24))
         searches[problem_name] = tuple(results)
-    return tracking_results.EntryResult(
+    return tracking_results.TrackingResult(
         name=name, text=name, law=name, date="2026-11-30", searches=searches
     )
 

@@ -7,8 +7,8 @@ error is (kd p + kp) / (M p^2 + kd p + kp), p = d/dt, which is positive real if 
 the adaptation is passive, F - F0 stays bounded, and both e and F - F0 go to 0 where M r'' is small,
 whatever gamma > 0 is. A load that does not change its sign with r' looks like no friction, and
 moves F up and down. The trace's s is kp e + kd de.
-Gains: kp [N/m]; kd [N s/m]; gamma, of the adaptation [1/s]; v0, the speed of the reference above
-which the whole level is given [m/s].
+Gains: kp, of the error [N/m]; kd, of its rate [N s/m]; gamma, of the adaptation [1/s]; v0, the
+speed of the reference above which the whole level is given [m/s].
 Sources: C. Canudas de Wit, K. J. Astrom & K. Braun, "Adaptive friction compensation in DC-motor
 drives", IEEE J. Robotics Autom. 3(6):681, 1987; J.-J. Slotine & W. Li, Applied Nonlinear Control,
 Prentice Hall 1991, section 8.1 (positive real error systems). The condition is worked out here.
