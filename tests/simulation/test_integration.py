@@ -225,3 +225,24 @@ def test_the_table_of_twelve_machines_is_that_of_the_benchmark_and_within_its_ba
         errors = [abs(row[f"now {score}"]) for score in integrators.SCORES]
         assert row["marked"] or max(errors) < most
     assert np.median([row["cost"] for row in measured.values()]) < 1.15
+
+
+TWO_HINGES = """<mujoco><worldbody><body><joint name="a" axis="0 1 0"/><geom type="capsule"
+fromto="0 0 0 0 0 -.3" size=".02" mass="1" contype="0" conaffinity="0"/><body pos="0 0 -.3">
+<joint name="b" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -.3" size=".02" mass="1"
+contype="0" conaffinity="0"/></body></body></worldbody><actuator>
+<motor joint="a" ctrlrange="-20 20"/><motor joint="b" ctrlrange="-20 20"/></actuator></mujoco>"""
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(
+    ("law", "off"),
+    [
+        (smc.law("classical", k=8.0, c=5.0), "a quarter off"),
+        (smc.law("pid", kp=20.0, kd=3.0, ki=0.0), "some percent off"),
+    ],
+)
+def test_a_friction_that_acts_once_a_step_errs_by_more_where_u_chatters(law, off):
+    fields = {"plant": smc.plant_from(TWO_HINGES, ["a", "b"]), "x0": 0.3, "duration": 0.5}
+    friction = smc.hardware.Stribeck(0.1)
+    assert off in smc.run(smc.Scenario(law=law, friction=friction, **fields)).unresolved
