@@ -12,7 +12,7 @@ and damping takes on the way comes on top. M, D, load and springs are those at t
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -66,6 +66,30 @@ def bump(plant: Plant, time: float, rubs: float) -> tuple[Stops, Impulse]:
     momentum, side, joint, ends = min(stopped)
     stops = Stops({joint: ends})
     return stops, Impulse(side * momentum, time=time, width=WIDTH)
+
+
+def unmet(trace: Any) -> str:
+    """Return a sentence on stops that no blow of a run drove its joint against, or ""."""
+    scenario = trace.scenario
+    blows = [d for d in scenario.disturbance if isinstance(d, Impulse)]
+    if not blows or trace.failure:
+        return ""
+    names = channel_names(scenario.plant)
+    for stops in scenario.contact:
+        limits = stops.limits if isinstance(stops, Stops) else {}
+        for joint, (low, high) in limits.items():
+            if joint not in names:
+                continue
+            x = trace.x[:, names.index(joint)]
+            if low < x.min() and x.max() < high:
+                k = int(np.searchsorted(trace.t, blows[0].time))
+                return (
+                    f"the blow of {scenario.plant.name} under {scenario.law.name} at "
+                    f"{blows[0].time:g} s meets nothing: joint {joint!r} is at {x[k]:.3g} then, "
+                    f"and its stops are at {low:.3g} and {high:.3g}; give more time before it, or "
+                    "a law that has arrived"
+                )
+    return ""
 
 
 def _stopped(plant: Plant, rubs: float) -> list[Stopped]:

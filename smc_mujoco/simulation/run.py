@@ -132,8 +132,9 @@ def run(
         if " raised " in trace.broken or " instead of " in trace.broken:
             broken.setdefault(trace.scenario.law.name, trace.broken)
     warn_of_broken(broken)
-    for unresolved in dict.fromkeys(trace.unresolved for trace in traces.values()):
-        warn_once(unresolved)
+    for trace in traces.values():
+        warn_once(trace.unresolved)
+        warn_once(trace.unmet)
     if isinstance(scenarios, Scenario):
         return traces[0]
     return [traces[i] for i in range(len(prepared))]

@@ -129,6 +129,13 @@ class Trace:
         return self.reaction if self.damping is None else self.reaction - self.damping
 
     @property
+    def unmet(self) -> str:
+        """What a blow of the run was to meet and did not, in a sentence; "" if nothing."""
+        from smc_mujoco.simulation.blow import unmet
+
+        return unmet(self)
+
+    @property
     def unresolved(self) -> str:
         """What the physics step does not resolve in this run of your own model, in a sentence; ""
         if nothing is known. `smc.run` warns of it.
@@ -167,6 +174,8 @@ class Trace:
             rows["failed"] = self.failure
         if self.unresolved:
             rows["not resolved"] = self.unresolved
+        if self.unmet:
+            rows["not met"] = self.unmet
         efforts = s.efforts[: s.plant.driven]
         for name, units in (("x", s.plant.units), ("u", efforts)):
             for unit in dict.fromkeys(units):

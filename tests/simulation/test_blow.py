@@ -79,3 +79,23 @@ def test_a_blow_reaches_the_stops_whatever_u_does(name, more):
         beyond = np.clip(trace.x[:, joint], *stopped[1]) != trace.x[:, joint]
         assert not beyond[trace.t < TIME].any()
         assert beyond[trace.t >= TIME].any()
+
+
+SLOW = """<mujoco><compiler angle="radian"/><worldbody><body pos="0 0 2">
+<joint name="j" axis="0 1 0" damping="{}" armature="2"/><geom type="capsule" size=".04" mass="12"
+fromto="0 0 0 0 0 -.8" contype="0" conaffinity="0"/></body></worldbody>
+<actuator><motor joint="j" ctrlrange="-330 330"/></actuator></mujoco>"""
+
+
+@pytest.mark.filterwarnings("ignore:.*default gains")
+@pytest.mark.parametrize(("damping", "meets"), [(200.0, False), (20.0, True)])
+def test_a_blow_that_comes_before_the_law_has_arrived_is_said_to_meet_nothing(damping, meets):
+    plant = smc.plant_from(SLOW.format(damping), ["j"])
+    (scenario,) = smc.grid(plant, smc.law("pid"), "contact", duration=2.0)
+    trace = smc.run([scenario])[0] if meets else None
+    if trace is None:
+        with pytest.warns(smc.errors.ScenarioWarning, match="meets nothing"):
+            trace = smc.run(scenario)
+    low, high = scenario.contact[0].limits["j"]
+    assert bool(np.any((trace.x < low) | (trace.x > high))) == meets
+    assert bool(trace.unmet) != meets
