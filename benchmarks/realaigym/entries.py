@@ -12,13 +12,12 @@ The entry's feedback is 1.5 s near the trajectory and bends where |s| nears phi;
 linear-quadratic regulator. `FEEDBACKS` has three others, as control experiments. docs/boards.md
 tells what they say about the entry.
 
-`trajectories/` has z*, u*, z*'' and b'P/R of each robot, and how they were computed;
-benchmarks/swing_up.py does it again. The entry's velocities are those of a Savitzky-Golay filter of
-5 positions; the published entries use measured ones, so every feedback has a row with each.
-Sources: R. E. Kalman, Contributions to the theory of optimal control, Boletin de la Sociedad
-Matematica Mexicana 5:102, 1960 (the regulator); V. I. Utkin, Sliding Modes in Control and
-Optimization, Springer 1992, chapter 9 (s = 0 as a surface of least quadratic cost).
-"""
+`trajectories/` has z*, u*, z*'' and b'P/R of each robot, and how they were computed. The entry's
+velocities are those of a Savitzky-Golay filter of 5 positions; the published entries use measured
+ones, so every feedback has a row with each. Sources: R. E. Kalman, Contributions to the theory of
+optimal control, Boletin de la Sociedad Matematica Mexicana 5:102, 1960 (the regulator); V. I.
+Utkin, Sliding Modes in Control and Optimization, Springer 1992, chapter 9 (s = 0 as a surface of
+least quadratic cost)."""
 
 import dataclasses
 import math

@@ -11,11 +11,10 @@ the acrobot that of the machine, and the shoulder's speed. u gives the wanted v'
 model (collocated linearisation). z is the distance from upright, and P and k' solve its Riccati
 equation for Q = diag(10, 10, 1, 1), R = 1.
 
-Gains were found by random search on the resets of seeds 100 to 115 (`python benchmarks/swing_up.py
-ROBOT --resets`). `global_experiments` has the entry and its control experiments. Source: M. W.
-Spong, The swing up control problem for the acrobot, IEEE Control Systems Magazine 15(1):49, 1995
-(the linearisation, and a reference that pumps), with a sliding surface in place of his linear law.
-"""
+Gains were found by random search on the resets of seeds 100 to 115. `global_experiments` has the
+entry and its control experiments. Source: M. W. Spong, The swing up control problem for the
+acrobot, IEEE Control Systems Magazine 15(1):49, 1995 (the linearisation, and a reference that
+pumps), with a sliding surface in place of his linear law."""
 
 import dataclasses
 import math
