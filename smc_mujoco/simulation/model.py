@@ -56,7 +56,7 @@ ROUND_WRAPS = mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER
 # ends of the names of a free body's sensors
 POSE_SENSORS = {"x_sensor": (":x", ":q"), "v_sensor": (":v", ":w")}
 MAX_RECENT = 16  # mechanisms that are kept for later runs, as those of a search for gains; chosen
-MAX_RECENT_BYTES = 320_000_000  # of their models together; chosen
+MAX_RECENT_BYTES = 160_000_000  # of their models together; chosen
 # m, at a start; chosen: bodies in contact overlap by less, so a deeper start begins with a blow
 MAX_OVERLAP = 1e-3
 OBSTACLE = "the obstacle"
