@@ -34,7 +34,7 @@ import numpy as np
 
 from smc_mujoco.analysis import linear_theory as theory
 from smc_mujoco.analysis.engine import Device
-from smc_mujoco.analysis.engine.scored_runs import ScoredRuns
+from smc_mujoco.analysis.engine.scored_runs import ScoredRuns, worth_compiling
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.common.aliases import AnyPath
 from smc_mujoco.common.constraints import Boolean, Called, constrained
@@ -539,7 +539,8 @@ def margins_of(
     """
     cells = Cells(bases, kinds, resolution, report)
     # a coarse search by MuJoCo takes less time than compiling its law for the fast engine
-    runs = ScoredRuns({REST_SHARE.name: REST_SHARE.of}, device, threads, resolution != COARSE)
+    worth = resolution != COARSE and worth_compiling(cells.left)
+    runs = ScoredRuns({REST_SHARE.name: REST_SHARE.of}, device, threads, worth)
     unchanged = [(i, None) for i in range(0, len(cells.pairs), len(kinds))]
     held = cells.tolerated(unchanged, runs.by_mujoco)
     going = {}

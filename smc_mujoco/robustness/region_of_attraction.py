@@ -42,6 +42,7 @@ from smc_mujoco.analysis.engine.choice import chosen
 from smc_mujoco.analysis.engine.form import SCORES, SETTING
 from smc_mujoco.analysis.engine.group import FormGroup, why_not
 from smc_mujoco.analysis.engine.outcome import NAME, over_trace
+from smc_mujoco.analysis.engine.scored_runs import worth_compiling
 from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair, Fields, Floats
 from smc_mujoco.common.constraints import Called, constrained
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, whole
@@ -214,7 +215,9 @@ def basin_of(
     states = np.stack([every_x, every_v], axis=1)
     checked = ""
     kind, _ = chosen(base, (NAME,), device)
-    if kind is None or len(states) < kind.least or prepare(base).why_not:
+    work = round(len(states) * base.work * sum(HORIZONS))
+    compiles = device != "cpu" or worth_compiling(work)
+    if kind is None or not compiles or len(states) < kind.least or prepare(base).why_not:
         outcome, decided_at = grid.decide(grid.by_mujoco, grid.traced, states, report)
     else:
         outcome, decided_at = grid.decide(

@@ -30,6 +30,7 @@ class AnswerTime:
     table: the work of a law's runs for the tables, at the least.
     choice: the work of the runs that choose a law's gains and compare the law with others.
     unit: the work of a judgement of one set of gains.
+    least: the work of the runs without which there is no answer.
     pace: how long a unit of work takes, s, as the last runs took; 0 before them.
     searching: how long a unit of a search's work takes, over `pace`, as the last search took.
     """
@@ -40,6 +41,7 @@ class AnswerTime:
     table: float = 0.0
     choice: float = 0.0
     unit: float = 0.0
+    least: float = 0.0
     pace: float = 0.0
     searching: float = 1.0
 
@@ -82,6 +84,11 @@ class AnswerTime:
         """
         of_law = self.table if first else self.table + self.choice
         return self.ends - self.pace * (self.after + min(laws, SHOWN) * of_law)
+
+    @property
+    def first_sets_end(self) -> float:
+        """When the searches for first sets must end, whatever else is left out."""
+        return self.ends - self.pace * self.least
 
     @property
     def left(self) -> float:

@@ -310,7 +310,7 @@ def _first_sets(
     progress.says("set of gains", float(len(ready)))
     pieces = [RaceSearch(entrant, 0) for entrant in searched(entrants)]
     start = time.monotonic()
-    for i, result in _made(course, pieces, clock.ends, shorten=True):
+    for i, result in _made(course, pieces, clock.first_sets_end, shorten=True):
         entrant = pieces[i].entrant
         entrant.results.append(result)
         spent = time.monotonic() - start
@@ -339,7 +339,8 @@ def _shorten(course: RaceCourse, entrant: SearchedEntrant, waiting: int) -> floa
     """
     clock = course.clock
     now = time.monotonic()
-    room = max(clock.race_ends(waiting + 1, first=True) - now, LAST_ROOM * clock.left) / waiting
+    last = LAST_ROOM * (clock.first_sets_end - now)
+    room = max(clock.race_ends(waiting + 1, first=True) - now, last) / waiting
     for share in SHORTER:
         entrant.share = share
         if clock.search_seconds(_work(course, entrant)) <= room:

@@ -38,7 +38,11 @@ from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.doubts import constant_goal
 from smc_mujoco.simulation.force_bounds import default_u_max
 from smc_mujoco.simulation.prepare import prepare
-from smc_mujoco.simulation.run import run_unjudged
+from smc_mujoco.simulation.run import (
+    lower_mmap_threshold,
+    return_freed_memory,
+    run_unjudged,
+)
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, Noise
 from smc_mujoco.studies.answer_time import FEWEST_SEEDS, SHOWN, AnswerTime
@@ -77,6 +81,7 @@ KINDS = ("delay", "friction", "mass", "blow")  # of the margins
 KINDS_OF_POSES = ("delay", "disturbance", "mass", "blow")  # of a free body
 LIGHT = 0.01  # of the bound on u: a smaller load pushes nothing; chosen
 TRIED = 15  # runs that a coarse margin takes, on average; chosen
+LEAST_RUNS = 3  # of a law in each condition: for the tables, and the film twice; chosen
 # judgements of each law after a race: of the sets considered, and of the one chosen
 AFTER = CONSIDERED * len(CHOOSING) + judgements(DECIDING)
 
@@ -95,6 +100,7 @@ def recommend(
     trial: Trial, plant: Plant, question: Question, goal: Objective, clock: AnswerTime
 ) -> Recommendation:
     """Race laws on a plant and recommend one of them, all as long as the clock lets it."""
+    lower_mmap_threshold()
     course = RaceCourse(trial, plant, goal, clock)
     entrants, left_out = _entrants(trial, plant, question.laws, goal)
     table_work = _work_of_tables(course)
@@ -104,8 +110,12 @@ def recommend(
     few = min(question.seeds, FEWEST_SEEDS)
     clock.table, clock.choice = few * table_work, AFTER * clock.unit
     clock.after = margins_work + 2 * len(BESIDE_NONE) * clock.unit
+    clock.least = LEAST_RUNS * table_work
     raced = race(course, entrants, question.relevant)
-    chosen, tunings = _chosen(course, raced, _shown(raced))
+    names = _shown(raced)
+    if not clock.fits(len(names) * table_work):
+        names = names[:1]
+    chosen, tunings = _chosen(course, raced, names)
     fixed = None
     if clock.fits(len(chosen) * (judgements(DECIDING) * clock.unit + few * table_work)):
         rivals = [*chosen][: max(2, len(raced.first))]
@@ -160,6 +170,7 @@ def recommend(
         untried_laws=question.untried_laws,
         judged=_judged(trial, goal),
         folder=trial.folder,
+        pictured=clock.left + clock.spare > 2.0 * clock.pace * base.work,
     )
 
 
@@ -258,7 +269,8 @@ def _chosen(
         if entrant.count > 1:
             law = _best_set(course, entrant)
         if isinstance(entrant, SearchedEntrant):
-            tuned = search.result_of(entrant.task, tuple(entrant.results)).sourced()
+            beside = course.clock.fits(course.clock.unit)
+            tuned = search.result_of(entrant.task, tuple(entrant.results), beside).sourced()
             law = law.sourced(source.TUNED, tuned.search)
             tunings[name] = tuned.of_law(law)
         chosen[name] = law
@@ -511,4 +523,5 @@ def _work_of_judgement(course: RaceCourse) -> float:
             for prepared in (case, halved(case)):
                 prepare(prepared)
                 drawn.advance(1.0)
+    return_freed_memory()
     return sum(case.work for case in cases)

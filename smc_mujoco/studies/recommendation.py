@@ -134,6 +134,7 @@ class Recommendation(Answer):
     untried_laws: Sequence[str]  # the package's laws that suit, too, and were not tried
     judged: Mapping[str, bool]  # the conditions that J is of, and whether each was asked for
     folder: Path  # where the files are
+    pictured: bool = True  # whether there is time for the picture of the report
     call: Sequence[str] = ()  # the words of this call as a command; () where they are not known
 
     @property
@@ -597,6 +598,8 @@ class Recommendation(Answer):
     @property
     def pictures(self) -> list[html.Html]:
         """The worst run of the law."""
+        if not self.pictured:
+            return []
         from smc_mujoco.draw import figure
 
         def draw(file: Path, size: str | None) -> object:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, overload
 
 from smc_mujoco.analysis.engine import Device
-from smc_mujoco.analysis.engine.scored_runs import ScoredRuns
+from smc_mujoco.analysis.engine.scored_runs import ScoredRuns, worth_compiling
 from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.data import attributes
 from smc_mujoco.common.errors import ScenarioError, find, has, has_items, items_of, shown
@@ -89,7 +89,7 @@ def score(
     columns = {"plant": pa.string(), "law": pa.string(), "condition": pa.string()}
     columns |= {"seed": pa.int64()} | dict.fromkeys((*names, "diverged_at"), pa.float64())
     schema = pa.schema(list(columns.items()))
-    scored = ScoredRuns(attributes(catalogue, names), device, threads, worlds=True)
+    scored = ScoredRuns(attributes(catalogue, names), device, threads, False, worlds=True)
     tables = []
     left = iter(runs)
     while chunk := list(itertools.islice(left, CHUNK)):
@@ -99,6 +99,9 @@ def score(
                     f"cannot score {shown(case)}: give one Trace, or scenarios; score a list of "
                     "traces one at a time"
                 )
+        if not tables:
+            worth = worth_compiling(sum(case.work for case in chunk))
+            scored.worth_compiling = device != "cpu" or worth
         rows = []
         for case, (values, failed) in zip(chunk, scored.scored(chunk), strict=True):
             numbers = values if failed is None else (None,) * len(values)

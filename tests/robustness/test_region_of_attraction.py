@@ -9,9 +9,19 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis import linear_theory
+from smc_mujoco.analysis.engine import scored_runs
 from smc_mujoco.control.law import Law
 from smc_mujoco.robustness import region_of_attraction as maps
 from smc_mujoco.robustness.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED, Basin
+
+
+@pytest.fixture(autouse=True, scope="module")
+def engine_for_short_runs():
+    """So short runs are MuJoCo's elsewhere."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scored_runs, "MIN_WORK", 0)
+        yield
+
 
 PENDULUM = smc.plant("inverted_pendulum")
 WEAK = smc.law("observer_free", lam=1.5, k1=9.0)  # N m, of the 2.45 that hold a pendulum anywhere
@@ -289,3 +299,11 @@ def test_a_map_survives_its_file(weak, tmp_path):
     assert again.outcome.dtype == np.int8
     assert repr(again).startswith(f"Basin({weak.law} on {weak.plant}: ")
     assert len(repr(again)) < 200
+
+
+def test_few_states_are_left_to_mujoco_which_takes_less_than_compiling(monkeypatch):
+    monkeypatch.setattr(scored_runs, "MIN_WORK", 10**9)
+    monkeypatch.setattr(maps, "FormGroup", None)  # so the engine would fail
+    fast = base("inverted_pendulum", WEAK, 1.0, "RK4")
+    few = maps.basin_of(fast, np.linspace(-1.5, 1.5, 6), np.linspace(-4.5, 4.5, 6))
+    assert few.checked == ""

@@ -7,9 +7,18 @@ import pytest
 from helpers.runs import at_defaults
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.engine import scored_runs
 from smc_mujoco.common.text import number
 from smc_mujoco.metrics.catalogue import itae, settling_time
 from smc_mujoco.studies import score as module
+
+
+@pytest.fixture(autouse=True, scope="module")
+def engine_for_short_runs():
+    """So short runs are MuJoCo's elsewhere."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scored_runs, "MIN_WORK", 0)
+        yield
 
 
 @smc.law_function(gains={"when": 1.0})

@@ -31,6 +31,7 @@ minimised.
 """
 
 import dataclasses
+import math
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -42,6 +43,7 @@ import numpy as np
 
 from smc_mujoco.analysis import step_halving
 from smc_mujoco.analysis.engine import Device
+from smc_mujoco.analysis.engine.scored_runs import worth_compiling
 from smc_mujoco.analysis.tuning import quick_search, search_space
 from smc_mujoco.analysis.tuning.evaluator import EQUATION, PYTHON, Evaluator, with_gains
 from smc_mujoco.analysis.tuning.objective import (
@@ -352,7 +354,9 @@ class TuningTask(NamedTuple):
         cases = self.cases(i)
         if self.quick:
             cases = list(map(step_halving.doubled, cases))
-        by_equation = self._evaluator(cases, by_equation=True)
+        # as for all searches of a usual tuning, so that a search does not depend on their number
+        work = SEARCHES * self.size * sum(case.work for case in cases)
+        by_equation = self._evaluator(cases, self.device != "cpu" or worth_compiling(work))
         random = np.random.default_rng([self.seed, i, draw] if draw else [self.seed, i])
         if self.quick:
             return self._search_quickly(by_equation, random, report, failure)
@@ -614,8 +618,10 @@ def _only_limits(case: Scenario) -> bool:
     )
 
 
-def result_of(task: TuningTask, found: tuple[SearchResult, ...]) -> Tuned:
-    """Return the tuning that these searches of a task are."""
+def result_of(task: TuningTask, found: tuple[SearchResult, ...], beside: bool = True) -> Tuned:
+    """Return the tuning that these searches of a task are, with J of the law's own gains `beside`
+    it.
+    """
     rule = quick_search.RULE if task.quick else RULE
     if task.outside_theorem:
         rule += ", outside the conditions of the law's theorem"
@@ -633,9 +639,11 @@ def result_of(task: TuningTask, found: tuple[SearchResult, ...]) -> Tuned:
         searched=task.searched,
         versions=versions(),
     )
-    cases = task.cases(found.index(tuned.best))
-    traces = run_unjudged(cases, task.threads)
-    before = task.goal.evaluation(cases[0], traces).objective
+    before = math.nan
+    if beside:
+        cases = task.cases(found.index(tuned.best))
+        traces = run_unjudged(cases, task.threads)
+        before = task.goal.evaluation(cases[0], traces).objective
     gains = tuned.best.best.gains
     law = with_gains(task.law, tuple(task.box), gains)
     return dataclasses.replace(tuned, law=law, before=before)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.engine import scored_runs
 from smc_mujoco.analysis.tuning import search, search_space, stages
 from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective
@@ -20,6 +21,15 @@ from smc_mujoco.analysis.tuning.search import tune
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.units import Gain, Unit
 from smc_mujoco.metrics.catalogue import itae, tv
+
+
+@pytest.fixture(autouse=True, scope="module")
+def engine_for_short_runs():
+    """So short runs are MuJoCo's elsewhere."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scored_runs, "MIN_WORK", 0)
+        yield
+
 
 SHORT = Objective(duration=0.5)
 LEAN = Objective(conditions=("nominal",), duration=0.25)
@@ -634,3 +644,15 @@ def test_a_law_with_the_name_of_one_of_the_library_is_refused_before_any_search(
         return -gains.k * y.e, y.e
 
     refused(lambda: tune("duffing", terminal), "'terminal' has the name of a law of the library")
+
+
+def test_a_short_search_is_mujocos_and_does_not_depend_on_the_number_of_searches(monkeypatch):
+    """Compiling the form of a plant takes longer."""
+    task = search.task_of("duffing", smc.law("observer_free"), SHORT, 16, 3, 1)
+    work = search.SEARCHES * task.size * sum(case.work for case in task.cases(0))
+    engines = []
+    for least in (work + 1, work):
+        monkeypatch.setattr(scored_runs, "MIN_WORK", least)
+        tuned = tune("duffing", "observer_free", 16, 3, SHORT, searches=1)
+        engines.append(tuned.searches[0].engine)
+    assert engines == [MUJOCO, EQUATION]
