@@ -110,6 +110,7 @@ class Evaluator:
         """Yield the indices of cases and what runs them, which is kept for the next candidates; of
         large models, which a batch has twice, one after the other is made and freed.
         """
+        self._prepared = self._prepared or list(map(prepare, self.cases))
         models = {id(item.mechanism): item.mechanism.model for item in self._prepared}
         if sum(map(mujoco.mj_sizeModel, models.values())) > LARGE_MODELS:
             for member in self._members:
@@ -121,8 +122,9 @@ class Evaluator:
             yield indices, runner
 
     def release(self) -> None:
-        """Free the memory of the runs, which the next call makes again."""
+        """Free the memory of the runs and of their models, which the next call makes again."""
         self._runners = []
+        self._prepared = []
 
     def __call__(self, candidates: Sequence[Floats]) -> list[Evaluation]:
         """Return the evaluations of sets of gains."""

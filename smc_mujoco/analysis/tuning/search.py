@@ -403,6 +403,7 @@ class TuningTask(NamedTuple):
         else:
             coarse = _cheap(by_equation, at_period=True)
             accurate = by_equation
+            accurate.release()
         first = coarse.of_first()
         trials = self._trials(coarse, coarse, report)
         alone = self._trials(first, first, lambda count: report(0))
