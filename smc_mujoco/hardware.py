@@ -3,6 +3,7 @@
 from smc_mujoco.mechanisms.hardware.command_delay import CommandDelay
 from smc_mujoco.mechanisms.hardware.command_filter import CommandFilter
 from smc_mujoco.mechanisms.hardware.contact import Contact
+from smc_mujoco.mechanisms.hardware.drag import Drag
 from smc_mujoco.mechanisms.hardware.drives import RateLimit
 from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
 from smc_mujoco.mechanisms.hardware.friction import LuGre
@@ -13,6 +14,14 @@ from smc_mujoco.mechanisms.hardware.sliding import Sigmoid
 from smc_mujoco.mechanisms.hardware.stepper import Stepper
 from smc_mujoco.mechanisms.hardware.stribeck import Stribeck
 
-__all__ = ["CommandDelay", "CommandFilter", "Contact", "ElasticJoint", "LuGre", "PositionServo"]
+__all__ = [
+    "CommandDelay",
+    "CommandFilter",
+    "Contact",
+    "Drag",
+    "ElasticJoint",
+    "LuGre",
+    "PositionServo",
+]
 __all__ += ["RateLimit", "ServoFriction", "Sigmoid", "Stepper", "Stribeck"]
 __all__ += ["actuator_function", "friction_function", "servo"]

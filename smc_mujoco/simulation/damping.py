@@ -39,10 +39,12 @@ def _coefficients(scenario: Scenario) -> Array:
     """Return the damping of each channel, (3, n), as `of_file`."""
     coefficients = of_file(scenario.plant).copy()
     for part in scenario.friction:
-        b = part.added_to_model.damping
-        if b and part.side == "link":
+        added = part.added_to_model
+        if part.side == "link" and (added.damping or added.per_speed):
             named = part.joint_names(scenario.plant)  # some may be no channels
-            coefficients[0, np.isin(channel_names(scenario.plant), named)] += b
+            on = np.isin(channel_names(scenario.plant), named)
+            coefficients[0, on] += added.damping
+            coefficients[1, on] += added.per_speed
     return coefficients
 
 

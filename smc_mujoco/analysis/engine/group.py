@@ -65,6 +65,9 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cpu"
         "it has friction by a formula beside a play or a force that is held over a step": (
             not s.exact_friction and _has_brakes(s) and _needs_implicit(s)
         ),
+        "it has drag, which grows with the speed": any(
+            part.added_to_model.per_speed for part in s.friction
+        ),
         "it has MuJoCo's friction, contacts, another mechanism, or a play on joints that do not "
         "move alone": not (
             s.plain_equation or (s.exact_friction and not plant.free) or steps_implicitly(s)
@@ -467,7 +470,8 @@ class FormGroup:
         self._fill_rotors(row, s)
         places = self.layout.row.damping, self.layout.row.levels
         for part in s.friction if self.form.rubs else ():
-            for first, value in zip(places, part.added_to_model, strict=True):
+            added = part.added_to_model
+            for first, value in zip(places, (added.damping, added.dry), strict=True):
                 row[np.add(first, self._bodies(part, s))] += value
 
     def _bodies(self, part: Any, s: Resolved) -> list[int]:

@@ -164,6 +164,7 @@ class Added(NamedTuple):
 
     damping: float = 0.0  # N m s/rad (N s/m)
     dry: float = 0.0  # dry friction, N m (N)
+    per_speed: float = 0.0  # damping that the speed adds, N m s^2/rad^2 (N s^2/m^2)
 
 
 @dataclasses.dataclass(frozen=True)
