@@ -51,12 +51,12 @@ class Training(VecEnv):
 
     def __init__(self, seed: int):
         changes = {"control_period": PERIOD, "duration": DURATION, "u_max": BOUND + LOAD}
-        made = gymnasium.make_vec(
+        environments = gymnasium.make_vec(
             "smc_mujoco:smc/InvertedPendulum-v0", num_envs=COPIES, task="regulate", changes=changes
         )
-        self.copies, self.random, self.first = made, np.random.default_rng(seed), seed
+        self.copies, self.random, self.first = environments, np.random.default_rng(seed), seed
         space = gymnasium.spaces.Box(-np.inf, np.inf, (4,), np.float32)
-        super().__init__(COPIES, space, made.single_action_space)
+        super().__init__(COPIES, space, environments.single_action_space)
 
     def reset(self) -> np.ndarray:
         """Begin an episode in all copies."""
@@ -85,13 +85,16 @@ class Training(VecEnv):
             + SMOOTH * np.abs(self.actions - self.last)[:, 0]
         )
         self.last, done = self.actions.copy(), ended | cut
-        its, infos = self.observed(seen), [{} for _ in range(COPIES)]
+        observations, infos = self.observed(seen), [{} for _ in range(COPIES)]
         if done.any():
             assert done.all()
             assert not ended.any()
-            infos = [{"terminal_observation": one, "TimeLimit.truncated": True} for one in its]
-            its = self.reset()
-        return its, -cost.astype(np.float32), done, infos
+            infos = [
+                {"terminal_observation": observation, "TimeLimit.truncated": True}
+                for observation in observations
+            ]
+            observations = self.reset()
+        return observations, -cost.astype(np.float32), done, infos
 
     def close(self) -> None:
         """Free the copies."""
@@ -188,14 +191,14 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=1_000_000, help="of 10 ms, for each seed")
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--out", type=Path, default=Path("learned"))
-    asked = parser.parse_args()
-    asked.out.mkdir(exist_ok=True)
+    options = parser.parse_args()
+    options.out.mkdir(exist_ok=True)
     laws = []
-    for seed in range(asked.seeds):
-        layers = trained(seed, asked.steps, asked.out / f"ppo-{asked.steps}-{seed}.json")
+    for seed in range(options.seeds):
+        layers = trained(seed, options.steps, options.out / f"ppo-{options.steps}-{seed}.json")
         laws.append(law_of(layers, f"ppo_{seed}"))
     print(
-        smc.compare([*laws, *RIVALS], PLANT, CONDITIONS, duration=4.0, out=asked.out / "compared")
+        smc.compare([*laws, *RIVALS], PLANT, CONDITIONS, duration=4.0, out=options.out / "compared")
     )
 
 

@@ -21,8 +21,8 @@ LAWS = {
     "boundary layer": smc.law("computed_torque_sliding", k=K, c=10.0, width=0.4),
     "super-twisting": smc.law(
         "super_twisting_computed_torque",
-        k1=[1.5 * each**0.5 for each in L],
-        k2=[1.1 * each for each in L],
+        k1=[1.5 * limit**0.5 for limit in L],
+        k2=[1.1 * limit for limit in L],
         c=10.0,
     ),
     "time delay": smc.law("time_delay_sliding", m=M, k=20.0, c=10.0, width=0.4),

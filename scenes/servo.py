@@ -32,8 +32,8 @@ def torque(trace, up):
         passed = (trace.v < -0.1) & (trace.x <= ACROSS)
     else:
         passed = (trace.v > 0.1) & (trace.x >= ACROSS)
-    found = -trace.force[passed]
-    return found[0] if len(found) else float("nan")  # a short run does not get there
+    torques = -trace.force[passed]
+    return torques[0] if len(torques) else float("nan")  # a short run does not get there
 
 
 def share(trace):

@@ -30,7 +30,7 @@ class Clip(NamedTuple):
     condition: str = "nominal"
     changes: Mapping[str, Any] = {}
     laws: Sequence[str | Law] = ()
-    shown: Sequence[str] = smc.paper.LAWS
+    laws_shown: Sequence[str] = smc.paper.LAWS
 
     def frames(self, **options: Any) -> Frames:
         """Return the pictures of the clip; options as of `smc.film`."""
@@ -99,7 +99,7 @@ CLIPS = {  # name of the clip's file -> what it shows
         "Blow, rubber stops, friction",
         2.2,
         changes=BLOW,
-        shown=("classical", "adaptive", "super_twisting"),
+        laws_shown=("classical", "adaptive", "super_twisting"),
     ),
     "wall_and_ball": Clip(
         smc.plant_from(

@@ -67,9 +67,9 @@ def entry(robot: str, feedback: str = "Riccati", **fields: Any) -> Scenario:
     law = find(
         "robot of the boards", robot, {"acrobot": acrobot_swing_up, "pendubot": pendubot_swing_up}
     )
-    made = law(**find("feedback of the entry", feedback, FEEDBACKS)).sourced(SHIPPED)
+    gained_law = law(**find("feedback of the entry", feedback, FEEDBACKS)).sourced(SHIPPED)
     filtered = estimator("savitzky_golay", window=FILTER_READINGS, degree=2)
-    return dataclasses.replace(on_board(robot, made, filtered), **fields)
+    return dataclasses.replace(on_board(robot, gained_law, filtered), **fields)
 
 
 def on_board(

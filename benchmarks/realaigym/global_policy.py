@@ -180,20 +180,20 @@ def _minute(
                     rate = (error - before[joint]) / PID_PERIOD
                 else:
                     rate = 0.0
-                wanted = KP * error + KI * PID_PERIOD * total[joint] + KD * rate
+                torque = KP * error + KI * PID_PERIOD * total[joint] + KD * rate
                 before[joint] = error
-                wanted = min(max(wanted, -TORQUE_LIMIT), TORQUE_LIMIT) + gravity[joint]
-                u[joint] = min(max(wanted, -TORQUE_LIMIT), TORQUE_LIMIT)
+                torque = min(max(torque, -TORQUE_LIMIT), TORQUE_LIMIT) + gravity[joint]
+                u[joint] = min(max(torque, -TORQUE_LIMIT), TORQUE_LIMIT)
             since += t - last
         else:
             seen[0], seen[1], seen[2], seen[3] = x
             y[T] = t
-            wanted, raised = answered(
+            torque, raised = answered(
                 functions, gains, tuning, memory, memories, known, driven, seen, y, room
             )
             if raised:
                 return True
-            u[driven], u[1 - driven] = min(max(wanted, -limit), limit), 0.0
+            u[driven], u[1 - driven] = min(max(torque, -limit), limit), 0.0
         last = t
         torques[k] = u
         x = stepped(x, u[0], u[1], known)

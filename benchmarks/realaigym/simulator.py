@@ -397,12 +397,12 @@ def _simulate(
         seen[2] += noise[k, 0]
         seen[3] += noise[k, 1]
         y[T] = k * STEP
-        wanted, raised = answered(
+        target_torque, raised = answered(
             functions, gains, tuning, memory, memories, known, driven, seen, y, room
         )
         if raised:
             return True
-        motor += response * (min(max(wanted, -limit), limit) - motor)
+        motor += response * (min(max(target_torque, -limit), limit) - motor)
         motor = min(max(motor + noise[k, 2], -limit), limit)
         u = motor + pulse[k]
         u1, u2 = (u, 0.0) if driven == 0 else (0.0, u)

@@ -127,8 +127,8 @@ def _swing_up(robot: str) -> Template:
         )
         e = z[0] if shoulder else z[1]
         s = y.v + gains.c * (e - reference)
-        wanted = -gains.c * y.v - gains.K * min(max(s / gains.phi, -1.0), 1.0)
-        return (wanted - y.f) / y.g, s
+        desired = -gains.c * y.v - gains.K * min(max(s / gains.phi, -1.0), 1.0)
+        return (desired - y.f) / y.g, s
 
     law.__name__ = law.__qualname__ = (
         f"{robot}_sliding_swing_up"  # by which files and other processes find it
@@ -162,11 +162,11 @@ def global_entry(robot: str, **gains: float) -> Scenario:
 
 def global_experiments(robot: str) -> dict[str, Scenario]:
     """Return name of row -> run of the entry on the board of 2025, and of its experiments."""
-    made = global_entry(robot)
+    own_entry = global_entry(robot)
     gains = GAINS[robot]
     straight = {name: NEVER_BENDS * gains[name] for name in ("K", "phi")}
     return {
-        GLOBAL_NAME: made,
+        GLOBAL_NAME: own_entry,
         "the same, linear": global_entry(robot, **straight),
         "the same, no pump": global_entry(robot, A=1e-9),
         "the same, no catch": global_entry(robot, level=0.0),

@@ -66,14 +66,14 @@ def families() -> dict[str, list[str]]:
 
 def pages() -> dict[str, dict[str, list[Page]]]:
     """Return the pages by section and group; those of laws by family."""
-    wanted = []
+    drawings = []
     for name, t in laws().items():
         for plant in figures.shown_on(t):
-            wanted.append((figures.law_figure, (name, plant)))
-    wanted += [
+            drawings.append((figures.law_figure, (name, plant)))
+    drawings += [
         (draw, (name,)) for draw in (figures.plant_figure, figures.still) for name in plants()
     ]
-    drawn = figures.figures(wanted)
+    drawn = figures.figures(drawings)
     grouped = {}
     for family, names in families().items():
         grouped[style.in_words(family)] = [_law_page(laws()[name], drawn) for name in names]
@@ -107,15 +107,15 @@ def files(drawn_stills: Mapping[str, bytes]) -> dict[str, bytes]:
 def stills() -> dict[str, bytes]:
     """Return plant -> its picture, from the cache."""
     return {
-        key[1]: found
-        for key, found in figures.figures([(figures.still, (name,)) for name in plants()]).items()
+        key[1]: picture
+        for key, picture in figures.figures([(figures.still, (name,)) for name in plants()]).items()
     }
 
 
 def _law_page(template: Template, drawn: Mapping[tuple[str, ...], bytes]) -> Page:
     parts = entry(template)
     name = template.name
-    shown = "".join(
+    drawn_figures = "".join(
         _figure(drawn["law_figure", name, plant], f"{_link_up(plant)}")
         for plant in figures.shown_on(template)
     )
@@ -124,7 +124,7 @@ def _law_page(template: Template, drawn: Mapping[tuple[str, ...], bytes]) -> Pag
         f"`{name}`" + f" · {template.family}",
         _display(parts.formula, template.gains),
         _symbols(parts.formula),
-        f'<div class="figures">{shown}</div>\n<p class="key">{KEY}</p>',
+        f'<div class="figures">{drawn_figures}</div>\n<p class="key">{KEY}</p>',
         "With [tuned gains](../run_study.md#gains-by-the-same-rule), from the plant's own start. "
         "$u$ is held between "
         "samples of 1 ms; where it chatters, the line is its mean and the band its range.",
@@ -238,9 +238,9 @@ def _tuned_gains(template: Template) -> str:
 def meanings(template: Template) -> dict[str, tuple[str, str]]:
     """Return gain -> what it is, and its unit, from the docstring's `Gains: ...`."""
     parts = GAINS.split(SOURCE.split(template.doc)[0])
-    found: dict[str, tuple[str, str]] = dict.fromkeys(template.gains, ("", "1"))
+    meaning_by_gain: dict[str, tuple[str, str]] = dict.fromkeys(template.gains, ("", "1"))
     if len(parts) < 2:
-        return found
+        return meaning_by_gain
     for part in " ".join(parts[1].split()).rstrip(".").split("; "):
         names = _names(part, template.gains)
         rest = part
@@ -253,8 +253,8 @@ def meanings(template: Template) -> dict[str, tuple[str, str]]:
         meaning = UNIT.sub("", rest).lstrip(", ").strip()
         for name in names:
             unit = units.get(name) or (common[1] if common else units.get(names[-1], "1"))
-            found[name] = notation.sentence(meaning, template.gains), unit
-    return found
+            meaning_by_gain[name] = notation.sentence(meaning, template.gains), unit
+    return meaning_by_gain
 
 
 def _names(part: str, gains) -> list[str]:
@@ -304,7 +304,7 @@ def _properties(template: Template) -> str:
         "plants": ", ".join(f"`{plant}`" for plant in template.plants)
         or "all with an actuator at each joint",
         "found by": ", ".join(
-            f"`--need {need}`" for need, one in PROPERTIES.items() if one.holds(template)
+            f"`--need {need}`" for need, prop in PROPERTIES.items() if prop.holds(template)
         )
         or "its name",
     }
@@ -321,11 +321,11 @@ def body(template: Template) -> str:
 
 def _paragraphs(text: str, names, formula: str) -> Iterator[str]:
     """Yield the paragraphs of a docstring as Markdown, without its formula."""
-    first, *others = text.strip("\n").split("\n\n")
+    first, *later = text.strip("\n").split("\n\n")
     rest = _without_head(" ".join(first.split()), formula)
     if rest:
         yield _prose(rest, names)
-    for paragraph in others:
+    for paragraph in later:
         if not paragraph.startswith("    "):
             yield _prose(" ".join(paragraph.split()), names)
         elif " ".join(paragraph.split()).rstrip(".") != formula:
@@ -334,9 +334,9 @@ def _paragraphs(text: str, names, formula: str) -> Iterator[str]:
 
 def _without_head(text: str, formula: str) -> str:
     """Return a paragraph without `Name: formula.` at its beginning."""
-    found = text.find(formula)
-    if found >= 0 and formula:
-        return text[found + len(formula) :].lstrip(". ")
+    place = text.find(formula)
+    if place >= 0 and formula:
+        return text[place + len(formula) :].lstrip(". ")
     return "" if text.endswith(":") else text
 
 
@@ -371,12 +371,12 @@ def _prose(text: str, names) -> str:
 def _c_form(name: str) -> str:
     """Return the law in C99, without the header that all exported laws share."""
     code = law_to_c(law(name)).rpartition(HEADER_END)[2].strip()
-    made = (
+    words = (
         f"`smc-mujoco export {name}.c` writes this law as one file, with [the "
         "header](../c.md) at its top."
     )
     return (
-        f'## In C {{ data-search-exclude }}\n\n{made}\n\n??? note "The law in C99"\n\n'
+        f'## In C {{ data-search-exclude }}\n\n{words}\n\n??? note "The law in C99"\n\n'
         + _indented(f"```c\n{code}\n```")
     )
 
@@ -409,15 +409,15 @@ def _listing(title: str, intro: str, templates: Mapping[str, Template]) -> str:
 def _plant_page(plant: Plant, drawn: Mapping[tuple[str, ...], bytes]) -> Page:
     name = plant.name
     doc, *source = SOURCE.split(described(plant), maxsplit=1)
-    title, formula, known = equation(doc)
+    title, formula, about = equation(doc)
     if explained := explained_by(plant):
         formula = equation(SOURCE.split(described(explained))[0])[1]
-        known = re.sub(r"\b(\w+)\.py\b", r"`\1`", known)
+        about = re.sub(r"\b(\w+)\.py\b", r"`\1`", about)
     laws_shown = figures.plant_laws(name)
     labels = figures.page_colours(laws_shown)
     key = "".join(
-        f'<span style="--key: {colour}">{style.law_name(each)}</span>'
-        for each, colour in zip(laws_shown, labels, strict=True)
+        f'<span style="--key: {colour}">{style.law_name(law)}</span>'
+        for law, colour in zip(laws_shown, labels, strict=True)
     )
     picture = f'![{title}]({name}.webp){{ loading=lazy width="1280" height="720" }}' * bool(
         drawn["still", name]
@@ -440,7 +440,7 @@ def _plant_page(plant: Plant, drawn: Mapping[tuple[str, ...], bytes]) -> Page:
         picture,
         "\n\n".join(
             _prose(_capital(" ".join(p.split()), plant), plant.parameters)
-            for p in known.split("\n\n")
+            for p in about.split("\n\n")
             if p.strip(" .\n")
         ),
         more,
@@ -491,13 +491,13 @@ def equation(doc: str) -> tuple[str, list[str], str]:
     The equations stand in the first sentence, as in `Title: M x'' = u + d. Sentences ...`, or below
     it as an indented block; there is none if another module has them.
     """
-    first, _, others = doc.strip().partition("\n\n")
+    first, _, body = doc.strip().partition("\n\n")
     title, _, rest = first.partition(": ")
-    if others.startswith("    "):
-        block, _, others = others.partition("\n\n")
-        return title, _joined(block), f"{rest}\n\n{others}"
+    if body.startswith("    "):
+        block, _, body = body.partition("\n\n")
+        return title, _joined(block), f"{rest}\n\n{body}"
     if "=" not in rest:
-        return title, [], f"{rest}\n\n{others}"
+        return title, [], f"{rest}\n\n{body}"
     words, rest = re.fullmatch(r"((?:[^=,]+, )*)(.*)", " ".join(rest.split())).groups()  # pyright: ignore
     end = re.search(r"\.\s|\.$|, |(?<=d)\s+\(", rest)
     if end:
@@ -506,27 +506,27 @@ def equation(doc: str) -> tuple[str, list[str], str]:
     else:
         formula = rest
         more = ""
-    return title, [formula], f"{words.rstrip(', ') or more}.\n\n{others}"
+    return title, [formula], f"{words.rstrip(', ') or more}.\n\n{body}"
 
 
 def _joined(block: str) -> list[str]:
     """Return the equations of an indented block; a line that is indented further continues the one
     before.
     """
-    found: list[str] = []
+    joined_lines: list[str] = []
     for line in block.splitlines():
-        if line.startswith("     ") and found:
-            found[-1] += "\n" * line.lstrip().startswith("[") + " " + line.strip()
+        if line.startswith("     ") and joined_lines:
+            joined_lines[-1] += "\n" * line.lstrip().startswith("[") + " " + line.strip()
         else:
-            found.append(line.strip())
-    return found
+            joined_lines.append(line.strip())
+    return joined_lines
 
 
 def _equation(text: str, names) -> str:
     """Return an equation as displayed LaTeX; `X = [a, b]` is a column, more rows are a matrix."""
     if "= [" not in text:
         return _display(text, names)
-    left, _, right = text.partition(" = ")
+    left_side, _, right = text.partition(" = ")
     rows = [notation.clauses(row.strip()[1:-1].strip()) for row in right.split("\n")]
     if len(rows) == 1:
         rows = [[entry] for entry in rows[0]]
@@ -534,7 +534,7 @@ def _equation(text: str, names) -> str:
         " & ".join(notation.formula(entry.strip(), names) for entry in row) for row in rows
     )
     return (
-        f'<div class="formula" markdown><div markdown>${notation.formula(left, names)} = '
+        f'<div class="formula" markdown><div markdown>${notation.formula(left_side, names)} = '
         rf"\begin{{pmatrix}} {latex} \end{{pmatrix}}$</div></div>"
     )
 
@@ -552,16 +552,18 @@ def units(plant: Plant) -> list[str]:
     dictionary in the module that has them.
     """
     named = explained_by(plant) or plant
-    alike = [one for one in plants().values() if one.parameters == named.parameters]
+    alike = [
+        candidate for candidate in plants().values() if candidate.parameters == named.parameters
+    ]
     has = re.compile(r"(?:^[A-Z\d_]+ = |^ +parameters=)\{").search
-    for one in (named, *alike):  # one may have another's
-        lines = inspect.getsource(sys.modules[one.build.__module__]).splitlines()
-        for at, line in enumerate(lines):
+    for candidate in (named, *alike):  # one may have another's
+        lines = inspect.getsource(sys.modules[candidate.build.__module__]).splitlines()
+        for line_number, line in enumerate(lines):
             if has(line):
                 above = itertools.takewhile(
-                    lambda text: text.strip().startswith("#"), reversed(lines[:at])
+                    lambda text: text.strip().startswith("#"), reversed(lines[:line_number])
                 )
-                end = next(text for text in lines[at:] if "}" in text)
+                end = next(text for text in lines[line_number:] if "}" in text)
                 words = line.partition("#")[2] or end.partition("#")[2]
                 if not words:
                     words = " ".join(text.partition("#")[2] for text in reversed([*above]))

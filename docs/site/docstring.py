@@ -22,7 +22,7 @@ class Entry(NamedTuple):
     formula: str
     gains: str
     discretisation: str
-    known: str
+    about: str
     source: str
 
 
@@ -47,6 +47,6 @@ def entry(template: Template) -> Entry:
         formula=formula if colon else title,
         gains=" ".join(gains).removeprefix("Gains: "),
         discretisation=" ".join(discrete),
-        known=" ".join(s for s in sentences if s not in discrete),
+        about=" ".join(s for s in sentences if s not in discrete),
         source=" ".join("".join(source).split()),
     )

@@ -87,9 +87,9 @@ def still(plant: str) -> bytes:
     traces = smc.run([_case(plant, law, "nominal") for law in plant_laws(plant)])
     with tempfile.TemporaryDirectory() as folder:
         picture = smc.film(traces, Path(folder) / "still.png", at=0.25)
-        kept = io.BytesIO()
-        Image.open(picture).save(kept, "WEBP", quality=85)
-    return kept.getvalue()
+        content = io.BytesIO()
+        Image.open(picture).save(content, "WEBP", quality=85)
+    return content.getvalue()
 
 
 def plant_laws(plant: str) -> tuple[str, ...]:
@@ -100,14 +100,14 @@ def plant_laws(plant: str) -> tuple[str, ...]:
     """
     import smc_mujoco as smc
 
-    known = smc.laws(plant)
+    law_names = smc.laws(plant)
     if smc.plant(plant).pose:
         return FLIGHT_LAWS
     if smc.plant(plant).rest:
         return ARM_LAWS
-    if set(PAPER_LAWS) <= set(known):
+    if set(PAPER_LAWS) <= set(law_names):
         return PAPER_LAWS
-    return tuple(name for name in known if name != "none") or ("none",)
+    return tuple(name for name in law_names if name != "none") or ("none",)
 
 
 def _case(plant: str, law: str, condition: str):
@@ -139,7 +139,7 @@ def _svg(traces: Sequence, colours: Sequence[str]) -> bytes:
     from smc_mujoco.draw.decimate import end, finite
 
     traces = [finite(trace) for trace in traces]
-    shown = []
+    panel_rows = []
     for panel in (
         panel for quantity in ("x", "u") for panel in panels.over_groups(traces, quantity)
     ):
@@ -147,16 +147,16 @@ def _svg(traces: Sequence, colours: Sequence[str]) -> bytes:
         for trace, colour in zip(panel.traces, colours, strict=True):
             rows.append((panel._replace(traces=[trace]), [colour]))
         if panel.quantity == "u" and lanes.crowded(panel):
-            shown += rows
+            panel_rows += rows
         else:
-            shown += [(panel, colours)]
+            panel_rows += [(panel, colours)]
     with style.page():
         import matplotlib
 
         matplotlib.rcParams["svg.fonttype"] = "none"  # letters of the page
-        figure = Figure(figsize=(WIDTH, HEIGHT * (0.5 + len(shown) / 4)), layout="constrained")
-        axes = figure.subplots(len(shown), sharex=True, squeeze=False)[:, 0]
-        for ax, (panel, shades) in zip(axes, shown, strict=True):
+        figure = Figure(figsize=(WIDTH, HEIGHT * (0.5 + len(panel_rows) / 4)), layout="constrained")
+        axes = figure.subplots(len(panel_rows), sharex=True, squeeze=False)[:, 0]
+        for ax, (panel, shades) in zip(axes, panel_rows, strict=True):
             panels.over_time(ax, panel, shades)
             alone = len(panel.traces) == 1  # of several rows, which have no room for "control"
             words = panel.label.removeprefix("control ") if alone else panel.label
@@ -219,14 +219,14 @@ def figures(
       also: further files that the figures depend on.
     """
     version = _version(also)
-    found = {}
+    content_by_key = {}
     jobs = []
     CACHE.mkdir(parents=True, exist_ok=True)
     for draw, arguments in wanted:
         key = draw.__name__, *arguments
         path = CACHE / f"{'-'.join(key)}-{version}"
         if path.is_file():
-            found[key] = path.read_bytes()
+            content_by_key[key] = path.read_bytes()
         else:
             jobs.append((key, path, draw))
     if jobs:
@@ -240,8 +240,8 @@ def figures(
                 for key, path, draw in jobs
             ]
             for key, path, future in futures:
-                found[key] = future.result()[1]
+                content_by_key[key] = future.result()[1]
                 part = path.with_suffix(f".{os.getpid()}")
-                part.write_bytes(found[key])
+                part.write_bytes(content_by_key[key])
                 part.replace(path)
-    return found
+    return content_by_key

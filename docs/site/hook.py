@@ -131,12 +131,12 @@ def on_post_build(config):
     """Put what people type for a section into the search's index, and write llms.txt."""
     site = Path(config.site_dir)
     index = site / "search" / "search_index.json"
-    found = json.loads(index.read_text(encoding="utf-8"))
+    search_index = json.loads(index.read_text(encoding="utf-8"))
     phrases = tomllib.loads((ROOT / "docs" / "site" / "phrases.toml").read_text(encoding="utf-8"))
-    for entry in found["docs"]:
+    for entry in search_index["docs"]:
         if words := phrases.pop(entry["location"], ""):
             entry["tags"] = words.split()
     if phrases:
         raise ValueError(f"phrases.toml names no section of the site: {sorted(phrases)}")
-    index.write_text(json.dumps(found), encoding="utf-8")
+    index.write_text(json.dumps(search_index), encoding="utf-8")
     (site / "llms.txt").write_text(llms.text(config.nav, ROOT / "docs"), encoding="utf-8")

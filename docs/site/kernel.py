@@ -37,12 +37,12 @@ def main() -> None:
     shell = ZMQInteractiveShell.instance(config=config)
     shell.enable_matplotlib("inline")
     _shown(shell, before)
-    shown = []
+    outputs = []
     for cell in cells:
         if cell["cell_type"] == "code":
-            shown.append(_shown(shell, "".join(cell["source"])))
+            outputs.append(_shown(shell, "".join(cell["source"])))
     _shown(shell, after)
-    Path(file).write_text(json.dumps(shown))
+    Path(file).write_text(json.dumps(outputs))
 
 
 def _shown(shell: InteractiveShell, code: str) -> list[dict[str, str]]:

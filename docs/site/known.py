@@ -70,18 +70,21 @@ def tasks() -> dict[str, list[str]]:
 def entries() -> dict[str, list[str]]:
     """Return title -> the names on a page of the reference, with their modules."""
     origins = smc._LAZY.origins  # pyright: ignore[reportAttributeAccessIssue] private
-    found = {}
-    for task, its in tasks().items():
-        found[task] = [f"{origins[name]}.{name}" for name in its if name in origins]
+    names_by_task = {}
+    for task, task_names in tasks().items():
+        names_by_task[task] = [f"{origins[name]}.{name}" for name in task_names if name in origins]
     shelves = {}
     for shelf, title in SHELVES.items():
         shelves[title] = [
             _path(getattr(getattr(smc, shelf), name)) for name in getattr(smc, shelf).__all__
         ]
     return (
-        found
+        names_by_task
         | shelves
-        | {title: [f"smc_mujoco.{name}" for name in its.split()] for title, its in OTHERS.items()}
+        | {
+            title: [f"smc_mujoco.{name}" for name in task_names.split()]
+            for title, task_names in OTHERS.items()
+        }
     )
 
 
@@ -94,7 +97,9 @@ def _path(thing: Any) -> str:
 
 def reference() -> dict[str, str]:
     """Return path -> a page of the reference, as mkdocstrings reads it."""
-    titled = {title: "\n".join(f"::: {name}" for name in its) for title, its in entries().items()}
+    titled = {
+        title: "\n".join(f"::: {name}" for name in members) for title, members in entries().items()
+    }
     return {path(title): f"# {title}\n\n{names}\n" for title, names in titled.items()}
 
 
@@ -114,8 +119,8 @@ def machines() -> Iterator[str]:
     """Yield a table of the plants, with the words at the top of their files."""
     yield "| plant | what it is |\n|---|---|"
     for name, plant in plants().items():
-        title, _, known = catalogue.equation(catalogue.described(plant))
-        words = " ".join(known.split("\n\n")[0].split()).rstrip(" .")
+        title, _, about = catalogue.equation(catalogue.described(plant))
+        words = " ".join(about.split("\n\n")[0].split()).rstrip(" .")
         yield _row(f"`{name}`", _plain(", ".join(filter(None, (title, words)))))
 
 
@@ -153,10 +158,10 @@ def audits() -> Iterator[str]:
     kinds = VERDICTS[:-1]
     heads = "audit", "read", *(MARKS[kind] for kind in kinds), "derived", "questions"
     yield f"{_row(*heads)}\n|{'---|' * len(heads)}"
-    for name, shown in AUDITS.items():
+    for name, verdict_by_claim in AUDITS.items():
         about = paper(name)
         whose = {id: claim.whose for id, claim in about.claims.items()}
-        own = [verdict for id, (verdict, *_) in shown.items() if whose[id] == PAPER]
+        own = [verdict for id, (verdict, *_) in verdict_by_claim.items() if whose[id] == PAPER]
         counts = [
             *map(own.count, kinds),
             *(list(whose.values()).count(kind) for kind in (DERIVED, OURS)),
@@ -168,12 +173,12 @@ def decisions() -> Iterator[str]:
     """Yield each audit's claims with their verdicts and the checks that decide, in a box that
     opens.
     """
-    for name, shown in AUDITS.items():
+    for name, verdict_by_claim in AUDITS.items():
         about = paper(name)
         yield f'\n??? note "{about.authors}: {about.title}"\n'
         yield f"    `{name}`: {_plain(about.source)}. Read: {about.read}; {_plain(about.access)}.\n"
         yield "    | claim | verdict | decided by |\n    |---|---|---|"
-        for id, (verdict, decided, _) in shown.items():
+        for id, (verdict, decided, _) in verdict_by_claim.items():
             claim = about.claims[id]
             whose = f", {WHOSE_WORDS[claim.whose]}" * (claim.whose != PAPER)
             immune = f". No broken law can lose it: {claim.immune}" * bool(claim.immune)

@@ -51,14 +51,14 @@ def font() -> bytes:
     spec = importlib.util.find_spec("ziamath")
     assert spec is not None
     assert spec.origin is not None
-    whole = TTFont(Path(spec.origin).parent / "fonts" / "STIXTwoMath-Regular.ttf")
+    typeface = TTFont(Path(spec.origin).parent / "fonts" / "STIXTwoMath-Regular.ttf")
     cut = subset.Subsetter(
         subset.Options(layout_features=["ssty", "mark", "mkmk", "dtls"], notdef_outline=True)
     )
     cut.populate(unicodes=[code for first, last in LETTERS for code in range(first, last + 1)])
-    cut.subset(whole)
+    cut.subset(typeface)
     file = io.BytesIO()
-    whole.save(file)
+    typeface.save(file)
     return file.getvalue()
 
 

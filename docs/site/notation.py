@@ -105,16 +105,16 @@ class Token(NamedTuple):
 
 def tokens(text: str) -> list[Token]:
     """Split a text."""
-    found = []
+    token_list = []
     space = ""
     for match in TOKEN.finditer(text):
         if match["space"]:
             space += match["space"]
             continue
         kind = next(k for k in ("code", "word", "name", "number", "operator") if match[k])
-        found.append(Token(kind, match[kind], match["mark"] or "", space))
+        token_list.append(Token(kind, match[kind], match["mark"] or "", space))
         space = ""
-    return found
+    return token_list
 
 
 def is_symbol(token: Token, after: Token | None, gains: Collection[str]) -> bool:
@@ -131,10 +131,10 @@ def is_symbol(token: Token, after: Token | None, gains: Collection[str]) -> bool
         ):
             return True
         return text in gains and is_symbol(after, None, gains)
-    known = text in gains or text in GREEK or text in FUNCTIONS or text in SYMBOLS
+    has_symbol = text in gains or text in GREEK or text in FUNCTIONS or text in SYMBOLS
     head = text.partition("_")[0].rstrip("0123456789")
     return (
-        known
+        has_symbol
         or len(head) == 1
         or head in GREEK
         or head in FUNCTIONS
@@ -162,18 +162,18 @@ def clauses(text: str) -> list[str]:
 
 def sentence(text: str, gains: Collection[str] = ()) -> str:
     """Return a text with its formulas as $LaTeX$."""
-    found = tokens(text)
+    token_list = tokens(text)
     parts = []
     run = []
-    for i, token in enumerate(found):
-        after = found[i + 1] if i + 1 < len(found) else None
+    for i, token in enumerate(token_list):
+        after = token_list[i + 1] if i + 1 < len(token_list) else None
         ends = token.text in (",", ";") and (after is None or after.space != "")  # of a clause
         math = (
             token.kind in ("number", "operator")
             and token.text not in ".:!?\"'&"
             and not (ends and not _open(run))
         )
-        before = found[i - 1] if i else None
+        before = token_list[i - 1] if i else None
         if not _is_unit(before, token, after) and (math or is_symbol(token, after, gains)):
             run.append(token)
             continue
@@ -207,11 +207,11 @@ def _spell(run: list[Token], gains: Collection[str]) -> Iterator[str]:
     """Yield a run of what may be a formula: as $LaTeX$ where it is one, else as it is."""
     if not run:
         return
-    at = _unmatched(run)
-    if at is not None:
-        yield from _spell(run[:at], gains)
-        yield run[at].space + _plain(run[at])
-        yield from _spell(run[at + 1 :], gains)
+    unmatched = _unmatched(run)
+    if unmatched is not None:
+        yield from _spell(run[:unmatched], gains)
+        yield run[unmatched].space + _plain(run[unmatched])
+        yield from _spell(run[unmatched + 1 :], gains)
     elif run[-1].text in "-+=/<>^~|," or run[-1].text in ("<=", ">="):
         yield from _spell(run[:-1], gains)
         yield run[-1].space + _plain(run[-1])
@@ -251,9 +251,9 @@ class Parser:
         self.fractions = fractions
 
     def peek(self, ahead: int = 0) -> Token | None:
-        at = self.at + ahead
-        if at < len(self.tokens):
-            return self.tokens[at]
+        place = self.at + ahead
+        if place < len(self.tokens):
+            return self.tokens[place]
         return None
 
     def take(self) -> Token:

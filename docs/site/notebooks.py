@@ -39,12 +39,12 @@ def outputs(name: str) -> bytes:
 def pages() -> dict[str, str | bytes]:
     """Return path -> text of a page, or picture or film that a page shows."""
     depends = [KERNEL, *FOLDER.glob("*.ipynb"), *(ROOT / "smc_mujoco" / "studies").rglob("*.py")]
-    shown = figures.figures([(outputs, (name,)) for name in names()], depends)
-    found: dict[str, str | bytes] = {}
+    content_by_key = figures.figures([(outputs, (name,)) for name in names()], depends)
+    files_by_path: dict[str, str | bytes] = {}
     for name in names():
-        parts, files = _page(name, json.loads(shown["outputs", name]))
-        found |= {f"notebooks/{name}.md": "\n\n".join(parts)} | files
-    return found
+        parts, files = _page(name, json.loads(content_by_key["outputs", name]))
+        files_by_path |= {f"notebooks/{name}.md": "\n\n".join(parts)} | files
+    return files_by_path
 
 
 def _page(name: str, shown: list[list[dict[str, str]]]) -> tuple[list[str], dict[str, str | bytes]]:

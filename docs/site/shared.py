@@ -20,5 +20,5 @@ class Shared(griffe.Extension):
 def each(found):
     """The lines that stand for one: the text is the last name's."""
     indent, names, last = found.groups()
-    others = names.rstrip(", ").split(", ")
-    return "".join(f"{indent}{name}: with `{last}`.\n" for name in others) + f"{indent}{last}: "
+    earlier = names.rstrip(", ").split(", ")
+    return "".join(f"{indent}{name}: with `{last}`.\n" for name in earlier) + f"{indent}{last}: "

@@ -20,7 +20,7 @@ NUMBER = 3  # of the draw; any shows the same four verdicts
 def cases() -> list[tuple[str, Comparison]]:
     """Return four comparisons of A with B, each with what is particular about it."""
     drawn = np.random.default_rng(NUMBER).normal(size=(4, UNITS))
-    made = []
+    comparisons = []
     particular = {  # the spread of A's runs, its lead, the change by half the step
         "A leads by about 20 %": (0.05, 0.2, 0.0),
         "A and B are alike": (0.02, 0.0, 0.0),
@@ -28,13 +28,13 @@ def cases() -> list[tuple[str, Comparison]]:
         "half the step undoes the lead": (0.04, 0.2, 0.3),
     }
     for name, (spread, lead, step) in particular.items():
-        a = np.exp(spread * drawn[len(made)]) * (1.0 - lead)
+        a = np.exp(spread * drawn[len(comparisons)]) * (1.0 - lead)
         b = np.ones(UNITS)
         sets = dict.fromkeys("AB", np.arange(UNITS))
-        made.append(
+        comparisons.append(
             (name, Comparison({"A": a, "B": b}, halves={"A": a * (1 + step), "B": b}, sets=sets))
         )
-    return made
+    return comparisons
 
 
 def verdict(comparison: Comparison) -> str:

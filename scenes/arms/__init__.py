@@ -105,12 +105,12 @@ def gained(name: str, gains: Mapping[str, float] | None = None) -> Law:
     for gain in BY_INERTIA.get(name, ()):
         values[gain] = [values[gain] * joint for joint in inertia()]  # pyright: ignore[reportArgumentType]
     if name not in OUTER:
-        made = law(name, **values)
+        gained_law = law(name, **values)
     else:
-        made = law(OUTER[name], **values).on_computed_torque()
+        gained_law = law(OUTER[name], **values).on_computed_torque()
     if gains:
-        return made
-    return made.sourced(SHIPPED, GainSearch(rule="random draws", evaluations=DRAWS))
+        return gained_law
+    return gained_law.sourced(SHIPPED, GainSearch(rule="random draws", evaluations=DRAWS))
 
 
 def hybrid(friction: bool = False) -> Law:
@@ -119,12 +119,12 @@ def hybrid(friction: bool = False) -> Law:
     """
     gains: dict[str, object] = {"force": PRESS, **GAINS["computed_torque_sliding"]}
     if friction:
-        known = arm().friction
-        gains |= {"f1": known.p1, "f2": known.p2, "f3": known.p3}
-    made = law("hybrid_sliding", **gains).sourced(SHIPPED)  # pyright: ignore[reportArgumentType]
+        arm_friction = arm().friction
+        gains |= {"f1": arm_friction.p1, "f2": arm_friction.p2, "f3": arm_friction.p3}
+    hybrid_law = law("hybrid_sliding", **gains).sourced(SHIPPED)  # pyright: ignore[reportArgumentType]
     if friction:
-        return made.named("hybrid_with_friction")
-    return made
+        return hybrid_law.named("hybrid_with_friction")
+    return hybrid_law
 
 
 @functools.cache
@@ -189,14 +189,16 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
         "behind": (lambda: wall_path(PATH_BEHIND), {"duration": 3.8, "contact": "wall"}),
     }
     references, fields = find("task of the arm", task, tasks)
-    wanted = references()
-    start = np.array([signal.values[0] for signal in (wall_path() if task == "behind" else wanted)])
+    signals = references()
+    start = np.array(
+        [signal.values[0] for signal in (wall_path() if task == "behind" else signals)]
+    )
     if seed and task not in ("wall", "behind"):
         start = start + np.random.default_rng(seed).uniform(-SPREAD, SPREAD, panda.n)
     return Scenario(
         plant=panda,
         law=law,
-        reference=wanted,
+        reference=signals,
         x0=tuple(start),
         seed=seed,
         noise=NOISE,

@@ -43,14 +43,14 @@ def crossover(lags: Sequence[float], one: Sequence[float], other: Sequence[float
     """
     columns = np.array([lags, one, other], float)
     table = np.log(columns)
-    known = np.isfinite(table).all(axis=0)
-    at, first, second = table[:, known]
+    finite = np.isfinite(table).all(axis=0)
+    log_lags, first, second = table[:, finite]
     ratios = first - second
     crossed = ratios[:-1] * ratios[1:] <= 0.0
     for k in np.flatnonzero(crossed):
         if ratios[k] != ratios[k + 1]:
             share = ratios[k] / (ratios[k] - ratios[k + 1])
-            return math.exp(at[k] + share * (at[k + 1] - at[k]))
+            return math.exp(log_lags[k] + share * (log_lags[k + 1] - log_lags[k]))
     return math.nan
 
 
@@ -80,11 +80,11 @@ def amplitudes(
             runs.setdefault(label, []).append(trace)
     laws = []
     sources = []
-    for its in runs.values():
-        its.sort(key=lambda trace: lag(trace.scenario))
-        laws.append(its[0].scenario.law)
+    for law_traces in runs.values():
+        law_traces.sort(key=lambda trace: lag(trace.scenario))
+        laws.append(law_traces[0].scenario.law)
         of_law = []
-        for trace in its:
+        for trace in law_traces:
             of_law.append(trace.scenario.law.source)
         sources.append(of_law)
     gains, shared = pages.gain_sources(sources)
@@ -96,17 +96,17 @@ def amplitudes(
         ax.set(xscale="log", yscale="log")
         colours = style.law_colours(laws)
         rows = zip(runs.items(), colours, gains, strict=True)
-        for (label, its), colour, source in rows:
-            over_lag = amplitudes_of(its)
+        for (label, law_traces), colour, source in rows:
+            over_lag = amplitudes_of(law_traces)
             drawn.append(over_lag)
-            draw_law(ax, its, over_lag, colour)
+            draw_law(ax, law_traces, over_lag, colour)
             words = f"{style.label(label)}{source}"
             if not over_lag.cycles:
                 words += ": no limit cycle"
             handles.append(pages.entry(words, colour))
         if len(drawn) == 2:
-            one, other = drawn
-            crossing = crossover(one.lags, one.predicted, other.predicted)
+            first_law, second_law = drawn
+            crossing = crossover(first_law.lags, first_law.predicted, second_law.predicted)
             mark_crossover(ax, crossing)
         dot = {"marker": "o", "lw": 0.0}
         sample = pages.entry("predicted", lw=style.points(1.5))
@@ -156,12 +156,12 @@ def draw_law(ax: Axes, traces: Sequence[Trace], over_lag: OverLag, colour: str) 
     """Draw a line through the predicted amplitudes, and a dot for each run."""
     ax.plot(over_lag.lags, over_lag.predicted, color=colour, lw=style.points(2.0))
     changes = step_halving(traces, 0)
-    for at, size, change in zip(over_lag.lags, over_lag.run, changes, strict=True):
+    for lag_time, size, change in zip(over_lag.lags, over_lag.run, changes, strict=True):
         look: Fields = {"color": colour, "mec": style.PAPER}
         if change.marked:
             look = {"color": style.PAPER, "mec": colour}
         size_of_dot = style.points(7.0)
-        ax.plot(at, size, "o", ms=size_of_dot, **look)
+        ax.plot(lag_time, size, "o", ms=size_of_dot, **look)
 
 
 def set_axes(ax: Axes, lags: Sequence[float], unit: str) -> None:

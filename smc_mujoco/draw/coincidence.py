@@ -35,21 +35,21 @@ def agreements(lines: Sequence[Line], limits: Pair, logarithmic: bool = False) -
         return []
     last = max(float(t[-1]) for t, _ in lines)
     until = []
-    for one in lines:
+    for line in lines:
         partings = []
-        for other in lines:
-            partings.append(_parting(one, other, limits, logarithmic))
+        for rival in lines:
+            partings.append(_parting(line, rival, limits, logarithmic))
         until.append(partings)
-    found = []
-    left = list(range(len(lines)))
+    shared = []
+    ungrouped = list(range(len(lines)))
     if MIN_AGREEMENT * last <= min(until[0]) < last:
-        found.append((left, min(until[0])))
-    while left:
-        group = [i for i in left if until[left[0]][i] >= last]
-        left = [i for i in left[1:] if i not in group]
+        shared.append((ungrouped, min(until[0])))
+    while ungrouped:
+        group = [i for i in ungrouped if until[ungrouped[0]][i] >= last]
+        ungrouped = [i for i in ungrouped[1:] if i not in group]
         if len(group) > 1:
-            found.append((group, np.inf))
-    return found
+            shared.append((group, np.inf))
+    return shared
 
 
 def _parting(one: Line, other: Line, limits: Pair, logarithmic: bool) -> float:
@@ -58,8 +58,8 @@ def _parting(one: Line, other: Line, limits: Pair, logarithmic: bool) -> float:
     """
     from scipy.ndimage import maximum_filter1d
 
-    both = one[0] <= other[0][-1] + 1e-9
-    t = one[0][both]
+    common = one[0] <= other[0][-1] + 1e-9
+    t = one[0][common]
     of_one = one[1][: len(t)]
     of_other = np.interp(t, *other)
     y = np.stack([of_one, of_other])
@@ -95,7 +95,7 @@ def tell_agreements(
     size = style.points(9.0)
     height = 72 * ax.get_window_extent().height / ax.figure.dpi  # points
     room = 72 * ax.get_window_extent().width / ax.figure.dpi - size
-    forever = [one for one in shared if one[1] == np.inf]
+    forever = [agreement for agreement in shared if agreement[1] == np.inf]
     for which in (shared, forever):
         said = "; ".join(filter(None, (agreement_words(which, names), also)))
         words = style.wrapped(said, room, size, 2)

@@ -29,9 +29,9 @@ def suit_page(artists: Iterable[Artist]) -> None:
         name = to_hex((red, green, blue)).upper()
         return to_rgba(on_dark(name, neutral), opacity)
 
-    found = list(artists)
-    found += [words.get_bbox_patch() for words in found if isinstance(words, Text)]
-    for artist in found:
+    coloured = list(artists)
+    coloured += [words.get_bbox_patch() for words in coloured if isinstance(words, Text)]
+    for artist in coloured:
         if isinstance(artist, Text):
             if to_hex(artist.get_color()).upper() != style.PAPER:  # else it is on a colour
                 artist.set_color(turned(artist.get_color()))

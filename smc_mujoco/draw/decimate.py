@@ -92,23 +92,23 @@ def band(t: Array, y: Array) -> tuple[Array, Array, Array]:
     from scipy.ndimage import grey_closing, grey_opening
 
     count = len(t) - 1
-    at = t
+    times = t
     low = high = y
     if count > COLUMNS:
         edges = t[:: 2 * -(-count // (2 * COLUMNS))].copy()
         edges[-1] = t[-1]
         e = windows(t, y, edges)
-        at = e.t
+        times = e.t
         low = e.low
         high = e.high
-    size = int(np.searchsorted(at - at[0], MAX_GAP, side="right"))
+    size = int(np.searchsorted(times - times[0], MAX_GAP, side="right"))
     # of each channel by itself: where channels cross, all of them are close, and that is no gap
     after = ((0, size), (0, 0))
     lower = np.pad(low, after, "minimum", stat_length=size)
     upper = np.pad(high, after, "maximum", stat_length=size)
     lower = grey_opening(lower, (size, 1), mode="nearest")
     upper = grey_closing(upper, (size, 1), mode="nearest")
-    return at, lower[: len(at)].min(axis=1), upper[: len(at)].max(axis=1)
+    return times, lower[: len(times)].min(axis=1), upper[: len(times)].max(axis=1)
 
 
 def window(trace: Trace) -> int:
@@ -195,7 +195,7 @@ def smooth(y: Array, width: int) -> Array:
         means = np.pad(smoothed, half - 1, "edge")
         off = (means < low[part]) | (means > high[part])
         from_start = line[part], means, off
-        from_end = [each[::-1] for each in from_start]
+        from_end = [values_forward[::-1] for values_forward in from_start]
         for values, mean, leaves in (from_start, from_end):
             if not leaves[: half - 1].any():
                 continue
@@ -221,14 +221,14 @@ def line(t: Array, y: Array, width: int) -> tuple[Array, Array]:
     `band`, in few points that keep extremes.
     """
     smoothed = smooth(y, width)
-    at, low, high = band(t, y[:, None])
-    within = np.clip(smoothed, np.interp(t, at, low), np.interp(t, at, high))
+    band_times, low, high = band(t, y[:, None])
+    within = np.clip(smoothed, np.interp(t, band_times, low), np.interp(t, band_times, high))
     y = np.where(smoothed == y, y, within)
     size = -(-len(t) // LINE_PARTS)
     starts = np.arange(0, len(t), size)
     missing = len(starts) * size - len(y)
-    whole = np.pad(y, (0, missing), "edge")
-    padded = whole.reshape(-1, size)
+    lengthened = np.pad(y, (0, missing), "edge")
+    padded = lengthened.reshape(-1, size)
     lowest = starts + padded.argmin(axis=1)
     highest = starts + padded.argmax(axis=1)
     keep = np.unique([0, *lowest, *highest, len(t) - 1])

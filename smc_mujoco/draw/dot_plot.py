@@ -230,17 +230,17 @@ def _differs_much(intervals: Mapping[Cell, Interval], metric: str) -> bool:
     """
     if metric == SETTLES:
         return False
-    found = False
+    differs = False
     for plant in dict.fromkeys(cell[1] for cell in intervals):
         here = []
-        for cell, its in intervals.items():
+        for cell, interval in intervals.items():
             if cell[:2] == (metric, plant):
-                here.append(its)
+                here.append(interval)
         sizes = _finite(here)
         if sizes.size and not sizes.min() > 0.0:
             return False
-        found |= bool(sizes.size and style.LOG_RANGE * sizes.min() < sizes.max())
-    return found
+        differs |= bool(sizes.size and style.LOG_RANGE * sizes.min() < sizes.max())
+    return differs
 
 
 def _distinct(table: RunColumns, column: str) -> list[str]:
@@ -291,12 +291,12 @@ def _floors(table: RunColumns, metrics: Sequence[str]) -> dict[tuple[str, str, s
 
 def _shade(ax: Axes, floors: Sequence[float], height: int) -> None:
     """Shade the values from 0 to the floor of each condition, in a block of `height` lines."""
-    left, right = ax.get_xlim()
-    start = max(left, 0.0)
+    lowest, right = ax.get_xlim()
+    start = max(lowest, 0.0)
     for j, least in enumerate(floors):
         lines = [j * height - 1, (j + 1) * height - 1]
         ax.fill_betweenx(lines, start, max(start, least), color=style.BAND, lw=0.0, zorder=0)
-    ax.set_xlim(left, right)
+    ax.set_xlim(lowest, right)
 
 
 def _intervals(table: RunColumns, metrics: Sequence[str]) -> dict[Cell, Interval]:
@@ -329,11 +329,11 @@ def _key(table: RunColumns, dots: Dots) -> tuple[list[Handle], str]:
     if that is the same.
     """
     rows = np.arange(len(table.column("law")))
-    known = sources(table, rows)
+    sources_by_law = sources(table, rows)
     intervals = list(dots.intervals.values())
     key: list[Handle] = []
     line: Fields = {"lw": style.points(1.5)}
-    gains, shared = pages.gain_sources([known.get(law, ()) for law in dots.looks])
+    gains, shared = pages.gain_sources([sources_by_law.get(law, ()) for law in dots.looks])
     for look, source in zip(dots.looks.values(), gains, strict=True):
         label = look["label"] + source
         sample = pages.entry(label, look["color"], marker=look["marker"], mec="none", **line)

@@ -80,10 +80,10 @@ class DrawnRuns(NamedTuple):
             behind, _ = pages.gain_sources([[source] for source in sources])
             entries = list(map(operator.add, names, behind))
         words = [source.words for source in sources]
-        shown = list(map(finite, traces))
+        finite_traces = list(map(finite, traces))
         events = style.events(traces, names)
         return cls(
-            shown,
+            finite_traces,
             names,
             entries,
             style.trace_colours(traces),
@@ -91,17 +91,17 @@ class DrawnRuns(NamedTuple):
             by_words(dict(zip(style.numbered(names), words, strict=True))),
             events,
             style.marks(events),
-            (horizon.horizon(shown), end(shown)),
+            (horizon.horizon(finite_traces), end(finite_traces)),
         )
 
     @property
     def early(self) -> list[Trace]:
         """The traces over the time that panels show, and as far beyond it as means reach."""
-        found = []
+        early_traces = []
         for trace in self.traces:
             beyond = 0.5 * window(trace) * trace.scenario.control_period
-            found.append(horizon.until(trace, self.span[0] + beyond))
-        return found
+            early_traces.append(horizon.until(trace, self.span[0] + beyond))
+        return early_traces
 
 
 def figure(
@@ -162,8 +162,8 @@ def figure(
     """
     paths = pages.files(path, format)
     if ax is not None:
-        wanted = pages.given_axes(ax, size, fig, panels)
-        _draw_alone(ax, DrawnRuns.of(traces, labels), wanted, title)
+        quantity = pages.given_axes(ax, size, fig, panels)
+        _draw_alone(ax, DrawnRuns.of(traces, labels), quantity, title)
         return pages.save(ax.figure, paths)
     width, height = pages.measure(size, fig)
     runs = DrawnRuns.of(traces, labels)
@@ -202,7 +202,7 @@ def _composed_page(
     blocks = _blocks(runs, chosen)
     head = style.titled(title, runs.head)
     handles = pages.run_handles(runs.traces, runs.entries, runs.colours)
-    key = _key([*blocks.left, *blocks.right], runs.events)
+    key = _key([*blocks.left_panels, *blocks.right], runs.events)
     if blocks.left_out:
         entry = pages.entry(blocks.left_out, lw=0)
         key.append(entry)
@@ -232,7 +232,7 @@ def _composed_page(
     inches = page.bbox.height / page.dpi
     free = 72 * (inches - space - 0.4)  # points
     cells = _cells(page, list(columns), heights)
-    for k, panels in ((0, blocks.left), (1, blocks.right)):
+    for k, panels in ((0, blocks.left_panels), (1, blocks.right)):
         rows = _height_of(columns, k)
         pitch = free / max(1.0, rows)
         room = (pitch * np.array(heights[k])).tolist()
@@ -241,7 +241,7 @@ def _composed_page(
         _draw_over_time(page, cells[k], titled, runs, k == 0, noted)
     _draw_beside(page, cells[2], blocks.beside, blocks.places, runs)
     pages.set_head(page, width, head, handles, gains)
-    meaning = "; ".join(str(one.get_label()) for one in key)
+    meaning = "; ".join(str(entry_of_key.get_label()) for entry_of_key in key)
     page.set_label(meaning)
     pages.space_ticks(page)
     return page
@@ -250,7 +250,7 @@ def _composed_page(
 class Blocks(NamedTuple):
     """The panels of a page in its three blocks."""
 
-    left: list[Panel]  # over time
+    left_panels: list[Panel]  # over time
     right: list[Panel]  # over time, the controls of single channels
     beside: list[str]  # names of SIDE_PANELS, what is not over the same time
     places: list[Panel]  # of these: the first group, then the portraits
@@ -267,9 +267,9 @@ class Blocks(NamedTuple):
                 if lanes.end_in_lanes(controls):
                     high = max(high, LINE_ROW * len(controls.traces))
             beside.append(high)
-        left = list(map(_height, self.left))
+        left_heights = list(map(_height, self.left_panels))
         right = list(map(_height, self.right))
-        return left, right, beside
+        return left_heights, right, beside
 
 
 def _height_of(columns: Mapping[tuple[int, ...], float], block: int) -> float:
@@ -283,21 +283,21 @@ def _height_of(columns: Mapping[tuple[int, ...], float], block: int) -> float:
 def _blocks(runs: DrawnRuns, chosen: Sequence[str]) -> Blocks:
     """Return the chosen panels of traces."""
     early = runs.early
-    left: list[Panel] = []
+    left_panels: list[Panel] = []
     right: list[Panel] = []
     left_out = ""
     if "channels" in chosen:
         worst = drawing.worst_first(early)
         if len(worst) <= MAX_WORST:  # all have a place, as in the model
             worst.sort(key=lambda panel: panel.group.channels)
-        left += worst[:MAX_WORST]
-        right += _controls(left, early)
+        left_panels += worst[:MAX_WORST]
+        right += _controls(left_panels, early)
         if right and len(worst) > MAX_WORST:
             left_out = f"the {MAX_WORST} worst of {len(worst)} channels"
     for name, quantity in TIME_PANELS.items():
         if name in chosen:
             panels = drawing.over_groups(early, quantity)
-            left += panels if name == "d" else _by_joint(panels)
+            left_panels += panels if name == "d" else _by_joint(panels)
     groups = drawing.of_groups(runs.traces, "x")
     portraits = _by_joint(groups)
     beside = []
@@ -305,7 +305,7 @@ def _blocks(runs: DrawnRuns, chosen: Sequence[str]) -> Blocks:
         if name in SIDE_PANELS:
             count = len(portraits) if name == "phase" else 1
             beside += [name] * count
-    return Blocks(left, right, beside, [groups[0], *portraits], left_out)
+    return Blocks(left_panels, right, beside, [groups[0], *portraits], left_out)
 
 
 def _columns(blocks: Blocks, narrow: bool) -> dict[tuple[int, ...], float]:
@@ -331,8 +331,8 @@ def _usual_height(width: float, space: float, rows: float, panels: int) -> float
     row = style.points(ROW_HEIGHT)
     tall = space + row * rows + 0.5
     if width < pages.NARROW:
-        wanted = space + row * panels + 0.5
-        return min(tall, max(pages.MAX_HEIGHT, wanted))
+        needed = space + row * panels + 0.5
+        return min(tall, max(pages.MAX_HEIGHT, needed))
     return max(0.5625 * width, tall)
 
 
@@ -342,8 +342,8 @@ def _controls(errors: Sequence[Panel], traces: Sequence[Trace]) -> list[Panel]:
     """
     if traces[0].scenario.plant.pose:
         panels = drawing.actuators(traces)
-        several = len(traces) > 1 and len(panels) > 1
-        return drawing.together(panels) if several else panels
+        many_panels = len(traces) > 1 and len(panels) > 1
+        return drawing.together(panels) if many_panels else panels
     controls = []
     for error in errors:
         if error.group.driven:
@@ -383,13 +383,13 @@ def _height(panel: Panel) -> float:
 def _default(traces: Sequence[Trace], width: float) -> list[str]:
     """Return the names of the panels that suit the plant and the page."""
     parts = style.split(traces)
-    several = any(len(group.channels) > 1 for group in parts)
+    many_channels = any(len(group.channels) > 1 for group in parts)
     disturbed = any(np.nan_to_num(trace.d).any() for trace in traces)
     names = ["d"] if disturbed else []
-    if several and traces[0].scenario.plant.direct:
+    if many_channels and traces[0].scenario.plant.direct:
         return [*names, "channels", "tip", "contact", "settling"]
     names += ["x", "spread", "u", "delivered", "reaction"]
-    if several:
+    if many_channels:
         return [*names, "settling"]
     s = np.concatenate([trace.s for trace in traces])
     if np.nan_to_num(s).any():
@@ -430,8 +430,8 @@ def _draw_over_time(
         above = axes[0] if axes else None
         frame, rows = _rows(page, cell, panel, runs, above)
         frame.set_ylabel(words)
-        if (axes or not runs.marks) and (told := notes.pop(_noted(panel), "")):
-            drawing.note(frame, told)
+        if (axes or not runs.marks) and (note := notes.pop(_noted(panel), "")):
+            drawing.note(frame, note)
         frames.append(frame)
         for ax, part, colours in rows:
             axes.append(ax)
@@ -464,7 +464,7 @@ def _draw_alone(ax: Axes, runs: DrawnRuns, wanted: str, title: str | None) -> No
     if blocks.beside:
         places = blocks.places[1:] if name == "phase" else blocks.places[:1]
     else:
-        places = blocks.left
+        places = blocks.left_panels
     if len(places) != 1 or len(blocks.beside) > 1:
         plant = runs.traces[0].scenario.plant.name
         count = len(blocks.beside or places) or "none"
@@ -488,9 +488,9 @@ def _draw_alone(ax: Axes, runs: DrawnRuns, wanted: str, title: str | None) -> No
 
 def _time_words(runs: DrawnRuns) -> str:
     """Return the label of the time axis of panels that may end before the runs do."""
-    shown, whole = runs.span
-    if shown < whole:
-        return f"time (s), the first {shown:.2g} s of {whole:g} s"
+    drawn_time, duration = runs.span
+    if drawn_time < duration:
+        return f"time (s), the first {drawn_time:.2g} s of {duration:g} s"
     return "time (s)"
 
 

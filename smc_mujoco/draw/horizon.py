@@ -23,7 +23,7 @@ def horizon(traces: Sequence[Trace]) -> float:
 
     Nothing changes or disturbs the plant after that part, and no reference moves.
     """
-    whole = end(traces)
+    duration = end(traces)
     last = 0.0
     for group, parts in style.split(traces).items():
         low, high = span(parts, "x")
@@ -43,9 +43,9 @@ def horizon(traces: Sequence[Trace]) -> float:
                 last = max(last, trace.scenario.jump.time)
             if trace.scenario.fault:
                 last = max(last, trace.scenario.fault.at)
-    if 0.0 < ZOOM * last < MAX_ZOOMED * whole:
+    if 0.0 < ZOOM * last < MAX_ZOOMED * duration:
         return ZOOM * last
-    return whole
+    return duration
 
 
 def settles_at(trace: Trace) -> float:

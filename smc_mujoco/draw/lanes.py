@@ -55,14 +55,14 @@ def rows(
     axes.
     """
     pitch = 1.0 / len(panel.traces)
-    found = []
+    drawn_rows = []
     for i, (trace, colour) in enumerate(zip(panel.traces, colours, strict=True), 1):
         place = (0.0, 1.0 - i * pitch, wide, ROW_FILLED * pitch)
         ax = frame.inset_axes(place, sharex=share)
         single = panel._replace(traces=[trace])
-        found.append(Row(ax, single, [colour]))
+        drawn_rows.append(Row(ax, single, [colour]))
         share = ax
-    return found
+    return drawn_rows
 
 
 def below_film(
@@ -76,20 +76,20 @@ def below_film(
     """Draw a panel below a film, whose time axis is set, and return its rows, one a run where they
     would hide each other, and the artists of the runs, which have `settled` at these times, s.
     """
-    found = [Row(ax, panel, colours)]
+    drawn_rows = [Row(ax, panel, colours)]
     laned = in_lanes(panel)
     if laned:
         letters = style.points(float(style.RC["font.size"]))
         room = 72 * ax.get_window_extent().width / ax.figure.dpi
         beside = (style.width("smooth", letters) + 2.0) / room
-        found = rows(ax, panel, colours, 1.0 - beside)
-        for row in found:
+        drawn_rows = rows(ax, panel, colours, 1.0 - beside)
+        for row in drawn_rows:
             row.axes.set(xlim=ax.get_xlim(), xticks=ax.get_xticks())
             row.axes.set_xticklabels(ax.get_xticklabels())
-            row.axes.tick_params(length=0, labelbottom=row is found[-1], labelleft=False)
+            row.axes.tick_params(length=0, labelbottom=row is drawn_rows[-1], labelleft=False)
         ax.set_axis_off()
     drawn: list[Artist] = []
-    for row in found:
+    for row in drawn_rows:
         mark(row.axes, changes, named=False)
         bands = laned or not crowded(panel)
         drawn += over_time(row.axes, row.panel, row.colours, panel.traces, bands, names)
@@ -102,7 +102,7 @@ def below_film(
             tell_swing(row.axes, row.panel.traces[0], row.colours[0], panel.scale[0])
     if panel.quantity == "x":
         drawn += mark_settled(ax, panel.traces, colours, settled)
-    return found, drawn
+    return drawn_rows, drawn
 
 
 def in_lanes(panel: Panel) -> bool:
@@ -167,14 +167,14 @@ def mark_settled(
     """
     marks: list[Artist] = []
     top = ax.get_ylim()[1]
-    shown = ax.get_xlim()[1]
-    beside = BESIDE * shown * ax.figure.dpi / 72 / ax.get_window_extent().width
+    drawn_time = ax.get_xlim()[1]
+    beside = BESIDE * drawn_time * ax.figure.dpi / 72 / ax.get_window_extent().width
     places = apart(times, style.points(beside))
     look: Fields = {"ms": style.points(6), "mec": style.PAPER, "mew": style.points(0.5)}
     look |= {"marker": "v", "markevery": [0], "lw": style.points(STEM), "clip_on": False}
     runs = zip(traces, colours, style.looks(traces), times, places, strict=True)
     for trace, colour, dashes, time, place in runs:
-        if 0.0 < time < min(trace.t[-1], shown):
+        if 0.0 < time < min(trace.t[-1], drawn_time):
             mean = trace.x.mean(axis=1)
             y = float(np.interp(time, trace.t, mean))
             marks += ax.plot([place, place], [y, top], color=colour, zorder=6, **look, **dashes)

@@ -71,16 +71,16 @@ def nyquist(
             dot = {"marker": "o", "lw": 0.0, "ms": style.points(8)}
             handles.append(pages.entry(CYCLE, **dot))
         head = pages.head_height(style.FULL_WIDTH, handles)
-        whole = head + ROW_HEIGHT * len(scenarios)
-        page = pages.blank(style.FULL_WIDTH, whole)
+        height = head + ROW_HEIGHT * len(scenarios)
+        page = pages.blank(style.FULL_WIDTH, height)
         axes = page.subplots(len(scenarios), 2, squeeze=False, width_ratios=[1.0, 2.0])
         size = style.points(9.5)
         rows = zip(axes, scenarios, cycles, traces, changes, colours, strict=True)
-        for (left, right), scenario, cycle, trace, change, colour in rows:
+        for (left_axes, right), scenario, cycle, trace, change, colour in rows:
             if cycle:
-                plane(left, scenario, cycle, channel, colour)
+                plane(left_axes, scenario, cycle, channel, colour)
             else:  # nothing crosses: s has the whole row
-                left.remove()
+                left_axes.remove()
                 grid = right.get_subplotspec()
                 row = grid.get_gridspec()[grid.rowspan.start, :]
                 right.set_subplotspec(row)

@@ -72,10 +72,10 @@ class Page(Figure):
 
 def embedded(page: Figure | SubFigure) -> tuple[bytes, float]:
     """Return the whole figure as a PNG, and its width in px of a web page, 96 an inch."""
-    whole = page.get_figure(root=True)
+    root = page.get_figure(root=True)
     content = io.BytesIO()
-    whole.savefig(content, format="png", dpi=DPI)
-    return content.getvalue(), 96 * whole.get_figwidth()
+    root.savefig(content, format="png", dpi=DPI)
+    return content.getvalue(), 96 * root.get_figwidth()
 
 
 def resolution(page: Figure | SubFigure) -> float:
@@ -171,8 +171,8 @@ def _legend(handles: Sequence[Handle], width: float) -> tuple[list[str], int]:
     for share in (MAX_SHARE, MAX_SINGLE_SHARE):
         labels = []
         widths = []
-        for one in handles:
-            words = str(one.get_label())
+        for handle in handles:
+            words = str(handle.get_label())
             label = style.wrapped(words, share * page - beside, size, lines=2)
             labels.append(label)
             widest = style.widest(label.split("\n"), size)
@@ -253,16 +253,16 @@ def gain_sources(sources: Sequence[Iterable[Source]]) -> tuple[list[str], str]:
     If all gains come from the same source, the note says so, and the texts are "".
     """
     words = []
-    for its in sources:
-        source = kinds(its)
+    for of_law in sources:
+        source = kinds(of_law)
         words.append("" if source in ("", NONE) else f"gains: {source}")
     different = set(filter(None, words))
     if len(different) == 1:
         return [""] * len(words), different.pop()
-    told = []
+    words_by_law = []
     for text in words:
-        told.append(f", {text}" if text else "")
-    return told, ""
+        words_by_law.append(f", {text}" if text else "")
+    return words_by_law, ""
 
 
 def files(path: str | os.PathLike[str] | None, format: str | None = None) -> list[Path]:
@@ -312,28 +312,28 @@ def save(page: Figure | SubFigure, paths: Sequence[Path]) -> Figure:
 
     The same figure gives the same files.
     """
-    whole = page.get_figure(root=True)
+    root = page.get_figure(root=True)
     if not paths:
-        return whole
+        return root
     about = str(page.get_label()) or None
-    layout = whole.get_layout_engine()
+    layout = root.get_layout_engine()
     if layout is not None:
-        canvas = whole.canvas
-        dpi = whole.dpi
+        canvas = root.canvas
+        dpi = root.dpi
         canvas_of = get_registered_canvas_class(paths[0].suffix[1:])
-        canvas_of(whole)  # texts are as large as this canvas draws them
-        whole.dpi = resolution(whole)
-        layout.execute(whole)
-        whole.set_canvas(canvas)
-        whole.dpi = dpi
-    whole.set_layout_engine(None)  # savefig draws a figure twice while it has a layout
+        canvas_of(root)  # texts are as large as this canvas draws them
+        root.dpi = resolution(root)
+        layout.execute(root)
+        root.set_canvas(canvas)
+        root.dpi = dpi
+    root.set_layout_engine(None)  # savefig draws a figure twice while it has a layout
     for path in paths:
         key, dates = METADATA[path.suffix]
-        look = {"format": path.suffix[1:], "dpi": resolution(whole)}
+        look = {"format": path.suffix[1:], "dpi": resolution(root)}
         with replacing(path) as part:
-            whole.savefig(part, metadata=dates | {key: about}, **look)
-    whole.set_layout_engine(layout)
-    return whole
+            root.savefig(part, metadata=dates | {key: about}, **look)
+    root.set_layout_engine(layout)
+    return root
 
 
 def space_ticks(page: Figure | SubFigure) -> None:

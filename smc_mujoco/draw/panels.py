@@ -92,13 +92,17 @@ class Panel(NamedTuple):
     group: ChannelGroup
     traces: Sequence[Trace]  # of these channels alone
     channel: int | None = None  # of a small panel
-    whole: Sequence[Trace] = ()  # of all channels of the group, where one is shown
+    group_traces: Sequence[Trace] = ()  # of all channels of the group, where one is shown
 
     def band(self, trace: Trace) -> float:
         """Return the settling band of one of its traces, which is that of the group, as in
         scores.
         """
-        of_group = [one for one in self.whole if one.scenario is trace.scenario]
+        of_group = [
+            channel_trace
+            for channel_trace in self.group_traces
+            if channel_trace.scenario is trace.scenario
+        ]
         return settling_band(trace.scenario, scale([*of_group, trace][0]))
 
     @property
@@ -184,15 +188,15 @@ def without_s(trace: Trace) -> Trace:
 
 def is_shared(panel: Panel) -> bool:
     """Return whether a panel shows one disturbance, which all its runs have."""
-    first, *others = panel.traces
-    if panel.quantity != "d" or not others:
+    first, *later_traces = panel.traces
+    if panel.quantity != "d" or not later_traces:
         return False
-    return all(np.array_equal(first.d, other.d, equal_nan=True) for other in others)
+    return all(np.array_equal(first.d, trace.d, equal_nan=True) for trace in later_traces)
 
 
 def of_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
     """Return a panel of the quantity for each group of channels."""
-    return [Panel(quantity, *each) for each in style.split(traces).items()]
+    return [Panel(quantity, *group_traces) for group_traces in style.split(traces).items()]
 
 
 def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
@@ -213,13 +217,13 @@ def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
         return panels
     if quantity == "force" and not any(scenario.actuator for scenario in scenarios):
         return []
-    kept = []
+    panels_of_groups = []
     for panel in filter(has_something, panels):
         if quantity in ("u", "applied") and not panel.group.effort:
-            kept += by_channel(panel)
+            panels_of_groups += by_channel(panel)
         else:
-            kept.append(panel)
-    return kept
+            panels_of_groups.append(panel)
+    return panels_of_groups
 
 
 def has_something(panel: Panel) -> bool:
@@ -240,13 +244,13 @@ def worst_first(traces: Sequence[Trace]) -> list[Panel]:
     """Return a panel of the error of each channel, first that of the largest mean |e|, in scales of
     its group.
     """
-    found = []
+    sized_panels = []
     for group, parts in style.split(traces).items():
         size = max(map(scale, parts))
         for panel in by_channel(Panel("e", group, parts)):
-            found.append((mean_error(panel) / size, panel))
-    found.sort(key=lambda one: -one[0])
-    return [panel for _, panel in found]
+            sized_panels.append((mean_error(panel) / size, panel))
+    sized_panels.sort(key=lambda one: -one[0])
+    return [panel for _, panel in sized_panels]
 
 
 def mean_error(panel: Panel) -> float:
@@ -270,8 +274,8 @@ def by_channel(panel: Panel) -> list[Panel]:
         traces = [group_trace(trace, within) for trace in panel.traces]
         effort = panel.traces[0].scenario.efforts[channel]
         group = dataclasses.replace(panel.group, channels=(channel,), effort=effort)
-        one = Panel(panel.quantity, group, traces, channel, panel.traces)
-        panels.append(one)
+        panel_of_channel = Panel(panel.quantity, group, traces, channel, panel.traces)
+        panels.append(panel_of_channel)
     return panels
 
 
@@ -330,8 +334,10 @@ def meaning(panels: Sequence[Panel]) -> dict[str, str]:
     if over:
         words["line"] = f"mean over up to {1e3 * over:.3g} ms where it chatters"
     if n > 1:
-        shown = min(n, MAX_DRAWN_CHANNELS)
-        words["thin lines"] = f"the {n} {kind}" if shown == n else f"{shown} of {n} {kind}"
+        drawn_channels = min(n, MAX_DRAWN_CHANNELS)
+        words["thin lines"] = (
+            f"the {n} {kind}" if drawn_channels == n else f"{drawn_channels} of {n} {kind}"
+        )
         if any(panel.quantity == "x" for panel in panels):
             words["thin lines"] += ", the slowest thick"
     return words
@@ -339,8 +345,8 @@ def meaning(panels: Sequence[Panel]) -> dict[str, str]:
 
 def aims(panel: Panel) -> bool:
     """Return whether a panel of x or of the error shows a reference."""
-    known = [np.isfinite(trace.r).any() for trace in panel.traces]
-    return panel.quantity in ("x", "e") and any(known)
+    have_references = [np.isfinite(trace.r).any() for trace in panel.traces]
+    return panel.quantity in ("x", "e") and any(have_references)
 
 
 def parted(panel: Panel) -> bool:
@@ -547,8 +553,8 @@ def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str]) -> bool:
     peak = 0.0
     usual = 0.0
     for trace in panel.traces:
-        known = np.isfinite(trace.reaction)
-        sizes = np.abs(trace.reaction[known])
+        finite = np.isfinite(trace.reaction)
+        sizes = np.abs(trace.reaction[finite])
         if sizes.size:
             peak = max(peak, float(sizes.max()))
             lasting_size = np.quantile(sizes, LASTING_QUANTILE)
@@ -585,13 +591,13 @@ def references(traces: Sequence[Trace]) -> list[tuple[Trace, Array, Array]]:
     longest = {}
     for trace in sorted(traces, key=lambda trace: len(trace.t)):
         longest[trace.scenario.resolved.reference] = trace
-    found = []
+    reference_lines = []
     for trace in longest.values():
         r = trace.r.mean(axis=1)
-        known = np.isfinite(r)
-        if known.any():
-            found.append((trace, trace.t[known], r[known]))
-    return found
+        finite = np.isfinite(r)
+        if finite.any():
+            reference_lines.append((trace, trace.t[finite], r[finite]))
+    return reference_lines
 
 
 def target(ax: Axes, panel: Panel) -> None:
@@ -621,13 +627,13 @@ def mark(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
             continue
         words = style.cropped(change, room, size)
         width = style.width(words, size)
-        at = room * time / last
-        begin = min(at, room - width)
+        offset = room * time / last
+        begin = min(offset, room - width)
         row = 0
         while row < len(ends) and ends[row] >= begin:
             row += 1
         ends[row:] = [begin + width + size]
-        place = (begin - at, 2 + 1.2 * size * row)
+        place = (begin - offset, 2 + 1.2 * size * row)
         look = {"va": "bottom", "fontsize": size, "parse_math": False}
         ax.annotate(words, (time, 1.0), place, ("data", "axes fraction"), "offset points", **look)
 
@@ -647,8 +653,8 @@ def phase(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
         set_numbers(axis, own)
         axis.set_label_text(style.folded(own.label))
     ax.set(xlim=limits(traces, names[0]), ylim=limits(traces, names[1]))
-    one = traces[0].x.shape[1] == 1
-    width = style.points(LINE if one else LIGHT_LINE)
+    is_single = traces[0].x.shape[1] == 1
+    width = style.points(LINE if is_single else LIGHT_LINE)
     rows = zip(traces, colours, style.looks(traces), strict=True)
     for trace, colour, look in reversed(list(rows)):
         places = QUANTITIES[names[0]](trace)
@@ -700,15 +706,15 @@ def last_samples(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
 
 def close_up_begin(traces: Sequence[Trace]) -> float:
     """Return the time, s, from which a close-up shows the last samples of the longest run."""
-    shown = LAST_SAMPLES * traces[0].scenario.control_period
-    return max(0.0, end(traces) - shown)
+    close_up_time = LAST_SAMPLES * traces[0].scenario.control_period
+    return max(0.0, end(traces) - close_up_time)
 
 
 def dot(ax: Axes, colour: str) -> Line2D:
     """Add to axes the dot of a run."""
     rim: Fields = {"mec": style.PAPER, "mew": style.points(0.6), "ms": style.points(5.0)}
-    (found,) = ax.plot([], [], "o", color=colour, zorder=6, clip_on=False, animated=True, **rim)
-    return found
+    (marker,) = ax.plot([], [], "o", color=colour, zorder=6, clip_on=False, animated=True, **rim)
+    return marker
 
 
 def drawn_channels(y: Array) -> list[int]:

@@ -140,8 +140,8 @@ def limits(traces: Sequence[Trace], name: str) -> Pair:
     if name == "x":
         references = []
         for trace in traces:
-            known = np.isfinite(trace.r)
-            references.append(trace.r[known])
+            finite = np.isfinite(trace.r)
+            references.append(trace.r[finite])
         r = np.concatenate(references)
         low = min(low, r.min(initial=low))
         high = max(high, r.max(initial=high))

@@ -82,7 +82,7 @@ class Session:
             )
         prepared = list(map(prepare, scenarios))
         with callback.installed():
-            self.batches = [ScenarioBatch([one], threads=1) for one in prepared]
+            self.batches = [ScenarioBatch([prepared_run], threads=1) for prepared_run in prepared]
         self.scenarios = tuple(scenarios)
         self.sliders = list(map(sliders, scenarios))
         self.advance_to(sample)
@@ -222,11 +222,11 @@ class Session:
 
 def sliders(s: Scenario) -> dict[str, Slider]:
     """Return name -> slider of a run's gains and conditions."""
-    found = {} if len(s.law.parts) > 1 else gain_sliders(s.law)
+    slider_by_name = {} if len(s.law.parts) > 1 else gain_sliders(s.law)
     for name, slider in condition_sliders(s).items():
         if takes(s, slider):
-            found[name] = slider
-    return found
+            slider_by_name[name] = slider
+    return slider_by_name
 
 
 def laws_of(plant: Plant) -> list[str]:
@@ -256,12 +256,12 @@ def gain_sliders(law: Law) -> dict[str, Slider]:
             "law": dataclasses.replace(s.law, gains={**s.law.gains, name: gain})
         }
 
-    found = {}
+    slider_by_gain = {}
     for name, gain in law.gains.items():
         if not isinstance(gain, tuple) and math.isfinite(gain):
             low, high = sorted((gain / 10.0, gain * 10.0))
-            found[name] = Slider(gain, low, high if gain else 1.0, fields(name))
-    return found
+            slider_by_gain[name] = Slider(gain, low, high if gain else 1.0, fields(name))
+    return slider_by_gain
 
 
 def condition_sliders(s: Scenario) -> Mapping[str, Slider]:
@@ -287,8 +287,8 @@ def condition_sliders(s: Scenario) -> Mapping[str, Slider]:
             lambda s, v: {"noise": dataclasses.replace(s.noise, position=v)},
         ),
     }
-    rubs, *others = s.friction or (Coulomb(0.0),)
-    if isinstance(rubs, Coulomb) and not others:
+    rubs, *more_friction = s.friction or (Coulomb(0.0),)
+    if isinstance(rubs, Coulomb) and not more_friction:
         most = 0.5 * bound if math.isfinite(bound) else 1.0
         sliders["friction, N or N m"] = Slider(
             rubs.level,

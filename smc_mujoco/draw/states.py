@@ -53,16 +53,16 @@ def timeline(
     """
     if trace.scenario.plant.tip:  # its forces have their numbers
         return [ended(trace, time) for time in times.tolist()]
-    shown = played(trace.t) if played else trace.t
-    ticks = MIN_STATE_TIME * np.floor(shown / MIN_STATE_TIME + 1e-9)
-    read = np.searchsorted(shown, ticks - 1e-9)  # numbers that change are held as long, too
+    film_times = played(trace.t) if played else trace.t
+    ticks = MIN_STATE_TIME * np.floor(film_times / MIN_STATE_TIME + 1e-9)
+    read = np.searchsorted(film_times, ticks - 1e-9)  # numbers that change are held as long, too
     gap = backlash_gap(trace.scenario)
-    hits = contacts(trace, shown)
-    blown = blows(trace, shown)
-    rest = resting(trace, shown)
+    hits = contacts(trace, film_times)
+    blown = blows(trace, film_times)
+    rest = resting(trace, film_times)
     sides_of_flanks = []
     for flank in flanks(trace).T:
-        sides_of_flanks.append(backlash_side(flank, shown, MIN_STATE_TIME))
+        sides_of_flanks.append(backlash_side(flank, film_times, MIN_STATE_TIME))
     sides = np.array(sides_of_flanks)
     plant = trace.scenario.plant
     names = () if plant.network and not plant.direct else channel_names(plant)
@@ -139,12 +139,12 @@ def blows(trace: Trace, shown: Array) -> list[State | None]:
 
 def struck(trace: Trace) -> Array:
     """Return where an impulse acts on each channel, (K + 1, n)."""
-    found = np.zeros(trace.d.shape, bool)
+    is_struck = np.zeros(trace.d.shape, bool)
     for signal in trace.scenario.disturbance:
         if isinstance(signal, Impulse):
             during = (trace.t >= signal.time - 1e-9) & (trace.t < signal.time + signal.width)
-            found |= during[:, None] & (np.nan_to_num(trace.d) != 0.0)
-    return found
+            is_struck |= during[:, None] & (np.nan_to_num(trace.d) != 0.0)
+    return is_struck
 
 
 def told(

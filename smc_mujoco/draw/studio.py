@@ -138,26 +138,26 @@ def runs_of(
     scenario: Scenario | Sequence[Scenario] | Plant | str, laws: Sequence[Law | str]
 ) -> list[Scenario]:
     """Return the scenarios to show."""
-    wanted = listed_laws(laws) if laws else []
+    named_laws = listed_laws(laws) if laws else []
     if isinstance(scenario, Scenario):
         runs = [scenario]
     else:
         runs = scenario
     if isinstance(runs, list | tuple):
-        if not runs or not all(isinstance(one, Scenario) for one in runs):
+        if not runs or not all(isinstance(run, Scenario) for run in runs):
             raise ScenarioError(
                 f"scenario is {shown(scenario)}: give a Scenario or two, or a plant"
             )
         first = runs[0]
         of_laws = []
-        for law in wanted:
+        for law in named_laws:
             own = law_for(first.plant, law)
             of_laws.append(dataclasses.replace(first, law=own))
         runs = of_laws or list(runs)
     else:
         plant = as_plant(runs)
         runs = []
-        for law in wanted or laws_of(plant)[:1]:
+        for law in named_laws or laws_of(plant)[:1]:
             own = law_for(plant, law)
             runs.append(Scenario(plant=plant, law=own))
     if len(runs) > 2:

@@ -215,13 +215,13 @@ def trace_colours(traces: Sequence[Trace]) -> list[str]:
         more = _farthest([*RUN_COLOURS, *NEUTRAL], max(0, count - len(RUN_COLOURS)))
         return [*RUN_COLOURS, *more][:count]
     colours = law_colours([trace.scenario.law for trace in traces])
-    found = []
+    colour_by_trace = []
     for i, colour in enumerate(colours):
         shades = [colour]
         if colours.count(colour) > 1:
             shades = ramp(colour, colours.count(colour), LIGHTEST_RUN)
-        found.append(shades[colours[:i].count(colour)])
-    return found
+        colour_by_trace.append(shades[colours[:i].count(colour)])
+    return colour_by_trace
 
 
 def law_colours(laws: Sequence[Component | str]) -> list[str]:
@@ -246,15 +246,15 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
     colours: dict[int, str] = {}
     changed = []
     for i in dict.fromkeys([*library, *everyone]):
-        wanted = law_colour(laws[i])
+        own_colour = law_colour(laws[i])
         if names.index(names[i]) < i:  # it has the colour of the first
             continue
-        if any(distance(wanted, other) < MIN_DISTANCE for other in colours.values()):
+        if any(distance(own_colour, taken) < MIN_DISTANCE for taken in colours.values()):
             changed.append(i)
         else:
-            colours[i] = wanted
-    found = _farthest([*colours.values(), *NEUTRAL], len(changed))
-    colours |= zip(sorted(changed), found, strict=True)
+            colours[i] = own_colour
+    new_colours = _farthest([*colours.values(), *NEUTRAL], len(changed))
+    colours |= zip(sorted(changed), new_colours, strict=True)
     return [colours[names.index(name)] for name in names]
 
 
@@ -347,10 +347,10 @@ def label(name: str) -> str:
     """Return the label of the library's law, surface or estimator of this name; other words
     unchanged.
     """
-    known = surfaces.catalogue() | estimators.catalogue()
+    named_parts = surfaces.catalogue() | estimators.catalogue()
     if name in all_laws():
         return law_name(name)
-    return in_words(name) if name in known else name
+    return in_words(name) if name in named_parts else name
 
 
 def _template(law: Component | str) -> tuple[Template | None, str]:
@@ -375,37 +375,37 @@ def in_words(name: str) -> str:
     return capital(name.replace("_", " "))
 
 
-def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
+def labels(traces: Sequence[Trace], own_labels: Sequence[str] | None) -> list[str]:
     """Return one label per trace: the given ones, else the laws' labels, with what differs between
     runs of one law.
 
     Machines whose parameters differ have these in their labels, whatever their laws. Equal labels
     are numbered.
     """
-    if given is not None:
-        given = items_of("labels", given)
-        if len(given) != len(traces):
+    if own_labels is not None:
+        own_labels = items_of("labels", own_labels)
+        if len(own_labels) != len(traces):
             raise ScenarioError(
-                f"labels are {shown(given)} for {len(traces)} traces: give one string a trace"
+                f"labels are {shown(own_labels)} for {len(traces)} traces: give one string a trace"
             )
         texts = []
-        for label in given:
+        for label in own_labels:
             texts.append(label if isinstance(label, str) else shown(label))
         return texts
     names = [law_name(trace.scenario.law) for trace in traces]
-    told = []
+    label_texts = []
     for trace, name in zip(traces, names, strict=True):
         words = differences(trace, traces)
-        told.append(f"{name}: {words}" if words else name)
-    return numbered(told)
+        label_texts.append(f"{name}: {words}" if words else name)
+    return numbered(label_texts)
 
 
 def numbered(names: Sequence[str]) -> list[str]:
     """Return names, equal ones with numbers behind them."""
     apart = []
     for i, name in enumerate(names):
-        several = names.count(name) > 1
-        apart.append(f"{name} {names[:i].count(name) + 1}" if several else name)
+        is_repeated = names.count(name) > 1
+        apart.append(f"{name} {names[:i].count(name) + 1}" if is_repeated else name)
     return apart
 
 
@@ -440,8 +440,8 @@ def _few(words: str) -> str:
     """Return what a label says of a field, without its last items if it is long."""
     if len(words) <= MAX_LETTERS:
         return words
-    kept, _, _ = words[: MAX_LETTERS + 1].rpartition(",")
-    return kept or words
+    shortened, _, _ = words[: MAX_LETTERS + 1].rpartition(",")
+    return shortened or words
 
 
 def _as_words(values: Mapping[str, Any]) -> dict[str, str]:
@@ -546,26 +546,26 @@ def events(traces: Sequence[Trace], names: Sequence[str]) -> list[Event]:
     """
     who_at: dict[Event, list[str]] = {}
     for trace, name in zip(traces, names, strict=True):
-        found = set()
+        happened = set()
         if jump := trace.scenario.jump:
             words = trace.scenario.plant.change(jump.factors)
-            found.add(Event(jump.time, math.inf, words))
+            happened.add(Event(jump.time, math.inf, words))
         if fault := trace.scenario.fault:
-            found.add(Event(fault.at, math.inf, fault.words))
+            happened.add(Event(fault.at, math.inf, fault.words))
         for push in pushes([trace]):
             force = math.hypot(push.x, push.y, push.z)
             size = short(force)
             end = push.time + push.width
-            found.add(Event(push.time, end, f"blow of {size} N"))
-        for event in found:
+            happened.add(Event(push.time, end, f"blow of {size} N"))
+        for event in happened:
             who_at.setdefault(event, []).append(name)
-    told = []
+    told_events = []
     for event, who in sorted(who_at.items()):
         if len(who) < len(traces) and not all(event.words in name for name in who):
-            told.append(event._replace(words=f"{', '.join(who)}: {event.words}"))
+            told_events.append(event._replace(words=f"{', '.join(who)}: {event.words}"))
         else:
-            told.append(event)
-    return told
+            told_events.append(event)
+    return told_events
 
 
 def marks(happened: Sequence[Event]) -> dict[float, str]:
@@ -581,14 +581,14 @@ def marks(happened: Sequence[Event]) -> dict[float, str]:
 
 def pushes(traces: Sequence[Trace]) -> list[Push]:
     """Return the blows on bodies of arms and of users' models, which no d of a trace has."""
-    found = []
+    body_pushes = []
     for trace in traces:
         plant = trace.scenario.plant
         if plant.tip or (plant.is_user_model and not plant.pose):
             for push in trace.scenario.disturbance:
                 if isinstance(push, Push):
-                    found.append(push)
-    return found
+                    body_pushes.append(push)
+    return body_pushes
 
 
 @functools.cache
@@ -661,10 +661,10 @@ def traces_of_one_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
             f"traces is {shown(traces)}, no trace: give what smc.run or smc.load returns"
         )
     traces = [traces] if isinstance(traces, Trace | Scenario) else items_of("traces", traces)
-    for given in traces:
-        if not isinstance(given, Trace):
+    for item in traces:
+        if not isinstance(item, Trace):
             raise ScenarioError(
-                f"traces has {shown(given)}, no trace: give what smc.run or smc.load returns"
+                f"traces has {shown(item)}, no trace: give what smc.run or smc.load returns"
             )
     if not traces:
         raise ScenarioError(
@@ -720,8 +720,8 @@ def plant_name(plant: Plant | str, short: bool = False) -> str:
     A user's model keeps the user's name.
     """
     if isinstance(plant, str):
-        known = catalogue().get(plant)
-        return plant_name(known, short) if known else plant
+        library_plant = catalogue().get(plant)
+        return plant_name(library_plant, short) if library_plant else plant
     if short and plant.short:
         return plant.short
     return plant.label or (plant.name if plant.is_user_model else in_words(plant.name))
@@ -740,8 +740,8 @@ def heading(
     plants: Sequence[Plant | str], conditions: Sequence[str] = (), short: bool = False
 ) -> str:
     """Return plants, and the condition if there is only one, which is not the nominal one."""
-    found = dict.fromkeys(plant_name(plant, short) for plant in plants)
-    head = ", ".join(found)
+    plant_names = dict.fromkeys(plant_name(plant, short) for plant in plants)
+    head = ", ".join(plant_names)
     if len(set(conditions)) == 1 and conditions[0] != "nominal":
         return under(head, condition_name(conditions[0]))
     return head
@@ -788,13 +788,13 @@ def ramp(colour: str, count: int, lightest: float = LIGHTEST) -> list[str]:
     """
     ends = RAMP_ON_DARK if neutral_on_dark() else (lightest, DARKEST)
     shades = []
-    for other in (PAPER, "#000000"):
+    for end_colour in (PAPER, "#000000"):
         for share in np.linspace(0.0, 0.95, 96):
-            shades.append(mixed(colour, other, share))
+            shades.append(mixed(colour, end_colour, share))
     values = [_as_each_sight(shade)[0][0] for shade in shades]
     lightness = np.array(values)
-    wanted = np.linspace(*ends, count)
-    misses = np.abs(lightness - wanted[:, None])
+    target_lightness = np.linspace(*ends, count)
+    misses = np.abs(lightness - target_lightness[:, None])
     nearest = misses.argmin(axis=1)
     return [shades[i] for i in nearest]
 

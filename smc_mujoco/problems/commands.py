@@ -87,11 +87,11 @@ def enter(
     terminal = Terminal()
     earlier = None if against is None else load(against)
     target = entering.enter(folder, suite, seed, results, instances, verify)
-    found = load(target.parent)
-    (name,) = [name for name, entry in found.entries.items() if entry.folder == target]
-    for place in _places(found, name):
+    loaded = load(target.parent)
+    (name,) = [name for name, entry in loaded.entries.items() if entry.folder == target]
+    for place in _places(loaded, name):
         terminal.print(place)
-    about = found.entries[name].about
+    about = loaded.entries[name].about
     for failure in about["failures"]:
         terminal.note(f"failed: {printable(failure)}")
     runs = f"{about['instances']} instances of seed {seed}, {about['failed']} failed runs"
@@ -100,7 +100,7 @@ def enter(
     if site:
         _write_site(results, terminal)
     if earlier is not None:
-        changes = found.compare(earlier)
+        changes = loaded.compare(earlier)
         terminal.print(str(changes))
         if changes.worse:
             raise typer.Exit(1)
@@ -125,10 +125,10 @@ def _places(found: "Results", entry: str) -> Iterator[str]:
     from smc_mujoco.problems.results import TITLES
 
     for question, board in found.boards().items():
-        for one in board.standings:
-            if one.entry == entry:
-                place = f"place {one.place} of {len(board.standings)}"
-                reached = f"{100 * one.reached:.0f} % of the targets"
+        for standing in board.standings:
+            if standing.entry == entry:
+                place = f"place {standing.place} of {len(board.standings)}"
+                reached = f"{100 * standing.reached:.0f} % of the targets"
                 yield f"{TITLES[question]}: {place}, {reached}"
 
 

@@ -92,10 +92,10 @@ def _check_same_entry(target: Path, digest: str) -> None:
     """Raise ScenarioError if a folder has the result of another entry."""
     if not (target / RESULT).exists():
         return
-    other = read_json(target / RESULT)["entry"]
-    if other["digest"] != digest:
+    earlier = read_json(target / RESULT)["entry"]
+    if earlier["digest"] != digest:
         raise ScenarioError(
-            f"{target} is the result of another entry, {shown(other['name'])}: "
+            f"{target} is the result of another entry, {shown(earlier['name'])}: "
             "give this one another name, or remove that folder"
         )
 

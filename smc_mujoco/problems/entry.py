@@ -163,15 +163,15 @@ def _text(name: str, value: object) -> str:
 def _gains(sets: object, division: str) -> Mapping[str, Numbers]:
     """Return plant -> gain -> value, as a division allows them."""
     if division == "one set":
-        known = (EVERYWHERE,)
+        allowed = (EVERYWHERE,)
     else:
-        known = plants()
-    cure = f"the division {division!r} takes {DIVISIONS[division]}, so write [gains.{known[0]}]"
+        allowed = plants()
+    cure = f"the division {division!r} takes {DIVISIONS[division]}, so write [gains.{allowed[0]}]"
     if not isinstance(sets, dict):
         raise ScenarioError(f"gains is {shown(sets)}: {cure}")
     gains = {}
     for plant, values in sets.items():
-        if plant not in known or not isinstance(values, dict):
+        if plant not in allowed or not isinstance(values, dict):
             raise ScenarioError(f"gains for {shown(plant)}: {cure}")
         numbers = {}
         for name, value in values.items():

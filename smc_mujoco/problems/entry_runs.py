@@ -33,14 +33,14 @@ def rows(
     one: Problem, scenarios: Sequence[Scenario], instances: Sequence[int]
 ) -> tuple[list[Row], list[str]]:
     """Run the scenarios of a problem's instances. Return their rows, and how runs failed."""
-    found: list[Row] = [{} for _ in scenarios]
+    table: list[Row] = [{} for _ in scenarios]
     failures = []
     for i, trace in stream(scenarios):
-        found[i] = {"problem": one.id, "instance": instances[i]} | one.measures(trace)
-        if found[i]["failed"]:
+        table[i] = {"problem": one.id, "instance": instances[i]} | one.measures(trace)
+        if table[i]["failed"]:
             why = trace.failure or f"it diverged at {trace.diverged_at:.3g} s"
             failures.append(f"{one.id}#{instances[i]:02d}: {why}")
-    return found, failures
+    return table, failures
 
 
 def write(path: Path, groups: Iterable[list[Row]]) -> None:

@@ -87,14 +87,14 @@ def _environment() -> "Environment":
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
         from markupsafe import Markup
 
-    made = Environment(
+    environment = Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.globals |= {
+    environment.globals |= {
         "css": Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
         "titles": TITLES,
         "words": WORDS,
@@ -108,7 +108,7 @@ def _environment() -> "Environment":
         "folder_of": suite.folder,
         "curve": CURVE,
     }
-    return made
+    return environment
 
 
 def scale(board: QuestionBoard, rank: float) -> float:

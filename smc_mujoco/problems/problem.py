@@ -81,10 +81,10 @@ class Problem:
     @cached_property
     def _values(self) -> Data:
         """The rules' values for the plant and the condition."""
-        of = rules(self.version)
-        special = of.get("special", {}).get(self.plant, {})
-        of_plant = of["more"].get(self.plant, {}) | special
-        return of | of_plant | (of["worst"] if self._attacked else {})
+        rules_of_version = rules(self.version)
+        special = rules_of_version.get("special", {}).get(self.plant, {})
+        of_plant = rules_of_version["more"].get(self.plant, {}) | special
+        return rules_of_version | of_plant | (rules_of_version["worst"] if self._attacked else {})
 
     @property
     def _attacked(self) -> bool:
@@ -119,11 +119,11 @@ class Problem:
     @property
     def targets(self) -> dict[str, Floats]:
         """Measure -> the levels that laws are to reach, the hardest first."""
-        kept = {}
+        levels = {}
         if self._frozen:
             for name in MEASURES:
-                kept[name] = tuple(self._frozen[name])
-        return kept
+                levels[name] = tuple(self._frozen[name])
+        return levels
 
     def __repr__(self) -> str:
         return f"Problem({self.id!r})"
@@ -208,8 +208,8 @@ class Problem:
     def _worst(self, scenario: Scenario) -> Scenario:
         """Return the worst run that an adversary finds for the scenario's law."""
         within = Uncertainty(**self._values["conditions"][self.condition])
-        found = worst_case(scenario, within=within, budget=self.budget, seed=scenario.seed)
-        return found.scenario.named(self.condition)
+        worst = worst_case(scenario, within=within, budget=self.budget, seed=scenario.seed)
+        return worst.scenario.named(self.condition)
 
     def measures(self, trace: Trace) -> dict[str, float]:
         """Return the measures of a run, and the time from which each target is reached and kept, s
@@ -296,14 +296,14 @@ def problem(name: str) -> Problem:
         )
     plant, condition, version = parts.groups()
     find("version of the rules", version, dict.fromkeys(versions()))
-    of = rules(int(version))
+    rules_of_version = rules(int(version))
     conditions: dict[str, dict[str, None]] = {}
     for cell in cells(int(version)):
         of_plant, _, of_condition = cell.partition("/")
         conditions.setdefault(of_plant, {})[of_condition] = None
     find("plant of the problems", plant, conditions)
     find(f"condition of problems of {plant}", condition, conditions[plant])
-    if f"{plant}/{condition}" in of.get("frozen", {}).get("left_out", ()):
+    if f"{plant}/{condition}" in rules_of_version.get("frozen", {}).get("left_out", ()):
         raise ScenarioError(
             f"problem {name!r} is left out by rule, as a control forbids it: choose another"
         )
@@ -314,11 +314,11 @@ def problem(name: str) -> Problem:
 
 def cells(version: int) -> list[str]:
     """List every plant/condition of the rules, also those that are left out."""
-    of = rules(version)
-    plants = of.get("plants", [])
-    usual: list[str] = of.get("conditions", [])
+    rules_of_version = rules(version)
+    plants = rules_of_version.get("plants", [])
+    usual: list[str] = rules_of_version.get("conditions", [])
     conditions = dict.fromkeys(plants, usual)
-    for plant, fields in of["more"].items():
+    for plant, fields in rules_of_version["more"].items():
         conditions[plant] = fields["conditions"]
     listed = []
     attacks = dict.fromkeys(plants, _attacks(version))

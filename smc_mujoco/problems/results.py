@@ -106,10 +106,11 @@ class QuestionBoard:
     def __str__(self) -> str:
         title = TITLES[self.question]
         lines = [f"{title}: {WORDS[MEASURE[self.question]]}, {len(self.problems)} problems"]
-        for one in self.standings:
-            rank = f"{one.rank:5.1f} [{one.low:.1f}, {one.high:.1f}]"
-            star = "*" if one.best else ""
-            lines.append(f"{one.place:>3} {one.entry:<28} {rank} {100 * one.reached:4.0f} %{star}")
+        for standing in self.standings:
+            rank = f"{standing.rank:5.1f} [{standing.low:.1f}, {standing.high:.1f}]"
+            star = "*" if standing.best else ""
+            share = 100 * standing.reached
+            lines.append(f"{standing.place:>3} {standing.entry:<28} {rank} {share:4.0f} %{star}")
         return "\n".join(lines)
 
 
@@ -242,19 +243,19 @@ class Results:
         tails = 50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL)
         ends = np.percentile(ranks @ draws(count) / count, tails, axis=1)
         placed = ranking.placed(names, ranks, np.isinf(medians), best)
-        places = np.array([one.place for one in placed])
+        places = np.array([rank.place for rank in placed])
         standings = []
-        for one in placed:
-            low, high = ends[:, names.index(one.law)].tolist()
+        for rank in placed:
+            low, high = ends[:, names.index(rank.law)].tolist()
             standings.append(
                 Standing(
-                    entry=one.law,
-                    place=1 + int((places < one.place).sum()),
-                    rank=one.mean,
+                    entry=rank.law,
+                    place=1 + int((places < rank.place).sum()),
+                    rank=rank.mean,
                     low=low,
                     high=high,
-                    best=one.best,
-                    reached=float(self.curve(one.law, question)[1][-1]),
+                    best=rank.best,
+                    reached=float(self.curve(rank.law, question)[1][-1]),
                 )
             )
         return standings
@@ -370,9 +371,9 @@ def results(source: AnyPath = "smc-30@1", seed: int = 0) -> Results:
     if refused:
         raise refused[0]
     if len(loaded) != 1:
-        several = " and ".join(each.title for each in loaded) or "none"
+        titles = " and ".join(loaded_suite.title for loaded_suite in loaded) or "none"
         raise ScenarioError(
-            f"{shown(str(path))} has results on {several}: give a folder of one suite and seed, "
+            f"{shown(str(path))} has results on {titles}: give a folder of one suite and seed, "
             "which smc-mujoco enter FOLDER writes"
         )
     return loaded[0]
@@ -392,13 +393,13 @@ def sound(folder: Path) -> tuple[list[Results], list[ScenarioError]]:
         except ScenarioError as error:
             refused.append(error)
             continue
-        others = entries.setdefault((entry.about["suite"], entry.about["seed"]), {})
-        if slug(entry.name) in map(slug, others):
+        entries_of_suite = entries.setdefault((entry.about["suite"], entry.about["seed"]), {})
+        if slug(entry.name) in map(slug, entries_of_suite):
             refused.append(
                 ScenarioError(f"{place} is another result of {shown(entry.name)}: remove it")
             )
         else:
-            others[entry.name] = entry
+            entries_of_suite[entry.name] = entry
     return [Results(*key, of_key) for key, of_key in sorted(entries.items())], refused
 
 

@@ -38,10 +38,10 @@ def folder(name: str, seed: int) -> str:
 
 def boards(name: str) -> Names:
     """Return the questions that a problem informs, of "forces", "sensors", "speed" and "calm"."""
-    one = problem(name)
+    chosen = problem(name)
     informed = []
-    for board, conditions in rules(one.version)["boards"].items():
-        if {"*", one.condition} & {*conditions}:
+    for board, conditions in rules(chosen.version)["boards"].items():
+        if {"*", chosen.condition} & {*conditions}:
             informed.append(board)
     return tuple(informed)
 
@@ -50,10 +50,10 @@ def pattern(version: int, share: int) -> Names:
     """Return the IDs that the pattern of a version chooses, `share` of 5 of its plants and
     conditions.
     """
-    of = rules(version)
+    rules_of_version = rules(version)
     chosen = []
-    for j, plant in enumerate(of["plants"]):
-        for i, condition in enumerate(of["conditions"]):
+    for j, plant in enumerate(rules_of_version["plants"]):
+        for i, condition in enumerate(rules_of_version["conditions"]):
             if (i + 2 * j + version) % PERIOD < share:
                 chosen.append(f"{plant}/{condition}@{version}")
     return tuple(chosen)

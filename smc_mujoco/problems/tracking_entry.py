@@ -65,8 +65,8 @@ class TrackingEntry:
         """The name in tables."""
         if not self.kind:
             return self.law.name
-        at = ", speed" if self.on == "speed" else ""
-        return f"{self.law.name} + {self.kind}({self.share:g}{at})"
+        speed = ", speed" if self.on == "speed" else ""
+        return f"{self.law.name} + {self.kind}({self.share:g}{speed})"
 
     def law_on(self, problem: TrackingProblem) -> Component:
         """Return the law, with a bound on its integral where it has a gain for that."""

@@ -95,9 +95,9 @@ def problem_table(board: TrackingBoard, result: ProblemBoard) -> Iterator[str]:
             f"| `{gains_text(chosen.gains)}` |"
         )
     share = f"{100 * result.told_apart:.0f} %"
-    others = len(result.names) - len(stands)
+    more = len(result.names) - len(stands)
     yield ""
-    yield f"{others} more entries; {share} of all pairs can be told apart."
+    yield f"{more} more entries; {share} of all pairs can be told apart."
 
 
 def tags_of(name: str) -> dict[str, str]:
@@ -123,8 +123,8 @@ def tag_table(board: TrackingBoard) -> Iterator[str]:
     for (tag, value), names in sorted(values.items()):
         problems = sum(bool(names & {*result.leaders}) for result in board.problems)
         typical = np.median([np.median(ratios[name]) for name in names])
-        of = f"{problems} of {len(board.problems)}"
-        yield f"| {tag} | {value} | {len(names)} | {of} | {number(float(typical))} |"
+        problem_count = f"{problems} of {len(board.problems)}"
+        yield f"| {tag} | {value} | {len(names)} | {problem_count} | {number(float(typical))} |"
 
 
 def relative_errors(board: TrackingBoard) -> dict[str, list[float]]:

@@ -57,18 +57,18 @@ def enter_tracking(
     parts = target.with_suffix("")
     parts.mkdir(parents=True, exist_ok=True)
     searched = {}
-    whole = len(chosen.problems) * SEARCHES * SETS
-    with bar(f"sets of gains of {entry.name}", whole, progress) as shown_bar:
+    set_count = len(chosen.problems) * SEARCHES * SETS
+    with bar(f"sets of gains of {entry.name}", set_count, progress) as shown_bar:
         for problem in chosen.problems:
             depends = [problem.name, str(problem), entry.name, fingerprint.of(entry.law.function)]
             file = CachedResult(parts / f"{problem.name}.json", depends, _write, read_json)
-            kept = file.read()
-            if kept is None:
+            stored = file.read()
+            if stored is None:
                 results = search_problem(problem, entry, threads, shown_bar.advance)
-                kept = file.keep([result._asdict() for result in results])
+                stored = file.keep([result._asdict() for result in results])
             else:
                 shown_bar.advance(SEARCHES * SETS)
-            searched[problem.name] = kept
+            searched[problem.name] = stored
     about = {
         "suite": suite,
         "entry": text,
@@ -80,8 +80,8 @@ def enter_tracking(
     }
     with replacing(target) as file:
         file.write_text(_compact(about), encoding="utf-8")
-    for kept in parts.iterdir():
-        kept.unlink()
+    for stored in parts.iterdir():
+        stored.unlink()
     parts.rmdir()
     return target
 

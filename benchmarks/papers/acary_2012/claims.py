@@ -177,10 +177,10 @@ def explicit(runs):
         "variation of u, implicit / explicit": lambda trace: variation_of(trace.u),
         "largest |x|, implicit / explicit": lambda trace: largest(trace.v),
     }
-    for name, of in measures.items():
+    for name, measure in measures.items():
         ratios[name] = {}
         for condition in runs.conditions:
-            implicit, explicit = (of(traces[runs.plant, law, condition]) for law in runs.laws)
+            implicit, explicit = (measure(traces[runs.plant, law, condition]) for law in runs.laws)
             ratios[name][condition] = implicit / explicit
     return ratios
 

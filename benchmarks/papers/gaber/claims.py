@@ -220,24 +220,24 @@ def smallest_stable(runs):
                 (i for i, stable in enumerate([False, *inner[plant]]) if not stable), default=0
             )
             low[plant], high[plant] = lams[last], lams[last + 1]
-    found = {}
+    lambda_by_plant = {}
     for plant, (smallest, largest) in ends.items():
-        found[plant] = MIN_LAMBDA if smallest else high[plant]
+        lambda_by_plant[plant] = MIN_LAMBDA if smallest else high[plant]
         if not smallest and not largest:
-            found[plant] = math.inf
-    return found
+            lambda_by_plant[plant] = math.inf
+    return lambda_by_plant
 
 
 def dying(runs, lams):
     """Return plant -> whether a small start dies out, for each lambda; k1 is the set's."""
     grid = []
-    for plant, some in lams.items():
-        for lam in some:
+    for plant, plant_lams in lams.items():
+        for lam in plant_lams:
             grid.append(long_run(runs, plant, lam, SMALL_START_SHARE))
     traces = iter(runs.traces(grid))
     dying = {}
-    for plant, some in lams.items():
-        dying[plant] = [dies_out(next(traces)) for _ in some]
+    for plant, plant_lams in lams.items():
+        dying[plant] = [dies_out(next(traces)) for _ in plant_lams]
     return dying
 
 
@@ -308,13 +308,13 @@ def bounded(runs):
     for run, score in zip(grid, runs.scores(grid), strict=True):
         shares.append(ratio(score["max_u"], run.law.gains["lam"]))
     largest = max(shares)
-    every = []
+    ratios = []
     for run in runs.results():
         if run.law == OURS:
-            every.append(ratio(run.scores["max_u"], run.gains["lam"]))
+            ratios.append(ratio(run.scores["max_u"], run.gains["lam"]))
     cases = {"five plants in the ideal conditions, and without a bound": largest}
-    cases |= {"every run of this law": max(every, default=largest)}
-    return {"max |u| / lambda": cases, "runs of this law": len(every)}
+    cases |= {"every run of this law": max(ratios, default=largest)}
+    return {"max |u| / lambda": cases, "runs of this law": len(ratios)}
 
 
 def robust(runs):
@@ -335,8 +335,8 @@ def scalable(runs):
         fields = {"duration": SHORT_RUN, "integrator": "implicitfast"}
         for n in sizes:
             grid.append(runs.scenario(plant, OURS, plant=find_plant(plant, n=n), **fields))
-        of_two, *others = runs.scores(grid)
-        for n, scores in zip(sizes[1:], others, strict=True):
+        of_two, *larger = runs.scores(grid)
+        for n, scores in zip(sizes[1:], larger, strict=True):
             time = ratio(scores["settling_time"], of_two["settling_time"])
             ratios[f"{plant}, N = {n}"] = time
     return {"settling time / that of N = 2": ratios}
@@ -356,8 +356,8 @@ def compensates(runs):
 
     def apart(plant):
         squeezed = variant(runs.law(plant, OURS), "squeezed")
-        both = runs.scenario(plant, OURS), runs.scenario(plant, OURS, law=squeezed)
-        return deviation(*runs.traces(both))
+        scenario_pair = runs.scenario(plant, OURS), runs.scenario(plant, OURS, law=squeezed)
+        return deviation(*runs.traces(scenario_pair))
 
     return {"max |x - x'| / |x0|": runs.by_plant(apart)}
 
@@ -372,7 +372,7 @@ def never_chatters(runs):
         # the shortest takes ten times the steps, so it has the ends of the delays alone
         cells = [*itertools.product(periods, delays), *itertools.product((shortest,), ends)]
     rate = {}
-    at = {}
+    cell_by_plant = {}
     limit = {}
     for plant in runs.plants:
         scores = runs.scores(
@@ -382,15 +382,17 @@ def never_chatters(runs):
         rates = []
         for score in scores:
             rates.append(ratio(score["tv_rate"], command_bound(runs, plant)))
-        rate[plant], at[plant] = max(zip(rates, cells, strict=True))
+        rate[plant], cell_by_plant[plant] = max(zip(rates, cells, strict=True))
         lam, k1 = (runs.law(plant, OURS).gains[gain] for gain in ("lam", "k1"))
         limit[plant] = 1e3 * linear_theory.critical_delay(
             find_plant(plant), lam, k1, control_period=1e-3
         )
     return {
         "largest TV rate / min(lambda, u_max), 1/s": rate,
-        "that is at a control period of, ms": {plant: period for plant, (period, _) in at.items()},
-        "and a delay of, ms": {plant: delay for plant, (_, delay) in at.items()},
+        "that is at a control period of, ms": {
+            plant: period for plant, (period, _) in cell_by_plant.items()
+        },
+        "and a delay of, ms": {plant: delay for plant, (_, delay) in cell_by_plant.items()},
         "delay from which the loop is unstable at 1 ms, linear theory, ms": limit,
     }
 
@@ -442,12 +444,12 @@ def nanoseconds(laws: Mapping[str, Component]) -> dict[str, float]:
 def simple(runs):
     """Claim 14: low complexity."""
     spent = nanoseconds({name: runs.mutated(find_law(name)) for name in (OURS, *GENERAL_LAWS)})
-    others = {}
+    ratio_by_law = {}
     for name in GENERAL_LAWS:
-        others[f"{OURS} over {name}"] = ratio(spent[OURS], spent[name])
+        ratio_by_law[f"{OURS} over {name}"] = ratio(spent[OURS], spent[name])
     return {
-        "time per sample / that of the fastest other law": max(others.values()),
-        "time per sample, a ratio": others,
+        "time per sample / that of the fastest other law": max(ratio_by_law.values()),
+        "time per sample, a ratio": ratio_by_law,
     }
 
 
@@ -467,8 +469,8 @@ def higher_degree(runs):
         jerk = lyapunov.input_gain(find_plant(name)) * U_MAX / LAG
         velocities = [estimator("levant", L=share * jerk) for share in JERK_SHARES]
         tried = []
-        for one in velocities:
-            tried.append(runs.scenario(name, OURS, law=third, actuator=Lag(LAG), velocity=one))
+        for velocity in velocities:
+            tried.append(runs.scenario(name, OURS, law=third, actuator=Lag(LAG), velocity=velocity))
         bounds = []
         for scores in runs.scores(tried):
             bounds.append(scores["ultimate_bound"])
@@ -521,8 +523,11 @@ def decreases(runs):
             lyapunov.vdot(*states),
             -np.inf,
         )
-        at = np.unravel_index(np.argmax(rate), rate.shape)
-        share[name], worst[name] = np.mean(rate > 0.0), (rate[at], x[at], v[at])
+        worst_place = np.unravel_index(np.argmax(rate), rate.shape)
+        share[name], worst[name] = (
+            np.mean(rate > 0.0),
+            (rate[worst_place], x[worst_place], v[worst_place]),
+        )
     names = ("largest Vdot", "largest Vdot, at x", "largest Vdot, at v")
     beside = {}
     for k, what in enumerate(names):
@@ -590,8 +595,8 @@ def side_by_side(runs):
     """Claims 27 to 29, 33, 34 and 37: what the thresholds name, of the claim's first law or of the
     paper's rival.
     """
-    (law, other), plant = runs.laws, runs.plant
-    rival = law if other == OURS else other
+    (law, second), plant = runs.laws, runs.plant
+    rival = law if second == OURS else second
 
     def overshoots_more():
         limit = larger_than(overshoot(runs, plant, OURS), scale=100.0)
@@ -604,7 +609,7 @@ def side_by_side(runs):
 
     measures = {
         "settling time": lambda: slower(runs, plant, rival),
-        "settling time, apart": lambda: alike(runs, plant, law, other),
+        "settling time, apart": lambda: alike(runs, plant, law, second),
         "overshoot, %": lambda: runs.check(
             "overshoot, %", f"{plant}: overshoot of {law}, %", overshoot(runs, plant, law)
         ),
@@ -627,24 +632,24 @@ def moderate_undershoot(runs):
 
 def largest_oscillation(runs):
     """Claim 32: Van der Pol: HOSMC largest oscillation."""
-    others = larger_than(
+    rivals = larger_than(
         max(overshoot(runs, runs.plant, law) for law in LAWS if law != HOSMC), scale=100.0
     )
     over = runs.metric("overshoot", runs.plant, (HOSMC, CONDITIONED, UNCLAMPED))
     name = f"{runs.plant}: overshoot of {{}}, %"
     checks = []
     for law in (HOSMC, CONDITIONED):
-        checks.append(runs.check("overshoot", name.format(law), over[law], others))
+        checks.append(runs.check("overshoot", name.format(law), over[law], rivals))
     return [*checks, Beside(name.format(UNCLAMPED), over[UNCLAMPED])]
 
 
 def fast_and_minimal(runs):
     """Claim 35: Duffing: fast, minimal overshoot."""
-    ours, *others = times(runs, runs.plant, *LAWS)
+    ours, *rival_times = times(runs, runs.plant, *LAWS)
     over, *overs = (overshoot(runs, runs.plant, law) for law in LAWS)
     what = f"{runs.plant}: {{}} of {OURS} against 1.1 of the best rival's"
     return [
-        runs.check("settling time", what.format("settling time, s,"), ours, min(others)),
+        runs.check("settling time", what.format("settling time, s,"), ours, min(rival_times)),
         runs.check("overshoot", what.format("overshoot, %,"), over, min(overs)),
     ]
 
@@ -678,7 +683,9 @@ def distortion(runs):
         for kc in runs.values["couplings"]:
             coupled.append(find_plant(plant, kc=kc))
         scores = runs.scores(
-            runs.scenario(plant, law, plant=one) for law in (CLASSICAL, OURS) for one in coupled
+            runs.scenario(plant, law, plant=coupled_plant)
+            for law in (CLASSICAL, OURS)
+            for coupled_plant in coupled
         )
         over = [score["overshoot"] for score in scores]
         what = f"{plant}: overshoot of"
@@ -850,7 +857,7 @@ def cheap_tanh(runs):
             else:
                 time = settling_time(trace)
             apart = deviation(trace, reference)
-            both = [
+            timed = [
                 runs.check(
                     "deviation", f"{plant}, {name}: deviation, over |x0|", apart, sentence=name
                 ),
@@ -863,9 +870,9 @@ def cheap_tanh(runs):
                 ),
             ]
             if name == FIXED_POINT_LAW:
-                evidence += [Beside(one.what, one.value) for one in both]
+                evidence += [Beside(check.what, check.value) for check in timed]
             else:
-                evidence += both
+                evidence += timed
     return evidence
 
 
@@ -1071,10 +1078,13 @@ def growth(runs, law):
 def estimated(runs, law):
     """Return how many signals, beside position and velocity, change what a law does."""
     bound = runs.law(runs.plants[0], law)
-    x, v, other = np.random.default_rng(0).normal(size=(3, PROBE_SAMPLES))
+    x, v, replacement = np.random.default_rng(0).normal(size=(3, PROBE_SAMPLES))
     plain = commanded(bound, x, v)
     return float(
-        sum(np.any(commanded(bound, x, v, **{name: other}) != plain) for name in ESTIMATED_FIELDS)
+        sum(
+            np.any(commanded(bound, x, v, **{name: replacement}) != plain)
+            for name in ESTIMATED_FIELDS
+        )
     )
 
 

@@ -48,8 +48,8 @@ def ratios(runs, scenarios, names):
     }
     traces = runs.traces(scenarios)
     shares = {}
-    for what, of in measures.items():
-        pairs = zip(map(of, traces[::2]), map(of, traces[1::2]), strict=True)
+    for what, measure in measures.items():
+        pairs = zip(map(measure, traces[::2]), map(measure, traces[1::2]), strict=True)
         by_name = {}
         for name, (implicit, explicit) in zip(names, pairs, strict=True):
             by_name[name] = float(implicit / explicit)

@@ -51,10 +51,10 @@ def sweep(runs):
 
 def exponents(runs, measure):
     """Return plant -> exponent of a measure as a function of the control period."""
-    found = {}
+    exponent_by_plant = {}
     for plant, traces in sweep(runs).items():
-        found[plant] = exponent(runs.values["periods"], map(measure, traces))
-    return found
+        exponent_by_plant[plant] = exponent(runs.values["periods"], map(measure, traces))
+    return exponent_by_plant
 
 
 def accuracy_of_s(runs):

@@ -168,10 +168,10 @@ def crossover(runs):
         amplitudes.append(cycle(trace)[0])
     names = ("at the crossover", "at half of it", "at twice of it")
     ratios = np.divide(amplitudes[::2], amplitudes[1::2])
-    found = {"ATC at the crossover, s": equal}
+    crossing = {"ATC at the crossover, s": equal}
     for name, ratio in zip(names, ratios, strict=True):
-        found[f"amplitude, STA / FOSMC, {name}"] = ratio
-    return found
+        crossing[f"amplitude, STA / FOSMC, {name}"] = ratio
+    return crossing
 
 
 def redesigned(runs):

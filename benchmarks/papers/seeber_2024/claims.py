@@ -109,10 +109,10 @@ def compared(runs):
     """Largest |x| of the last half of 5 s under random slopes, over that of the explicit and the
     older implicit law.
     """
-    proper, *others = runs.laws
+    proper, *rivals = runs.laws
     ours = random_runs(runs, proper)
     ratios = {}
-    for law in others:
+    for law in rivals:
         ratios |= {
             f"{law}, {name}": ours[name] / theirs for name, theirs in random_runs(runs, law).items()
         }

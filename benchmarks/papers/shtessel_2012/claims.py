@@ -58,7 +58,7 @@ def narrower(runs):
     traces = runs.traces(runs.only(law=runs.law(runs.plant, *runs.laws, mu=mu)) for mu in layers)
     return {
         "exponent of the largest |s| in mu": exponent(
-            layers, [np.abs(third(one.v)).max() for one in traces]
+            layers, [np.abs(third(trace.v)).max() for trace in traces]
         )
     }
 

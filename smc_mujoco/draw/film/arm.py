@@ -45,15 +45,15 @@ class Overlay:
         self.scale = stage.scale
         self.forces = None  # of a contact, (frames, 3) N
         path = trace.x[:, :3]
-        wanted = trace.r[:, :3]
+        reference_path = trace.r[:, :3]
         if trace.scenario.plant.tip:
-            path, wanted = tip.tip_paths(trace)
-        some = slice(None, None, 1 + len(trace.t) // PATH_POINTS)
-        self.times = trace.t[some]
+            path, reference_path = tip.tip_paths(trace)
+        every_nth = slice(None, None, 1 + len(trace.t) // PATH_POINTS)
+        self.times = trace.t[every_nth]
         floor = np.array([-np.inf, -np.inf, 0.0])
         above = np.array([0.0, 0.0, stage.puppet.height])
-        self.path = np.maximum(path[some] + above, floor)
-        self.wanted = np.maximum(wanted[some] + above, floor)
+        self.path = np.maximum(path[every_nth] + above, floor)
+        self.wanted = np.maximum(reference_path[every_nth] + above, floor)
         if tip.knows_contacts(trace.scenario):
             push = tip.contacts(trace).push
             self.forces = windows(trace.t, push, edges).mean
@@ -71,9 +71,9 @@ class Overlay:
         if self.forces is not None:
             size = float(np.linalg.norm(self.forces[frame]))
             if size > 0.5:
-                at = self.stage.find(self.trace.scenario.plant.tip)
-                behind = at - self.newton * self.forces[frame]
-                stamped += self.arrow(image, at, behind, size, "")
+                tip_place = self.stage.find(self.trace.scenario.plant.tip)
+                behind = tip_place - self.newton * self.forces[frame]
+                stamped += self.arrow(image, tip_place, behind, size, "")
         start = self.edges[frame] - self.stage.track.holds[frame]
         for body, peak in arrows.blows(self.trace, start, time):
             size = float(np.linalg.norm(peak))

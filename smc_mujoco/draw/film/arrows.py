@@ -98,7 +98,7 @@ class Arrow(NamedTuple):
     body: str = ""  # which a blow hits
     cut: bool = False  # it is longer than fits
     words: str = ""  # its value, where that is written beside it
-    told: bool = False  # whether the word on its hit or blow has its value
+    on_blow: bool = False  # whether the word on its hit or blow has its value
     hollow: bool = False  # whether only its edge is in its colour
     foot: bool = False  # whether there is a bar at its tail
 
@@ -162,10 +162,10 @@ def mounts(
         if plant.n == 1 and "l" in plant.parameters and usual:  # as large on any rod
             turning = usual.parameters["l"] / plant.parameters["l"]
         hinge = slide._replace(unit=turning)
-    found = []
+    joint_mounts = []
     for joint, slides_here in zip(joints, slides, strict=True):
-        found.append((slide if slides_here else hinge)._replace(joint=joint))
-    return found
+        joint_mounts.append((slide if slides_here else hinge)._replace(joint=joint))
+    return joint_mounts
 
 
 def loads(trace: Trace, edges: Array) -> dict[str, Envelope]:
@@ -189,7 +189,7 @@ def weights(trace: Trace) -> Array:
     """Return the constant force of gravity on each channel, (K + 1, n) N: on slides on a slope, or
     upright ones, that no hinge turns; 0 on others, whose weight depends on the pose.
     """
-    found = np.zeros(trace.d.shape)
+    weight_forces = np.zeros(trace.d.shape)
     for shape in shapes(trace.scenario):
         model = shape.model
         data = mujoco.MjData(model)
@@ -199,8 +199,8 @@ def weights(trace: Trace) -> Array:
         mujoco.mj_rne(model, data, 0, bias)
         for channel, dof in enumerate(dof_ids(model).tolist()):
             if slides_alone(model, dof):
-                found[trace.t >= shape.time, channel] = -bias[dof]
-    return found
+                weight_forces[trace.t >= shape.time, channel] = -bias[dof]
+    return weight_forces
 
 
 def slides_alone(model: mujoco.MjModel, dof: int) -> bool:
@@ -236,20 +236,20 @@ def _of_one_unit(traces: Sequence[Trace]) -> dict[ChannelGroup, Sequence[Trace]]
     """
     if is_network(traces[0].scenario.plant):
         traces = list(map(mean_trace, traces))
-    found = {}
+    traces_by_group = {}
     for group, parts in style.split(traces).items():
         if group.effort or traces[0].scenario.plant.pose:
-            found[group] = parts
+            traces_by_group[group] = parts
             continue
         for panel in by_channel(Panel("u", group, parts)):
-            found[panel.group] = panel.traces
-    return found
+            traces_by_group[panel.group] = panel.traces
+    return traces_by_group
 
 
 def scales(traces: Sequence[Trace]) -> dict[ChannelGroup, Scale]:
     """Return the scale of the arrows for each group of channels."""
     traces = [dataclasses.replace(trace, d=trace.d + weights(trace)) for trace in traces]
-    found = {}
+    scale_by_group = {}
     lasting = [0.0]  # forces that drive and disturb
     brief = [0.0]
     for group, parts in _of_one_unit(traces).items():
@@ -259,7 +259,7 @@ def scales(traces: Sequence[Trace]) -> dict[ChannelGroup, Scale]:
                 forces = np.linalg.norm(trace.d[:, :3], axis=1)
                 pushes.append(forces.max())
             push = float(max(pushes)) if group.unit == "m" else 0.0
-            found[group] = Scale(0.0, push)
+            scale_by_group[group] = Scale(0.0, push)
             lasting.append(push)
             continue
         reaction = max(map(abs, quantities.span(parts, "reaction")))
@@ -267,7 +267,7 @@ def scales(traces: Sequence[Trace]) -> dict[ChannelGroup, Scale]:
             reaction = 0.0  # the floor's, which bears the machine
         brief.append(reaction)
         if not group.driven:
-            found[group] = Scale(0.0, 0.0, reaction)
+            scale_by_group[group] = Scale(0.0, 0.0, reaction)
             continue
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
         drive = same and any(map(_drives, traces))
@@ -278,10 +278,10 @@ def scales(traces: Sequence[Trace]) -> dict[ChannelGroup, Scale]:
         brief.append(push)
         if same:
             lasting += [control, quantities.usual(parts, "d")]
-        found[group] = Scale(control, push, reaction, drive, full=0.0 if same else control)
+        scale_by_group[group] = Scale(control, push, reaction, drive, full=0.0 if same else control)
     longest = max(lasting) or max(brief)
     scaled = {}
-    for group, scale in found.items():
+    for group, scale in scale_by_group.items():
         units = style.units(group)
         full = scale.full or longest
         scaled[group] = scale._replace(
@@ -402,34 +402,36 @@ def frames(
     acting = loads(trace, edges)
     plant = trace.scenario.plant
     if is_network(plant) and sizes:
-        acting = {name: mean_of(one) for name, one in acting.items()}
-        shown = [(len(sizes) // 2, sizes[0])]
+        acting = {name: mean_of(force) for name, force in acting.items()}
+        numbered_sizes = [(len(sizes) // 2, sizes[0])]
     else:
-        shown = list(enumerate(sizes))
-    found = []
+        numbered_sizes = list(enumerate(sizes))
+    drawn_frames = []
     for k, time in enumerate(edges[1:].tolist()):
         drawn = []
         if plant.pose and sizes:
             drawn = flying(acting, k, sizes[0])
         else:
-            for i, size in shown:
+            for i, size in numbered_sizes:
                 for arrow in arrows(acting, k, i, size, colour):
                     drawn.append((i, arrow))
             for body, peak in blows(trace, edges[k] - holds[k], time) if sizes else ():
                 drawn.append((0, along(peak, sizes[0], body)))
-        found.append(Drawn(time, drawn))
-    return found
+        drawn_frames.append(Drawn(time, drawn))
+    return drawn_frames
 
 
 def held(drawn: Drawn, then: Drawn, shade: tuple[float, ...]) -> Drawn:
     """Return the arrows with those of a shade, whatever its opacity, as they were `then`, without
     their numbers: the words on a hit or a blow have them.
     """
-    kept = [one for one in drawn.arrows if one[1].rgba[:3] != shade[:3]]
+    held_arrows = [
+        channel_arrow for channel_arrow in drawn.arrows if channel_arrow[1].rgba[:3] != shade[:3]
+    ]
     for channel, arrow in then.arrows:
         if arrow.rgba[:3] == shade[:3]:
-            kept.append((channel, arrow._replace(rgba=shade, words="", told=True)))
-    return drawn._replace(arrows=kept)
+            held_arrows.append((channel, arrow._replace(rgba=shade, words="", on_blow=True)))
+    return drawn._replace(arrows=held_arrows)
 
 
 def is_network(plant: Plant) -> bool:
@@ -462,12 +464,12 @@ def mean_of(acting: Envelope) -> Envelope:
 
 def blows(trace: Trace, start: float, stop: float) -> list[tuple[str, Array]]:
     """Return the bodies that blows hit between two times, s, with the peak of each, (3,) N."""
-    found = []
+    forces = []
     for push in style.pushes([trace]):
         if start <= push.time + push.width and stop >= push.time:
             force = np.array([push.x, push.y, push.z])
-            found.append((push.body, force))
-    return found
+            forces.append((push.body, force))
+    return forces
 
 
 def straight(
@@ -555,16 +557,16 @@ def outline(
     way = np.append(0.0, steps.cumsum())
     width = min(width, MAX_THICKNESS * way[-1])
     long = min(HEAD_LENGTH * HEAD_WIDTH * width, longest * way[-1]) * head
-    at = np.linspace(0.0, way[-1] - long, len(line))
+    stations = np.linspace(0.0, way[-1] - long, len(line))
     rows = []
     for part in line.T:
-        rows.append(np.interp(at, way, part))
+        rows.append(np.interp(stations, way, part))
     shaft = np.column_stack(rows)
     along = np.gradient(shaft, axis=0)
     sizes = np.linalg.norm(along, axis=1)[:, None]
     across = 0.5 * width * along[:, ::-1] * (-1, 1) / sizes
     if foot:
-        barred = at <= min(FOOT_LENGTH * width, MAX_FOOT * way[-1])
+        barred = stations <= min(FOOT_LENGTH * width, MAX_FOOT * way[-1])
         across[barred] *= FOOT_WIDTH
     wing = long / HEAD_LENGTH / (0.5 * width) * across[-1]
     tip = [shaft[-1] + wing, line[-1], shaft[-1] - wing]
@@ -596,7 +598,7 @@ def bytes_of(rgba: Sequence[float]) -> tuple[int, ...]:
 def boxes(stamped: Sequence[Stamped], scale: float) -> list[Array]:
     """Return boxes, (2, 2) px each, that cover arrows on a picture, with a gap for numbers."""
     around = np.array([[-GAP], [GAP]]) * scale
-    return [point + around for one in stamped for point in one.edge]
+    return [point + around for stamp in stamped for point in stamp.edge]
 
 
 def write_numbers(
@@ -607,9 +609,9 @@ def write_numbers(
     `taken`, (2, 2) px each, which get those of the numbers.
     """
     said = set()
-    numbered = [one for one in stamped if one.arrow.words]
+    numbered = [stamp for stamp in stamped if stamp.arrow.words]
     if numbered and wide < NARROW * scale:
-        numbered = [max(numbered, key=lambda one: abs(one.arrow.high))]
+        numbered = [max(numbered, key=lambda stamp: abs(stamp.arrow.high))]
     for arrow, line, _ in numbered:
         key = arrow.words, arrow.rgba
         if key not in said:
@@ -637,9 +639,9 @@ def write(image: Image.Image, arrow: Arrow, line: Array, scale: float, taken: li
                 taken.append(box)
                 rim = {"stroke_width": round(2 * scale), "stroke_fill": style.PAPER}
                 letters = style.font(high, True)
-                at = tuple(place.tolist())
+                centre = tuple(place.tolist())
                 colour = bytes_of(arrow.rgba)
-                ImageDraw.Draw(image).text(at, arrow.words, colour, letters, anchor="mm", **rim)
+                ImageDraw.Draw(image).text(centre, arrow.words, colour, letters, anchor="mm", **rim)
                 return
 
 
@@ -653,8 +655,8 @@ def is_apart(box: Array, taken: Sequence[Array]) -> bool:
     """Return whether a box, (2, 2) px, overlaps none of those that are taken."""
     if not taken:
         return True
-    others = np.array(taken)
-    beyond = (box[1] <= others[:, 0]) | (box[0] >= others[:, 1])
+    taken_boxes = np.array(taken)
+    beyond = (box[1] <= taken_boxes[:, 0]) | (box[0] >= taken_boxes[:, 1])
     return bool(beyond.any(axis=1).all())
 
 
@@ -674,16 +676,16 @@ def number_places(ends: tuple[Array, Array], half: Array, most: Array, gap: floa
 
     `half` is half the size of the number, and `most` the farthest place that it may have.
     """
-    free, other = ends
-    side = 1.0 if free[0] >= other[0] else -1.0
-    middle = (free + other) / 2
+    free, foot = ends
+    side = 1.0 if free[0] >= foot[0] else -1.0
+    middle = (free + foot) / 2
     reach = np.array([side * (gap + half[0]), 0.0])
-    apart = np.array([0.0, abs(free[1] - other[1]) / 2 + 2 * half[1]])
-    steep = abs(free[1] - other[1]) > abs(free[0] - other[0])
+    apart = np.array([0.0, abs(free[1] - foot[1]) / 2 + 2 * half[1]])
+    steep = abs(free[1] - foot[1]) > abs(free[0] - foot[0])
     beside = middle + reach if steep else middle - apart
     within = np.maximum(half, most)
     beside[0] = np.clip(beside[0], half[0], within[0])
-    return [free + reach, beside, other - reach]
+    return [free + reach, beside, foot - reach]
 
 
 def paint(

@@ -29,7 +29,7 @@ Sizes = Callable[[float], tuple[Array, float]]
 class Room(NamedTuple):
     """A part of a picture, px from the top left."""
 
-    left: float
+    left_end: float
     top: float
     right: float
     bottom: float
@@ -92,10 +92,10 @@ def fit(
     z = -points @ turn[:, 2]
     x = size[0] / 2
     y = size[1] / 2
-    left, right, low, high = np.array(
-        [room.left - x, room.right - x, y - room.bottom, y - room.top]
+    leftmost, right, low, high = np.array(
+        [room.left_end - x, room.right - x, y - room.bottom, y - room.top]
     ) * pixel(size)
-    sides = [(across, left, right), (up, low, high)]
+    sides = [(across, leftmost, right), (up, low, high)]
     distance = least
     for p, a, b in sides:
         span = np.max(p - b * z) - np.min(p - a * z)
@@ -121,10 +121,10 @@ def widened(view: View, points: Array, missed: Array) -> Array:
     seen = missed * np.clip(1.0 + MAX_MISSED - far / reach, 0.0, 1.0)
     moves = []
     for ways in seen.swapaxes(0, 1):
-        every = [np.concatenate([points, points + way]) for way in ways]
-        places = [fit(both, view.turn, view.size, view.inside) for both in every]
+        swept = [np.concatenate([points, points + way]) for way in ways]
+        places = [fit(cloud, view.turn, view.size, view.inside) for cloud in swept]
         back = float(max(place @ view.turn[:, 2] for place in places))
-        places = [fit(both, view.turn, view.size, view.inside, back) for both in every]
+        places = [fit(cloud, view.turn, view.size, view.inside, back) for cloud in swept]
         moves.append(np.array(places) - view.place)
     return np.array(moves).swapaxes(0, 1)
 
@@ -172,19 +172,19 @@ def layout(
         columns = -(-count // rows)
         if columns * (rows - 1) >= count:  # a row would be empty
             continue
-        pitch = np.array([(room.right - room.left) / columns, (room.bottom - room.top) / rows])
+        pitch = np.array([(room.right - room.left_end) / columns, (room.bottom - room.top) / rows])
         wide, tall = (pitch - TILE_GAP).astype(int).tolist()
         labels, read = sizes(MAX_BESIDE * wide if beside else wide)
         across, down = labels.max(axis=0).tolist()
         fits = down <= tall if beside else across <= wide
         if beside:
             fits &= across <= MAX_BESIDE * wide
-            left, foot = math.ceil(min(across, MAX_BESIDE * wide)), 0
+            beside_width, foot = math.ceil(min(across, MAX_BESIDE * wide)), 0
         else:
-            left, foot = 0, math.ceil(min(down, (1.0 - MIN_HEIGHT) * tall))
-        size = (wide - left, tall - foot)
+            beside_width, foot = 0, math.ceil(min(down, (1.0 - MIN_HEIGHT) * tall))
+        size = (wide - beside_width, tall - foot)
         edge = TILE_EDGE * size[1]
-        head = HEAD_ROOM * (room.right - room.left)
+        head = HEAD_ROOM * (room.right - room.left_end)
         top = min(max(edge, head, words), 0.5 * size[1])
         inside = Room(edge, top, size[0] - edge, size[1] - edge)
         place = fit(points, turn, size, inside)
@@ -193,15 +193,15 @@ def layout(
         layouts.append((merit, columns, pitch, view))
     _, columns, pitch, view = max(layouts, key=lambda one: one[0])
     wide, tall = view.size
-    left, foot = (pitch - TILE_GAP - view.size).astype(int).tolist()
-    corner = np.array([room.left, room.top])
+    beside_width, foot = (pitch - TILE_GAP - view.size).astype(int).tolist()
+    corner = np.array([room.left_end, room.top])
     tiles = []
     labels = []
     for k in range(count):
         x, y = (corner + pitch * (k % columns, k // columns)).round().tolist()
-        tiles.append((x + left, y, x + left + wide, y + tall))
-        if left > foot:
-            labels.append((x, y, x + left, y + tall))
+        tiles.append((x + beside_width, y, x + beside_width + wide, y + tall))
+        if beside_width > foot:
+            labels.append((x, y, x + beside_width, y + tall))
         else:
             labels.append((x, y + tall, x + wide, y + tall + foot))
     return np.array(tiles, int), np.array(labels), view

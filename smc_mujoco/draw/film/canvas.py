@@ -56,10 +56,10 @@ class Canvas:
 
         `add` adds shapes to the scene, such as ghosts.
         """
-        shown = self.renderer.scene
+        scene = self.renderer.scene
         self.renderer.update_scene(self.data, "film", self.option)
-        add(shown)
-        add_shadows(shown, self.sun, self.casts, self.extent)
+        add(scene)
+        add_shadows(scene, self.sun, self.casts, self.extent)
         return self.renderer.render()
 
     def outlined(
@@ -68,16 +68,16 @@ class Canvas:
         """Return a picture with the outline, of a width in px, of the white shapes that `add` adds
         to a scene; read-only. An outline that would be cut is not drawn.
         """
-        shown = self.renderer.scene
-        shown.ngeom = 0
-        add(shown)
-        if not shown.ngeom:
+        scene = self.renderer.scene
+        scene.ngeom = 0
+        add(scene)
+        if not scene.ngeom:
             return picture
-        flags = shown.flags.copy()
-        shown.flags[FLAT] = 1
-        shown.flags[FOG] = shown.flags[SKY] = 0
+        flags = scene.flags.copy()
+        scene.flags[FLAT] = 1
+        scene.flags[FOG] = scene.flags[SKY] = 0
         seen = Image.fromarray(self.renderer.render()[..., 0])  # white shapes on black
-        shown.flags[:] = flags
+        scene.flags[:] = flags
         x0, y0, x1, y1 = seen.getbbox() or (0, 0, 0, 0)
         if x0 == 0 or y0 == 0 or x1 == seen.width or y1 == seen.height:
             return picture

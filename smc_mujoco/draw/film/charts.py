@@ -30,12 +30,12 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
     """Return the two panels below a film: the first two of its `candidates`, those in which
     all runs agree only if there are no others.
     """
-    found = []
-    for place, each in enumerate(candidates(traces)):
-        linear = each.quantity in PEAKS and not needs_decades(each)
-        panel = each._replace(quantity=LINEAR[each.quantity]) if linear else each
-        found.append((all_agree(panel), place, panel))
-    best = sorted(found, key=operator.itemgetter(0, 1))[:2]
+    ranked = []
+    for place, candidate in enumerate(candidates(traces)):
+        linear = candidate.quantity in PEAKS and not needs_decades(candidate)
+        panel = candidate._replace(quantity=LINEAR[candidate.quantity]) if linear else candidate
+        ranked.append((all_agree(panel), place, panel))
+    best = sorted(ranked, key=operator.itemgetter(0, 1))[:2]
     return [panel for *_, panel in sorted(best, key=operator.itemgetter(1))]
 
 
@@ -54,8 +54,8 @@ def candidates(traces: Sequence[Trace]) -> list[Panel]:
     motions = []
     controls = []
     errors = []
-    for each in style.split(traces).items():
-        place = Panel("x", *each)
+    for group_traces in style.split(traces).items():
+        place = Panel("x", *group_traces)
         error = place._replace(quantity="settling")
         many = len(place.group.channels) > 1
         if place.group.driven:
@@ -75,7 +75,9 @@ def candidates(traces: Sequence[Trace]) -> list[Panel]:
     elif plant.direct and not first and motions[0].quantity == "settling":
         hit = hit_channels(traces)
         joints = worst_first(traces)
-        motions[1:1] = [one._replace(quantity="x") for one in joints if one.channel in hit][:1]
+        motions[1:1] = [joint._replace(quantity="x") for joint in joints if joint.channel in hit][
+            :1
+        ]
     return [*first, *motions, *controls, *errors]
 
 
@@ -105,15 +107,15 @@ def stays_settled(trace: Trace) -> bool:
 
 def hit_channels(traces: Sequence[Trace]) -> set[int]:
     """Return the channels that impulses hit, or whose reactions are largest during contact."""
-    found: set[int] = set()
+    channels: set[int] = set()
     for trace in traces:
         touch = in_contact(trace).any(axis=1)
         sizes = np.abs(np.nan_to_num(trace.reaction))
         during = sizes[touch].max(axis=0, initial=0.0)
         apart = sizes[~touch].max(axis=0, initial=0.0)
         acts = (during > apart) | states.struck(trace).any(axis=0)
-        found.update(np.flatnonzero(acts).tolist())
-    return found
+        channels.update(np.flatnonzero(acts).tolist())
+    return channels
 
 
 def all_agree(panel: Panel) -> bool:

@@ -237,9 +237,9 @@ def film(
 
 def write(frames: Frames, path: Path) -> Path:
     """Write frames to a file, as its ending tells, and return its path."""
-    made = iter(frames)
-    with replacing(path) as part, contextlib.closing(made), bar("film", len(frames)) as progress:
-        WRITERS[path.suffix](frames, _counted(made, progress), part)
+    images = iter(frames)
+    with replacing(path) as part, contextlib.closing(images), bar("film", len(frames)) as progress:
+        WRITERS[path.suffix](frames, _counted(images, progress), part)
     return path
 
 
@@ -287,11 +287,11 @@ def _checked_size(size: Iterable[int]) -> tuple[int, int]:
     sides = items_of("size", size)
     fit = len(sides) == 2
     for side, low, high in zip(sides, MIN_SIZE, MAX_SIZE, strict=False):
-        whole = isinstance(side, int | np.integer)
-        fit &= whole and low <= side <= high and side % 2 == 0
+        is_integer = isinstance(side, int | np.integer)
+        fit &= is_integer and low <= side <= high and side % 2 == 0
     if not fit:
-        wanted = f"two even numbers from {MIN_SIZE} to {MAX_SIZE}"
-        raise ScenarioError(f"a film of {errors.shown(size)} px: give {wanted}")
+        cure = f"two even numbers from {MIN_SIZE} to {MAX_SIZE}"
+        raise ScenarioError(f"a film of {errors.shown(size)} px: give {cure}")
     return int(sides[0]), int(sides[1])
 
 
@@ -318,8 +318,8 @@ def pictures(frames: Frames) -> Generator[Array]:
         ordered = [[*key, order] for key in keys]
         lines = head_lines(runs, size, frames.title, ordered)
         placed = placement(tracks, frames.camera, runs.names, size, lines)
-    whole = size, placed.tiles, placed.labels, frames.title
-    sheet = Sheet(runs, *whole, keys[0], lines=lines, order=order)
+    arguments = size, placed.tiles, placed.labels, frames.title
+    sheet = Sheet(runs, *arguments, keys[0], lines=lines, order=order)
     with contextlib.ExitStack() as opened:
         stages = [opened.enter_context(stage) for stage in staged(tracks, placed, clock.times)]
         shots = separate_shots
@@ -338,7 +338,7 @@ def pictures(frames: Frames) -> Generator[Array]:
             last = runs._replace(traces=closing)
             stop = end(last.traces)
             last = last._replace(span=(stop, stop))
-            sheet = Sheet(last, *whole, keys[-1], start, lines, order)
+            sheet = Sheet(last, *arguments, keys[-1], start, lines, order)
             for stage, track in zip(stages, tracks_at(close, runs, scales), strict=True):
                 middle = track.x.mean(axis=0)
                 larger = close.factor * (track.x - middle)
@@ -355,10 +355,10 @@ def tracks_at(
     count = max(1, round(FPS * stop))
     samples = 1 + min(MAX_GRID, count)
     grid = np.linspace(0.0, stop, samples)  # also for a still
-    found = []
+    tracks = []
     for trace, colour in zip(runs.traces, runs.colours, strict=True):
-        found.append(MachineTrack(trace, colour, clock, grid, scales))
-    return found
+        tracks.append(MachineTrack(trace, colour, clock, grid, scales))
+    return tracks
 
 
 def separate_shots(stages: Sequence[Stage], frame: int, time: float) -> list[Array]:
@@ -429,15 +429,17 @@ def placement(
     sizes = functools.partial(label_sizes, names, size)
     room = room_of(size, lines)
     words = STATE_HEIGHT * letters(size) if any(track.speaks for track in tracks) else 0.0
-    several = len(tracks) > 1  # the name of one has room below it, where no chart is as wide
-    tiles, labels, view = camera.layout(len(tracks), room, sizes, points, turn, several, words)
+    many_machines = len(tracks) > 1  # the name of one has room below it, where no chart is as wide
+    tiles, labels, view = camera.layout(
+        len(tracks), room, sizes, points, turn, many_machines, words
+    )
     lanes = shared_picture.places(puppets, turn)
     if lanes is not None:
-        every = np.concatenate([points + place for place in lanes])
-        shared = shared_picture.layout(len(tracks), room, sizes, every, turn, words)
-        if camera.magnification(shared[2], every) > camera.magnification(view, points):
+        points_of_lanes = np.concatenate([points + place for place in lanes])
+        shared = shared_picture.layout(len(tracks), room, sizes, points_of_lanes, turn, words)
+        if camera.magnification(shared[2], points_of_lanes) > camera.magnification(view, points):
             tiles, labels, view = shared
-            points = every
+            points = points_of_lanes
             puppets = list(map(shared_picture.on_roof, puppets))
         else:
             lanes = None

@@ -67,10 +67,10 @@ class FilmClock(NamedTuple):
         the speeds that it has there.
         """
         passed = np.diff(self.times) / self.speeds[1:]
-        shown = np.append(0.0, np.cumsum(passed))
+        film_times = np.append(0.0, np.cumsum(passed))
         before = np.minimum(t - self.times[0], 0.0) / self.speeds[0]
         after = np.maximum(t - self.times[-1], 0.0) / self.speeds[-1]
-        return np.interp(t, self.times, shown) + before + after
+        return np.interp(t, self.times, film_times) + before + after
 
     def still(self, time: float) -> "FilmClock":
         """Return the clock of the picture at a time of the run, s: what a film holds for a while,
@@ -91,19 +91,19 @@ def clock(traces: Trace | Sequence[Trace], fps: Rate, speed: Speed | None = None
     the rule above.
     """
     traces = style.traces_of_one_plant(traces)
-    whole = end(traces)
+    duration = end(traces)
     if speed is not None:
-        count = int(whole * fps / speed + 1e-6) + 1
+        count = int(duration * fps / speed + 1e-6) + 1
         times = np.arange(count) * (speed / fps)
         return FilmClock(times, np.full(len(times), speed))
-    grid, wanted = speeds(traces, fps)
+    grid, speed_of_grid = speeds(traces, fps)
     times = [0.0]
-    while times[-1] < whole - 1e-9:
-        at = np.searchsorted(grid, times[-1] + 1e-9, side="right") - 1
-        now = wanted[at]
-        times.append(min(times[-1] + now / fps, whole))
+    while times[-1] < duration - 1e-9:
+        cell = np.searchsorted(grid, times[-1] + 1e-9, side="right") - 1
+        now = speed_of_grid[cell]
+        times.append(min(times[-1] + now / fps, duration))
     frames = np.array(times)
-    speeds_there = wanted[np.searchsorted(grid, frames + 1e-9, side="right") - 1]
+    speeds_there = speed_of_grid[np.searchsorted(grid, frames + 1e-9, side="right") - 1]
     return FilmClock(frames, speeds_there, close_up(traces, fps))
 
 
@@ -173,10 +173,10 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[Array, Array]:
     """
     from scipy.ndimage import maximum_filter1d
 
-    whole = end(traces)
-    grid = np.arange(max(1, round(whole * fps))) / fps
+    duration = end(traces)
+    grid = np.arange(max(1, round(duration * fps))) / fps
     runs = list(map(finite, traces))
-    travel = travel_of(runs, np.append(grid, whole))
+    travel = travel_of(runs, np.append(grid, duration))
     beyond = np.maximum(travel / MAX_TRAVEL, 1.0)
     powers = np.ceil(np.log2(beyond) - 1e-9)
     powers = np.asarray(
@@ -192,7 +192,7 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[Array, Array]:
     moving = np.asarray(
         maximum_filter1d(moved, 2 * round(REST_MARGIN * fps) + 1, mode="nearest"), bool
     )
-    longest = max(MAX_LENGTH[0] * whole, MAX_LENGTH[1])
+    longest = max(MAX_LENGTH[0] * duration, MAX_LENGTH[1])
     playback = np.ones(len(grid))
     for saved in range(2 * MAX_HALVINGS + 1):  # first around other motion, then around pushes
         slowest = max(0, MAX_HALVINGS - saved)

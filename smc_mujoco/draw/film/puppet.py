@@ -75,7 +75,7 @@ class Course(NamedTuple):
     times: list[float]  # s
     places: list[Array]
     goals: list[Array]
-    others: list[Array]
+    loose_boxes: list[Array]
     rest: list[Array]  # of a machine that its driven joints do not carry
 
     @property
@@ -97,8 +97,8 @@ class Course(NamedTuple):
         clipped = half.clip(0.0, 0.5 * FOLLOW_TIME)
         half = clipped[:, None]
         shares = np.linspace(-1.0, 1.0, 9)
-        at = times[:, None] + half * shares
-        means = [np.interp(at, self.times, part).mean(axis=1) for part in self.middle.T]
+        sample_times = times[:, None] + half * shares
+        means = [np.interp(sample_times, self.times, part).mean(axis=1) for part in self.middle.T]
         return np.stack(means, axis=1)
 
 
@@ -122,14 +122,14 @@ class Puppet:
         """Return the machine of a scenario."""
         scenario = world.first_channels(scenario)
         plant = scenario.plant
-        found = shapes(scenario)
-        model = found[0].model
+        machine_shapes = shapes(scenario)
+        model = machine_shapes[0].model
         ids = joint_ids(model)
         slides = model.jnt_type[ids] == mujoco.mjtJoint.mjJNT_SLIDE
         rail = np.inf
         start = model.qpos0
         if plant.on_stage:
-            for shape in found:
+            for shape in machine_shapes:
                 world.restyle(shape.model)
             if plant.unit != "rad" and not plant.pose:
                 halves = world.fixed_boxes(model)[..., 0]
@@ -145,8 +145,8 @@ class Puppet:
                 rotors.append((k, model.jnt_qposadr[rotor]))
         return cls(
             scenario,
-            found,
-            [mujoco.MjData(shape.model) for shape in found],
+            machine_shapes,
+            [mujoco.MjData(shape.model) for shape in machine_shapes],
             ids,
             slides,
             rail,
@@ -276,7 +276,7 @@ class Puppet:
             course.times.append(time)
             body_corners = corners[body].reshape(-1, 3)
             course.places.append(body_corners)
-            course.others.append(corners[loose])
+            course.loose_boxes.append(corners[loose])
             course.rest.append(corners[rest])
         return course
 
@@ -322,9 +322,9 @@ class Puppet:
         radius = arrows.BENT_SIZE * float(widest)
         ids = self.ids.tolist()
         slides = self.slides.tolist()
-        found = arrows.mounts(self.scenario, ids, slides, self.rail, front)
+        joint_mounts = arrows.mounts(self.scenario, ids, slides, self.rail, front)
         mounts = []
-        for mount in found:
+        for mount in joint_mounts:
             smaller = min(mount.radius, radius)
             mounts.append(mount._replace(radius=smaller))
         lines = self.lines(track, mounts)
@@ -337,13 +337,13 @@ class Puppet:
             every_time = np.array([*course.times, *line_times])
             places = course.followed(every_time)
             relative = []
-            for part, at in zip([*course.places, *curves], places, strict=True):
-                relative.append(part - at)
+            for part, origin in zip([*course.places, *curves], places, strict=True):
+                relative.append(part - origin)
             points = np.concatenate(relative)
             around = (0.5 * MOST_HEIGHT - 0.5) * np.ptp(points, axis=0).max()
             ends = points.min(axis=0) - around, points.max(axis=0) + around
             moved = zip(course.rest, places, strict=False)
-            rest = np.concatenate([boxes - at for boxes, at in moved])
+            rest = np.concatenate([boxes - origin for boxes, origin in moved])
             points = np.concatenate([points, within(rest, *ends).reshape(-1, 3)])
             every_place = np.concatenate(course.places)
             lowest = float(every_place[:, 2].min())
@@ -370,8 +370,8 @@ class Puppet:
         machines = [shape.model for shape in self.shapes]
         world.cut(machines, points, axes, on_stage)
         world.forward(model, self.data[0])
-        kept = world.still(model) & (model.geom_group < world.HIDDEN_GROUP)
-        standing = world.boxes(model, self.data[0])[kept]
+        standing_geoms = world.still(model) & (model.geom_group < world.HIDDEN_GROUP)
+        standing = world.boxes(model, self.data[0])[standing_geoms]
         low = points.min(axis=0)
         high = points.max(axis=0)
         size = (high - low).max()
@@ -385,8 +385,8 @@ class Puppet:
         stand = OWN_STAND_SHARE * size
         if not on_stage:  # what moves fills half of the picture
             reached = np.concatenate([course.reached for course in courses])
-            tall, whole = (np.ptp(some @ turn[:, 1]) for some in (reached, points))
-            room = max(0.0, MOST_HEIGHT * tall - whole) / max(turn[2, 1], MIN_UPRIGHT)
+            tall, whole_height = (np.ptp(cloud @ turn[:, 1]) for cloud in (reached, points))
+            room = max(0.0, MOST_HEIGHT * tall - whole_height) / max(turn[2, 1], MIN_UPRIGHT)
             near[2] = np.inf
             standing = within(standing, low - near, high + near)
             stand = min(room, low[2] - standing[..., 2].min(initial=low[2]))
@@ -400,7 +400,7 @@ class Puppet:
         if on_stage:
             standing[..., 2] = standing[..., 2].clip(low[2] - stand, high[2] + stand)
         points = np.concatenate([points, around.reshape(-1, 3), standing.reshape(-1, 3)])
-        height = -foot if kept.any() else 0.0
+        height = -foot if standing_geoms.any() else 0.0
         if not on_stage:  # it stands on the floor, or hangs close above it
             height = -min(lowest, foot, float(around[..., 2].min(initial=np.inf)))
             hangs = foot > low[2] + FLOOR_SHARE * (high[2] - low[2])
@@ -422,7 +422,7 @@ class Puppet:
         moving = []
         calm = []
         for course in courses:
-            places = np.stack(course.others)
+            places = np.stack(course.loose_boxes)
             way = np.ptp(places, axis=0).max(axis=(1, 2))
             moving.append(places[:, way >= little].reshape(-1, 8, 3))
             calm += [places[0, way < little], *course.rest]
@@ -440,11 +440,11 @@ class Puppet:
             place = np.searchsorted(t, drawn.time - 1e-9)
             sample = min(int(place), len(t) - 1)
             x = track.trace.x[sample, : self.shown]
-            at = self.posed(track, x, drawn.time)
+            pose = self.posed(track, x, drawn.time)
             for i, arrow in drawn.arrows:
-                found = arrows.path(*at, mounts[i], arrow)
-                if found and not arrow.body:
-                    lines.append((drawn.time, found[0]))
+                path = arrows.path(*pose, mounts[i], arrow)
+                if path and not arrow.body:
+                    lines.append((drawn.time, path[0]))
         return lines
 
     def shape(self, time: float) -> int:

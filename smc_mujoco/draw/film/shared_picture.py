@@ -79,8 +79,8 @@ def layout(
 
 def across(box: Array, count: int) -> Array:
     """Return so many parts of a box, side by side, (count, 4) px."""
-    left, top, right, bottom = box
-    ends = np.linspace(left, right, count + 1).round().astype(int)
+    left_edge, top, right, bottom = box
+    ends = np.linspace(left_edge, right, count + 1).round().astype(int)
     return np.array([(a, top, b, bottom) for a, b in itertools.pairwise(ends)])
 
 
@@ -108,11 +108,11 @@ def shots(stages: Sequence[Stage], frame: int, time: float) -> list[Array]:
     for stage in stages:
         drawn.append(stage.pose(frame, time))
         stage.forward()
-    first, *others = stages
+    first, *stages_beside = stages
 
     def add(shown) -> None:
-        for other in others:
-            other.add_beside(shown)
+        for stage_beside in stages_beside:
+            stage_beside.add_beside(shown)
 
     def add_outlines(shown) -> None:
         for stage in stages:
@@ -131,4 +131,4 @@ def shots(stages: Sequence[Stage], frame: int, time: float) -> list[Array]:
     for own in stamped:
         arrows.write_numbers(image, own, first.scale, taken, image.width / len(stages))
     picture = np.asarray(image)
-    return [picture[:, left:right] for left, _, right, _ in parts.tolist()]
+    return [picture[:, left_edge:right] for left_edge, _, right, _ in parts.tolist()]

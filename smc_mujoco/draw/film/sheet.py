@@ -179,13 +179,13 @@ def label_sizes(names: Sequence[str], size: tuple[int, int], room: float) -> tup
     """
     high = letters(size)
     labels = Labels.of(names, room, high)
-    found = []
+    sizes = []
     for words, name in zip(labels.words, style.distinct(names), strict=True):
         lines = [name] if "…" in words else words.split("\n")
         wide = style.widest(lines, labels.letters)
         tall = LINE_PITCH * (1 + words.count("\n")) * labels.letters + SAMPLE * high
-        found.append((wide + EDGE * high, tall))
-    return np.array(found), labels.letters / high
+        sizes.append((wide + EDGE * high, tall))
+    return np.array(sizes), labels.letters / high
 
 
 class Sheet:
@@ -228,7 +228,7 @@ class Sheet:
         self.full = self.raster()
         fade(future)
         self.faint = self.raster()
-        self.frames = [self.box(one.axes) for one in self.moving]
+        self.frames = [self.box(moving_line.axes) for moving_line in self.moving]
 
     def raster(self) -> Array:
         """Return the page without what moves, (height, width, 4) uint8."""
@@ -239,8 +239,8 @@ class Sheet:
         """Return where axes are: left, top, right, bottom px."""
         box = ax.get_window_extent()
         sides = (box.x0, self.size[1] - box.y1, box.x1, self.size[1] - box.y0)
-        left, top, right, bottom = map(round, sides)
-        return left, top, right, bottom
+        left_edge, top, right, bottom = map(round, sides)
+        return left_edge, top, right, bottom
 
     def write(self, x: float, y: float, words: str = "", **look) -> Text:
         """Write words at a place, px from the top left; without words, those of each frame."""
@@ -252,17 +252,17 @@ class Sheet:
         """Write the title, and below or beside it the key, with the clock at the right."""
         high = self.letters
         stop = self.start + self.runs.span[1]
-        left = EDGE * high
-        right = self.size[0] - left
+        left_edge = EDGE * high
+        right = self.size[0] - left_edge
         wide = style.width(title, high, bold=True)
-        share = max(LEAST_TITLE, min(1.0, (right - left) / max(wide, 1.0)))
-        words = style.cropped(title, right - left, share * high, bold=True)
+        share = max(LEAST_TITLE, min(1.0, (right - left_edge) / max(wide, 1.0)))
+        words = style.cropped(title, right - left_edge, share * high, bold=True)
         first = FIRST_LINE * LINE_PITCH * high
         title_size = share * ONE_SIZE["axes.titlesize"]
-        self.write(left, first, words, va="center", weight="bold", fontsize=title_size)
+        self.write(left_edge, first, words, va="center", weight="bold", fontsize=title_size)
         if lines == 1:
             last = first
-            left += wide + high if title else 0.0
+            left_edge += wide + high if title else 0.0
             self.room = key_room(self.size, stop, title)
         else:
             last = SECOND_LINE * LINE_PITCH * high
@@ -277,7 +277,7 @@ class Sheet:
         while len(said) > least and style.width(" · ".join(said), high) > self.room:
             said.pop()
         self.key = style.cropped(" · ".join(said), self.room, high)
-        self.below = self.write(left, last, va="center", color=style.MUTED)
+        self.below = self.write(left_edge, last, va="center", color=style.MUTED)
 
     def write_labels(self, labels: Array) -> None:
         """Write the machines' names, each below its line in the panels."""
@@ -290,12 +290,12 @@ class Sheet:
         looks = style.looks(runs.traces)
         parts = zip(labels, self.tiles, names.words, runs.colours, looks, strict=True)
         for box, tile, words, colour, look in parts:
-            left, top, right, bottom = box
-            middle = (left + right) / 2
+            left_edge, top, right, bottom = box
+            middle = (left_edge + right) / 2
             tall = pitch * (1 + words.count("\n")) + SAMPLE * high
             start = top if top >= tile[3] else (top + bottom - tall) / 2  # below it, or beside
             y = start + 0.5 * SAMPLE * high
-            ends = np.array([left + INSET * high, right - INSET * high])
+            ends = np.array([left_edge + INSET * high, right - INSET * high])
             line = (ends / self.size[0], [1.0 - y / self.size[1]] * 2)
             sample = Line2D(*line, color=colour, lw=style.points(2.5), **look)
             self.page.add_artist(sample)
@@ -309,18 +309,18 @@ class Sheet:
         what moves in them.
         """
         high = self.letters
-        shown = charts.strip(self.runs.early)
+        panels = charts.strip(self.runs.early)
         settled = list(map(settles_at, self.runs.traces))
-        wide = self.size[0] / len(shown)
-        left = style.width("−00.00", high) + 0.5 * high
+        wide = self.size[0] / len(panels)
+        label_width = style.width("−00.00", high) + 0.5 * high
         top = (1.0 - CHARTS_SHARE) * self.size[1] + 1.15 * LINE_PITCH * high
         foot = 1.15 * LINE_PITCH * high
-        room = wide - left - EDGE * high
+        room = wide - label_width - EDGE * high
         future: list[Artist] = []
         moving = []
         flights = []
-        for k, panel in enumerate(shown):
-            corner = ((k * wide + left) / self.size[0], foot / self.size[1])
+        for k, panel in enumerate(panels):
+            corner = ((k * wide + label_width) / self.size[0], foot / self.size[1])
             sides = (room / self.size[0], 1.0 - (top + foot) / self.size[1])
             ax = self.page.add_axes((*corner, *sides))
             if panel.quantity == "path":
@@ -367,14 +367,17 @@ class Sheet:
         pixels = np.asarray(self.canvas.buffer_rgba())
         pixels[:] = self.faint
         room = round(0.3 * self.letters)
-        for one, (left, top, right, bottom) in zip(self.moving, self.frames, strict=True):
-            share = min(1.0, time / one.axes.get_xlim()[1])
+        for moving_line, (left_edge, top, right, bottom) in zip(
+            self.moving, self.frames, strict=True
+        ):
+            share = min(1.0, time / moving_line.axes.get_xlim()[1])
             past = np.s_[
-                top - room : bottom + room, left - room : left + round(share * (right - left))
+                top - room : bottom + room,
+                left_edge - room : left_edge + round(share * (right - left_edge)),
             ]
             pixels[past] = self.full[past]
-        for (left, top, right, bottom), machine in zip(self.tiles, machines, strict=True):
-            pixels[top:bottom, left:right, :3] = machine
+        for (left_edge, top, right, bottom), machine in zip(self.tiles, machines, strict=True):
+            pixels[top:bottom, left_edge:right, :3] = machine
         renderer = self.canvas.get_renderer()
         for artist in self.moved(moment, time):
             artist.draw(renderer)
@@ -390,16 +393,16 @@ class Sheet:
                 for words in ax.texts:
                     if words.get_bbox_patch():
                         drawn.append(words)
-            for shown, t, y in dots:
+            for dot, t, y in dots:
                 if time <= min(t[-1], ax.get_xlim()[1]) + 1e-9 and np.isfinite(y[0]):
-                    shown.set_data([time], [np.interp(time, t, y)])
-                    drawn.append(shown)
-        for one in self.flights:
-            flown = one.places[:, one.times <= time + 1e-9]
-            one.past.set_data(*flown)
-            one.dot.set_data(*flown[:, -1:])
+                    dot.set_data([time], [np.interp(time, t, y)])
+                    drawn.append(dot)
+        for curve in self.flights:
+            flown = curve.places[:, curve.times <= time + 1e-9]
+            curve.past.set_data(*flown)
+            curve.dot.set_data(*flown[:, -1:])
         for part in ("past", "goal", "dot"):
-            drawn += [getattr(one, part) for one in self.flights]
+            drawn += [getattr(curve, part) for curve in self.flights]
         self.clock.set_text(f"{moment.time:.{3 if moment.speed < 0.2 else 2}f} s")
         words, opacity = self.event_words(moment)
         said = words or self.key

@@ -229,8 +229,8 @@ class Stage:
         way = stop - start
         far = float(np.linalg.norm(way))
         size, pitch = np.array(DOTS) * self.scale
-        for at in np.arange(pitch, min(far, sum(image.size)), pitch).tolist():
-            middle = start + at / far * way
+        for distance in np.arange(pitch, min(far, sum(image.size)), pitch).tolist():
+            middle = start + distance / far * way
             box = [*(middle - size / 2).tolist(), *(middle + size / 2).tolist()]
             ImageDraw.Draw(image).ellipse(box, style.INK)
 
@@ -243,11 +243,11 @@ class Stage:
         """Draw arrows, given as (channel, arrow), over a picture in which words are in boxes of
         (2, 2) px each; return those that are seen.
         """
-        found = []
+        stamps = []
         for i, arrow in sorted(drawn, key=lambda item: item[1].head):  # bars are behind arrows
-            if one := self.draw_arrow(image, self.mounts[i], arrow, words):
-                found.append(one)
-        return found
+            if stamp := self.draw_arrow(image, self.mounts[i], arrow, words):
+                stamps.append(stamp)
+        return stamps
 
     def draw_arrow(
         self,
@@ -259,10 +259,10 @@ class Stage:
         """Draw an arrow over the picture and return it; nothing, None, if it has no place or points
         at the camera, or if it lies under the words that have its value.
         """
-        found = arrows.path(self.model, self.data, mount, arrow)
-        if not found:
+        path = arrows.path(self.model, self.data, mount, arrow)
+        if not path:
             return None
-        points, width = found
+        points, width = path
         line = self.project(points)
         length = np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
         if length < arrows.MIN_PIXELS * self.scale:
@@ -271,7 +271,7 @@ class Stage:
         across = self.project(np.array([points[0], beside]))
         least = arrows.MIN_SHAFT * self.scale * arrow.size
         thick = max(float(np.ptp(across[:, 1])), least)
-        if arrow.told and arrows.covers(words, arrows.outline(line, thick)):
+        if arrow.on_blow and arrows.covers(words, arrows.outline(line, thick)):
             return None
         if mount.radius and not arrow.body:
             anchor = self.project(self.data.xanchor[[mount.joint]])[0]
@@ -306,9 +306,9 @@ class Stage:
     def add_beside(self, shown: mujoco.MjvScene) -> None:
         """Add the machine to the scene of another, at its place beside it."""
         first = shown.ngeom
-        every = mujoco.mjtCatBit.mjCAT_ALL
+        all_geoms = mujoco.mjtCatBit.mjCAT_ALL
         look = self.canvas.option, mujoco.MjvPerturb()
-        mujoco.mjv_addGeoms(self.model, self.data, *look, every, shown)
+        mujoco.mjv_addGeoms(self.model, self.data, *look, all_geoms, shown)
         for shape in shown.geoms[first : shown.ngeom]:
             shape.pos[:] += self.beside
 

@@ -64,8 +64,8 @@ class MachineTrack:
         self.drawn = arrows.frames(trace, edges, self.holds, sizes, colour)
         self.framing = arrows.frames(trace, grid, np.zeros(len(grid)), sizes, colour)
         self.states = states.timeline(trace, times, clock.played)
-        some = trace.t[:: 1 + len(trace.t) // SAID_TIMES]
-        self.speaks = any(states.timeline(trace, some, clock.played))
+        sampled_times = trace.t[:: 1 + len(trace.t) // SAID_TIMES]
+        self.speaks = any(states.timeline(trace, sampled_times, clock.played))
         for k, state in enumerate(self.states):
             if state and state.peak is not None:
                 around = state.peak + HALF_STILL * np.array([-1.0, 1.0])
@@ -116,9 +116,9 @@ def motion(trace: Trace, times: Array) -> Motion | None:
         return None
     model = models.compile_model(scenario)
     ids = joint_ids(model)
-    known = len(ids)
+    joint_count = len(ids)
     for i in ids:
         rotor = ROTOR + model.joint(i).name
-        known += mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, rotor) >= 0
-    moved = None if known == model.nv else poses(trace, times)
+        joint_count += mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, rotor) >= 0
+    moved = None if joint_count == model.nv else poses(trace, times)
     return None if moved is None else Motion(times, moved)

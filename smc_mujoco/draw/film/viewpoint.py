@@ -47,7 +47,9 @@ def view(
             return own
     roots = model.body_rootid[model.geom_bodyid]
     drawn = model.geom_group < world.DRAWN_GROUPS
-    whole = np.flatnonzero(np.isin(roots, roots[links]) & drawn & (model.geom_type != world.PLANE))
+    mechanism_geoms = np.flatnonzero(
+        np.isin(roots, roots[links]) & drawn & (model.geom_type != world.PLANE)
+    )
     rated = []
     for azimuth, elevation in itertools.product(AZIMUTHS.tolist(), ELEVATIONS):
         angles = azimuth, elevation
@@ -60,7 +62,7 @@ def view(
             break
         share = -motion * visible(model, data, links, angles)
         if share > most:  # else the rest of the machine cannot make it better
-            hidden = 1.0 - visible(model, data, whole, angles)
+            hidden = 1.0 - visible(model, data, mechanism_geoms, angles)
             share *= 1.0 - HIDDEN_WEIGHT * hidden
         if share > most:
             most = share
@@ -121,13 +123,13 @@ def visible(
 
 def points_inside(model: mujoco.MjModel, data: mujoco.MjData, geoms: Array) -> Array:
     """Return points inside the boxes of some geoms, (points, 3) m."""
-    found = []
+    clouds = []
     for geom in geoms.tolist():
         box = model.geom_aabb[geom]
         local = box[:3] + INSIDE * world.CORNERS * box[3:]
         turn = data.geom_xmat[geom].reshape(3, 3)
-        found.append(data.geom_xpos[geom] + local @ turn.T)
-    return np.concatenate(found) if found else np.zeros((0, 3))
+        clouds.append(data.geom_xpos[geom] + local @ turn.T)
+    return np.concatenate(clouds) if clouds else np.zeros((0, 3))
 
 
 def first_hit(model: mujoco.MjModel, data: mujoco.MjData, start: Array, way: Array) -> int:

@@ -265,8 +265,8 @@ def cut(machines: Sequence[mujoco.MjModel], points: Array, bars: Array, own: boo
         most = corners[..., axis].max(axis=1)
         long = _slender(sides, axis) & (turned.max(axis=1) > 0.999)
         upright = axis == 2
-        wanted = own if upright else (np.abs(bars[:, axis]) > 0.9).any()
-        if not long.any() or not wanted:
+        is_cut = own if upright else (np.abs(bars[:, axis]) > 0.9).any()
+        if not long.any() or not is_cut:
             continue
         first = lows[axis]
         last = highs[axis]
@@ -295,8 +295,8 @@ def cut(machines: Sequence[mujoco.MjModel], points: Array, bars: Array, own: boo
             elif not upright and not first <= middle <= last:
                 model.geom_group[geom] = HIDDEN_GROUP
             _move(model, data, geom, way)
-    for other, name in itertools.product(machines[1:], CUT_FIELDS):
-        getattr(other, name)[fixed] = getattr(model, name)[fixed]
+    for machine, name in itertools.product(machines[1:], CUT_FIELDS):
+        getattr(machine, name)[fixed] = getattr(model, name)[fixed]
 
 
 def _move(model: mujoco.MjModel, data: mujoco.MjData, geom: int, way: Array) -> None:
@@ -310,8 +310,8 @@ def _move(model: mujoco.MjModel, data: mujoco.MjData, geom: int, way: Array) -> 
 def _slender(sides: Array, axis: int) -> Array:
     """Return which boxes, (k, 3) m, are long and narrow along an axis, (k,)."""
     remaining = np.delete(sides, axis, axis=1)
-    others = remaining.max(axis=1)
-    return sides[:, axis] > SLENDER * others
+    other_sides = remaining.max(axis=1)
+    return sides[:, axis] > SLENDER * other_sides
 
 
 def lengthen(model: mujoco.MjModel, geom: int, side: int, longer: float) -> None:

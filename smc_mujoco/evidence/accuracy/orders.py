@@ -177,9 +177,11 @@ def orders(
     setups = []
     for plant in listed("plants", plants):
         for condition in listed_conditions(conditions):
-            at = as_plant(plant), condition
+            plant_and_condition = as_plant(plant), condition
             for law in listed_laws(laws):
-                setups.append(_setup(*at, law, descending, numbers, gains, duration, starts))
+                setups.append(
+                    _setup(*plant_and_condition, law, descending, numbers, gains, duration, starts)
+                )
     return _ordered(_run(setups, threads, report))
 
 
@@ -289,16 +291,16 @@ def _setup(
         gain_set = "default"
 
     def scenario(seed: int, h: float) -> Scenario:
-        made = case(plant, law, condition, duration, gain_set, seed, starts, {"control_period": h})
-        if made.resolved.integrator == "RK4":
-            steps = made.steps
+        run = case(plant, law, condition, duration, gain_set, seed, starts, {"control_period": h})
+        if run.resolved.integrator == "RK4":
+            steps = run.steps
         else:
-            steps = max(made.steps, MIN_STEPS)
+            steps = max(run.steps, MIN_STEPS)
         if "physics_step" in fields:
             step = fields["physics_step"]
         else:
             step = h / steps
-        return dataclasses.replace(made, physics_step=step).named(made.condition)
+        return dataclasses.replace(run, physics_step=step).named(run.condition)
 
     runs = []
     for seed in seeds:

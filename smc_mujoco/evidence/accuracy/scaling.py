@@ -100,11 +100,11 @@ class Accuracy:
         for none.
         """
         promised = []
-        for one in (self.e, self.s):
-            if one.theory is None:
+        for order in (self.e, self.s):
+            if order.theory is None:
                 promised.append("")
             else:
-                promised.append(f"{one.theory:.2g}")
+                promised.append(f"{order.theory:.2g}")
         return ", ".join(dict.fromkeys(promised))
 
     def error(self, k: int) -> str:

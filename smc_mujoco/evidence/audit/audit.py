@@ -152,18 +152,18 @@ def select_claims(paper: Paper, only: Iterable[str | int] | None) -> list[ClaimE
     """Return the claims of some ids, or all for None, in the order of the file; refuse an unknown
     id.
     """
-    known = paper.claims
+    claims = paper.claims
     if only is None:
-        return list(known.values())
+        return list(claims.values())
     ids = set()
     for i in items_of("only", only):
         if isinstance(i, int | str):
             ids.add(str(i))
         else:
             ids.add(shown(i))
-    for id in sorted(ids - set(known)):
-        raise unknown("claim", id, known)
-    return [entry for entry in known.values() if entry.id in ids]
+    for id in sorted(ids - set(claims)):
+        raise unknown("claim", id, claims)
+    return [entry for entry in claims.values() if entry.id in ids]
 
 
 def sets(paper: Paper, gains: str | Sequence[str] | None, quick: bool) -> list[str]:
@@ -213,10 +213,10 @@ def _evidence(entry: ClaimEntry, returned: Any) -> Iterator[Check | Beside]:
     """Yield checks and numbers from what a claim's function returned."""
     if not isinstance(returned, Mapping):
         if isinstance(returned, Sequence):
-            each = returned
+            items = returned
         else:
-            each = [None]
-        if not all(isinstance(one, Check | Beside) for one in each):
+            items = [None]
+        if not all(isinstance(item, Check | Beside) for item in items):
             raise ScenarioError(f"it returns {shown(returned)}: {CURE}")
         yield from returned
         return
@@ -226,8 +226,8 @@ def _evidence(entry: ClaimEntry, returned: Any) -> Iterator[Check | Beside]:
             'write a table, as { "exponent" = ">= 1.9" }'
         )
     values = {}
-    for measure, one in returned.items():
-        values[measure] = dict(_cases(measure, one))
+    for measure, item in returned.items():
+        values[measure] = dict(_cases(measure, item))
     for threshold in entry.thresholds:
         if not values.get(threshold.measure):
             raise ScenarioError(

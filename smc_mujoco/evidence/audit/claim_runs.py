@@ -212,24 +212,24 @@ class ClaimRuns:
         """Return every metric of every scenario, in order; a run that fails has inf in every
         metric.
         """
-        wanted = self._keyed(scenarios)
-        known = ChainMap(self.shared, self.table)
+        keyed = self._keyed(scenarios)
+        results = ChainMap(self.shared, self.table)
         new = {}
-        for name, scenario in wanted:
-            if name not in known:
+        for name, scenario in keyed:
+            if name not in results:
                 new[name] = scenario
         names = list(new)
         for index, trace in stream(list(new.values()), self.threads):
             law = trace.scenario.law
-            known[names[index]] = RunResult.of(law.name, law.gains, result_columns(trace))
-        for name, scenario in wanted:
-            self.scored[name] = result = known[name]
+            results[names[index]] = RunResult.of(law.name, law.gains, result_columns(trace))
+        for name, scenario in keyed:
+            self.scored[name] = result = results[name]
             parts = []
             for metric, value in sorted(result.scores.items()):
                 parts.append(f"{metric}={float(value).hex()}")
             hashed = _hash(",".join(parts).encode())
             self.used[name] = self.used.get(name, Used(scenario))._replace(scores=hashed)
-        return [known[name].scores for name, _ in wanted]
+        return [results[name].scores for name, _ in keyed]
 
     def score(self, plant: str, law_name: str, condition: str = "nominal") -> Scores:
         """Return every metric of one run."""
@@ -250,10 +250,10 @@ class ClaimRuns:
 
     def traces(self, scenarios: Iterable[Scenario]) -> list[Trace]:
         """Return the traces of scenarios, in order; they are not kept."""
-        wanted = self._keyed(scenarios)
-        done = dict(stream([scenario for _, scenario in wanted], self.threads))
+        keyed = self._keyed(scenarios)
+        done = dict(stream([scenario for _, scenario in keyed], self.threads))
         traces = [done[i] for i in sorted(done)]
-        for (name, scenario), trace in zip(wanted, traces, strict=True):
+        for (name, scenario), trace in zip(keyed, traces, strict=True):
             parts = []
             for array in ARRAYS:
                 parts.append(getattr(trace, array).tobytes())

@@ -122,12 +122,12 @@ def _run(scenario: Scenario) -> Fields:
     plant = scenario.plant
     suite = plants().get(scenario.plant.name)
     if suite:
-        known = dict(suite.parameters) | {"n": suite.n}
+        suite_parameters = dict(suite.parameters) | {"n": suite.n}
     else:
-        known = {}
+        suite_parameters = {}
     changed = {}  # other than the suite's
     for name, value in (dict(plant.parameters) | {"n": plant.n}).items():
-        if name not in known or known[name] != value:
+        if name not in suite_parameters or suite_parameters[name] != value:
             changed[name] = value
     return {
         "plant": plant.name,

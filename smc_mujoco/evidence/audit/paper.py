@@ -174,18 +174,18 @@ class Paper:
         if of_set is None:
             if law in self.laws:
                 return self.bound(law, {})
-            known = law in (*gain_sets.COMPARED, *gain_sets.STUDY_ALIASES)
-            return gain_sets.law(self.plant(plant), law, gains if known else "default")
+            has_sets = law in (*gain_sets.COMPARED, *gain_sets.STUDY_ALIASES)
+            return gain_sets.law(self.plant(plant), law, gains if has_sets else "default")
         general = of_set.get("", {}).get(law, {})
         of_plant = of_set.get(plant, {}).get(law, {})
         values = {**general, **of_plant}
         bound_law = self.bound(law, values)
         if law in self.laws:
-            known = {}
+            has_sets = {}
         else:
-            known = find("law", law, laws_known()).gains
+            has_sets = find("law", law, laws_known()).gains
         lacking = []
-        for gain, declared in known.items():
+        for gain, declared in has_sets.items():
             if not declared.held and gain not in values:
                 lacking.append(f"{gain} = {declared.default:g}")
         if lacking:
@@ -240,16 +240,16 @@ def _of_package(point: EntryPoint) -> Home:
 
 def paper(which: str | Path) -> Paper:
     """Return a paper by its name in `smc-mujoco claims --papers`, or from its folder."""
-    known = catalogue()
-    if isinstance(which, str) and which in known:
-        return _read_once(*known[which])
+    paper_homes = catalogue()
+    if isinstance(which, str) and which in paper_homes:
+        return _read_once(*paper_homes[which])
     folder = as_path(which, "the paper")
     if not os.path.isdir(folder):
         if isinstance(which, str) and not set("/\\.") & set(which):
-            raise unknown("paper", which, known)
+            raise unknown("paper", which, paper_homes)
         raise ScenarioError(
             f"no folder {str(which)!r} with a {PAPER_FILE}: "
-            f"give one, or a name of {', '.join(known)}"
+            f"give one, or a name of {', '.join(paper_homes)}"
         )
     return _read(folder, _package(folder))
 
@@ -258,15 +258,15 @@ def papers() -> dict[str, Paper]:
     """Return every paper that ships, or comes with another package, by its name, in alphabetical
     order.
     """
-    known: dict[str, Paper] = {}
+    paper_by_name: dict[str, Paper] = {}
     for key, home in catalogue().items():
         try:
-            known[key] = _read_once(*home)
+            paper_by_name[key] = _read_once(*home)
         except ScenarioError as error:
             if not (package := catalogue().package(key)):
                 raise
             warn(f"package {package!r}: its paper {key!r}: {error}")
-    return known
+    return paper_by_name
 
 
 def new(folder: Path) -> list[Path]:
@@ -396,15 +396,15 @@ def _checked(folder: Path, data: Data, code: ModuleType) -> Paper:
     find("part in read", values["read"], READ_PARTS)
     sets = _sets(values.get("gains", {}), values.get("sets", []))
     quick_sets = tuple(values.get("quick_sets", list(sets)[:1]))
-    for one in quick_sets:
-        find("set of gains in quick_sets", one, sets)
+    for item in quick_sets:
+        find("set of gains in quick_sets", item, sets)
     texts = {}
     for field in TEXT_FIELDS:
         if field in values:
             texts[field] = values[field]
     plants = {}
-    for key, one in values.get("plants", {}).items():
-        plants[key] = _plant(f"plants.{key}", one, folder)
+    for key, item in values.get("plants", {}).items():
+        plants[key] = _plant(f"plants.{key}", item, folder)
     conditions = {}
     for key, text in values.get("conditions", {}).items():
         conditions[key] = condition(key, **_fields(f"conditions.{key}", text))
@@ -426,15 +426,15 @@ def _checked(folder: Path, data: Data, code: ModuleType) -> Paper:
         if inspect.isfunction(value):
             functions[key] = value
     allowed = {}
-    for law, one in values.get("allowed", {}).items():
-        allowed[law] = _allowed(law, one, functions, paper)
+    for law, item in values.get("allowed", {}).items():
+        allowed[law] = _allowed(law, item, functions, paper)
     paper = dataclasses.replace(paper, allowed=allowed)
     entries = {}
-    for number, one in enumerate(values["claim"], 1):
+    for number, item in enumerate(values["claim"], 1):
         with _about(
-            f"claim {one.get('id', f'number {number}') if isinstance(one, dict) else number}"
+            f"claim {item.get('id', f'number {number}') if isinstance(item, dict) else number}"
         ):
-            entry = _entry(_typed("it", one, dict), functions, paper)
+            entry = _entry(_typed("it", item, dict), functions, paper)
             if entry.id in entries:
                 raise ScenarioError("it is there twice: give one another id")
         entries[entry.id] = entry
@@ -445,13 +445,14 @@ def _entry(data: Data, functions: Mapping[str, Callable], paper: Paper) -> Claim
     """Return a claim from its table."""
     values: Fields = {"read": paper.read} | _values(data, CLAIM_FIELDS, REQUIRED_OF_CLAIM)
     function = find(f"function of {CODE_FILE}", values.pop("function"), functions)
-    asked = values.pop("holds_if")
-    if isinstance(asked, str):
+    threshold_text = values.pop("holds_if")
+    if isinstance(threshold_text, str):
         thresholds = ()
     else:
-        thresholds = tuple(_thresholds(asked))
+        thresholds = tuple(_thresholds(threshold_text))
     values["holds_if"] = values.pop(
-        "words", asked if isinstance(asked, str) else ", ".join(map(str, thresholds))
+        "words",
+        threshold_text if isinstance(threshold_text, str) else ", ".join(map(str, thresholds)),
     )
     values["quantifier"] = find("quantifier", values.get("quantifier", "named"), QUANTIFIERS)
     for field in ("plants", "laws", "conditions"):
@@ -478,13 +479,13 @@ def _check(entry: ClaimEntry, paper: Paper) -> None:
         raise ScenarioError(
             f'nothing of the paper was read, and it is {entry.whose!r}: write whose = "ours"'
         )
-    for one in entry.plants:
-        paper.plant(one)
+    for name in entry.plants:
+        paper.plant(name)
     for plant, gains in entry.examples.items():
         find("plant in examples", plant, dict.fromkeys(entry.plants))
         paper.bound(entry.searched or entry.laws[0], gains)
-    for one in entry.conditions:
-        paper.condition(one)
+    for name in entry.conditions:
+        paper.condition(name)
     for law in entry.laws:
         find("law", law, laws_known() | paper.laws)
         for gains, of_set in paper.sets.items():
@@ -600,8 +601,8 @@ def _laws(code: ModuleType) -> Iterator[tuple[str, Template | Component]]:
     """
     for value in vars(code).values():
         if isinstance(value, Template | Component) and value.kind == "law":
-            known = laws_known().get(value.name)
-            if known and known.function is not value.function:
+            library_law = laws_known().get(value.name)
+            if library_law and library_law.function is not value.function:
                 raise ScenarioError(
                     f"law {value.name!r} of {CODE_FILE} is a name of the library's: rename it"
                 )

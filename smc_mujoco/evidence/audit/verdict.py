@@ -141,7 +141,7 @@ def measured(value: float, what: str, *others: float) -> str:
     if value == math.inf and "time" in what:
         return "never"
     digits = 3
-    while any(f"{value:.{digits}g}" == f"{one:.{digits}g}" for one in others if one != value):
+    while any(f"{value:.{digits}g}" == f"{rival:.{digits}g}" for rival in others if rival != value):
         digits += 1
     return f"{value:.{digits}g}"
 
@@ -218,11 +218,11 @@ class Threshold(NamedTuple):
                 yield check(what, value, self.relation, self.limit, self.sentence)
                 continue
             if self.low == self.high:
-                of = f"{self.low:g}"
+                levels = f"{self.low:g}"
             else:
-                of = f"{self.low:g} to {self.high:g}"
+                levels = f"{self.low:g} to {self.high:g}"
             yield check(
-                f"{what}{DISTANCE_WORDS}{of}",
+                f"{what}{DISTANCE_WORDS}{levels}",
                 self.distance(value),
                 self.relation,
                 self.limit,
@@ -306,11 +306,11 @@ class Claim(Statement):
             parts[f"holds on {plant} with"] = words
         if self.instead and self.verdict != SUPPORTED:
             parts["instead"] = f"{self.instead} ({self.shown_by})"
-        told = {}
+        text_by_part = {}
         for name, text in parts.items():
             if text:
-                told[name] = text
-        return told
+                text_by_part[name] = text
+        return text_by_part
 
     def _repr_html_(self) -> str:
         return Claims([self])._repr_html_()
@@ -399,10 +399,10 @@ def over_gains(claims: Sequence[Claim]) -> str:
     """Return a sentence on how many supported sentences hold under every set of gains."""
     supported = 0
     same = 0
-    for one in claims:
-        if one.whose == PAPER and one.verdict == SUPPORTED:
+    for claim in claims:
+        if claim.whose == PAPER and claim.verdict == SUPPORTED:
             supported += 1
-            same += one.for_every_set
+            same += claim.for_every_set
     return (
         f"Of the paper's {supported} supported sentences {same} hold under every set of gains "
         f"that was run, and {supported - same} for some gains."
@@ -467,13 +467,13 @@ def _by_name(evidence: Evidence) -> tuple[dict[str, Fields], dict[str, float]]:
     """Return what is measured -> the fields of its check, and -> the number beside the checks."""
     checks: dict[str, Fields] = {}
     beside: dict[str, float] = {}
-    for one in evidence:
-        fields = one._asdict()
+    for item in evidence:
+        fields = item._asdict()
         what = fields.pop("what")
         if what in checks or what in beside:
             raise ScenarioError(f"a claim measures {what!r} twice: name the two apart")
-        if isinstance(one, Beside):
-            beside[what] = float(one.value)
+        if isinstance(item, Beside):
+            beside[what] = float(item.value)
         else:
             checks[what] = fields
     return checks, beside
@@ -483,9 +483,9 @@ def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
     """Return a claim with its verdict, from set of gains -> checks and the numbers beside them."""
     limit = "" if statement.whose == OURS else statement.limit
     verdicts = {}
-    for name, some in evidence.items():
+    for name, items in evidence.items():
         searched = statement.over if statement.rivals in ("", name) else ""
-        verdicts[name] = verdict(some, statement.quantifier, searched, limit)
+        verdicts[name] = verdict(items, statement.quantifier, searched, limit)
     if statement.rivals in verdicts:
         overall = verdicts[statement.rivals]
         rivals = f"{statement.rivals} gains of the other laws"
@@ -499,8 +499,8 @@ def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
             verdicts[name] = ANSWERS[kind]
     numbers = {}
     beside = {}
-    for name, some in evidence.items():
-        numbers[name], beside[name] = _by_name(some)
+    for name, items in evidence.items():
+        numbers[name], beside[name] = _by_name(items)
     shared = {}
     for field in dataclasses.fields(Statement):
         shared[field.name] = getattr(statement, field.name)

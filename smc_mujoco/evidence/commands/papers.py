@@ -142,8 +142,8 @@ def _papers(listed: bool, new: Path | None, check: Path | None, terminal: Termin
         terminal.note(f"the seal is whole: {about}: {counts}", wrap=True)
     if listed:
         rows = []
-        for name, known in paper.papers().items():
-            line = f"{known.authors}: {known.title} ({known.contents})"
+        for name, entry in paper.papers().items():
+            line = f"{entry.authors}: {entry.title} ({entry.contents})"
             rows.append((name, tables.with_package(line, paper.catalogue().package(name))))
         terminal.print(tables.catalogue("Papers, for smc-mujoco claims --paper", rows))
     terminal.finish()

@@ -28,15 +28,15 @@ def rotary(torque: float, surface: Mapping[str, float]) -> tuple[Law, ...]:
     `rotary_swing_up`.
     """
     force = 1.0 / torque
-    made = []
+    laws = []
     for name, gains in KINDS.items():
         own = {
             **{key: value * force for key, value in gains.items()},
             "k1": gains["k1"] * math.sqrt(force),
         }
         law = rotary_swing_up(**own, w_max=0.03 * force, catch=0.05 * force, **surface)
-        made.append(law.named(name).sourced(SHIPPED))
-    return tuple(made)
+        laws.append(law.named(name).sourced(SHIPPED))
+    return tuple(laws)
 
 
 @law_function(

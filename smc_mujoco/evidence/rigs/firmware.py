@@ -96,12 +96,12 @@ def move(target, m, passed):
 
     Return its acceleration, deg/s^2.
     """
-    left = target - m[REF]
+    distance = target - m[REF]
     old = m[REF_RATE]
-    braking = math.sqrt(2.0 * MOVE_ACCELERATION * abs(left))
-    wanted = math.copysign(min(MOVE_SPEED, braking), left)
-    rate = old + clip(wanted - old, MOVE_ACCELERATION * passed)
-    if abs(left) <= abs(rate) * passed and abs(rate) <= 2.0 * MOVE_ACCELERATION * passed:
+    braking = math.sqrt(2.0 * MOVE_ACCELERATION * abs(distance))
+    target_rate = math.copysign(min(MOVE_SPEED, braking), distance)
+    rate = old + clip(target_rate - old, MOVE_ACCELERATION * passed)
+    if abs(distance) <= abs(rate) * passed and abs(rate) <= 2.0 * MOVE_ACCELERATION * passed:
         m[REF], m[REF_RATE] = target, 0.0
         return 0.0
     m[REF], m[REF_RATE] = m[REF] + rate * passed, rate
@@ -145,8 +145,8 @@ def acceleration(kind, alpha, m, since, ref_acceleration):
     rate, de = clip(rate, 200.0), clip(de, 200.0)
     k = 0.5 * min(since / 0.2, 1.0)
     s = rate + 15.0 * alpha + k * clip(de + 2.0 * clip(e, STOP_ARM), 300.0)
-    wanted = free + 15.0 * rate + 2.0 * k * de - k * ref_acceleration + 800.0 * clip(s / 50.0, 1.0)
-    return STEPS * wanted / max(COUPLING * cosine - k, 0.6) + base, s
+    desired = free + 15.0 * rate + 2.0 * k * de - k * ref_acceleration + 800.0 * clip(s / 50.0, 1.0)
+    return STEPS * desired / max(COUPLING * cosine - k, 0.6) + base, s
 
 
 @law_function(

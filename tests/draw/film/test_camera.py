@@ -163,11 +163,11 @@ def test_a_camera_that_follows_goes_back_while_the_reference_is_far_but_not_for_
     assert back[0] == pytest.approx(back[1])
     assert (back[:, 1:3] > 0.1).all()
     assert np.abs(moved[[0, 3]]).max() < 1e-9
-    middle = inside.left + inside.right, inside.top + inside.bottom
+    middle = inside.left_end + inside.right, inside.top + inside.bottom
     for frame, way in enumerate(away[:3]):
         for move, seen in ((moved, points), (moved, points + way), (home, points)):
             x, y = camera.project(seen, turn, view.place + move[frame], size).T
-            assert inside.left - 1e-6 <= x.min() < x.max() <= inside.right + 1e-6
+            assert inside.left_end - 1e-6 <= x.min() < x.max() <= inside.right + 1e-6
             assert inside.top - 1e-6 <= y.min() < y.max() <= inside.bottom + 1e-6
         # one that is at home stays where it is in its tile
         assert (x.min() + x.max(), y.min() + y.max()) == pytest.approx(middle, rel=0.02)

@@ -381,7 +381,7 @@ def test_of_two_joints_the_state_told_is_of_what_happens_in_either():
 @pytest.mark.parametrize(
     ("plant", "parts", "said"),
     [
-        ("furuta", {"friction": {"arm": smc.Coulomb(0.2)}}, "arm sticks"),
+        ("furuta", {"friction": {"arm": smc.Coulomb(0.04)}}, "arm sticks"),
         ("furuta", {"friction": {"hinge": smc.hardware.LuGre(0.5, 0.8, 0.05)}}, "hinge sticks"),
         (smc.plant("furuta", cf=0.002), {}, "arm sticks"),
         (smc.plant("furuta", cf=0.002, cfq=0.002), {}, "sticks"),

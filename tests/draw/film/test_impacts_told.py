@@ -112,7 +112,7 @@ def test_an_arrow_is_broken_if_it_is_cut_and_its_number_is_told(run):
                     assert state
                     assert state.colour == colour  # the number is in its words
                     assert arrow.words == ""
-                    assert arrow.told
+                    assert arrow.on_blow
     assert min(broken.values()) > 0
 
 
@@ -194,7 +194,7 @@ def test_the_arrow_of_a_hit_is_not_drawn_under_the_words_that_have_its_number(ru
             (tail + 10.0, True, True),
         ):
             shown.words = [words]
-            seen = shown.render([(0, arrow._replace(told=told))])
+            seen = shown.render([(0, arrow._replace(on_blow=told))])
             assert (np.abs(seen - bare) > 60).any() == drawn
 
 

@@ -74,7 +74,7 @@ def _model(plant: Plant, x: Array, v: Array) -> ArrayPair:
     """Return f and g of the first channel, with every channel in the same state."""
     p = SimpleNamespace(**plant.parameters)
     pairs = zip(np.ravel(x).tolist(), np.ravel(v).tolist(), strict=True)
-    both = np.array(
+    values = np.array(
         [plant.nominal(np.full(plant.n, a), np.full(plant.n, b), 0, p) for a, b in pairs]
     )
-    return both[:, 0].reshape(np.shape(x)), both[:, 1].reshape(np.shape(x))
+    return values[:, 0].reshape(np.shape(x)), values[:, 1].reshape(np.shape(x))

@@ -101,11 +101,11 @@ UNITS = {  # quantity -> unit, and range
 
 def quantities(source, **values):
     """Return name -> Quantity, from numbers of one source in UNITS."""
-    found = {}
+    quantity_by_name = {}
     for name, (unit, *ends) in UNITS.items():
         if name in values:
-            found[name] = Quantity(values[name], unit, source, *ends)
-    return found
+            quantity_by_name[name] = Quantity(values[name], unit, source, *ends)
+    return quantity_by_name
 
 
 QUBE_SERVO_2 = PublishedRig(

@@ -102,7 +102,7 @@ def ripples(q, x: Array) -> Array:
     """
     pairs = ((0.0, q.bridge), (q.brush_gap, q.bridge_2))
     return q.ripple * sum(
-        np.exp((np.cos(BARS * (x - at)) - 1.0) / (BARS * wide) ** 2) for at, wide in pairs
+        np.exp((np.cos(BARS * (x - centre)) - 1.0) / (BARS * wide) ** 2) for centre, wide in pairs
     )
 
 
@@ -136,8 +136,8 @@ def zero(q, record: Record) -> dict[str, float]:
         [lacks, lacks - rate(ripples(q, x - angles[:, np.newaxis]) * torque, PERIOD, 0)]
     )
     gaps -= gaps @ smooth @ smooth.T
-    left = np.log(np.linalg.norm(gaps, axis=1))
-    even, *likely = np.exp((left.min() - left) * _independent(gaps[0]))
+    misfits = np.log(np.linalg.norm(gaps, axis=1))
+    even, *likely = np.exp((misfits.min() - misfits) * _independent(gaps[0]))
     best = int(np.argmax(likely))
     reach = ANGLE_COUNT // 16
     nearby = np.sum(np.roll(likely, reach - best)[: 2 * reach + 1])
