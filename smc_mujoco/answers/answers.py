@@ -444,6 +444,7 @@ def more(fact: More) -> Labelled:
 
 # which
 
+MOST_NAMED = 5  # laws that the first line names
 MORE_MINUTES = 30  # of a next step, where the time that is needed is not known
 # kind of a caution -> its label, and what to know and do
 CAUTIONS = {
@@ -507,7 +508,10 @@ def _first_line(facts: WhichFacts) -> Labelled:
     if facts.form == "undecided":
         words = _sets(facts)
         if len(facts.undecided) > 1:
-            words += f" open between {joined(facts.undecided)};"
+            laws = joined(facts.undecided)
+            if len(facts.undecided) > MOST_NAMED:
+                laws = f"{len(facts.undecided)} laws"
+            words += f" open between {laws};"
         return "Undecided", f"{words} for now {facts.law}"
     return f"Use {facts.law}", _gains(facts)
 

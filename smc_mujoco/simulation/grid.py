@@ -24,7 +24,7 @@ import math
 import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import mujoco
 import numpy as np
@@ -349,6 +349,21 @@ def case(
     starts.check_condition(condition.name, of_condition)
     scenario = Scenario(**fields | of_condition | dict(changes))
     return starts.place(scenario, seed).named(condition.name)
+
+
+class Draws(NamedTuple):
+    """Which random numbers the runs of a comparison have: initial states, noise and phases."""
+
+    seeds: int  # runs of a law on each plant in each condition
+    starts: Starts | None = None
+    seed: int = 0  # another one draws others
+
+    def numbers(self, count: int | None = None) -> range:
+        """Return the seeds of that many runs, or of all, which are also the numbers of unseen
+        instances.
+        """
+        first = self.seed * MAX_ITEMS
+        return range(first, first + (self.seeds if count is None else count))
 
 
 def checked_starts(given: object) -> Starts:

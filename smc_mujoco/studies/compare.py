@@ -14,6 +14,7 @@ from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.law_time import LawTime, law_time
 from smc_mujoco.analysis.ranking import RELEVANT, Relevant, needed_to_win
+from smc_mujoco.analysis.tuning.effort import Search
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Budget, Searches
 from smc_mujoco.answers import answers
 from smc_mujoco.answers.answer import Answer
@@ -40,7 +41,7 @@ from smc_mujoco.robustness.uncertainty import Uncertainty
 from smc_mujoco.robustness.worst_case import DURATION, WorstCase, WorstCases
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.force_bounds import bounds_in_words
-from smc_mujoco.simulation.grid import Starts, case, listed, listed_conditions, listed_laws
+from smc_mujoco.simulation.grid import Draws, Starts, case, listed, listed_conditions, listed_laws
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -48,7 +49,7 @@ from smc_mujoco.simulation.workers import Workers
 from smc_mujoco.studies.board_numbers import unit_of
 from smc_mujoco.studies.board_tables import Boards
 from smc_mujoco.studies.contests import contests
-from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
+from smc_mujoco.studies.fair_gains import Candidate, GainChoice, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, Holdout, leaderboard, objective_boards
 from smc_mujoco.studies.race import LOOKS, STUCK
 from smc_mujoco.studies.study import FULL, QUICK
@@ -567,25 +568,18 @@ def compare(
         plants = extent.plants
     machines = list(map(as_plant, listed("plants", plants)))
     length = duration or extent.duration
+    usual = QUICK_SEARCHES if quick else SEARCHES
     trial = Trial.of(
         machines,
         conditions,
         extent.conditions,
         length,
         out,
-        starts=starts,
+        draws=Draws(seeds, starts, seed),
+        search=Search(searches or usual, budget, quick, device, executor),
+        gains=GainChoice(gains, tune and gains == "tuned", defaults, searches is not None),
         threads=threads,
         progress=progress,
-        defaults=defaults,
-        asked=searches,
-        usual=QUICK_SEARCHES if quick else SEARCHES,
-        quick=quick,
-        budget=budget,
-        tune=tune and gains == "tuned",
-        gain_set=gains,
-        seed=seed,
-        device=device,
-        executor=executor,
     )
     if quick:  # as many as can name a winner in each block
         least = needed_to_win(len(machines) * len(trial.conditions))
@@ -674,7 +668,7 @@ def _worst_cases(
     for plant in trial.plants:
         by_plant[plant.name] = {}
         for law, *_ in candidates[plant.name]:
-            run = case(plant, law, "nominal", duration or DURATION, starts=trial.starts)
+            run = case(plant, law, "nominal", duration or DURATION, starts=trial.draws.starts)
             by_plant[plant.name][law.name] = trial.attack(f"{plant.name}-{law.name}", run, within)
     return by_plant
 

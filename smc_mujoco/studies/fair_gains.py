@@ -21,7 +21,8 @@ import numpy as np
 from smc_mujoco.analysis.ranking import needed_to_win
 from smc_mujoco.analysis.step_halving import doubled
 from smc_mujoco.analysis.tuning import quick_search, result, search, search_space
-from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Objective, objectives
+from smc_mujoco.analysis.tuning.effort import Search
+from smc_mujoco.analysis.tuning.objective import BUDGET, Objective, objectives
 from smc_mujoco.analysis.tuning.run_limits import RunLimit, shows_limits
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import AnyPath
@@ -44,6 +45,7 @@ from smc_mujoco.robustness.worst_case import WorstCase, cached_worst_case
 from smc_mujoco.simulation import coerce, run_key
 from smc_mujoco.simulation.conditions import NAMED, Condition, applicable
 from smc_mujoco.simulation.grid import (
+    Draws,
     Starts,
     all_combinations,
     check_moving,
@@ -54,7 +56,6 @@ from smc_mujoco.simulation.grid import case as run_of_grid
 from smc_mujoco.simulation.law_checks import blind
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.scenario_checks import event_times
-from smc_mujoco.simulation.workers import Workers
 from smc_mujoco.studies.leaderboard import Holdout
 from smc_mujoco.studies.study import REPEATED_SEEDS, study
 from smc_mujoco.studies.table import Table
@@ -146,31 +147,31 @@ class GainRule(NamedTuple):
     quick: bool  # whether by `quick_search`
 
 
+class GainChoice(NamedTuple):
+    """Which gains the laws of a comparison have that were given without."""
+
+    of_package: str = "tuned"  # the set of the package's gains
+    tune: bool = True  # whether laws without gains are tuned
+    defaults: bool = False  # whether a law may win over rivals that have their defaults
+    # whether laws with fewer shipped sets than searches are tuned, too, as their number was asked
+    # for
+    as_many: bool = False
+
+
 class Trial(NamedTuple):
-    """The plants and conditions of a comparison, how its gains are searched, and its folder;
-    `threads` and `progress` are as in `run`.
+    """A comparison: its plants and conditions, random numbers, gains and folder; `threads` and
+    `progress` are as in `run`.
     """
 
     plants: Sequence[Plant]
     conditions: Sequence[Condition]
     duration: float  # of a run, s
-    starts: Starts | None
     folder: Path
-    threads: int | None
-    progress: bool
-    # whether a law may win over rivals that have their defaults
-    defaults: bool = False
-    asked: int | None = None  # number of searches that the user asked for
-    usual: int = SEARCHES  # number of searches if the user asked for none
-    budget: int = BUDGET  # sets of gains that a search tries at most, for each gain
-    tune: bool = True  # whether laws without gains are tuned
-    gain_set: str = "tuned"  # of the package's gains
-    seed: int = 0  # another one draws other instances, noise and starts
-    # whether gains are searched by `quick_search`, under the trial's conditions and with noise, on
-    # plants for which the package has no gains of its laws
-    quick: bool = False
-    device: str = "cpu"  # on which the fast engine searches
-    executor: Workers | None = None  # where searches and runs are made
+    draws: Draws
+    search: Search = Search()
+    gains: GainChoice = GainChoice()
+    threads: int | None = None
+    progress: bool = False
 
     @classmethod
     def of(
@@ -191,22 +192,13 @@ class Trial(NamedTuple):
         parsed = listed_conditions(texts)
         return cls(plants=plants, conditions=parsed, duration=duration, folder=Path(out), **fields)
 
-    @property
-    def searches(self) -> int:
-        """The number of searches that tune a law."""
-        return self.asked or self.usual
-
-    def seeds(self, count: int) -> range:
-        """Return the seeds of that many runs, which are also the numbers of unseen instances."""
-        first = self.seed * MAX_ITEMS
-        return range(first, first + count)
-
     def case(
         self, plant: Plant, law: Component | Template | str, condition: Condition | str
     ) -> Scenario:
         """Return a run of a law, from the start of the first seed."""
-        (seed,) = self.seeds(1)
-        return run_of_grid(plant, law, condition, self.duration, seed=seed, starts=self.starts)
+        (seed,) = self.draws.numbers(1)
+        starts = self.draws.starts
+        return run_of_grid(plant, law, condition, self.duration, seed=seed, starts=starts)
 
     def check(self, laws: Mapping[str, Laws]) -> None:
         """Refuse, before gains are searched, two things of one name, your law with the name of a
@@ -251,7 +243,7 @@ class Trial(NamedTuple):
                 to_search = [
                     law.name for law, ready in zip(laws[name], of_plant, strict=True) if not ready
                 ]
-                if to_search and self.tune:
+                if to_search and self.gains.tune:
                     repeated = f"searches of these laws as they are now, which {self.folder} keeps"
                     sentence = f"gains to search on {name}: {joined(to_search)}; {repeated}"
                     print(f"{sentence}, are not repeated", file=sys.stderr)
@@ -263,7 +255,7 @@ class Trial(NamedTuple):
                 laws[plant.name], without_search[plant.name], strict=True
             ):
                 candidate = known_candidate or default_of(law)
-                if known_candidate is None and self.tune:
+                if known_candidate is None and self.gains.tune:
                     candidate = self.search_gains(plant, law, rule)
                 by_plant[plant.name].append(candidate)
         return by_plant
@@ -274,11 +266,11 @@ class Trial(NamedTuple):
         Raises:
           ScenarioError: see `candidates`.
         """
-        count = self.asked if self.tune else None
+        count = self.search.searches if self.gains.tune and self.gains.as_many else None
         candidates = []
         for law in laws:
-            candidates.append(_without_search(plant, law, self.gain_set, count))
-        if self.tune and not self.defaults:
+            candidates.append(_without_search(plant, law, self.gains.of_package, count))
+        if self.gains.tune and not self.gains.defaults:
             self._check_tunable(plant, laws, candidates, self.rule(plant, candidates).goal)
         return candidates
 
@@ -288,9 +280,10 @@ class Trial(NamedTuple):
         """
         kinds = [candidate.law.source.kind for candidate in known if candidate]
         shipped = source.SHIPPED in kinds
-        if self.quick and not shipped:
+        if self.search.quick and not shipped:
             return GainRule(self.asked_goal(plant), quick_search.BUDGET, True)
-        return GainRule(self._goal(plant, None if shipped else self.starts), self.budget, False)
+        starts = None if shipped else self.draws.starts
+        return GainRule(self._goal(plant, starts), self.search.budget, False)
 
     def _if_few(self, known: Sequence[Candidate | None], seeds: int) -> str:
         """Return a sentence, to be said before minutes of tuning, if so few sets of gains or runs
@@ -298,7 +291,7 @@ class Trial(NamedTuple):
         """
         samples = []
         for candidate in known:
-            sets = self.searches if self.tune else 1
+            sets = self.search.searches if self.gains.tune else 1
             if candidate:
                 sets = len(candidate.sets)
             samples.append(min(sets, seeds) if sets > 1 else seeds)
@@ -352,7 +345,7 @@ class Trial(NamedTuple):
         goal = dataclasses.replace(
             usual,
             conditions=tuple(conditions),
-            starts=self.starts or usual.starts,
+            starts=self.draws.starts or usual.starts,
             duration=duration,
             limits=limits,
         )
@@ -393,10 +386,10 @@ class Trial(NamedTuple):
                     goal,
                     self.threads,
                     self.progress,
-                    searches=self.searches,
+                    searches=self.search.searches,
                     folder=folder / "searches",
-                    device=self.device,
-                    executor=self.executor,
+                    device=self.search.device,
+                    executor=self.search.executor,
                     quick=rule.quick,
                 )
 
@@ -404,7 +397,7 @@ class Trial(NamedTuple):
             first = goal.scenarios(plant, default)[0]
             code = fingerprint.of((default.function, ranges))
             tuned = cached(
-                folder / f"{plant.name}-{law.name}-{self.searches}-{rule.budget}.json",
+                folder / f"{plant.name}-{law.name}-{self.search.searches}-{rule.budget}.json",
                 [run_key.key(first), goal.describe(), code, rule.quick],
                 searched,
                 lambda made, path: made.save(path),
@@ -438,9 +431,9 @@ class Trial(NamedTuple):
             self.plants,
             lambda plant: candidates[plant.name],
             self.conditions,
-            self.seeds(seeds),
+            self.draws.numbers(seeds),
             self.duration,
-            self.starts,
+            self.draws.starts,
         )
         if coarse:
             runs = list(map(doubled, runs))
@@ -450,7 +443,7 @@ class Trial(NamedTuple):
             threads=self.threads,
             progress=self.progress,
             half_steps=not coarse,
-            executor=self.executor,
+            executor=self.search.executor,
         )
 
     def holdout(
@@ -464,7 +457,7 @@ class Trial(NamedTuple):
         laws = sum(map(len, candidates.values()))
         with bar(words, laws, self.progress, counted=True) as progress_bar:
             for plant in self.plants:
-                goal = self._goal(plant, self.starts)
+                goal = self._goal(plant, self.draws.starts)
                 if self.rule(plant, candidates[plant.name]).quick:
                     goal = self.asked_goal(plant)
                 least = len(goal.conditions) * goal.duration**2 / 2.0
@@ -472,7 +465,7 @@ class Trial(NamedTuple):
                 runs = Holdout({}, {}, {}, {}, least, names)
                 with contextlib.suppress(ScenarioError):
                     for candidate in candidates[plant.name]:
-                        parts = self._holdout(plant, candidate, goal, self.seeds(count))
+                        parts = self._holdout(plant, candidate, goal, self.draws.numbers(count))
                         for of_law, values in zip(runs[:4], parts, strict=True):
                             of_law[candidate.law.name] = values  # pyright: ignore[reportIndexIssue] made as dicts
                         progress_bar.advance(1.0)
@@ -505,7 +498,7 @@ class Trial(NamedTuple):
         """Return the worst case of a scenario, which the folder keeps under a name."""
         file = self.folder / "worst" / f"{name}.json"
         return cached_worst_case(
-            file, scenario, within, budget, self.threads, self.progress, self.device
+            file, scenario, within, budget, self.threads, self.progress, self.search.device
         )
 
 

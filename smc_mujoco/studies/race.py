@@ -494,13 +494,13 @@ def _made(
         else:
             missing.append(i)
             writable(file.path)
-    if course.trial.executor is None:
+    if course.trial.search.executor is None:
         yield from _made_here(course, pieces, missing, ends, shorten)
     elif missing:
         calls = []
         for i in missing:
             calls.append(pieces[i].entrant.call(pieces[i].k, pieces[i].draw))
-        with opened(course.trial.executor) as pool:
+        with opened(course.trial.search.executor) as pool:
             for j, result in called(pool, search.searched, calls):
                 yield missing[j], _file(course, pieces[missing[j]]).keep(result)
                 if time.monotonic() > ends:
@@ -581,7 +581,7 @@ def _judge(course: RaceCourse, running: Sequence[Entrant], count: int) -> None:
 def _judgement(course: RaceCourse, entrant: Entrant, k: int) -> CachedResult[Unseen]:
     """Return the file of J of a law's set k."""
     trial, plant, goal, _ = course
-    (first,) = trial.seeds(1)
+    (first,) = trial.draws.numbers(1)
     case = goal.holdout(plant, entrant.gains(k), first + k)[0]
     path = trial.folder / "unseen" / f"{plant.name}-{entrant.law.name}-set-{k}.json"
 
@@ -611,7 +611,7 @@ def unseen(
     Runs under RK4 have twice the usual physics step here, where that fits, and the usual one in
     that one of four. J moves by some thousandths, for half of the time.
     """
-    (first,) = trial.seeds(1)
+    (first,) = trial.draws.numbers(1)
     instances = [first + k for k in numbers]
     values, _ = objectives(plant, laws, goal, instances, trial.threads, doubled=True)
     halves = np.full(len(laws), math.nan)

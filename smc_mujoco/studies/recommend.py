@@ -91,7 +91,6 @@ class Question(NamedTuple):
 
     laws: Laws
     metrics: Sequence[str]  # of the tables
-    seeds: int  # of the tables, if the time allows it
     relevant: float  # as in `ranking`
     untried_laws: Sequence[str]  # further laws of the package that suit
 
@@ -107,7 +106,7 @@ def recommend(
     kinds = len(KINDS) + 1  # friction from two sides
     margins_work = TRIED * kinds * _coarse(trial, plant, WITHOUT, trial.conditions[0]).work
     clock.unit = _work_of_judgement(course)
-    few = min(question.seeds, FEWEST_SEEDS)
+    few = min(trial.draws.seeds, FEWEST_SEEDS)
     clock.table, clock.choice = few * table_work, AFTER * clock.unit
     clock.after = margins_work + 2 * len(BESIDE_NONE) * clock.unit
     clock.least = LEAST_RUNS * table_work
@@ -121,7 +120,7 @@ def recommend(
         rivals = [*chosen][: max(2, len(raced.first))]
         fixed = _fixed(course, {law: chosen[law] for law in rivals}, question.relevant)
     candidates = [Candidate(law, (law,)) for law in chosen.values()]
-    count = clock.seeds(question.seeds, len(chosen) * table_work, margins_work)
+    count = clock.seeds(trial.draws.seeds, len(chosen) * table_work, margins_work)
     with clock.timed(count * len(chosen) * table_work):
         table = trial.run({plant.name: candidates}, count, coarse=True)
     settled = _settled(table)
@@ -163,7 +162,7 @@ def recommend(
             helped=[driven_names(plant)[i] for i in helped],
             opposed=opposed,
         ),
-        seeds=question.seeds,
+        seeds=trial.draws.seeds,
         worst_run=_worst_run(table, first.name),
         tuned=tunings.get(first.name),
         left_out=left_out,
@@ -222,12 +221,14 @@ def _entrants(
                 rule.goal, limits=tuple(limit.for_search for limit in goal.limits)
             )
             task = search.task_of(plant, bound, sought, rule.budget, 0, trial.threads)
-            entrants.append(SearchedEntrant(task._replace(quick=rule.quick, device=trial.device)))
+            entrants.append(
+                SearchedEntrant(task._replace(quick=rule.quick, device=trial.search.device))
+            )
         except BrokenLawError:
             raise
         except ScenarioError as error:
             left_out[bound.name] = f"{NOT_TUNED}{error}"
-            if trial.defaults or len(laws) == 1:
+            if trial.gains.defaults or len(laws) == 1:
                 entrants.append(ReadyEntrant(default_of(law)))
     return entrants, left_out
 

@@ -12,6 +12,7 @@ from typing import Annotated
 
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.ranking import RELEVANT, Relevant
+from smc_mujoco.analysis.tuning.effort import Search
 from smc_mujoco.analysis.tuning.run_limits import RunLimit, limits_in
 from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find
@@ -23,12 +24,12 @@ from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE, metric_of, metrics
 from smc_mujoco.simulation.conditions import Condition
-from smc_mujoco.simulation.grid import Starts, listed, listed_laws
+from smc_mujoco.simulation.grid import Draws, Starts, listed, listed_laws
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.workers import Workers
 from smc_mujoco.studies.answer_time import AnswerTime
 from smc_mujoco.studies.compare import DrawSeed
-from smc_mujoco.studies.fair_gains import Laws, Trial, law_or_template
+from smc_mujoco.studies.fair_gains import GainChoice, Laws, Trial, law_or_template
 from smc_mujoco.studies.race import WITHOUT
 from smc_mujoco.studies.recommend import Question, recommend
 from smc_mujoco.studies.recommendation import Recommendation
@@ -128,14 +129,11 @@ def which(
         DEFAULT_CONDITIONS,
         duration or DURATION,
         out,
-        starts=starts,
+        draws=Draws(seeds or SEEDS, starts, seed),
+        search=Search(quick=True, device=device, executor=executor),
+        gains=GainChoice(defaults=defaults),
         threads=threads,
         progress=progress,
-        defaults=defaults,
-        seed=seed,
-        quick=True,
-        device=device,
-        executor=executor,
     )
     trial.check({machine.name: chosen})
     shown_metrics = _with_values(
@@ -143,7 +141,7 @@ def which(
     )
     names = {law.name for law in chosen}
     untried = [law.name for law in _of_package(machine, properties) if law.name not in names]
-    question = Question(chosen, shown_metrics, seeds or SEEDS, relevant, untried)
+    question = Question(chosen, shown_metrics, relevant, untried)
     goal = trial.asked_goal(machine, limits)
     recommendation = recommend(trial, machine, question, goal, AnswerTime.within(began, minutes))
     call = _call(plant, conditions, laws, needs, starts, trial.folder, minutes)

@@ -14,20 +14,22 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search
+from smc_mujoco.analysis.tuning.effort import Search
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.control import from_text
 from smc_mujoco.control.law import all_laws, catalogue, law_function
 from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
 from smc_mujoco.simulation.conditions import NAMED, find_condition
+from smc_mujoco.simulation.grid import Draws
 from smc_mujoco.studies import fair_gains
-from smc_mujoco.studies.fair_gains import Candidate, Trial
+from smc_mujoco.studies.fair_gains import Candidate, GainChoice, Trial
 
 FAST = smc.law("observer_free", lam=6.0, k1=2.0)
 DUFFING = smc.plant("duffing")
 
 
-def trial(folder, plants=(), starts=None, **search) -> Trial:
-    return Trial(plants, [], 1.0, starts, folder, None, False, **search)
+def trial(folder, plants=(), starts=None, gains=GainChoice(), **effort) -> Trial:  # noqa: B008
+    return Trial(plants, [], 1.0, folder, Draws(12, starts), Search(**effort), gains)
 
 
 def test_laws_are_tuned_from_the_starts_of_the_packages_gains_where_these_are_compared(monkeypatch):
@@ -41,7 +43,9 @@ def test_laws_are_tuned_from_the_starts_of_the_packages_gains_where_these_are_co
     mine = law_function(gains={"k": 2.0})(lambda y, gains, memory: (-gains.k * y.e, y.e))
     laws = [catalogue()["classical"], mine]
     for plant in (DUFFING, smc.plant("duffing", M=2.0)):
-        trial(Path("gains"), [plant], other, defaults=True).candidates({"duffing": laws}, 12)
+        trial(Path("gains"), [plant], other, GainChoice(defaults=True)).candidates(
+            {"duffing": laws}, 12
+        )
     assert asked == [Objective().starts, other, other]
 
 
@@ -65,7 +69,7 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(tmp_pa
     # no catalogue has it, so its name says nothing to what reads the file of a tuning
     heavy = dataclasses.replace(smc.plant("duffing", M=2.0), name="mine")
     for _ in range(2):
-        searched = trial(tmp_path, [heavy], usual=2, budget=8)
+        searched = trial(tmp_path, [heavy], searches=2, budget=8)
         (found,) = searched.candidates({"mine": [my_pd]}, 12)["mine"]
         assert found.law.function is my_pd.function
         assert found.law.gains == tuned[0].law.gains != my_pd.defaults
@@ -211,12 +215,15 @@ def test_a_law_with_fewer_shipped_sets_than_searches_asked_for_is_tuned_too(monk
     laws = [catalogue()[name] for name in ("fixed_time", "pid")]
     monkeypatch.setattr(Trial, "search_gains", lambda self, plant, law, starts: law.name)
     for asked, tuned, kept in ((None, 3, 12), (3, 3, 3), (6, "fixed_time", 6)):
-        few, many = trial(Path("gains"), [DUFFING], asked=asked).candidates({"duffing": laws}, 12)[
-            "duffing"
-        ]
+        gains = GainChoice(as_many=asked is not None)
+        effort = {} if asked is None else {"searches": asked}
+        compared = trial(Path("gains"), [DUFFING], gains=gains, **effort)
+        few, many = compared.candidates({"duffing": laws}, 12)["duffing"]
         assert (few if asked == 6 else len(few.sets)) == tuned
         assert len(many.sets) == kept
-    untuned = trial(Path("gains"), [DUFFING], asked=6, tune=False)
+    untuned = trial(
+        Path("gains"), [DUFFING], gains=GainChoice(tune=False, as_many=True), searches=6
+    )
     assert len(untuned.candidates({"duffing": laws}, 12)["duffing"][0].sets) == 3
 
 
@@ -233,9 +240,9 @@ def test_what_cannot_be_ranked_is_said_before_laws_are_tuned(monkeypatch, capsys
         ),
         (5, "5 sets of gains or runs cannot rank 2 laws in 1 condition; 6"),
     ):
-        asked = trial(Path("gains"), [DUFFING], usual=usual)._replace(
-            progress=True, conditions=[NAMED["noise"]], defaults=True
-        )
+        asked = trial(
+            Path("gains"), [DUFFING], gains=GainChoice(defaults=True), searches=usual
+        )._replace(progress=True, conditions=[NAMED["noise"]])
         (said, _) = asked.candidates({"duffing": [mine, mine]}, 12)["duffing"]
         assert said.startswith(words)
         assert said.endswith(
@@ -258,9 +265,8 @@ def test_laws_that_cannot_see_what_nothing_drives_are_named_before_the_runs(tmp_
     laws = [all_laws()[name] for name in ("pid", "hierarchical")]
     for plant, told in (("cart_pole", ["pid"]), ("duffing", [])):
         machine = smc.plant(plant)
-        trial = Trial.of(
-            [machine], "nominal", (), 1.0, tmp_path, starts=None, threads=1, progress=True
-        )
+        fields = {"draws": Draws(1), "threads": 1, "progress": True}
+        trial = Trial.of([machine], "nominal", (), 1.0, tmp_path, **fields)
         trial.check({plant: laws})
         said = capsys.readouterr().err
         assert [law.name for law in laws if law.name in said] == told

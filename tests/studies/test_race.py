@@ -10,9 +10,11 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis import step_halving
 from smc_mujoco.analysis.ranking import RELEVANT, Comparison
+from smc_mujoco.analysis.tuning.effort import Search
 from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, objectives
 from smc_mujoco.analysis.tuning.result import SearchResult
 from smc_mujoco.common.progress import Bar
+from smc_mujoco.simulation.grid import Draws
 from smc_mujoco.studies import race as module
 from smc_mujoco.studies.answer_time import FEWEST_SEEDS, AnswerTime
 from smc_mujoco.studies.fair_gains import default_of
@@ -79,7 +81,7 @@ def run(monkeypatch):
 
 
 def course(clock=None):
-    trial = types.SimpleNamespace(progress=False, executor=None)
+    trial = types.SimpleNamespace(progress=False, search=Search())
     return module.RaceCourse(trial, None, GOAL, clock or AnswerTime())
 
 
@@ -320,7 +322,7 @@ def test_unseen_runs_under_rk4_have_twice_the_step_and_one_in_four_their_own():
     robot = smc.plant_from(ROBOT, ["j"], name="robot")
     law = smc.law("pid", kp=20.0, ki=20.0, kd=2.0)
     goal = Objective(conditions=("friction", "contact", "delay_10ms"), duration=1.0)
-    trial = types.SimpleNamespace(seeds=range, threads=1)
+    trial = types.SimpleNamespace(draws=Draws(2), threads=1)
     steps = {case.resolved.physics_step for case in goal.holdout(robot, law, 0)}
     assert {case.resolved.integrator for case in goal.holdout(robot, law, 0)} == {"RK4"}
     assert max(steps) < goal.control_period  # so they may be doubled

@@ -22,6 +22,7 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.properties import searched
 from smc_mujoco.robustness import margins
+from smc_mujoco.simulation.grid import Draws
 from smc_mujoco.studies import race, recommend
 from smc_mujoco.studies import recommendation as recommendation_module
 from smc_mujoco.studies import which as module
@@ -304,8 +305,7 @@ def test_a_law_runs_under_all_conditions_at_once_unless_they_exclude_each_other(
     pushed = smc.condition("pushed", disturbance=smc.Constant(force))
 
     def course(*conditions):
-        fields = {"starts": None, "threads": 1, "progress": False}
-        trial = Trial.of([plant], conditions, (), 3.0, tmp_path, **fields)
+        trial = Trial.of([plant], conditions, (), 3.0, tmp_path, draws=Draws(3), threads=1)
         return RaceCourse(trial, plant, Objective(), AnswerTime())
 
     for condition in (rubs, pushed):
