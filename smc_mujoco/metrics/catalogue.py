@@ -180,8 +180,8 @@ def settling_time(trace: Trace) -> float:
     """Time from which every channel stays in the settling band.
 
     Last exit of max_i |e_i| from 2 % of the scale, or from 5 standard deviations of the noise if
-    the run starts within 15. The time counts from t[0], even if r steps
-    later. NaN where the reference travels, as in a speed loop: no time is known for that.
+    the run starts within 15. The time counts from t[0], even if r steps later. NaN where the
+    reference travels, as in a speed loop: no time is known for that.
     """
     if travels(trace):
         return np.nan

@@ -15,8 +15,7 @@ actuators, N. Of the attitude only the heading counts where tilt follows from th
 rotors that push one way.
 
 Letters: t (K+1,) s, x (K+1, n) true position, r its reference, e = x - r, u the command, s the
-law's
-sliding variable; h the time between samples. The conventions, all chosen, one for the whole
+law's sliding variable; h the time between samples. The conventions, all chosen, one for the whole
 project:
 
 - scale: the largest |e(0)| over the group's channels, or the largest peak-to-peak range of r over

@@ -11,8 +11,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.aliases import Array
-from smc_mujoco.common.mjcb import compiled
-from smc_mujoco.mechanisms.layout import channel_names
+from smc_mujoco.mechanisms.layout import channel_names, loaded
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.scenario import Scenario
 
@@ -56,7 +55,7 @@ def of_file(plant: Plant) -> Array:
     coefficients = np.zeros((3, plant.n))
     if not plant.is_user_model or plant.pose:
         return coefficients
-    model = compiled(plant.spec())
+    model = loaded(plant)
     for i, name in enumerate(channel_names(plant)):
         joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
         if joint >= 0:  # a measured base has none

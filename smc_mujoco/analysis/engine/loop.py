@@ -299,9 +299,7 @@ def _forces(form: Form, compile_user: Compiler) -> Fields:
         "diverged": diverged,
         "disturb": _disturbing(form, compile_user),
         "truth": inlined(lambda view, i: (view.work[work_at.x + i], view.work[work_at.v + i])),
-        "applied": inlined(
-            lambda view, i: state_in(view.work, work_at.states + STATES * i).delayed
-        ),
+        "applied": applied,
         "disturbance": inlined(lambda view, i: view.work[work_at.d + i]),
     }
 

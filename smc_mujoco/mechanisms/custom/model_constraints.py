@@ -4,6 +4,7 @@ dry friction holds.
 
 import copy
 import math
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
@@ -62,8 +63,10 @@ def smooth(model: mujoco.MjModel, rubs: bool = False) -> bool:
     )
 
 
-def harden(spec: mujoco.MjSpec) -> None:
-    """Make dry friction hold, where the file does not say how softly: MuJoCo's default creeps."""
+def harden(spec: mujoco.MjSpec, touching: Callable[[], bool]) -> None:
+    """Make dry friction hold, where the file does not say how softly: MuJoCo's default creeps.
+    `touching` says whether two geoms may meet.
+    """
     hard = []
     for part in (*spec.joints, *spec.tendons):
         if part.frictionloss > 0.0 and np.array_equal(part.solref_friction, SOFT_SOLREF):
@@ -71,7 +74,7 @@ def harden(spec: mujoco.MjSpec) -> None:
     for part in hard:
         part.solref_friction = HARD_SOLREF
         part.solimp_friction = HARD_SOLIMP
-    if hard and not touches(spec.copy().compile()):
+    if hard and not touching():
         hold(spec)
 
 

@@ -16,7 +16,7 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.mechanisms.custom.model_constraints import sets_friction_solref, touches
 from smc_mujoco.mechanisms.hardware.part import Part
-from smc_mujoco.mechanisms.layout import moving_joints, state_with
+from smc_mujoco.mechanisms.layout import loaded, moving_joints, state_with
 from smc_mujoco.mechanisms.plant import Plant, write
 
 POSES = 12  # in which poles are computed, beside the start; chosen
@@ -116,7 +116,7 @@ def constraint_rate(plant: Plant) -> float:
     """Return the fastest rate of what a plant may touch, of its limits and its ties, 1/s; 0 if it
     has none of them.
     """
-    model = compiled(plant.spec())
+    model = loaded(plant)
     off = model.opt.disableflags
     if off & FLAGS.mjDSBL_CONSTRAINT.value:
         return 0.0
@@ -146,7 +146,7 @@ def rubs(plant: Plant) -> bool:
     """Return whether joints or tendons of the file have dry friction, or a softness of one that a
     parameter adds.
     """
-    model = compiled(plant.spec())
+    model = loaded(plant)
     for name in plant.parameters:
         joint, _, kind = name.rpartition(".")
         if kind == "frictionloss" and sets_friction_solref(model, model.joint(joint).dofadr[0]):
@@ -157,11 +157,11 @@ def rubs(plant: Plant) -> bool:
 @functools.lru_cache(maxsize=64)
 def coupled(plant: Plant) -> bool:
     """Return whether joints of a plant move each other."""
-    model = compiled(plant.spec())
+    model = loaded(plant)
     return bool(np.any(model.dof_parentid >= 0) or model.ntendon or model.neq)
 
 
 @functools.lru_cache(maxsize=64)
 def may_touch(plant: Plant) -> bool:
     """Return whether two geoms of the file may meet."""
-    return touches(compiled(plant.spec()))
+    return touches(loaded(plant))

@@ -2,6 +2,7 @@
 
 import base64
 import dataclasses
+import functools
 from collections.abc import Iterable, Iterator
 
 import mujoco
@@ -12,7 +13,7 @@ from smc_mujoco.common.data import frozen_data
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs, joints_of
 from smc_mujoco.mechanisms.custom.mjcf import ModelSource
-from smc_mujoco.mechanisms.custom.model_constraints import harden
+from smc_mujoco.mechanisms.custom.model_constraints import harden, touches
 from smc_mujoco.mechanisms.custom.others import edit, limp, usual_keyframe
 from smc_mujoco.mechanisms.layout import OWN, ROTOR, START
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Field
@@ -60,7 +61,7 @@ class UserModel:
         edit(spec, self.source, self.channels, self.keyframe, self.others, seen)
         return spec
 
-    def __call__(self, n: int) -> mujoco.MjSpec:
+    def with_channels(self) -> mujoco.MjSpec:
         """Return the model with the sensors of each channel, and a motor for each driven one. A
         free joint keeps its thrusters instead of motors.
         """
@@ -72,7 +73,12 @@ class UserModel:
             own.add_motors(spec, self.motors)
             for joint in (*joints_of(self.channels), *self.measured):
                 own.add_joint_sensors(spec, joint)
-        harden(spec)
+        return spec
+
+    def __call__(self, n: int) -> mujoco.MjSpec:
+        """Return the model of runs: with its channels, hard dry friction and one keyframe."""
+        spec = self.with_channels()
+        harden(spec, functools.partial(_touches, self))
         for key in list(spec.keys):
             if key.name != self.keyframe or self.keyframe is None:
                 spec.delete(key)
@@ -125,6 +131,12 @@ class UserModel:
                 assets[name] = base64.b64encode(content).decode()
             data |= {"text": self.source.text, "assets": assets}
         return data
+
+
+@functools.lru_cache(maxsize=32)
+def _touches(build: UserModel) -> bool:
+    """Return whether two geoms of a model may meet."""
+    return touches(build.with_channels().compile())
 
 
 def with_compensation(model: mujoco.MjModel, fields: Iterable[Field]) -> Iterator[Field]:

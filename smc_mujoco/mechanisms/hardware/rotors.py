@@ -36,11 +36,10 @@ import numpy as np
 from numba import njit
 
 from smc_mujoco.common.jit import floats, pointer, record_at
-from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.moments import Run, channel_at, state_at
 from smc_mujoco.mechanisms.hardware.part import Part
-from smc_mujoco.mechanisms.layout import drive_ids
+from smc_mujoco.mechanisms.layout import drive_ids, loaded
 from smc_mujoco.mechanisms.plant import Plant
 
 ROTORS_TEXT = "smc:rotors"  # name of a text in models whose actuators are rotors
@@ -76,7 +75,7 @@ def has_rotors(model: mujoco.MjModel) -> bool:
 @functools.lru_cache(maxsize=32)
 def flies(plant: Plant) -> bool:
     """Return whether a plant's actuators are rotors, so that it has drag."""
-    return bool(plant.pose) and has_rotors(compiled(plant.spec()))
+    return bool(plant.pose) and has_rotors(loaded(plant))
 
 
 @njit(error_model="numpy")

@@ -1190,3 +1190,19 @@ def test_what_parts_add_to_a_model_takes_none_of_its_defaults(condition):
         fields = NAMED[condition].on(plant, 0.2)
         ends.append(smc.run(smc.Scenario(plant=plant, law=law, duration=0.2, **fields)).x[-1, 0])
     assert ends[0] == ends[1] == ends[2]
+
+
+def test_a_run_compiles_its_model_and_that_of_its_plant_once(arm, monkeypatch):
+    """Six times before: what only asks the model has that of the plant."""
+    compiled = []
+    compile_spec = mujoco.MjSpec.compile
+
+    def counting(*arguments):
+        compiled.append(arguments)
+        return compile_spec(*arguments)
+
+    plant = arm(rest=ACTUATED)
+    scenario = smc.Scenario(plant=plant, law="pid", duration=0.01, friction=smc.Viscous(0.1))
+    monkeypatch.setattr(mujoco.MjSpec, "compile", counting)
+    smc.run(scenario)
+    assert len(compiled) <= 2
