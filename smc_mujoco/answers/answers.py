@@ -19,20 +19,25 @@ from smc_mujoco.answers.facts import (
     CompareFacts,
     Contest,
     EnteredFacts,
+    Grid,
     IdentifyFacts,
     Lead,
     Level,
+    MarginsFacts,
     More,
     NextStep,
     NotRanked,
     Open,
     Sample,
+    SensitivityFacts,
     Settles,
     Tied,
     Trails,
+    TuneFacts,
     Use,
     Verdict,
     WhichFacts,
+    WorstFacts,
 )
 from smc_mujoco.common.text import counted, joined, number
 
@@ -40,6 +45,7 @@ WIDTH = 80  # characters of a line
 LINES = 24  # of a screen
 MAX_CONTESTS = 5  # that have a block each; more have one table of winners
 MAX_NAMED = 8  # conditions that a verdict names; chosen
+GAP = "  "  # between columns
 HEADING = 12  # characters of a line of a heading; chosen
 NAMES = 24  # characters of a plant and a condition beside winners; chosen
 LARGEST = 0.995  # a share that is printed: of the leads that might not show; chosen
@@ -49,8 +55,8 @@ Labelled = tuple[str, str]  # the label of a line, and its text
 
 
 def labelled(pairs: Iterable[Labelled], width: int = WIDTH) -> list[str]:
-    """Return lines with their labels at the left. A longer text goes on below itself. A text with
-    ends of lines keeps them: a piece of a command cannot be pasted.
+    """Return lines with their labels at the left. A longer text goes on below itself. A text of
+    several lines begins with a command, which is broken so that it can be pasted.
     """
     pairs = list(pairs)
     indent = max((len(label) for label, _ in pairs), default=0) + 2
@@ -58,8 +64,9 @@ def labelled(pairs: Iterable[Labelled], width: int = WIDTH) -> list[str]:
     for label, text in pairs:
         head = label.ljust(indent)
         if "\n" in text:
-            first, *below = text.splitlines()
-            lines += [head + first, *(" " * indent + line for line in below)]
+            command, *below = text.splitlines()
+            first, *rest = _pasted(command, width - indent)
+            lines += [head + first, *(" " * indent + line for line in (*rest, *below))]
             continue
         hanging = textwrap.wrap(
             text,
@@ -70,6 +77,24 @@ def labelled(pairs: Iterable[Labelled], width: int = WIDTH) -> list[str]:
             break_on_hyphens=False,
         )
         lines += hanging or [head.rstrip()]
+    return lines
+
+
+def _pasted(command: str, width: int) -> list[str]:
+    """Return a command of a shell on lines of a width."""
+    lines = [""]
+    parts: list[str] = []
+    for word in map(shlex.quote, shlex.split(command)):
+        if parts and parts[-1].startswith("-") and not word.startswith("-"):
+            parts[-1] += f" {word}"  # an option with its value
+        else:
+            parts.append(word)
+    for part in parts:
+        if lines[-1] and len(f"{lines[-1]} {part} \\") > width:
+            lines[-1] += " \\"
+            lines.append(f"  {part}")
+        else:
+            lines[-1] = f"{lines[-1]} {part}" if lines[-1] else part
     return lines
 
 
@@ -297,16 +322,17 @@ def sample(fact: Sample) -> str:
     return f"{runs}, {gains}{' (some laws: one set)' if fact.one else ''}"
 
 
-def grid(contest: Contest, width: int = WIDTH) -> tuple[list[str], list[str]]:
-    """Return a table of numbers, a star at each winner's, and the metrics that have no room."""
-    columns = [["", "", "", *(law for law, _ in contest.rows)]]
+def grid_lines(fact: Grid, width: int = WIDTH) -> tuple[list[str], list[str]]:
+    """Return a table of numbers, a star at each winner's, and the columns that have no room."""
+    columns = [["", "", "", *(law for law, _ in fact.rows)]]
     omitted = []
-    for i, (name, unit) in enumerate(contest.columns):
+    for i, (name, unit) in enumerate(fact.columns):
         words = textwrap.wrap(name, HEADING)[:2]
-        column = [f"{part} " for part in ([""] * (2 - len(words)) + words + [unit])]
-        for law, numbers in contest.rows:
-            column.append(numbers[i] + ("*" if law == contest.winners[i] else " "))
-        if sum(map(_width, columns)) + _width(column) + len(columns) > width + 1:
+        room = " " if fact.winners[i] else ""  # for the star
+        column = [part + room for part in ([""] * (2 - len(words)) + words + [unit])]
+        for law, numbers in fact.rows:
+            column.append(numbers[i] + ("*" if room and law == fact.winners[i] else room))
+        if sum(map(_width, columns)) + _width(column) + len(GAP) * len(columns) > width:
             omitted.append(name)
         else:
             columns.append(column)
@@ -315,7 +341,7 @@ def grid(contest: Contest, width: int = WIDTH) -> tuple[list[str], list[str]]:
         cells = [law.ljust(_width(columns[0]))]
         for text, column in zip(numbers, columns[1:], strict=True):
             cells.append(text.rjust(_width(column)))
-        lines.append(" ".join(cells).rstrip())
+        lines.append(GAP.join(cells).rstrip())
     return list(filter(None, lines)), omitted
 
 
@@ -326,9 +352,9 @@ def _width(column: Sequence[str]) -> int:
 def contest_lines(contest: Contest) -> list[str]:
     """Return the block of a plant in a condition: the table, the law to use, who leads."""
     heading = f"{contest.plant} under {contest.condition}: {sample(contest.sample)}"
-    table, omitted = grid(contest)
+    table, omitted = grid_lines(contest.grid)
     notes = ["Lower is better."]
-    if any(contest.winners):
+    if any(contest.grid.winners):
         notes.insert(0, "* best of these laws (95 % sure).")
     if contest.settled:
         notes.append(settled(contest.settled))
@@ -352,7 +378,7 @@ def winners_lines(contests: Sequence[Contest]) -> list[str]:
     """Return one table of the winners on many plants in many conditions, and what holds on each
     plant.
     """
-    names = [name for name, _ in contests[0].columns if name != ON_PLANT]
+    names = [name for name, _ in contests[0].grid.columns if name != ON_PLANT]
     head = min(NAMES, max(len(f"{one.plant} {one.condition}") for one in contests))
     room = (WIDTH - head) // max(len(names), 1) - 1
     rows = [("", [textwrap.wrap(name, room) for name in names])]
@@ -361,7 +387,7 @@ def winners_lines(contests: Sequence[Contest]) -> list[str]:
         fact_of = {fact.metric: fact for fact in contest.verdicts}
         cells = []
         for name in names:
-            text = winner(fact_of[name], len(contest.rows)) if name in fact_of else ""
+            text = winner(fact_of[name], len(contest.grid.rows)) if name in fact_of else ""
             cells.append(textwrap.wrap(text, room))
         rows.append((f"{contest.plant} {contest.condition}", cells))
         if ON_PLANT in fact_of and contest.plant not in of_plants:
@@ -409,6 +435,81 @@ def compare_lines(facts: CompareFacts) -> list[str]:
     return [*lines, *([""] if lines and pairs else []), *labelled(pairs)]
 
 
+# what a law bears
+
+
+def margins_lines(facts: MarginsFacts) -> list[str]:
+    """Return the most that laws tolerate: a table for each plant, and who tolerates the most."""
+    lines = [f"The most that each law tolerates in runs of {facts.duration:g} s"]
+    most: dict[str, list[str]] = {}
+    starred = False
+    for plant, table in facts.grids:
+        numbers, omitted = grid_lines(table)
+        lines += ["", plant, *numbers]
+        lines += [f"With --full: {joined(omitted)}."] if omitted else []
+        for (kind, _), law in zip(table.columns, table.winners, strict=True):
+            starred |= bool(law)
+            if law:
+                most.setdefault(law, []).append(f"{kind} on {plant}")
+    if starred:
+        lines.append("* more than any other of these laws, by more than the search resolves")
+    if facts.gains:
+        lines.append(f"{facts.gains[:1].upper()}{facts.gains[1:]}")
+    pairs = [(law, f"tolerates the most {joined(kinds)}") for law, kinds in most.items()]
+    if facts.failing:
+        pairs.append(("fails", f"unchanged: {', '.join(facts.failing)}"))
+    pairs += [next_step(facts.next), more(More("", "", ("margin",)))]
+    return [*lines, "", *labelled(pairs)]
+
+
+def worst_lines(facts: WorstFacts) -> list[str]:
+    """Return the worst runs found of laws on a plant."""
+    about = f"{facts.about}, worst of {facts.runs} runs a law; bounds: {facts.bounds}"
+    numbers, _ = grid_lines(facts.grid)
+    lines = [*textwrap.wrap(about, WIDTH), *numbers, "Lower is better. A worse case may exist.", ""]
+    pairs = leads([facts.lead] if facts.lead else [])
+    pairs += facts.outside
+    return lines + labelled([*pairs, next_step(facts.next), more(More("", "", ("worst",)))])
+
+
+def sensitivity_lines(facts: SensitivityFacts) -> list[str]:
+    """Return what explains a score, where runs fail, and what to narrow first."""
+    first = f"{facts.about}: open which axis explains most of the {facts.metric}"
+    if facts.first:
+        share = percent(*facts.share)
+        first = f"{facts.about}: {facts.first} explains {share} of the variance of {facts.metric}"
+    numbers, _ = grid_lines(facts.grid)
+    lines = [*textwrap.wrap(first, WIDTH), "", *numbers, ""]
+    pairs = [
+        (facts.metric, f"{facts.spread[0]} to {facts.spread[1]} in 90 % of {facts.failed.of} runs"),
+        ("fail", f"{facts.failed.count} of {facts.failed.of} runs"),
+    ]
+    if facts.narrow:
+        before, after = facts.medians
+        pairs.append(("narrow", f"{facts.narrow} first: the median is then {after}, not {before}"))
+    return lines + labelled([*pairs, next_step(facts.next), more(More("", "", ("sensitivity",)))])
+
+
+def tune_lines(facts: TuneFacts) -> list[str]:
+    """Return the gains that searches found."""
+    lower = 1.0 - facts.objective / facts.before if facts.before > 0.0 else 0.0
+    own = f"{number(facts.before)} s² with the law's own gains"
+    if facts.before == math.inf:
+        own = "the law's own gains fail"
+    elif lower > 0.0:
+        own = f"{percent(lower, lower)} below the law's own gains"
+    pairs = [
+        ("gains", facts.gains),
+        ("J", f"{number(facts.objective)} s², {own}"),
+    ]
+    ends = f"{facts.searches} ended within {facts.spread}" if facts.spread else "1"
+    pairs.append(("searches", ends))
+    for gain, end in facts.at_bound:
+        pairs.append(("at bound", f"{gain}, at the {end} end: a value beyond may do better"))
+    lines = [f"{facts.law} on {facts.plant}"]
+    return lines + labelled([*pairs, next_step(facts.next), more(More("", "", ("J",)))])
+
+
 # lines that all answers have
 
 
@@ -419,18 +520,9 @@ def beware(fact: Beware) -> Labelled:
 
 def next_step(fact: NextStep) -> Labelled:
     """Return the one next step: a whole command to paste, and what it does."""
-    indent = len("next  ")
-    purpose = f"{fact.purpose[:1].upper()}{fact.purpose[1:]}." if fact.purpose else ""
     if not fact.command.startswith(PROGRAM):
         return "next", f"{fact.command}: {fact.purpose}"
-    lines = [""]
-    for word in map(shlex.quote, shlex.split(fact.command)):
-        if lines[-1] and indent + len(f"{lines[-1]} {word} \\") > WIDTH:
-            lines[-1] += " \\"
-            lines.append(f"  {word}")
-        else:
-            lines[-1] = f"{lines[-1]} {word}".strip() if len(lines) == 1 else f"{lines[-1]} {word}"
-    return "next", "\n".join([*lines, purpose])
+    return "next", f"{fact.command}\n{fact.purpose[:1].upper()}{fact.purpose[1:]}."
 
 
 def more(fact: More) -> Labelled:

@@ -14,25 +14,58 @@ def remember(words: Sequence[str]) -> None:
     _typed.set(tuple(words))
 
 
-def again(options: Mapping[str, str]) -> str:
+def again(options: Mapping[str, str], without: Sequence[str] = ()) -> str:
     """Return the command that is running, with these options in place of its own, such as
-    {"--seeds": "24"}; where Python runs, the arguments that differ in the call.
+    {"--seeds": "24"}, and `without` some flags; where Python runs, the arguments that differ.
     """
     if not _typed.get():
         arguments = []
-        for option, value in options.items():
+        for option, value in {**dict.fromkeys(without, "False"), **options}.items():
             name = option.removeprefix("--").replace("-", "_")
-            written = int(value) if value.isdigit() else value or True
-            arguments.append(f"{ARGUMENTS.get(name, name)}={written!r}")
+            arguments.append(f"{ARGUMENTS.get(name, name)}={_written(value)}")
         return f"the same call with {', '.join(arguments)}"
+    words = [word for word in _others(options) if word not in without]
+    return shlex.join([PROGRAM, *words, *_flat(options)])
+
+
+def instead(command: str, options: Mapping[str, str], shared: Sequence[str] = ()) -> str:
+    """Return another command with the arguments, and the `shared` options, of the one that is
+    running, and further options; where Python runs, its name.
+    """
+    typed = _typed.get()
+    if not typed:
+        return f"smc.{command}"
+    words = [command]
+    for i, word in enumerate(typed[1:], 1):
+        if not word.startswith("-"):
+            if not typed[i - 1].startswith("-"):
+                words.append(word)
+            elif typed[i - 1] in shared:
+                words += typed[i - 1 : i + 1]
+    return shlex.join([PROGRAM, *words, *_flat(options)])
+
+
+def _written(value: str) -> str:
+    """Return a value as Python writes it."""
+    if value in ("", "False"):
+        return value or "True"
+    return value if value.isdigit() else repr(value)
+
+
+def _others(options: Mapping[str, str]) -> list[str]:
+    """Return the words of the running command without these options and their values."""
     words = []
     skip = False
     for word in _typed.get():
         if skip:
             skip = False
         elif word.partition("=")[0] in options:
-            skip = "=" not in word
+            skip = "=" not in word and options[word] != ""
         else:
             words.append(word)
-    extra = [part for pair in options.items() for part in pair if part]
-    return shlex.join([PROGRAM, *words, *extra])
+    return words
+
+
+def _flat(options: Mapping[str, str]) -> list[str]:
+    """Return the options and their values as words."""
+    return [part for pair in options.items() for part in pair if part]

@@ -230,15 +230,22 @@ class WhichFacts:
 
 
 @keyword_dataclass
+class Grid:
+    """Numbers of laws, or of what else has a row."""
+
+    columns: tuple[tuple[str, str], ...]  # a name as a reader says it, and its unit
+    rows: tuple[tuple[str, tuple[str, ...]], ...]  # a law and its numbers
+    winners: Names  # of each column, "" where none wins
+
+
+@keyword_dataclass
 class Contest:
     """Laws compared on a plant in a condition."""
 
     plant: str
     condition: str
     sample: Sample
-    columns: tuple[tuple[str, str], ...]  # a metric as a reader says it, and its unit
-    rows: tuple[tuple[str, tuple[str, ...]], ...]  # a law and its numbers
-    winners: Names  # of each column, "" where none wins
+    grid: Grid
     settled: tuple[tuple[str, Settles], ...]  # by law
     use: Use | None  # None if no law is to be preferred
     verdicts: tuple[Verdict, ...]
@@ -304,3 +311,61 @@ class EnteredFacts:
     entries: int  # in all
     standings: tuple[ProblemStanding, ...]  # one for each problem
     page: str  # the file of the board
+
+
+# what a law bears
+
+
+@keyword_dataclass
+class MarginsFacts:
+    """The most that laws tolerate on each plant."""
+
+    duration: float  # of a run, s
+    gains: str  # where they are from
+    grids: tuple[tuple[str, Grid], ...]  # by plant
+    failing: Names  # laws of which not even the unchanged run is tolerated
+    next: NextStep
+
+
+@keyword_dataclass
+class WorstFacts:
+    """The worst runs found of laws on a plant."""
+
+    about: str  # the plant, and the metric
+    runs: int  # of each law
+    bounds: str  # of the class, in words
+    grid: Grid
+    lead: Lead | None  # of the first law over the second, of the worst runs found
+    outside: tuple[tuple[str, str], ...]  # a law, and why its theorem does not cover the class
+    next: NextStep
+
+
+@keyword_dataclass
+class SensitivityFacts:
+    """What explains the variance of a score."""
+
+    about: str  # the law and the plant
+    metric: str
+    first: str  # the axis that explains most; "" if the intervals do not tell
+    share: tuple[float, float]  # its share of the variance, an interval
+    grid: Grid
+    spread: tuple[str, str]  # of the metric of 90 % of the runs, with units
+    failed: Settles  # runs that fail, of all
+    narrow: str  # the half of an axis to keep, in words; "" if none is better
+    medians: tuple[str, str]  # before and in that half
+    next: NextStep
+
+
+@keyword_dataclass
+class TuneFacts:
+    """The gains that searches found for a law."""
+
+    law: str
+    plant: str
+    gains: str
+    objective: float  # s^2
+    before: float  # s^2, of the law's own gains
+    searches: int
+    spread: str  # between the J at which the searches ended, such as "4.1 %"; "" of one search
+    at_bound: tuple[tuple[str, str], ...]  # a gain, and "lower" or "upper"
+    next: NextStep

@@ -32,7 +32,6 @@ from smc_mujoco.simulation.trace import Trace
 if TYPE_CHECKING:
     from smc_mujoco.analysis.chattering import Chattering
     from smc_mujoco.analysis.step_halving import StepChange
-    from smc_mujoco.robustness.margins import Margin
 
 T = TypeVar("T")
 # label -> the same run again, as `step_halving.repetitions` has it
@@ -400,33 +399,7 @@ def with_package(line: str, package: str) -> str:
     return f"{line} [{package}]" if package else line
 
 
-# margins and chattering
-
-
-def margins(kind: str, results: Sequence[Margin]) -> Table:
-    """Return the results of one kind: a line for each plant and law, with a column of the range
-    over shipped sets of gains, and of theory, where a line has one.
-    """
-    of_kind = [margin for margin in results if margin.kind == kind]
-    over_sets = any(margin.over_sets for margin in of_kind)
-    in_theory = any(margin.theory is not None for margin in of_kind)
-    heads = ["margin", "to within", *["all sets"] * over_sets, *["theory"] * in_theory]
-    numbers = number_columns(heads, no_wrap=True)
-    table = titled(f"largest {kind} tolerated", "plant", "law", *numbers, "unit")
-    last = None
-    for margin in of_kind:
-        columns = []
-        if over_sets:
-            columns.append(margin.over_sets)
-        if in_theory:
-            of_theory = "" if margin.theory is None else number(margin.theory)
-            columns.append("any" if margin.theory == math.inf else of_theory)
-        plant = "" if margin.plant == last else margin.plant
-        law = Text(margin.law, style=style.law_colour(margin.law))
-        within = number(margin.resolution) if margin.resolution else ""
-        table.add_row(plant, law, margin.text, within, *columns, margin.unit)
-        last = margin.plant
-    return table
+# chattering
 
 
 def chattering(

@@ -36,16 +36,23 @@ from smc_mujoco.analysis import linear_theory as theory
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns, worth_compiling
 from smc_mujoco.analysis.tuning import search_space
+from smc_mujoco.answers import answers
+from smc_mujoco.answers.answer import Answer
+from smc_mujoco.answers.command import again, instead
+from smc_mujoco.answers.facts import Grid, MarginsFacts, NextStep
 from smc_mujoco.common.aliases import AnyPath
 from smc_mujoco.common.constraints import Boolean, Called, constrained
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find
 from smc_mujoco.common.progress import Report, summed
+from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import number
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import Law
+from smc_mujoco.control.source import in_words
+from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.robustness.uncertainty import JITTER_SHARES, with_friction, with_jitter
@@ -415,8 +422,79 @@ class Margin:
         return f"{'≥ ' if self.open else ''}{number(self.value)}"
 
 
-class Margins(list[Margin]):
-    """Margins of laws on plants, which can be drawn."""
+class Margins(Answer, list[Margin]):
+    """Margins of laws on plants: `print` shows who tolerates the most, `full` all tables, and they
+    can be drawn.
+    """
+
+    duration: float = DURATION  # of a run, s
+    gains: str = ""  # where the laws' gains are from, in words
+    coarse: bool = False
+
+    @property
+    def lines(self) -> list[str]:
+        """The answer on one screen."""
+        grids = []
+        for plant in dict.fromkeys(margin.plant for margin in self):
+            grids.append((plant, self._grid([margin for margin in self if margin.plant == plant])))
+        failing = dict.fromkeys(margin.law for margin in self if math.isnan(margin.value))
+        step = NextStep(
+            instead("worst", {}, ("--law", "--gains", "--condition")),
+            "searches the worst of many disturbances at once",
+        )
+        if self.coarse:
+            step = NextStep(again({}, without=("--quick",)), "finds them more exactly")
+        return answers.margins_lines(
+            MarginsFacts(
+                duration=self.duration,
+                gains=self.gains,
+                grids=tuple(grids),
+                failing=tuple(failing),
+                next=step,
+            )
+        )
+
+    @staticmethod
+    def _grid(margins: Sequence[Margin]) -> Grid:
+        """Return the margins on one plant, and of each kind the law that tolerates the most."""
+        kinds: dict[str, dict[str, Margin]] = {}
+        for margin in margins:
+            kinds.setdefault(margin.kind, {})[margin.law] = margin
+        columns = []
+        winners = []
+        for kind, by_law in kinds.items():
+            unit = next(iter(by_law.values())).unit
+            columns.append((kind, "of nominal" if kind == "mass" else unit.replace("1", "share")))
+            winners.append(_most(list(by_law.values())))
+        rows = []
+        for law in dict.fromkeys(margin.law for margin in margins):
+            cells = [by_law[law].over_sets or by_law[law].text for by_law in kinds.values()]
+            rows.append((law, tuple(cells)))
+        return Grid(columns=tuple(columns), rows=tuple(rows), winners=tuple(winners))
+
+    @property
+    def tables(self) -> list[Tabular]:
+        """A table for each kind, with a line for each plant and law."""
+        tables = []
+        for kind in dict.fromkeys(margin.kind for margin in self):
+            of_kind = [margin for margin in self if margin.kind == kind]
+            over_sets = any(margin.over_sets for margin in of_kind)
+            in_theory = any(margin.theory is not None for margin in of_kind)
+            rows = []
+            for margin in of_kind:
+                of_theory = "" if margin.theory is None else number(margin.theory)
+                of_theory = "any" if margin.theory == math.inf else of_theory
+                within = number(margin.resolution) if margin.resolution else ""
+                extra = *[margin.over_sets] * over_sets, *[of_theory] * in_theory
+                law = Cell(margin.law, colour=style.law_colour(margin.law))
+                rows.append((margin.plant, law, margin.text, within, *extra, margin.unit))
+            extra = *["all sets"] * over_sets, *["theory"] * in_theory
+            heads = "plant", "law", "margin", "to within", *extra, "unit"
+            title = f"largest {kind} tolerated, in runs of {self.duration:g} s"
+            tables.append(Tabular(headings=heads, rows=rows, title=title, left=2))
+        if tables and self.gains:
+            tables[-1] = dataclasses.replace(tables[-1], notes=[self.gains])
+        return tables
 
     def figure(self, path: AnyPath | None = None, **options: Any) -> "Figure":
         """Draw them as bars, in a panel for each plant and kind, and return the figure; arguments
@@ -559,6 +637,9 @@ def margins_of(
         ranges = OverSets(cells, siblings, len(kinds), runs.scored).ranges(going)
     warn_of_broken(runs.broken)
     margins = Margins()
+    margins.duration = bases[0].duration
+    margins.gains = in_words({base.law.name: [base.law.source] for base in bases})
+    margins.coarse = resolution == COARSE
     for i, ((base, kind), search) in enumerate(zip(cells.pairs, cells.searches, strict=True)):
         margin = Margin(
             plant=base.plant.name,
@@ -575,6 +656,22 @@ def margins_of(
             margin = dataclasses.replace(margin, low=ranges[i][0], high=ranges[i][1])
         margins.append(margin)
     return margins
+
+
+def _most(margins: Sequence[Margin]) -> str:
+    """Return the law that tolerates more than any other, with each of its sets of gains and by more
+    than the search resolves; "" if there is none.
+    """
+    for margin in margins:
+        ends = []
+        for rival in margins:
+            most = rival.value if math.isnan(rival.high) else rival.high
+            if rival is not margin and not math.isnan(rival.value):
+                ends.append(math.inf if most == rival.searched else most + rival.resolution)
+        least = margin.low if margin.over_sets else margin.value
+        if len(margins) > 1 and least >= max(ends, default=-math.inf):
+            return margin.law
+    return ""
 
 
 Tried = tuple[int, float | None]  # a cell and its level; None is the unchanged run

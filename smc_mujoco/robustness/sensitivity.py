@@ -28,12 +28,16 @@ import numpy as np
 from smc_mujoco.analysis.bootstrap import Interval, share_interval
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns, worth_compiling
+from smc_mujoco.answers import answers
+from smc_mujoco.answers.answer import Answer
+from smc_mujoco.answers.command import again
+from smc_mujoco.answers.facts import Grid, NextStep, SensitivityFacts, Settles
 from smc_mujoco.common.aliases import Array, ArrayPair
 from smc_mujoco.common.constraints import Seed, Whole, constrained
 from smc_mujoco.common.data import attributes
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.progress import bar
-from smc_mujoco.common.tabular import Cell, Tables, Tabular
+from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
 from smc_mujoco.metrics.catalogue import CATALOGUE, metric_of
@@ -41,6 +45,7 @@ from smc_mujoco.metrics.conventions import Metric, by_group
 from smc_mujoco.robustness.margins import REST_SHARE, TOLERATED_ERROR
 from smc_mujoco.robustness.sobol import (
     CHANCE,
+    Axis,
     Cut,
     Improvement,
     SobolResult,
@@ -80,18 +85,47 @@ HEADINGS = "axis", "from", "to", "alone", "with others", "more is"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class Sensitivity(Tables, SobolResult):
+class Sensitivity(Answer, SobolResult):
     """What explains a law's score over a class of uncertainty, and where its runs fail."""
 
     within: Uncertainty
     improvement: Improvement | None  # None if no half of an axis is better
     runs: int  # number of all runs
 
-    def __repr__(self) -> str:
-        return f"Sensitivity({self})"
+    @property
+    def lines(self) -> list[str]:
+        """The answer on one screen."""
+        low, high = np.quantile(self.values, [0.05, 0.95])
+        rows = []
+        for axis in self.axes:
+            rows.append((in_words(axis.name), (_percent(axis.total).text, _trend(axis))))
+        columns = ("explains, with others", "%"), ("more of it is", "")
+        half = self.improvement
+        first = self.leading
+        finer = NextStep(again({"--points": f"{2 * len(self.values)}"}), "narrows the intervals")
+        return answers.sensitivity_lines(
+            SensitivityFacts(
+                about=f"{self.scenario.law.name} on {self.scenario.plant.name}",
+                metric=self.label,
+                first=in_words(first.name) if first else "",
+                share=(first.total.low, first.total.high) if first else (math.nan, math.nan),
+                grid=Grid(columns=columns, rows=tuple(rows), winners=("", "")),
+                spread=(self.text(low), self.text(high)),
+                failed=Settles(int(self.failed.sum()), len(self.failed)),
+                narrow=_words(self.space, [half.half]) if half else "",
+                medians=(self.text(half.before), self.text(half.median)) if half else ("", ""),
+                next=finer,
+            )
+        )
 
-    def __str__(self) -> str:
-        return f"{self.scenario.law.name} on {self.scenario.plant.name}: {' '.join(self.sentences)}"
+    @property
+    def leading(self) -> Axis | None:
+        """The axis that explains most; None if the intervals do not tell."""
+        if not self.axes or not np.ptp(self.values) or 2 * self.unscored > len(self.values):
+            return None
+        first, *further = self.axes
+        apart = all(axis.total.high <= first.total.low for axis in further)
+        return first if apart else None
 
     @property
     def label(self) -> str:
@@ -137,8 +171,8 @@ class Sensitivity(Tables, SobolResult):
         """The axis that explains most, if the intervals tell."""
         if not self.axes or not np.ptp(self.values) or 2 * self.unscored > len(self.values):
             return "no axis, as the scores do not differ, or most runs have none"
-        first, *further = self.axes
-        if any(axis.total.high > first.total.low for axis in further):
+        first = self.leading
+        if first is None:
             return "open, as intervals overlap (give more points)"
         share = _percent(first.total)
         return f"{in_words(first.name)}, {share.text} % ({share.below} %), alone and with others"
@@ -151,16 +185,14 @@ class Sensitivity(Tables, SobolResult):
         rows = []
         for axis in self.axes:
             ends = ["–", "–"]
-            trend = "–"
             if axis.name != CHANCE:
                 ends = [_with_unit(axis.low, axis.unit), _with_unit(axis.high, axis.unit)]
-                if abs(axis.direction) >= 0.1:
-                    trend = "worse" if axis.direction > 0.0 else "better"
             shares = _percent(axis.first), _percent(axis.total)
-            rows.append([in_words(axis.name), *ends, *shares, trend])
+            rows.append([in_words(axis.name), *ends, *shares, _trend(axis)])
         where = f"{self.scenario.law.name} on {self.scenario.plant.name}"
         title = f"{where}: shares of the variance of {self.label}, %"
-        notes = [*self.sentences, KEY]
+        runs = f"{self.runs} runs, {len(self.values)} of them independent"
+        notes = [*self.sentences, KEY, f"{runs}, gains: {self.scenario.law.source}"]
         if len(self.values) < 2 * ROUGH_POINTS:
             notes.insert(0, f"Fewer than {ROUGH_POINTS} points: intervals are rough, give more.")
         return [Tabular(headings=HEADINGS, rows=rows, title=title, notes=notes)]
@@ -192,6 +224,13 @@ class Sensitivity(Tables, SobolResult):
         return draw(self, path, **options)
 
     plot = figure
+
+
+def _trend(axis: Axis) -> str:
+    """Return whether more of an axis makes a score worse or better; "–" if neither."""
+    if axis.name == CHANCE or abs(axis.direction) < 0.1:
+        return "–"
+    return "worse" if axis.direction > 0.0 else "better"
 
 
 @constrained

@@ -18,6 +18,10 @@ import numpy as np
 
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns, worth_compiling
+from smc_mujoco.answers import answers
+from smc_mujoco.answers.answer import Answer
+from smc_mujoco.answers.command import again
+from smc_mujoco.answers.facts import Grid, Lead, NextStep, WorstFacts
 from smc_mujoco.common.aliases import Numbers
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.constraints import Seed, Whole, constrained
@@ -26,6 +30,7 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
+from smc_mujoco.control.source import in_words
 from smc_mujoco.draw.style import law_colour, law_name, plant_name
 from smc_mujoco.metrics.catalogue import CATALOGUE, metric_of
 from smc_mujoco.metrics.conventions import Metric
@@ -163,11 +168,41 @@ class WorstCase(Tables):
     plot = figure
 
 
-class WorstCases(Tables, list[WorstCase]):
-    """Worst cases of several laws on one plant within one class, the best law first, as a table."""
+class WorstCases(Answer, list[WorstCase]):
+    """Worst cases of several laws on one plant within one class, the best law first."""
 
     def __init__(self, cases: Iterable[WorstCase]):
         super().__init__(sorted(cases, key=lambda case: (case.value, case.median)))
+
+    @property
+    def lines(self) -> list[str]:
+        """The answer on one screen."""
+        first = self[0]
+        label = CATALOGUE[first.metric].label
+        rows = []
+        for case in self:
+            rows.append((case.nominal.law.name, (case.shown(case.value), case.shown(case.median))))
+        lead = None
+        if len(self) > 1 and math.isfinite(first.value) and self[1].value > first.value:
+            share = 1.0 - first.value / self[1].value
+            names = first.nominal.law.name, self[1].nominal.law.name
+            lead = Lead(
+                law=names[0], rival=names[1], metric=f"worst {label}", low=share, high=share
+            )
+        columns = ("worst found", first.unit), ("median", first.unit)
+        outside = [(case.nominal.law.name, case.outside) for case in self if case.outside]
+        draw = NextStep(again({"--figure": "worst"}), "draws the worst runs")
+        return answers.worst_lines(
+            WorstFacts(
+                about=f"{first.nominal.plant.name}, {label}",
+                runs=first.tried,
+                bounds=first.class_words,
+                grid=Grid(columns=columns, rows=tuple(rows), winners=("", "")),
+                lead=lead,
+                outside=tuple(outside),
+                next=draw,
+            )
+        )
 
     @property
     def title(self) -> str:
@@ -209,6 +244,9 @@ class WorstCases(Tables, list[WorstCase]):
         for case in self:
             for words in filter(None, (case.outside, case.checked)):
                 notes.append(f"{case.nominal.law.name}: {words}")
+        gains = in_words({case.nominal.law.name: [case.nominal.law.source] for case in self})
+        count = f"{sum(case.tried for case in self)} runs"
+        notes.append(", ".join(filter(None, (count, gains))))
         return notes
 
     def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure":

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from smc_mujoco.analysis.paired_runs import OBJECTIVE, SETTLES
 from smc_mujoco.answers.facts import (
     Contest,
+    Grid,
     Lead,
     NotRanked,
     Open,
@@ -68,9 +69,11 @@ def _contest(columns: Sequence[Column], gains: Mapping[str, str], own: Names) ->
         plant=last.plant,
         condition=last.condition,
         sample=last.sample,
-        columns=tuple((name(board), _unit(board)) for board, _ in with_numbers),
-        rows=tuple(rows),
-        winners=tuple(block.winner or "" for _, block in with_numbers),
+        grid=Grid(
+            columns=tuple((name(board), _unit(board)) for board, _ in with_numbers),
+            rows=tuple(rows),
+            winners=tuple(block.winner or "" for _, block in with_numbers),
+        ),
         settled=_settled(columns),
         use=_use(columns, verdicts, gains),
         verdicts=tuple(verdicts),

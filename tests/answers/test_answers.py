@@ -10,7 +10,7 @@ from helpers.words import words
 from smc_mujoco.answers import answers
 from smc_mujoco.answers.answer import Answer
 from smc_mujoco.answers.explain import explain, glossary
-from smc_mujoco.answers.facts import Lead, NextStep, Open, Settles, Tied, Trails, Use
+from smc_mujoco.answers.facts import Lead, Open, Settles, Tied, Trails, Use
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.tabular import Cell, Tabular
 
@@ -93,7 +93,7 @@ def test_a_line_is_at_most_80_wide_and_a_command_can_be_pasted():
     lines = answers.labelled(
         [
             ("adrc", "J 21 to 25 % below the rest " * 9),
-            answers.next_step(NextStep(shlex.join(words))),
+            ("next", f"{shlex.join(words)}\n"),
         ]
     )
     assert max(map(len, lines)) <= answers.WIDTH

@@ -64,21 +64,21 @@ CALLS = {
     "--relevant 0.05 --out there --allow-defaults --seed 5 --json w.json --threads 2 --device cuda "
     "--executor dask://h:1 --minutes 2 --no-film --falling --full": ["studies.which.which"],
     "tune duffing --law pid": ["analysis.tuning.search.tune"],
-    "tune duffing --law pid --need calm --device cuda --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
+    "tune duffing --law pid --full --need calm --device cuda --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
     "--condition noise --x0 0.4 --json j.json --threads 2": ["analysis.tuning.search.tune"],
     "margins": ["robustness.margins.margins"],
     "margins --quick": ["robustness.margins.margins"],
-    "margins duffing --law pid --kind delay,mass --gains default --quick --device cuda --condition noise --x0 "
+    "margins duffing --law pid --full --kind delay,mass --gains default --quick --device cuda --condition noise --x0 "
     "0.4 "
     "--figure m --json m.json --threads 2": ["robustness.margins.margins"],
     "worst duffing": ["robustness.worst_case.worst_case"],
-    "worst duffing --law pid --disturbance 2 "
+    "worst duffing --law pid --full --disturbance 2 "
     "--bound slope=3,position_noise=0.01,delay=0:0.01,mass=0.7:1.3,alpha=0.8:1.2 "
     "--metric peak --gains default --condition noise --duration 2 --budget 9 --seed 3 --figure w "
     "--json w.json --threads 2 --device cuda": ["robustness.worst_case.worst_case"],
     "worst lifted_pendulum": ["robustness.worst_case.worst_case"],
     "sensitivity duffing": ["robustness.sensitivity.sensitivity"],
-    "sensitivity duffing --law pid --disturbance 2 --bound "
+    "sensitivity duffing --law pid --full --disturbance 2 --bound "
     "delay=0:0.01,encoder=256:4096,period=1:4 "
     "--metric peak --gains default --condition noise --duration 2 --points 8 --seed 3 --figure s "
     "--json s.json --threads 2 --device cuda": ["robustness.sensitivity.sensitivity"],

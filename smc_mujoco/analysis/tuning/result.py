@@ -8,11 +8,15 @@ from typing import Any
 
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, restore
+from smc_mujoco.answers import answers
+from smc_mujoco.answers.answer import Answer
+from smc_mujoco.answers.command import again, instead
+from smc_mujoco.answers.facts import NextStep, TuneFacts
 from smc_mujoco.common.aliases import AnyPath, Data, Fields
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, reading, sealed, unsealed, with_ending, write_json
-from smc_mujoco.common.tabular import Tables, Tabular
+from smc_mujoco.common.tabular import Tabular
 from smc_mujoco.common.text import counted
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component
@@ -21,6 +25,8 @@ from smc_mujoco.simulation import scenario_json
 
 # equal in tunings that are compared
 COMPARED_FIELDS = "rule", "plant", "definition", "budget", "seed", "versions"
+FAR_APART = 1.0  # a spread of J beyond which a search was stuck, as in a race
+RIVALS = ("pid", "adrc")
 HEADINGS = ("gain", "tuned", "searched from", "to", "")  # of a tuning's table
 SAVED_FIELDS = ("before", "rule", "budget", "seed", "scales", "bounds", "searched", "versions")
 
@@ -63,7 +69,7 @@ def _evaluation(row: Sequence[Any]) -> Evaluation:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, repr=False)
-class Tuned(Tables):
+class Tuned(Answer):
     """A law's gains that independent searches found, and how."""
 
     law: Component  # with the gains of the least J
@@ -84,6 +90,30 @@ class Tuned(Tables):
     def __repr__(self) -> str:
         return (
             f"Tuned({self.plant.name}, {self.law}, objective={self.objective:.4g}, {self.verdict})"
+        )
+
+    @property
+    def lines(self) -> list[str]:
+        """The answer on one screen."""
+        name = self.law.name
+        laws = ",".join(dict.fromkeys([name, *RIVALS]))
+        step = NextStep(
+            instead("compare", {"--law": laws}, ("--condition", "--x0")), "compares it with rivals"
+        )
+        if self.spread > FAR_APART:
+            step = NextStep(again({"--budget": f"{4 * self.budget}"}), "searches longer")
+        return answers.tune_lines(
+            TuneFacts(
+                law=name,
+                plant=self.plant.name,
+                gains=", ".join(f"{gain}={value:.4g}" for gain, value in self.gains.items()),
+                objective=self.objective,
+                before=self.before,
+                searches=len(self.searches),
+                spread=self.search.apart,
+                at_bound=tuple(self.at_bound.items()),
+                next=step,
+            )
         )
 
     @property

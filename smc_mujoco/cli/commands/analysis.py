@@ -11,7 +11,6 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_signals
-from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.chattering import Chattering
@@ -88,6 +87,7 @@ def tune(
     threads: options.Threads = None,
     device: options.Device = "cpu",
     needs: Limits = None,
+    full: options.Full = False,
 ) -> None:
     """Tune a law for a plant, by a rule that is the same for every law.
 
@@ -127,8 +127,7 @@ def tune(
         device=device,
         needs=needs,
     )
-    terminal.print(tuned)
-    terminal.note(f"{terminal.seconds:.0f} s", "dim")
+    terminal.answer(tuned, full)
     if out:
         terminal.wrote(tuned.save(out))
     terminal.finish()
@@ -164,6 +163,7 @@ def margins(
     json: options.Json = None,
     threads: options.Threads = None,
     device: options.Device = "cpu",
+    full: options.Full = False,
 ) -> None:
     """Find the largest delay, friction, noise and so on that a law tolerates: the error must still
     end below 5 % of its initial value, in runs of 10 s, or 5 s with --quick.
@@ -184,14 +184,13 @@ def margins(
     Example: smc-mujoco margins duffing --law observer_free,classical --kind delay
     """
     with delay_signals():
-        from smc_mujoco.cli import tables
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
         from smc_mujoco.draw.page import files
         from smc_mujoco.mechanisms.named import as_plant
-        from smc_mujoco.robustness.margins import KINDS, QUICK_DURATION
+        from smc_mujoco.robustness.margins import KINDS
         from smc_mujoco.robustness.margins import margins as search
-        from smc_mujoco.simulation.conditions import DURATION, PLANTS
+        from smc_mujoco.simulation.conditions import PLANTS
 
     terminal = Terminal(json)
     options.check_files(None, *files(figure))
@@ -212,29 +211,11 @@ def margins(
             options.starts(x0),
             device,
         )
-    for name in kind:
-        terminal.print(tables.margins(name, results))
-    sources = _sources(machines, chosen, gains)
-    runs = f"in runs of {QUICK_DURATION if quick else DURATION:g} s"
-    words = [f"{counted(len(results), 'margin')} {runs}", sources, f"{terminal.seconds:.0f} s"]
-    terminal.note(", ".join(filter(None, words)), "dim", wrap=True)
+    terminal.answer(results, full)
     if figure:
         results.figure(figure)
         terminal.wrote(*files(figure))
     terminal.finish(list(map(dataclasses.asdict, results)))
-
-
-def _sources(machines: "Sequence[Machine]", laws: "Sequence[Law | str]", gains: str) -> str:
-    """Return in words where the laws' gains on some plants are from."""
-    from smc_mujoco.control.source import in_words
-    from smc_mujoco.simulation.grid import case
-
-    sources = {}
-    for machine in machines:
-        for law in laws:
-            used = case(machine, law, gains=gains).law
-            sources.setdefault(used.name, []).append(used.source)
-    return in_words(sources)
 
 
 Plant = Annotated[
@@ -269,6 +250,7 @@ def worst(
     json: options.Json = None,
     threads: options.Threads = None,
     device: options.Device = "cpu",
+    full: options.Full = False,
 ) -> None:
     """Search for the worst case of each law within bounds that you give, instead of sampling at
     random.
@@ -306,10 +288,7 @@ def worst(
             )
         )
     results = WorstCases(found)
-    terminal.print(results)
-    runs = sum(case.tried for case in results)
-    sources = _sources_of([case.nominal for case in results])
-    terminal.note(f"{runs} runs, {sources}", "dim", wrap=True)
+    terminal.answer(results, full)
     terminal.finish([case.about() for case in results])
     if figure:
         results.figure(figure)
@@ -336,6 +315,7 @@ def sensitivity(
     json: options.Json = None,
     threads: options.Threads = None,
     device: options.Device = "cpu",
+    full: options.Full = False,
 ) -> None:
     """Find what breaks a law: how much of a score's variance each uncertainty explains, and where
     runs fail.
@@ -364,9 +344,7 @@ def sensitivity(
     chosen = options.law(law)
     scenario = case(as_plant(plant), chosen, condition, duration, gains)
     found = sensitivity(scenario, over, metric, points, seed, threads, True, device)
-    terminal.print(found)
-    runs = f"{found.runs} runs, {len(found.values)} of them independent"
-    terminal.note(f"{runs}, gains: {scenario.law.source}", "dim", wrap=True)
+    terminal.answer(found, full)
     terminal.finish(found.about())
     if figure:
         found.figure(figure)
