@@ -14,7 +14,7 @@ The names by task, those of a first script first; `help(smc.run)` tells what a n
 
     Run and look: Scenario, run, Trace, load, score, figure, plot, film, show, view
     Laws: law, laws, law_function, law_from
-    Plants: plant, plants, plant_from, Channel
+    Plants: plant, plants, plant_from, plant_from_steps, Channel
     Conditions: condition, starts, Noise, Constant, Step, Sine, Coulomb, Viscous, Encoder,
         Backlash, DCMotor, Lag, Stops, Wall, Ball, Feedforward
     Compare: compare, which, tune, margins, grid, study, leaderboard, Table

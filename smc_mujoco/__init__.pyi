@@ -29,6 +29,7 @@ from smc_mujoco.identification.identify import identify as identify
 from smc_mujoco.identification.published_rig import rig as rig
 from smc_mujoco.identification.published_rig import rigs as rigs
 from smc_mujoco.identification.speed_torque import identify_friction as identify_friction
+from smc_mujoco.identification.steps import plant_from_steps as plant_from_steps
 from smc_mujoco.mechanisms.custom.plant_from import Channel as Channel
 from smc_mujoco.mechanisms.custom.plant_from import plant_from as plant_from
 from smc_mujoco.mechanisms.hardware.backlash import Backlash as Backlash

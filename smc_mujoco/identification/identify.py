@@ -266,13 +266,13 @@ class Identified(Answer):
             scatter = f"{self.scatter[name]:.2g}" if self.scatter else ""
             numbers.append([name, number.value, number.error, number.unit, before.value, scatter])
         heads = [f"log {i}" for i in range(1, len(self.fits) + 1)]
-        whole, pieces = list(self.fits), list(self.by_pieces or [{}] * len(self.fits))
+        whole_fits, piece_fits = list(self.fits), list(self.by_pieces or [{}] * len(self.fits))
         if self.held_out:
             heads.append("held out")
-            whole.append(self.held_out.fit)
-            pieces.append(self.held_out.by_pieces)
+            whole_fits.append(self.held_out.fit)
+            piece_fits.append(self.held_out.by_pieces)
         fits = []
-        for head, of_log, of_pieces in zip(heads, whole, pieces, strict=True):
+        for head, of_log, of_pieces in zip(heads, whole_fits, piece_fits, strict=True):
             for column, fit in of_log.items():
                 in_pieces = f"{of_pieces[column]:.2f}" if column in of_pieces else ""
                 fits.append([head, column, f"{fit:.2f}", in_pieces])

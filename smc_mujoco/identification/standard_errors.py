@@ -161,20 +161,21 @@ def _blocks(slopes: Slopes) -> int:
 def independent(slopes: Slopes) -> float:
     """Return how many samples of the residuals are independent of each other: their number over a
     correlation time.
-
-    A correlation time is 1 + 2 (sum of the autocorrelations up to the first one below 0), in
-    samples.
     """
     times = []
     for r in slopes.residuals:
-        rows = r.reshape(-1, slopes.columns)
-        transform = np.fft.rfft(rows, 2 * len(rows), axis=0)
-        power = np.abs(transform) ** 2
-        for correlation in np.fft.irfft(power, axis=0)[: len(rows)].T:
-            end = int(np.argmax(correlation < 0.0)) or len(correlation)
-            later = correlation[1:end].sum() / max(correlation[0], MIN_POWER)
-            times.append(1.0 + 2.0 * float(later))
+        times += map(correlation_time, r.reshape(-1, slopes.columns).T)
     return sum(map(len, slopes.residuals)) / slopes.columns / float(np.median(times))
+
+
+def correlation_time(r: Array) -> float:
+    """Return 1 + 2 (sum of the autocorrelations of residuals up to the first one below 0), in
+    samples.
+    """
+    power = np.abs(np.fft.rfft(r, 2 * len(r))) ** 2
+    correlation = np.fft.irfft(power)[: len(r)]
+    end = int(np.argmax(correlation < 0.0)) or len(correlation)
+    return 1.0 + 2.0 * float(correlation[1:end].sum() / max(correlation[0], MIN_POWER))
 
 
 def _normal(r: Array, J: Array, S: Array) -> tuple[Array, Array]:

@@ -58,10 +58,10 @@ def rig_of(arm, side, names=("input_delay",)):
 
 @pytest.mark.parametrize("side", ["motor", "link"])
 def test_a_replay_gives_what_the_encoder_of_its_side_reads(arm, logs, side):
-    other = {"motor": "link", "link": "motor"}[side]
+    opposite = {"motor": "link", "link": "motor"}[side]
     rig = rig_of(arm, side)
     assert rig.fit(logs[side])["x"] > 99.9
-    assert rig.fit(logs[other])["x"] < 99.7
+    assert rig.fit(logs[opposite])["x"] < 99.7
 
 
 @pytest.mark.parametrize("side", ["motor", "link"])
