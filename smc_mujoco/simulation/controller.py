@@ -24,6 +24,7 @@ from collections import namedtuple
 from smc_mujoco.common.jit import call, inlined, integers, not_inlined, pointer, store
 from smc_mujoco.common.mjcb import slots
 from smc_mujoco.mechanisms import rotation
+from smc_mujoco.mechanisms.hardware.feedforward import AT_REST, ON
 from smc_mujoco.mechanisms.hardware.moments import (
     channel_at,
     drive_at,
@@ -41,6 +42,7 @@ from smc_mujoco.simulation.step import Asked, Moments, asking, lateness, order, 
 
 MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo gives up at 1e10
 OTHER_CALLBACKS = len(slots())
+ON_SPEED, ON_ERROR = ON.index("speed"), ON.index("error")
 
 
 # Arrays of one mjData, as pointers to their numbers; of its mjModel the levels of dry friction, and
@@ -240,14 +242,20 @@ def _compensate(view, k, t, i):
 @not_inlined
 def _compensation(view, k, t, i):
     address, sim, _ = view
+    x = pointer(sim.seen.x)[i]
     v = pointer(sim.seen.v)[i]
-    if sim.on_reference != 0:
-        raised, _, v, _ = refer(view, i, k, t)
+    size = v
+    if sim.compensates_on != ON_SPEED:
+        raised, r, v, _ = refer(view, i, k, t)
         if raised:
             return True, 0.0
+        size = v
+        if sim.compensates_on == ON_ERROR:
+            size = r - x
+            v = math.copysign(AT_REST, size)
     y = sim.joint_state
     y.t = t
-    y.x = pointer(sim.seen.x)[i]
+    y.x = x
     y.v = v
     y.h = y.u = y.motor = y.load = 0.0
     force = 0.0
@@ -258,7 +266,7 @@ def _compensation(view, k, t, i):
             if evaluate(part.function, 0, address + places.joint_state, address + places.exerted):
                 return True, 0.0
             force += sim.exerted.force
-    return False, sim.share * math.tanh(abs(v) / sim.eps) * force / drive_at(sim.drives, i).gain
+    return False, sim.share * math.tanh(abs(size) / sim.eps) * force / drive_at(sim.drives, i).gain
 
 
 @inlined

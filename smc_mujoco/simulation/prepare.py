@@ -25,7 +25,7 @@ from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.properties import read_by
-from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
+from smc_mujoco.mechanisms.hardware.feedforward import ON, Feedforward
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, DRIVE, PART, READER, Run
 from smc_mujoco.mechanisms.hardware.part import Friction, Part
 from smc_mujoco.mechanisms.plant import Native, Plant
@@ -411,7 +411,8 @@ def compensation(s: Resolved) -> dict[str, Any]:
     if not isinstance(feedforward, Feedforward):
         return {}
     share = 1.0 + feedforward.error
-    return {"share": share, "eps": feedforward.eps, "on_reference": feedforward.on == "reference"}
+    on = ON.index(feedforward.on)
+    return {"share": share, "eps": feedforward.eps, "compensates_on": on}
 
 
 def settings(s: Resolved) -> dict[str, Any]:

@@ -158,13 +158,13 @@ SIMULATION = np.dtype(
         ("nominal", FUNCTION),
         ("reference", FUNCTION),
         ("feedforward", FUNCTION),
-        # compensation of friction: how many PARTs, their address, 1 + error, eps, and whether on
-        # the reference
+        # compensation of friction: how many PARTs, their address, 1 + error, eps, and on what, an
+        # index of feedforward.ON
         ("compensated", "i8"),
         ("compensations", "i8"),
         ("share", "f8"),
         ("eps", "f8"),
-        ("on_reference", "i8"),
+        ("compensates_on", "i8"),
         ("uses_model", "f8"),
         # address of the other forces on the joints, (n,), for a law with the true model; else 0
         ("other_forces", "i8"),

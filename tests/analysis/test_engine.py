@@ -74,6 +74,11 @@ APART = {
         "feedforward": smc.Feedforward(Sigmoid(0.4, 50.0), on="speed", eps=0.02),
         "noise": smc.Noise(1e-3, 5e-3),
     },
+    "compensation on the error": {
+        "friction": smc.Coulomb(0.2),
+        "feedforward": smc.Feedforward(smc.Coulomb(0.2), on="error", eps=0.1),
+        "reference": MinimumJerk(0.4, 1.0, 2.0),
+    },
     "lag": {"actuator": smc.Lag(0.01), "friction": smc.Coulomb(0.1), "input_delay": 3e-3},
     "drives": {"actuator": (smc.Lag(0.01), RateLimit(50.0))},
 }

@@ -80,7 +80,7 @@ class Form(NamedTuple):
     frictions: tuple[ChannelFunction, ...]  # on joints
     rotor_frictions: tuple[ChannelFunction, ...]  # on rotors, by the channels of their joints
     compensated: tuple[ChannelFunction, ...]  # frictions
-    on_reference: bool  # whether they are compensated at the speed of the reference
+    compensates_on: int  # at which speed they are compensated, an index of feedforward.ON
     references: tuple[type, ...]  # kinds of signals, of all channels, or one for each
     disturbances: tuple[type, ...]
     feedforward: type | None

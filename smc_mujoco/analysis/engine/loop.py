@@ -41,6 +41,7 @@ from smc_mujoco.common.aliases import Fields
 from smc_mujoco.common.jit import always, beyond, inlined, place, record_in
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import begin_measurement, put_channel
+from smc_mujoco.mechanisms.hardware.feedforward import AT_REST, ON
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, JointState, Sight
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.controller import MAX_STATE
@@ -350,7 +351,8 @@ def _compensating(form: Form, compile_user: Compiler) -> Any:
     """
     if not form.compensated:
         return always((False, 0.0))
-    on_reference = form.on_reference
+    on_speed = form.compensates_on == ON.index("speed")
+    on_error = form.compensates_on == ON.index("error")
     refer = _referring(form, compile_user)
     row_at, work_at = layout(form)[:2]
     steady = always(0.0)
@@ -359,14 +361,18 @@ def _compensating(form: Form, compile_user: Compiler) -> Any:
 
     @inlined
     def compensate(view, k, t, i):
+        x = view.work[work_at.seen_x + i]
         v = view.work[work_at.seen_v + i]
-        if on_reference:
-            v = refer(view, t, i)[1]
+        if not on_speed:
+            r, v, _ = refer(view, t, i)
+        size = v
+        if on_error:
+            size = r - x
+            v = math.copysign(AT_REST, size)
         share = view.row[row_at.compensation]
         eps = view.row[row_at.compensation + 1]
-        x = view.work[work_at.seen_x + i]
         y = JointState(t, 0.0, x, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        return False, share * math.tanh(abs(v) / eps) * steady(view, i, y)
+        return False, share * math.tanh(abs(size) / eps) * steady(view, i, y)
 
     return compensate
 

@@ -14,7 +14,7 @@ import numpy as np
 from smc_mujoco.common import jit
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.exchange.c.translation.values import Kind
-from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
+from smc_mujoco.mechanisms.hardware.feedforward import AT_REST, Feedforward
 from smc_mujoco.mechanisms.hardware.moments import JointState
 from smc_mujoco.simulation.prepare import compensations
 from smc_mujoco.simulation.scenario import Scenario
@@ -38,7 +38,7 @@ def compensate_of(scenario: Scenario) -> Compensate | None:
         p = jit.named(part.names)(*numbers)
         memory = max(part.memory, 1)
         terms[i].append((part.steady, p, memory))
-    speed = {"reference": of_reference, "speed": of_joint}[feedforward.on]
+    on = feedforward.on
     gains = [nominal.gain for nominal in s.drive_train.nominal[: s.plant.driven]]
     if not s.law.joint:
         first = repr((terms[0], gains[0]))
@@ -48,13 +48,16 @@ def compensate_of(scenario: Scenario) -> Compensate | None:
                     "the scenario's Feedforward differs between its channels, but a law of one "
                     "channel is written once for all: give one that is the same for every channel"
                 )
-        added = _added(terms[0], speed, feedforward.eps, gains[0])
-        return _of_channel(added)
+        added = _added(terms[0], on, feedforward.eps, gains[0])
+        return _of_channel(added) if on != "error" else _of_channel_on_error(added)
     compensate: Compensate = add_nothing
     for i, (own, gain) in enumerate(zip(terms, gains, strict=True)):
         if own:
-            added = _added(own, speed, feedforward.eps, gain)
-            compensate = _with_joint(compensate, added, i)
+            added = _added(own, on, feedforward.eps, gain)
+            if on == "error":
+                compensate = _with_joint_on_error(compensate, added, i)
+            else:
+                compensate = _with_joint(compensate, added, i)
     return compensate
 
 
@@ -111,6 +114,23 @@ def _of_channel(added: Callable) -> Compensate:
     return compensate
 
 
+def _of_channel_on_error(added: Callable) -> Compensate:
+    def compensate(y, total):
+        total[0] = added(y.t, y.x, y.v, y.r)
+
+    return compensate
+
+
+def _with_joint_on_error(others: Callable, added: Callable, i: int) -> Compensate:
+    """Return others, and what is added to u of joint i, whose error has the direction."""
+
+    def compensate(y, total):
+        others(y, total)
+        total[i] = added(y.t, y.x[i], y.v[i], y.r[i])
+
+    return compensate
+
+
 def _with_joint(others: Compensate, added: Callable, i: int) -> Compensate:
     """Return others, and what is added to u of joint i."""
 
@@ -121,10 +141,11 @@ def _with_joint(others: Compensate, added: Callable, i: int) -> Compensate:
     return compensate
 
 
-def _added(terms: Sequence[tuple], speed: Callable, eps: float, gain: float) -> Callable:
+def _added(terms: Sequence[tuple], on: str, eps: float, gain: float) -> Callable:
     """Return what is added to u of one joint, by its time, position, speed and that of the
-    reference.
+    reference, or the reference itself on the error.
     """
+    speed = of_reference if on == "reference" else of_joint
     force = no_force
     for steady, p, size in terms:
         force = _with_friction(force, steady, p, size)
@@ -134,7 +155,13 @@ def _added(terms: Sequence[tuple], speed: Callable, eps: float, gain: float) -> 
         y = JointState(t, 0.0, x, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         return math.tanh(abs(v) / eps) * force(y) / gain
 
-    return added
+    def on_error(t, x, v, r):
+        size = r - x
+        v = math.copysign(AT_REST, size)
+        y = JointState(t, 0.0, x, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return math.tanh(abs(size) / eps) * force(y) / gain
+
+    return on_error if on == "error" else added
 
 
 def _with_friction(others: Callable, steady: Any, p: Any, size: int) -> Callable:

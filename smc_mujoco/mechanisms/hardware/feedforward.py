@@ -10,6 +10,8 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.part import Friction, Positive
 from smc_mujoco.mechanisms.plant import Plant
 
+ON = "speed", "reference", "error"  # in the order of their codes
+AT_REST = 1e-12  # rad/s (m/s): the speed at which F is what a joint at rest needs
 Compensated = Friction | Sequence[Friction] | Mapping[str, Friction | Sequence[Friction]]
 
 
@@ -27,11 +29,16 @@ class Feedforward:
     `smc.exchange.law_to_c` and `law_to_fmu` write it with the law of a scenario, as if its error
     were 0: no controller knows how far its compensation is off.
 
+    On the "error" it is (1 + error) F(0+) tanh(|e| / eps) towards the reference: what a joint at
+    rest needs to break away.
+
     Attributes:
       friction: what is compensated, as a scenario's `friction`: one part, several, or by joint. It
         may differ from the true one.
-      on: which v: that of the "reference", or the "speed" that the law measures or estimates.
-      eps: rad/s (m/s), greater than 0: the speed above which all of F is given, nearly.
+      on: which v: that of the "reference", or the "speed" that the law measures or estimates; or
+        the "error", whose sign is the direction.
+      eps: rad/s (m/s), or rad (m) on the error; greater than 0: the speed, or the error, above
+        which all of F is given, nearly.
       error: the share by which it is wrong: -0.3 gives 70 % of the force. `grid`, `tune` and
         `compare` draw it for each seed, evenly between -error and error.
 
@@ -40,7 +47,7 @@ class Feedforward:
     """
 
     friction: Compensated
-    on: Annotated[str, OneOf(names=("reference", "speed"))] = "reference"
+    on: Annotated[str, OneOf(names=ON)] = "reference"
     eps: Positive = 0.005
     error: Annotated[float, Number(low=-1.0, high=math.inf)] = 0.0
 

@@ -29,7 +29,7 @@ RUBS = {
     "servo": ServoFriction(kc=0.01, kcs=0.02, vs=0.5, alpha=1.5, kv=0.04),
     "sigmoid": Sigmoid(0.04, 5.0),
 }
-WAYS = [("stribeck", "reference"), *((name, "speed") for name in RUBS)]
+WAYS = [("stribeck", "reference"), ("stribeck", "error"), *((name, "speed") for name in RUBS)]
 
 
 def scenario(feedforward: smc.Feedforward, **more) -> smc.Scenario:
@@ -65,7 +65,8 @@ def both(scenario: smc.Scenario, path: Path) -> tuple[smc.Trace, smc.Trace]:
 @pytest.mark.parametrize(("rubs", "on"), WAYS)
 def test_u_has_the_bits_of_the_run_whose_feedforward_is_right(tmp_path, rubs, on):
     """Of a drive whose u is no force, too. The function that gives it alone gives its bits."""
-    wrong = smc.Feedforward(RUBS[rubs], on=on, eps=0.01, error=0.3)
+    eps = 2.0 if on == "error" else 0.01
+    wrong = smc.Feedforward(RUBS[rubs], on=on, eps=eps, error=0.3)
     theirs, ours = both(scenario(wrong, actuator=smc.DCMotor(gear=5.0)), tmp_path / "law.c")
     if on == "reference":
         library: Any = getattr(ours.scenario.law.function, "library", None)
@@ -78,7 +79,7 @@ def test_u_has_the_bits_of_the_run_whose_feedforward_is_right(tmp_path, rubs, on
         np.testing.assert_array_equal(added, theirs.compensation[:, 0])
 
 
-@pytest.mark.parametrize("on", ["reference", "speed"])
+@pytest.mark.parametrize("on", ["reference", "speed", "error"])
 def test_of_many_joints_each_has_its_own(tmp_path, on):
     rubs = {"turn": Stribeck(0.1, 0.3, 0.2), "reach": (smc.Coulomb(0.2), smc.Viscous(0.3))}
     arm = scenario(

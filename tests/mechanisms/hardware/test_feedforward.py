@@ -45,6 +45,24 @@ STEADY = [
 ]
 
 
+def test_on_the_error_it_is_what_breaks_a_joint_away_towards_the_reference(joint):
+    """A joint of stiction 0.3 N m stands still under a P law of 0.1 N m, and moves with it."""
+    friction = smc.hardware.Stribeck(0.2, 0.3, 0.05)
+    fields = {"reference": None, "friction": friction, "x0": 0.1, "duration": 3.0}
+    weak = smc.law("pid", kp=1.0, ki=0.0, kd=0.2)
+
+    def end(feedforward):
+        return smc.run(smc.Scenario(plant=joint, law=weak, feedforward=feedforward, **fields))
+
+    assert end(None).x[-1, 0] == pytest.approx(0.1, abs=1e-3)
+    assert end(smc.Feedforward(friction, on="speed")).x[-1, 0] == pytest.approx(0.1, abs=1e-3)
+    eps = 0.01
+    trace = end(smc.Feedforward(friction, on="error", eps=eps))
+    expected = np.copysign(0.3 * np.tanh(np.abs(trace.e) / eps), -trace.e)
+    np.testing.assert_allclose(trace.compensation[:-1], expected[:-1], rtol=1e-9)  # pyright: ignore[reportOptionalSubscript]
+    assert abs(trace.x[-1, 0]) < 0.02
+
+
 def test_a_drive_gets_the_u_that_gives_the_force(joint):
     motor = smc.DCMotor()
     feedforward = smc.Feedforward(smc.Coulomb(0.02))
