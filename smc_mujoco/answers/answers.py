@@ -16,6 +16,7 @@ from smc_mujoco.answers.facts import (
     Barred,
     Beware,
     Caution,
+    ClaimsFacts,
     CompareFacts,
     Contest,
     EnteredFacts,
@@ -45,6 +46,7 @@ WIDTH = 80  # characters of a line
 LINES = 24  # of a screen
 MAX_CONTESTS = 5  # that have a block each; more have one table of winners
 MAX_NAMED = 8  # conditions that a verdict names; chosen
+MAX_REFUTED = 8  # claims that an answer names; chosen
 GAP = "  "  # between columns
 HEADING = 12  # characters of a line of a heading; chosen
 NAMES = 24  # characters of a plant and a condition beside winners; chosen
@@ -508,6 +510,26 @@ def tune_lines(facts: TuneFacts) -> list[str]:
         pairs.append(("at bound", f"{gain}, at the {end} end: a value beyond may do better"))
     lines = [f"{facts.law} on {facts.plant}"]
     return lines + labelled([*pairs, next_step(facts.next), more(More("", "", ("J",)))])
+
+
+# audits
+
+
+def claims_lines(facts: ClaimsFacts) -> list[str]:
+    """Return how many claims of a paper hold, and which are refuted; more of these than a screen
+    has room for are counted.
+    """
+    pairs = [(whose, ", ".join(verdicts)) for whose, verdicts in facts.counts]
+    if facts.supported.of:
+        holds = f"{facts.supported.count} of {facts.supported.of} supported sentences hold"
+        pairs.append(("every gain", f"{holds} under every set of gains that was run"))
+    for name, text in facts.refuted[:MAX_REFUTED]:
+        pairs.append((f"refuted {name}", text))
+    if len(facts.refuted) > MAX_REFUTED:
+        pairs.append(("refuted", f"{len(facts.refuted) - MAX_REFUTED} more, all by --full"))
+    if facts.next:
+        pairs.append(next_step(facts.next))
+    return labelled(pairs)
 
 
 # lines that all answers have

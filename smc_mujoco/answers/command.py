@@ -35,7 +35,7 @@ def instead(command: str, options: Mapping[str, str], shared: Sequence[str] = ()
     typed = _typed.get()
     if not typed:
         return f"smc.{command}"
-    words = [command]
+    words = command.split()
     for i, word in enumerate(typed[1:], 1):
         if not word.startswith("-"):
             if not typed[i - 1].startswith("-"):

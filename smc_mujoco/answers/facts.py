@@ -369,3 +369,16 @@ class TuneFacts:
     spread: str  # between the J at which the searches ended, such as "4.1 %"; "" of one search
     at_bound: tuple[tuple[str, str], ...]  # a gain, and "lower" or "upper"
     next: NextStep
+
+
+# audits
+
+
+@keyword_dataclass
+class ClaimsFacts:
+    """The verdicts on a paper's claims."""
+
+    counts: tuple[tuple[str, tuple[str, ...]], ...]  # whose claims: how many have each verdict
+    supported: Settles  # claims that hold under every set of gains, of those supported
+    refuted: tuple[tuple[str, str], ...]  # an id, and the claim
+    next: NextStep | None

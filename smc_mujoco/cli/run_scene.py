@@ -41,7 +41,10 @@ def perform(
         terminal.note(f"{question}\n", "bold", wrap=True)
     out.mkdir(parents=True, exist_ok=True)
     traces = simulate(scene, threads)
+    written = save(traces, out, export)  # first, so that runs are kept if the scene's answer fails
     again = repeat(traces, threads) if repeated else {}
+    terminal.print(Text(scene.sentence(traces), "bold"))
+    terminal.print()
     for condition, runs in traces.items():
         title = _title(scene, condition)
         others = again.get(condition)
@@ -53,9 +56,6 @@ def perform(
         terminal.print()
     for table in tables.answers(scene.answers, traces, again) if scene.answers else ():
         terminal.print(table, "")
-    written = save(traces, out, export)  # first, so that runs are kept if the scene's answer fails
-    terminal.print(Text(scene.sentence(traces), "bold"))
-    terminal.print()
     written += figures(scene, traces, out)
     try:
         if filming:

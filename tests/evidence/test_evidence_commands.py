@@ -215,7 +215,11 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
             "quick: coarser grids",
         ],
     ),
-    "claims --evidence e.json": (
+    "claims --gains study": (
+        0,
+        ["refuted 3 it settles", "next smc-mujoco claims 3", "○ 1 refuted"],
+    ),
+    "claims --full --evidence e.json": (
         0,
         [
             "audit(a Paper gaber, None, None, False, None",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 from rich.console import Console
@@ -9,6 +10,10 @@ from rich.padding import Padding
 from rich.table import Column, Table
 from rich.text import Text
 
+from smc_mujoco.answers import answers
+from smc_mujoco.answers.command import instead
+from smc_mujoco.answers.facts import ClaimsFacts, NextStep, Settles
+from smc_mujoco.cli.console import Terminal
 from smc_mujoco.cli.tables import plain, titled
 from smc_mujoco.common.text import capital
 from smc_mujoco.evidence.audit import verdict as verdicts
@@ -22,18 +27,44 @@ CHECKED = {True: Text("✓", COLOURS[SUPPORTED]), False: Text("✗", COLOURS[REF
 MARKS = {verdict: Text(mark, style=COLOURS[verdict]) for verdict, mark in verdicts.MARKS.items()}
 
 
-def print_claims(claims: Sequence[Claim], console: Console, full: bool) -> None:
-    """Print a table of claims with their verdicts, or each in full; then the totals of the paper's
-    own sentences.
+def print_claims(claims: Sequence[Claim], terminal: Terminal, named: bool, full: bool) -> None:
+    """Print the answer of an audit; or with `full` a table of claims with their verdicts; or those
+    that were `named`, each in full. The two end with the totals of the paper's own sentences.
     """
-    if full:
+    if not named and not full:
+        terminal.note("\n".join(answers.claims_lines(facts_of(claims))))
+        return
+    if named:
         for claim in claims:
-            _print_claim(claim, console)
+            _print_claim(claim, terminal)
     else:
-        console.print(_claims_overview(claims))
-    console.print(Text(f"{capital(verdicts.summary(claims))}."), highlight=False)
+        terminal.print(_claims_overview(claims))
+    terminal.print(Text(f"{capital(verdicts.summary(claims))}."), highlight=False)
     if any(len(claim.verdicts) > 1 for claim in claims):
-        console.print(Text(verdicts.over_gains(claims)), highlight=False)
+        terminal.print(Text(verdicts.over_gains(claims)), highlight=False)
+
+
+def facts_of(claims: Sequence[Claim]) -> ClaimsFacts:
+    """Return what an audit says on one screen."""
+    counts = []
+    for whose, words in verdicts.WHOSE_WORDS.items():
+        of_whose = Counter(claim.verdict for claim in claims if claim.whose == whose)
+        texts = [f"{verdicts.MARKS[kind]} {count} {kind}" for kind, count in of_whose.items()]
+        if texts:
+            counts.append((words, tuple(texts)))
+    of_paper = [claim for claim in claims if claim.whose == verdicts.PAPER]
+    supported = [claim for claim in of_paper if claim.verdict == SUPPORTED]
+    refuted = [(claim.id, claim.text) for claim in of_paper if claim.verdict == REFUTED]
+    step = None
+    if refuted:
+        ids = " ".join(name for name, _ in refuted[: answers.MAX_REFUTED])
+        step = NextStep(instead(f"claims {ids}", {}, ("--paper",)), "shows their checks")
+    return ClaimsFacts(
+        counts=tuple(counts),
+        supported=Settles(sum(claim.for_every_set for claim in supported), len(supported)),
+        refuted=tuple(refuted),
+        next=step,
+    )
 
 
 def _claims_overview(claims: Sequence[Claim]) -> Table:

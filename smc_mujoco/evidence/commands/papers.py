@@ -57,6 +57,7 @@ def claims(
     papers: Annotated[bool, typer.Option("--papers", help="List the papers instead.")] = False,
     new: New = None,
     check: Check = None,
+    full: options.Full = False,
 ) -> None:
     """Audit a paper's claims: test each against a threshold that was fixed before any run.
 
@@ -101,7 +102,7 @@ def claims(
         done = audit(about, ids or None, sets, quick, threads, report=drawn.reached)
     if evidence:
         evidence = done.save(evidence)
-    claim_tables.print_claims(done.claims, terminal, full=bool(ids))
+    claim_tables.print_claims(done.claims, terminal, bool(ids), full)
     _finish(document(done.claims), quick, evidence, terminal)
 
 
