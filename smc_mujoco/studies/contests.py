@@ -77,7 +77,7 @@ def _contest(columns: Sequence[Column], gains: Mapping[str, str], own: Names) ->
         settled=_settled(columns),
         use=_use(columns, verdicts, gains),
         verdicts=tuple(verdicts),
-        trails=tuple(_trails(*columns[0], own)),
+        trails=tuple(_trails(*with_numbers[0], own)) if with_numbers else (),
         not_ranked=tuple(not_ranked),
     )
 

@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.answers.explain import explain as meaning
+from smc_mujoco.answers.explain import glossary
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.console import Terminal
 
@@ -19,8 +20,17 @@ Word = Annotated[
 
 
 def explain(word: Word) -> None:
-    """Say what a word of an answer means, in a few lines.
+    """Say what a word of an answer means, in a few lines. It may be a metric's name, too.
 
     Example: smc-mujoco explain star
     """
-    Terminal().note(meaning(" ".join(word)))
+    terminal = Terminal()
+    asked_word = " ".join(word)
+    if asked_word not in glossary():
+        from smc_mujoco.metrics.catalogue import CATALOGUE
+
+        for metric in CATALOGUE.values():
+            if asked_word.casefold() in (metric.name, metric.label.casefold()):
+                terminal.note(f"{metric.label}\n{metric.summary}", wrap=True)
+                return
+    terminal.note(meaning(asked_word))

@@ -1,0 +1,157 @@
+"""One screen of a comparison: it fits, and each of its numbers is that of the boards."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from helpers.tables import MadeTable
+
+from smc_mujoco.answers import answers
+from smc_mujoco.answers.explain import explain
+from smc_mujoco.answers.facts import CompareFacts, Lead, More, NextStep, Settles, Trails
+from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.studies.board_numbers import size
+from smc_mujoco.studies.contests import PLAIN, contests
+from smc_mujoco.studies.leaderboard import METRICS, leaderboard
+
+pytestmark = pytest.mark.quick
+
+LAWS = ("observer_based_finite_time", "super_twisting", "adrc", "pid", "my_law")
+SEEDS = 12
+OWN = {plant: dict.fromkeys(LAWS, "wc=29.9, w=31.7, b=8.53") for plant in ("duffing", "pendulum")}
+
+
+def table(conditions=("friction",), plants=("duffing",)):
+    """Runs of five laws: the first wins in ITAE, the last in settling time."""
+    cells = [(plant, condition) for plant in plants for condition in conditions]
+    count = len(cells) * SEEDS
+    noise = np.random.default_rng(0).uniform(0.95, 1.05, (5, count))
+    first = np.array([[1.0], [1.3], [1.4], [1.6], [2.0]]) * noise
+    return MadeTable(
+        law=np.repeat(LAWS, count),
+        plant=np.tile(np.repeat([plant for plant, _ in cells], SEEDS), 5),
+        condition=np.tile(np.repeat([condition for _, condition in cells], SEEDS), 5),
+        seed=np.tile(np.arange(SEEDS), 5 * len(cells)),
+        itae=(0.1 * first).ravel(),
+        settling_time=first[::-1].ravel(),
+        ultimate_bound=np.full(5 * count, 1e-3) * noise.ravel(),
+        tv_rate=(500.0 * noise).ravel(),
+    )
+
+
+@pytest.fixture(scope="module")
+def boards():
+    return leaderboard(table(), by=("plant", "condition"))
+
+
+@pytest.fixture(scope="module")
+def contest(boards):
+    (contest,) = contests(boards, OWN, ("my_law", "pid"))
+    return contest
+
+
+def test_five_laws_in_one_condition_fit_a_screen_of_80_by_24(contest):
+    command = f"smc-mujoco compare inverted_pendulum --law {','.join(LAWS)} --seeds 24"
+    step = NextStep(f"{command} --condition friction+encoder+delay_10ms", "tries all at once")
+    more = More("compared/report.html", "intervals, gains, figure", ("lead",))
+    lines = answers.compare_lines(CompareFacts(contests=(contest,), next=step, more=more))
+    assert len(lines) <= answers.LINES
+    assert max(map(len, lines)) <= answers.WIDTH
+
+
+def test_the_numbers_of_the_screen_are_those_of_the_boards(boards, contest):
+    for row, numbers in contest.grid.rows:
+        for (name, _), text in zip(contest.grid.columns, numbers, strict=True):
+            (board,) = [one for one in boards if PLAIN.get(one.metric, one.label) == name]
+            (entry,) = [entry for entry in board.entries if entry.law == row]
+            assert text == size(entry.interval.median, board.metric)
+    assert dict(contest.settled) == dict.fromkeys(LAWS, Settles(SEEDS, SEEDS))
+
+
+def test_a_lead_on_the_screen_is_the_least_lead_of_the_board(boards, contest):
+    (lead,) = [
+        fact for fact in contest.verdicts if isinstance(fact, Lead) and fact.metric == "ITAE"
+    ]
+    (board,) = [one for one in boards if one.metric == "itae"]
+    effect = board.blocks[0].lead.effect
+    assert (lead.law, lead.rival) == (LAWS[0], LAWS[1])
+    assert (lead.low, lead.high) == (1.0 - effect.high, 1.0 - effect.low)
+    lines = "\n".join(answers.contest_lines(contest))
+    assert f"{100 * lead.low:.2g} to {100 * lead.high:.2g} % below {lead.rival}" in lines
+
+
+def test_the_law_to_use_is_the_first_metrics_and_others_are_named_where_they_win(contest):
+    assert contest.use is not None
+    assert contest.use.law == contest.grid.winners[0] == LAWS[-1]
+    assert contest.use.unless == (("ITAE", LAWS[0]),)
+    assert contest.use.gains in answers.use(contest.use)
+
+
+def test_an_own_law_that_loses_has_its_ratio(contest):
+    (fact,) = [fact for fact in contest.trails if fact.law == "pid"]
+    assert isinstance(fact, Trails)
+    times = dict(contest.grid.rows)
+    ratio = float(times["pid"][0]) / float(times[fact.leader][0])
+    assert fact.times == pytest.approx(ratio, rel=0.05)
+    assert fact.ahead[0] == fact.leader == LAWS[-1]
+
+
+def test_a_law_with_a_run_that_does_not_arrive_is_not_to_be_used():
+    runs = table()
+    winner = np.flatnonzero(runs.column("law") == LAWS[-1])
+    runs.columns["arrived"][winner[0]] = False
+    (contest,) = contests(leaderboard(runs, by=("plant", "condition")), OWN, ())
+    assert contest.use is None or contest.use.law != LAWS[-1]
+
+
+def test_more_than_five_plants_and_conditions_are_one_table_of_winners():
+    made = leaderboard(
+        table(("friction", "noise", "encoder"), ("duffing", "pendulum")), by=("plant", "condition")
+    )
+    blocks = contests(made, OWN, ())
+    assert len(blocks) == 6
+    lines = answers.compare_lines(CompareFacts(contests=blocks))
+    assert max(map(len, lines)) <= answers.WIDTH
+    whole = " ".join(lines)
+    for block in blocks:
+        assert len(re.findall(rf"^{block.plant} {block.condition}", "\n".join(lines), re.M)) == 1
+    assert whole.count("my_law") == 6
+
+
+@pytest.mark.parametrize(
+    "word",
+    [
+        *(PLAIN.get(name) or CATALOGUE[name].label for name in METRICS if name in CATALOGUE),
+        *(CATALOGUE[name].label for name in METRICS if name in CATALOGUE),
+        *("J", "settled", "settled runs", "floor", "star", "best", "lead", "below"),
+        *("tied", "open", "not ranked", "no winner", "beware", "gains", "margin", "worst"),
+        *("shipped", "tuned here", "given", "default", "interval", "searches", "evaluations"),
+        *("J spread", "relative time", "arrived", "to within", "theory", "all sets", "found by"),
+        *(
+            "alone",
+            "with others",
+            "narrow",
+            "fail",
+            "withstands",
+            "without a law",
+            "at rest",
+            "held out",
+        ),
+    ],
+)
+def test_every_word_of_answers_and_tables_is_explained(word):
+    assert len(explain(word).splitlines()) > 1
+
+
+def test_the_share_of_the_bound_stands_beside_the_variation_of_u(boards):
+    import dataclasses
+
+    (board,) = [one for one in boards if one.metric == "tv_rate"]
+    blocks = tuple(dataclasses.replace(block, bound=250.0) for block in board.blocks)
+    (contest,) = contests([dataclasses.replace(board, blocks=blocks)], {}, ())
+    ((_, unit),) = contest.grid.columns
+    assert "of bound" in unit
+    for law, (text,) in contest.grid.rows:
+        share = float(re.search(r"\(([\d.]+) %\)", text)[1])
+        assert math.isclose(share, 100 * blocks[0].medians[law] / 250.0, rel_tol=0.06)
