@@ -20,7 +20,7 @@ FOLDER = Path(__file__).parent / "gallery"
 
 
 class Clip(NamedTuple):
-    """What a clip shows: laws of the paper, all four unless `shown` names some, with the study's
+    """What a clip shows: laws of the paper, all four unless `laws_shown` names some, with the study's
     gains, or `laws` with their published ones.
     """
 
@@ -42,7 +42,7 @@ class Clip(NamedTuple):
             compared = smc.paper.comparison(
                 str(self.plant), self.condition, duration=self.seconds, changes=changes
             )
-            runs = [compared[law] for law in self.shown]
+            runs = [compared[law] for law in self.laws_shown]
         return smc.film(smc.run(runs), title=self.title, fps=20.0, **options)
 
 
