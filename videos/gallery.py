@@ -20,8 +20,8 @@ FOLDER = Path(__file__).parent / "gallery"
 
 
 class Clip(NamedTuple):
-    """What a clip shows: laws of the paper, all four unless `laws_shown` names some, with the study's
-    gains, or `laws` with their published ones.
+    """What a clip shows: laws of the paper, all four unless `laws_shown` names some, with the
+    study's gains, or `laws` with their published ones.
     """
 
     plant: str | Plant
