@@ -581,9 +581,10 @@ def compare(
         threads=threads,
         progress=progress,
     )
-    if quick:  # as many as can name a winner in each block
+    if quick and searches is None:  # as many as can name a winner in each block
         least = needed_to_win(len(machines) * len(trial.conditions))
-        trial = trial._replace(usual=max(QUICK_SEARCHES, least))
+        count = max(QUICK_SEARCHES, least)
+        trial = trial._replace(search=trial.search._replace(searches=count))
     chosen: dict[str, list[Law | Template]] = {}
     if laws is None:
         of_all = None

@@ -617,7 +617,6 @@ def test_a_board_s_intervals_are_those_of_the_table_where_runs_share_gains(monke
     rows = Shared(laws=("classical", "pid"), seeds=24)
     page = smc.plot(rows, metrics=["tv_rate"])
     boards = smc.leaderboard(rows, ["tv_rate"], by=("plant", "condition"))
-    assert "fewer than 6 samples an interval is their range" in " ".join(repr(boards).split())
     assert "range if under 6 samples" in " ".join(
         " ".join(text.split()) for text in words_of(page, monkeypatch)
     )
