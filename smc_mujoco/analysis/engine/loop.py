@@ -361,7 +361,7 @@ def _compensating(form: Form, compile_user: Compiler) -> Any:
 
     @inlined
     def compensate(view, k, t, i):
-        x = view.work[work_at.seen_x + i]
+        r = x = view.work[work_at.seen_x + i]
         v = view.work[work_at.seen_v + i]
         if not on_speed:
             r, v, _ = refer(view, t, i)

@@ -18,16 +18,18 @@ from smc_mujoco.mechanisms.plant import MAX_PARAMETER
 class Stribeck(Sliding):
     """Friction that falls with speed from its level at rest, with viscous friction and an offset.
 
-        F(v) = (coulomb + (static - coulomb) exp(-(v/stribeck)^2)) step(v) + viscous v + offset
+        F(v) = (L + (static - coulomb) exp(-(v/stribeck)^2)) step(v) + viscous v + offset
+        L = coulomb + km |motor - load|
 
         smc.hardware.Stribeck(coulomb=0.2, static=0.3, stribeck=0.1, viscous=0.05, offset=-0.02)
 
-    step(v) is sgn(v), or tanh(v/width). At rest friction holds what lies between offset - static
-    and offset + static. So the offset is what the two directions differ by: levels of 0.3 forward
-    and 0.26 backward are coulomb = 0.28 and offset = 0.02.
+    step(v) is sgn(v), or tanh(v/width). At rest friction holds what lies between offset - S and
+    offset + S, with S = static + km |motor - load|. So the offset is what the two directions differ
+    by: levels of 0.3 forward and 0.26 backward are coulomb = 0.28 and offset = 0.02.
 
-    It has no bristles and no state of its own, unlike `LuGre`, and does not grow with the load,
-    unlike `ServoFriction`.
+    It has no bristles and no state of its own, unlike `LuGre`. With `km` it grows with what the
+    gearbox carries: the torque of the motor and that from outside, as `ServoFriction` has them. A
+    `Feedforward` knows neither, and leaves that out.
 
     Source: B. Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, A survey of models, analysis
     tools and compensation methods for the control of machines with friction, Automatica 30(7),
@@ -41,6 +43,8 @@ class Stribeck(Sliding):
         is needed with static.
       viscous: N m s/rad (N s/m), 0 or more.
       offset: a constant part of the force, N m (N).
+      km: dry friction for each N m (N) that the gearbox carries, 0 or more: its loss, twice over
+        where the motor holds a load, as both torques count.
       width: the speed within which the step is smooth, rad/s (m/s), 0 or more. 0: a step. Such a
         joint is held by static at rest, too.
 
@@ -48,7 +52,7 @@ class Stribeck(Sliding):
       ScenarioError: a number out of its range, static below coulomb, or static without stribeck.
     """
 
-    forces = "coulomb", "static", "viscous", "offset"
+    forces = "coulomb", "static", "viscous", "offset", "km"
     ordered = "coulomb", "static"
     units: ClassVar[Mapping[str, str]] = {
         "coulomb": "{f}",
@@ -65,6 +69,7 @@ class Stribeck(Sliding):
     viscous: NaturalPerJoint = 0.0
     offset: Annotated[PerJoint, Each(item=Number(low=-MAX_PARAMETER, high=MAX_PARAMETER))] = 0.0
     width: NaturalPerJoint = 0.0
+    km: NaturalPerJoint = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -83,10 +88,11 @@ class Stribeck(Sliding):
 
     @staticmethod
     def value(v, motor, load, p):
-        level = p.coulomb
-        static = p.coulomb
+        carried = p.km * abs(motor - load)
+        level = p.coulomb + carried
+        static = level
         if not math.isnan(p.static):
-            static = p.static
+            static = p.static + carried
             level += (p.static - p.coulomb) * math.exp(-((v / p.stribeck) ** 2))
         step = math.tanh(v / p.width) if p.width > 0.0 else math.copysign(1.0, v)
         return level * step + p.viscous * v + p.offset, p.offset - static, p.offset + static

@@ -2,6 +2,7 @@
 as parts.
 """
 
+import dataclasses
 import math
 from types import SimpleNamespace
 
@@ -105,3 +106,37 @@ def test_a_published_servo_moves_and_stalls_at_its_numbers(name):
     assert servo.friction.kc == fitted["friction_base"]
     parts = {"actuator": servo.motor, "friction": servo.friction}
     assert cart(**parts, feedforward=smc.Constant(stall), duration=1.0).x[-1, 0] > 0.01
+
+
+def test_friction_grows_with_what_the_gearbox_carries():
+    """A motor that holds 3 N m against a load of 3 N m has |motor - load| = 6: by hand, and as a
+    servo's model M3 has it.
+    """
+    share = smc.hardware.Stribeck(0.2, km=0.05)
+    f, low, high = share.value(0.4, 3.0, -3.0, SimpleNamespace(**fields_of(share)))
+    assert f == pytest.approx(0.2 + 0.05 * 6.0)
+    assert (low, high) == pytest.approx((-f, f))
+    runs = []
+    for friction in (share, smc.hardware.ServoFriction(kc=0.2, km=0.05, ke=0.05)):
+        runs.append(
+            smc.run(
+                smc.Scenario(
+                    plant="inverted_pendulum",
+                    law=smc.law("pid", kp=60.0, ki=0.0, kd=6.0),
+                    friction=friction,
+                    x0=0.4,
+                    duration=1.0,
+                )
+            )
+        )
+    np.testing.assert_array_equal(runs[0].x, runs[1].x)
+    plain = dataclasses.replace(runs[0].scenario, friction=smc.hardware.Stribeck(0.2))
+    assert np.abs(smc.run(plain).x - runs[0].x).max() > 1e-3
+
+
+def fields_of(part):
+    return {
+        field.name: math.nan if (value := getattr(part, field.name)) is None else value
+        for field in dataclasses.fields(part)
+        if not field.kw_only
+    }
