@@ -12,6 +12,7 @@ from smc_mujoco.common.interrupts import delay_signals
 
 if TYPE_CHECKING:
     from smc_mujoco.control.law import Law
+    from smc_mujoco.simulation.scenario import Scenario
 
 What = Annotated[
     list[str],
@@ -51,6 +52,10 @@ Model = Annotated[
         help="FMU: nominal: f and g of x'' = f + g u are inputs; default as needed.",
     ),
 ]
+Ros2 = Annotated[
+    bool, typer.Option("--ros2", help="Write OUT as a package for ros2_control, a folder.")
+]
+Plain = Annotated[bool, typer.Option("--plain", help="Write OUT as C with a main loop, a folder.")]
 Binary = Annotated[bool, typer.Option(help="FMU: whether to compile a binary for this machine.")]
 
 
@@ -66,8 +71,10 @@ def export(
     u_max: UMax = math.inf,
     model: Model = None,
     binary: Binary = True,
+    ros2: Ros2 = False,
+    plain: Plain = False,
 ) -> None:
-    """Export a law as C or as an FMU: to OUT.c or OUT.fmu.
+    """Export a law as C or as an FMU, to OUT.c or OUT.fmu; or as a folder that compiles as it is.
 
     LAW is a name of `smc-mujoco list`, my_law.py with one law, made by @smc.law_function, or
     gains.json that `smc-mujoco tune --out` wrote. If you leave it out, it is the name of OUT, as in
@@ -89,13 +96,23 @@ def export(
 
     Example: smc-mujoco export observer_free.c --gains lam=6,k1=3 --type float
 
+    With --ros2 OUT is a folder, a package of ros2_control with the law's gains, bound, estimator
+    and compensation of friction as parameters; with --plain a folder of C with a main loop and a
+    Makefile. A file that tune or which wrote gives all of these.
+
+    Example: smc-mujoco export which/recommended.json my_controller --ros2
+
     Example: smc-mujoco export super_twisting controller.fmu --gains k1=5,k2=8 --velocity levant
     --u-max 6
     """
-    name, out = _law_and_file(what)
-    of_fmu = "surface", "velocity", "period", "u_max", "model", "binary"
+    packed = ros2 or plain
+    name, out = _law_and_file(what, packed)
+    of_controller = "surface", "velocity", "period", "u_max"
     options.only_for(ctx, ("numbers",), out.suffix == ".c", "OUT.c")
-    options.only_for(ctx, of_fmu, out.suffix == ".fmu", "OUT.fmu")
+    options.only_for(ctx, ("model", "binary"), out.suffix == ".fmu", "OUT.fmu")
+    options.only_for(ctx, of_controller, packed or out.suffix == ".fmu", "OUT.fmu or a folder")
+    if ros2 and plain:
+        raise ScenarioError("a folder is for --ros2 or --plain: give one of them")
     with delay_signals():
         from smc_mujoco.control import from_text
     chosen = from_text.law(
@@ -103,7 +120,26 @@ def export(
         **from_text.parsed_gains(gains, "--gains"),  # pyright: ignore[reportArgumentType]
     )
     with delay_signals():
-        if out.suffix == ".c":
+        if packed:
+            from smc_mujoco.exchange.loop.package import law_to_package
+
+            what_it_is = "a package for ros2_control" if ros2 else "C with a main loop"
+            kind = "ros2" if ros2 else "plain"
+            tuned = _tuned_scenario(name, gains)
+            if tuned is not None:
+                law_to_package(tuned, out, kind)
+            else:
+                law_to_package(
+                    chosen,
+                    out,
+                    kind,
+                    surface=surface,
+                    velocity=velocity,
+                    control_period=period,
+                    u_max=u_max,
+                    joints=joints,
+                )
+        elif out.suffix == ".c":
             _write_c(out, chosen, numbers, joints)
             what_it_is = "C99"
         else:
@@ -121,15 +157,34 @@ def export(
                 binary=binary,
             )
             what_it_is = f"FMI 3.0, Co-Simulation, every {period:g} s"
-    print(f"{out}, {out.stat().st_size / 1024:.0f} kB; {what_it_is}")
+    size = "" if packed else f", {out.stat().st_size / 1024:.0f} kB"
+    print(f"{out}{size}; {what_it_is}")
 
 
-def _law_and_file(what: list[str]) -> tuple[str, Path]:
-    """Return the text of the law and the file to write, from the command's arguments."""
+def _tuned_scenario(name: str, gains: str) -> "Scenario | None":
+    """Return the scenario of a tuning's file, which has the bound and the estimator, too; None for
+    another law.
+    """
+    if not name.endswith(".json") or gains:
+        return None
+    from smc_mujoco.analysis.tuning.result import load_tuned
+
+    tuned = load_tuned(name)
+    return tuned.definition.scenarios(tuned.plant, tuned.law, tuned.seed)[0]
+
+
+def _law_and_file(what: list[str], packed: bool) -> tuple[str, Path]:
+    """Return the text of the law and the file or the folder to write, from the command's
+    arguments.
+    """
     *laws, last = what
     out = Path(last)
-    if out.suffix not in (".c", ".fmu"):
-        raise ScenarioError(f"cannot write {last}: end its name in .c or .fmu")
+    if packed and out.suffix:
+        raise ScenarioError(f"cannot write {last} as a folder: give a name without an ending")
+    if not packed and out.suffix not in (".c", ".fmu"):
+        raise ScenarioError(
+            f"cannot write {last}: end its name in .c or .fmu, or add --ros2 or --plain"
+        )
     if len(laws) > 1:
         raise ScenarioError(f"{len(laws)} laws for {out}: give one")
     return laws[0] if laws else out.stem, out

@@ -108,9 +108,7 @@ def law_to_fmu(
         "model": model,
         "joints": joints,
     }
-    if isinstance(law, Scenario):
-        law, chosen = law.resolved.law, _of_scenario(law, chosen)
-    exported = _exported(law, **chosen)
+    exported = exported_law(law, **chosen)
     word = re.sub(r"\W+", "_", exported.law.name, flags=re.ASCII)
     identifier = word.strip("_")
     if not identifier[:1].isalpha():
@@ -129,6 +127,17 @@ def law_to_fmu(
             about = zipfile.ZipInfo(name)  # without the time
             archive.writestr(about, content, zipfile.ZIP_DEFLATED)
     return target
+
+
+def exported_law(law: Any, **options: Any) -> ExportedLaw:
+    """Return what is exported of a law or a scenario, checked. Arguments and errors as in
+    `law_to_fmu`.
+    """
+    names = "surface", "velocity", "control_period", "u_max", "model", "joints"
+    chosen: Fields = dict.fromkeys(names) | options
+    if isinstance(law, Scenario):
+        return _exported(law.resolved.law, **_of_scenario(law, chosen))
+    return _exported(law, **chosen)
 
 
 def _of_scenario(scenario: Scenario, chosen: Data) -> Fields:
@@ -213,6 +222,41 @@ def _bounds(u_max: float | Sequence[float], joints: int) -> Floats:
 def _files(exported: ExportedLaw, identifier: str) -> dict[str, str]:
     """Return path in the archive -> text, for all files but the binary."""
     listed = contents.variables(exported)
+    files = {"fmu.c": (FOLDER / "fmu.c").read_text(encoding="utf-8")} | _sources(exported, listed)
+    header = contents.header(listed, exported, identifier, "")
+    content = "\0".join([*files.values(), header])
+    token = f"{{{uuid.UUID(bytes=hashlib.sha256(content.encode()).digest()[:16])}}}"
+    compiled = list(files)
+    files |= _headers(exported, identifier, token)
+    for name in FMI_HEADERS:
+        files[name] = (FOLDER / "headers" / name).read_text(encoding="utf-8")
+    placed = {
+        "modelDescription.xml": description.model_description(listed, exported, identifier, token),
+        "sources/buildDescription.xml": description.build_description(compiled, identifier),
+    }
+    for name, text in files.items():
+        placed[f"sources/{name}"] = text
+    return placed
+
+
+def controller_files(exported: ExportedLaw, identifier: str) -> dict[str, str]:
+    """Return name -> text of the C of a controller alone, with its headers."""
+    listed = contents.variables(exported)
+    return _sources(exported, listed) | _headers(exported, identifier, "")
+
+
+def _headers(exported: ExportedLaw, identifier: str, token: str) -> dict[str, str]:
+    """Return name -> text of the headers of a controller."""
+    listed = contents.variables(exported)
+    return {
+        "controller.h": contents.header(listed, exported, identifier, token),
+        "smc_fmu.h": (FOLDER / "smc_fmu.h").read_text(encoding="utf-8"),
+        build.HEADER.name: build.HEADER.read_text(encoding="utf-8"),
+    }
+
+
+def _sources(exported: ExportedLaw, listed: Sequence[contents.Variable]) -> dict[str, str]:
+    """Return name -> text of the C of a controller."""
     law = with_head(exported.law, "double", *exported.code["law"], exported.joints)
     files = {
         "controller.c": contents.source(
@@ -223,23 +267,7 @@ def _files(exported: ExportedLaw, identifier: str) -> dict[str, str]:
     for kind, (slots, text) in exported.code.items():
         if kind != "law":
             files[f"{kind}.c"] = contents.component_file(exported.parts[kind], slots, text)
-    files = {"fmu.c": (FOLDER / "fmu.c").read_text(encoding="utf-8"), **files}
-    header = contents.header(listed, exported, identifier, "")
-    content = "\0".join([*files.values(), header])
-    token = f"{{{uuid.UUID(bytes=hashlib.sha256(content.encode()).digest()[:16])}}}"
-    compiled = list(files)
-    files["controller.h"] = contents.header(listed, exported, identifier, token)
-    files["smc_fmu.h"] = (FOLDER / "smc_fmu.h").read_text(encoding="utf-8")
-    files[build.HEADER.name] = build.HEADER.read_text(encoding="utf-8")
-    for name in FMI_HEADERS:
-        files[name] = (FOLDER / "headers" / name).read_text(encoding="utf-8")
-    placed = {
-        "modelDescription.xml": description.model_description(listed, exported, identifier, token),
-        "sources/buildDescription.xml": description.build_description(compiled, identifier),
-    }
-    for name, text in files.items():
-        placed[f"sources/{name}"] = text
-    return placed
+    return files
 
 
 def platform_tuple() -> tuple[str, str]:

@@ -23,13 +23,13 @@ int main()
     controller->state_interfaces_[1].value = v;
     if (t == 0.0) {
       controller->on_activate({});
-      controller->node->last->callback({0.2});
+      controller->node->last->callback({{0.2}});
     }
     controller->update({}, {1e-3});
     std::printf("%.17g\n", controller->command_interfaces_[0].value);
   }
   using controller_interface::return_type;
-  for (auto * interface : {&controller->state_interfaces_[1], &controller->command_interfaces_[0]}) {
+  for (auto * interface : {&controller->state_interfaces_[0], &controller->command_interfaces_[0]}) {
     interface->held = true;
     if (controller->update({}, {1e-3}) != return_type::ERROR) return 3;
     interface->held = false;

@@ -1,13 +1,15 @@
-// What examples/ros2_control uses of ROS 2, so that it compiles where there is no ROS.
+// What an exported package uses of ROS 2, so that it compiles where there is no ROS.
 #pragma once
 #include <functional>
 #include <memory>
 #include <optional>
+#include <map>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 namespace rclcpp_lifecycle { struct State {}; }
-namespace std_msgs { namespace msg { struct Float64 { double data; }; } }
+namespace std_msgs { namespace msg { struct Float64MultiArray { std::vector<double> data; }; } }
 namespace rclcpp
 {
 struct Time {};
@@ -19,11 +21,20 @@ template <class M> struct Subscription
   std::function<void(const M &)> callback;
 };
 }
-struct Parameter { std::string value; std::string as_string() const { return value; } };
+struct Parameter
+{
+  std::string text;
+  double number{0.0};
+  std::vector<std::string> texts;
+  std::string as_string() const { return text; }
+  double as_double() const { return number; }
+  std::vector<std::string> as_string_array() const { return texts; }
+};
 struct Node
 {
-  rclcpp::Subscription<std_msgs::msg::Float64>::SharedPtr last;
-  Parameter get_parameter(const std::string &) const { return {"elbow"}; }
+  rclcpp::Subscription<std_msgs::msg::Float64MultiArray>::SharedPtr last;
+  std::map<std::string, Parameter> parameters;
+  Parameter get_parameter(const std::string & name) const { return parameters.at(name); }
   rclcpp::Logger get_logger() const { return {}; }
   template <class M, class F> typename rclcpp::Subscription<M>::SharedPtr create_subscription(const std::string &, int, F f)
   {
@@ -54,7 +65,17 @@ struct ControllerInterface
   virtual InterfaceConfiguration command_interface_configuration() const = 0;
   virtual InterfaceConfiguration state_interface_configuration() const = 0;
   virtual return_type update(const rclcpp::Time &, const rclcpp::Duration &) = 0;
-  template <class T> void auto_declare(const std::string &, const T &) {}
+  template <class T> void auto_declare(const std::string & name, const T & value)
+  {
+    Parameter & parameter = node->parameters[name];
+    if constexpr (std::is_same_v<T, double>) {
+      parameter.number = value;
+    } else if constexpr (std::is_same_v<T, std::string>) {
+      parameter.text = value;
+    } else {
+      parameter.texts = value;
+    }
+  }
   std::shared_ptr<Node> get_node() const { return node; }
   unsigned get_update_rate() const { return rate; }
   std::shared_ptr<Node> node = std::make_shared<Node>();
