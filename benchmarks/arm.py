@@ -35,9 +35,12 @@ def main() -> None:
             batch = batch_of(scenario, 1, 1)
             # both before the first step
             with_law, bare = stepping(batch, STEPS), stepping(batch, STEPS, BARE)
-            one, other, factor = ratio(with_law, bare)
+            law_seconds, bare_seconds, factor = ratio(with_law, bare)
             _, _, of_plain = ratio(with_law, plain_steps(scenario, 1, STEPS))
-            microseconds = f"{1e6 * one / STEPS:6.2f} us a step, {1e6 * other / STEPS:6.2f} bare"
+            microseconds = (
+                f"{1e6 * law_seconds / STEPS:6.2f} us a step, "
+                f"{1e6 * bare_seconds / STEPS:6.2f} bare"
+            )
             factors = f"{factor:.2f}, {of_plain:.2f} of mj_step with its timers"
             print(
                 f"{integrator:13} {law:26} {microseconds}: {factors} (at most {TARGET})", flush=True

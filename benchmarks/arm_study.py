@@ -133,8 +133,8 @@ def measured(trace: smc.Trace) -> tuple[float, ...]:
 def row(name: str, values: np.ndarray) -> str:
     """A line of the table: median and interval of each column."""
     cells = []
-    for each in values.T:
-        median, low, high, _ = median_of(np.sort(each)[None])
+    for column in values.T:
+        median, low, high, _ = median_of(np.sort(column)[None])
         cells.append(f"{median:.3g} [{low:.3g}, {high:.3g}]")
     return f"| {name} | {' | '.join(cells)} |"
 
@@ -164,13 +164,13 @@ def main() -> None:
     laws = {"hybrid": arms.hybrid(), "hybrid, friction known": arms.hybrid(friction=True)}
     for name, law in laws.items():
         runs = smc.run([arms.scenario("wall", law, seed) for seed in SEEDS])
-        found = np.array(
+        scores = np.array(
             [
-                [one["mean_force"], one["force_error"], one["touching"], 1e3 * one["depth"]]
-                for one in (smc.metrics.tip_scores(trace) for trace in runs)
+                [tip["mean_force"], tip["force_error"], tip["touching"], 1e3 * tip["depth"]]
+                for tip in (smc.metrics.tip_scores(trace) for trace in runs)
             ]
         )
-        print(row(name, found), flush=True)
+        print(row(name, scores), flush=True)
 
 
 if __name__ == "__main__":

@@ -42,11 +42,11 @@ def table(
     """Return a board for a robot, with the rows named in `bold` in bold."""
     title, headings, digits = BOARDS[type(rows[0])]
     columns = [Column(heading, justify="right") for heading in headings]
-    made = titled(f"{robot}, {title}", "controller", *columns, pad_edge=False)
+    sheet = titled(f"{robot}, {title}", "controller", *columns, pad_edge=False)
     for row in rows:
         cells = [f"{value:.{places}f}" for value, places in zip(row[1:], digits, strict=False)]
-        made.add_row(row.name, *cells, style="bold" if row.name in bold else None)
-    return made
+        sheet.add_row(row.name, *cells, style="bold" if row.name in bold else None)
+    return sheet
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -55,22 +55,22 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("robot", choices=realaigym.ROBOTS)
     parser.add_argument("--entry", metavar="FOLDER", help="a law and entry.toml: its rows alone")
     parser.add_argument("--no-robustness", action="store_true", help="leave out its 722 machines")
-    given = parser.parse_args(arguments)
-    robot = given.robot
+    options = parser.parse_args(arguments)
+    robot = options.robot
     rows = realaigym.experiments(robot)
     of_2025 = realaigym.global_experiments(robot)
-    if given.entry:
-        entry = entries.read(given.entry)
+    if options.entry:
+        entry = entries.read(options.entry)
         rows = of_2025 = {entry.name: realaigym.on_board(robot, entry.law(robot))}
     console = Console()
     traces = dict(zip(rows, smc.run(list(rows.values())), strict=True))
     console.print(table(robot, realaigym.board(traces), rows))
-    if not given.no_robustness:
+    if not options.no_robustness:
         survived = {name: realaigym.robustness(scenario) for name, scenario in rows.items()}
         console.print(table(robot, realaigym.robustness_board(robot, survived), rows))
     minutes = [realaigym.global_row(name, scenario) for name, scenario in of_2025.items()]
     console.print(table(robot, realaigym.global_board(robot, minutes), of_2025))
-    if not given.entry:
+    if not options.entry:
         console.print(realaigym.KEY, style="dim")
     console.print(
         f"2025: means over four seeds of the resets. Published rows: {realaigym.SOURCE}.",

@@ -93,9 +93,9 @@ def group_of(plant: Plant, duration: float, **fields: Any) -> WorldGroup:
 def rows_of(group: WorldGroup, count: int) -> np.ndarray:
     """Rows of runs that differ in seed and start."""
     rows = np.repeat(group.rows[:1], count, axis=0)
-    at = group.layout.row.x0
+    x0_place = group.layout.row.x0
     n = group.form.n
-    rows[:, at : at + n] += np.random.default_rng(1).uniform(-0.05, 0.05, (count, n))
+    rows[:, x0_place : x0_place + n] += np.random.default_rng(1).uniform(-0.05, 0.05, (count, n))
     rows[:, SETTING.seed] = np.arange(count)
     return rows
 
@@ -140,11 +140,11 @@ def bare_step_time(group: WorldGroup, count: int) -> float:
 def times_of_steps() -> dict[str, Any]:
     """Times of steps, and whether a step was captured."""
     panda = group_of(smc.plant("panda"), 1.0)
-    found: dict[str, Any] = {}
+    times: dict[str, Any] = {}
     for name, group in (("arm", group_of(arm(), 1.0)), ("panda", panda)):
-        found[name] = [step_time(group, count) for count in WORLDS]
-    found["callback"] = 1.0 - bare_step_time(panda, WORLDS[-1]) / found["panda"][-1]
-    return found
+        times[name] = [step_time(group, count) for count in WORLDS]
+    times["callback"] = 1.0 - bare_step_time(panda, WORLDS[-1]) / times["panda"][-1]
+    return times
 
 
 def pandas() -> dict[str, Any]:
@@ -167,14 +167,14 @@ def wall() -> dict[str, Any]:
         cases.append(
             smc.Scenario(plant=arm(WALL), law=smc.law("pid"), noise=NOISE, seed=seed, x0=x0)
         )
-    made = WorldGroup(cases, METRICS)
-    found = made.run(made.rows)  # raises where contacts do not fit
+    group = WorldGroup(cases, METRICS)
+    group_scores = group.run(group.rows)  # raises where contacts do not fit
     apart = 0.0
-    for scores, trace in zip(found, smc.run(cases), strict=True):
+    for scores, trace in zip(group_scores, smc.run(cases), strict=True):
         for name, value in zip(METRICS, scores[SCORES:], strict=True):
             expected = getattr(catalogue, name)(trace)
             apart = max(apart, abs(value - expected) / max(abs(expected), 1e-12))
-    return {"wall_apart": apart, "wall_failed": int((found[:, FAILURE] != state.FINE).sum())}
+    return {"wall_apart": apart, "wall_failed": int((group_scores[:, FAILURE] != state.FINE).sum())}
 
 
 def costs(group: WorldGroup, goal: Objective, names: list[str], sets: np.ndarray) -> np.ndarray:
@@ -183,14 +183,14 @@ def costs(group: WorldGroup, goal: Objective, names: list[str], sets: np.ndarray
     rows = np.repeat(group.rows[:1], len(sets), axis=0)
     for j, name in enumerate(names):
         rows[:, group.gain_columns(name)] = sets[:, [j]]
-    found = []
+    J = []
     start = sum(map(abs, case.x0))
     for failure, step, itae, tv in group.run(rows).tolist():
         terms = goal.terms_of_failure(step * case.physics_step)
         if failure == state.FINE:
             terms = goal.terms_of_sums(case, itae, start, tv)
-        found.append(terms[0] + goal.weight * terms[1])
-    return np.array(found)
+        J.append(terms[0] + goal.weight * terms[1])
+    return np.array(J)
 
 
 def wide() -> dict[str, Any]:
@@ -219,12 +219,12 @@ def wide() -> dict[str, Any]:
     tuned = smc.tune(plant, law, objective=goal, searches=1)
     of_tune = time.perf_counter() - began
     gains = dict(zip(names, 10 ** best[0], strict=True))
-    found = []
-    for one in (smc.law("super_twisting", **gains), tuned.law):
-        (unseen,) = goal.scenarios(plant, one, search=1)
+    J = []
+    for gained_law in (smc.law("super_twisting", **gains), tuned.law):
+        (unseen,) = goal.scenarios(plant, gained_law, search=1)
         terms = goal.terms_of_run(smc.run(unseen))
-        found.append(terms[0] + goal.weight * terms[1])
-    return {"wide": [found[0] / found[1], taken / of_tune]}
+        J.append(terms[0] + goal.weight * terms[1])
+    return {"wide": [J[0] / J[1], taken / of_tune]}
 
 
 def shown(value: Any) -> str:
@@ -232,7 +232,7 @@ def shown(value: Any) -> str:
     if value is None:
         return "not measured"
     if isinstance(value, list):
-        return " / ".join(f"{one:.3g}" for one in value)
+        return " / ".join(f"{number:.3g}" for number in value)
     return f"{value:.3g}"
 
 
@@ -261,9 +261,9 @@ def main() -> None:
     measured: dict[str, Any] = {"card": f"{card}, {datetime.date.today()}"}
     for part in (times_of_steps, pandas, wall, wide):
         try:
-            with warnings.catch_warnings(record=True) as told:
+            with warnings.catch_warnings(record=True) as caught:
                 measured |= part()
-            print(part.__name__, *map(str, told), flush=True)
+            print(part.__name__, *map(str, caught), flush=True)
         except Exception:  # the others go on
             print(f"{part.__name__} failed:\n{traceback.format_exc()}", flush=True)
     print(table(measured))

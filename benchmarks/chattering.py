@@ -57,17 +57,17 @@ def halving(plant: str) -> None:
         changes = {} if drive is None else {"actuator": drive}
         runs = smc.run([case(plant, law, "nominal", 5.0, "tuned", changes=changes) for law in laws])
         integrator = runs[0].scenario.resolved.integrator
-        found = {}
+        change_by_law = {}
         for t, c in zip(runs, smc.accuracy.step_halving(runs, 0), strict=True):
             if c.marked:
-                found[t.scenario.law.name] = c
-        marked[integrator] += len(found)
+                change_by_law[t.scenario.law.name] = c
+        marked[integrator] += len(change_by_law)
         cases[integrator] += len(runs)
         parts = []
-        for law, change in found.items():
+        for law, change in change_by_law.items():
             parts.append(f"{law} {100 * change.amplitude:.0f} %, {100 * change.frequency:.0f} %")
         print(
-            f"{name}: {len(found)} of "
+            f"{name}: {len(change_by_law)} of "
             f"{len(runs)}{', amplitude and frequency: ' * bool(parts)}{'; '.join(parts)}"
         )
     print(*(f"{name}: {marked[name]} of {cases[name]}" for name in cases), sep=", ")
@@ -83,16 +83,16 @@ def main() -> None:
         metavar="PLANT",
         help="what half the physics step changes on this plant instead",
     )
-    given = parser.parse_args()
+    options = parser.parse_args()
     warnings.simplefilter("ignore")
-    if given.halving:
-        halving(given.halving)
+    if options.halving:
+        halving(options.halving)
         return
-    rng = np.random.default_rng(given.seed)
+    rng = np.random.default_rng(options.seed)
     rows = []
     samples = []
     none = 0
-    while len(rows) < given.loops:
+    while len(rows) < options.loops:
         loop = random_loop(rng)
         amplitude, frequency = loop.cycle()
         if not frequency > SLOWEST:

@@ -41,10 +41,10 @@ FALL = {"cart_pole": 9.81, "furuta": 9.81 / 0.085}
 def oracle(y, gains, memory):
     """Return u and the distance to the parabola."""
     w = gains.w
-    left = gains.share * max(abs(y.g) * y.limit - abs(y.f - y.ddr), 0.05 * abs(y.g) * y.limit)
+    spare = gains.share * max(abs(y.g) * y.limit - abs(y.f - y.ddr), 0.05 * abs(y.g) * y.limit)
     h = 0.5 * w * y.e
-    if abs(y.e) > 2.0 * left / (w * w):
-        h = math.copysign(math.sqrt(2.0 * left * abs(y.e)) - left / w, y.e)
+    if abs(y.e) > 2.0 * spare / (w * w):
+        h = math.copysign(math.sqrt(2.0 * spare * abs(y.e)) - spare / w, y.e)
     s = y.de + h
     return (y.ddr - y.f - 2.0 * w * s) / y.g, s
 
@@ -108,13 +108,13 @@ def scenarios(
     if isinstance(instances, str):
         instances = range(one.visible)
     base = one._base(law)
-    made = []
+    runs = []
     for index in instances:
         scenario = informed(one._place(base, one.instance(index, seed)))
         if one._attacked:
             scenario = informed(one._worst(scenario))
-        made.append(scenario)
-    return made
+        runs.append(scenario)
+    return runs
 
 
 def oracles(one: Problem) -> Iterable[tuple[float, float]]:

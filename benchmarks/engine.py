@@ -51,11 +51,11 @@ def scenario(fields: dict, seed: int = 0) -> smc.Scenario:
 def rows_of(group: FormGroup, count: int) -> np.ndarray:
     """Rows of runs that differ in seed and start."""
     rows = np.repeat(group.rows[:1], count, axis=0)
-    at = group.layout.row
+    places = group.layout.row
     n = group.form.n
     starts = np.random.default_rng(1).uniform(0.2, 0.6, (count, n))
-    rows[:, at.x0 : at.x0 + n] = starts
-    rows[:, at.bands : at.bands + n] = 0.02 * starts.max(axis=1, keepdims=True)
+    rows[:, places.x0 : places.x0 + n] = starts
+    rows[:, places.bands : places.bands + n] = 0.02 * starts.max(axis=1, keepdims=True)
     rows[:, SETTING.seed] = np.arange(count)
     return rows
 
@@ -79,17 +79,17 @@ def on_processor(fields: dict) -> str:
     """Runs a second in all threads, how they scale, MuJoCo's, and how far apart the scores are."""
     group = FormGroup([scenario(fields, seed) for seed in range(BY_MUJOCO)], METRICS)
     rows = rows_of(group, COMPARED)
-    found = group.run(group.rows)
+    engine_scores = group.run(group.rows)
     in_one = rate(lambda: group.run(rows, threads=1), COMPARED)
     in_all = rate(lambda: group.run(rows), COMPARED)
     traces = []
     by_mujoco = rate(lambda: traces.extend(smc.run(group.scenarios)), BY_MUJOCO)
-    expected = found.copy()
+    expected = engine_scores.copy()
     for row, trace in zip(expected, traces, strict=True):
         row[SCORES:] = [getattr(catalogue, metric)(trace) for metric in METRICS]
     return (
         f"{in_all:9,.0f}  {in_all / in_one:5.2f}x  {by_mujoco:8,.0f}  {in_all / by_mujoco:5.1f}x  "
-        f"{apart(found, expected)[-1]:.0e}"
+        f"{apart(engine_scores, expected)[-1]:.0e}"
     )
 
 
@@ -98,12 +98,12 @@ def on_device(fields: dict, wanted: int) -> str:
     group = FormGroup([scenario(fields)], METRICS)
     few = rows_of(group, COMPARED)
     many = rows_of(group, AT_ONCE)
-    found = group.run(few, device="cuda")
+    device_scores = group.run(few, device="cuda")
     expected = group.run(few)
     by_processor = rate(lambda: group.run(few), COMPARED)
     by_device = rate(lambda: group.run(many, device="cuda"), AT_ONCE)
-    alike = (found[:, FAILURE] == expected[:, FAILURE]).mean()
-    differences = apart(found, expected)
+    alike = (device_scores[:, FAILURE] == expected[:, FAILURE]).mean()
+    differences = apart(device_scores, expected)
     return (
         f"{by_processor:9,.0f}  {by_device:11,.0f}  {wanted:9,}  {by_device / by_processor:5.0f}x  "
         f"{100 * alike:5.1f} %  {differences[COMPARED // 2]:.0e}  {differences[-1]:.0e}"
@@ -114,11 +114,11 @@ def picture(path: str, device: str, side: int = 1000) -> None:
     """Draw from where a weak law brings the pendulum upright, a start a pixel."""
     law = smc.law("observer_free", lam=1.5, k1=9.0)  # N m, of the 2.45 that hold it anywhere
     began = time.perf_counter()
-    found = smc.design.basin("inverted_pendulum", law, points=(side, side), device=device)
+    basin = smc.design.basin("inverted_pendulum", law, points=(side, side), device=device)
     seconds = time.perf_counter() - began
-    region_figure.draw([found], path)
-    share = 100.0 * found.share
-    print(f"{path}: {share:.3f} % of {side**2:,} starts in {seconds:.1f} s; {found.checked}")
+    region_figure.draw([basin], path)
+    share = 100.0 * basin.share
+    print(f"{path}: {share:.3f} % of {side**2:,} starts in {seconds:.1f} s; {basin.checked}")
 
 
 def main() -> None:
@@ -134,8 +134,8 @@ def main() -> None:
         print("case, threads, device, wanted, ratio; fail alike, scores apart: median, largest")
     else:
         print("case, threads, to one thread, MuJoCo, ratio; scores apart")
-    for name, (wanted, fields) in CASES.items():
-        cells = on_device(fields, wanted) if cuda else on_processor(fields)
+    for name, (names, fields) in CASES.items():
+        cells = on_device(fields, names) if cuda else on_processor(fields)
         print(f"{name:34}{cells}", flush=True)
 
 

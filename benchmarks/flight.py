@@ -119,20 +119,21 @@ def leads(table: Table, metric: str, families: Mapping[str, Sequence[str]]) -> t
     """Return the lead in every cell of a study's table that has one; families: name -> names of
     laws.
     """
-    found = []
+    lead_rows = []
     by_row = paired_runs.by_row(table, metric)
     for group in paired_runs.groups(table, by=("plant", "condition")):
         ((plant, condition),) = group.blocks
         (ran,) = paired_runs.scenarios(table, group)
         if not (scored := group.scores(by_row)).values:
             continue
-        there = ~np.isnan(np.array([row[0] for row in scored.values.values()])).any(axis=0)
+        has_value = ~np.isnan(np.array([row[0] for row in scored.values.values()])).any(axis=0)
         values, sets = (
-            {law: row[0][there] for law, row in of.items()} for of in (scored.values, scored.sets)
+            {law: row[0][has_value] for law, row in columns.items()}
+            for columns in (scored.values, scored.sets)
         )
-        if one := lead(values, sets, paired_runs.floor(ran, metric), families):
-            found.append(one._replace(plant=plant, condition=condition))
-    return tuple(found)
+        if lead_row := lead(values, sets, paired_runs.floor(ran, metric), families):
+            lead_rows.append(lead_row._replace(plant=plant, condition=condition))
+    return tuple(lead_rows)
 
 
 def conditions() -> list[Any]:
@@ -149,11 +150,11 @@ def twins() -> list[Law]:
     sliding, adaptive = (
         smc.law(name) for name in ("quaternion_sliding", "adaptive_quaternion_sliding")
     )
-    its = SimpleNamespace(**sliding.gains)
-    line = {"kx": its.Kx * its.rhox * its.c, "kv": its.c + its.Kx * its.rhox}
-    line |= {"kR": its.K * its.rho * its.lam / 2, "kW": its.K * its.rho + its.lam / 2}
+    gains = SimpleNamespace(**sliding.gains)
+    line = {"kx": gains.Kx * gains.rhox * gains.c, "kv": gains.c + gains.Kx * gains.rhox}
+    line |= {"kR": gains.K * gains.rho * gains.lam / 2, "kW": gains.K * gains.rho + gains.lam / 2}
     still = smc.law("adaptive_quaternion_sliding", Gx=0, mux=0, G=0, mu=0)
-    as_they_are = [smc.law(one.name, **one.gains) for one in (sliding, adaptive)]
+    as_they_are = [smc.law(law.name, **law.gains) for law in (sliding, adaptive)]
     return [
         as_they_are[0],
         smc.law("geometric", **line).named("its line"),
@@ -201,7 +202,7 @@ def main() -> None:
         laws = twins()
         names = [law.name for law in laws]
     with tempfile.TemporaryDirectory() as passing:
-        found = smc.compare(
+        compared = smc.compare(
             laws,
             DRONE,
             conditions(),
@@ -210,13 +211,14 @@ def main() -> None:
             metrics=(MEASURE,),
             out=chosen.out or passing,
         )
-    print("\n".join(rows(found.leaderboard, names)))
-    for one in leads(found.table, MEASURE, FAMILIES):
+    print("\n".join(rows(compared.leaderboard, names)))
+    for lead_row in leads(compared.table, MEASURE, FAMILIES):
         sure = (
-            f"{one.first} by {one.times:.3g} times ({one.low:.3g} to {one.high:.3g}), "
-            f"{'/'.join(one.laws)}"
+            f"{lead_row.first} by {lead_row.times:.3g} times "
+            f"({lead_row.low:.3g} to {lead_row.high:.3g}), "
+            f"{'/'.join(lead_row.laws)}"
         )
-        print(f"{one.condition}: {sure if one.sure else 'no family is surely first'}")
+        print(f"{lead_row.condition}: {sure if lead_row.sure else 'no family is surely first'}")
 
 
 if __name__ == "__main__":

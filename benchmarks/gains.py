@@ -54,8 +54,8 @@ class Task(NamedTuple):
 def tasks() -> Iterator[Task]:
     """Every law on every plant: those of the first page first, in the set that ranks them."""
     yield from (Task("tuned", plant, law, SEARCHES) for law in RANKED for plant in PLANTS)
-    others = [law for law in gain_sets.general() if law not in RANKED]
-    yield from (Task("tuned", plant, law, OTHERS) for law in others for plant in PLANTS)
+    rarer_laws = [law for law in gain_sets.general() if law not in RANKED]
+    yield from (Task("tuned", plant, law, OTHERS) for law in rarer_laws for plant in PLANTS)
     yield from (Task("tracking", plant, law, OTHERS) for law in gain_sets.LAWS for plant in PLANTS)
 
 
@@ -129,11 +129,11 @@ def main() -> None:
     )
     parser.add_argument("laws", nargs="*", help="only these laws")
     parser.add_argument("--all", action="store_true", help="tune again what is there")
-    asked = parser.parse_args()
-    todo = wanted(asked.laws, asked.all)
+    options = parser.parse_args()
+    todo = wanted(options.laws, options.all)
     start = time.monotonic()
     done = 0
-    whole = sum(task.work for task in todo)
+    whole_work = sum(task.work for task in todo)
     with ProcessPoolExecutor(PROCESSES) as pool:
         running = {pool.submit(tune, task): task for task in todo}
         for count, future in enumerate(as_completed(running), 1):
@@ -141,11 +141,11 @@ def main() -> None:
             record = future.result()
             store(task, record)
             done += task.work
-            left = (time.monotonic() - start) / 60.0 * (whole / done - 1.0)
+            minutes = (time.monotonic() - start) / 60.0 * (whole_work / done - 1.0)
             least = min(record["objectives"])
             most = max(record["objectives"])
             words = f"{task.gains}: {task.plant}, {task.law}: J {least:.4g} to {most:.4g} s²"
-            print(f"{count}/{len(todo)} {words}; about {left:.0f} min left", flush=True)
+            print(f"{count}/{len(todo)} {words}; about {minutes:.0f} min left", flush=True)
 
 
 if __name__ == "__main__":

@@ -168,9 +168,9 @@ def stribeck_joint(inertia, weight, numbers, r, dr, noise, quantum):
     us.
     """
     kc, kcs, vs, kv, offset, delay = numbers
-    every = round(1.0 / RATE / STEP)
+    steps_per_sample = round(1.0 / RATE / STEP)
     late = round(delay / STEP)
-    found = np.zeros((len(r), 2))
+    readings = np.zeros((len(r), 2))
     u = np.zeros(len(r))
     x = v = last = dy = 0.0
     share = 1.0 - math.exp(-1.0 / RATE / 4e-3)
@@ -180,10 +180,10 @@ def stribeck_joint(inertia, weight, numbers, r, dr, noise, quantum):
             dy += share * ((y - last) * RATE - dy)
         last = y
         u[k] = KP * (r[k] - y) + KD * (dr[k] - dy)
-        found[k, 0], found[k, 1] = y, u[k]
-        for j in range(every):
-            i = k * every + j - late
-            force = (u[i // every] if i >= 0 else 0.0) + offset - weight * math.sin(x)
+        readings[k, 0], readings[k, 1] = y, u[k]
+        for j in range(steps_per_sample):
+            i = k * steps_per_sample + j - late
+            force = (u[i // steps_per_sample] if i >= 0 else 0.0) + offset - weight * math.sin(x)
             if v == 0.0 and abs(force) <= kc + kcs:
                 continue
             sign = math.copysign(1.0, v if v != 0.0 else force)
@@ -193,7 +193,7 @@ def stribeck_joint(inertia, weight, numbers, r, dr, noise, quantum):
                 after = 0.0
             x += 0.5 * STEP * (v + after)
             v = after
-    return found
+    return readings
 
 
 def stribeck_log(seed: int, motion: Any, inertia: float, duration: float = 8.0) -> dict:
@@ -217,7 +217,10 @@ def found_of(name: str, seed: int) -> tuple[Any, dict[str, float]]:
             sines([0.0], [0.5, 0.3, 0.15], [0.23, 0.7, 1.9]),
             sines([0.0], [0.4, 0.3, 0.1], [0.31, 0.9, 2.3]),
         ]
-        run, held = (stribeck_log(seed + 50 * k, one, inertia) for k, one in enumerate(motions))
+        run, held = (
+            stribeck_log(seed + 50 * k, joint_motion, inertia)
+            for k, joint_motion in enumerate(motions)
+        )
         return smc.identify(machine, run, list(STRIBECK), held_out=held), STRIBECK
     m = MACHINES[name]
     measured = m.get("measured", [])
@@ -237,22 +240,22 @@ def known(names: list[str], seeds: int) -> None:
     for name in names:
         for seed in range(seeds):
             begin = time.process_time()
-            found, truth = found_of(name, seed)
+            identified, truth = found_of(name, seed)
             spent = time.process_time() - begin
-            print(f"{name}, seed {seed}: {spent:.0f} s of processor, {found.evaluations} sets")
+            print(f"{name}, seed {seed}: {spent:.0f} s of processor, {identified.evaluations} sets")
             for path, true in truth.items():
-                off = found.values[path] - true
-                error = found.errors[path]
+                off = identified.values[path] - true
+                error = identified.errors[path]
                 within = abs(off) <= max(2.0 * error, 0.003 * abs(true))
                 inside += within
                 total += 1
-                start = found.before.values[path] / true - 1.0
+                start = identified.before.values[path] / true - 1.0
                 print(
                     f"  {path:20s} {true:8.4g}  start {100 * start:+6.1f} %"
                     f"  off {100 * off / true:+6.2f} %, {off / error:+5.1f} errors"
                     f"{'' if within else '  outside'}"
                 )
-            print(f"  {str(found).split(chr(10) * 2)[1]}", flush=True)
+            print(f"  {str(identified).split(chr(10) * 2)[1]}", flush=True)
     print(f"{inside} of {total} numbers within two errors or 0.3 %")
 
 
@@ -263,23 +266,23 @@ def public(folder: Path) -> None:
     names = ["m", "j.armature", "j.damping", "j.frictionloss", "j.offset", "input_delay"]
     used = tuple(pendulum_log(folder, name) for name in ("ddp", "direct_collocation"))
     names_of_others = "energy_shaping", "pd-system_identification"
-    others = {name: pendulum_log(folder, name) for name in names_of_others}
-    beside_published(arm, names, used, others)
+    held_out = {name: pendulum_log(folder, name) for name in names_of_others}
+    beside_published(arm, names, used, held_out)
     arm = smc.plant_from(double_pendulum(), ["shoulder", "elbow"])
     names = [f"{joint}.{kind}" for joint in ("shoulder", "elbow") for kind in KINDS]
     used = tuple(double_pendulum_log(folder, name, 6.0) for name in ("03", "13"))
-    others = {name: double_pendulum_log(folder, name, 8.0) for name in ("01", "05", "07")}
-    beside_published(arm, [*names, "input_delay"], used, others)
+    held_out = {name: double_pendulum_log(folder, name, 8.0) for name in ("01", "05", "07")}
+    beside_published(arm, [*names, "input_delay"], used, held_out)
 
 
 def beside_published(arm: Any, names: list[str], used: tuple, others: dict[str, dict]) -> None:
     """Print what logs give, and how it fits others, beside the published numbers of the model."""
     begin = time.process_time()
-    found = smc.identify(arm, list(used), names)
-    print(f"{time.process_time() - begin:.0f} s of processor\n{found}")
+    identified = smc.identify(arm, list(used), names)
+    print(f"{time.process_time() - begin:.0f} s of processor\n{identified}")
     before = own_rig(arm, [name for name in names if name.endswith(".frictionloss")])
-    for name, other in others.items():
-        ours, theirs = (check(rig, other).by_pieces for rig in (found.rig, before))
+    for name, record in others.items():
+        ours, theirs = (check(rig, record).by_pieces for rig in (identified.rig, before))
         for column, fit in ours.items():
             published = f"published numbers {theirs[column]:.2f} %"
             print(f"held out {name}, {column} in pieces of 1 s: {fit:.2f} %, {published}")
@@ -287,11 +290,11 @@ def beside_published(arm: Any, names: list[str], used: tuple, others: dict[str, 
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore", smc.errors.ScenarioWarning)
-    given = argparse.ArgumentParser(description=__doc__)
-    given.add_argument("machines", nargs="*", default=[*MACHINES, "stribeck"])
-    given.add_argument("--seeds", type=int, default=1)
-    given.add_argument("--public", type=Path)
-    options = given.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("machines", nargs="*", default=[*MACHINES, "stribeck"])
+    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--public", type=Path)
+    options = parser.parse_args()
     if options.public:
         public(options.public)
     else:

@@ -40,17 +40,17 @@ def chain(n: int, damping: float = 0.0, armature: float = 0.0) -> str:
     """The MJCF of a chain of n links with random numbers, and more damping and armature."""
     rng = random.Random(f"chain {n}")
     text = HEAD.format(f"chain{n}")
-    at = 1.5
+    place = 1.5
     for i in range(1, n + 1):
         length, mass = rng.uniform(0.25, 0.45), rng.uniform(0.4, 1.4) / i
         text += (
-            f'<body name="b{i}" pos="0 0 {at}"><joint name="j{i}" axis="0 1 0" '
+            f'<body name="b{i}" pos="0 0 {place}"><joint name="j{i}" axis="0 1 0" '
             f'damping="{damping + rng.uniform(0.01, 0.06):.4f}" '
             f'armature="{armature + rng.uniform(0, 0.02):.4f}" '
             f'range="-6 6"/><geom name="g{i}" fromto="0 0 -.03 0 0 {0.03 - length:.4f}" '
             f'mass="{mass:.4f}" {FREE}/>'
         )
-        at = -round(length, 4)
+        place = -round(length, 4)
     motors = (f'<motor joint="j{i}" ctrlrange="-40 40"/>' for i in range(1, n + 1))
     return f"{text}{'</body>' * n}</worldbody><actuator>{''.join(motors)}</actuator></mujoco>"
 
@@ -190,7 +190,7 @@ def row(scenario: smc.Scenario) -> dict:
     now, spent = timed(scenario)
     step = resolved.physics_step / 16 if resolved.integrator == "RK4" else SHORTEST
     truth = smc.run(dataclasses.replace(scenario, integrator="RK4", physics_step=step))
-    found: dict = {
+    values: dict = {
         "integrator": resolved.integrator,
         "ms": 1e3 * resolved.physics_step,
         "cost": spent / first,
@@ -199,8 +199,8 @@ def row(scenario: smc.Scenario) -> dict:
     for name, trace in (("before", before), ("now", now)):
         for score in SCORES:
             true = smc.score(truth)[score]
-            found[f"{name} {score}"] = 100.0 * (smc.score(trace)[score] / true - 1.0)
-    return found
+            values[f"{name} {score}"] = 100.0 * (smc.score(trace)[score] / true - 1.0)
+    return values
 
 
 def measure() -> dict[str, dict]:
@@ -209,8 +209,8 @@ def measure() -> dict[str, dict]:
     for name, make in MACHINES.items():
         plant, fields = make()
         for law in LAWS:
-            given = smc.Scenario(plant=plant, law=law, duration=DURATION, model="none", **fields)
-            rows[f"{name} | {law}"] = row(given)
+            scenario = smc.Scenario(plant=plant, law=law, duration=DURATION, model="none", **fields)
+            rows[f"{name} | {law}"] = row(scenario)
             print(name, law, rows[f"{name} | {law}"], flush=True)
     return rows
 
@@ -226,13 +226,13 @@ def table(rows: dict[str, dict]) -> str:
         "| machine | law | default | bound, rms off | told | under implicitfast, 0.25 ms | time |",
         "|---|---|---|---|---|---|---|",
     ]
-    for name, found in rows.items():
+    for name, values in rows.items():
         errors = {}
         for when in ("now", "before"):
-            errors[when] = ", ".join(percent(found[f"{when} {score}"]) for score in SCORES)
+            errors[when] = ", ".join(percent(values[f"{when} {score}"]) for score in SCORES)
         lines.append(
-            f"| {name} | {found['integrator']}, {found['ms']:g} ms | {errors['now']} | "
-            f"{'yes' if found['marked'] else 'no'} | {errors['before']} | {found['cost']:.2f} |"
+            f"| {name} | {values['integrator']}, {values['ms']:g} ms | {errors['now']} | "
+            f"{'yes' if values['marked'] else 'no'} | {errors['before']} | {values['cost']:.2f} |"
         )
     return "\n".join(lines)
 

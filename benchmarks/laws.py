@@ -126,7 +126,7 @@ def sample(law: str, velocity: str = "measured") -> float:
         mujoco.mj_forward(batch.model, data)
     function = callback().ctypes
     model = batch.model._address
-    at = data._address
+    address = data._address
     moved = phase + 7e-3 * np.arange(SAMPLES)[:, None]
     seen = np.empty((SAMPLES, len(data.sensordata)))  # position and velocity, channel by channel
     seen[:, 0::2], seen[:, 1::2] = 0.3 * np.sin(moved), 2.1 * np.cos(moved)
@@ -136,7 +136,7 @@ def sample(law: str, velocity: str = "measured") -> float:
         start = time.perf_counter()
         for k in range(SAMPLES):
             data.sensordata[:] = seen[k]
-            function(model, at)
+            function(model, address)
         least = min(least, time.perf_counter() - start)
         assert batch.records["failure"][0] == FINE, law
     return 1e9 * least / (SAMPLES * PENDULUMS)
@@ -162,15 +162,17 @@ def main() -> None:
     worst = 0.0
     for name in laws():
         blind, seeing = (nanoseconds(smc.law(name), drive, model) for model in (0.0, 1.0))
-        whole = sample(name) if general(name) else np.nan
-        worst = max(worst, whole / sample_base if general(name) and name not in SOLVERS else 0.0)
-        rows.append((blind, name, seeing, whole))
-    for blind, name, seeing, whole in sorted(rows):
-        if np.isnan(whole):
-            shown = ("", "")
+        sample_time = sample(name) if general(name) else np.nan
+        worst = max(
+            worst, sample_time / sample_base if general(name) and name not in SOLVERS else 0.0
+        )
+        rows.append((blind, name, seeing, sample_time))
+    for blind, name, seeing, sample_time in sorted(rows):
+        if np.isnan(sample_time):
+            cells = ("", "")
         else:
-            shown = (f"{whole:.0f}", f"{whole / sample_base:.2f}")
-        table.add_row(name, f"{blind:.1f}", f"{seeing:.1f}", f"{blind / call_base:.1f}", *shown)
+            cells = (f"{sample_time:.0f}", f"{sample_time / sample_base:.2f}")
+        table.add_row(name, f"{blind:.1f}", f"{seeing:.1f}", f"{blind / call_base:.1f}", *cells)
     console.print(table)
     verdict = "held" if worst <= MOST else "missed"
     console.print(
@@ -178,13 +180,15 @@ def main() -> None:
         highlight=False,
     )
     for name in SOLVERS:
-        its = law_time(case("duffing", name, "nominal", 2.0, "tuned", 0))
-        assert its is not None
-        if its.ratio <= MOST_OF_PID:
+        timed = law_time(case("duffing", name, "nominal", 2.0, "tuned", 0))
+        assert timed is not None
+        if timed.ratio <= MOST_OF_PID:
             verdict = "held"
         else:
             verdict = "missed"
-        words = f"{1e9 * its.median:.0f} ns, 99 % {1e9 * its.high:.0f} ns, {its.ratio:.2f}x pid"
+        words = (
+            f"{1e9 * timed.median:.0f} ns, 99 % {1e9 * timed.high:.0f} ns, {timed.ratio:.2f}x pid"
+        )
         console.print(
             f"{name} in a run: {words}, target <= {MOST_OF_PID:g}x: {verdict}", highlight=False
         )
@@ -193,13 +197,13 @@ def main() -> None:
         table.add_column(head, justify="left" if head == "estimator" else "right", no_wrap=True)
     for name in estimators():
         spent = nanoseconds(smc.estimator(name), read)
-        whole = sample("classical", name)
+        sample_time = sample("classical", name)
         table.add_row(
             name,
             f"{spent:.1f}",
             f"{spent / call_base:.1f}",
-            f"{whole:.0f}",
-            f"{whole / sample_base:.2f}",
+            f"{sample_time:.0f}",
+            f"{sample_time / sample_base:.2f}",
         )
     console.print(table)
 

@@ -80,7 +80,7 @@ def of_record(
     record = dict(np.load(file))
     members = list(rig.members().values())
     variants = {"": members} | {
-        variant: [one.with_values(values, "left out") for one in members]
+        variant: [member.with_values(values, "left out") for member in members]
         for variant, values in VARIANTS.get(rig.name, {}).items()
     }
     control = rig.set(published) if published else None
@@ -89,12 +89,12 @@ def of_record(
     else:
         beside = (control.predictions([record])[0], control.fits([record])[0])
     for variant, sets in variants.items():
-        of_sets = [(one.predictions([record])[0], one.fits([record])[0]) for one in sets]
+        of_sets = [(member.predictions([record])[0], member.fits([record])[0]) for member in sets]
         for column, (figure, measured) in enumerate(of_sets[0][0][1].items()):
             values = []
-            for (made, _, _), fits in of_sets:
+            for (predicted, _, _), fits in of_sets:
                 values.append(
-                    math.inf if math.isinf(list(fits.values())[column]) else size(made[figure])
+                    math.inf if math.isinf(list(fits.values())[column]) else size(predicted[figure])
                 )
             fit = float(list(of_sets[0][1].values())[column])
             public = math.nan
@@ -133,9 +133,9 @@ def of_emps() -> Iterator[TwinFigure]:
         "with the reference a tick late": [values[0], *values[:-1]],
         "with the reference a tick early": [*values[1:], values[-1]],
     }
-    for variant, other in variants.items():
+    for variant, torque in variants.items():
         predicted = programs.tracking(
-            rig, None if other is None else TimeSeries(program.times, other)
+            rig, None if torque is None else TimeSeries(program.times, torque)
         )
         for (figure, machine), twin in zip(EMPS_RECORD.items(), predicted, strict=True):
             yield TwinFigure(
@@ -160,12 +160,12 @@ def of_qube_servo_3() -> Iterator[TwinFigure]:
     step = np.genfromtxt(STEP, delimiter=",", names=True)
     step = step[step["t"] <= 0.8]
 
-    def arm(one: Rig) -> np.ndarray:
-        t, theta, _ = programs.moved(one, -1.0, 0.0, 0.8)
+    def arm(parameters: Rig) -> np.ndarray:
+        t, theta, _ = programs.moved(parameters, -1.0, 0.0, 0.8)
         return np.interp(step["t"], t, theta)
 
     sets = list(rig.members().values())
-    arms = [arm(one) for one in sets]
+    arms = [arm(parameters) for parameters in sets]
     fits = [percentages({"theta": values}, {"theta": step["theta"]})["theta"] for values in arms]
     common = {"rig": rig.name, "law": "none", "runs": len(sets)}
     rms = [size(values) for values in arms]
@@ -181,7 +181,7 @@ def of_qube_servo_3() -> Iterator[TwinFigure]:
         published=size(arm(public)),
         **common,
     )
-    predicted = np.transpose([programs.falls(one) for one in sets])
+    predicted = np.transpose([programs.falls(parameters) for parameters in sets])
     published = programs.falls(public)
     for (figure, (unit, machine)), twins, of_public in zip(
         FALLS.items(), predicted.tolist(), published, strict=True
@@ -205,13 +205,13 @@ def of_stepper(seeds: int) -> Iterator[TwinFigure | Order]:
     """
     rig = smc.rig("stepper_furuta")
     sets = len(rig.members())
-    whole = {name: stepper.predicted(rig, name, seeds) for name in stepper.CONDITIONS}
-    for condition, by_set in whole.items():
+    by_condition = {name: stepper.predicted(rig, name, seeds) for name in stepper.CONDITIONS}
+    for condition, by_set in by_condition.items():
         for law in stepper.ORDER:
             runs = [run for by_law in by_set.values() for run in by_law[law]]
-            known = {}
+            recorded = {}
             if law == stepper.FITTED_ON:
-                known = stepper.RECORDED[condition]
+                recorded = stepper.RECORDED[condition]
             for figure, unit in stepper.SHOWN.items():
                 values = stepper.standing(runs, figure)
                 if not len(values):
@@ -223,17 +223,17 @@ def of_stepper(seeds: int) -> Iterator[TwinFigure | Order]:
                     law=law.replace("_", " "),
                     figure=figure.replace("_", " "),
                     unit=unit,
-                    machine=known.get(figure, math.nan),
+                    machine=recorded.get(figure, math.nan),
                     twin=middle,
                     low=low,
                     high=high,
                     runs=len(values),
                 )
-    found = {("", condition): by_set for condition, by_set in whole.items()}
+    by_variant = {("", condition): by_set for condition, by_set in by_condition.items()}
     for part, changes in stepper.LEFT_OUT.items():
         few = stepper.predicted(rig, "hold", max(1, seeds // 4), changes)
-        found[f"without {part}", "hold"] = few
-    for (variant, condition), by_set in found.items():
+        by_variant[f"without {part}", "hold"] = few
+    for (variant, condition), by_set in by_variant.items():
         count, tau = stepper.ordered(by_set)
         yield Order(
             rig=rig.name,
@@ -275,19 +275,21 @@ def main() -> None:
     parser.add_argument(
         "--write", action="store_true", help="replace the rows, and draw docs/rigs.svg"
     )
-    given = parser.parse_args()
+    options = parser.parse_args()
     rows: list[TwinFigure | Order] = []
     for name, records in FILES.items():
         for record, law, file, published in records:
-            if (path := given.folder / f"{file}.npz").is_file():
+            if (path := options.folder / f"{file}.npz").is_file():
                 rows += of_record(smc.rig(name), record, law, path, published)
             else:
                 print(f"{path} is not there: its old rows stay")
-                rows += [one for one in twin_figures.rows(name) if one.record == record]
+                rows += [
+                    twin_row for twin_row in twin_figures.rows(name) if twin_row.record == record
+                ]
     rows += [*of_emps(), *of_qube_servo_3()]
-    rows += of_stepper(given.seeds)
+    rows += of_stepper(options.seeds)
     data = {
-        "command": f"python benchmarks/machines.py FOLDER --seeds {given.seeds} --write",
+        "command": f"python benchmarks/machines.py FOLDER --seeds {options.seeds} --write",
         "versions": versions(),
         "figures": [described(row) for row in rows if isinstance(row, TwinFigure)],
         "orders": [dataclasses.asdict(row) for row in rows if isinstance(row, Order)],
@@ -307,7 +309,7 @@ def main() -> None:
                 f"{row.rig:21} {row.condition}: {row.ordered} of {row.sets}, tau {row.tau:.2f} "
                 f"{row.variant}"
             )
-    if given.write:
+    if options.write:
         twin_figures.FILE.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
         _, picture = twin_figures.twins_figure(twin_figures.rows(), FIGURE)
         picture.unlink()  # as PNG

@@ -34,16 +34,16 @@ def by_cma_es(objective: ObjectiveFunction, count: int, seed: int) -> list[float
 
     bounds = np.log10(list(objective.bounds.values()))
     search = CMA(mean=bounds.mean(axis=1), sigma=0.5, bounds=bounds, seed=seed + 1)
-    found: list[tuple[float, list[float]]] = []
-    while len(found) < count:
-        asked = [search.ask() for _ in range(search.population_size)]
+    evaluated: list[tuple[float, list[float]]] = []
+    while len(evaluated) < count:
+        population = [search.ask() for _ in range(search.population_size)]
         costs = []
-        for logs in asked:
+        for logs in population:
             gains = (10.0**logs).tolist()
             costs.append(min(objective(gains), WORST))
-            found.append((costs[-1], gains))
-        search.tell(list(zip(asked, np.log(costs).tolist(), strict=True)))
-    return min(found[:count])[1]
+            evaluated.append((costs[-1], gains))
+        search.tell(list(zip(population, np.log(costs).tolist(), strict=True)))
+    return min(evaluated[:count])[1]
 
 
 def by_optuna(objective: ObjectiveFunction, count: int, seed: int) -> list[float]:
@@ -74,7 +74,10 @@ def measure() -> dict[str, dict[str, list[float]]]:
         count = BUDGET * len(smc.design.objective(plant, law).bounds)
         tuned = smc.tune(plant, law, budget=BUDGET, searches=SEARCHES)
         laws = {
-            "tune": [law(**dict(zip(tuned.bounds, one.gains, strict=True))) for one in tuned.sets]
+            "tune": [
+                law(**dict(zip(tuned.bounds, search_result.gains, strict=True)))
+                for search_result in tuned.sets
+            ]
         }
         for optimiser, best in OTHERS.items():
             laws[optimiser] = []
@@ -82,8 +85,8 @@ def measure() -> dict[str, dict[str, list[float]]]:
                 objective = smc.design.objective(plant, law, search=i)
                 laws[optimiser].append(objective.law(best(objective, count, i)))
         row = {}
-        for optimiser, found in laws.items():
-            row[optimiser] = objectives(plant, found)[0].tolist()
+        for optimiser, gained_laws in laws.items():
+            row[optimiser] = objectives(plant, gained_laws)[0].tolist()
         rows[f"{plant} | {name}"] = row
         print(plant, name, row, flush=True)
     return rows

@@ -48,16 +48,16 @@ TOLD = [(name, 0.0) for name in (*(ROTOR.names or ()), *OF_BODY, "delay")]
 @njit(error_model="numpy")
 def _left(t, move):
     """Return what is left of the way at a time, as a share, and its four derivatives, (5,)."""
-    left = np.zeros(5)
+    remaining = np.zeros(5)
     s = min(t / move, 1.0)
-    left[0] = 1.0
+    remaining[0] = 1.0
     for k in range(5 if s < 1.0 else 1):
         for i in range(5):
             factor = STEP[i]
             for j in range(k):
                 factor *= (5 + i - j) / move
-            left[k] -= factor * s ** (5 + i - k)
-    return left
+            remaining[k] -= factor * s ** (5 + i - k)
+    return remaining
 
 
 @njit(error_model="numpy")
@@ -74,7 +74,7 @@ def _plan(y, gains, memory):
     dddr = memory[:, 3]
     acceleration = np.zeros(6)
     first = memory[0, 7] == 0.0
-    left = _left(y.t, gains.move)
+    remaining = _left(y.t, gains.move)
     plan = np.zeros((5, 6))
     now = np.zeros((3, 6))
     if first:
@@ -87,7 +87,7 @@ def _plan(y, gains, memory):
         else:
             acceleration[i] = (read - v[i]) / y.dt
         for k in range(5):
-            plan[k, i] = start[i] * left[k]
+            plan[k, i] = start[i] * remaining[k]
         plan[2, i] += y.ddr[i]
         plan[3, i] += third
         plan[4, i] += (third - dddr[i]) / y.dt
@@ -104,7 +104,7 @@ def _jerk(gains, now, modelled, memory, dt):
     forces.
     """
     before = memory[:3, 4]
-    other = memory[3:, 4]
+    unmodelled = memory[3:, 4]
     jerk = np.zeros(3)
     share = dt * FILTER * gains.w / (1.0 + dt * FILTER * gains.w)
     for i in range(3):
@@ -112,16 +112,16 @@ def _jerk(gains, now, modelled, memory, dt):
             change = 0.0
         else:
             change = (now[2, i] - before[i]) / dt
-        other[i] += share * (change - modelled[i] - other[i])
-        jerk[i], before[i] = modelled[i] + other[i], now[2, i]
+        unmodelled[i] += share * (change - modelled[i] - unmodelled[i])
+        jerk[i], before[i] = modelled[i] + unmodelled[i], now[2, i]
     return jerk
 
 
 @njit(error_model="numpy")
 def _thrust(gains, j, W):
     """Return the thrust of rotor j, and its slope over the speed."""
-    whole = 1.0 - gains.fade if j == 0 else 1.0
-    return whole * (gains.linear + gains.square * W) * W, whole * (
+    share = 1.0 - gains.fade if j == 0 else 1.0
+    return share * (gains.linear + gains.square * W) * W, share * (
         gains.linear + 2.0 * gains.square * W
     )
 
@@ -166,11 +166,11 @@ def _shares(y, gains, T, torque, speeds, commanded, supply):
     levers = (gains.a, gains.a, gains.c)
     for j in range(ROTORS):
         signs = (PLACES[j, 1], -PLACES[j, 0], -SPINS[j])
-        wanted = T
-        whole = 1.0 - gains.fade if j == 0 else 1.0
+        lift = T
+        strength = 1.0 - gains.fade if j == 0 else 1.0
         for i in range(3):
-            wanted += signs[i] * torque[i] / levers[i]
-        goal = speed_for(gains, 0.25 * wanted / whole)
+            lift += signs[i] * torque[i] / levers[i]
+        goal = speed_for(gains, 0.25 * lift / strength)
         rate = gains.rise if goal > speeds[j] else gains.fall
         speed = max(0.0, speeds[j] + (goal - speeds[j]) / -math.expm1(-rate * AHEAD)) / supply
         share = min(max((gains.linear + gains.square * speed) * speed, 0.0), gains.fmax)
@@ -250,10 +250,10 @@ def knowing(scenario: Scenario) -> Scenario:
     plant = scenario.plant
     law = scenario.law
     true = plant.values(scenario.factors(0))
-    known = dict(zip(ROTOR.names or (), quadrotor.rotor(true, 0), strict=True))
-    known |= {name: getattr(true, name) for name in OF_BODY} | {
+    rotor_numbers = dict(zip(ROTOR.names or (), quadrotor.rotor(true, 0), strict=True))
+    rotor_numbers |= {name: getattr(true, name) for name in OF_BODY} | {
         "delay": float(scenario.delay_steps)
     }
-    law = oracle_flight(**dict(law.gains) | known).named(law.name)
+    law = oracle_flight(**dict(law.gains) | rotor_numbers).named(law.name)
     plant = dataclasses.replace(plant, parameters=vars(true))
     return dataclasses.replace(scenario, plant=plant, law=law, mismatch={}, noise=None)

@@ -91,23 +91,23 @@ def measure(kind: str, out: Path, seed: int, instances: int, names: Sequence[str
         plant, condition, version = str(name).replace("@", "/").split("/")
         # as problem(), also where left out
         text = (problems.RULES / f"{version}.toml").read_text(encoding="utf-8")
-        one = problems.Problem(
+        chosen = problems.Problem(
             id=name, plant=plant, condition=condition, version=int(version), rules=text
         )
         attacked = "/worst" in name
-        laws = laws_of(kind, one)
+        laws = laws_of(kind, chosen)
         count = min(instances, ATTACKED) if attacked else instances
         if not laws or (attacked and kind == "laws"):
             continue
         scenarios = []
         for law in laws.values():
-            for s in controls.scenarios(one, law, range(count), seed):
+            for s in controls.scenarios(chosen, law, range(count), seed):
                 scenarios.append(s)
-        found = [[math.nan]] * len(scenarios)
+        values_of_run = [[math.nan]] * len(scenarios)
         for i, trace in stream(scenarios):
-            values = one.measures(trace)
-            found[i] = [values[measure] for measure in MEASURES]
-        runs[name] = {law: found[i * count : (i + 1) * count] for i, law in enumerate(laws)}
+            values = chosen.measures(trace)
+            values_of_run[i] = [values[measure] for measure in MEASURES]
+        runs[name] = {law: values_of_run[i * count : (i + 1) * count] for i, law in enumerate(laws)}
         out.write_text(json.dumps(done))
         print(name, file=sys.stderr, flush=True)
 
@@ -165,18 +165,18 @@ def targets(
         worst["accuracy"] = max(worst["accuracy"], 0.0 if laws else rules["hardest"])
         if not all(map(math.isfinite, worst.values())):
             continue
-        found = {m: levels(laws, m, worst[m], rules) for m in problems.MEASURES}
-        ease = sum(math.log(level) for measure in found.values() for level in measure)
+        levels_by_measure = {m: levels(laws, m, worst[m], rules) for m in problems.MEASURES}
+        ease = sum(math.log(level) for measure in levels_by_measure.values() for level in measure)
         if best is None or ease < best[0]:
-            best = ease, setting, found, worst
+            best = ease, setting, levels_by_measure, worst
     if best is None:
         return None
-    _, setting, found, worst = best
+    _, setting, levels_by_measure, worst = best
     best_of_nothing = float(runs["zero"][:, MEASURES.index("accuracy")].min())
     if worst["accuracy"] > (bound := min(best_of_nothing / 2.0, NEAR)) or best_of_nothing < NEAR:
         return None
-    found["accuracy"] = [min(level, bound) for level in found["accuracy"]]
-    return found | {"oracle": setting}
+    levels_by_measure["accuracy"] = [min(level, bound) for level in levels_by_measure["accuracy"]]
+    return levels_by_measure | {"oracle": setting}
 
 
 def repeat(folder: Path, names: Sequence[str], version: int) -> bool:
@@ -201,14 +201,19 @@ def repeat(folder: Path, names: Sequence[str], version: int) -> bool:
         for law, runs in visible.get(name, {}).items():
             if f"{cell.partition('/')[0]}/{law}" not in LATER:
                 laws[law] = runs
-        found = targets(name, laws, of_controls[name], seen[name])
+        levels_by_measure = targets(name, laws, of_controls[name], seen[name])
         stored = rules["targets"].get(cell)
-        if found is not None:
-            found |= {m: [float(f"{level:.3g}") for level in found[m]] for m in problems.MEASURES}
-        differ += found != stored
+        if levels_by_measure is not None:
+            levels_by_measure |= {
+                m: [float(f"{level:.3g}") for level in levels_by_measure[m]]
+                for m in problems.MEASURES
+            }
+        differ += levels_by_measure != stored
         print(
             name,
-            "the same" if found == stored else f"differs: {found}, and in the rules {stored}",
+            "the same"
+            if levels_by_measure == stored
+            else f"differs: {levels_by_measure}, and in the rules {stored}",
             flush=True,
         )
     return not differ
@@ -249,23 +254,23 @@ def hold(seed: int, instances: int | None) -> bool:
     """Print the margins of both controls on every problem of every suite, and return whether both
     hold on all.
     """
-    names = sorted({name for each in suite.suites() for name in suite.suite(each)})
+    names = sorted({name for suite_name in suite.suites() for name in suite.suite(suite_name)})
     table: dict[str, dict[str, str]] = {}
-    every = []
+    margin_rows = []
     failing = []
     for name in names:
-        one = problems.problem(name)
+        chosen = problems.problem(name)
         if instances:
             count = range(min(instances, ATTACKED) if "/worst" in name else instances)
         else:
             count = "visible"
-        oracle, zero, failures = margins(one, count, seed)
-        every.append((oracle, zero, name))
+        oracle, zero, failures = margins(chosen, count, seed)
+        margin_rows.append((oracle, zero, name))
         if failures:
             failing += [f"{name}: {failures} targets"]
         else:
             failing += []
-        table.setdefault(one.plant, {})[one.condition] = f"{oracle:.2f}, {zero:.3g}"
+        table.setdefault(chosen.plant, {})[chosen.condition] = f"{oracle:.2f}, {zero:.3g}"
         print(name, f"{oracle:.3f}", f"{zero:.3g}", failures, sep="\t", file=sys.stderr, flush=True)
     conditions = list(dict.fromkeys(name.replace("@", "/").split("/")[1] for name in names))
     print("", *conditions, sep=" | ")
@@ -277,9 +282,9 @@ def hold(seed: int, instances: int | None) -> bool:
     )
     print(
         "least of the oracle:",
-        *min(every)[::2],
+        *min(margin_rows)[::2],
         "; least of u = 0:",
-        *min(every, key=lambda row: row[1])[1:],
+        *min(margin_rows, key=lambda row: row[1])[1:],
     )
     return not failing
 
@@ -290,15 +295,16 @@ def freeze(visible: Runs, of_controls: Runs, seen: Runs, seed: int, version: int
     lines = ["[targets]"]
     left_out = []
     for name in cells(version):
-        if (found := targets(name, visible.get(name, {}), of_controls[name], seen[name])) is None:
+        if (
+            levels_by_measure := targets(name, visible.get(name, {}), of_controls[name], seen[name])
+        ) is None:
             left_out.append(name.partition("@")[0])
             continue
         texts = []
         for m in problems.MEASURES:
-            texts.append(f"{m} = [{', '.join(f'{level:.3g}' for level in found[m])}]")
-        lines.append(
-            f'"{name.partition("@")[0]}" = {{ {", ".join(texts)}, oracle = {found["oracle"]} }}'
-        )
+            texts.append(f"{m} = [{', '.join(f'{level:.3g}' for level in levels_by_measure[m])}]")
+        texts.append(f"oracle = {levels_by_measure['oracle']}")
+        lines.append(f'"{name.partition("@")[0]}" = {{ {", ".join(texts)} }}')
     write_suites(left_out, version)
     text = path.read_text().partition(MARK)[0] + MARK
     head = (
@@ -311,7 +317,7 @@ def freeze(visible: Runs, of_controls: Runs, seen: Runs, seed: int, version: int
 
 def write_suites(left_out: Sequence[str], version: int) -> None:
     """Write the lists of a version's suites, without the problems that are left out."""
-    every = [name for name in cells(version) if name.partition("@")[0] not in left_out]
+    names = [name for name in cells(version) if name.partition("@")[0] not in left_out]
     lists = {
         "smc-30@1": (
             "Those that the pattern of version 1 chooses, 3 of 5, see suite.py.",
@@ -320,23 +326,23 @@ def write_suites(left_out: Sequence[str], version: int) -> None:
         "smc-50@1": ("All problems of the pattern's plants and conditions.", suite.pattern(1, 5)),
         "smc-arm@1": (
             "The arm of two links.",
-            [name for name in every if name.startswith("double_pendulum")],
+            [name for name in names if name.startswith("double_pendulum")],
         ),
         "smc-carts@1": (
             "A joint without an actuator.",
-            [n for n in every if n.startswith(("cart_pole", "furuta"))],
+            [n for n in names if n.startswith(("cart_pole", "furuta"))],
         ),
         "smc-worst@1": (
             "The paper's plants against an adversary.",
-            [name for name in every if "/worst" in name],
+            [name for name in names if "/worst" in name],
         ),
-        "smc-flight@2": ("A quadrotor.", every),
-        "smc-carts@3": ("A joint without an actuator, and friction.", every),
+        "smc-flight@2": ("A quadrotor.", names),
+        "smc-carts@3": ("A joint without an actuator, and friction.", names),
     }
     for name, (words, chosen) in lists.items():
         if not name.endswith(f"@{version}"):
             continue
-        text = "".join(f"{one}\n" for one in chosen if one in every)
+        text = "".join(f"{chosen_name}\n" for chosen_name in chosen if chosen_name in names)
         (suite.SUITES / f"{name}.txt").write_text(f"# {words}\n{text}")
 
 
@@ -358,17 +364,17 @@ def agree(visible: Runs, drawn: Runs) -> None:
     problems left out.
     """
     chosen = suite.suite("smc-30@1")
-    whole = suite.suite("smc-50@1")
-    others = [name for name in whole if name not in chosen]
+    all_names = suite.suite("smc-50@1")
+    outside = [name for name in all_names if name not in chosen]
     print("board | visible with drawn, tau (rho) | with the problems left out, tau (rho)")
     for question in BOARDS:
         mine = board(visible, chosen, question)
         cells = []
-        for other in (
+        for ranks in (
             board(drawn, chosen, question),
-            board(visible, others, question),
+            board(visible, outside, question),
         ):
-            cells.append((kendalltau(mine, other)[0], spearmanr(mine, other)[0]))
+            cells.append((kendalltau(mine, ranks)[0], spearmanr(mine, ranks)[0]))
         print(question, *(f"{tau:.3f} ({rho:.3f})" for tau, rho in cells), sep=" | ")
 
 
@@ -381,10 +387,10 @@ def enter_all(out: Path) -> None:
 
 def parser() -> argparse.ArgumentParser:
     """Return the command line."""
-    made = argparse.ArgumentParser(
+    argument_parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    commands = made.add_subparsers(dest="command", required=True)
+    commands = argument_parser.add_subparsers(dest="command", required=True)
     measured = commands.add_parser("measure")
     measured.add_argument("kind", choices=("laws", "controls"))
     measured.add_argument("out", type=Path)
@@ -406,31 +412,31 @@ def parser() -> argparse.ArgumentParser:
     repeated.add_argument("folder", type=Path)
     repeated.add_argument("problems", nargs="*")
     commands.add_parser("enter").add_argument("results", type=Path)
-    return made
+    return argument_parser
 
 
 if __name__ == "__main__":
-    given = parser().parse_args()
-    seed = getattr(given, "seed", "0")
+    options = parser().parse_args()
+    seed = getattr(options, "seed", "0")
     seed = secrets.randbits(256) if seed == "random" else int(seed)
     print(f"seed {seed}", file=sys.stderr)
-    if given.command == "measure":
-        measure(given.kind, given.out, seed, given.instances, cells(given.version))
-    elif given.command == "hold":
-        sys.exit(not hold(seed, given.instances))
-    elif given.command == "repeat":
-        named = given.problems or cells()
+    if options.command == "measure":
+        measure(options.kind, options.out, seed, options.instances, cells(options.version))
+    elif options.command == "hold":
+        sys.exit(not hold(seed, options.instances))
+    elif options.command == "repeat":
+        named = options.problems or cells()
         same = []
         for version in map(int, problems.versions()):
-            if its := [name for name in named if name in cells(version)]:
-                same.append(repeat(given.folder / str(version), its, version))
+            if own_names := [name for name in named if name in cells(version)]:
+                same.append(repeat(options.folder / str(version), own_names, version))
         sys.exit(not all(same))
-    elif given.command == "freeze":
-        controlled = read(given.controls)
-        seen = read(given.seen)
-        seed = json.loads(given.controls.read_text())["seed"]
-        freeze(read(given.visible), controlled, seen, seed, given.version)
-    elif given.command == "enter":
-        enter_all(given.results)
+    elif options.command == "freeze":
+        controlled = read(options.controls)
+        seen = read(options.seen)
+        seed = json.loads(options.controls.read_text())["seed"]
+        freeze(read(options.visible), controlled, seen, seed, options.version)
+    elif options.command == "enter":
+        enter_all(options.results)
     else:
-        agree(read(given.visible), read(given.drawn))
+        agree(read(options.visible), read(options.drawn))

@@ -87,14 +87,14 @@ def tracking(rig: Rig, reference: TimeSeries | None = None, **changes: Any) -> t
     """Return the rms and the largest tracking error of the program, m; `reference`: the
     controller's instead.
     """
-    wanted = program()
+    motion = program()
     fields = {
-        "reference": reference or wanted,
-        "duration": wanted.times[-1],
+        "reference": reference or motion,
+        "duration": motion.times[-1],
         "x0": START[0],
         "v0": START[1],
     }
-    error = np.array(wanted.values) - smc.run(rig.scenario(**fields | changes)).x[:, 0]
+    error = np.array(motion.values) - smc.run(rig.scenario(**fields | changes)).x[:, 0]
     return float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
 
 
@@ -120,14 +120,14 @@ def falls(twin: Rig) -> tuple[float, float]:
     """Return frequency, Hz, and damping ratio of the pendulum, means of the first periods of FALLS,
     circuit open.
     """
-    found = []
+    swings = []
     for angle in map(math.radians, FALLS):
         t, _, a = moved(twin, None, angle, 1.2)
         i = np.flatnonzero(a[:-1] * a[1:] < 0.0)
         crossings = t[i] + (t[i + 1] - t[i]) * a[i] / (a[i] - a[i + 1])
         peaks = [np.abs(a[j:k]).max() for j, k in itertools.pairwise(i[:4])]
-        found.append(
+        swings.append(
             (1.0 / (crossings[2] - crossings[0]), math.log(peaks[0] / peaks[2]) / math.tau)
         )
-    frequency, damping = np.mean(found, axis=0)
+    frequency, damping = np.mean(swings, axis=0)
     return float(frequency), float(damping)

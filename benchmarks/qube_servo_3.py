@@ -96,11 +96,11 @@ def motion(q, state, volts, duration, motor):
     rows = np.zeros((count + 1, 2))
     for i in range(count + 1):
         rows[i] = z[:2]
-        one = rates(z, q, volts, motor)
-        two = rates(z + 0.5 * STEP * one, q, volts, motor)
+        first = rates(z, q, volts, motor)
+        two = rates(z + 0.5 * STEP * first, q, volts, motor)
         three = rates(z + 0.5 * STEP * two, q, volts, motor)
         z = z + STEP / 6.0 * (
-            one + 2.0 * two + 2.0 * three + rates(z + STEP * three, q, volts, motor)
+            first + 2.0 * two + 2.0 * three + rates(z + STEP * three, q, volts, motor)
         )
     return rows
 
@@ -109,16 +109,16 @@ def fall(q, motor=0.0):
     """Return the frequency, Hz, and the damping ratio of falls, the means of the first period of
     each.
     """
-    found = []
+    swings = []
     for angle in FALLS:
         a = motion(q, np.array([0.0, angle, 0.0, 0.0, 0.0]), 0.0, FALL_TIME, motor)[:, 1]
         i = np.flatnonzero(a[:-1] * a[1:] < 0.0)[:4]
         crossings = STEP * (i + a[i] / (a[i] - a[i + 1]))
         peaks = [np.abs(a[j:k]).max() for j, k in itertools.pairwise(i)]
-        found.append(
+        swings.append(
             (1.0 / (crossings[2] - crossings[0]), np.log(peaks[0] / peaks[2]) / (2.0 * np.pi))
         )
-    return np.mean(found, axis=0)
+    return np.mean(swings, axis=0)
 
 
 def parts(record):
@@ -128,7 +128,7 @@ def parts(record):
     rows = record[np.round(record[:, 0] / SPACING, 6) % 1.0 == 0.0]
     ahead = rows[:, 0] <= STEP_END
     back = (rows[:, 0] >= RETURN[0]) & (rows[:, 0] <= RETURN[1])
-    return [np.array([one[:, 0], one[:, 1], -one[:, 2]]) for one in (rows[ahead], rows[back])]
+    return [np.array([part[:, 0], part[:, 1], -part[:, 2]]) for part in (rows[ahead], rows[back])]
 
 
 def errors(q, speeds, step, back):
@@ -136,14 +136,14 @@ def errors(q, speeds, step, back):
     # of bristles that have slipped on the way to the stop
     bend = -q[4] / q[5] if q[4] > 0.0 else 0.0
     starts = (np.zeros(5), np.array([*back[1:, 0], *speeds, bend]))
-    found = []
+    residuals = []
     for start, part in zip(starts, (step, back), strict=True):
-        at = np.round((part[0] - part[0, 0]) / STEP).astype(int)
-        found.append(motion(q, start, -1.0, STEP * at[-1], 1.0)[at].T - part[1:])
-    return found
+        steps = np.round((part[0] - part[0, 0]) / STEP).astype(int)
+        residuals.append(motion(q, start, -1.0, STEP * steps[-1], 1.0)[steps].T - part[1:])
+    return residuals
 
 
-def identified(step, back, weight=1.0, kept=None, rigid=False, motor=0.0):
+def identified(step, back, weight=1.0, used=None, rigid=False, motor=0.0):
     """Return the quantities, (6,), the two speeds of the way back, and the sum of squared
     residuals.
 
@@ -151,34 +151,36 @@ def identified(step, back, weight=1.0, kept=None, rigid=False, motor=0.0):
     `motor`: in falls.
     """
     count = step.shape[1]
-    if kept is None:
-        kept = np.ones(count + back.shape[1], bool)
+    if used is None:
+        used = np.ones(count + back.shape[1], bool)
     free = np.array([i for i in range(8) if not rigid or i < RIGID or i > 5])
 
     def split(z):
-        every = np.zeros(8)
-        every[free] = z
-        return every[:6] * SCALES, every[6:]
+        all_numbers = np.zeros(8)
+        all_numbers[free] = z
+        return all_numbers[:6] * SCALES, all_numbers[6:]
 
     def residuals(z):
         q, speeds = split(z)
         ahead, after = errors(q, speeds, step, back)
-        rows = [ahead[:, kept[:count]] / NOISE, weight * after[:, kept[count:]] / NOISE]
+        rows = [ahead[:, used[:count]] / NOISE, weight * after[:, used[count:]] / NOISE]
         of_falls = []
-        for one, (value, error) in zip(fall(q, motor), (FREQUENCY, DAMPING), strict=True):
-            of_falls.append((one - value) / error)
+        for predicted, (value, error) in zip(fall(q, motor), (FREQUENCY, DAMPING), strict=True):
+            of_falls.append((predicted - value) / error)
         return np.concatenate([*map(np.ravel, rows), of_falls])
 
     start = np.array([*START, 0.9, 0.1])[free]
     bounds = (np.array(LOW)[free], np.array(HIGH)[free])
-    found = least_squares(residuals, start, diff_step=1e-3, bounds=bounds)
-    return *split(found.x), 2.0 * found.cost
+    fit = least_squares(residuals, start, diff_step=1e-3, bounds=bounds)
+    return *split(fit.x), 2.0 * fit.cost
 
 
 def report(label, found, step, back):
     """Print quantities and what they reach."""
     q, speeds, cost = found
-    ahead, after = (np.sqrt(np.mean(one**2, axis=1)) for one in errors(q, speeds, step, back))
+    ahead, after = (
+        np.sqrt(np.mean(residual**2, axis=1)) for residual in errors(q, speeds, step, back)
+    )
     print(
         f"{label}: "
         + ", ".join(f"{name} {value:.4g}" for name, value in zip(NAMES, q, strict=True))
@@ -202,9 +204,9 @@ def drawn(values, covariance):
     low, high = (np.array(ends[:6]) * SCALES for ends in (LOW, HIGH))
     sets = []
     while len(sets) < DRAWN:
-        one = random.multivariate_normal(values, covariance)
-        if np.all((one > low) & (one < high)):
-            sets.append(one)
+        sample = random.multivariate_normal(values, covariance)
+        if np.all((sample > low) & (sample < high)):
+            sets.append(sample)
     return np.array(sets)
 
 
@@ -221,7 +223,7 @@ def main():
     blocks = np.array_split(np.arange(count), BLOCKS)
     without = []
     for block in blocks:
-        without.append(identified(step, back, kept=~np.isin(np.arange(count), block))[0])
+        without.append(identified(step, back, used=~np.isin(np.arange(count), block))[0])
     away = np.array(without) - np.mean(without, axis=0)
     covariance = (BLOCKS - 1) / BLOCKS * away.T @ away
     spread = np.sqrt(np.diag(covariance))

@@ -48,8 +48,8 @@ PLANTS = {
 def medians(task: search.TuningTask, found: list[search.SearchResult]) -> np.ndarray:
     """Return the median J of each set on the same unseen instances."""
     values = []
-    for one in found:
-        law = with_gains(task.law, tuple(task.box), one.best.gains)
+    for search_result in found:
+        law = with_gains(task.law, tuple(task.box), search_result.best.gains)
         J, _ = objectives(task.plant, [law] * INSTANCES, task.goal, range(INSTANCES), 1)
         values.append(float(np.median(J)))
     return np.array(values)
@@ -60,13 +60,17 @@ def searched(plant: Plant, name: str, quick: bool) -> tuple[np.ndarray, int, flo
     budget = quick_search.BUDGET if quick else BUDGET
     task = search.task_of(plant, coerce.law(name), GOAL, budget, 0, 1)._replace(quick=quick)
     start = time.process_time()
-    found = [task.search(i, "", lambda count: None) for i in range(LOOKS[0] if quick else WHOLE)]
-    seconds = (time.process_time() - start) / len(found)
-    again = stuck([one.best.objective for one in found]) if quick else []
+    search_results = [
+        task.search(i, "", lambda count: None) for i in range(LOOKS[0] if quick else WHOLE)
+    ]
+    seconds = (time.process_time() - start) / len(search_results)
+    again = (
+        stuck([search_result.best.objective for search_result in search_results]) if quick else []
+    )
     for i in again:
-        better = (found[i], task.search(i, "", lambda count: None, 1))
-        found[i] = min(better, key=lambda one: one.best.objective)
-    return medians(task, found), len(again), seconds
+        better = (search_results[i], task.search(i, "", lambda count: None, 1))
+        search_results[i] = min(better, key=lambda search_result: search_result.best.objective)
+    return medians(task, search_results), len(again), seconds
 
 
 def main() -> None:
@@ -76,8 +80,8 @@ def main() -> None:
         plant = make()
         for law in LAWS:
             quick, again, seconds = searched(plant, law, True)
-            whole, _, whole_seconds = searched(plant, law, False)
-            ratios = quick / np.median(whole)
+            whole_medians, _, whole_seconds = searched(plant, law, False)
+            ratios = quick / np.median(whole_medians)
             row = {
                 "plant": name,
                 "law": law,

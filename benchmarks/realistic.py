@@ -63,7 +63,7 @@ def cases(plant: str) -> dict[str, smc.Scenario]:
     }
     gains = smc.paper.GAINS[plant]["observer_free"]
     plain = smc.Scenario(plant=plant, law=smc.law("observer_free", **gains))  # pyright: ignore[reportArgumentType]
-    return {name: dataclasses.replace(plain, **given) for name, given in fields.items()}
+    return {name: dataclasses.replace(plain, **changes) for name, changes in fields.items()}
 
 
 def measure(scenario: smc.Scenario) -> tuple[float, float]:
@@ -89,12 +89,12 @@ if __name__ == "__main__":
     for plant in (name for name in smc.plants() if smc.plant(name).n == 1):
         for name, scenario in cases(plant).items():
             rate, over = measure(scenario)
-            kept = "met" if rate >= TARGET else "[red]missed"
+            verdict = "met" if rate >= TARGET else "[red]missed"
             if len(parts(scenario)) > 1:
-                made = f"{name} ({len(parts(scenario))} parts)"
+                words = f"{name} ({len(parts(scenario))} parts)"
             else:
-                made = name
-            table.add_row(plant, made, f"{rate:,.0f}", kept, f"{over:.2f}")
+                words = name
+            table.add_row(plant, words, f"{rate:,.0f}", verdict, f"{over:.2f}")
     console.print(table)
     load = ", ".join(f"{x:.1f}" for x in os.getloadavg())
     console.print(

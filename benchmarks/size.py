@@ -140,10 +140,10 @@ def show(measured: dict[str, dict[str, int]], release: str, before: dict) -> Non
         print(f"\n{title:<70}{'now':>10}{release:>15}")
         for name, now in measured[part].items():
             then = before.get(part, {}).get(name)
-            shown = "-"
+            released = "-"
             if then is not None:
-                shown = f"{then:,}"
-            print(f"  {name:<68}{now:>10,}{shown:>15}")
+                released = f"{then:,}"
+            print(f"  {name:<68}{now:>10,}{released:>15}")
 
 
 def main() -> None:
@@ -155,8 +155,8 @@ def main() -> None:
     measured = measure()
     show(measured, before["release"], before)
     if release:
-        kept = {"release": release, **measured}
-        RELEASE.write_text(json.dumps(kept, indent=2) + "\n", encoding="utf-8", newline="\n")
+        stored = {"release": release, **measured}
+        RELEASE.write_text(json.dumps(stored, indent=2) + "\n", encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

@@ -64,10 +64,10 @@ def ratio(
     for action in (one, other):
         action()
     rounds = [(seconds(one, clock), seconds(other, clock)) for _ in range(ROUNDS)]
-    ones, others = zip(*rounds, strict=True)
+    ones, second_times = zip(*rounds, strict=True)
     return (
         statistics.median(ones),
-        statistics.median(others),
+        statistics.median(second_times),
         statistics.median(a / b for a, b in rounds),
     )
 
@@ -145,21 +145,21 @@ def callback_against_mj_step(table: Table) -> None:
             with_law, bare = stepping(batch, STEPS), stepping(batch, STEPS, BARE)
             plain = plain_steps(scenario, 16, STEPS)
             per = 1e6 / (16 * STEPS)
-            for other, steps, goal in (
+            for rival, steps, goal in (
                 ("mj_step", plain, f"<= {target}"),
                 ("bare mj_step", bare, ""),
             ):
                 a, b, r = ratio(with_law, steps)
-                row(table, f"callback / {other}, {integrator}, {name}", a * per, b * per, r, goal)
-                if other == "bare mj_step":
+                row(table, f"callback / {rival}, {integrator}, {name}", a * per, b * per, r, goal)
+                if rival == "bare mj_step":
                     measured[f"{integrator}, {name}"] = round(r, 3)
 
 
 def threads(table: Table) -> None:
     """Simulated steps per second on two threads against one."""
     scenario = smc.paper.scenario("inverted_pendulum", "super_twisting")
-    one, two = (stepping(batch_of(scenario, 64, n), STEPS // 4) for n in (1, 2))
-    a, b, r = ratio(one, two, time.perf_counter)
+    single, two = (stepping(batch_of(scenario, 64, n), STEPS // 4) for n in (1, 2))
+    a, b, r = ratio(single, two, time.perf_counter)
     per = 1e6 / (64 * (STEPS // 4))
     row(table, "1 thread / 2 threads", a * per, b * per, r, ">= 1.8")
 

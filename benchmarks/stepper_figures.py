@@ -231,9 +231,9 @@ def figures(record: Mapping[str, np.ndarray]) -> dict[str, float]:
     t = record["timestamp_ms"] / 1e3
     if len(t) < MIN_ROWS:
         raise ScenarioError(f"the record has {len(t)} rows: give at least {MIN_ROWS}, 20 s")
-    kept = t - t[0] >= SINCE
+    counted = t - t[0] >= SINCE
     alpha, alpha_rate, theta, theta_rate, acceleration, speed = (
-        record[name][kept] for name in COLUMNS[1:7]
+        record[name][counted] for name in COLUMNS[1:7]
     )
 
     def rms(values: np.ndarray) -> float:
@@ -252,13 +252,13 @@ def figures(record: Mapping[str, np.ndarray]) -> dict[str, float]:
     settings = {"fs": 1.0 / row, "window": "hann", "nperseg": SEGMENT, "noverlap": SEGMENT // 2}
     f, power = signal.welch(alpha, **settings)
     inside = (f >= BAND[0]) & (f <= BAND[1])
-    at = int(np.flatnonzero(inside)[np.argmax(power[inside])])
+    peak = int(np.flatnonzero(inside)[np.argmax(power[inside])])
 
     def response(output: np.ndarray, driver: np.ndarray) -> complex:
         cross = signal.csd(driver, output, **settings)[1]
         own = signal.welch(driver, **settings)[1]
-        if own[at] > 0.0:
-            return complex(cross[at] / own[at])
+        if own[peak] > 0.0:
+            return complex(cross[peak] / own[peak])
         return complex(np.nan)
 
     tilt = response(alpha, theta)
@@ -283,9 +283,9 @@ def figures(record: Mapping[str, np.ndarray]) -> dict[str, float]:
         },
         **{f"second_{p}": float(np.percentile(seconds, p)) for p in (25, 50, 75, 90)},
         "centroid": float(np.average(f[inside], weights=power[inside]))
-        if power[at] > 0.0
+        if power[peak] > 0.0
         else np.nan,
-        "peak": float(f[at]),
+        "peak": float(f[peak]),
         "ratio": abs(tilt),
         "phase": float(np.degrees(np.angle(tilt)) % 360.0 - 360.0),
         "gain": abs(follow),
@@ -300,7 +300,7 @@ def fallen(found):
 
 def standing(runs: Sequence[Mapping[str, float]], figure: str) -> np.ndarray:
     """Return a figure of the runs that stood; an arm that rests has no phase, which is left out."""
-    values = np.array([found[figure] for found in runs if not fallen(found)])
+    values = np.array([run_figures[figure] for run_figures in runs if not fallen(run_figures)])
     return values[np.isfinite(values)]
 
 
@@ -315,7 +315,7 @@ def predicted(rig, condition, seeds, changes=None):
     `changes`: quantities that leave a part of the twin out.
     """
     laws = [law for law in rig.laws if law.name in ORDER]
-    found = {}
+    runs_by_law = {}
     for name, member in rig.members().items():
         twin = member.with_values(changes or {}, "left out")
         scenarios = []
@@ -324,8 +324,10 @@ def predicted(rig, condition, seeds, changes=None):
                 fields = {"x0": start(seed), "seed": seed} | CONDITIONS[condition]
                 scenarios.append(twin.scenario(law, **fields))
         of_runs = [figures(logged(trace)) for trace in smc.run(scenarios)]
-        found[name] = {law.name: of_runs[i * seeds : (i + 1) * seeds] for i, law in enumerate(laws)}
-    return found
+        runs_by_law[name] = {
+            law.name: of_runs[i * seeds : (i + 1) * seeds] for i, law in enumerate(laws)
+        }
+    return runs_by_law
 
 
 def ordered(found):

@@ -119,13 +119,13 @@ def distance(by_condition):
     """Return the rms deviation of condition -> figures from the recorded ones, in spreads."""
     apart = []
     for condition, spreads in SPREADS.items():
-        found = by_condition[condition]
+        predicted = by_condition[condition]
         recorded = RECORDED[condition]
         for name, spread in spreads.items():
             if name in LINEAR:
-                off = found[name] - recorded[name]
+                off = predicted[name] - recorded[name]
             else:
-                off = math.log(max(found[name], 1e-3) / recorded[name])
+                off = math.log(max(predicted[name], 1e-3) / recorded[name])
             apart.append(off / spread)
     squares = float(np.mean(np.square(apart)))
     if math.isfinite(squares):
@@ -138,31 +138,31 @@ def recordings(pairs, condition):
     rig = smc.rig("stepper_furuta")
     fields = CONDITIONS[condition]
     scenarios = []
-    for one, seed in pairs:
+    for parameters, seed in pairs:
         scenarios.append(
-            rig.with_values(one, "drawn").scenario(x0=start(seed), seed=seed, **fields)
+            rig.with_values(parameters, "drawn").scenario(x0=start(seed), seed=seed, **fields)
         )
     return [figures(logged(trace)) for trace in smc.run(scenarios)]
 
 
 def explored(rounds, draw, prior):
     """Return (distance, shares) of every draw of the rounds; `draw`: function of a generator."""
-    found = []
+    ranked = []
     for seed, draws in rounds.items():
         random = np.random.default_rng(seed)
         for first in range(0, draws, BATCH):
             drawn = [draw(random) for _ in range(BATCH)]
             pairs = [
-                (quantities(one, prior), number)
-                for number, one in enumerate(drawn, 100_000 * seed + first)
+                (quantities(parameters, prior), number)
+                for number, parameters in enumerate(drawn, 100_000 * seed + first)
             ]
             runs = {name: recordings(pairs, name) for name in CONDITIONS}
-            for i, one in enumerate(drawn):
-                found_of = {name: its[i] for name, its in runs.items()}
+            for i, parameters in enumerate(drawn):
+                found_of = {name: law_runs[i] for name, law_runs in runs.items()}
                 fell = any(map(fallen, found_of.values()))
-                found.append((math.inf if fell else distance(found_of), one))
+                ranked.append((math.inf if fell else distance(found_of), parameters))
             print(f"seed {seed}: {first + BATCH} of {draws}", file=sys.stderr)
-    return sorted(found, key=lambda each: each[0])
+    return sorted(ranked, key=lambda each: each[0])
 
 
 def accepted(one, number):
@@ -181,8 +181,8 @@ def accepted(one, number):
     if any(map(fallen, runs["nudges"])):
         return math.inf
     medians = {}
-    for name, its in runs.items():
-        medians[name] = {key: np.nanmedian([run[key] for run in its]) for key in its[0]}
+    for name, law_runs in runs.items():
+        medians[name] = {key: np.nanmedian([run[key] for run in law_runs]) for key in law_runs[0]}
     return distance(medians)
 
 
@@ -191,15 +191,18 @@ def main(second):
     rounds = SEEDS[second]
     first = explored(rounds[0], lambda random: random.random(len(prior)), prior)
     nearest = np.array([shares for _, shares in first[:NEAR]])
-    both = [*first, *explored(rounds[1], lambda random: about(nearest, random), prior)]
-    found = [
+    ranked = [*first, *explored(rounds[1], lambda random: about(nearest, random), prior)]
+    best_sets = [
         (apart, quantities(shares, prior))
-        for apart, shares in sorted(both, key=lambda each: each[0])
+        for apart, shares in sorted(ranked, key=lambda each: each[0])
     ]
     if second:
-        found = [(accepted(one, number), one) for number, (_, one) in enumerate(found[:TRIED], 1)]
-    for apart, one in sorted(found, key=lambda each: each[0])[:KEPT]:
-        values = ", ".join(f"{float(f'{one[name]:.4g}')!r}" for name in NAMES)
+        best_sets = [
+            (accepted(parameters, number), parameters)
+            for number, (_, parameters) in enumerate(best_sets[:TRIED], 1)
+        ]
+    for apart, parameters in sorted(best_sets, key=lambda each: each[0])[:KEPT]:
+        values = ", ".join(f"{float(f'{parameters[name]:.4g}')!r}" for name in NAMES)
         if apart < math.inf:
             print(f"    ({values}),  # {apart:.2f}")
 

@@ -132,12 +132,12 @@ def summaries(rows: Sequence[TwinFigure]) -> list[Summary]:
     groups: dict[tuple[str, str], list[TwinFigure]] = {}
     for row in known(rows):
         groups.setdefault((row.rig, row.use), []).append(row)
-    found = []
+    twin_figures = []
     for (rig, use), group in groups.items():
         apart = [row.apart for row in group]
         published = np.array([abs(row.published / row.machine - 1.0) for row in group])
         published = published[~np.isnan(published)]
-        found.append(
+        twin_figures.append(
             Summary(
                 rig=rig,
                 use=use,
@@ -148,7 +148,7 @@ def summaries(rows: Sequence[TwinFigure]) -> list[Summary]:
                 published=float(np.median(published)) if len(published) else math.nan,
             )
         )
-    return found
+    return twin_figures
 
 
 @functools.cache
@@ -197,12 +197,12 @@ def laid_out(rows: Sequence[TwinFigure]) -> list[Row]:
     groups: dict[tuple[str, str], list[TwinFigure]] = {}
     for row in known(rows):
         groups.setdefault((row.rig, row.use), []).append(row)
-    found: list[Row] = []
+    placed_rows: list[Row] = []
     top = 0.0
     for (rig, _), figures in groups.items():
-        first = not found or found[-1].figures[0].rig != rig
+        first = not placed_rows or placed_rows[-1].figures[0].rig != rig
         lines = 2 if first else 1
-        if first and found:
+        if first and placed_rows:
             top += GAP
         marks = BESIDE * (len(figures) + 2)
         deep = max(LINE * lines, marks)
@@ -210,9 +210,9 @@ def laid_out(rows: Sequence[TwinFigure]) -> list[Row]:
         places = middle + BESIDE * (np.arange(len(figures)) - 0.5 * (len(figures) - 1))
         words = middle + 0.5 * LINE * (lines - 1)
         name = middle - 0.5 * LINE if first else math.nan
-        found.append(Row(figures, places.tolist(), name, words, top + deep))
+        placed_rows.append(Row(figures, places.tolist(), name, words, top + deep))
         top += deep
-    return found
+    return placed_rows
 
 
 def twins_page(rows: Sequence[TwinFigure]) -> Figure:
@@ -222,23 +222,23 @@ def twins_page(rows: Sequence[TwinFigure]) -> Figure:
     A line is a mark's range, a cross is by published numbers. Figures that are kept aside, and
     variants of a twin, are left out.
     """
-    shown = laid_out(rows)
-    rigs = list(dict.fromkeys(row.figures[0].rig for row in shown))
+    placed_rows = laid_out(rows)
+    rigs = list(dict.fromkeys(row.figures[0].rig for row in placed_rows))
     colours = dict(zip(rigs, style.spread(len(rigs)), strict=True))
     with style.page(WIDTH):
         handles = [
             pages.entry("twin, with its range", style.INK, lw=1.0, marker="o", ms=3.5),
             pages.entry("published numbers", marker="x", ms=3.5, ls=""),
         ]
-        height = pages.head_height(WIDTH, handles) + (shown[-1].end + GAP) / 72 + 0.5
+        height = pages.head_height(WIDTH, handles) + (placed_rows[-1].end + GAP) / 72 + 0.5
         page = pages.blank(WIDTH, height)
         ax = page.subplots()
-        for row in shown:
-            for place, one in zip(row.places, row.figures, strict=True):
-                _mark(ax, place, one, colours[one.rig])
-        _name_rows(ax, shown, colours)
+        for row in placed_rows:
+            for place, twin_figure in zip(row.places, row.figures, strict=True):
+                _mark(ax, place, twin_figure, colours[twin_figure.rig])
+        _name_rows(ax, placed_rows, colours)
         ax.axvline(1.0, color=style.RULE, lw=0.8, zorder=0)
-        ax.set(xscale="log", xlim=(LEAST, MOST), ylim=(shown[-1].end + GAP / 2, -GAP / 2))
+        ax.set(xscale="log", xlim=(LEAST, MOST), ylim=(placed_rows[-1].end + GAP / 2, -GAP / 2))
         ax.set_xlabel("twin over machine")
         ax.set_xticks([0.25, 0.5, 1.0, 2.0, 4.0], ["¼", "½", "1", "2", "4"])
         ax.xaxis.set_minor_locator(NullLocator())
@@ -262,13 +262,13 @@ def _name_rows(ax: Axes, rows: Sequence[Row], colours: dict[str, str]) -> None:
     labels = []
     looks = []
     for row in rows:
-        one = row.figures[0]
+        first_figure = row.figures[0]
         if not math.isnan(row.name):
             ticks.append(row.name)
-            labels.append(one.rig)
-            looks.append({"color": colours[one.rig], "fontweight": "bold"})
+            labels.append(first_figure.rig)
+            looks.append({"color": colours[first_figure.rig], "fontweight": "bold"})
         ticks.append(row.words)
-        labels.append(f"{len(row.figures)} figures, {one.use}")
+        labels.append(f"{len(row.figures)} figures, {first_figure.use}")
         looks.append({})
     ax.set_yticks(ticks, labels)
     ax.tick_params(axis="y", length=0.0, pad=6.0)
@@ -297,5 +297,5 @@ def _mark(ax: Axes, place: float, row: TwinFigure, colour: str) -> None:
             mark = ">"
         elif ratio < LEAST:
             mark = "<"
-        at = min(max(ratio, LEAST), MOST)
-        ax.plot(at, place, mark, color=ink, ms=3.5, clip_on=False)
+        drawn_ratio = min(max(ratio, LEAST), MOST)
+        ax.plot(drawn_ratio, place, mark, color=ink, ms=3.5, clip_on=False)
