@@ -70,8 +70,8 @@ def median_of(values: Array, samples: Sequence[int] | None = None) -> Interval:
         drawn = draws(n)[list(samples)]
     lower, upper = np.empty((2, RESAMPLES, len(values)))
     for k, block in enumerate(values):
-        known = ~np.isnan(block)
-        order = np.argsort(block)[: known.sum()]
+        defined = ~np.isnan(block)
+        order = np.argsort(block)[: defined.sum()]
         counts = drawn[order]
         ordered = block[order]
         # a resample that draws no run of the block takes each of them once
@@ -88,19 +88,19 @@ def median_of(values: Array, samples: Sequence[int] | None = None) -> Interval:
     ratio = n / (n - 1)
     tail = ndtr(-math.sqrt(ratio) * quantile)
     # index of the resample at which the interval ends, from either end
-    at = max(1, math.floor(tail * (RESAMPLES + 1)))
+    end = max(1, math.floor(tail * (RESAMPLES + 1)))
     lower = np.sort(middle(lower))
     upper = np.sort(middle(upper))
-    low = float(lower[at - 1])
-    high = float(upper[RESAMPLES - at])
+    low = float(lower[end - 1])
+    high = float(upper[RESAMPLES - end])
     return Interval(centre, low, high, n)
 
 
 def middle(values: Array) -> Array:
     """Return the median over the last axis, without NaN; NaN if all values are NaN."""
     ordered = np.sort(values, axis=-1)
-    known = ~np.isnan(values)
-    n = known.sum(axis=-1, keepdims=True)
+    defined = ~np.isnan(values)
+    n = defined.sum(axis=-1, keepdims=True)
     lower_place = np.maximum((n - 1) // 2, 0)
     low = np.take_along_axis(ordered, lower_place, axis=-1)
     upper_place = np.maximum(n // 2, 0)

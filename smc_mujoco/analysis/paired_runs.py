@@ -88,8 +88,8 @@ def values(table: RunColumns, metric: str) -> Array:
     plants = np.asarray(table.column("plant"), str)
     lost = failed(table)
     missing = np.isnan(scores) & ~lost
-    kept = set(plants[~missing & ~lost])
-    lacking = set(plants[missing]) - kept
+    scored = set(plants[~missing & ~lost])
+    lacking = set(plants[missing]) - scored
     if not CATALOGUE[name].error:
         lost = lost | ~has_arrived(table)
     scores[lost] = np.inf
@@ -105,16 +105,16 @@ def _column(metric: str) -> str:
 def by_row(table: RunColumns, metric: str) -> ByRow:
     """Return a metric of the rows of a table, with what is charged to it."""
     name = _column(metric)
-    whole = values(table, metric)
+    scores = values(table, metric)
     halves = _from_json(table, "half_step", name, CATALOGUE[name].absent)
     if not CATALOGUE[name].error:
         halves[_from_json(table, "half_step", "arrived", 1.0) == 0.0] = np.inf
-    halves[np.isnan(whole)] = np.nan
+    halves[np.isnan(scores)] = np.nan
     trends = _from_json(table, "trends", name, np.nan)
     if metric == SETTLES:
         halves = _missed(halves, table)
         trends[:] = np.nan
-    return ByRow(whole, halves, trends, has_arrived(table).astype(float))
+    return ByRow(scores, halves, trends, has_arrived(table).astype(float))
 
 
 def _missed(times: Array, table: RunColumns) -> Array:
@@ -127,11 +127,11 @@ def _from_json(table: RunColumns, column: str, name: str, absent: float) -> Arra
     """Return a number by row from a column of JSON objects, NaN where there is none; {} is a run
     that failed.
     """
-    found = []
+    numbers_by_row = []
     for text in table.column(column).tolist():
         numbers = from_json(text) if text else {name: np.nan}
-        found.append(numbers.get(name, absent) if numbers else np.inf)
-    return np.array(found, float)
+        numbers_by_row.append(numbers.get(name, absent) if numbers else np.inf)
+    return np.array(numbers_by_row, float)
 
 
 def has_arrived(table: RunColumns) -> Array:
@@ -174,10 +174,12 @@ def untouched(table: RunColumns) -> list[str]:
         for law, alone in laws.items():
             if alone:
                 clear.append(law)
-        of = "" if len(clear) == len(laws) else f" of {joined(clear)}"
+        of_laws = "" if len(clear) == len(laws) else f" of {joined(clear)}"
         if clear:
             where = f"on {plant} under {condition}"
-            sentences.append(f"No run{of} touches a stop or an obstacle {where}, at any sample.")
+            sentences.append(
+                f"No run{of_laws} touches a stop or an obstacle {where}, at any sample."
+            )
     return sentences
 
 
@@ -260,10 +262,10 @@ class RunGroup:
         blocks = np.flatnonzero(common.any(axis=1))
         seeds = np.flatnonzero(common.any(axis=0))
         every_law = np.arange(len(self.laws))
-        kept = np.ix_(every_law, blocks, seeds)
+        indices = np.ix_(every_law, blocks, seeds)
         parts = []
         for values in (cube, self.outcome, self.sets, *cubes[1:]):
-            by_law = zip(self.laws, values[kept], strict=True)
+            by_law = zip(self.laws, values[indices], strict=True)
             parts.append(dict(by_law))
         return Scores(blocks.tolist(), *parts)
 
@@ -272,8 +274,8 @@ def groups(table: RunColumns, by: Sequence[str]) -> list[RunGroup]:
     """Return the groups of a table, one for each plant, or for each plant and condition, in the
     order of its rows.
     """
-    wanted = tuple(items_of("by", by))
-    if wanted not in (GROUPS[:1], GROUPS):
+    columns_shared = tuple(items_of("by", by))
+    if columns_shared not in (GROUPS[:1], GROUPS):
         raise ScenarioError(f"by is {shown(by)}: give ('plant',) or ('plant', 'condition')")
     columns = {}
     for name in (*GROUPS, "law"):
@@ -287,12 +289,12 @@ def groups(table: RunColumns, by: Sequence[str]) -> list[RunGroup]:
     keys = zip(*(columns[name].tolist() for name in by), strict=True)
     for row, key in enumerate(keys):
         rows_of.setdefault(key, []).append(row)
-    made = []
+    run_groups = []
     for key, rows in rows_of.items():
         of_group = {name: column[rows] for name, column in columns.items()}
         shared = dict(zip(by, key, strict=True))
-        made.append(RunGroup(shared, np.array(rows), of_group))
-    return made
+        run_groups.append(RunGroup(shared, np.array(rows), of_group))
+    return run_groups
 
 
 def _checked_sets(table: RunColumns, columns: Mapping[str, Array]) -> Array:
@@ -301,13 +303,13 @@ def _checked_sets(table: RunColumns, columns: Mapping[str, Array]) -> Array:
     """
     sets = []
     first: dict[tuple, tuple[str, dict[str, Any]]] = {}
-    known: dict[str, int] = {}
+    number_of: dict[str, int] = {}
     names = "plant", "condition", "seed", "law"
     runs = zip(*(columns[name].tolist() for name in names), table.column("scenario"), strict=True)
     for *cell, law, text in runs:
         about = json.loads(text)
         gains = json.dumps([about.pop(name, None) for name in GAIN_ENTRIES])
-        sets.append(known.setdefault(gains, len(known)))
+        sets.append(number_of.setdefault(gains, len(number_of)))
         for name in OTHER_ENTRIES:
             about.pop(name, None)
         about["plant"].get("mjcf", {}).pop("path", None)  # models are identified by their contents
@@ -358,9 +360,9 @@ def unit_of_x(plant: str, ran: Sequence[Scenario | None]) -> str:
     """Return the unit of positions on a plant, by its name or from runs on it; "" where it is not
     known.
     """
-    known = catalogue().get(plant)
-    if known:
-        return known.unit
+    library_plant = catalogue().get(plant)
+    if library_plant:
+        return library_plant.unit
     for scenario in ran:
         if scenario:
             return scenario.plant.unit
@@ -385,8 +387,8 @@ def sources(table: RunColumns, rows: Array) -> dict[str, tuple[Source, ...]]:
     of_laws = set(zip(*columns, strict=True))
     for law, kind, search in sorted(of_laws, key=str):
         about = {"kind": kind, "search": search and json.loads(search)}
-        known = by_law.get(law, ())
-        by_law[law] = (*known, restore(about))
+        earlier = by_law.get(law, ())
+        by_law[law] = (*earlier, restore(about))
     return by_law
 
 
@@ -430,12 +432,12 @@ def without_floor(metric: str) -> str:
 
 def labels(table: RunColumns) -> dict[str, str]:
     """Return law -> its label, of the laws whose scenarios the table knows and that state one."""
-    found = {}
-    for scenario in getattr(table, "known", {}).values():
+    label_of = {}
+    for scenario in getattr(table, "scenarios_by_key", {}).values():
         template = scenario.law.template
         if template and template.label:
-            found[scenario.law.name] = template.label
-    return found
+            label_of[scenario.law.name] = template.label
+    return label_of
 
 
 def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:

@@ -259,8 +259,8 @@ class Comparison:
     @property
     def seeds(self) -> np.ndarray:
         """The number of seeds of each block, (blocks,)."""
-        known = ~np.isnan(self.cells[0])
-        return known.sum(axis=1)
+        ran = ~np.isnan(self.cells[0])
+        return ran.sum(axis=1)
 
     @property
     def samples(self) -> np.ndarray:
@@ -288,8 +288,8 @@ class Comparison:
         better = (self.p <= self.limit) & self._eligible
         for block, ranked, winner in zip(better, self.ranked.T, self.winners, strict=True):
             if winner is not None:
-                others = np.array(self.laws) != winner
-                block[self.laws.index(winner)] |= ranked & others
+                losers = np.array(self.laws) != winner
+                block[self.laws.index(winner)] |= ranked & losers
         return better
 
     @property
@@ -388,19 +388,19 @@ class Comparison:
 
         It makes up for what half the step and trends charge, too.
         """
-        at = block, self.laws.index(law), self.laws.index(rival)
-        ours_or_theirs = self.below[list(at[1:]), block]
+        pair = block, self.laws.index(law), self.laws.index(rival)
+        ours_or_theirs = self.below[list(pair[1:]), block]
         if ours_or_theirs.any():
             return math.nan
-        lead = least_visible_lead(self.leads[at], self.first, self.relevant)
+        lead = least_visible_lead(self.leads[pair], self.first, self.relevant)
         return 1.0 - (1.0 - lead) * (1.0 - self.charged(block, law, rival))
 
     def charged(self, block: int, law: str, rival: str) -> float:
         """Return the lead of a law over a rival that half the step and trends take from it, as a
         share.
         """
-        at = block, self.laws.index(law), self.laws.index(rival)
-        difference = _difference(self.plain[at], self.leads[at])
+        pair = block, self.laws.index(law), self.laws.index(rival)
+        difference = _difference(self.plain[pair], self.leads[pair])
         charged = np.nan_to_num(middle(difference))
         return -math.expm1(-max(float(charged), 0.0))
 
@@ -434,7 +434,7 @@ def bounds(
     """
     if shares:
         return np.fmin(cells, halves), np.fmax(cells, halves)
-    whole = _logarithms(cells)
+    as_run = _logarithms(cells)
     half = _logarithms(halves)
     of_halves = _logarithms(halves, floors)
     of_cells = _logarithms(cells, floors)
@@ -449,10 +449,10 @@ def bounds(
     rise = powers[:, None] * np.where(matters, clipped, 0.0)
     q = _logarithms(floors[:, None])
     once = np.isnan(half)
-    lowest = np.where(once, whole - widening, half)
-    low = np.fmin(whole, lowest) + np.minimum(rise, 0.0)
-    highest = np.where(once, whole + widening, half)
-    high = np.fmax(whole, highest) + np.maximum(rise, 0.0)
+    lowest = np.where(once, as_run - widening, half)
+    low = np.fmin(as_run, lowest) + np.minimum(rise, 0.0)
+    highest = np.where(once, as_run + widening, half)
+    high = np.fmax(as_run, highest) + np.maximum(rise, 0.0)
     return np.maximum(low, q), np.maximum(high, q)
 
 
@@ -528,27 +528,27 @@ def first_of_kind(outcomes: np.ndarray, exists: np.ndarray) -> np.ndarray:
     for k, block in enumerate(exists):
         seeds = np.flatnonzero(block)
         outcomes_there = outcomes[:, k, seeds]
-        _, kept = np.unique(outcomes_there, axis=1, return_index=True)
-        first[k, seeds[kept]] = True
+        _, first_seeds = np.unique(outcomes_there, axis=1, return_index=True)
+        first[k, seeds[first_seeds]] = True
     return first
 
 
 def corrected(comparisons: Sequence[Comparison]) -> None:
     """Correct the winners' limits of comparisons whose blocks form one family."""
-    several = [one for one in comparisons if len(one.laws) > 1]
-    blocks = sum(len(one.floors) for one in several)
-    for one in several:
-        one.first = one.error / blocks
-    p = [one.winner_p.min(axis=1) for one in several]
-    for one in several:
-        one.winning = holm(np.concatenate(p), one.error)
+    with_rivals = [comparison for comparison in comparisons if len(comparison.laws) > 1]
+    blocks = sum(len(comparison.floors) for comparison in with_rivals)
+    for comparison in with_rivals:
+        comparison.first = comparison.error / blocks
+    p = [comparison.winner_p.min(axis=1) for comparison in with_rivals]
+    for comparison in with_rivals:
+        comparison.winning = holm(np.concatenate(p), comparison.error)
 
 
 def holm(p: np.ndarray, error: float) -> float:
     """Return the p-value up to which Holm's method rejects."""
     allowed = error / np.arange(p.size, 0, -1)
-    kept = np.flatnonzero(np.sort(p) > allowed)
-    return float(allowed[kept[0]]) if kept.size else error
+    accepted = np.flatnonzero(np.sort(p) > allowed)
+    return float(allowed[accepted[0]]) if accepted.size else error
 
 
 def needed_to_win(blocks: int) -> int:
@@ -610,12 +610,12 @@ def placed(
     lacked = lacking.sum(axis=1).tolist()
     rounded = np.round(means, 9).tolist()
     order = list(zip(lacked, rounded, strict=True))
-    found = []
+    placed_laws = []
     for law, mean, own, star in zip(laws, means, order, best.tolist(), strict=True):
-        better = sum(other < own for other in order)
+        better = sum(standing < own for standing in order)
         place = better + (1 + order.count(own)) / 2
-        found.append(Rank(law, mean, place, star))
-    return sorted(found, key=lambda rank: (rank.place, rank.law))
+        placed_laws.append(Rank(law, mean, place, star))
+    return sorted(placed_laws, key=lambda rank: (rank.place, rank.law))
 
 
 # relevant differences

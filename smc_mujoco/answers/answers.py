@@ -303,14 +303,16 @@ def printed_verdicts(facts: Sequence[Verdict], name: Callable[[str], str]) -> st
 def settled(facts: Sequence[tuple[str, Settles]]) -> str:
     """Return how many runs of each law settled, in one sentence."""
     count = sum(fact.count for _, fact in facts)
-    total = sum(fact.of for _, fact in facts)
+    total = sum(fact.total for _, fact in facts)
     if count == total:
         return f"All {total} runs settled."
     if not count:
         return f"No run of {total} settled."
-    short = [f"{law} {fact.count} of {fact.of}" for law, fact in facts if fact.count < fact.of]
-    others = "" if len(short) == len(facts) else ", all of the others"
-    return f"Settled runs: {', '.join(short)}{others}."
+    short = [
+        f"{law} {fact.count} of {fact.total}" for law, fact in facts if fact.count < fact.total
+    ]
+    ending = "" if len(short) == len(facts) else ", all of the others"
+    return f"Settled runs: {', '.join(short)}{ending}."
 
 
 def sample(fact: Sample) -> str:
@@ -321,7 +323,7 @@ def sample(fact: Sample) -> str:
     if fact.sets < 2:
         return f"{runs}, one set of gains"
     gains = f"gains of {'at least ' if fact.more else ''}{fact.sets} searches"
-    return f"{runs}, {gains}{' (some laws: one set)' if fact.one else ''}"
+    return f"{runs}, {gains}{' (some laws: one set)' if fact.single else ''}"
 
 
 def grid_lines(fact: Grid, width: int = WIDTH) -> tuple[list[str], list[str]]:
@@ -381,7 +383,7 @@ def winners_lines(contests: Sequence[Contest]) -> list[str]:
     plant.
     """
     names = [name for name, _ in contests[0].grid.columns if name != ON_PLANT]
-    head = min(NAMES, max(len(f"{one.plant} {one.condition}") for one in contests))
+    head = min(NAMES, max(len(f"{row.plant} {row.condition}") for row in contests))
     room = (WIDTH - head) // max(len(names), 1) - 1
     rows = [("", [textwrap.wrap(name, room) for name in names])]
     of_plants: dict[str, str] = {}
@@ -395,8 +397,8 @@ def winners_lines(contests: Sequence[Contest]) -> list[str]:
         if ON_PLANT in fact_of and contest.plant not in of_plants:
             of_plants[contest.plant] = verdict(fact_of[ON_PLANT])
             if contest.use:
-                whole = dataclasses.replace(contest.use, unless=())
-                of_plants[contest.plant] = f"{use(whole)} {of_plants[contest.plant]}."
+                of_plant = dataclasses.replace(contest.use, unless=())
+                of_plants[contest.plant] = f"{use(of_plant)} {of_plants[contest.plant]}."
     lines = [f"{len(contests)} plants and conditions: {sample(contests[0].sample)}"]
     for label, cells in rows:
         names_and_cells = textwrap.wrap(label, head) or [""], *cells
@@ -483,8 +485,11 @@ def sensitivity_lines(facts: SensitivityFacts) -> list[str]:
     numbers, _ = grid_lines(facts.grid)
     lines = [*textwrap.wrap(first, WIDTH), "", *numbers, ""]
     pairs = [
-        (facts.metric, f"{facts.spread[0]} to {facts.spread[1]} in 90 % of {facts.failed.of} runs"),
-        ("fail", f"{facts.failed.count} of {facts.failed.of} runs"),
+        (
+            facts.metric,
+            f"{facts.spread[0]} to {facts.spread[1]} in 90 % of {facts.failed.total} runs",
+        ),
+        ("fail", f"{facts.failed.count} of {facts.failed.total} runs"),
     ]
     if facts.narrow:
         before, after = facts.medians
@@ -520,8 +525,8 @@ def claims_lines(facts: ClaimsFacts) -> list[str]:
     has room for are counted.
     """
     pairs = [(whose, ", ".join(verdicts)) for whose, verdicts in facts.counts]
-    if facts.supported.of:
-        holds = f"{facts.supported.count} of {facts.supported.of} supported sentences hold"
+    if facts.supported.total:
+        holds = f"{facts.supported.count} of {facts.supported.total} supported sentences hold"
         pairs.append(("every gain", f"{holds} under every set of gains that was run"))
     for name, text in facts.refuted[:MAX_REFUTED]:
         pairs.append((f"refuted {name}", text))
@@ -634,8 +639,8 @@ def _sets(facts: WhichFacts) -> str:
     """Return how many sets of gains a verdict needs."""
     size = facts.size
     kind = "shorter set" if size.shorter else "set"
-    of = f"{size.raced} of {size.named} laws" if size.raced < size.named else "each law"
-    words = f"{of} got {counted(size.sets, kind)}"
+    raced = f"{size.raced} of {size.named} laws" if size.raced < size.named else "each law"
+    words = f"{raced} got {counted(size.sets, kind)}"
     if facts.sets_needed > size.sets:
         words += f"; deciding takes {facts.sets_needed}"
         if not math.isnan(facts.minutes_needed):
@@ -696,7 +701,7 @@ def _below(lead: Lead) -> str:
 
 def _counts(fact: Settles) -> str:
     """Return a count of runs, such as "all 24" or "3 of 24"."""
-    return f"{fact.count} of {fact.of}"
+    return f"{fact.count} of {fact.total}"
 
 
 def _level(level: Level) -> str:
@@ -793,9 +798,9 @@ def identify_lines(facts: IdentifyFacts) -> list[str]:
         *([text.ljust(width) for text in texts] for texts, width in columns), strict=True
     ):
         lines.append(f"{name}  {value}  ± {error}  {unit}".rstrip())
-    of = "pieces of 1 s" if facts.by_pieces else "whole logs"
+    parts = "pieces of 1 s" if facts.by_pieces else "whole logs"
     held_out = "" if facts.held_out is None else f", held out {_fit(facts.held_out)}"
-    lines.append(f"fits {_fit(facts.fit)}{held_out} ({of}, worst column)")
+    lines.append(f"fits {_fit(facts.fit)}{held_out} ({parts}, worst column)")
     for k, doubt in enumerate(facts.doubts):
         below = labelled([("doubt", doubt)])
         later = len(facts.doubts) - k - 1
@@ -829,9 +834,9 @@ def identify_files(condition: str, figure: str, report: str) -> str:
 def entered_lines(facts: EnteredFacts) -> list[str]:
     """Return where an entry stands in a suite: a line a problem."""
     level = sum(standing.level for standing in facts.standings)
-    of = f"{level} of {len(facts.standings)} problems"
+    count = f"{level} of {len(facts.standings)} problems"
     lines = [
-        f"{facts.entry} in {facts.suite}: not led by any of {facts.entries - 1} others in {of}",
+        f"{facts.entry} in {facts.suite}: not led by any of {facts.entries - 1} others in {count}",
         "",
     ]
     rows = [("problem", "place", "error", "first", "its error")]

@@ -35,11 +35,11 @@ def explain(word: str) -> str:
     """
     entries = glossary()
     plain = {name.casefold(): name for name in entries}
-    asked = " ".join(word.split())
-    known = plain.get(asked.casefold()) or plain.get(asked.casefold().removesuffix("s")) or asked
-    body = find("word", known, entries)
+    typed = " ".join(word.split())
+    entry = plain.get(typed.casefold()) or plain.get(typed.casefold().removesuffix("s")) or typed
+    body = find("word", entry, entries)
     pages = dict.fromkeys(address for _, address in LINK.findall(body))
-    lines = [known]
+    lines = [entry]
     for paragraph in body.split("\n\n"):
         text = LINK.sub(r"\1", LAST_LINKS.sub(".", paragraph)).replace("$", "")
         lines += textwrap.wrap(" ".join(text.split()), WIDTH, break_on_hyphens=False)

@@ -88,7 +88,7 @@ class Sample:
     runs: int  # distinct ones
     sets: int  # the least number of sets of gains of a law that has several
     more: bool  # whether some laws have more sets
-    one: bool  # whether a law has one set of gains
+    single: bool  # whether a law has one set of gains
 
 
 @frozen_data
@@ -96,7 +96,7 @@ class Settles:
     """How many runs settle, of how many."""
 
     count: int
-    of: int
+    total: int
 
 
 @keyword_dataclass

@@ -49,10 +49,10 @@ def print_pages(name: str, console: Console) -> None:
     if name in plants():
         return print_plant(plants()[name], console)
     pages = []
-    known: dict[str, None] = {}
+    titles: dict[str, None] = {}
     for catalogue_of in CATALOGUES.values():
         templates = catalogue_of()
-        known |= dict.fromkeys(templates)
+        titles |= dict.fromkeys(templates)
         if name in templates:
             pages.append((templates[name], templates.package(name)))
     if not pages and "." in name:
@@ -60,7 +60,7 @@ def print_pages(name: str, console: Console) -> None:
             if isinstance(law, Law) and law.template:
                 pages.append((law.template, ""))
     if not pages:
-        raise unknown("law, surface, velocity estimator or plant", name, [*known, *plants()])
+        raise unknown("law, surface, velocity estimator or plant", name, [*titles, *plants()])
     for template, package in pages:
         print_page(template, console, package, name)
     return None
@@ -117,11 +117,11 @@ def print_suitable(needs: Sequence[str], plant: str | None, console: Console) ->
         title += f" that {' and '.join(PROPERTIES[need].words for need in needs)}"
     if plant is not None:
         title += f" for {plant}"
-    shown = []
+    suitable_laws = []
     for row in lists()["Laws"]:
         if row[0] in names:
-            shown.append(row)
-    console.print(catalogue(title, shown))
+            suitable_laws.append(row)
+    console.print(catalogue(title, suitable_laws))
 
 
 def print_page(template: Template, console: Console, package: str, text: str) -> None:
@@ -130,8 +130,8 @@ def print_page(template: Template, console: Console, package: str, text: str) ->
     """
     console.print(Text.assemble((template.name, "bold cyan"), (f"  {template.kind}", "dim")))
     _print_docstring(template.doc, console)
-    some = _values(dict(list(template.defaults.items())[:2]))
-    call = f'"{text}", {some}' if some else f'"{text}"'
+    examples = _values(dict(list(template.defaults.items())[:2]))
+    call = f'"{text}", {examples}' if examples else f'"{text}"'
     conditions = [*template.conditions]
     for words in template.advice:
         conditions.append(f"{words} (advice)")

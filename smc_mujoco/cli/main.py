@@ -79,24 +79,24 @@ def main(arguments: Sequence[str] | None = None) -> None:
         signal.signal(signal.SIGTERM, _end)
     choose_gl()  # before a command imports mujoco, which fails if MUJOCO_GL does not name a backend
     warnings.showwarning = _showing_once()
-    given = sys.argv[1:] if arguments is None else arguments
-    if given and given[0] in DRAWN:
+    words = sys.argv[1:] if arguments is None else arguments
+    if words and words[0] in DRAWN:
         with errors_as_sentences():
             raise ScenarioError(
-                f"no command {given[0]!r}: `smc-mujoco run SCENE` writes figures and a film, and "
+                f"no command {words[0]!r}: `smc-mujoco run SCENE` writes figures and a film, and "
                 "smc.figure and smc.film draw any traces in Python"
             )
-    command.remember(given)
+    command.remember(words)
     app(arguments, prog_name=command.PROGRAM)
 
 
 def _showing_once() -> Callable[..., None]:
     """Return a showwarning that prints each sentence once, also if parts of a command repeat it."""
-    shown: set[str] = set()
+    sentences: set[str] = set()
 
     def show(message: Warning | str, *_: object, **__: object) -> None:
-        if (sentence := printable(str(message))) not in shown:
-            shown.add(sentence)
+        if (sentence := printable(str(message))) not in sentences:
+            sentences.add(sentence)
             print(f"smc-mujoco: {sentence}", file=sys.stderr)
 
     return show

@@ -47,8 +47,8 @@ def perform(
     terminal.print()
     for condition, runs in traces.items():
         title = _title(scene, condition)
-        others = again.get(condition)
-        for table in [*tables.scores(title, runs, others), *tables.tips(title, runs, others)]:
+        repeats = again.get(condition)
+        for table in [*tables.scores(title, runs, repeats), *tables.tips(title, runs, repeats)]:
             terminal.print(table)
         for label, trace in runs.items():
             if trace.failure:
@@ -79,9 +79,9 @@ def _title(scene: Scene, condition: str) -> str:
 def simulate(scene: Scene, threads: int | None) -> Traces:
     """Run all scenarios of the scene at once, with a progress bar."""
     runs = list(scene.runs())
-    made = run([scenario for _, _, scenario in runs], threads, progress=True)
+    finished = run([scenario for _, _, scenario in runs], threads, progress=True)
     traces: dict[str, dict[str, Trace]] = {}
-    for (condition, label, _), trace in zip(runs, made, strict=True):
+    for (condition, label, _), trace in zip(runs, finished, strict=True):
         traces.setdefault(condition, {})[label] = trace
     return traces
 
@@ -95,10 +95,10 @@ def repeat(traces: Traces, threads: int | None) -> dict[str, dict[str, list[Trac
                 for again in repetitions(trace):
                     changed.append((condition, label, again))
     repeated = run([scenario for *_, scenario in changed], threads, progress=True)
-    made: dict[str, dict[str, list[Trace]]] = {}
+    by_condition: dict[str, dict[str, list[Trace]]] = {}
     for (condition, label, _), trace in zip(changed, repeated, strict=True):
-        made.setdefault(condition, {}).setdefault(label, []).append(trace)
-    return made
+        by_condition.setdefault(condition, {}).setdefault(label, []).append(trace)
+    return by_condition
 
 
 def save(traces: Traces, out: Path, export: Sequence[str] = ()) -> list[Path]:

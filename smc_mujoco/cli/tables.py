@@ -93,11 +93,11 @@ def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) 
         for metric in metrics():
             if metric.applies_to(group):
                 units[metric.name] = metric.unit_for(group.unit, group.effort)
-        shown = []
+        names = []
         heads = []
         for head, name in SCORE_COLUMNS.items():
             if name in units:
-                shown.append(name)
+                names.append(name)
                 heads.append(_head(head, units[name]))
         rows: dict[str, list[Text]] = {}
         for label, runs in values.items():
@@ -105,7 +105,7 @@ def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) 
             for name in units:
                 least[name] = floor(traces[label].scenario, name)
             rows[label] = []
-            for name in shown:
+            for name in names:
                 of_runs: list[Any] = [run and run[group.name][name] for run in runs]
                 rows[label].append(_marked(of_runs, traces[label].scenario, least[name]))
         tables.append(_by_label(", ".join(filter(None, (title, heading))), heads, traces, rows))
@@ -196,17 +196,17 @@ def tips(title: str, traces: Mapping[str, Trace], again: Again | None = None) ->
     if not next(iter(traces.values())).scenario.plant.tip:
         return []
     values = _several(tip_scores, traces, again)
-    known = set().union(*filter(None, chain.from_iterable(values.values())))
-    shown = []
+    measured = set().union(*filter(None, chain.from_iterable(values.values())))
+    columns = []
     heads = []
     for head, (name, unit, factor) in TIP_COLUMNS.items():
-        if name in known:
-            shown.append((name, factor))
+        if name in measured:
+            columns.append((name, factor))
             heads.append(_head(head, unit))
     rows: dict[str, list[Text]] = {}
     for label, runs in values.items():
         rows[label] = []
-        for name, factor in shown:
+        for name, factor in columns:
             of_runs: list[Any] = [run and factor * run.get(name, math.nan) for run in runs]
             rows[label].append(_marked(of_runs, traces[label].scenario))
     return _noted([_by_label(f"{title}, tip", heads, traces, rows)])
@@ -347,18 +347,18 @@ def document(printed: Iterable[Any]) -> dict[str, Any]:
     """Return what a command printed as JSON data: tables, with numbers as numbers, and notes."""
     tables: list[Tabular] = []
     notes: list[str] = []
-    for thing in printed:
-        shown = thing.renderable if isinstance(thing, Padding) else thing
-        if isinstance(shown, Table):
-            tables.append(_tabular(shown))
-        elif isinstance(shown, Tabular):
-            tables.append(shown)
-        elif isinstance(shown, Tables):
-            tables += shown.tables
-            if isinstance(shown, Answer):
-                notes += shown.lines
-        elif str(shown):
-            notes.append(str(shown))
+    for printable in printed:
+        content = printable.renderable if isinstance(printable, Padding) else printable
+        if isinstance(content, Table):
+            tables.append(_tabular(content))
+        elif isinstance(content, Tabular):
+            tables.append(content)
+        elif isinstance(content, Tables):
+            tables += content.tables
+            if isinstance(content, Answer):
+                notes += content.lines
+        elif str(content):
+            notes.append(str(content))
     return {"tables": [table.about() for table in tables], "notes": notes}
 
 

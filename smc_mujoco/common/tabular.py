@@ -131,12 +131,12 @@ class Tabular:
         narrow = [self._column(i, narrow=True) for i in numbers]
         while sum(map(_widest, [*names, *columns])) + len(self.headings) - 1 > width:
             savings = []
-            for wide, other in zip(columns, narrow, strict=True):
-                savings.append(_widest(wide) - _widest(other))
+            for wide, narrower in zip(columns, narrow, strict=True):
+                savings.append(_widest(wide) - _widest(narrower))
             if max(savings, default=0) <= 0:
                 break
-            at = savings.index(max(savings))
-            columns[at] = narrow[at]
+            widest = savings.index(max(savings))
+            columns[widest] = narrow[widest]
         return [*names, *columns]
 
     def _names(self, i: int, width: int = NAME_WIDTH) -> "list[Text]":
@@ -176,8 +176,8 @@ class Tabular:
 
     def _heading(self, i: int, width: int) -> str:
         """Return a heading on lines as wide as the cells of its column; a unit stays whole."""
-        whole = re.sub(r"\(.*\)", lambda unit: unit[0].replace(" ", NO_BREAK), self.headings[i])
-        return _wrapped(whole, max(HEADING_WIDTH, width))
+        unbroken = re.sub(r"\(.*\)", lambda unit: unit[0].replace(" ", NO_BREAK), self.headings[i])
+        return _wrapped(unbroken, max(HEADING_WIDTH, width))
 
     def _repr_html_(self) -> str:
         lines = [list(map(_html, row)) for row in self.rows]
@@ -376,14 +376,14 @@ def _parts(widths: Sequence[int], width: int, names: int) -> list[list[int]]:
     """Return the columns of each part of a table that fits into a width; each part begins with the
     names.
     """
-    left = list(range(names))
-    parts = [left]
+    name_columns = list(range(names))
+    parts = [name_columns]
     for i, column_width in enumerate(widths[names:], names):
         last = parts[-1]
         taken = sum(widths[k] for k in last) + len(last)
         if len(last) > names and taken + column_width > width:
-            last = left
-            parts.append(left)
+            last = name_columns
+            parts.append(name_columns)
         parts[-1] = [*last, i]
     return parts
 
@@ -467,8 +467,8 @@ def tex(text: str) -> str:
     low = r"(?P<low>[<-]?[\d.]+)e(?P<of_low>-?\d+)"
     interval = rf"{low}–(?P<high>-?[\d.]+)(?:e(?P<of_high>-?\d+))?"
     number = r"(?P<number>[<-]?[\d.]+)e(?P<power>-?\d+)"
-    others = r"\^(?P<raised>-?\d+)|(?P<bound>\bu_max\b)|(?P<letter>.)"
-    return re.sub(rf"{interval}|{number}|{others}", written, text)
+    notation = r"\^(?P<raised>-?\d+)|(?P<bound>\bu_max\b)|(?P<letter>.)"
+    return re.sub(rf"{interval}|{number}|{notation}", written, text)
 
 
 def _with_power(number: str, power: str) -> str:

@@ -64,9 +64,9 @@ def ends(low: str, high: str) -> str:
 
 def joined(parts: Iterable[str], last_word: str = "and") -> str:
     """Return "a, b and c"; "" for no parts."""
-    *others, last = list(parts) or [""]
-    if others:
-        return f"{', '.join(others)} {last_word} {last}"
+    *first_parts, last = list(parts) or [""]
+    if first_parts:
+        return f"{', '.join(first_parts)} {last_word} {last}"
     return last
 
 

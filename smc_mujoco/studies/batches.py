@@ -35,12 +35,12 @@ def result_columns(trace: Trace) -> ResultColumns:
     if trace.failure is not None:
         return failed
     try:
-        known = {}
+        scored = {}
         for name, value in score(trace).items():
             if not math.isnan(value):
-                known[name] = value
+                scored[name] = value
         ends = {"trends": to_json(trends(trace)), "arrived": arrived(trace)}
-        return failed | known | ends | {"touched": touched(trace)}
+        return failed | scored | ends | {"touched": touched(trace)}
     except ScenarioError as error:  # not finite, though nothing failed
         return failed | {"failure": str(error)}
 

@@ -105,7 +105,7 @@ class Block:
     by_step: Mapping[str, Pair]
     samples: int  # largest number of any two laws, see `ranking`; for one law, of its runs
     sets: int  # smallest number of sets of gains of a law that has several; 1 if none has
-    given: bool  # whether a law has one set of gains
+    single_set: bool  # whether a law has one set of gains
     few: Mapping[str, int]  # laws that are not ranked, as they have so few sets of gains or runs
     rising: Names = ()  # laws whose median is below the floor, but need not stay there
     # the laws with default gains, over which no other law is named the winner
@@ -148,7 +148,7 @@ class Block:
             runs=self.runs,
             sets=self.sets,
             more=self.samples > self.sets,
-            one=self.sets > 1 and self.given,
+            single=self.sets > 1 and self.single_set,
         )
 
 
@@ -248,7 +248,7 @@ class Board:
         """Return what a sample of a block is."""
         if block.sets == 1:
             return "runs"
-        return "sets of gains or runs" if block.given else "sets of gains"
+        return "sets of gains or runs" if block.single_set else "sets of gains"
 
     @property
     def not_ranked(self) -> list[NotRanked]:

@@ -153,9 +153,11 @@ def _table(
     under = []
     if "strong=True" in str(rows):
         facts = [board.verdict(block) for board in boards for block in board.blocks[:1]]
-        whole = [fact for fact, board in zip(facts, boards, strict=True) if fact and _is_one(board)]
+        decided = [
+            fact for fact, board in zip(facts, boards, strict=True) if fact and _is_one(board)
+        ]
         under = [
-            answers.printed_verdicts(whole, lambda law: labels.get(law) or style.law_name(law))
+            answers.printed_verdicts(decided, lambda law: labels.get(law) or style.law_name(law))
         ]
     return Tabular(
         headings=["law", *map(heading, boards)],
@@ -193,7 +195,7 @@ def _sample(block: Block) -> str:
         parts.append(counted(sample.runs, "distinct run"))
     if sample.sets > 1:
         least = "at least " if sample.more else ""
-        alone = " (one for some laws)" if sample.one else ""
+        alone = " (one for some laws)" if sample.single else ""
         parts.append(f"{least}{sample.sets} sets of gains{alone}")
     return ", ".join(parts)
 

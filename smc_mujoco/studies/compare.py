@@ -468,8 +468,10 @@ class Compared(Answer):
             last = paired_runs.SETTLES
             first = sorted(self._metrics, key=lambda name: (name not in won, name == last))[:most]
             names = [name for name in self._metrics if name in first]
-            if others := [name for name in self._metrics if name not in first]:
-                warn_once(f"plot leaves out {joined(others)}: draw the rest with metrics={others}")
+            if omitted := [name for name in self._metrics if name not in first]:
+                warn_once(
+                    f"plot leaves out {joined(omitted)}: draw the rest with metrics={omitted}"
+                )
         return dot_plot.plot(self.table, path, names, winners=self.leaderboard.winners, **options)
 
 
@@ -626,8 +628,8 @@ def _in_words(trial: Trial, duration: float) -> dict[str, dict[str, str]]:
     by_plant: dict[str, dict[str, str]] = {}
     for plant in trial.plants:
         of_plant = by_plant.setdefault(plant.name, {})
-        for one in trial.conditions:
-            of_plant[one.name] = one.brief(plant, duration) or "the scenario's defaults"
+        for condition in trial.conditions:
+            of_plant[condition.name] = condition.brief(plant, duration) or "the scenario's defaults"
     return by_plant
 
 
@@ -691,14 +693,14 @@ def _times(
 
 def _usual(plant: Plant) -> list[Any]:
     """Return the laws to compare on a plant if none are given."""
-    known = []
+    suited = []
     tuned = []
     for name in gain_sets.COMPARED:
         if suits(catalogue()[name], plant):
-            known.append(name)
+            suited.append(name)
             if gain_sets.in_set(plant, name, "tuned"):
                 tuned.append(name)
-    if known:
-        return tuned or known
+    if suited:
+        return tuned or suited
     left_out = {"none", *gain_sets.ALIASES}  # aliases have the gains of laws that are there already
     return [law for law in suitable(plant=plant) if law.name not in left_out]

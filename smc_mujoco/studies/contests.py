@@ -43,11 +43,11 @@ def contests(boards: Sequence[Board], gains: Gains, own: Names) -> tuple[Contest
                 objectives[block.plant] = board, block
             else:
                 columns_of.setdefault((block.plant, block.condition), []).append((board, block))
-    made = []
+    compared = []
     for (plant, _), of_metrics in columns_of.items():
         of_plant = [objectives[plant]] if plant in objectives else []
-        made.append(_contest([*of_plant, *of_metrics], gains.get(plant, {}), own))
-    return tuple(made)
+        compared.append(_contest([*of_plant, *of_metrics], gains.get(plant, {}), own))
+    return tuple(compared)
 
 
 def _contest(columns: Sequence[Column], gains: Mapping[str, str], own: Names) -> Contest:

@@ -90,10 +90,10 @@ def leaderboard(
     """
     if isinstance(metrics, str) or not items_of("metrics", metrics):
         raise ScenarioError(f"metrics is {shown(metrics)}: give names, such as ('itae', 'tv_rate')")
-    known = dict(UNITS)
-    del known[OBJECTIVE]
+    units = dict(UNITS)
+    del units[OBJECTIVE]
     for name in metrics:
-        find("metric", name, known)
+        find("metric", name, units)
     paired_runs.check_table(table)
     boards = Boards()
     boards.failures = paired_runs.failures(table)
@@ -147,10 +147,10 @@ class RankedGroup(NamedTuple):
 def _commands(ranked: Sequence[RankedGroup]) -> list[str]:
     """Return what the commands of the drives mean, and that default gains are for a force."""
     words: list[str] = []
-    for each in ranked:
-        for scenario in filter(None, each.ran):
+    for ranked_group in ranked:
+        for scenario in filter(None, ranked_group.ran):
             words += scenario.drive_train.words
-        if words and any(map(_is_default, itertools.chain(*each.sources.values()))):
+        if words and any(map(_is_default, itertools.chain(*ranked_group.sources.values()))):
             words.append("Default gains are for a force: tune them for this u first.")
     return [*dict.fromkeys(words)]
 
@@ -168,12 +168,12 @@ def _boards_of(
     by_row = paired_runs.by_row(table, metric)
     scores = []
     compared = {}
-    for i, each in enumerate(ranked):
-        judged = [paired_runs.is_judged(scenario, metric) for scenario in each.ran]
-        of_group = each.group.scores(by_row, judged)
+    for i, ranked_group in enumerate(ranked):
+        judged = [paired_runs.is_judged(scenario, metric) for scenario in ranked_group.ran]
+        of_group = ranked_group.group.scores(by_row, judged)
         scores.append(of_group)
         if of_group.blocks:
-            compared[i] = _compared(of_group, each.ran, metric, relevant)
+            compared[i] = _compared(of_group, ranked_group.ran, metric, relevant)
     corrected([*compared.values()])
     family = _family(compared.values())
     boards = {}
@@ -239,8 +239,8 @@ def _untuned(sources: Sources, defaults: bool) -> Names:
     if defaults:
         return ()
     untuned = []
-    for law, known in sources.items():
-        if any(map(_is_default, known)):
+    for law, of_law in sources.items():
+        if any(map(_is_default, of_law)):
             untuned.append(law)
     return tuple(untuned)
 
@@ -262,12 +262,12 @@ def _board(
     """Return the board of a comparison, whose winners are corrected for `family` blocks."""
     blocks = []
     of_blocks = []
-    for at, k in enumerate(scores.blocks):
+    for block_number, k in enumerate(scores.blocks):
         of_blocks.append(ran[k])
         floor = paired_runs.floor_words(ran[k], metric)
         if floor and len(scores.blocks) > 1:
             floor += f" under {group.blocks[k][1]}"
-        block = _block(group.blocks[k], group.seeds[k], comparison, at, untuned, floor)
+        block = _block(group.blocks[k], group.seeds[k], comparison, block_number, untuned, floor)
         blocks.append(dataclasses.replace(block, bound=_bound(ran[k])))
     repeated = not np.isnan(comparison.halves).all()
     return Board(
@@ -393,7 +393,7 @@ def _block(
         samples=int(comparison.samples[at].max()) if len(laws) > 1 else runs,
         sets=min(sets[sets > 1].tolist(), default=1),
         few=sets_of_few,
-        given=bool((sets == 1).any()),
+        single_set=bool((sets == 1).any()),
         untuned=untuned,
     )
 
@@ -462,8 +462,8 @@ def _entries(
     """Return the entries of all laws."""
     entries = []
     for rank in ranks(comparison):
-        at = comparison.laws.index(rank.law)
-        values = comparison.cells[at]
+        i = comparison.laws.index(rank.law)
+        values = comparison.cells[i]
         interval = median_of(values, linked(*sets[rank.law]))
         if comparison.shares:
             share = float(1 - np.nanmean(values, axis=1).mean())
@@ -474,7 +474,7 @@ def _entries(
                 interval=interval,
                 vague=not comparison.shares and _vague(interval, comparison.floors.min()),
                 rank=rank,
-                failed=int(comparison.without_value[at].sum()),
+                failed=int(comparison.without_value[i].sum()),
                 runs=int((~np.isnan(values)).sum()),
                 sources=sources.get(rank.law, ()),
             )

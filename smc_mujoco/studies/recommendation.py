@@ -267,7 +267,7 @@ class Recommendation(Answer):
         """What the runs of the law warn of."""
         cautions = []
         for name, runs in self.unsettled_in.items():
-            cautions.append(Caution(kind="unsettled", where=name, count=runs.count, of=runs.of))
+            cautions.append(Caution(kind="unsettled", where=name, count=runs.count, of=runs.total))
         if self.form != "untried" and self.unsettled_in and leans(self.worst_trace):
             cautions.append(Caution(kind="leans", where=str(self.worst_run.condition)))
         if self.together and self.together[0] < RELIABLE * self.together[1]:

@@ -89,13 +89,13 @@ class Outcome:
         return self._filtered(lambda label, run: run.failure is None and bool(holds(run)))
 
     def _filtered(self, wanted: Callable[[str, Trace], bool]) -> "Outcome":
-        kept = {}
+        selected = {}
         for name, runs in self.traces.items():
-            kept[name] = {}
+            selected[name] = {}
             for label, run in runs.items():
                 if wanted(label, run):
-                    kept[name][label] = run
-        return Outcome(traces=kept)
+                    selected[name][label] = run
+        return Outcome(traces=selected)
 
     def values(self, measure: Measure) -> dict[str, dict[str, float]]:
         """Return condition -> label -> value: NaN for a run that failed, inf for "never"."""
@@ -161,20 +161,20 @@ class Outcome:
           plural: the verb, such as "settle", with what follows it.
           holds: whether a run counts; by default whether it settles.
         """
-        kept = self.select(holds).traces
+        holding = self.select(holds).traces
         parts = []
         for name, runs in self.traces.items():
-            others = []
+            failing = []
             for label in runs:
-                if label not in kept[name]:
-                    others.append(label)
-            text = f"{len(kept[name])} of {len(runs)}"
+                if label not in holding[name]:
+                    failing.append(label)
+            text = f"{len(holding[name])} of {len(runs)}"
             if not parts:
                 text += f" {plural}"
             if len(self.traces) > 1:
                 text += f" under {name}"
-            if others:
-                text += f" (not {joined(others)})"
+            if failing:
+                text += f" (not {joined(failing)})"
             parts.append(text)
         return ", ".join(parts)
 
@@ -182,11 +182,11 @@ class Outcome:
         """Return the last condition that each label tolerates, if the conditions are ordered from
         weak to strong: the last one before `holds` is first false, as in "a and b 20 ms, c none".
         """
-        kept = self.select(holds).traces
+        holding = self.select(holds).traces
         last: dict[str, list[str]] = {}
         for label in self.labels:
             tolerated = "none"
-            for name, runs in kept.items():
+            for name, runs in holding.items():
                 if label in self.traces[name]:
                     if label not in runs:
                         break
@@ -216,19 +216,19 @@ class Outcome:
         runs = self.traces[condition]
         # who does nothing is calm
         to_arrive = isinstance(measure, str) and sign > 0.0 and not CATALOGUE[measure].error
-        known = {}
+        comparable = {}
         for label, value in values.items():
             if math.isnan(value) or (to_arrive and not arrived(runs[label])):
                 continue
-            known[label] = value
-        best = min(known.values(), key=lambda value: sign * value, default=math.nan)
-        if not known or sign * best == math.inf:
+            comparable[label] = value
+        best = min(comparable.values(), key=lambda value: sign * value, default=math.nan)
+        if not comparable or sign * best == math.inf:
             return {}
         least = 0.0
         if isinstance(measure, str):
-            least = floor(self.traces[condition][next(iter(known))].scenario, measure)
+            least = floor(self.traces[condition][next(iter(comparable))].scenario, measure)
         level = {}
-        for label, value in known.items():
+        for label, value in comparable.items():
             if sign > 0.0:
                 worse, better = (value, best)
             else:
@@ -269,14 +269,14 @@ def _range(values: Sequence[float], unit: str) -> str:
     """Return the value, or the smallest and the largest: "0.323 s", "1.12 to 1.13 s, 1 failed",
     "never"; "none" of none.
     """
-    known = []
+    numbers = []
     for value in values:
         if not math.isnan(value):
-            known.append(value)
-    failed = len(values) - len(known)
+            numbers.append(value)
+    failed = len(values) - len(numbers)
     parts = []
-    if known:
-        parts.append(_from_to((min(known), max(known)), unit))
+    if numbers:
+        parts.append(_from_to((min(numbers), max(numbers)), unit))
     if failed:
         parts.append(f"{failed} failed")
     return ", ".join(parts) or "none"

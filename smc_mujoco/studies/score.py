@@ -91,8 +91,8 @@ def score(
     schema = pa.schema(list(columns.items()))
     scored = ScoredRuns(attributes(catalogue, names), device, threads, False, worlds=True)
     tables = []
-    left = iter(runs)
-    while chunk := list(itertools.islice(left, CHUNK)):
+    remaining = iter(runs)
+    while chunk := list(itertools.islice(remaining, CHUNK)):
         for case in chunk:
             if not isinstance(case, Scenario):
                 raise ScenarioError(

@@ -230,15 +230,15 @@ def study(
     plants: run_key.Hashes = {}
     by_key = _by_key(_checked(scenarios), store, resume, plants)
     repeated = _repeated(by_key, plants) if half_steps else {}
-    every = dict(by_key)
+    by_name = dict(by_key)
     for name, scenario in repeated.values():
         if name not in by_key:
-            every[name] = scenario
-    missing = {name: scenario for name, scenario in every.items() if name not in store.where}
-    if progress and (done := len(every) - len(missing)):
-        both = " (runs, and repeats at half the physics step)" if repeated else ""
-        kept = printable(str(store.parts))
-        print(f"{done} of {len(every)} simulations{both} are in {kept}", file=sys.stderr)
+            by_name[name] = scenario
+    missing = {name: scenario for name, scenario in by_name.items() if name not in store.where}
+    if progress and (done := len(by_name) - len(missing)):
+        remark = " (runs, and repeats at half the physics step)" if repeated else ""
+        folder = printable(str(store.parts))
+        print(f"{done} of {len(by_name)} simulations{remark} are in {folder}", file=sys.stderr)
     _compute(missing, store, plants, threads, progress, executor)
     half_steps_of = _half_step_scores(repeated, store)
 
@@ -249,7 +249,7 @@ def study(
         return columns
 
     store.collect(list(by_key), changes)
-    return dataclasses.replace(Table.read(store.results), known=by_key)
+    return dataclasses.replace(Table.read(store.results), scenarios_by_key=by_key)
 
 
 def _by_key(
@@ -330,8 +330,8 @@ def _half_step_scores(repeated: Mapping[str, tuple[str, Scenario]], store: Store
 def _checked(scenarios: Any) -> Iterator[Scenario]:
     """Check and yield scenarios one by one: a generator with a wrong item may be endless."""
     empty = True
-    several = isinstance(scenarios, Iterable) and not isinstance(scenarios, str | bytes | Mapping)
-    for scenario in scenarios if several else ():
+    is_list = isinstance(scenarios, Iterable) and not isinstance(scenarios, str | bytes | Mapping)
+    for scenario in scenarios if is_list else ():
         if not isinstance(scenario, Scenario):
             raise ScenarioError(
                 f"cannot study {shown(scenario)}: give scenarios, such as those of smc.grid"

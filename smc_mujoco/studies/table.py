@@ -148,14 +148,14 @@ def _median(metric: str, values: np.ndarray) -> Cell:
     """Return the median of a metric with its range, of values (N,) that are NaN where a run has
     none.
     """
-    known = values[~np.isnan(values)]
-    missing = len(values) - len(known)
+    numbers = values[~np.isnan(values)]
+    missing = len(values) - len(numbers)
     alarm = f"{missing} of {len(values)} have none" if missing else ""
-    if not len(known):
+    if not len(numbers):
         return Cell("", alarm=alarm)
     text = CATALOGUE[metric].text
-    middle = float(np.median(known))
-    ends = span(text(float(known.min())), text(float(known.max())))
+    middle = float(np.median(numbers))
+    ends = span(text(float(numbers.min())), text(float(numbers.max())))
     return Cell(text(middle), ends, alarm=alarm)
 
 
@@ -208,7 +208,7 @@ class Table:
     """
 
     data: "pa.Table"
-    known: Mapping[str, Scenario] = dataclasses.field(default_factory=dict, repr=False)
+    scenarios_by_key: Mapping[str, Scenario] = dataclasses.field(default_factory=dict, repr=False)
 
     @classmethod
     def read(cls, path: AnyPath) -> "Table":
@@ -257,9 +257,9 @@ class Table:
         rows_of: dict[tuple[str, ...], list[int]] = {}
         for i, case in enumerate(zip(*map(self.column, CASE), strict=True)):
             rows_of.setdefault(case, []).append(i)
-        shown = list(rows_of)[:MAX_CASES]
+        cases = list(rows_of)[:MAX_CASES]
         cells = []
-        for case in shown:
+        for case in cases:
             row: list[Cell | str] = [name or "" for name in case]
             for name, column in values.items():
                 row.append(_median(name, column[rows_of[case]]))
@@ -267,7 +267,7 @@ class Table:
         notes = []
         if len(rows_of) < len(self):
             notes.append("Medians; below each the least and the largest value.")
-        if rest := len(rows_of) - len(shown):
+        if rest := len(rows_of) - len(cases):
             notes.append(f"And {rest} more: Table.select.")
         return Tabular(headings=[*CASE, *values], rows=cells, notes=notes, left=len(CASE))
 
@@ -323,16 +323,16 @@ class Table:
         import pyarrow.compute as pc
 
         data = self.data
-        for name, wanted in (("plant", plant), ("law", law), ("condition", condition)):
-            if wanted is not None:
-                several = isinstance(wanted, Iterable) and not isinstance(wanted, str)
-                if several:
-                    names = items_of(name, wanted)
+        for name, values in (("plant", plant), ("law", law), ("condition", condition)):
+            if values is not None:
+                is_list = isinstance(values, Iterable) and not isinstance(values, str)
+                if is_list:
+                    names = items_of(name, values)
                 else:
-                    names = [wanted]
-                known = dict.fromkeys(self.column(name).tolist())
+                    names = [values]
+                present = dict.fromkeys(self.column(name).tolist())
                 for value in names:
-                    find(f"{name} of this table", value, known)
+                    find(f"{name} of this table", value, present)
                 data = data.filter(pc.field(name).isin(pa.array(names, pa.string())))
         return dataclasses.replace(self, data=data)
 
@@ -343,8 +343,8 @@ class Table:
         if "scenario" not in self.data.column_names:
             raise ScenarioError("this table has scores alone: take row i of the scenarios it is of")
         row = self.data.slice(int(i) % len(self), 1)
-        if known := self.known.get(row["hash"][0].as_py()):
-            return known
+        if scenario := self.scenarios_by_key.get(row["hash"][0].as_py()):
+            return scenario
         about = from_json(row["scenario"][0].as_py())
         if "source" in row.column_names:
             search = row["search"][0].as_py()

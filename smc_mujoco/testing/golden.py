@@ -60,13 +60,13 @@ def compare(file: Path, key: str, response: StepResponse, tolerances: Numbers) -
     tolerances in the file.
     """
     tolerances = _checked(response, tolerances)
-    known = read(file).get(key, {})
-    missing = [name for name in tolerances if name not in known]
-    if not known:
+    recorded = read(file).get(key, {})
+    missing = [name for name in tolerances if name not in recorded]
+    if not recorded:
         missing = missing or ["metrics"]
     if missing:
         raise AssertionError(f"{file.name} has no golden {', '.join(missing)} of {key}: {UPDATE}")
-    names = tolerances or known
+    names = tolerances or recorded
     try:
         response.check_names(names)
     except ScenarioError as error:  # recorded by another version, or of another plant
@@ -74,12 +74,12 @@ def compare(file: Path, key: str, response: StepResponse, tolerances: Numbers) -
     limits = []
     for name in names:
         value, unit = response.value(name)
-        golden: Any = known[name]["value"]
-        tolerance = tolerances.get(name, known[name]["tolerance"])
+        golden: Any = recorded[name]["value"]
+        tolerance = tolerances.get(name, recorded[name]["tolerance"])
         alike = value == golden or (math.isnan(value) and math.isnan(golden))
         within = alike or abs(value - golden) <= tolerance
-        asked = f"{quantity(golden)} ± {quantity(tolerance)}"  # pyright: ignore[reportArgumentType] NaN is None only in the file
-        limits.append(Limit(name, quantity(value, unit), asked, within))
+        expected = f"{quantity(golden)} ± {quantity(tolerance)}"  # pyright: ignore[reportArgumentType] NaN is None only in the file
+        limits.append(Limit(name, quantity(value, unit), expected, within))
     judge(limits, "golden", "golden", f"{response}; if it is meant, {UPDATE}")
 
 

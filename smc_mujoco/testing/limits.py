@@ -36,10 +36,10 @@ def bound(metric: str, value: float, unit: str, limit: object) -> Limit:
     if math.isnan(value):
         compared = CATALOGUE[metric.rpartition(" ")[2]].absent
     what = f"limit of {metric}"
-    given = quantity(value, unit)
+    text = quantity(value, unit)
     if not isinstance(limit, tuple | list):
         high = number(what, limit, infinite=True)
-        return Limit(metric, given, f"<= {quantity(high)}", compared <= high)
+        return Limit(metric, text, f"<= {quantity(high)}", compared <= high)
     if len(limit) != 2:
         raise ScenarioError(
             f"{what} is {shown(limit)}: give the highest value, or (lowest, highest)"
@@ -48,7 +48,7 @@ def bound(metric: str, value: float, unit: str, limit: object) -> Limit:
     if low > high:
         raise ScenarioError(f"{what} is {shown(limit)}: give the lower one first")
     words = f"{quantity(low)} .. {quantity(high)}"
-    return Limit(metric, given, words, low <= compared <= high)
+    return Limit(metric, text, words, low <= compared <= high)
 
 
 def judge(limits: Sequence[Limit], kind: str, word: str, note: object) -> None:

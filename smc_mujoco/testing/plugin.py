@@ -92,8 +92,8 @@ def _cases(
 
     defaults = {"plants": PLANTS, "conditions": ("nominal",)}
     name_of = {
-        "plant": lambda one: find("plant", one, catalogue()).name,
-        "condition": lambda one: str(find_condition(one)),
+        "plant": lambda item: find("plant", item, catalogue()).name,
+        "condition": lambda item: str(find_condition(item)),
     }
     if given:
         raise ScenarioError(
@@ -105,13 +105,13 @@ def _cases(
     for plural, default in defaults.items():
         argument = plural.removesuffix("s")
         value = named.get(plural, default)
-        several = value if isinstance(value, list | tuple) else [value]
+        values = value if isinstance(value, list | tuple) else [value]
         if argument in arguments:
-            if not several:
+            if not values:
                 raise ScenarioError(
                     f"{plural} of marker smc is {shown(value)}: give names, as in {EXAMPLE}"
                 )
-            used[argument] = [name_of[argument](one) for one in several]
+            used[argument] = [name_of[argument](item) for item in values]
         elif plural in named:
             raise ScenarioError(
                 f"marker smc gives {plural} and the test takes no {argument}: add the argument"
@@ -219,12 +219,12 @@ def _used(item: pytest.Item, ledger: Ledger) -> list[StepResponse]:
     """Return the responses that a test made, and those from fixtures of a wider scope."""
     from smc_mujoco.testing.response import StepResponse
 
-    given = [*getattr(item, "funcargs", {}).values(), *ledger.responses]
-    found = {}
-    for value in given:
+    candidates = [*getattr(item, "funcargs", {}).values(), *ledger.responses]
+    used = {}
+    for value in candidates:
         if isinstance(value, StepResponse):
-            found[id(value)] = value
-    return list(found.values())
+            used[id(value)] = value
+    return list(used.values())
 
 
 def pytest_terminal_summary(

@@ -484,7 +484,7 @@ def pair() -> Board:
 
 
 LOST = {"ahead": None, "best": ()}
-FEW = {"ahead": None, "samples": 3, "sets": 3, "given": False}
+FEW = {"ahead": None, "samples": 3, "sets": 3, "single_set": False}
 REASONS = {  # changes of a block -> the verdict
     "few sets below the floor": (
         LOST | {"samples": 3, "sets": 3, "below": LAWS, "floor": "0.1 m"},
@@ -604,13 +604,13 @@ def test_a_law_that_others_beat_has_its_ratio_to_the_law_in_front(pair):
 
 def test_a_heading_says_if_some_laws_have_more_sets_of_gains(boards):
     block = dataclasses.replace(boards[0].blocks[0], seeds=8, runs=8, samples=7, sets=7)
-    assert block.given
-    sample = Sample(seeds=8, runs=8, sets=7, more=False, one=True)
+    assert block.single_set
+    sample = Sample(seeds=8, runs=8, sets=7, more=False, single=True)
     assert block.sample == sample
-    block = dataclasses.replace(block, given=False)
-    assert block.sample == dataclasses.replace(sample, one=False)
+    block = dataclasses.replace(block, single_set=False)
+    assert block.sample == dataclasses.replace(sample, single=False)
     more = dataclasses.replace(block, sets=3).sample
-    assert more == dataclasses.replace(sample, one=False, sets=3, more=True)
+    assert more == dataclasses.replace(sample, single=False, sets=3, more=True)
 
 
 def test_a_verdict_counts_more_conditions_than_eight():

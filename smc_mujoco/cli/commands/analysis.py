@@ -280,14 +280,14 @@ def worst(
     within = _within(disturbance, bound)
     options.check_files(None, *files(figure))
     cases = _attacked_cases(plant, law, condition, duration, gains)
-    found = []
+    attacks = []
     for attacked in cases:
-        found.append(
+        attacks.append(
             worst_case(
                 attacked, metric, within, budget, seed, threads, progress=True, device=device
             )
         )
-    results = WorstCases(found)
+    results = WorstCases(attacks)
     terminal.answer(results, full)
     terminal.finish([case.about() for case in results])
     if figure:
@@ -343,11 +343,11 @@ def sensitivity(
     options.check_files(None, *files(figure))
     chosen = options.law(law)
     scenario = case(as_plant(plant), chosen, condition, duration, gains)
-    found = sensitivity(scenario, over, metric, points, seed, threads, True, device)
-    terminal.answer(found, full)
-    terminal.finish(found.about())
+    result = sensitivity(scenario, over, metric, points, seed, threads, True, device)
+    terminal.answer(result, full)
+    terminal.finish(result.about())
     if figure:
-        found.figure(figure)
+        result.figure(figure)
         terminal.wrote(*files(figure))
 
 
@@ -358,7 +358,7 @@ def _within(disturbance: float | None, bounds: str | None) -> "Uncertainty | Non
     from smc_mujoco.robustness.uncertainty import Uncertainty
 
     fields: dict[str, Any] = {} if disturbance is None else {"disturbance": disturbance}
-    known = {field.name for field in dataclasses.fields(Uncertainty)}
+    names = {field.name for field in dataclasses.fields(Uncertainty)}
     for name, text in options.pairs(bounds, "--bound", "mass=0.7:1.3").items():
         try:
             values = list(map(float, text.split(":")))
@@ -366,7 +366,7 @@ def _within(disturbance: float | None, bounds: str | None) -> "Uncertainty | Non
             cure = "write a range as mass=0.7:1.3, a number as x0=0.2"
             raise ScenarioError(f"--bound {name}={text} cannot be read: {cure}") from None
         value = tuple(values) if len(values) > 1 else values[0]
-        if name in known:
+        if name in names:
             fields[name] = value
         else:
             fields.setdefault("parameters", {})[name] = value
@@ -413,8 +413,8 @@ def _attacked_cases(
     chosen = options.laws(law, gain_sets.LAWS)
     machine = as_plant(plant)
     cases = []
-    for one in _cases(machine, chosen, condition, duration, gains, {}):
-        cases.append([one])
+    for scenario in _cases(machine, chosen, condition, duration, gains, {}):
+        cases.append([scenario])
     return cases
 
 

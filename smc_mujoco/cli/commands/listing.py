@@ -73,8 +73,8 @@ def list_(
     if name is not None and plant is not None:
         with delay_signals():
             from smc_mujoco.simulation.conditions import NAMED
-        shown = name == CONDITIONS or name in NAMED
-        options.only_for(ctx, ("plant",), shown, "lists and conditions: leave out NAME")
+        about_condition = name == CONDITIONS or name in NAMED
+        options.only_for(ctx, ("plant",), about_condition, "lists and conditions: leave out NAME")
     terminal = Terminal(json)
     if name is not None and Path(name).suffix in (".c", ".so"):
         with delay_signals():
@@ -138,11 +138,11 @@ def _print_all(terminal: Terminal, kind: str, plant: str | None = None) -> None:
     lists[f"Conditions, on {machine.name} for 10 s"] = conditions
     lists["Metrics"] = [(metric.name, _about(metric)) for metric in metrics()]
     for title, rows in lists.items():
-        found = rows
+        listed = rows
         if kind not in title.lower():
-            found = [row for row in rows if row[0] == kind]
-        if found:
-            terminal.print(tables.catalogue(title, found), "")
+            listed = [row for row in rows if row[0] == kind]
+        if listed:
+            terminal.print(tables.catalogue(title, listed), "")
     terminal.print(
         "smc-mujoco list NAME shows a law or a plant in full; --need one-gain,continuous lists "
         "the laws that have both"

@@ -53,10 +53,10 @@ def _completing(module: str, name: str) -> Callable[[str], list[str]]:
 
     def complete(incomplete: str) -> list[str]:
         names = getattr(importlib.import_module(f"smc_mujoco.{module}"), name)
-        known: Any = names() if callable(names) else names
+        choices: Any = names() if callable(names) else names
         last = re.split("[,+]", incomplete)[-1]
         completed = []
-        for word in known:
+        for word in choices:
             if word.startswith(last):
                 completed.append(incomplete + word[len(last) :])
         return completed
@@ -257,11 +257,11 @@ def plants(texts: Sequence[str] | None, default: Sequence[str] = ()) -> list[str
     """Return the names of plants in texts, or the default; a law's name is refused."""
     from smc_mujoco.control.law import all_laws
 
-    found = names(texts, default)
-    for name in found:
+    chosen = names(texts, default)
+    for name in chosen:
         if name in all_laws():
             raise ScenarioError(f"{name!r} is a law, not a plant: give it as --law {name}")
-    return found
+    return chosen
 
 
 def check_files(json: Path | None, *others: Path | None) -> None:
@@ -308,11 +308,11 @@ def laws(
     """
     from smc_mujoco.control import from_text
 
-    known = {law.name: [law] for law in of_rig}
-    made = []
+    rig_laws = {law.name: [law] for law in of_rig}
+    chosen = []
     for text in names(texts, default):
-        made += known.get(text) or from_text.laws(text)
-    return made
+        chosen += rig_laws.get(text) or from_text.laws(text)
+    return chosen
 
 
 def law(text: str) -> "str | Law":
@@ -333,8 +333,8 @@ def conditions(texts: Sequence[str] | None) -> "list[named.Condition]":
 
     chosen = []
     for text in texts or ():
-        for one in [text] if ":" in text else names(text):
-            chosen += find_conditions(one)
+        for part in [text] if ":" in text else names(text):
+            chosen += find_conditions(part)
     return chosen
 
 
@@ -381,9 +381,9 @@ def actuator(text: str) -> "tuple[Actuator, ...]":
     from smc_mujoco.mechanisms.hardware.part import Actuator
     from smc_mujoco.simulation.conditions import read_fields
 
-    known: dict[str, type[Actuator]] = {}
+    kinds: dict[str, type[Actuator]] = {}
     for kind in subclasses(Actuator):
-        known[kind.__name__.lower()] = kind
+        kinds[kind.__name__.lower()] = kind
     parts = []
     for part in map(str.strip, text.split("+")):
         if WITHIN.match(part):
@@ -398,7 +398,7 @@ def actuator(text: str) -> "tuple[Actuator, ...]":
             parts.append(fields["actuator"])
             continue
         name, _, numbers = part.partition(":")
-        kind = find("actuator", name.strip().lower().replace("_", ""), known)
+        kind = find("actuator", name.strip().lower().replace("_", ""), kinds)
         try:
             parts.append(kind(*map(float, filter(None, numbers.split(",")))))
         except (TypeError, ValueError):

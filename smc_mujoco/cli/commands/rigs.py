@@ -81,8 +81,8 @@ def rig(
             f"{len(files or ())} records of {name}: give one file; smc-mujoco identify takes many"
         )
     else:
-        wanted = options.names(sets)
-        _repeat(name, files[0], named, wanted, start, duration, figure, film, terminal)
+        chosen_sets = options.names(sets)
+        _repeat(name, files[0], named, chosen_sets, start, duration, figure, film, terminal)
     terminal.finish()
 
 
@@ -93,8 +93,8 @@ def _list(terminal: Terminal) -> None:
         from smc_mujoco.identification.published_rig import catalogue
 
     rows = []
-    for name, known in catalogue().items():
-        rows.append((name, known.label))
+    for name, entry in catalogue().items():
+        rows.append((name, entry.label))
     terminal.print(tables.catalogue("Rigs", rows))
 
 
@@ -128,17 +128,17 @@ def _repeat(
         )
     twins = {"twin": twin} | {name: twin.set(name) for name in sets}
     fits = {"twin": twin.fit(record)}
-    for name, shown in twins.items():
+    for name, twin_shown in twins.items():
         if name != "twin":
-            fits[name] = shown.fits([record])[0]
+            fits[name] = twin_shown.fits([record])[0]
     terminal.print(rig_tables.fits(twin.label, fits))
     title = f"{twin.name}: {file.stem}"
     if figure:
         from smc_mujoco.identification.residual_figure import residual_figure
 
         predictions = {}
-        for name, shown in twins.items():
-            predictions[name] = shown.predictions([record])[0]
+        for name, twin_shown in twins.items():
+            predictions[name] = twin_shown.predictions([record])[0]
         predicted = {}
         for name, prediction in predictions.items():
             predicted[name] = prediction[0]
@@ -146,8 +146,8 @@ def _repeat(
         terminal.wrote(*residual_figure(title, t, measured, predicted, fits, twin.units, figure))
     if film:
         replays = []
-        for shown in twins.values():
-            replays.append(shown.replay(record, start, duration))
+        for twin_shown in twins.values():
+            replays.append(twin_shown.replay(record, start, duration))
         repeated = run(replays)
         traces = [twin.measured(record, start, duration), *repeated]
         begin = twin.start if start is None else start

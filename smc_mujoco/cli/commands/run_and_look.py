@@ -110,8 +110,10 @@ def show(
     for name, value in s.given.items():
         if name not in ("duration", "control_period"):
             fields[name] = value
-    others = Condition("others", fields).brief(s.plant, s.duration)
-    terminal.print(Text.assemble(plant, " under ", law, times, gains, others and f", {others}"))
+    conditions = Condition("others", fields).brief(s.plant, s.duration)
+    terminal.print(
+        Text.assemble(plant, " under ", law, times, gains, conditions and f", {conditions}")
+    )
     if loaded.failure:
         terminal.note(f"failed: {loaded.failure}", "red", wrap=True)
     else:
@@ -162,10 +164,10 @@ def view(
     with delay_signals():
         from smc_mujoco.draw import studio
 
-    shown = machine
+    viewed = machine
     if machine.endswith(".py"):
         from smc_mujoco.studies import scene as scenes
 
         scene = scenes.read(scenes.find(machine))
-        shown = list(scene.conditions[scene.film].values())[:2]
-    studio.view(shown, options.laws(law), port, browser)
+        viewed = list(scene.conditions[scene.film].values())[:2]
+    studio.view(viewed, options.laws(law), port, browser)

@@ -166,9 +166,9 @@ def _film(recommendation: "Recommendation", out: Path, ends: float, terminal: Te
         next(pictures)
         first = time.monotonic()
         next(pictures, None)
-        each = time.monotonic() - first
+        per_picture = time.monotonic() - first
         pictures.close()
-        fit = (MADE * (ends - time.monotonic()) - (first - begun)) / each  # pictures
+        fit = (MADE * (ends - time.monotonic()) - (first - begun)) / per_picture  # pictures
         fps = min(MAX_FPS, films.FPS * fit / len(frames))
         if fps >= MIN_FPS:  # with fewer pictures a second, motion is shown more slowly
             frames = films.Frames(run, title=title, size=films.FULL_SIZE, fps=fps)
@@ -177,9 +177,9 @@ def _film(recommendation: "Recommendation", out: Path, ends: float, terminal: Te
             terminal.wrote(films.film(run, out / "worst.mp4", title=title, fps=fps))
         else:
             file = out / "worst.png"
-            at = _worst_time(recommendation.worst_trace)
-            terminal.wrote(films.film(run, file, title=title, at=at))
-            needed = first - begun + MIN_FPS * each * len(frames) / frames.fps
+            moment = _worst_time(recommendation.worst_trace)
+            terminal.wrote(films.film(run, file, title=title, at=moment))
+            needed = first - begun + MIN_FPS * per_picture * len(frames) / frames.fps
             terminal.note(
                 f"This picture stands in place of a film, which would take {needed:.0f} s: the "
                 "same command with more --minutes makes it.",
@@ -386,9 +386,9 @@ def _compare_on_rig(
 
     machine = rig(name)
     chosen = options.laws(law, of_rig=machine.laws) or None
-    table, boards, found = ensemble.compare(machine, chosen, seeds, **shared)
+    table, boards, candidates = ensemble.compare(machine, chosen, seeds, **shared)
     terminal.answer(boards, full)
-    for candidate in found:
+    for candidate in candidates:
         terminal.note(f"{candidate.law} {candidate.remark}".strip(), wrap=True)
     terminal.note(ensemble.verdict(boards))
     _finish(table, shared["out"], terminal)
