@@ -28,7 +28,7 @@ from smc_mujoco.identification.least_squares import least_squares
 from smc_mujoco.identification.log_rig import LogRig, moves
 from smc_mujoco.identification.paths import DELAY, MAX_DELAY, slope, steady_force
 from smc_mujoco.identification.records import Columns, Record, stacked, step_of
-from smc_mujoco.mechanisms.custom.model_numbers import KINDS, PAYLOAD
+from smc_mujoco.mechanisms.custom.model_numbers import KINDS, PAYLOAD, SLIDING
 from smc_mujoco.mechanisms.hardware.part import Friction
 from smc_mujoco.mechanisms.layout import channel_names, driven_names
 from smc_mujoco.mechanisms.plant import degrees_hint
@@ -40,8 +40,6 @@ WEIGHINGS = 4  # least squares with the noise of each joint by the one before; c
 LEAST_NOISE = 1e-9  # of the forces, of a joint without noise
 LARGEST_FACTOR = 10.0  # of a pass, for a parameter that cannot be negative; chosen
 DELAY_STEP = 1e-3  # s, between delays that are tried; chosen
-# of the largest speed, below which a joint's direction counts in part; chosen
-SLIDING = 0.02
 # Samples in a period of the fastest forces that are compared, and these in Hz; chosen: of four
 # known machines the worst start is then 7 % off, and 19 % with 5 Hz
 SAMPLES_A_PERIOD, FASTEST = 40.0, 10.0
@@ -326,14 +324,9 @@ def _column(rig: LogRig, name: str, filtered: Filter, motion: Sequence[Array]) -
         return slopes
     joint, _, kind = name.rpartition(".")
     i = names.index(joint)
-    slow = SLIDING * np.abs(v[:, i]).max() + 1e-12
-    column = {
-        "damping": v[:, i],
-        "armature": a[:, i],
-        "stiffness": x[:, i],
-        "frictionloss": np.tanh(v[:, i] / slow),
-        "offset": -np.ones(len(v)),
-    }[kind]
+    column = -np.ones(len(v))  # of an offset
+    if kind in KINDS:
+        column = KINDS[kind].slope(x[:, i], v[:, i], a[:, i])
     slopes[:, i] = filtered.low(column)
     return slopes
 

@@ -25,7 +25,11 @@ import numpy as np
 from smc_mujoco.common.constraints import of_fields
 from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
 from smc_mujoco.identification.rig import Quantity
-from smc_mujoco.mechanisms.custom.model_numbers import model_numbers, with_model_numbers
+from smc_mujoco.mechanisms.custom.model_numbers import (
+    KINDS,
+    model_numbers,
+    with_model_numbers,
+)
 from smc_mujoco.mechanisms.custom.plant_from import PARAMETER_UNITS
 from smc_mujoco.mechanisms.hardware.moments import JointState
 from smc_mujoco.mechanisms.hardware.part import Friction, Part
@@ -86,7 +90,8 @@ def resolved(base: Scenario, names: Sequence[str]) -> Paths:
     for name in names:
         if name in of_joints:
             number = of_joints[name]
-            quantities[name] = Quantity(number.value, number.unit, "the model", 0.0)
+            least = KINDS[number.kind].least if number.kind in KINDS else 0.0
+            quantities[name] = Quantity(number.value, number.unit, "the model", least)
         elif name in plant.parameters:
             least = _open(plant.constraint(name).low)
             if name in NATURAL:

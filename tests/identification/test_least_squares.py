@@ -655,3 +655,61 @@ def test_a_twin_falls_beyond_two_ranges_from_when_it_was_one_range_off():
     fit = percentages({"x": measured["x"] + 0.25, "y": np.ones(5)}, measured)
     norm = np.linalg.norm(measured["x"] - 0.5)
     assert fit == {"x": pytest.approx(100.0 * (1.0 - 0.25 * math.sqrt(5.0) / norm)), "y": -1e3}
+
+
+def of_lines(noise, J, pieces, values):
+    """Slopes at the least squares of a linear curve without states, in pieces."""
+    residuals = noise - J @ np.linalg.lstsq(J, noise, rcond=None)[0]
+    none = [np.zeros((len(J) // pieces, 0))] * pieces
+    point = Point(np.array(values), np.zeros((pieces, 0)))
+    return Slopes(point, np.split(residuals, pieces), np.split(J, pieces), none, 1, 1)
+
+
+def replays_of(pieces, scales, records=None):
+    """What `statistics` asks of replays."""
+    of_records = [SimpleNamespace(record=k) for k in records or [0] * pieces]
+    names = [f"q{k}" for k in range(len(scales))]
+    return SimpleNamespace(names=names, scales=np.array(scales), pieces=of_records, closed=False)
+
+
+def test_errors_and_correlations_are_those_of_a_linear_curve_of_known_covariance():
+    """Of 40 draws of white noise: neither half as large nor twice, and their correlation."""
+    random = np.random.default_rng(2)
+    t = np.linspace(0.0, 1.0, 240)
+    J = np.column_stack([np.ones_like(t), t])
+    covariance = 0.01 * np.linalg.inv(J.T @ J)
+    exact = np.sqrt(np.diag(covariance)) * [2.0, 5.0]  # in the scales of the numbers
+    ratios = []
+    for _ in range(40):
+        slopes = of_lines(0.1 * random.standard_normal(240), J, 4, [1.0, 1.0])
+        errors, correlations = standard_errors.statistics(
+            replays_of(4, [2.0, 5.0]), slopes, np.zeros(2)
+        )
+        ratios.append(np.array(list(errors.values())) / exact)
+    assert np.all((np.mean(ratios, axis=0) > 0.9) & (np.mean(ratios, axis=0) < 1.6))
+    expected = covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1])
+    assert correlations[0, 1] == pytest.approx(expected)
+
+
+def test_the_model_s_part_of_an_error_is_added_as_a_square():
+    random = np.random.default_rng(3)
+    J = np.ones((100, 1))
+    slopes = of_lines(0.1 * random.standard_normal(100), J, 4, [1.0])
+    (plain,) = standard_errors.statistics(replays_of(4, [3.0]), slopes, np.zeros(1))[0].values()
+    by_model = np.array([0.5])
+    (with_model,) = standard_errors.statistics(replays_of(4, [3.0]), slopes, by_model)[0].values()
+    assert with_model == pytest.approx(math.hypot(plain, 1.5))
+
+
+@pytest.mark.parametrize("records", [None, [0, 0, 1, 1]], ids=["pieces", "records"])
+def test_pieces_and_records_that_disagree_widen_the_error(records):
+    """A step of 1 between pieces, or between records, of white noise of 0.01."""
+    random = np.random.default_rng(4)
+    level = np.repeat([0.5, -0.5, 0.5, -0.5] if records is None else [0.5, 0.5, -0.5, -0.5], 25)
+    J = np.ones((100, 1))
+    slopes = of_lines(level + 0.01 * random.standard_normal(100), J, 4, [1.0])
+    replayed = replays_of(4, [1.0], records)
+    (error,) = standard_errors.statistics(replayed, slopes, np.zeros(1))[0].values()
+    groups = records or [0, 1, 2, 3]
+    assert error >= standard_errors.between(slopes, groups)[0] * (1.0 - 1e-12)
+    assert standard_errors.between(slopes, groups)[0] > 0.25

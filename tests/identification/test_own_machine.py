@@ -26,6 +26,7 @@ from smc_mujoco.identification.first_guess import first_guess
 from smc_mujoco.identification.friction_figure import curve_error, friction, measured_friction
 from smc_mujoco.identification.identify import SLOW, check
 from smc_mujoco.identification.own_rig import own_rig
+from smc_mujoco.mechanisms.custom.model_numbers import KINDS
 from smc_mujoco.mechanisms.hardware.servos import ServoFriction
 from smc_mujoco.simulation.conditions import from_file
 
@@ -852,3 +853,16 @@ def test_a_condition_that_was_found_has_no_servo_of_the_file_so_it_suits_ideal_m
     assert fields.keys() == {"mismatch", "input_delay", "physics_step"}
     alone = smc.plant_from(TWO, ["j1"], others="held")
     assert smc.condition("found", **fields).on(alone, 1.0)["mismatch"] == {"j1.damping": 0.3}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_kind_of_number_starts_near_where_a_run_has_it(kind):
+    """A row of KINDS is enough: slope, range and unit."""
+    arm = smc.plant_from(ONE, ["j1"])
+    true = {"damping": 0.3, "frictionloss": 0.4, "armature": 0.05, "stiffness": 2.0}.get(kind, 0.1)
+    motion = smc.Sine(2.0, 4.0) + smc.Sine(1.0, 9.0)
+    common = {"plant": arm, "law": "none", "feedforward": motion, "duration": 2.0, "u_max": 9.0}
+    run = smc.run(smc.Scenario(**common, mismatch={f"j1.{kind}": true}))
+    rig, data = own_rig(arm, [f"j1.{kind}"]).reading([run])
+    assert first_guess(rig, data).values[f"j1.{kind}"] == pytest.approx(true, rel=0.1)
+    assert rig.quantities[f"j1.{kind}"].least == KINDS[kind].least

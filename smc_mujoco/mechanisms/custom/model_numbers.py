@@ -24,22 +24,35 @@ from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF
 from smc_mujoco.mechanisms.layout import OWN, ROTOR, all_joints, loaded
 from smc_mujoco.mechanisms.plant import Field, Plant, Values
 
+SLIDING = 0.02  # of the largest speed, below which a joint's direction counts in part; chosen
 SLIDE = mujoco.mjtJoint.mjJNT_SLIDE.value
 
 
+def sliding(v: np.ndarray) -> np.ndarray:
+    """Return the direction of speeds, smooth where they are small beside the largest: a measured
+    direction is noise there.
+    """
+    return np.tanh(v / (SLIDING * np.abs(v).max() + 1e-12))
+
+
 class JointField(NamedTuple):
-    """A number that every joint of a model has."""
+    """A number that every joint of a model has. A row of KINDS is all that identification needs of
+    a new one.
+    """
 
     field: str  # of the MjModel
     hinge: str  # unit for a hinge
     slide: str  # unit for a slide
+    # position, speed and acceleration of a joint, (K,) -> the force that a unit of it takes, (K,)
+    slope: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+    least: float = 0.0  # end of its range
 
 
 KINDS = {
-    "damping": JointField("dof_damping", "N m s/rad", "N s/m"),
-    "frictionloss": JointField("dof_frictionloss", "N m", "N"),
-    "armature": JointField("dof_armature", "kg m^2", "kg"),
-    "stiffness": JointField("jnt_stiffness", "N m/rad", "N/m"),
+    "damping": JointField("dof_damping", "N m s/rad", "N s/m", lambda x, v, a: v),
+    "frictionloss": JointField("dof_frictionloss", "N m", "N", lambda x, v, a: sliding(v)),
+    "armature": JointField("dof_armature", "kg m^2", "kg", lambda x, v, a: a),
+    "stiffness": JointField("jnt_stiffness", "N m/rad", "N/m", lambda x, v, a: x),
 }
 PAYLOAD = "payload"  # kg, of a body
 
