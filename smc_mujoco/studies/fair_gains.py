@@ -394,7 +394,7 @@ class Trial(NamedTuple):
                 )
 
         try:
-            first = goal.scenarios(plant, default)[0]
+            (first,) = goal.scenarios(plant, default, count=1)
             code = fingerprint.of((default.function, ranges))
             tuned = cached(
                 folder / f"{plant.name}-{law.name}-{self.search.searches}-{rule.budget}.json",
@@ -478,7 +478,7 @@ class Trial(NamedTuple):
         """Return what `Candidate.holdout` does, which the folder keeps."""
         keys = []
         for law in candidate.sets:
-            keys.append(run_key.key(goal.scenarios(plant, law)[0]))
+            keys.append(run_key.key(goal.scenarios(plant, law, count=1)[0]))
 
         def load(path: Path) -> tuple[np.ndarray, ...]:
             with np.load(path) as parts:

@@ -125,6 +125,7 @@ class SearchedEntrant(Entrant):
         self.results: list[SearchResult] = []
         self.again: set[int] = set()  # searches that were made once more
         self.share = 1  # by which the evaluations of the first search are divided
+        self.files: dict[tuple[int, int, int], CachedResult[SearchResult]] = {}
 
     @cached_property
     def failure(self) -> str:
@@ -159,6 +160,13 @@ class SearchedEntrant(Entrant):
         if k or draw:
             report(0)
         return result
+
+    def file(self, k: int, draw: int, folder: Path) -> CachedResult[SearchResult]:
+        """Return the file of search k in a folder, the same in every call."""
+        key = k, draw, self.share if k == 0 else 1
+        if key not in self.files:
+            self.files[key] = self.task_of(k).file(k, folder, draw)
+        return self.files[key]
 
     def call(self, k: int, draw: int) -> tuple:
         """Return the arguments with which a worker makes search k."""
@@ -477,7 +485,7 @@ def _are_kept(course: RaceCourse, pieces: Sequence[RaceSearch]) -> bool:
 def _file(course: RaceCourse, piece: RaceSearch) -> CachedResult[SearchResult]:
     """Return the file of a search."""
     folder = course.trial.folder / "gains" / "searches"
-    return piece.entrant.task_of(piece.k).file(piece.k, folder, piece.draw)
+    return piece.entrant.file(piece.k, piece.draw, folder)
 
 
 def _made(
@@ -582,7 +590,7 @@ def _judgement(course: RaceCourse, entrant: Entrant, k: int) -> CachedResult[Uns
     """Return the file of J of a law's set k."""
     trial, plant, goal, _ = course
     (first,) = trial.draws.numbers(1)
-    case = goal.holdout(plant, entrant.gains(k), first + k)[0]
+    (case,) = goal.holdout(plant, entrant.gains(k), first + k, 1)
     path = trial.folder / "unseen" / f"{plant.name}-{entrant.law.name}-set-{k}.json"
 
     def save(J: Unseen, file: Path) -> None:

@@ -147,25 +147,34 @@ class Objective:
         return values | ({"limits": limits} if limits else {})
 
     def scenarios(
-        self, plant: Plant | str, law: Component, seed: int = 0, search: int = 0
+        self,
+        plant: Plant | str,
+        law: Component,
+        seed: int = 0,
+        search: int = 0,
+        count: int | None = None,
     ) -> list[Scenario]:
-        """Return one run for each condition, of a search of a tuning with this seed.
+        """Return one run for each condition, or for the first ones, of a search of a tuning with
+        this seed.
 
         Every candidate of a search gets the same initial states and the same noise, those of other
         searches get others.
         """
-        return self._instance(plant, law, MAX_SEARCHES * seed + search)
+        return self._instance(plant, law, MAX_SEARCHES * seed + search, count)
 
-    def _instance(self, plant: Plant | str, law: Component, number: int) -> list[Scenario]:
+    def _instance(
+        self, plant: Plant | str, law: Component, number: int, count: int | None
+    ) -> list[Scenario]:
         common = {}
         for name in ("duration", "control_period", "u_max"):
             common[name] = getattr(self, name)
         first = Scenario(plant=plant, law=law, **common)
         fields = []
-        for part in self.conditions:
+        conditions = self.conditions[:count]
+        for part in conditions:
             fields.append(part.on(first.plant, self.duration))
         cases = []
-        for i, (condition, changes) in enumerate(zip(self.conditions, fields, strict=True)):
+        for i, (condition, changes) in enumerate(zip(conditions, fields, strict=True)):
             self.starts.check_condition(condition.name, changes)
             case = self.starts.place(
                 dataclasses.replace(first, **changes), GRID_SEEDS + SEEDS_PER_SEARCH * number + i
@@ -247,9 +256,13 @@ class Objective:
         """Return the terms of a run that fails at a time, s."""
         return FAILURE_COST * (2.0 - min(time / self.duration, 1.0)), 0.0
 
-    def holdout(self, plant: Plant | str, law: Component, instance: int) -> list[Scenario]:
-        """Return one run for each condition, of an instance 0, 1, ... that no search uses."""
-        return self._instance(plant, law, HOLDOUT + instance)
+    def holdout(
+        self, plant: Plant | str, law: Component, instance: int, count: int | None = None
+    ) -> list[Scenario]:
+        """Return one run for each condition, or for the first ones, of an instance 0, 1, ... that
+        no search uses.
+        """
+        return self._instance(plant, law, HOLDOUT + instance, count)
 
     def excess(self, case: Scenario) -> float:
         """Return what predicted chattering costs, s^2: 0 up to the bound, above it in proportion to

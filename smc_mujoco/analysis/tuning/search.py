@@ -313,6 +313,11 @@ class TuningTask(NamedTuple):
         """Return the runs of search i."""
         return self.goal.scenarios(self.plant, self.law, self.seed, i)
 
+    def first_case(self, i: int) -> Scenario:
+        """Return the first run of search i, of which a file's name is made."""
+        (first,) = self.goal.scenarios(self.plant, self.law, self.seed, i, 1)
+        return first
+
     def codes(self) -> Any:
         """Return hashes of the code that every search depends on.
 
@@ -320,7 +325,7 @@ class TuningTask(NamedTuple):
         """
         template = self.law.template
         ranges = template and (dict(template.gains), dict(template.conditions))
-        return code_hashes(self.cases(0)[0], {}), fingerprint.of((self.law.function, ranges))
+        return code_hashes(self.first_case(0), {}), fingerprint.of((self.law.function, ranges))
 
     def call(self, i: int, failure: str, draw: int = 0) -> tuple:
         """Return the arguments with which a worker makes search i, see `searched`."""
@@ -329,9 +334,8 @@ class TuningTask(NamedTuple):
 
     def file(self, i: int, folder: AnyPath, draw: int = 0) -> "CachedResult[SearchResult]":
         """Return the file of search i in a folder."""
-        first, *_ = self.cases(i)
         depends = (
-            run_key.key(first),
+            run_key.key(self.first_case(i)),
             self.goal.describe(),
             self.codes(),
             self.budget,
