@@ -5,6 +5,7 @@ as_plant("arm.xml:shoulder,elbow")
 as_plant("cart.urdf:slider(motor,partner=pole,u_max=20,x0=0.5)")
 as_plant("drone.xml:body@hover")
 as_plant("robot.xml:knee(motor)@home+held")
+as_plant("arm.urdf:elbow(motor)@{shoulder=-1.57}+held")
 as_plant("cart.xml:slide+hinge(measured)")
 
 A text is short, so what it leaves out is chosen and said: the pose is the file's keyframe, and
@@ -76,7 +77,8 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
     A comma or a plus sign is between the joints: plants are separated by commas on the command
     line. Fields of a `Channel` follow a joint in brackets: lift(motor,u_max=30,x0=0.2); one that is
     only measured is hinge(measured). The law of a channel and its reference are those of the
-    scenario. The keyframe of the start follows after @; nothing after it is the pose of the file.
+    scenario. The keyframe of the start follows after @, or a pose in braces, as
+    @{shoulder=-1.57;wrist=0.3}; nothing after it is the pose of the file.
     What other joints do is last, as +held. For what is left out see `_left_out`.
     """
     if not (model := MODEL.fullmatch(text)):
@@ -105,8 +107,11 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
         raise ScenarioError(f"plant {text!r} names a joint twice: give each once")
     if measured:
         values = {"measured": measured} | values
-    if model["keyframe"] is not None:
-        values = {"keyframe": model["keyframe"].strip() or None} | values
+    start = model["keyframe"]
+    if start is not None and start.strip().startswith("{"):
+        values = {"pose": _pose(start.strip())} | values
+    elif start is not None:
+        values = {"keyframe": start.strip() or None} | values
     source = mjcf.source(folder / path)
     if channels:  # without one, an error names the joints
         named = [(name, channel or Channel()) for name, channel in channels.items()]
@@ -122,13 +127,14 @@ def _left_out(source: mjcf.ModelSource, seen: Sequence[str], given: dict) -> dic
     spec = source.spec()
     if not set(seen) <= {joint.name for joint in spec.joints}:
         return taken  # an error follows
-    if "keyframe" not in given and (keyframe := usual_keyframe(spec)):
+    starts = given.keys() & {"keyframe", "pose"}
+    if not starts and (keyframe := usual_keyframe(spec)):
         taken["keyframe"] = keyframe
         _say(
             f"the goal of {source.label} is its keyframe {keyframe!r}: @{keyframe} after the "
             "joints says so without this line, and @ alone takes the pose of the file"
         )
-    elif "keyframe" not in given and [key.name for key in spec.keys] == [""]:
+    elif not starts and [key.name for key in spec.keys] == [""]:
         _say(
             f"{source.label} has a keyframe without a name, and runs start and end in the pose of "
             "the file: give the keyframe a name to start there, or write @ after the joints to say "
@@ -142,6 +148,15 @@ def _left_out(source: mjcf.ModelSource, seen: Sequence[str], given: dict) -> dic
             "the joints says so without this line, +locked welds them, +file leaves them free"
         )
     return taken
+
+
+def _pose(text: str) -> dict[str, float]:
+    """Return joint -> position of a text such as "{shoulder=-1.57;wrist=0.3}"."""
+    pose = {}
+    for item in filter(str.strip, re.split("[;,]", text.strip("{}"))):
+        joint, _, value = (part.strip() for part in item.partition("="))
+        pose[joint] = _number(f"pose of {joint}", value)
+    return pose
 
 
 def _say(sentence: str) -> None:

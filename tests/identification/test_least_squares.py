@@ -680,6 +680,7 @@ def test_errors_and_correlations_are_those_of_a_linear_curve_of_known_covariance
     covariance = 0.01 * np.linalg.inv(J.T @ J)
     exact = np.sqrt(np.diag(covariance)) * [2.0, 5.0]  # in the scales of the numbers
     ratios = []
+    correlations = np.eye(2)
     for _ in range(40):
         slopes = of_lines(0.1 * random.standard_normal(240), J, 4, [1.0, 1.0])
         errors, correlations = standard_errors.statistics(

@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common import libmujoco, mjcb, process
-from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.common.errors import ScenarioError, find, number, shown
 from smc_mujoco.mechanisms.custom import file_numbers, urdf
 from smc_mujoco.mechanisms.layout import LEAD, ROTOR
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER
@@ -64,6 +64,10 @@ _lock = threading.Lock()  # held while MuJoCo writes XML with more digits
 process.free_after_fork(_lock)
 
 
+POSE = "pose"  # name of the keyframe of a user's pose
+SLIDE = mujoco.mjtJoint.mjJNT_SLIDE.value
+
+
 @dataclasses.dataclass(frozen=True)
 class ModelSource:
     """The source of a model: a file, or a text with the files that it names."""
@@ -72,6 +76,8 @@ class ModelSource:
     sha256: str  # of the model and all files that it names, 64 hex digits
     text: str = ""  # the MJCF, where there is no file
     assets: tuple[tuple[str, bytes], ...] = ()  # name and content of each file that the text names
+    # joints and their positions, rad or m, of a keyframe POSE that the model gets; () for none
+    pose: tuple[tuple[str, float], ...] = ()
 
     @property
     def file(self) -> str:
@@ -109,8 +115,40 @@ class ModelSource:
                 f"{self.path}, or a file that it names, has changed: call smc.plant_from again"
             )
 
+    def posed(self, pose: Mapping[str, float]) -> "ModelSource":
+        """Return the source with a keyframe POSE in which joints have positions, rad or m.
+
+        Raises:
+          ScenarioError: no such hinge or slide, or a position that is beyond its range.
+        """
+        model = mjcb.compiled(self.spec())
+        names = [model.joint(i).name for i in range(model.njnt) if model.jnt_type[i] >= SLIDE]
+        pairs = []
+        for name, value in pose.items():
+            find(f"joint of {self.label}", name, dict.fromkeys(names))
+            place = number(f"pose of {name}", value)
+            joint = model.joint(name)
+            low, high = joint.range
+            if model.jnt_limited[joint.id] and not low <= place <= high:
+                raise ScenarioError(
+                    f"pose of {name} is {place:g}, beyond its range from {low:.4g} to {high:.4g}: "
+                    "give one within it, rad or m"
+                )
+            pairs.append((name, place))
+        return dataclasses.replace(self, pose=tuple(pairs))
+
     def read(self) -> mujoco.MjSpec:
         """Parse the model, and check its numbers; a free joint without a name has its body's."""
+        spec = self._read()
+        if self.pose:
+            model = mjcb.compiled(spec.copy())
+            qpos = model.qpos0.copy()
+            for name, place in self.pose:
+                qpos[model.joint(name).qposadr] = place
+            spec.add_key(name=POSE, qpos=qpos)
+        return spec
+
+    def _read(self) -> mujoco.MjSpec:
         included = {}
         for name, content in self.assets:
             if name.lower().endswith(XML):

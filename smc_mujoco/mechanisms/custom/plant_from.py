@@ -84,6 +84,7 @@ def plant_from(
     tip: str | None = None,
     others: Annotated[str, OneOf(names=OTHERS)] | None = None,
     measured: Iterable[str] | None = None,
+    pose: Mapping[str, float] | None = None,
 ) -> Plant:
     """Make a plant of an MJCF or URDF model.
 
@@ -101,6 +102,8 @@ def plant_from(
       keyframe: name of the model's keyframe with the initial positions, which is the default goal;
         default: the model's qpos0. Runs start at rest, unless the scenario has a v0, and those of
         `grid`, `tune`, `compare` and `which` beside the goal, see `starts`.
+      pose: joint -> its position, rad or m, in place of a keyframe, which a URDF has not; joints
+        that are not in it stand as the model draws them.
       assets: name -> content of the files that a text names, bytes or text.
       tip: name of the site that films trace and `smc.metrics.tip_scores` scores; laws of many
         joints may read its Jacobian.
@@ -137,6 +140,10 @@ def plant_from(
     model in its own colours; those of several laws are mixed with the laws' colours.
     """
     source = mjcf.source(path, assets)
+    if pose:
+        if keyframe is not None:
+            raise ScenarioError(f"keyframe is {keyframe!r} beside a pose: give one of them")
+        source, keyframe = source.posed(pose), mjcf.POSE
     # laws and gains refer to plants by name
     if name is not None and catalogue().taken(errors.name("name", name)):
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
@@ -522,6 +529,7 @@ def restored(data: Mapping, name: str) -> Plant:
         source = mjcf.source(data["text"], assets)
     else:
         source = mjcf.source_of_record(data["path"], data["sha256"])
+    source = source.posed(data.get("pose", {}))
     what_others_do = data.get("others", "")
     pairs = own.coerce(data["channels"])
     measured = data.get("measured", ())

@@ -105,7 +105,10 @@ class UserModel:
             parts.append(f"{joint}(measured)")
         text = "+".join(parts)
         spec = self.source.spec()
-        if self.keyframe is not None:
+        if self.source.pose:
+            places = ";".join(f"{joint}={place:g}" for joint, place in self.source.pose)
+            text += f"@{{{places}}}"
+        elif self.keyframe is not None:
             text += f"@{self.keyframe}"
         elif usual_keyframe(spec):  # which a text would take
             text += "@"
@@ -122,6 +125,7 @@ class UserModel:
             "keyframe": self.keyframe,
             "channels": channels,
         }
+        data |= {"pose": dict(self.source.pose)} if self.source.pose else {}
         data |= {"tip": self.tip} if self.tip else {}
         data |= {"others": self.others} if self.others else {}
         data |= {"measured": list(self.measured)} if self.measured else {}
