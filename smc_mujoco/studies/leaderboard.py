@@ -31,6 +31,7 @@ from smc_mujoco.analysis.ranking import RELEVANT, Comparison, corrected, linked,
 from smc_mujoco.analysis.step_halving import first_order, repeats_every_run
 from smc_mujoco.common.aliases import Array, Names
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
+from smc_mujoco.common.text import joined
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.scenario import Scenario
@@ -120,8 +121,9 @@ def leaderboard(
 
 
 def _absent(metrics: Sequence[str], ranked: Sequence["RankedGroup"]) -> list[str]:
-    """Return why metrics have no single value in the runs of groups."""
+    """Return why metrics have no single value in the runs of groups, or are not compared there."""
     reasons = []
+    unjudged: dict[tuple[str, str], list[str]] = {}  # plant and condition -> metrics
     for metric in metrics:
         for group in ranked:
             scenario = next(filter(None, group.ran), None)
@@ -129,10 +131,13 @@ def _absent(metrics: Sequence[str], ranked: Sequence["RankedGroup"]) -> list[str
                 reasons.append(CATALOGUE[metric].refusal(scenario))
             for block, ran in zip(group.group.blocks, group.ran, strict=True):
                 if not paired_runs.is_judged(ran, metric):
-                    reasons.append(
-                        f"{metric} is not compared on {block[0]} under {block[1]}: the last part "
-                        "of a run needs two periods of the load, so give a longer duration"
-                    )
+                    unjudged.setdefault(block, []).append(metric)
+    for (plant, condition), names in unjudged.items():
+        verb = "is" if len(names) == 1 else "are"
+        reasons.append(
+            f"{joined(names)} {verb} not compared on {plant} under {condition}: the last part of a "
+            "run needs two periods of the load, so give a longer duration"
+        )
     return list(dict.fromkeys(filter(None, reasons)))
 
 
