@@ -9,10 +9,9 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from rich.console import Console
 from rich.padding import Padding
-from rich.table import Column
 from rich.text import Text
 
-from smc_mujoco.cli.tables import catalogue, listed, plain
+from smc_mujoco.cli.tables import Listing, catalogue, listed
 from smc_mujoco.common.errors import unknown
 from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Template
@@ -92,11 +91,8 @@ def _values(values: Mapping[str, float]) -> str:
 
 def _print_rows(rows: Mapping[str, str], console: Console) -> None:
     """Print the rows of a page that have words."""
-    table = plain(Column(style="dim", no_wrap=True), "", padding=(0, 2, 1, 0))
-    for label, words in rows.items():
-        if words:
-            table.add_row(label, Text(words))
-    console.print(table)
+    lines = [(label, words) for label, words in rows.items() if words]
+    console.print(Listing(headings=("", ""), rows=lines, style="dim", space=1))
 
 
 def lists() -> dict[str, list[tuple[str, str]]]:

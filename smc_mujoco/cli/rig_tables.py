@@ -1,21 +1,14 @@
 """The table of a rig: the fit of its twins."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
-from rich.table import Table
-
-from smc_mujoco.cli.tables import number_columns, titled
+from smc_mujoco.common.tabular import Tabular
 
 
-def fits(title: str, by_name: Mapping[str, Mapping[str, float]]) -> Table:
+def fits(title: str, by_name: Mapping[str, Mapping[str, float]]) -> Tabular:
     """Return the fit of each twin of a record, %, or when it falls."""
-    table = titled(
-        f"{title}: fit, %",
-        "",
-        *number_columns(next(iter(by_name.values()))),
-    )
+    rows = []
     for name, fit in by_name.items():
-        table.add_row(name, *(f"{value:z.1f}" for value in fit.values()))
-    return table
+        rows.append([name, *(f"{value:z.1f}" for value in fit.values())])
+    heads = ["twin", *next(iter(by_name.values()))]
+    return Tabular(headings=heads, rows=rows, title=f"{title}: fit, %")

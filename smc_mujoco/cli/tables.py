@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from rich import box
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.padding import Padding
-from rich.table import Column, Table
+from rich.table import Table
 from rich.text import Text
 
 from smc_mujoco.analysis.differ import differ
 from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.analysis.step_halving import MARK, NOTE, SCORE_NOTE, first_order
 from smc_mujoco.answers.answer import Answer
+from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.registry import Catalogue
-from smc_mujoco.common.tabular import Tables, Tabular
+from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import first_paragraph, number
 from smc_mujoco.control.source import in_words
 from smc_mujoco.draw import style
@@ -37,11 +39,11 @@ T = TypeVar("T")
 # label -> the same run again, as `step_halving.repetitions` has it
 Again = Mapping[str, Sequence[Trace]]
 TIP_COLUMNS = {  # of a table of an arm's tip: heading -> score, unit, factor on its SI value
-    "largest\nerror": ("max_error", "mm", 1e3),
-    "error at\nthe end": ("last_error", "mm", 1e3),
-    "mean\nforce": ("mean_force", "N", 1.0),
-    "off the\nwanted": ("force_error", "%", 1.0),
-    "force\nvaries by": ("force_ripple", "N", 1.0),
+    "largest error": ("max_error", "mm", 1e3),
+    "error at the end": ("last_error", "mm", 1e3),
+    "mean force": ("mean_force", "N", 1.0),
+    "off the wanted": ("force_error", "%", 1.0),
+    "force varies by": ("force_ripple", "N", 1.0),
     "touching": ("touching", "%", 1.0),
     "deepest": ("depth", "mm", 1e3),
 }
@@ -50,34 +52,42 @@ TIP_COLUMNS = {  # of a table of an arm's tip: heading -> score, unit, factor on
 SCORE_COLUMNS = {
     "settles": "settling_time",
     "overshoot": "overshoot",
-    "ultimate\nbound": "ultimate_bound",
+    "ultimate bound": "ultimate_bound",
     "ITAE": "itae",
     "max |u|": "max_u",
     "TV rate": "tv_rate",
-    "spread\nsettles": "spread_settling_time",
+    "spread settles": "spread_settling_time",
 }
-FAILED = Text("failed", style="red")
+FAILED = Cell("failed", colour="red")
 MAX_NAMED_JOINTS = 4  # in the heading of a group
 
 
-def titled(title: str, *columns: Column | str, **options: Any) -> Table:
-    """Return an empty table with a title at its left, and a rule below its headings."""
-    options = {"box": box.SIMPLE_HEAD, "title_justify": "left", "title_style": "bold"} | options
-    return Table(*columns, title=title or None, **options)
+@keyword_dataclass
+class Listing(Tabular):
+    """Names with a text about each, without headings or rules."""
 
+    style: str = "cyan"  # of the names
+    space: int = 0  # lines below each row
 
-def plain(*columns: Column | str, **options: Any) -> Table:
-    """Return an empty table without rules or headings, with columns two spaces apart."""
-    return Table(
-        *columns,
-        **{"box": None, "padding": (0, 2, 0, 0), "pad_edge": False, "show_header": False} | options,
-    )
+    def __rich_console__(
+        self, console: Console, options: ConsoleOptions
+    ) -> Iterator[RenderableType]:
+        if self.title:
+            yield Text(self.title, "bold")
+        gap = (0, 2, self.space, 0)
+        table = Table(box=None, padding=gap, pad_edge=False, show_header=False)
+        table.add_column(no_wrap=True, style=self.style)
+        for _ in self.headings[1:]:
+            table.add_column()
+        for row in self.rows:
+            table.add_row(*map(Text, map(str, row)))
+        yield table
 
 
 # scores of runs
 
 
-def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) -> list[Table]:
+def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) -> list[Tabular]:
     """Return a table for each group of channels, with a line for each run and a column for each
     metric.
 
@@ -99,7 +109,7 @@ def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) 
             if name in units:
                 names.append(name)
                 heads.append(_head(head, units[name]))
-        rows: dict[str, list[Text]] = {}
+        rows: dict[str, list[Cell]] = {}
         for label, runs in values.items():
             least = {}
             for name in units:
@@ -115,29 +125,24 @@ def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) 
     return _noted(tables, in_words(gains))
 
 
-def _head(head: str, unit: str) -> Text:
-    """Return a column's heading with the unit below."""
-    return Text(f"{head}\n").append(unit, "dim")
+def _head(head: str, unit: str) -> str:
+    """Return a column's heading with its unit."""
+    return f"{head} ({unit})" if unit else head
 
 
-def _noted(tables: list[Table], *words: str) -> list[Table]:
+def _noted(tables: list[Tabular], *words: str) -> list[Tabular]:
     """Return tables with words below the last one, and what a mark means if a cell has one."""
     notes = list(filter(None, words))
-    if any(map(_has_mark, tables)):
+    if any(MARK in cell.text for table in tables for row in table.rows for cell in _cells(row)):
         notes.append(SCORE_NOTE)
     if tables and notes:
-        tables[-1].caption = "; ".join(notes)
-        tables[-1].caption_justify = "left"
+        tables[-1] = dataclasses.replace(tables[-1], notes=["; ".join(notes)])
     return tables
 
 
-def _has_mark(table: Table) -> bool:
-    """Return whether a cell of a table has a mark."""
-    for column in table.columns:
-        for cell in column.cells:
-            if MARK in str(cell):
-                return True
-    return False
+def _cells(row: Sequence[Cell | str]) -> list[Cell]:
+    """Return the cells of a row that are no plain texts."""
+    return [cell for cell in row if isinstance(cell, Cell)]
 
 
 def _several(
@@ -165,7 +170,7 @@ def _of_runs(scored: Callable[[Trace], T], runs: Iterable[Trace]) -> list[T | No
     return scores
 
 
-def _marked(values: Sequence[float | None], scenario: Scenario, least: float = 0.0) -> Text:
+def _marked(values: Sequence[float | None], scenario: Scenario, least: float = 0.0) -> Cell:
     """Return a number as text; with its range, marked, if its values in the same run again are
     apart.
 
@@ -180,18 +185,18 @@ def _marked(values: Sequence[float | None], scenario: Scenario, least: float = 0
     texts = {}
     for value in values:
         if value is None:
-            texts[value] = FAILED.plain
+            texts[value] = FAILED.text
         else:
             texts[value] = number(value)
     low = texts[min(values, key=size)]
     high = texts[max(values, key=size)]
     numbers = [math.inf if value is None else value for value in values]
     if low != high and differ(numbers, least, first_order(scenario)):
-        return Text(f"{low}{MARK} (..{high})")
-    return FAILED if values[0] is None else Text(texts[values[0]])
+        return Cell(f"{low}{MARK} (..{high})")
+    return FAILED if values[0] is None else Cell(texts[values[0]])
 
 
-def tips(title: str, traces: Mapping[str, Trace], again: Again | None = None) -> list[Table]:
+def tips(title: str, traces: Mapping[str, Trace], again: Again | None = None) -> list[Tabular]:
     """Return a table of the tips of arms, with scores marked as in `scores`; [] elsewhere."""
     if not next(iter(traces.values())).scenario.plant.tip:
         return []
@@ -203,7 +208,7 @@ def tips(title: str, traces: Mapping[str, Trace], again: Again | None = None) ->
         if name in measured:
             columns.append((name, factor))
             heads.append(_head(head, unit))
-    rows: dict[str, list[Text]] = {}
+    rows: dict[str, list[Cell]] = {}
     for label, runs in values.items():
         rows[label] = []
         for name, factor in columns:
@@ -233,7 +238,7 @@ def answers(
     names: Sequence[str],
     traces: Mapping[str, Mapping[str, Trace]],
     again: Mapping[str, Again] | None = None,
-) -> list[Table]:
+) -> list[Tabular]:
     """Return a table for each metric that applies, or one table of them all if there is only one
     condition.
     """
@@ -262,7 +267,9 @@ def answers(
     return _noted(answered)
 
 
-def _answer(title: str, columns: Sequence[tuple[str, Metric, Mapping[str, Trace], Again]]) -> Table:
+def _answer(
+    title: str, columns: Sequence[tuple[str, Metric, Mapping[str, Trace], Again]]
+) -> Tabular:
     """Return a table with a line for every label; each column has a heading, a metric and labelled
     runs, also again.
     """
@@ -275,12 +282,10 @@ def _answer(title: str, columns: Sequence[tuple[str, Metric, Mapping[str, Trace]
         for _, metric, runs, again in columns:
             cells.append(_cell(metric, runs.get(label), again.get(label, ())))
         rows[label] = cells
-    table = _by_label(title, [Text(head) for head, *_ in columns], traces, rows, 30)
-    table.min_width = len(title)  # a narrower table would break the title
-    return table
+    return _by_label(title, [head for head, *_ in columns], traces, rows)
 
 
-def _cell(metric: Metric, trace: Trace | None, again: Sequence[Trace] = ()) -> Text | str:
+def _cell(metric: Metric, trace: Trace | None, again: Sequence[Trace] = ()) -> Cell | str:
     """Return a metric of a run as text; "" if there is no run, or if the metric does not apply to
     its plant.
     """
@@ -290,56 +295,40 @@ def _cell(metric: Metric, trace: Trace | None, again: Sequence[Trace] = ()) -> T
     return _marked(values, trace.scenario, floor(trace.scenario, metric.name))
 
 
-def number_columns(heads: Iterable[Text | str], **options: Any) -> list[Column]:
-    """Return the columns of numbers of a table, with other options of `Column`."""
-    return [Column(head, justify="right", **options) for head in heads]
-
-
 def _by_label(
     title: str,
-    heads: Iterable[Text],
+    heads: Iterable[str],
     traces: Mapping[str, Trace],
-    rows: Mapping[str, Iterable[Text | str]],
-    width: int = 16,
-) -> Table:
-    """Return a table with a row of cells for each labelled run, or "failed"; labels have up to
-    `width` letters.
-    """
+    rows: Mapping[str, Iterable[Cell | str]],
+) -> Tabular:
+    """Return a table with a row of cells for each labelled run, or "failed"."""
     laws = {trace.scenario.law.name for trace in traces.values()}
     # labels of runs of one law say what differs
     head = "run" if len(laws) == 1 < len(traces) else "law"
-    label = Column(head, no_wrap=True, vertical="bottom", max_width=width, overflow="ellipsis")
-    numbers = number_columns(heads, vertical="bottom")
-    table = titled(title, label, *numbers, padding=0, show_edge=False, pad_edge=False)
+    heads = [head, *heads]
+    lines = []
     for label, trace in traces.items():
-        table.add_row(
-            Text(label, style.law_colour(trace.scenario.law.name)), *rows.get(label, [FAILED])
-        )
-    return table
+        name = Cell(label, colour=style.law_colour(trace.scenario.law.name))
+        cells = [*rows.get(label, [FAILED])]
+        lines.append([name, *cells, *[""] * (len(heads) - 1 - len(cells))])
+    return Tabular(headings=heads, rows=lines, title=title)
 
 
-def trace_summary(trace: Trace) -> list[Table]:
+def trace_summary(trace: Trace) -> list[Listing]:
     """Return a table for each group of channels: every metric of one trace, with its unit and its
     meaning.
     """
     values = metric_scores(trace)
     tables = []
     for group, heading in headings(trace.scenario).items():
-        table = titled(
-            heading,
-            "metric",
-            Column("value", justify="right"),
-            "unit",
-            "",
-            box=None,
-            padding=(0, 2, 0, 0),
-        )
+        rows = []
         for m in metrics():
             if m.name in values[group.name] and (trace.scenario.realistic or not m.realistic):
                 value = number(values[group.name][m.name])
                 unit = m.unit_for(group.unit, group.effort)
-                table.add_row(m.name, value, unit, Text(m.summary))
-        tables.append(table)
+                rows.append((m.name, value, unit, m.summary))
+        heads = "metric", "value", "unit", ""
+        tables.append(Listing(headings=heads, rows=rows, title=heading))
     return tables
 
 
@@ -348,38 +337,21 @@ def document(printed: Iterable[Any]) -> dict[str, Any]:
     tables: list[Tabular] = []
     notes: list[str] = []
     for printable in printed:
-        content = printable.renderable if isinstance(printable, Padding) else printable
-        if isinstance(content, Table):
-            tables.append(_tabular(content))
-        elif isinstance(content, Tabular):
-            tables.append(content)
-        elif isinstance(content, Tables):
-            tables += content.tables
-            if isinstance(content, Answer):
-                notes += content.lines
-        elif str(content):
-            notes.append(str(content))
+        if isinstance(printable, Tabular):
+            tables.append(printable)
+        elif isinstance(printable, Tables):
+            tables += printable.tables
+            if isinstance(printable, Answer):
+                notes += printable.lines
+        else:
+            content = printable.renderable if isinstance(printable, Padding) else printable
+            notes += filter(None, [str(content)])
     return {"tables": [table.about() for table in tables], "notes": notes}
 
 
-def _tabular(table: Table) -> Tabular:
-    """Return the texts of a table of rich."""
-    heads = []
-    for column in table.columns:
-        heads.append(" ".join(str(column.header).split()))
-    rows = zip(*(map(str, column.cells) for column in table.columns), strict=True)
-    notes = [str(table.caption)] if table.caption else []
-    return Tabular(headings=heads, rows=list(rows), title=str(table.title or ""), notes=notes)
-
-
-def catalogue(title: str, rows: Iterable[tuple[str, str]]) -> Table:
+def catalogue(title: str, rows: Iterable[tuple[str, str]]) -> Listing:
     """Return a table of names, each with a line about it."""
-    table = titled(
-        title, Column(no_wrap=True, style="cyan"), "", show_header=False, box=None, padding=(0, 2)
-    )
-    for row in rows:
-        table.add_row(*map(Text, row))
-    return table
+    return Listing(headings=("", ""), rows=list(rows), title=title)
 
 
 def listed(known: Catalogue[T], doc: Callable[[T], str | None]) -> list[tuple[str, str]]:
@@ -408,31 +380,27 @@ def chattering(
     cycles: Sequence[Chattering],
     measured: Sequence[tuple[float, float]],
     changes: Sequence[StepChange],
-) -> Table:
+) -> Tabular:
     """Return predicted and measured limit cycles of a channel (amplitude of s, Hz), a line for each
     scenario.
     """
     plant = scenarios[0].plant
-    last = "coupling" if plant.driven > 1 else "third\nharmonic"
-    heads = [f"s ({plant.units[channel]}/s)\npredicted", "\nmeasured"]
-    heads += ["Hz\npredicted", "\nmeasured", "±", last]
-    numbers = number_columns(heads, no_wrap=True, vertical="bottom")
-    law = Column("law", no_wrap=True, vertical="bottom")
-    about = f"chattering of {plant.name}"
-    table = titled(about, law, *numbers, padding=(0, 1, 0, 0), show_edge=False, pad_edge=False)
+    last = "coupling" if plant.driven > 1 else "third harmonic"
+    unit = f"{plant.units[channel]}/s"
+    heads = [f"s predicted ({unit})", f"s measured ({unit})"]
+    heads = ["law", *heads, "predicted (Hz)", "measured (Hz)", "±", last]
+    rows = []
     for scenario, cycle, (amplitude, frequency), change in zip(
         scenarios, cycles, measured, changes, strict=True
     ):
-        law = Text(scenario.law.name, style=style.law_colour(scenario.law.name))
+        law = Cell(scenario.law.name, colour=style.law_colour(scenario.law.name))
         mark = MARK if change.marked else ""
         sizes = number(cycle.amplitude), number(amplitude) + mark
         rates = number(cycle.frequency), number(frequency) + mark
         share = cycle.coupling if plant.driven > 1 else cycle.third_harmonic
-        table.add_row(law, *sizes, *rates, _share(cycle.uncertainty), _share(share))
-    if any(change.marked for change in changes):
-        table.caption = NOTE
-        table.caption_justify = "left"
-    return table
+        rows.append((law, *sizes, *rates, _share(cycle.uncertainty), _share(share)))
+    notes = [NOTE] if any(change.marked for change in changes) else []
+    return Tabular(headings=heads, rows=rows, title=f"chattering of {plant.name}", notes=notes)
 
 
 def _share(share: float) -> str:

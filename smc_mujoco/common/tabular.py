@@ -342,13 +342,14 @@ def _cell(cell: Cell | str) -> Cell:
 
 def _value(cell: Cell | str) -> object:
     """Return a cell as JSON data: a number, a text, or the parts of a cell of several lines."""
-    if isinstance(cell, Cell):
+    if isinstance(cell, Cell) and (cell.below or cell.alarm or cell.strong):
         parts = {"text": _value(cell.text), "below": cell.below, "alarm": cell.alarm}
         return parts | {"strong": cell.strong}
+    text = _cell(cell).text
     try:
-        return float(cell)
+        return float(text)
     except ValueError:
-        return cell
+        return text
 
 
 def _wrapped(text: str, width: int) -> str:

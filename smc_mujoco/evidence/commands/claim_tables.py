@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
+from rich import box
 from rich.console import Console
 from rich.padding import Padding
 from rich.table import Column, Table
@@ -14,7 +15,6 @@ from smc_mujoco.answers import answers
 from smc_mujoco.answers.command import instead
 from smc_mujoco.answers.facts import ClaimsFacts, NextStep, Settles
 from smc_mujoco.cli.console import Terminal
-from smc_mujoco.cli.tables import plain, titled
 from smc_mujoco.common.text import capital
 from smc_mujoco.evidence.audit import verdict as verdicts
 from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Claim, measured
@@ -24,6 +24,7 @@ from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Claim, measure
 COLOURS = dict(zip(verdicts.VERDICTS, ("blue", "yellow", "red", "dim", "dim", "dim"), strict=True))
 COLOURS |= dict.fromkeys(verdicts.ANSWERS.values(), "cyan")
 CHECKED = {True: Text("✓", COLOURS[SUPPORTED]), False: Text("✗", COLOURS[REFUTED])}
+BARE = {"box": None, "padding": (0, 2, 0, 0), "pad_edge": False, "show_header": False}
 MARKS = {verdict: Text(mark, style=COLOURS[verdict]) for verdict, mark in verdicts.MARKS.items()}
 
 
@@ -75,7 +76,8 @@ def _claims_overview(claims: Sequence[Claim]) -> Table:
     columns = [Column("id", justify="right", style="cyan")]
     columns.extend(Column(name, justify="center") for name in sets)
     words = f"claim, verdict, whose (what was read)\ndecided by, {sets[-1]} gains"
-    table = titled("", *columns, words, padding=(0, 1, 0, 0), show_edge=False, pad_edge=False)
+    options = {"padding": (0, 1, 0, 0), "show_edge": False, "pad_edge": False}
+    table = Table(*columns, words, box=box.SIMPLE_HEAD, **options)
     for claim in claims:
         marks = [MARKS[claim.verdicts[name]] for name in sets]
         lines = Text.assemble(
@@ -104,7 +106,7 @@ def _print_claim(claim: Claim, console: Console) -> None:
     console.print(
         Text.assemble((claim.id, "bold cyan"), f"  {claim.text}", (f"  {claim.where}", "dim"))
     )
-    about = plain(Column(style="dim"), "")
+    about = Table(Column(style="dim"), "", **BARE)
     for label, text in claim.parts.items():
         about.add_row(label, Text(text))
     about.add_row("verdict", Text(_verdict(claim), f"bold {COLOURS[claim.verdict]}"))
@@ -112,7 +114,7 @@ def _print_claim(claim: Claim, console: Console) -> None:
     for name, verdict in claim.verdicts.items():
         columns = "", "", Column(justify="right"), ""
         title = Text(f"{name} gains: {verdict}", style=COLOURS[verdict])
-        table = plain(*columns, title=title, title_justify="left")
+        table = Table(*columns, title=title, title_justify="left", **BARE)
         for check in claim.checks(name):
             table.add_row(CHECKED[check.holds], Text(check.what), *check.texts)
         for what, value in claim.beside[name].items():
