@@ -59,14 +59,14 @@ def assert_none_outlives(code, how, tmp_path):
 
 def processes() -> dict[int, tuple[int, int, str]]:
     """Return process -> its session, its parent and its command, of those that live."""
-    found = {}
+    by_pid = {}
     for path in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):
             words, rest = path.read_text().rsplit(")", 1)
             state, parent, _, session = rest.split()[:4]
             if state != "Z":
-                found[int(path.parent.name)] = int(session), int(parent), words
-    return found
+                by_pid[int(path.parent.name)] = int(session), int(parent), words
+    return by_pid
 
 
 def sessions(parent: int) -> set[int]:

@@ -118,16 +118,16 @@ NAMES = {  # what is typed -> what is said of it
 
 @pytest.mark.parametrize("call", range(len(TAKEN)))
 def test_what_is_taken_comes_back(call):
-    made, expected = TAKEN[call]
-    assert made() == expected
-    assert type(made()) is type(expected)
+    call_made, expected = TAKEN[call]
+    assert call_made() == expected
+    assert type(call_made()) is type(expected)
 
 
 @pytest.mark.parametrize("call", range(len(REFUSED)))
 def test_what_is_refused_is_one_sentence(call):
-    made, sentence = REFUSED[call]
+    call_made, sentence = REFUSED[call]
     with pytest.raises(ScenarioError) as refused:
-        made()
+        call_made()
     assert str(refused.value) == sentence
 
 

@@ -67,14 +67,14 @@ def test_numbers_that_json_lacks_are_words():
 
 def test_maps_of_both_versions(tmp_path):
     axis = np.array([0.0])
-    one = np.ones((1, 1))
+    values = np.ones((1, 1))
     odd = Basin(
         plant="duffing",
         law="classical",
         x=axis,
         v=axis,
-        outcome=one.astype(np.int8),
-        decided_at=math.inf * one,
+        outcome=values.astype(np.int8),
+        decided_at=math.inf * values,
         unit="rad",
         duration=math.inf,
     )
@@ -90,8 +90,8 @@ def test_tunings(tmp_path):
     goal = Objective(conditions=("nominal",), duration=0.2)
     tuned = smc.tune("duffing", "classical", budget=8, objective=goal, searches=1)
     worst = tuned.history[0]._replace(objective=math.inf, tracking=math.inf)
-    found = dataclasses.replace(tuned.searches[0], history=(*tuned.history[1:], worst))
-    odd = dataclasses.replace(tuned, before=math.nan, searches=(found,))
+    worse = dataclasses.replace(tuned.searches[0], history=(*tuned.history[1:], worst))
+    odd = dataclasses.replace(tuned, before=math.nan, searches=(worse,))
     strict(odd.save(tmp_path / "a.json").read_text())
     assert same(result.load_tuned(tmp_path / "a.json"), odd)
     assert result.load_tuned(tmp_path / "a.json").history == odd.history
@@ -135,10 +135,10 @@ def test_a_table_that_unpacks_to_too_much_is_refused_before(tmp_path):
 @pytest.mark.parametrize("damage", ["", "[", "5", "[[]]", "[" * 10**5, '[{"plant": 1}]'])
 def test_a_damaged_part_of_a_kept_report_is_computed_again(damage, tmp_path):
     odd = [0.1, 0.2, math.inf]
-    made = []
+    computations = []
 
     def make() -> list[float]:
-        made.append(1)
+        computations.append(1)
         return odd
 
     def save(data: list[float], path: Path) -> None:
@@ -148,17 +148,17 @@ def test_a_damaged_part_of_a_kept_report_is_computed_again(damage, tmp_path):
         return cached(tmp_path / "numbers.json", [], make, save, files.read_json)
 
     assert get() == get() == odd
-    assert len(made) == 1
+    assert len(computations) == 1
     (path,) = tmp_path.iterdir()
     path.write_text(damage)
     assert get() == get() == odd
-    assert len(made) == 2
+    assert len(computations) == 2
     (path,) = tmp_path.iterdir()
     text = path.read_text()
     path.write_text(text.replace("0.1", "0.3"))
     assert path.read_text() != text
     assert get() == get() == odd
-    assert len(made) == 3
+    assert len(computations) == 3
 
 
 def test_a_file_is_replaced_as_a_whole(tmp_path):

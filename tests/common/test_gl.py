@@ -204,8 +204,8 @@ def test_a_trial_without_a_name_leaves_the_variable_and_one_that_hangs_ends(monk
 
 def test_renderers_have_mujoco_s_size_by_default_and_are_closed_at_the_end(monkeypatch):
     sizes = []
-    for made in (gl.renderer, mujoco.Renderer):
-        sizes.append(inspect.signature(made).parameters)
+    for factory in (gl.renderer, mujoco.Renderer):
+        sizes.append(inspect.signature(factory).parameters)
     assert [[size[name].default for name in ("height", "width")] for size in sizes] == [
         [240, 320]
     ] * 2

@@ -17,12 +17,12 @@ def parsed(text: str) -> ElementTree.Element:
 
 
 def test_text_is_escaped_everywhere():
-    made = html.table((EVIL, "b"), [(EVIL, 1)], caption=EVIL, note=EVIL) + html.fields(
+    pages = html.table((EVIL, "b"), [(EVIL, 1)], caption=EVIL, note=EVIL) + html.fields(
         {EVIL: EVIL}, EVIL
     )
-    assert "<script>" not in made
+    assert "<script>" not in pages
     cells = []
-    for node in parsed(made).iter():
+    for node in parsed(pages).iter():
         if node.text and "script" in node.text:
             cells.append(node.text)
     assert cells == [EVIL] * 7  # 4 of the table, 3 of the fields

@@ -37,9 +37,11 @@ def test_reasons_have_no_terminal_codes_from_quoted_texts():
 
 def test_laws_share_the_package_s_helpers():
     plain = smc.law("classical").function
-    one, other = (names(jit(smc.law(name).function)) for name in ("classical", "super_twisting"))
-    assert one["sliding"] is other["sliding"]
-    assert one["sliding"] is not names(plain)["sliding"]
+    of_classical, of_super_twisting = (
+        names(jit(smc.law(name).function)) for name in ("classical", "super_twisting")
+    )
+    assert of_classical["sliding"] is of_super_twisting["sliding"]
+    assert of_classical["sliding"] is not names(plain)["sliding"]
 
 
 def test_a_user_s_helper_follows_a_change_of_its_globals():
@@ -56,7 +58,7 @@ def test_a_user_s_helper_follows_a_change_of_its_globals():
 def test_code_is_kept_if_no_other_process_numbers_a_function_alike_and_no_address_is_added():
     own = f"f_B1v{Numbers.FIRST}"
     numbas = "f_B1v7"
-    for names_of, declared, filled, kept in (
+    for names_of, declared, filled, on_disk in (
         ([own, own], [], "x", True),
         ([own, numbas], [], "x", False),
         ([numbas, own], [], "x", False),
@@ -71,7 +73,7 @@ def test_code_is_kept_if_no_other_process_numbers_a_function_alike_and_no_addres
             global_variables=[SimpleNamespace(name=filled)], functions=functions
         )
         library: Any = SimpleNamespace(_final_module=module)
-        assert _complete(library) == kept
+        assert _complete(library) == on_disk
 
 
 @pytest.mark.parametrize(

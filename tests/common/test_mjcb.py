@@ -109,19 +109,19 @@ COMPILES = {
 def test_within_a_policy_every_model_compiles_and_the_run_goes_on(what, own, tmp_path):
     trace = run_of("none", own)
     trace.save(tmp_path / "own.npz")
-    for kept in (
+    for callback_set in (
         scenario_checks.mechanism_model,
         prepared,
         toppling,
     ):  # as the first time in a process
-        kept.cache_clear()
-    asked = []
-    found = []
+        callback_set.cache_clear()
+    calls = []
+    masses = []
 
     def act(observation):
-        asked.append(observation)
-        if len(asked) == 2:
-            found.append(COMPILES[what](own, trace, tmp_path))
+        calls.append(observation)
+        if len(calls) == 2:
+            masses.append(COMPILES[what](own, trace, tmp_path))
         return [-0.5 * observation[0]]
 
     def alone(observation):
@@ -129,8 +129,8 @@ def test_within_a_policy_every_model_compiles_and_the_run_goes_on(what, own, tmp
 
     beside = run_of(acting(act))
     assert beside.failure is None
-    assert all(found)
-    assert len(found) == 1
+    assert all(masses)
+    assert len(masses) == 1
     np.testing.assert_array_equal(beside.x, run_of(acting(alone)).x)
 
 
@@ -147,17 +147,17 @@ def in_thread(work):
 
 
 def test_another_thread_compiles_during_the_run_of_a_policy():
-    asked = threading.Event()
+    policy_called = threading.Event()
     let = threading.Event()
     failures = []
 
     def act(observation):
-        asked.set()
+        policy_called.set()
         assert let.wait(60)
         return [0.0]
 
     over = in_thread(lambda: failures.append(run_of(acting(act)).failure))
-    assert asked.wait(60)
+    assert policy_called.wait(60)
     assert in_thread(lambda: smc.plant("duffing").load()).wait(60)
     let.set()
     assert over.wait(60)
@@ -306,7 +306,7 @@ def test_runs_whose_callback_is_taken_away_fail_from_there_on(control, at, monke
         )
         for seed in range(2)
     ]
-    whole = smc.run(two)
+    undisturbed = smc.run(two)
     done = []
 
     def report(steps):
@@ -317,7 +317,7 @@ def test_runs_whose_callback_is_taken_away_fail_from_there_on(control, at, monke
     for i, trace in smc.stream(two, report=report):
         assert "took its control callback away" in (trace.failure or "")
         assert trace.diverged_at == pytest.approx(at * 1e-3)
-        np.testing.assert_array_equal(trace.u[:at], whole[i].u[:at])
+        np.testing.assert_array_equal(trace.u[:at], undisturbed[i].u[:at])
         for array in (trace.x, trace.u, trace.d, trace.reaction):
             assert np.isnan(array[at:]).all()
     assert mujoco.get_mjcb_control() is None
@@ -338,13 +338,13 @@ def lets_touch(model, data, one, other):
 def test_a_run_during_which_other_code_sets_any_callback_fails(name, law, monkeypatch):
     """Such a callback would change the forces of a run in silence."""
     scenario = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.2)
-    given = (lets_touch if name == "contactfilter" else native).ctypes
-    asked = itertools.count()
+    foreign = (lets_touch if name == "contactfilter" else native).ctypes
+    count = itertools.count()
     monkeypatch.setattr(runs, "SLICE_STEPS", 20)
 
     def set_it(*_):
-        if next(asked) == 3:
-            getattr(mujoco, f"set_mjcb_{name}")(given)
+        if next(count) == 3:
+            getattr(mujoco, f"set_mjcb_{name}")(foreign)
         return [0.0]
 
     if law == "python":
@@ -361,22 +361,22 @@ def test_a_run_during_which_other_code_sets_any_callback_fails(name, law, monkey
 def test_a_callback_that_is_set_and_cleared_within_a_slice_fails_the_run(name, integrator):
     """As a thread that does not wait for the run may do: at both ends of the slice there is none."""
     slots = {}
-    for one in ("passive", name):
-        slots[one] = ctypes.c_void_p.in_dll(libmujoco.library(), f"mjcb_{one}")
-    addresses = {one: ctypes.addressof(slot) for one, slot in slots.items()}
+    for slot_name in ("passive", name):
+        slots[slot_name] = ctypes.c_void_p.in_dll(libmujoco.library(), f"mjcb_{slot_name}")
+    addresses = {slot_name: ctypes.addressof(slot) for slot_name, slot in slots.items()}
     calls = np.zeros(1, np.int64)
-    at, passive, other = calls.ctypes.data, addresses["passive"], addresses[name]
+    calls_address, passive, slot_address = calls.ctypes.data, addresses["passive"], addresses[name]
 
     @numba.cfunc(types.void(types.intp, types.intp))
     def gone_after_ten_calls(model, data):
-        integers(at)[0] += 1
-        if integers(at)[0] == 10:
-            integers(passive)[0] = integers(other)[0] = 0
+        integers(calls_address)[0] += 1
+        if integers(calls_address)[0] == 10:
+            integers(passive)[0] = integers(slot_address)[0] = 0
 
-    asked = itertools.count()
+    count = itertools.count()
 
     def act(observation):
-        if next(asked) == 3:
+        if next(count) == 3:
             slots[name].value = lets_touch.address
             slots["passive"].value = gone_after_ten_calls.address
         return [0.0]
@@ -392,10 +392,10 @@ def test_a_callback_that_is_set_and_cleared_within_a_slice_fails_the_run(name, i
 
 @pytest.mark.parametrize("integrator", ["RK4", "Euler"])
 def test_a_law_that_clears_the_callback_fails_its_run(integrator):
-    asked = itertools.count()
+    count = itertools.count()
 
     def act(observation):
-        if next(asked) == 3:
+        if next(count) == 3:
             mujoco.set_mjcb_control(foreign)
             mujoco.set_mjcb_control(None)
         return [-0.5 * observation[0]]

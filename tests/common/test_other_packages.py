@@ -65,8 +65,10 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install
         about.mkdir(parents=True)
         (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
         lines = []
-        for group, of in points.items():
-            lines.append(f"[smc_mujoco.{group}]\n" + "".join(f"{k} = {v}\n" for k, v in of.items()))
+        for group, names in points.items():
+            lines.append(
+                f"[smc_mujoco.{group}]\n" + "".join(f"{k} = {v}\n" for k, v in names.items())
+            )
         (about / "entry_points.txt").write_text("\n".join(lines))
         for name, code in modules.items():
             (folder / f"{name}.py").write_text(code)
@@ -84,7 +86,7 @@ def said(call: Callable[[], object]) -> list[str]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         call()
-    return [str(one.message) for one in caught]
+    return [str(warning.message) for warning in caught]
 
 
 # found, and imported when asked for
@@ -201,7 +203,7 @@ def test_a_package_brings_the_gains_of_its_law(install):
     tuned.save(folder / "tuned_gains" / "tuned" / "duffing-tuned_law.json")
     assert [
         gain_sets.law("duffing", "tuned_law", seed=seed).gains for seed in range(len(tuned.sets))
-    ] == [dict(zip(tuned.bounds, one.gains, strict=True)) for one in tuned.sets]
+    ] == [dict(zip(tuned.bounds, gain_set.gains, strict=True)) for gain_set in tuned.sets]
     shipped = gain_sets.tuned("duffing", "tuned_law").search
     assert shipped.rule == tuned.rule
     assert shipped.searches == 2
@@ -212,13 +214,13 @@ def test_a_package_brings_the_gains_of_its_law(install):
 def test_a_plant_of_a_package_may_be_a_model_s_file(install, tmp_path):
     """It has the name of its entry, which nobody else may give to a model."""
     xml = (EXAMPLE / "my_smc_package/models/sprung_cart.xml").read_text()
-    given = 'gantry = smc.plant_from(PATH, channels=["slide"], name="gantry")\n'
+    code = 'gantry = smc.plant_from(PATH, channels=["slide"], name="gantry")\n'
     default = 'trolley = smc.plant_from(PATH.with_name("trolley.xml"), channels=["slide"])\n'
     folder = install(
         "cranes",
         {"plants": {"gantry": "cranes_plants:gantry", "trolley": "cranes_plants:trolley"}},
         cranes_plants="import smc_mujoco as smc\nfrom pathlib import Path\n"
-        f"PATH = Path(__file__).with_name('gantry.xml')\n{given}{default}",
+        f"PATH = Path(__file__).with_name('gantry.xml')\n{code}{default}",
     )
     for name in ("gantry", "trolley"):
         (folder / f"{name}.xml").write_text(xml)

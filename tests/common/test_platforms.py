@@ -51,20 +51,20 @@ def test_every_text_file_is_read_and_written_as_utf_8():
 
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="it is about systems that have it")
 def test_without_process_groups_a_late_command_dies_with_its_children(monkeypatch):
-    asked = []
+    commands = []
     real = subprocess.run
 
     def taskkill(command: list[str], **options: object) -> object:
         if command[0] != "taskkill":
             return real(command, **options)
-        asked.append(command)
+        commands.append(command)
         return subprocess.CompletedProcess(command, 0)
 
     monkeypatch.delattr(os, "killpg")
     monkeypatch.setattr(subprocess, "run", taskkill)
     with pytest.raises(process.TimedOut):
         process.timed([sys.executable, "-c", "import time; time.sleep(60)"], 0.2)
-    ((*command, number),) = asked
+    ((*command, number),) = commands
     assert command == ["taskkill", "/F", "/T", "/PID"]
     with pytest.raises(ProcessLookupError):  # it has ended, and was waited for
         os.kill(int(number), 0)

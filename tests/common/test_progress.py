@@ -23,19 +23,19 @@ def test_a_terminal_s_bar_vanishes_and_shows_the_time_left(monkeypatch):
             bar.reached(3.0, 9.0)
             bar.says("more", 0.5)
         columns = []
-        for each in rich.call_args.args:
-            columns.append(type(each).__name__)
+        for column in rich.call_args.args:
+            columns.append(type(column).__name__)
         assert columns == ["TextColumn", "BarColumn", share, "TextColumn"]
         console = rich.call_args.kwargs["console"]
         assert rich.call_args.kwargs == {"transient": True, "console": console}
         assert console.stderr
-    task = (shown := rich.return_value.__enter__.return_value).add_task.return_value
+    task = (bars := rich.return_value.__enter__.return_value).add_task.return_value
     states = (2.0, 8.0, "runs"), (3.0, 9.0, "runs"), (3.5, 9.0, "more")
     drawn = []
-    for done, whole, what in states:
-        told = {"completed": done, "total": whole, "description": what, "left": "0 s left"}
-        drawn.append(call.update(task, **told))
-    assert shown.mock_calls[-4:] == [call.add_task("runs", total=8.0, left=""), *drawn]
+    for done, total, what in states:
+        fields = {"completed": done, "total": total, "description": what, "left": "0 s left"}
+        drawn.append(call.update(task, **fields))
+    assert bars.mock_calls[-4:] == [call.add_task("runs", total=8.0, left=""), *drawn]
 
 
 def test_a_log_gets_a_line_each_ten_seconds(monkeypatch, capsys):
@@ -65,23 +65,23 @@ def test_a_notebook_s_line_is_replaced_by_the_next_and_leaves_nothing(monkeypatc
             bar.advance(1.0)
     lines = "film, 25 %, 30 s left", "film, 50 %, 20 s left", ""
     first, *later = [{"text/plain": line} for line in lines]
-    shown = [call.display(first, raw=True), *(call.update(line, raw=True) for line in later)]
-    assert handle.return_value.mock_calls == shown
+    displayed = [call.display(first, raw=True), *(call.update(line, raw=True) for line in later)]
+    assert handle.return_value.mock_calls == displayed
     assert capsys.readouterr() == ("", "")
 
 
 def test_the_time_left_is_the_median_of_pieces_that_were_not_read_from_a_file(monkeypatch):
     now = [0.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
-    shown = progress.Bar("pid", 6.0)
+    bar = progress.Bar("pid", 6.0)
     said = []
     for i, seconds in enumerate((0.01, 90.0, 4.0, 5.0)):
         now[0] += seconds
-        shown.add_piece(seconds, 5 - i)
-        shown.reached(i + 1.0, 6.0)
-        said.append(str(shown).rpartition(", ")[2])
+        bar.add_piece(seconds, 5 - i)
+        bar.reached(i + 1.0, 6.0)
+        said.append(str(bar).rpartition(", ")[2])
     now[0] += 3.0
-    assert [*said, shown.left] == [
+    assert [*said, bar.left] == [
         "0 s left",
         "6 min left",
         "3 min left",
@@ -118,9 +118,9 @@ def test_pieces_of_work_are_reported_as_their_sum():
 def test_no_time_is_estimated_before_a_tenth_is_done(monkeypatch):
     now = [0.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
-    shown = progress.Bar("tuning", 100.0)
+    bar = progress.Bar("tuning", 100.0)
     now[0] = 9.0
-    shown.advance(9.0)
-    assert str(shown) == "tuning, 9 %"
-    shown.advance(1.0)
-    assert str(shown) == "tuning, 10 %, 81 s left"
+    bar.advance(9.0)
+    assert str(bar) == "tuning, 9 %"
+    bar.advance(1.0)
+    assert str(bar) == "tuning, 10 %, 81 s left"

@@ -348,8 +348,8 @@ def test_rise_time_is_that_of_the_slowest_channel_and_inf_if_one_never_rises():
     fast = np.exp(-t / 0.1)
     slow = np.exp(-t / 0.4)
     still = np.zeros(t.size)
-    both = run(t, np.column_stack([fast, slow, still]))
-    assert m.rise_time(both) == m.rise_time(run(t, slow))
+    three = run(t, np.column_stack([fast, slow, still]))
+    assert m.rise_time(three) == m.rise_time(run(t, slow))
     assert m.rise_time(run(t, np.column_stack([fast, np.full(t.size, 0.2)]))) == math.inf
     assert m.rise_time(run(t)) == 0.0
 
@@ -424,9 +424,9 @@ def test_network_settles_in_mean_and_spread_separately():
 def test_the_sample_at_which_a_part_begins_belongs_to_it():
     """Also where rounding puts it a little before."""
     t = 0.007 * np.arange(21)
-    at = np.eye(21)
-    assert [m.rms_error(run(t, at[k])) for k in (4, 5)] == [0.0, 0.25]
-    assert [m.ultimate_bound(run(t, at[k])) for k in (15, 16)] == [0.0, 1.0]
+    pulses = np.eye(21)
+    assert [m.rms_error(run(t, pulses[k])) for k in (4, 5)] == [0.0, 0.25]
+    assert [m.ultimate_bound(run(t, pulses[k])) for k in (15, 16)] == [0.0, 1.0]
 
 
 @pytest.mark.parametrize("frequency", [1.0, 2.5, 20.0])
@@ -542,20 +542,20 @@ def test_driven_channels_and_free_joints_are_scored_as_if_each_were_alone():
                 )
             )
         )
-    found = m.scores(trace)
-    assert list(found) == ["driven", "free"]
-    assert found["driven"] == alone[0]
+    scores = m.scores(trace)
+    assert list(scores) == ["driven", "free"]
+    assert scores["driven"] == alone[0]
     commanded = []
     for metric in m.metrics():
         if metric.command:
             commanded.append(metric.name)
-    assert found["free"] == {
+    assert scores["free"] == {
         name: value for name, value in alone[1].items() if name not in commanded
     }
-    assert found["driven"]["settling_time"] == 0.2
-    assert found["free"]["settling_time"] == 0.3
-    assert found["driven"]["overshoot"] == 0.0
-    assert found["free"]["overshoot"] == pytest.approx(50.0)
+    assert scores["driven"]["settling_time"] == 0.2
+    assert scores["free"]["settling_time"] == 0.3
+    assert scores["driven"]["overshoot"] == 0.0
+    assert scores["free"]["overshoot"] == pytest.approx(50.0)
 
 
 def test_what_u_or_s_changes_is_of_the_command():
@@ -595,8 +595,8 @@ def test_trends_are_of_the_metrics_of_the_last_part_alone():
         "v": early,
     }
     felt |= {"s": np.exp(-t) + early, "reaction": 1.0 + early}
-    one, other = (m.score(run(t, **signals)) for signals in (plain, felt))
-    same = {name for name in one if one[name] == other[name]}
+    of_plain, of_felt = (m.score(run(t, **signals)) for signals in (plain, felt))
+    same = {name for name in of_plain if of_plain[name] == of_felt[name]}
     late = set()
     for metric in m.metrics():
         if metric.late:
@@ -689,21 +689,21 @@ def test_driven_channels_in_two_units_have_the_worst_time_and_no_number_in_eithe
         np.array([[10, 1, 0, 0, 0], [0.1, 0.1, 0.1, 0, 0], [0.05, 0, 0, 0, 0]]).T,
         units=("m", "rad", "rad"),
     )
-    found = m.score(arm)
+    score = m.score(arm)
     ours = m.scores(arm)
     assert list(ours) == ["driven m", "driven rad"]
     assert (
-        found["settling_time"]
+        score["settling_time"]
         == ours["driven rad"]["settling_time"]
         == 3.0
         > ours["driven m"]["settling_time"]
     )
-    assert "ultimate_bound" not in found
+    assert "ultimate_bound" not in score
     assert ours["driven m"]["peak"] == 10.0
     assert ours["driven rad"]["peak"] == 0.1
     assert not SYNC & {*ours["driven m"]}
     assert {*ours["driven rad"]} > SYNC  # a slide and two hinges, which can be compared
-    assert found["mean_settling_time"] == ours["driven rad"]["mean_settling_time"]
+    assert score["mean_settling_time"] == ours["driven rad"]["mean_settling_time"]
     for name in ("peak", "itae", "tv", "spread_bound"):
         with pytest.raises(
             ScenarioError, match=rf"{name} has no one value .* in m and rad, .*: use smc.scores"
@@ -752,10 +752,10 @@ def test_a_broken_trace_is_refused_by_score_and_by_every_metric(message, trace):
 @pytest.mark.parametrize("n", [1, 3])
 @pytest.mark.parametrize("samples", [1, 2, 3])
 def test_a_run_at_rest_scores_zero_however_short(n, samples):
-    found = m.score(run(np.arange(samples) * 0.1, np.zeros((samples, n))))
+    score = m.score(run(np.arange(samples) * 0.1, np.zeros((samples, n))))
     for name in CYCLE:
-        assert math.isnan(found.pop(name))
-    assert set(found.values()) == {0.0}
+        assert math.isnan(score.pop(name))
+    assert set(score.values()) == {0.0}
 
 
 def test_a_run_of_one_step_by_hand():
@@ -801,17 +801,17 @@ def test_the_limit_cycle_of_the_worst_channel_is_scored_and_its_absence_is_nan()
     t = np.arange(2001) / 100
     fast = 0.01 * np.sin(math.tau * 20.3 * t)
     large = 0.1 * np.sin(math.tau * 5.1 * t)
-    both = run(t, np.zeros((len(t), 3)), s=np.column_stack([fast, large, np.zeros(len(t))]))
-    assert m.chattering_amplitude(both) == pytest.approx(0.1, rel=0.05)
-    assert m.chattering_frequency(both) == pytest.approx(5.1, rel=1e-3)
+    three = run(t, np.zeros((len(t), 3)), s=np.column_stack([fast, large, np.zeros(len(t))]))
+    assert m.chattering_amplitude(three) == pytest.approx(0.1, rel=0.05)
+    assert m.chattering_frequency(three) == pytest.approx(5.1, rel=1e-3)
     assert math.isnan(m.chattering_amplitude(run(t, np.cos(t))))
 
 
 @pytest.mark.usefixtures("present_objects_frozen")
 def test_scoring_keeps_no_trace_and_looks_once_in_each_group(monkeypatch):
     t = np.arange(2001) / 100
-    asked = []
-    both = run(
+    looks = []
+    trace = run(
         t,
         np.zeros((len(t), 2)),
         s=np.sin(60 * t)[:, None] * np.ones(2),
@@ -820,15 +820,15 @@ def test_scoring_keeps_no_trace_and_looks_once_in_each_group(monkeypatch):
     monkeypatch.setattr(
         limit_cycle,
         "largest_of",
-        lambda t, s: asked.append(s.shape) or (0.1, 10.0),
+        lambda t, s: looks.append(s.shape) or (0.1, 10.0),
     )
-    m.scores(both)
-    m.score(both)
-    assert len(asked) == 4  # two groups, scored twice
-    kept = weakref.ref(both)
-    del both
+    m.scores(trace)
+    m.score(trace)
+    assert len(looks) == 4  # two groups, scored twice
+    reference = weakref.ref(trace)
+    del trace
     gc.collect()
-    assert kept() is None
+    assert reference() is None
 
 
 # Invariances
@@ -878,7 +878,8 @@ def test_scaling_x_or_u_scales_what_has_its_unit_and_leaves_times_and_percentage
     )
     for metric in m.metrics():
         power, of_u = (
-            2 if f"({one})^2" in metric.unit else int(one in metric.unit) for one in ("{x}", "{u}")
+            2 if f"({unit})^2" in metric.unit else int(unit in metric.unit)
+            for unit in ("{x}", "{u}")
         )
         if metric.name in before:
             factor = abs(c) ** power * abs(k) ** of_u
@@ -1010,10 +1011,10 @@ def test_a_run_that_starts_near_the_noise_settles_within_five_of_its_deviations(
     run = smc.Scenario(plant="duffing", law="none", x0=start, duration=1.0, noise=smc.Noise(sigma))
     t = np.linspace(0.0, 1.0, 1001)
     x = np.where(t < 0.5, start, 0.003)[:, None]
-    made = dataclasses.replace(smc.run(run), x=x)
-    assert (m.settling_time(made) < math.inf) == settles
+    near = dataclasses.replace(smc.run(run), x=x)
+    assert (m.settling_time(near) < math.inf) == settles
     if settles:
-        assert m.settling_time(made) == pytest.approx(0.5)
+        assert m.settling_time(near) == pytest.approx(0.5)
 
 
 def test_positions_of_a_pose_are_those_whose_distance_is_its_error():

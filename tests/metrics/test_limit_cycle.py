@@ -19,8 +19,8 @@ def wave(frequency, amplitude=0.3, phase=0.3):
 
 @pytest.mark.parametrize("frequency", [3.1, 7.3, 19.37, 81.4])
 def test_a_sine_has_its_amplitude_and_frequency(frequency):
-    amplitude, found = limit_cycle(T, wave(frequency))
-    assert found == pytest.approx(frequency, rel=1e-5)
+    amplitude, measured = limit_cycle(T, wave(frequency))
+    assert measured == pytest.approx(frequency, rel=1e-5)
     assert amplitude == pytest.approx(0.3, rel=0.04)  # a period is a whole number of samples
 
 
@@ -59,10 +59,10 @@ def test_the_first_harmonic_counts_where_a_higher_one_is_larger_in_the_rate(shap
         ),
     ):
         wave = SHAPES[shape](math.tau * frequency * T + 0.3)
-        amplitude, found = limit_cycle(
+        amplitude, measured = limit_cycle(
             T, wave + noise * np.random.default_rng(0).normal(size=len(T))
         )
-        assert found == pytest.approx(frequency, rel=1e-3)
+        assert measured == pytest.approx(frequency, rel=1e-3)
         assert amplitude == pytest.approx(1.0, rel=0.1)
 
 
@@ -79,8 +79,8 @@ def test_a_slow_wave_is_no_first_harmonic_of_a_cycle_that_is_much_larger_in_the_
 def test_steps_of_an_encoder_at_random_times_are_no_limit_cycle():
     rng = np.random.default_rng(2)
     s = np.zeros(len(T))
-    for at in rng.choice(len(T), 40, replace=False):
-        s[at:] += rng.choice([-1.0, 1.0]) * np.exp(-(T[at:] - T[at]) / 6e-3)
+    for sample in rng.choice(len(T), 40, replace=False):
+        s[sample:] += rng.choice([-1.0, 1.0]) * np.exp(-(T[sample:] - T[sample]) / 6e-3)
     assert math.isnan(limit_cycle(T, s)[0])
 
 
@@ -152,10 +152,10 @@ def test_a_group_without_a_limit_cycle_hides_no_other_and_units_do_not_mix(laws,
     )
     trace = smc.run(scenario)
     of_group = smc.scores(trace)
-    whole = smc.score(trace)
+    scores = smc.score(trace)
     frequencies = []
-    for its in of_group.values():
-        frequencies.append(its["chattering_frequency"])
+    for cycle in of_group.values():
+        frequencies.append(cycle["chattering_frequency"])
     assert sum(map(math.isnan, frequencies)) == 1  # pid has none
-    assert whole["chattering_frequency"] == max(f for f in frequencies if not math.isnan(f))
-    assert "chattering_amplitude" not in whole  # m/s and rad/s
+    assert scores["chattering_frequency"] == max(f for f in frequencies if not math.isnan(f))
+    assert "chattering_amplitude" not in scores  # m/s and rad/s

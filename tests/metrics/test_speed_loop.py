@@ -37,23 +37,23 @@ def ran(speed, tracks="speed", **fields):
 @pytest.mark.parametrize("k", [3.0, 9.0])
 def test_the_speed_settles_when_its_error_has_fallen_to_two_percent(speed, k):
     trace = ran(speed, k=k)
-    found = smc.score(trace)
+    scores = smc.score(trace)
     period = trace.scenario.control_period
     free = math.exp(-DAMPING * period / MASS)  # of the speed in a period, under a held force
     rate = -math.log(free - k * (1.0 - free) / DAMPING) / period
-    assert found["settling_time"] == pytest.approx(math.log(50.0) / rate, abs=period)
-    assert found["overshoot"] == 0.0
-    assert found["iae"] == pytest.approx(abs(speed) / rate, rel=1e-2)
+    assert scores["settling_time"] == pytest.approx(math.log(50.0) / rate, abs=period)
+    assert scores["overshoot"] == 0.0
+    assert scores["iae"] == pytest.approx(abs(speed) / rate, rel=1e-2)
 
 
 @pytest.mark.parametrize("share", [0.0, 2.0])
 def test_the_ultimate_bound_and_the_overshoot_are_of_the_speed(share):
     trace = ran(2.0, share=share)
     end = 2.0 * (6.0 + share * DAMPING) / (6.0 + DAMPING)  # m/s
-    found = smc.score(trace)
-    assert found["ultimate_bound"] == pytest.approx(abs(end - 2.0), rel=1e-3)
-    assert found["overshoot"] == pytest.approx(100.0 * max(0.0, end - 2.0) / 2.0, rel=1e-3)
-    assert found["settling_time"] == math.inf
+    scores = smc.score(trace)
+    assert scores["ultimate_bound"] == pytest.approx(abs(end - 2.0), rel=1e-3)
+    assert scores["overshoot"] == pytest.approx(100.0 * max(0.0, end - 2.0) / 2.0, rel=1e-3)
+    assert scores["settling_time"] == math.inf
 
 
 def test_by_default_the_same_run_is_scored_by_its_position():

@@ -57,21 +57,21 @@ def test_tip_scores_are_of_the_distance_in_space(trace):
     data = mujoco.MjData(model)
 
     def places(positions):
-        found = []
+        scores = []
         for x in positions:
             data.qpos[[2, 0, 1]] = x
             mujoco.mj_forward(model, data)
-            found.append(data.site("tip").xpos.copy())
-        return np.array(found)
+            scores.append(data.site("tip").xpos.copy())
+        return np.array(scores)
 
     away = np.linalg.norm(places(trace.x) - places(trace.r), axis=1)
-    found = smc.metrics.tip_scores(trace)
+    scores = smc.metrics.tip_scores(trace)
     expected = {
         "max_error": away.max(),
         "rms_error": np.sqrt(np.mean(away**2)),
         "last_error": away[-1],
     }
-    assert found == pytest.approx(expected, rel=1e-12)
+    assert scores == pytest.approx(expected, rel=1e-12)
     assert away.max() > 0.05
 
 
@@ -92,17 +92,17 @@ def test_the_actual_tip_is_that_of_the_true_plant(trace):
         parameters=dict(trace.scenario.plant.parameters) | {"share": 1.0},
     )
     longer = dataclasses.replace(trace.scenario, plant=plant, jump=smc.Jump(0.25, {"share": 1.1}))
-    actual, wanted = tip.tip_paths(dataclasses.replace(trace, scenario=longer))
+    actual, reference = tip.tip_paths(dataclasses.replace(trace, scenario=longer))
     before, same = tip.tip_paths(trace)
-    np.testing.assert_array_equal(wanted, same)
+    np.testing.assert_array_equal(reference, same)
     np.testing.assert_array_equal(actual[:250], before[:250])
     assert np.linalg.norm(actual - before, axis=1)[250:].min() > 0.01
 
 
 def test_joint_scores_are_each_joints_own(trace):
-    found = smc.metrics.joint_scores(trace)
-    assert list(found) == ["reach", "turn", "lift"]
-    for i, scores in enumerate(found.values()):
+    by_joint = smc.metrics.joint_scores(trace)
+    assert list(by_joint) == ["reach", "turn", "lift"]
+    for i, scores in enumerate(by_joint.values()):
         power = np.abs(trace.force[:, i] * trace.v[:, i])
         assert scores["max_u"] == np.abs(trace.u[:, i]).max()
         assert (
@@ -119,15 +119,15 @@ def test_contact_forces_are_those_that_the_joints_feel(pressed):
     """Without friction the reactions of the joints are -A' f, with A the tip's Jacobian along the
     wall's normal.
     """
-    found = tip.contacts(pressed)
+    contacts = tip.contacts(pressed)
     plant = pressed.scenario.plant
     for k in (400, 600, 900):
         A = plant.nominal.jacobian(pressed.x[k], plant.values({}), plant.tip)[0]
         felt = -(A @ pressed.reaction[k]) / (A @ A)
         np.testing.assert_allclose(pressed.reaction[k], -A * felt, atol=0.05)
-        assert found.force[k] == pytest.approx(felt, rel=5e-3)
+        assert contacts.force[k] == pytest.approx(felt, rel=5e-3)
         # away from the wall
-        np.testing.assert_allclose(found.push[k], [-found.force[k], 0.0, 0.0], atol=1e-6)
+        np.testing.assert_allclose(contacts.push[k], [-contacts.force[k], 0.0, 0.0], atol=1e-6)
 
 
 def test_contact_forces_are_those_under_the_runs_disturbance_and_motor():
@@ -170,9 +170,9 @@ def test_contact_forces_know_a_jump_between_two_samples(pressed):
     after = tip.contacts(changed(pressed, mismatch=heavy))
     assert pressed.scenario.steps > 1
     for time in (0.5004, 0.501):
-        found = tip.contacts(changed(pressed, jump=smc.Jump(time, heavy)))
-        assert found.force[:501].tolist() == before.force[:501].tolist()
-        assert found.force[501:].tolist() == after.force[501:].tolist()
+        contacts = tip.contacts(changed(pressed, jump=smc.Jump(time, heavy)))
+        assert contacts.force[:501].tolist() == before.force[:501].tolist()
+        assert contacts.force[501:].tolist() == after.force[501:].tolist()
     assert np.all(before.force[501:] != after.force[501:])
 
 

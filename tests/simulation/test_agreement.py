@@ -93,10 +93,10 @@ def test_signals_and_frictions_are_compared_too(fields):
 
 def test_what_only_compiled_code_can_do_is_no_difference():
     """Its Python raises TypeError where it reads an address."""
-    at = np.zeros(1).ctypes.data
+    address = np.zeros(1).ctypes.data
 
     def law(y, gains, memory):
-        return agreement_pointer(at)[0], 0.0
+        return agreement_pointer(address)[0], 0.0
 
     agreement_pointer = cfunctions.pointer
     assert why_not(scenario(made(law))) == ""

@@ -52,27 +52,27 @@ def resists(y, gains, memory):
 def machine(name):
     if name not in BUILT:
         return smc.plant(name)
-    parts, joints, others = BUILT[name]
-    return smc.plant_from(MACHINE.format(name="m", **ARM | parts), joints, others=others)
+    parts, joints, what_others_do = BUILT[name]
+    return smc.plant_from(MACHINE.format(name="m", **ARM | parts), joints, others=what_others_do)
 
 
 @pytest.mark.parametrize("more", ["", " + friction"])
 @pytest.mark.parametrize("name", [*BUILT, "duffing", "double_pendulum", "inverted_pendulum"])
 def test_a_blow_reaches_the_stops_whatever_u_does(name, more):
     plant = machine(name)
-    given = conditions.find_condition(f"contact{more}").on(plant, 2.0 * TIME)
-    blow = given["disturbance"]
-    at = at_goal(plant)
+    fields = conditions.find_condition(f"contact{more}").on(plant, 2.0 * TIME)
+    blow = fields["disturbance"]
+    moments = at_goal(plant)
     limits = smc.Scenario(plant=plant, law=smc.law("none")).limits
     laws = []
-    for bound, dof, load in zip(limits, at.dofs, at.load, strict=True):
+    for bound, dof, load in zip(limits, moments.dofs, moments.load, strict=True):
         kp = bound / 0.3
-        kd = 2.0 * math.sqrt(kp * at.M[dof, dof])
+        kd = 2.0 * math.sqrt(kp * moments.M[dof, dof])
         way = math.copysign(1.0, blow.impulse)
         laws.append(resists(kp=kp, kd=kd, load=load, bound=bound, way=way, at=TIME))
-    made = conditions.condition("hit", **given)
-    runs = [case(plant, by_channel(laws), made, TIME + 0.5, seed=seed) for seed in range(2)]
-    (stopped,) = given["contact"].limits.items()
+    hit = conditions.condition("hit", **fields)
+    runs = [case(plant, by_channel(laws), hit, TIME + 0.5, seed=seed) for seed in range(2)]
+    (stopped,) = fields["contact"].limits.items()
     joint = channel_names(plant).index(stopped[0])
     for trace in smc.run(runs):
         assert trace.failure is None

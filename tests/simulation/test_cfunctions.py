@@ -80,10 +80,10 @@ def test_a_function_of_arrays_is_compiled_once_for_all_processes(cache):
         return cfunctions.cached(FunctionType(ratio_to.__code__, {"FACTOR": factor}))(np.array([x]))
 
     assert ratio(2.0, 1.0) == 2.0
-    (kept,) = cache.rglob("*.code")
-    code = kept.read_bytes()  # has numbers that no compilation gives again
+    (file,) = cache.rglob("*.code")
+    code = file.read_bytes()  # has numbers that no compilation gives again
     assert ratio(2.0, 0.0) == np.inf
-    assert kept.read_bytes() == code
+    assert file.read_bytes() == code
     assert ratio(3.0, 1.0) == 3.0
 
 
@@ -168,18 +168,18 @@ def test_code_of_another_law_under_the_name_of_this_one_is_not_run(cache):
 def test_code_that_another_user_may_have_written_is_not_loaded(cache, monkeypatch):
     """It is a pickle, which runs what it holds."""
     force(mine("gains.k"))
-    (kept,) = cache.rglob("*.code")
+    (file,) = cache.rglob("*.code")
     assert hits(mine("gains.k")) == 1
-    for path in (kept, cache):
+    for path in (file, cache):
         mode = path.stat().st_mode
         for right in (0o020, 0o002):
             path.chmod(mode | right)
             assert hits(mine("gains.k")) == 0
-            kept.chmod(0o600)
+            file.chmod(0o600)
             cache.chmod(0o700)
     assert hits(mine("gains.k")) == 1
     monkeypatch.setattr(os, "getuid", lambda: 12345)
-    if kept.stat().st_uid != 0:
+    if file.stat().st_uid != 0:
         assert hits(mine("gains.k")) == 0
 
 
@@ -267,9 +267,9 @@ def test_numba_numbers_the_functions_of_others_as_ever(cache):
 
 @njit
 def doubled_by_sorting(x):
-    both = np.array([2.0 * x, x])
-    both.sort()
-    return both[1]
+    pair = np.array([2.0 * x, x])
+    pair.sort()
+    return pair[1]
 
 
 @pytest.mark.parametrize(
@@ -305,12 +305,15 @@ def test_own_functions_divide_as_numpy_does_and_those_of_laws_as_python_does():
         modules.append(importlib.import_module(f"smc_mujoco.simulation.{name}"))
 
     def models(*modules):
-        found = []
+        dividing = []
         for module in modules:
-            for one in vars(module).values():
-                if hasattr(one, "targetoptions") and one.py_func.__module__ == module.__name__:
-                    found.append(one.targetoptions.get("error_model", "python"))
-        return found
+            for member in vars(module).values():
+                if (
+                    hasattr(member, "targetoptions")
+                    and member.py_func.__module__ == module.__name__
+                ):
+                    dividing.append(member.targetoptions.get("error_model", "python"))
+        return dividing
 
     callbacks = models(*modules)
     assert len(callbacks) > 20
@@ -328,12 +331,12 @@ def test_the_callback_is_compiled_without_what_few_runs_have():
     compiled_with_it = set()
     ask_joints: Any = controller._ask_joints
     callback: Any = controller.control
-    left = [callback.py_func]
-    while left:
-        function = left.pop()
+    unread = [callback.py_func]
+    while unread:
+        function = unread.pop()
         if function not in compiled_with_it:
             compiled_with_it.add(function)
-            left += helpers(function)
+            unread += helpers(function)
     assert ask_joints.py_func in compiled_with_it
     seldom: list[Any] = [joint_controller.ask, joint_controller.mix, exogenous.disturb]
     for apart in seldom:

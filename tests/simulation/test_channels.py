@@ -126,10 +126,10 @@ def test_each_channel_runs_as_it_would_under_its_law_alone():
             )
         )
         for name in set(ARRAYS) - {"t"}:
-            one = getattr(together, name)[:, i]
-            other = getattr(alone, name)[:, i]
+            in_company = getattr(together, name)[:, i]
+            by_itself = getattr(alone, name)[:, i]
             # MuJoCo solves for all at once
-            np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-13, err_msg=name)
+            np.testing.assert_allclose(in_company, by_itself, rtol=1e-12, atol=1e-13, err_msg=name)
     assert np.abs(together.u).max(axis=0).tolist() == bounds
 
 
@@ -153,18 +153,18 @@ def test_a_plants_channels_suggest_what_a_scenario_leaves_out():
     assert suggested == smc.Scenario(plant=plant, **same, **COMMON)
     assert suggested.limits == (8.0, needs(plant)[1])
     assert_same(smc.run(suggested), reference.run(suggested))
-    others = {
+    overriding = {
         "law": smc.law("classical", k=1.0),
         "u_max": 2.0,
         "reference": MOVE,
     }
-    given = smc.Scenario(plant=plant, **others, **COMMON)
-    assert (given.law, given.u_max, given.reference) == tuple(others.values())
+    overridden = smc.Scenario(plant=plant, **overriding, **COMMON)
+    assert (overridden.law, overridden.u_max, overridden.reference) == tuple(overriding.values())
     plain = smc.plant_from(
         PENDULUM, channels={j: smc.Channel(motor=True) for j in channels}, name="suggesting"
     )
     assert plant == plain  # the same mechanism
-    assert smc.Scenario(plant=plain, **others, **COMMON) == given
+    assert smc.Scenario(plant=plain, **overriding, **COMMON) == overridden
     assert pickle.loads(pickle.dumps(suggested)) == suggested
     assert suggested.reference is None
     assert suggested.references == (SINE, REST)

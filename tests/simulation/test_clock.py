@@ -154,24 +154,24 @@ def test_callback_equals_plain_loop(plant, name):
         law = "hierarchical"
     else:
         law = "super_twisting"
-    made = smc.Scenario(
+    scenario = smc.Scenario(
         plant=plant,
         law=at_defaults(law),
         duration=0.2,
         seed=3,
         **FIELDS[name],
     )
-    assert_same(smc.run(made), reference.run(made))
+    assert_same(smc.run(scenario), reference.run(scenario))
 
 
 def test_a_law_that_raises_late_ends_the_run_with_its_own_reason():
-    made = dataclasses.replace(
+    late_scenario = dataclasses.replace(
         scenario(smc.Clock(jitter=0.9 * PERIOD)), law=failing_at_half_a_second()
     )
-    trace = smc.run(made)
+    trace = smc.run(late_scenario)
     assert trace.failure is not None
     assert "late" in trace.failure
-    assert_same(trace, reference.run(made))
+    assert_same(trace, reference.run(late_scenario))
 
 
 def test_a_clock_comes_back_from_a_file_and_from_text(tmp_path):

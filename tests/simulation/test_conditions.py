@@ -73,14 +73,14 @@ def test_text_says_a_condition_whole():
 
 
 def test_the_suites_conditions_go_by_their_names():
-    assert [str(one) for one in NAMED.values()] == list(NAMED)
+    assert [str(condition_of_suite) for condition_of_suite in NAMED.values()] == list(NAMED)
     assert find_condition("noise") is NAMED["noise"]
 
 
 def test_conditions_add_up(refused):
     duffing = smc.plant("duffing")
-    both = find_condition("sine + coulomb + constant").on(duffing, 4.0)
-    assert both == {
+    together = find_condition("sine + coulomb + constant").on(duffing, 4.0)
+    assert together == {
         "disturbance": (smc.Sine(0.2, 5.0), smc.Constant(0.2)),
         "friction": smc.Coulomb(0.1),
     }
@@ -140,7 +140,7 @@ def test_a_condition_of_your_own_needs_its_own_option(refused):
 def test_a_file_holds_a_condition_a_line(tmp_path, refused):
     path = tmp_path / "conditions.txt"
     path.write_text(f"# of the workshop\n\n{WORN}\nnoise + coulomb\n")
-    assert [one.name for one in from_file(path)] == ["worn gear", "noise + coulomb"]
+    assert [of_line.name for of_line in from_file(path)] == ["worn gear", "noise + coulomb"]
     path.write_text("# two\n\nworn x0=1\n")
     refused(lambda: from_file(path))
     refused(lambda: from_file(tmp_path / "none.txt"))
@@ -165,7 +165,7 @@ def test_a_condition_that_starts_at_0_is_nothing_to_tune_for(refused):
 
 
 def test_a_grid_has_conditions_of_ones_own_under_their_names():
-    made = smc.grid(
+    scenarios = smc.grid(
         "duffing",
         "classical",
         ["nominal", WORN, "noise + coulomb"],
@@ -173,12 +173,12 @@ def test_a_grid_has_conditions_of_ones_own_under_their_names():
         gains="default",
         duration=1.0,
     )
-    assert [reported(s) for s in made] == ["nominal"] * 2 + ["worn gear"] * 2 + [
+    assert [reported(s) for s in scenarios] == ["nominal"] * 2 + ["worn gear"] * 2 + [
         "noise + coulomb"
     ] * 2
-    assert made[2].friction == (smc.Coulomb(0.05),)
+    assert scenarios[2].friction == (smc.Coulomb(0.05),)
     # the name goes with the fields
-    assert dataclasses.replace(made[2], friction=None).condition is None
+    assert dataclasses.replace(scenarios[2], friction=None).condition is None
 
 
 def test_a_name_of_the_suite_changes_no_runs_key_and_ones_own_does():
@@ -186,15 +186,15 @@ def test_a_name_of_the_suite_changes_no_runs_key_and_ones_own_does():
     by_hand = paper.scenario("duffing", "classical", "noise", gains="default")
     assert ours == by_hand
     assert key(ours) == key(by_hand)
-    (one,) = smc.grid(
+    (scenario,) = smc.grid(
         "duffing",
         "classical",
         smc.condition("one", noise=smc.Noise(0.01, 0.05)),
         1,
         gains="default",
     )
-    assert one == ours
-    assert key(one) != key(ours)
+    assert scenario == ours
+    assert key(scenario) != key(ours)
 
 
 def test_starts_are_around_the_plants_own_or_around_a_given_one():
@@ -323,7 +323,7 @@ def test_a_model_is_tuned_in_conditions_of_ones_own(arm, refused):
     at_rest = smc.starts(x0=0.0)
     refused(lambda: smc.tune(arm, "pid", budget=4, conditions="nominal", starts=at_rest))
     goal = Objective(conditions=("nominal",), duration=0.5)
-    found = smc.tune(
+    tuned = smc.tune(
         arm,
         "observer_free",
         4,
@@ -332,8 +332,8 @@ def test_a_model_is_tuned_in_conditions_of_ones_own(arm, refused):
         starts=smc.starts(x0=0.4),
         searches=1,
     )
-    assert [one.name for one in found.definition.conditions] == ["worn gear"]
-    assert found.scales["X"] == 0.4
+    assert [own.name for own in tuned.definition.conditions] == ["worn gear"]
+    assert tuned.scales["X"] == 0.4
 
 
 # the command line

@@ -69,28 +69,28 @@ HITS = {
 
 def cases(n=None):
     """(plant, name) -> the fields of a scenario that make it realistic."""
-    found = {}
+    by_key = {}
     for name in smc.paper.GAINS:
         if n is None or smc.plant(name).n == 1:
             plant = smc.plant(name)
         else:
             plant = smc.plant(name, n=n)
         for part, fields in PARTS.items():
-            found[name, part] = {"plant": plant} | fields
+            by_key[name, part] = {"plant": plant} | fields
         for mechanism in plant.mechanisms:
-            found[name, mechanism] = {"plant": plant, "mechanism": mechanism}
+            by_key[name, mechanism] = {"plant": plant, "mechanism": mechanism}
         for contact, start in HITS[name].items():
             first = {}
             for key, value in start.items():
                 first[key] = (value, *[0.0] * (plant.n - 1))
-            found[name, contact] = {"plant": plant, "contact": contact} | first
-    return found
+            by_key[name, contact] = {"plant": plant, "contact": contact} | first
+    return by_key
 
 
 def scenarios(key, law, duration, n, starts):
     """The scenario of a case, or several from starts close by where it hunts."""
-    made = smc.law(law, **smc.paper.GAINS[key[0]][law])
-    first = smc.Scenario(**cases(n)[key], law=made, duration=duration)
+    bound = smc.law(law, **smc.paper.GAINS[key[0]][law])
+    first = smc.Scenario(**cases(n)[key], law=bound, duration=duration)
     if key[1] not in HUNTING:
         return [first]
     return [
@@ -109,13 +109,13 @@ def brief():
         key: LONG if key[1] in HUNTING + CREEPING else SLOW if key[0] == "van_der_pol" else BRIEF
         for key in cases()
     }
-    found = {}
+    shortened = {}
     for i, plant in enumerate(smc.paper.GAINS):
         for j, key in enumerate(key for key in cases() if key[0] == plant):
             if (i + j) % 2 and (key[1] not in HUNTING or smc.plant(plant).n == 1):
                 law = LAWS[(i + j) // 2 % len(LAWS)]
-                found[*key, law] = scenarios(key, law, brief[key], 2, 4)
-    return found
+                shortened[*key, law] = scenarios(key, law, brief[key], 2, 4)
+    return shortened
 
 
 def thorough():
@@ -126,12 +126,12 @@ def thorough():
 def scores(trace):
     """The three scores, none below its floor."""
     assert trace.failure is None
-    found = smc.score(trace)
+    values = smc.score(trace)
     floors = {
         "ultimate_bound": FLOOR * scale(trace),
         "tv_rate": FLOOR * trace.scenario.resolved.u_max,
     }
-    return [max(found[name], floors.get(name, 0.0)) for name in SCORES]
+    return [max(values[name], floors.get(name, 0.0)) for name in SCORES]
 
 
 def halved(scenario):
@@ -142,8 +142,8 @@ def study(chosen):
     """(plant, part, law) -> score -> its means with a step and with half of it, and the error of
     their difference.
     """
-    every = [s for group in chosen.values() for s in (*group, *map(halved, group))]
-    traces = iter(smc.run(every))
+    all_scenarios = [s for group in chosen.values() for s in (*group, *map(halved, group))]
+    traces = iter(smc.run(all_scenarios))
     result = {}
     for key, group in chosen.items():
         coarse, fine = (np.array([scores(next(traces)) for _ in group]) for _ in range(2))
@@ -195,8 +195,8 @@ def test_the_obstacles_of_the_study_are_hit():
     touching = []
     for key in keys:
         for law in LAWS:
-            for made in scenarios(key, law, 1.0, 2, 1):
-                touching.append(made)
+            for scenario in scenarios(key, law, 1.0, 2, 1):
+                touching.append(scenario)
     for trace in smc.run(touching):
         assert np.abs(trace.reaction).max() > 0.5, trace.scenario
 
@@ -215,11 +215,11 @@ def table(chosen):
     """The study as a rich table."""
     from rich.table import Table
 
-    shown = Table(
+    printed = Table(
         title="scores with the default physics step, and by how much they differ with half of it"
     )
     for head in ("plant", "part", "law", *SCORES):
-        shown.add_column(head)
+        printed.add_column(head)
     for key, values in study(chosen).items():
         cells = []
         for coarse, fine, spread in values.values():
@@ -232,8 +232,8 @@ def table(chosen):
             else:
                 colour = "[red]"
             cells.append(f"{coarse:.4g}  {colour}{100 * change(coarse, fine):.2f}{chance} %")
-        shown.add_row(*key, *cells)
-    return shown
+        printed.add_row(*key, *cells)
+    return printed
 
 
 if __name__ == "__main__":

@@ -28,14 +28,14 @@ def swing(joint="", friction=None, **fields):
 
 
 def test_one_motion_has_one_reaction_however_its_friction_is_written():
-    first, *others = (swing(*written) for written in WRITTEN.values())
+    first, *further = (swing(*written) for written in WRITTEN.values())
     peak = smc.score(first)["peak_reaction"]
     assert peak > 0.6  # of which the dry friction is 0.2
-    for other in others:
-        np.testing.assert_allclose(other.x, first.x, atol=1e-5)
-        assert smc.score(other)["peak_reaction"] == pytest.approx(peak, rel=1e-5)
+    for trace in further:
+        np.testing.assert_allclose(trace.x, first.x, atol=1e-5)
+        assert smc.score(trace)["peak_reaction"] == pytest.approx(peak, rel=1e-5)
         # a formula is that of the speed at the start of a step, also where a joint starts or turns
-        assert np.quantile(np.abs(other.reaction - first.reaction), 0.99) < 2e-3
+        assert np.quantile(np.abs(trace.reaction - first.reaction), 0.99) < 2e-3
 
 
 @pytest.mark.parametrize("damping", [".5", ".1 .2 .3"])

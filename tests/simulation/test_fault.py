@@ -35,9 +35,9 @@ def impulse(t, at, gain, bias, stuck, period):
     """Integral of the faulty force up to each sample, N s, in sums over short steps."""
     h = period / 400.0
     times = (np.arange(round(t[-1] / h)) + 0.5) * h
-    told = 3.0 * np.floor(times / period + 1e-9) * period
+    commanded = 3.0 * np.floor(times / period + 1e-9) * period
     last = 3.0 * np.floor((at - 1e-9) / period) * period
-    force = np.where(times < at, told, last if stuck else gain * told + bias)
+    force = np.where(times < at, commanded, last if stuck else gain * commanded + bias)
     total = np.concatenate([[0.0], np.cumsum(force) * h])
     return total[np.round(t / h).astype(int)]
 
@@ -92,13 +92,13 @@ def test_a_fault_on_one_motor_leaves_the_other_as_it_is(fields, on, lag, tmp_pat
     plant = smc.plant_from(TWO, ["left", "right"])
     run = {"plant": plant, "law": ramp, "duration": 1.0, "actuator": [smc.Lag(lag)] if lag else []}
     faults = smc.Fault(at=0.5, **fields, on=on), smc.Fault(at=0.5, **fields)
-    one, every, none = smc.run([smc.Scenario(fault=fault, **run) for fault in (*faults, None)])
+    on_one, on_all, none = smc.run([smc.Scenario(fault=fault, **run) for fault in (*faults, None)])
     i = ["left", "right"].index(on)
-    assert np.array_equal(one.v[:, i], every.v[:, i])
-    assert np.array_equal(one.v[:, 1 - i], none.v[:, 1 - i])
-    assert not np.array_equal(one.v, none.v)
+    assert np.array_equal(on_one.v[:, i], on_all.v[:, i])
+    assert np.array_equal(on_one.v[:, 1 - i], none.v[:, 1 - i])
+    assert not np.array_equal(on_one.v, none.v)
     text = str(smc.condition("f", fault=faults[0]))
-    assert find_condition(text).on(plant, 1.0) == {"fault": one.scenario.fault}
+    assert find_condition(text).on(plant, 1.0) == {"fault": on_one.scenario.fault}
     assert on in faults[0].words
 
 
@@ -154,14 +154,14 @@ def test_the_gain_that_may_be_lost_is_what_holds_the_start(kp, x0):
         return -gains.kp * y.e - gains.kd * y.de, y.e
 
     weight = 0.5 * 9.81 * 0.5
-    found = smc.margins(
+    margins = smc.margins(
         "inverted_pendulum",
         pd(kp=kp),
         "loss",
         starts=smc.starts(x0=x0),
     )
     held = 1.0 - weight * np.sin(x0) / 6.0  # u_max is 6 N m
-    assert found[0].value == pytest.approx(held, abs=0.03)
+    assert margins[0].value == pytest.approx(held, abs=0.03)
 
 
 LIFTS = """<mujoco model="lifts"><option><flag contact="disable"/></option><worldbody>
@@ -174,12 +174,12 @@ def test_the_margin_of_gain_is_of_all_actuators_or_of_the_one_that_a_fault_names
     channel = smc.Channel(motor=True, u_max=50.0, x0=0.3)
     plant = smc.plant_from(LIFTS, {"one": channel, "three": channel})
     law = smc.law("pid", kp=90.0, ki=200.0, kd=40.0)
-    found = []
+    margins = []
     for on in (None, "three", "one"):
         loss = smc.condition("loss", fault=smc.Fault(at=0.0, on=on))
-        found += smc.margins(plant, law, "loss", quick=True, threads=1, condition=loss)
-    every, heavy, light = [margin.value for margin in found]
-    assert every == heavy < 1.0 - 3.0 * 9.81 / 50.0 < light < 1.0 - 9.81 / 50.0
+        margins += smc.margins(plant, law, "loss", quick=True, threads=1, condition=loss)
+    of_all, heavy, light = [margin.value for margin in margins]
+    assert of_all == heavy < 1.0 - 3.0 * 9.81 / 50.0 < light < 1.0 - 9.81 / 50.0
 
 
 @pytest.mark.parametrize(

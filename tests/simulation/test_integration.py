@@ -108,13 +108,13 @@ def own_rk4(plant, x0, step, u, duration, period=1e-3):
     model.opt.timestep, model.opt.integrator = step, mujoco.mjtIntegrator.mjINT_RK4
     data = mujoco.MjData(model)
     data.qpos[:] = x0
-    found = [data.qpos.copy()]
+    positions = [data.qpos.copy()]
     for k in range(round(duration / period)):
         data.ctrl[:] = u(k * period, data.qpos, data.qvel)
         for _ in range(round(period / step)):
             mujoco.mj_step(model, data)
-        found.append(data.qpos.copy())
-    return np.array(found)
+        positions.append(data.qpos.copy())
+    return np.array(positions)
 
 
 @smc.law_function(gains={"k": 20.0})
@@ -123,24 +123,24 @@ def pulls(y, g, m):
 
 
 def test_a_range_that_is_never_reached_costs_no_accuracy():
-    given = scenario(RANGE, law=pulls())
-    trace = smc.run(given)
+    with_range = scenario(RANGE, law=pulls())
+    trace = smc.run(with_range)
 
     def u(t, q, v):
         r, dr = 0.3 * np.sin(3.0 * t), 0.9 * np.cos(3.0 * t)
         return -20.0 * (q - r) - 2.0 * (v - dr)
 
-    truth = own_rk4(given.plant, given.resolved.x0, 1e-3 / 16, u, 2.0)
+    truth = own_rk4(with_range.plant, with_range.resolved.x0, 1e-3 / 16, u, 2.0)
     np.testing.assert_allclose(trace.x, truth, atol=1e-9)  # 1e-4 under implicitfast at 0.25 ms
 
 
 @pytest.mark.parametrize("damping", [0.005, 0.02])
 def test_a_light_finger_is_right_or_told(damping):
     """Under RK4 at 1 ms the first was 18 rad off in silence, and the second diverged."""
-    given = scenario(damping, text=FINGER, law="none", duration=0.5)
-    trace = smc.run(given)
+    finger = scenario(damping, text=FINGER, law="none", duration=0.5)
+    trace = smc.run(finger)
     step = 2e-6 if damping > 0.01 else 2e-5
-    truth = own_rk4(given.plant, given.resolved.x0, step, lambda *_: np.zeros(2), 0.1)
+    truth = own_rk4(finger.plant, finger.resolved.x0, step, lambda *_: np.zeros(2), 0.1)
     error = np.abs(trace.x[:101] - truth).max()
     assert error < 1e-5 or ("fastest pole" in trace.unresolved and error < 1e-2)
     with pytest.warns(ScenarioWarning, match="unstable"):
@@ -203,9 +203,9 @@ def test_u_that_varies_in_its_last_digits_does_not_chatter():
 def test_one_joint_alone_that_chatters_is_resolved():
     arm = CHAIN.replace('name="j2"', 'name="j2" stiffness="0"').format(RANGE, "")
     start = arm.index('<body name="fore"')
-    one = arm[:start] + arm[arm.index("</body>", start) + len("</body>") :]
-    one = one.replace('<motor joint="j2" ctrlrange="-10 10"/>', "")
-    plant = smc.plant_from(one, {"j1": smc.Channel(x0=0.3)})
+    single = arm[:start] + arm[arm.index("</body>", start) + len("</body>") :]
+    single = single.replace('<motor joint="j2" ctrlrange="-10 10"/>', "")
+    plant = smc.plant_from(single, {"j1": smc.Channel(x0=0.3)})
     fields = {"plant": plant, "law": "super_twisting", "duration": 2.0}
     coarse = smc.run(smc.Scenario(**fields))
     fine = smc.run(smc.Scenario(**fields, physics_step=1e-3 / 16))

@@ -193,12 +193,12 @@ def test_nominal_dynamics_are_those_of_inverse_dynamics(arm):
         data.qpos[dofs], data.qvel[dofs], data.qacc[dofs] = x, v, a
         mujoco.mj_inverse(model, data)
         values = Values(**arm.parameters)
-        found = arm.nominal.dynamics(x, v, values)
+        dynamics = arm.nominal.dynamics(x, v, values)
         np.testing.assert_allclose(
-            found.M @ a + found.h, data.qfrc_inverse[dofs], rtol=1e-10, atol=1e-10
+            dynamics.M @ a + dynamics.h, data.qfrc_inverse[dofs], rtol=1e-10, atol=1e-10
         )
         np.testing.assert_allclose(
-            found.g, arm.nominal.dynamics(x, 0 * v, values).h, rtol=1e-12, atol=1e-12
+            dynamics.g, arm.nominal.dynamics(x, 0 * v, values).h, rtol=1e-12, atol=1e-12
         )
 
 
@@ -214,11 +214,11 @@ def test_the_jacobian_is_the_tips_velocity(arm):
         mujoco.mj_forward(model, data)
         return data.site("tip").xpos.copy()
 
-    found = arm.nominal.jacobian(x, Values(**arm.parameters), "tip")
+    jacobian = arm.nominal.jacobian(x, Values(**arm.parameters), "tip")
     expected = np.column_stack(
         [(place(x + h * unit) - place(x - h * unit)) / (2 * h) for unit in np.eye(3)]
     )
-    np.testing.assert_allclose(found, expected, atol=1e-9)
+    np.testing.assert_allclose(jacobian, expected, atol=1e-9)
 
 
 def test_coriolis_is_christoffels(arm):
@@ -233,8 +233,8 @@ def test_coriolis_is_christoffels(arm):
     damping = np.array([0.3, 0.1, 0.0])
     for _ in range(5):
         x, v, w = rng.normal(size=(3, 3))
-        found = nominal.dynamics(x, v, values)
-        quadratic = found.h - found.g - damping * v
+        dynamics = nominal.dynamics(x, v, values)
+        quadratic = dynamics.h - dynamics.g - damping * v
         np.testing.assert_allclose(
             nominal.coriolis(x, v, v, values), quadratic, rtol=1e-9, atol=1e-9
         )
@@ -310,10 +310,10 @@ def test_a_failing_law_ends_its_own_run_with_the_reason():
     ]
     common = {"plant": "double_pendulum", "duration": 0.03}
     laws = [law for law, _ in reasons]
-    *failed, other = smc.run([smc.Scenario(law=law, **common) for law in (*laws, "classical")])
+    *failed, sound = smc.run([smc.Scenario(law=law, **common) for law in (*laws, "classical")])
     for trace, (_, said) in zip(failed, reasons, strict=True):
         assert said in str(trace.failure)
-    assert other.failure is None
+    assert sound.failure is None
 
 
 def test_a_joint_law_pickles_and_survives_a_file(tmp_path, arm):

@@ -237,8 +237,8 @@ def test_a_disturbance_that_begins_at_a_sample_is_in_that_sample(period, steps):
 @smc.law_function(gains={"a": 20.0, "b": 5.0}, requires_model=True)
 def both(y, gains, memory):
     """Reads the model of the driven channel and of the one that it moves."""
-    wanted = -gains.a * y.e - gains.b * y.de
-    return (wanted - y.f) / y.g + 0.01 * (gains.a * y.q + gains.b * y.dq - y.fq) / y.gq, y.e
+    acceleration = -gains.a * y.e - gains.b * y.de
+    return (acceleration - y.f) / y.g + 0.01 * (gains.a * y.q + gains.b * y.dq - y.fq) / y.gq, y.e
 
 
 def test_a_voltage_and_a_feedforward_are_the_same_in_both_loops():
@@ -266,10 +266,10 @@ def test_a_voltage_and_a_feedforward_are_the_same_in_both_loops():
         duration=0.3,
     )
     trace = smc.run(scenario)
-    other = reference.run(scenario)
+    in_python = reference.run(scenario)
     for name in ARRAYS:
         np.testing.assert_allclose(
-            getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9, err_msg=name
+            getattr(trace, name), getattr(in_python, name), rtol=1e-9, atol=1e-9, err_msg=name
         )
     plain = smc.run(dataclasses.replace(scenario, feedforward=None))
     np.testing.assert_allclose(trace.u[0, 0], plain.u[0, 0])
@@ -314,7 +314,7 @@ def batch():
     """Two plants, each with half of the laws, mixed gains, signals, noise, seeds, delays, jumps and
     periods.
     """
-    found = []
+    scenarios = []
     for i, law in enumerate(STUDIED):
         common = smc.paper.scenario(
             ("duffing", "pendulum_network")[i % 2], law, "jump_mild", seed=i
@@ -323,15 +323,15 @@ def batch():
             "noise": smc.Noise(0.01, 0.05),
             "disturbance": smc.signals.OrnsteinUhlenbeck(0.2 + 0.1 * i, tau=0.1),
         }
-        found.append(shortened(common, 0.1))
-        found.append(shortened(dataclasses.replace(common, **noisy, input_delay=i * 1e-3), 0.1))
-        found.append(
+        scenarios.append(shortened(common, 0.1))
+        scenarios.append(shortened(dataclasses.replace(common, **noisy, input_delay=i * 1e-3), 0.1))
+        scenarios.append(
             shortened(dataclasses.replace(common, **noisy, velocity="filtered_difference"), 0.1)
         )
-        found.append(
-            dataclasses.replace(found[-1], jump=None, control_period=5e-3, u_max=0.1 * (i + 1))
+        scenarios.append(
+            dataclasses.replace(scenarios[-1], jump=None, control_period=5e-3, u_max=0.1 * (i + 1))
         )
-    return found
+    return scenarios
 
 
 def digest(traces):
@@ -389,17 +389,17 @@ def test_another_process_gives_the_same_bits_and_a_python_law_may_simulate_a_mod
 
 
 def test_runs_from_several_python_threads_give_the_same_bits(together):
-    found = {}
+    digests = {}
 
     def work(i):
-        found[i] = digest(smc.run(batch(), threads=1 + i % 2))
+        digests[i] = digest(smc.run(batch(), threads=1 + i % 2))
 
     workers = [threading.Thread(target=work, args=(i,)) for i in range(4)]
     for worker in workers:
         worker.start()
     for worker in workers:
         worker.join()
-    assert found == dict.fromkeys(range(4), digest(together))
+    assert digests == dict.fromkeys(range(4), digest(together))
 
 
 @smc.law_function(gains={"at": 0.05, "how": 0.0}, memory=1)
@@ -542,5 +542,5 @@ def test_a_python_law_may_run_scenarios_of_its_own():
     trace = smc.run(uncompiled(lambda: inside.append(smc.run(inner)), duration=0.005))
     assert trace.failure is None
     np.testing.assert_array_equal(trace.x, smc.run(uncompiled(duration=0.005)).x)
-    for other in inside:
-        assert_same(other, alone)
+    for of_inside in inside:
+        assert_same(of_inside, alone)

@@ -53,7 +53,7 @@ def named(model: mujoco.MjModel, kind: str) -> list[str]:
 
 
 def test_what_touches_or_is_referred_to_or_pushed_is_no_scenery_and_bodies_keep_their_mass():
-    whole = mujoco.MjSpec.from_string(REFERRED).compile()
+    with_scenery = mujoco.MjSpec.from_string(REFERRED).compile()
     spec = mujoco.MjSpec.from_string(REFERRED)
     without_scenery(spec, {"struck"})
     bare = spec.compile()
@@ -61,7 +61,7 @@ def test_what_touches_or_is_referred_to_or_pushed_is_no_scenery_and_bodies_keep_
     assert named(bare, "body") == ["world", "", "", "lump", "cart", "struck"]
     assert bare.nlight == bare.ncam == 0
     for name in ("body_mass", "body_inertia", "body_ipos", "body_iquat"):
-        moving = getattr(whole, name)[[2, 3, 4]]
+        moving = getattr(with_scenery, name)[[2, 3, 4]]
         np.testing.assert_array_equal(getattr(bare, name)[[2, 3, 4]], moving)
 
 
@@ -129,13 +129,13 @@ def test_a_run_has_a_model_without_scenery_and_the_same_bits(contact, geoms, mon
         x0=(1.2, 0.0),
         duration=0.5,
     )
-    whole = compile_model(scenario)
+    with_scenery = compile_model(scenario)
     bare = compile_model(scenario, scenery=False)
     assert bare.ngeom == geoms
     assert bare.nlight == 0
     assert bare.ncam == 0
-    assert bare.npair == whole.npair
-    assert bare.nsensor == whole.nsensor
+    assert bare.npair == with_scenery.npair
+    assert bare.nsensor == with_scenery.nsensor
     short = smc.run(scenario)
     monkeypatch.setattr(model, "_mechanisms", weakref.WeakValueDictionary())
     monkeypatch.setattr(model, "without_scenery", lambda *given: None)
@@ -166,14 +166,14 @@ def test_runs_of_a_users_model_have_no_meshes_that_touch_nothing_and_the_same_bi
     inertias from geoms.
     """
     of_geoms = MESHES.replace("<asset>", '<compiler inertiafromgeom="true"/><asset>')
-    kept = smc.plant_from(of_geoms, {"turn": smc.Channel(motor=True)}, name="kept")
-    scenario = smc.Scenario(plant=kept, law=smc.law("none"))
+    with_geoms = smc.plant_from(of_geoms, {"turn": smc.Channel(motor=True)}, name="kept")
+    scenario = smc.Scenario(plant=with_geoms, law=smc.law("none"))
     assert compile_model(scenario, scenery=False).ngeom == 4
     plant = smc.plant_from(MESHES, {"turn": smc.Channel(motor=True)}, name="painted")
     scenario = smc.Scenario(plant=plant, law=smc.law("none"), x0=0.1, duration=0.4)
-    whole = compile_model(scenario)
+    with_scenery = compile_model(scenario)
     bare = compile_model(scenario, scenery=False)
-    assert (whole.ngeom, whole.nmesh) == (4, 2)
+    assert (with_scenery.ngeom, with_scenery.nmesh) == (4, 2)
     assert (bare.ngeom, bare.nmesh, bare.nlight) == (2, 1, 1)
     short = smc.run(scenario)
     monkeypatch.setattr(model, "_mechanisms", weakref.WeakValueDictionary())
@@ -185,11 +185,13 @@ def test_runs_of_a_users_model_have_no_meshes_that_touch_nothing_and_the_same_bi
 
 
 def test_runs_one_after_another_share_a_model_that_none_of_them_changes(monkeypatch):
-    made = []
+    compilations = []
     compiled = model.compile_model
     monkeypatch.setattr(model, "_mechanisms", weakref.WeakValueDictionary())
     monkeypatch.setattr(
-        model, "compile_model", lambda *args, **named: made.append(args) or compiled(*args, **named)
+        model,
+        "compile_model",
+        lambda *args, **named: compilations.append(args) or compiled(*args, **named),
     )
     numbers = (2.0, 1.0, 1.5), (3.0, 2.0, 0.5), (2.0, 1.0, 1.5)
     first, _, again = (
@@ -204,5 +206,5 @@ def test_runs_one_after_another_share_a_model_that_none_of_them_changes(monkeypa
         )
         for k, M, x0 in numbers
     )
-    assert len(made) == 1
+    assert len(compilations) == 1
     np.testing.assert_array_equal(again.x, first.x)

@@ -87,17 +87,17 @@ def test_a_package_that_is_missing_is_named_with_its_cure(trace, monkeypatch, me
 
 def test_pandas_has_every_column_bit_for_bit_with_units(trace, cart):
     pandas = pytest.importorskip("pandas")
-    for one in (trace, cart):
-        frame = one.to_pandas()
-        columns = one.columns()
+    for run_shown in (trace, cart):
+        frame = run_shown.to_pandas()
+        columns = run_shown.columns()
         assert isinstance(frame, pandas.DataFrame)
         assert frame.index.name == "t"
-        assert np.array_equal(frame.index, one.t)
+        assert np.array_equal(frame.index, run_shown.t)
         assert list(frame.columns) == [name for name in columns if name != "t"]
         for name in frame.columns:
             assert np.array_equal(frame[name], columns[name])
-        assert frame.attrs["units"] == one.units()
-        assert json.loads(frame.attrs["scenario"])["plant"]["name"] == one.scenario.plant.name
+        assert frame.attrs["units"] == run_shown.units()
+        assert json.loads(frame.attrs["scenario"])["plant"]["name"] == run_shown.scenario.plant.name
 
 
 def test_arrow_has_every_column_bit_for_bit(cart):
@@ -123,7 +123,7 @@ def test_xarray_has_every_array_bit_for_bit_with_units(trace, cart):
         "u": "N m",
         "s": "",
     }
-    both = cart.to_xarray()
-    assert both["x"].dims == ("t", "channel")
-    assert both["x"].attrs["units"] == "m, rad"
-    assert float(both["x"].sel(t=0.05, method="nearest", channel=1)) == cart.x[50, 1]
+    dataset = cart.to_xarray()
+    assert dataset["x"].dims == ("t", "channel")
+    assert dataset["x"].attrs["units"] == "m, rad"
+    assert float(dataset["x"].sel(t=0.05, method="nearest", channel=1)) == cart.x[50, 1]

@@ -30,10 +30,10 @@ def nothing_left_behind():
     mujoco.set_mjcb_control(None)
     mujoco.set_mju_user_warning(None)
     yield
-    left = mujoco.get_mjcb_control(), mujoco.get_mju_user_warning()
+    installed = mujoco.get_mjcb_control(), mujoco.get_mju_user_warning()
     mujoco.set_mjcb_control(before[0])
     mujoco.set_mju_user_warning(before[1])
-    assert left == (None, None)
+    assert installed == (None, None)
 
 
 @pytest.fixture
@@ -62,21 +62,21 @@ def test_offsets_are_where_the_live_arrays_are(live):
     assert offsets == callback.offsets()
     assert ctypes.c_int64.from_address(model._address + offsets.nuserdata).value == 17
     for name, struct in STRUCTS.items():
-        of = model if struct == "mjModel" else data
+        owner = model if struct == "mjModel" else data
         assert (
-            ctypes.c_void_p.from_address(of._address + getattr(offsets, name)).value
-            == getattr(of, name).ctypes.data
+            ctypes.c_void_p.from_address(owner._address + getattr(offsets, name)).value
+            == getattr(owner, name).ctypes.data
         )
 
 
 @pytest.mark.parametrize("name", STRUCTS)
 def test_an_array_at_another_s_place_is_refused(monkeypatch, live, name):
-    other = {"mjModel": "dof_damping", "mjData": "qacc_warmstart"}[STRUCTS[name]]
+    neighbour = {"mjModel": "dof_damping", "mjData": "qacc_warmstart"}[STRUCTS[name]]
 
     def swap(fields):
         here = position(fields, name)
-        there = position(fields, other)
-        fields[here], fields[there] = fields[there], fields[here]
+        place = position(fields, neighbour)
+        fields[here], fields[place] = fields[place], fields[here]
         return fields
 
     doctored(monkeypatch, STRUCTS[name], swap)

@@ -27,8 +27,8 @@ def block(factors, **fields):
 
 def relaxed(t, v0, limit, rate):
     """Speed and way at t of v' = rate (limit - v), from v0."""
-    left = np.exp(-rate * t)
-    return limit + (v0 - limit) * left, limit * t + (v0 - limit) * (1.0 - left) / rate
+    decay = np.exp(-rate * t)
+    return limit + (v0 - limit) * decay, limit * t + (v0 - limit) * (1.0 - decay) / rate
 
 
 def in_two_parts(t, first, second):
@@ -51,8 +51,8 @@ def test_dry_and_viscous_friction_of_a_sliding_block():
 
 
 def test_a_jump_that_takes_all_damping_away():
-    given = {"friction": smc.Viscous(2.0), "feedforward": smc.Constant(6.0)}
-    trace = smc.run(block({"friction.b": 0.0}, **given))
+    fields = {"friction": smc.Viscous(2.0), "feedforward": smc.Constant(6.0)}
+    trace = smc.run(block({"friction.b": 0.0}, **fields))
     jump = trace.scenario.jump_sample
     assert trace.damping is not None
     assert trace.damping[jump, 0] < 0.0
@@ -62,8 +62,8 @@ def test_a_jump_that_takes_all_damping_away():
 def test_the_resistance_of_a_motor():
     """m v' = k (V - k v) / R, with k = 4 N/A."""
     motor = smc.DCMotor(2.0, 0.0, 0.4, 10.0, 0.0, current=math.inf, command="voltage")
-    given = {"actuator": motor, "feedforward": smc.Constant(5.0)}
-    trace = smc.run(block({"actuator.resistance": 2.0}, **given))
+    fields = {"actuator": motor, "feedforward": smc.Constant(5.0)}
+    trace = smc.run(block({"actuator.resistance": 2.0}, **fields))
     exact = in_two_parts(trace.t, (5.0 / 4.0, 16.0 / 4.0), (5.0 / 4.0, 16.0 / 8.0))
     np.testing.assert_allclose(trace.x[:, 0], exact, atol=1e-9)
 
@@ -72,8 +72,8 @@ def test_a_friction_that_grows_with_the_torque_of_such_a_motor():
     """m v' = (1 - km) k (V - k v) / R - kc."""
     motor = smc.DCMotor(2.0, 0.0, 0.4, 10.0, 0.0, current=math.inf, command="voltage")
     friction = smc.hardware.ServoFriction(kc=1.0, km=0.2, ke=0.2)
-    given = {"actuator": motor, "friction": friction, "feedforward": smc.Constant(5.0)}
-    trace = smc.run(block({"actuator.resistance": 2.0}, **given))
+    fields = {"actuator": motor, "friction": friction, "feedforward": smc.Constant(5.0)}
+    trace = smc.run(block({"actuator.resistance": 2.0}, **fields))
     assert trace.scenario.exact_friction
 
     def motion(R):
@@ -84,8 +84,8 @@ def test_a_friction_that_grows_with_the_torque_of_such_a_motor():
 
 
 def test_the_time_constant_of_a_lag_and_the_zero_of_an_encoder():
-    given = {"actuator": smc.Lag(0.1), "feedforward": smc.Constant(4.0)}
-    trace = smc.run(block({"actuator.tau": 3.0}, **given))
+    fields = {"actuator": smc.Lag(0.1), "feedforward": smc.Constant(4.0)}
+    trace = smc.run(block({"actuator.tau": 3.0}, **fields))
     # acceleration 2 (1 - exp(-t/tau)): its force goes on from what it was
     force = 4.0 * (1.0 - math.exp(-AT / 0.1))
     missing = (4.0 - force) * np.exp(-(trace.t - AT) / 0.3)
@@ -158,11 +158,11 @@ def test_a_condition_with_it_is_kept_and_run(tmp_path):
 
 
 def test_runs_side_by_side_and_alone_are_equal():
-    given = {"friction": smc.Coulomb(1.0), "feedforward": smc.Constant(3.0)}
-    several = [block({"friction.level": 1.0 + k}, **given) for k in range(3)]
-    several.append(dataclasses.replace(several[1], jump=None))
-    together = smc.run(several)
-    for scenario, trace in zip(several, together, strict=True):
+    fields = {"friction": smc.Coulomb(1.0), "feedforward": smc.Constant(3.0)}
+    blocks = [block({"friction.level": 1.0 + k}, **fields) for k in range(3)]
+    blocks.append(dataclasses.replace(blocks[1], jump=None))
+    together = smc.run(blocks)
+    for scenario, trace in zip(blocks, together, strict=True):
         np.testing.assert_array_equal(trace.x, smc.run(scenario).x)
     assert together[1].x[-1] < together[0].x[-1] == together[3].x[-1]
 
@@ -190,6 +190,6 @@ def test_what_cannot_jump_is_refused(refused):
     refused(lambda: smc.run(pendulum("actuator.tau", 0.0, actuator=smc.Lag(0.1))), "tau", "1e-9")
     late = smc.Encoder(delay=0.01)
     refused(lambda: smc.run(pendulum("sensor.delay", sensor=late)), "sensor.delay")
-    both = {"plant": "double_pendulum", "law": "pid", "friction": smc.Coulomb(0.1)}
+    on_both_joints = {"plant": "double_pendulum", "law": "pid", "friction": smc.Coulomb(0.1)}
     jump = smc.Jump(0.1, {"friction.shoulder.level": 2.0})
-    refused(lambda: smc.Scenario(**both, jump=jump), "2 joints", "friction.level")
+    refused(lambda: smc.Scenario(**on_both_joints, jump=jump), "2 joints", "friction.level")

@@ -64,11 +64,11 @@ SCENARIOS = {
 def test_it_gives_the_u_and_s_of_the_run_from_the_positions_and_velocities_of_the_run(name):
     trace = smc.run(dataclasses.replace(SCENARIOS[name], duration=0.05))
     controller = Controller(trace.scenario)
-    found = []
+    outputs = []
     for k, t in enumerate(trace.t.tolist()):
-        found.append(controller(k, t, trace.x[k], trace.v[k]))
-    np.testing.assert_allclose([u for u, _ in found], trace.u, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose([s for _, s in found], trace.s, rtol=1e-12, atol=1e-12)
+        outputs.append(controller(k, t, trace.x[k], trace.v[k]))
+    np.testing.assert_allclose([u for u, _ in outputs], trace.u, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose([s for _, s in outputs], trace.s, rtol=1e-12, atol=1e-12)
 
 
 def test_what_the_sensors_read_is_not_written_to():

@@ -449,17 +449,17 @@ def resting(name):
     friction.
     """
     plant = small(name)
-    found = []
+    errors_at_rest = []
     for law, weak in WEAK.items():
         gains = smc.paper.GAINS[name][law]
-        for these in (gains, gains | weak):
+        for gains_of_run in (gains, gains | weak):
             for level in LEVELS:
                 for friction in (smc.Coulomb(level), smc.hardware.LuGre(0.8 * level, level, 0.01)):
                     for start in STARTS if isinstance(friction, smc.Coulomb) else STARTS[:1]:
-                        found.append(
+                        errors_at_rest.append(
                             scenario(
                                 plant,
-                                law=smc.law(law, **these),
+                                law=smc.law(law, **gains_of_run),
                                 friction=friction,
                                 x0=tuple(start * x for x in plant.x0),
                                 duration=1.5 * RESTING
@@ -469,7 +469,7 @@ def resting(name):
                                 physics_step=5e-4,
                             )
                         )
-    return found
+    return errors_at_rest
 
 
 def balance(trace, end=-1):
@@ -513,10 +513,10 @@ def test_under_friction_a_smooth_law_rests_where_friction_holds_the_rest(name):
         if np.abs(trace.v[-200:]).max() > 1e-3:
             continue  # a weak law leaves a plant swinging
         rests += 1
-        left = balance(trace)
-        assert (np.abs(left) <= 1.02 * level).all(), trace.scenario
-        np.testing.assert_allclose(trace.reaction[-1], -left, atol=0.02 * level)
-        inside += np.any((np.abs(left) < 0.9 * level) & (np.abs(trace.x[-1]) > 1e-3))
+        unbalanced = balance(trace)
+        assert (np.abs(unbalanced) <= 1.02 * level).all(), trace.scenario
+        np.testing.assert_allclose(trace.reaction[-1], -unbalanced, atol=0.02 * level)
+        inside += np.any((np.abs(unbalanced) < 0.9 * level) & (np.abs(trace.x[-1]) > 1e-3))
         far += np.abs(trace.x[-1]).max() > 0.3
     assert rests >= 40
     assert inside >= 10  # not all at the edge, where the bound would hold by a hair or not at all
@@ -533,11 +533,11 @@ def energies(s):
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = models.initial_state(model, s)
     energy = data.energy
-    found = []
+    totals = []
     for _ in range(s.samples * s.steps):
         mujoco.mj_step(model, data)
-        found.append(energy[0] + energy[1])
-    return np.array(found)
+        totals.append(energy[0] + energy[1])
+    return np.array(totals)
 
 
 PASSIVE = {
@@ -584,16 +584,18 @@ def test_a_jump_at_the_start_is_a_mismatch(name):
         "sensor": smc.Encoder(delay=1e-3),
     }
     jumped = smc.run(scenario(name, jump=smc.Jump(0.0, {"mass": 2.0}), **fields))
-    other = smc.run(scenario(name, mismatch={"mass": 2.0}, **fields))
+    mismatched = smc.run(scenario(name, mismatch={"mass": 2.0}, **fields))
     for array in ARRAYS:
-        np.testing.assert_array_equal(getattr(jumped, array), getattr(other, array), err_msg=array)
+        np.testing.assert_array_equal(
+            getattr(jumped, array), getattr(mismatched, array), err_msg=array
+        )
 
 
 @pytest.mark.parametrize("name", ["duffing", "inverted_pendulum", "pendulum_network"])
 def test_after_a_jump_the_run_is_that_of_the_other_mass_from_there(name):
     fields = {"friction": (smc.Coulomb(0.3), smc.Viscous(0.1))}
-    whole = smc.run(scenario(name, jump=smc.Jump(0.04, {"mass": 2.0}), **fields))
-    start = {"x0": tuple(whole.x[40]), "v0": tuple(whole.v[40])}
+    jumping = smc.run(scenario(name, jump=smc.Jump(0.04, {"mass": 2.0}), **fields))
+    start = {"x0": tuple(jumping.x[40]), "v0": tuple(jumping.v[40])}
     rest = smc.run(
         scenario(
             name,
@@ -603,8 +605,8 @@ def test_after_a_jump_the_run_is_that_of_the_other_mass_from_there(name):
             **fields,
         )
     )
-    np.testing.assert_allclose(whole.x[40:], rest.x, atol=1e-9)
-    np.testing.assert_allclose(whole.v[40:], rest.v, atol=1e-7)
+    np.testing.assert_allclose(jumping.x[40:], rest.x, atol=1e-9)
+    np.testing.assert_allclose(jumping.v[40:], rest.v, atol=1e-7)
 
 
 # what force and reaction say
@@ -705,11 +707,11 @@ def test_the_impulse_of_all_forces_is_the_change_of_momentum(name, part):
     )
     inertia = 1.0 / plant.nominal(trace.x[0], trace.v[0], 0, values)[1]
     force = 0.0 if part == "backlash" else trace.force[1:]
-    left = inertia * np.diff(trace.v, axis=0)
+    momentum = inertia * np.diff(trace.v, axis=0)
     right = h * (force + trace.reaction[1:] + trace.d[:-1] + inertia * own[:-1])
     # a blow's force is found to a tolerance, which MuJoCo's solver has
     exact = 1e-4 if "contact" in fields else 1e-6
-    np.testing.assert_allclose(left, right, atol=exact * np.abs(left).max())
+    np.testing.assert_allclose(momentum, right, atol=exact * np.abs(momentum).max())
     if part == "backlash":
         assert np.abs(trace.reaction).max() > 0.5
 
@@ -811,9 +813,9 @@ def test_defaults_follow_the_fields_that_are_given():
         (ideal, realistic),
         (realistic, ideal),
     ):
-        there = dataclasses.replace(a, friction=b.friction)
-        back = dataclasses.replace(there, friction=a.friction)
-        assert there == b
+        with_friction = dataclasses.replace(a, friction=b.friction)
+        back = dataclasses.replace(with_friction, friction=a.friction)
+        assert with_friction == b
         assert back == a
         assert hash(back) == hash(a)
     assert (
@@ -833,9 +835,9 @@ def test_drives_keep_the_plain_integrator():
         (smc.DCMotor(), 2.5e-4),  # L/R = 0.28 ms
         (smc.DCMotor(inductance=0.0), 1e-3),
     ):
-        made = scenario(actuator=actuator)
-        assert made.resolved.integrator == "RK4"
-        assert made.resolved.physics_step == pytest.approx(step)
+        driven = scenario(actuator=actuator)
+        assert driven.resolved.integrator == "RK4"
+        assert driven.resolved.physics_step == pytest.approx(step)
 
 
 @PLANTS

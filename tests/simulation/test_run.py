@@ -62,18 +62,18 @@ def test_models_that_can_have_no_constraint_look_for_none_and_no_bit_changes(
             smc.Scenario(**{"law": smc.law("classical"), "duration": 0.2} | fields, seed=seed)
         )
     flags = []
-    its = runs.ScenarioBatch.may_have_constraints
+    may_have = runs.ScenarioBatch.may_have_constraints
     monkeypatch.setattr(
         runs.ScenarioBatch,
         "may_have_constraints",
-        lambda batch: flags.append(its(batch)) or flags[-1],
+        lambda batch: flags.append(may_have(batch)) or flags[-1],
     )
     quick = smc.run(scenarios)
     assert flags == [may]
     monkeypatch.setattr(runs.ScenarioBatch, "may_have_constraints", lambda batch: True)
-    for one, other in zip(quick, smc.run(scenarios), strict=True):
+    for quickly, slowly in zip(quick, smc.run(scenarios), strict=True):
         for name in (*ARRAYS, "force", "reaction"):
-            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+            np.testing.assert_array_equal(getattr(quickly, name), getattr(slowly, name))
 
 
 def test_dry_friction_of_any_run_of_a_batch_keeps_the_constraints():
@@ -83,14 +83,14 @@ def test_dry_friction_of_any_run_of_a_batch_keeps_the_constraints():
         "integrator": "implicitfast",
         "duration": 0.01,
     }
-    none, some = (
+    none, with_friction = (
         runs.prepare(smc.Scenario(**common, friction=smc.Coulomb(force))) for force in (0.0, 0.3)
     )
     with callback.installed():
         for prepared, may in (
             ([none, none], False),
-            ([none, some], True),
-            ([some, none], True),
+            ([none, with_friction], True),
+            ([with_friction, none], True),
         ):
             batch = runs.ScenarioBatch(prepared, 1)
             assert bool(batch.model.opt.disableflags & NO_ROWS) is not may
@@ -126,8 +126,8 @@ def test_plants_sizes_and_durations_mix_in_one_call():
     ]
     traces = smc.run(many)
     assert [len(trace.t) for trace in traces] == [21, 21, 21, 31, 11, 21]
-    for trace, one in zip(traces, many, strict=True):
-        assert same(trace, smc.run(one))
+    for trace, scenario_of_trace in zip(traces, many, strict=True):
+        assert same(trace, smc.run(scenario_of_trace))
 
 
 # failures
@@ -395,15 +395,15 @@ def test_a_stream_holds_one_batch_and_diverging_runs_print_nothing_and_leave_no_
 def test_a_stream_prepares_no_more_than_a_batch_ahead(monkeypatch):
     """A generator of a hundred thousand scenarios would be in memory as a whole."""
     monkeypatch.setattr(runs, "BATCH_BYTES", 1)
-    asked = []
+    prepared_ones = []
 
     def many():
         for seed in range(20):
-            asked.append(seed)
+            prepared_ones.append(seed)
             yield scenario(seed=seed)
 
     next(iter(smc.stream(many(), threads=2)))
-    assert len(asked) == 3
+    assert len(prepared_ones) == 3
 
 
 def test_a_callback_that_was_installed_is_put_back():
@@ -442,10 +442,10 @@ def test_one_thread_steps_all_slices_of_a_run(monkeypatch):
 @pytest.mark.parametrize("engine", ["MuJoCo", pytest.param("the equation", marks=pytest.mark.slow)])
 def test_ctrl_c_calls_a_slow_law_no_more_and_leaves_no_thread(engine):
     calls = np.zeros(2, np.int64)
-    at = calls.ctypes.data
+    address = calls.ctypes.data
 
     def slow(y, gains, memory):
-        integers(at)[0] += 1
+        integers(address)[0] += 1
         for _ in range(1_000_000):  # a ms or more
             memory[0] += 1.0
         return 0.0, 0.0
@@ -478,11 +478,11 @@ def test_ctrl_c_calls_a_slow_law_no_more_and_leaves_no_thread(engine):
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers")
 def test_ctrl_c_is_heard_while_a_compiled_law_computes_for_ever(monkeypatch):
     shared = np.zeros(2, np.int64)  # whether the law is to stop, and whether it has begun
-    at = shared.ctypes.data
+    address = shared.ctypes.data
 
     def endless(y, gains, memory):
-        integers(at)[1] = 1
-        while integers(at)[0] == 0:
+        integers(address)[1] = 1
+        while integers(address)[0] == 0:
             memory[0] += 1.0
         return 0.0, 0.0
 

@@ -34,10 +34,10 @@ scenario = functools.partial(runs.scenario, duration=0.05)
 
 @pytest.mark.parametrize("plant", gaber_study.PLANTS)
 def test_every_condition_is_known_by_its_name(plant):
-    made = grid([plant], ["observer_free"], list(gaber_study.CONDITIONS), 2, "study")
+    scenarios = grid([plant], ["observer_free"], list(gaber_study.CONDITIONS), 2, "study")
     assert (
-        [condition(s) for s in made[::2]]
-        == [condition(s) for s in made[1::2]]
+        [condition(s) for s in scenarios[::2]]
+        == [condition(s) for s in scenarios[1::2]]
         == list(gaber_study.CONDITIONS)
     )
 
@@ -64,14 +64,14 @@ def test_equal_scenarios_have_one_key_and_others_another():
     same = scenario(smc.law("classical"), physics_step=1e-3, integrator="RK4", x0=s.resolved.x0)
     assert same == s
     assert key(same) == key(s)
-    others = [
+    different = [
         scenario(smc.law("classical", k=3.0)),
         scenario(smc.law("adaptive")),
         scenario(smc.law("classical"), seed=1),
         scenario(smc.law("classical"), duration=0.06),
         scenario(smc.law("classical"), plant=smc.plant("duffing", alpha=0.5)),
     ]
-    assert len({key(s), *map(key, others)}) == 1 + len(others)
+    assert len({key(s), *map(key, different)}) == 1 + len(different)
 
 
 def test_other_versions_are_other_runs(monkeypatch):
@@ -156,8 +156,10 @@ def test_a_gain_and_a_module_of_this_package_count_by_whatever_name():
 
     assert key(scenario(mine(module=1.0))) != key(scenario(mine(module=2.0)))
     ours = scenario_json.describe(scenario(smc.law("classical")))
-    other = ours | {"law": ours["law"] | {"module": "smc_mujoco.control.laws.adaptive"}}
-    assert key(scenario(smc.law("classical")), ours) != key(scenario(smc.law("classical")), other)
+    of_another_module = ours | {"law": ours["law"] | {"module": "smc_mujoco.control.laws.adaptive"}}
+    assert key(scenario(smc.law("classical")), ours) != key(
+        scenario(smc.law("classical")), of_another_module
+    )
 
 
 def test_every_law_of_a_mixture_decides_the_key():
@@ -178,19 +180,21 @@ def test_a_comment_a_line_more_or_other_docstrings_are_no_edit():
 
 
 def test_another_order_of_a_class_s_definitions_is_no_edit():
-    one = {"a": 1.0, "b": 2.0}
-    other = {"b": 2.0, "a": 1.0}
-    assert fingerprint.of(type("Mine", (), one)) == fingerprint.of(type("Mine", (), other))
-    assert fingerprint.of(type("Mine", (), one)) != fingerprint.of(
+    ordered = {"a": 1.0, "b": 2.0}
+    reversed_order = {"b": 2.0, "a": 1.0}
+    assert fingerprint.of(type("Mine", (), ordered)) == fingerprint.of(
+        type("Mine", (), reversed_order)
+    )
+    assert fingerprint.of(type("Mine", (), ordered)) != fingerprint.of(
         type("Mine", (), {"a": 2.0, "b": 1.0})
     )
 
 
 def test_a_key_does_not_depend_on_the_process():
-    made = "grid(['duffing'], ['adaptive'], ['noise'], [3], 'study')[0]"
+    expression = "grid(['duffing'], ['adaptive'], ['noise'], [3], 'study')[0]"
     code = (
         "from smc_mujoco import grid; from smc_mujoco.simulation.run_key import key; "
-        f"print(key({made}))"
+        f"print(key({expression}))"
     )
     done = python("-c", code, PYTHONHASHSEED="1")
     assert done.stdout.strip() == key(grid(["duffing"], ["adaptive"], ["noise"], [3], "study")[0])
@@ -213,7 +217,7 @@ def test_a_global_changes_a_run_until_its_law_is_compiled():
     space = {"__name__": "users", "G": 3.0}
     exec("def late(y, gains, memory):\n    return -G * y.e, y.e", space)
     law = smc.law_function(space["late"])()
-    one, other = (
+    first, second = (
         smc.Scenario(
             plant="duffing",
             law=law,
@@ -222,14 +226,14 @@ def test_a_global_changes_a_run_until_its_law_is_compiled():
         )
         for x in (0.5, 0.6)
     )
-    before = key(one)
+    before = key(first)
     space["G"] = 5.0
-    assert key(one) != before
-    made = key(other)
-    assert smc.run(other).u[0, 0] == -5.0 * 0.6
+    assert key(first) != before
+    key_when_compiled = key(second)
+    assert smc.run(second).u[0, 0] == -5.0 * 0.6
     space["G"] = 7.0
-    assert key(other) == made
-    assert smc.run(other).u[0, 0] == -5.0 * 0.6
+    assert key(second) == key_when_compiled
+    assert smc.run(second).u[0, 0] == -5.0 * 0.6
 
 
 def test_a_function_that_reaches_itself_has_a_fingerprint():
@@ -247,8 +251,8 @@ def test_an_object_that_is_called_is_told_by_what_it_holds():
         def __call__(self, y, gains, memory):
             return float(self.weights @ [y.e, y.de]), y.e
 
-    one, same, other = (Policy(np.array(w)) for w in ([1.0, 2.0], [1.0, 2.0], [1.0, 3.0]))
-    assert fingerprint.of(one) == fingerprint.of(same) != fingerprint.of(other)
+    policy, same, changed = (Policy(np.array(w)) for w in ([1.0, 2.0], [1.0, 2.0], [1.0, 3.0]))
+    assert fingerprint.of(policy) == fingerprint.of(same) != fingerprint.of(changed)
 
 
 class Weighted:
@@ -391,13 +395,13 @@ def test_replaced_functions_of_a_plant_change_the_key():
         yield from ()
 
     # without a module, as SymPy's lambdify
-    exec("def generated(x, v, i, q): return 0.0, 2.0", made := {})
+    exec("def generated(x, v, i, q): return 0.0, 2.0", space := {})
     own = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.1)
     contacts = own.plant.contacts
     mechanisms = own.plant.mechanisms
     changes = (
         {"nominal": nominal},
-        {"nominal": made["generated"]},
+        {"nominal": space["generated"]},
         {"fields": nothing},
         {"contacts": {**contacts, "other": nothing}},
         {"mechanisms": {**mechanisms, "other": Variant(nothing, nothing)}},
@@ -406,8 +410,8 @@ def test_replaced_functions_of_a_plant_change_the_key():
     plants = []
     for change in changes:
         plants.append(dataclasses.replace(own.plant, **change))
-    *others, same = [key(dataclasses.replace(own, plant=plant)) for plant in plants]
-    assert len({key(own), *others}) == 6
+    *different, same = [key(dataclasses.replace(own, plant=plant)) for plant in plants]
+    assert len({key(own), *different}) == 6
     assert same == key(own)
 
 

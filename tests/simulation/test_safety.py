@@ -62,9 +62,9 @@ def test_the_hash_of_compiled_code_is_of_all_that_it_uses_and_of_nothing_else(mo
     law = smc.law("classical").function
     of_law = fingerprint.now(law)
     seen = {fingerprint.now(controller.control)}
-    for i, (module, name, thing) in enumerate(USED):
+    for i, (module, name, replacement) in enumerate(USED):
         with monkeypatch.context() as patch:
-            patch.setattr(module, name, thing)
+            patch.setattr(module, name, replacement)
             seen.add(fingerprint.now(controller.control))
             assert fingerprint.now(law) == of_law
         assert len(seen) == i + 2, name
@@ -171,14 +171,14 @@ def test_a_helper_that_writes_beyond_the_memory_fails_the_run_and_touches_nothin
         for seed in range(3)
     ]
     bad = scenario(made(function), plant=THREE)
-    first, trace, *others = plainly([good[0], bad, *good[1:]])
+    first, trace, *further = plainly([good[0], bad, *good[1:]])
     assert trace.failure is not None
     assert f"law '{function.__name__}'" in trace.failure
     assert "IndexError" in trace.failure
     assert trace.diverged_at == pytest.approx(0.005)
     assert not trace.s[:5].any()
     assert np.isnan(trace.s[5:]).all()
-    assert all(map(same, [first, *others], smc.run(good)))
+    assert all(map(same, [first, *further], smc.run(good)))
 
 
 @numba.njit
@@ -373,9 +373,9 @@ def test_batches_of_laws_with_large_memory_stay_bounded(monkeypatch):
         many.append(scenario(law, plant=smc.plant("pendulum_network", n=100), seed=seed))
     batches = list(RUN._batches(list(enumerate(map(prepare, many))), 1))
     assert [index for batch in batches for index, _ in batch] == list(range(20))
-    each = 8 * 10_000 * 100
+    memory_of_law = 8 * 10_000 * 100
     assert 1 < max(map(len, batches)) < 20
-    assert max(map(len, batches)) * each <= RUN.BATCH_BYTES
+    assert max(map(len, batches)) * memory_of_law <= RUN.BATCH_BYTES
 
 
 # (h) telling failures again
@@ -513,9 +513,9 @@ class SourNoise(smc.Signal):
     ids=["estimator", "surface", "reference", "feedforward", "disturbance"],
 )
 def test_every_part_that_raises_is_named(fields, words):
-    one = scenario(plant=THREE, x0=(1.0, 3.0, 2.0), **fields)
-    again = reference.run(one).failure
-    trace = smc.run([scenario(plant=THREE), one])[1]
+    failing = scenario(plant=THREE, x0=(1.0, 3.0, 2.0), **fields)
+    again = reference.run(failing).failure
+    trace = smc.run([scenario(plant=THREE), failing])[1]
     assert trace.failure.startswith(words)
     assert trace.failure == again
 
@@ -547,7 +547,7 @@ def test_the_arrays_of_a_failing_run_do_not_depend_on_its_company():
     many = []
     for v0 in (1.0, 2.0, 3.0):
         many.append(scenario(made(cancels), plant=THREE, duration=0.4, v0=v0))
-    assert all(map(same, smc.run(many), [smc.run(one) for one in many]))
+    assert all(map(same, smc.run(many), [smc.run(scenario_alone) for scenario_alone in many]))
 
 
 # (i) forks
@@ -817,9 +817,9 @@ def twice(x):
 
 def hits() -> int:
     """How often a compiled function is taken from the cache, as a new process would: 0 or 1."""
-    made = compiled(numba.types.float64(numba.types.float64), twice, Key("twice", "its hash"))
-    assert made.ctypes(1.5) == 3.0
-    return made.cache_hits
+    function = compiled(numba.types.float64(numba.types.float64), twice, Key("twice", "its hash"))
+    assert function.ctypes(1.5) == 3.0
+    return function.cache_hits
 
 
 def flipped(data: bytes) -> bytes:
@@ -848,17 +848,17 @@ def test_without_a_folder_code_is_kept_in_the_users_cache(tmp_path, monkeypatch)
 def test_compiled_code_that_no_process_reads_for_thirty_days_is_deleted(tmp_path, monkeypatch):
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
     assert hits() == 0
-    (kept,) = tmp_path.iterdir()
-    forgotten, other = tmp_path / "forgotten.code", tmp_path / "notes.txt"
+    (file,) = tmp_path.iterdir()
+    forgotten, notes = tmp_path / "forgotten.code", tmp_path / "notes.txt"
     day = 86400.0
-    for path, age in ((kept, 29), (forgotten, 31), (other, 31)):
+    for path, age in ((file, 29), (forgotten, 31), (notes, 31)):
         path.touch()
         os.utime(path, (time.time() - age * day,) * 2)
     assert hits() == 1  # which reads it
-    assert time.time() - kept.stat().st_mtime < day
+    assert time.time() - file.stat().st_mtime < day
     jit.delete_unread.cache_clear()
     jit.delete_unread(tmp_path)
-    assert sorted(tmp_path.iterdir()) == sorted([kept, other])
+    assert sorted(tmp_path.iterdir()) == sorted([file, notes])
 
 
 def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
@@ -926,11 +926,11 @@ def test_what_a_handler_raises_while_a_law_compiles_is_no_fault_of_the_law(monke
     def law(y, gains, memory):
         return -y.e, y.e
 
-    made = numba_internals.CFunc.compile
+    compile_function = numba_internals.CFunc.compile
 
     def interrupted(self):
         signal.pthread_kill(threading.main_thread().ident, signal.SIGALRM)
-        made(self)
+        compile_function(self)
 
     case = smc.Scenario(plant="duffing", law=smc.law_function(law), duration=0.1)
     before = signal.signal(signal.SIGALRM, handler)

@@ -94,9 +94,9 @@ def test_the_physics_step_is_the_largest_divisor_up_to_a_millisecond():
         (0.1, 1e-3, 100),
         (100.0, 1e-3, 100_000),
     ):
-        made = scenario(control_period=period, duration=100.0)
-        assert made.resolved.physics_step == pytest.approx(step, rel=1e-12)
-        assert made.steps == steps
+        stepped = scenario(control_period=period, duration=100.0)
+        assert stepped.resolved.physics_step == pytest.approx(step, rel=1e-12)
+        assert stepped.steps == steps
 
 
 def test_a_duration_that_is_no_whole_number_of_periods_is_named_with_what_is_run():
@@ -125,14 +125,14 @@ def test_a_physics_step_that_does_not_divide_the_period_is_refused(refused):
 def test_one_parameter_under_two_names_is_refused(refused):
     for name in ["duffing", "pendulum_network"]:
         plant = smc.plant(name)
-        both = {"mass": 1.2, plant.mass: 1.5}
+        masses = {"mass": 1.2, plant.mass: 1.5}
         words = (
             f"{plant.mass} 1.5 and mass 1.2, which are the same parameter of {name}: give one of "
             "them"
         )
         for fields, said in (
-            ({"mismatch": both}, "mismatch has"),
-            ({"jump": smc.Jump(0.5, both)}, "Jump has"),
+            ({"mismatch": masses}, "mismatch has"),
+            ({"jump": smc.Jump(0.5, masses)}, "Jump has"),
         ):
             refused(lambda fields=fields, plant=plant: scenario(plant=plant, **fields), said, words)
         # in turn
@@ -143,9 +143,9 @@ def test_one_parameter_under_two_names_is_refused(refused):
 
 @pytest.mark.parametrize("count", [1, 3, 7, 1000])
 def test_a_physics_step_that_divides_up_to_rounding_divides_exactly(count):
-    made = scenario(control_period=1e-2, physics_step=1e-2 / count * (1 + 1e-12))
-    assert made.steps == count
-    assert made.resolved.physics_step == 1e-2 / count
+    stepped = scenario(control_period=1e-2, physics_step=1e-2 / count * (1 + 1e-12))
+    assert stepped.steps == count
+    assert stepped.resolved.physics_step == 1e-2 / count
 
 
 def test_a_delay_that_is_no_whole_number_of_steps_is_refused(refused):
@@ -179,22 +179,22 @@ def test_a_state_is_one_number_or_one_a_channel():
         [np.float32(0.5)] * 3,
         np.array(0.5),
     ):
-        made = scenario(plant=smc.plant("pendulum_network", n=3), x0=value, v0=value)
-        assert made.resolved.x0 == made.resolved.v0 == (0.5, 0.5, 0.5)
+        network = scenario(plant=smc.plant("pendulum_network", n=3), x0=value, v0=value)
+        assert network.resolved.x0 == network.resolved.v0 == (0.5, 0.5, 0.5)
 
 
 def test_by_default_the_plant_starts_at_rest_where_the_paper_puts_it():
-    made = scenario(plant="inverted_pendulum")
-    assert made.resolved.x0 == smc.plant("inverted_pendulum").x0
-    assert made.resolved.v0 == (0.0,)
+    pendulum = scenario(plant="inverted_pendulum")
+    assert pendulum.resolved.x0 == smc.plant("inverted_pendulum").x0
+    assert pendulum.resolved.v0 == (0.0,)
 
 
 @pytest.mark.parametrize("n", [2, 5, 12])
 def test_a_network_recycles_the_paper_s_initial_positions(n):
     first = smc.plant("pendulum_network").x0
     assert len(first) == 5
-    made = scenario(plant=smc.plant("pendulum_network", n=n))
-    assert made.resolved.x0 == tuple(first[i % 5] for i in range(n))
+    network = scenario(plant=smc.plant("pendulum_network", n=n))
+    assert network.resolved.x0 == tuple(first[i % 5] for i in range(n))
 
 
 def test_an_unknown_name_suggests_the_nearest(refused):

@@ -116,12 +116,12 @@ def compiled(signal, times, seed=3, channel=1, stream=2):
     values = np.array([*cfunctions.signal_values(signal), 0.0])
     memory = np.zeros(max(signal.memory, 1))
     outputs = np.empty(3)
-    found = []
+    rows = []
     for t in times:
         inputs[0] = t
         assert call(*(array.ctypes.data for array in (inputs, values, memory, outputs))) == 0
-        found.append(outputs.copy())
-    return np.array(found)
+        rows.append(outputs.copy())
+    return np.array(rows)
 
 
 def path(signal, times, **key):
@@ -149,8 +149,8 @@ def test_the_compiled_function_gives_the_bits_of_the_written_one(signal):
 
 def test_bounds_of_a_signal_and_of_its_slope_are_reached_and_not_passed():
     times = np.linspace(0.0, 1.6, 16_001)
-    known = [(signal, bounds) for signal in EVERY if (bounds := bounds_of(signal))]
-    assert {type(signal) for signal, _ in known} == {
+    bounded = [(signal, bounds) for signal in EVERY if (bounds := bounds_of(signal))]
+    assert {type(signal) for signal, _ in bounded} == {
         Constant,
         Sine,
         Step,
@@ -158,7 +158,7 @@ def test_bounds_of_a_signal_and_of_its_slope_are_reached_and_not_passed():
         MinimumJerk,
         Relay,
     }
-    for signal, (bound, slope) in known:
+    for signal, (bound, slope) in bounded:
         d = path(signal, times)
         steepest = np.abs(np.diff(d)).max() / times[1]
         assert np.abs(d).max() == pytest.approx(bound)
@@ -167,11 +167,11 @@ def test_bounds_of_a_signal_and_of_its_slope_are_reached_and_not_passed():
 
 @pytest.mark.parametrize("signal", EVERY, ids=lambda s: type(s).__name__)
 def test_a_signal_disturbs_alike_in_both_loops(signal):
-    made = scenario(
+    disturbed = scenario(
         plant=smc.plant("pendulum_network", n=2), disturbance=[signal, Sine(0.1, 3.0)], duration=0.4
     )
-    fast = smc.run(made)
-    slow = reference.run(made)
+    fast = smc.run(disturbed)
+    slow = reference.run(disturbed)
     assert fast.failure is None
     for name in ("x", "v", "u", "d"):
         np.testing.assert_array_equal(getattr(fast, name), getattr(slow, name))
@@ -337,26 +337,26 @@ def test_a_time_series_is_straight_between_its_points_and_zero_outside():
     for n in (2, 3, 4, 7, 100):
         times = np.cumsum(rng.exponential(size=n))
         values = rng.normal(size=n)
-        at = np.concatenate([rng.uniform(0.0, times[-1] + 1.0, 200), times])
+        instants = np.concatenate([rng.uniform(0.0, times[-1] + 1.0, 200), times])
         expected = np.interp(
-            at,
+            instants,
             times,
             values,
             left=0.0,
             right=0.0,
         )
         np.testing.assert_allclose(
-            path(TimeSeries(times, values), at), expected, rtol=1e-12, atol=1e-12
+            path(TimeSeries(times, values), instants), expected, rtol=1e-12, atol=1e-12
         )
 
 
 def test_a_time_series_has_its_values_at_its_times_and_the_slope_behind_them():
-    found = written(UNEVEN, UNEVEN.times)
-    assert found[:-1, 0].tolist() == list(UNEVEN.values[:-1])
-    assert found[-1, 0] == pytest.approx(UNEVEN.values[-1], rel=1e-15)
+    values = written(UNEVEN, UNEVEN.times)
+    assert values[:-1, 0].tolist() == list(UNEVEN.values[:-1])
+    assert values[-1, 0] == pytest.approx(UNEVEN.values[-1], rel=1e-15)
     slopes = np.diff(UNEVEN.values) / np.diff(UNEVEN.times)
-    assert found[:, 1].tolist() == [*slopes, slopes[-1]]
-    assert not found[:, 2].any()
+    assert values[:, 1].tolist() == [*slopes, slopes[-1]]
+    assert not values[:, 2].any()
 
 
 @pytest.mark.usefixtures("present_objects_frozen")
@@ -387,8 +387,8 @@ class Staircase(Signal):
 
 def test_a_user_s_series_has_parameters_beside_its_data():
     np.testing.assert_array_equal(compiled(Staircase(), [0.05, 0.15])[:, 0], [2.0, 4.0])
-    made = scenario(law="none", disturbance=Staircase(3.0))
-    np.testing.assert_array_equal(smc.run(made).d, reference.run(made).d)
+    staircase = scenario(law="none", disturbance=Staircase(3.0))
+    np.testing.assert_array_equal(smc.run(staircase).d, reference.run(staircase).d)
 
 
 def test_data_that_compiled_code_would_misread_are_refused(monkeypatch, refused):
@@ -413,7 +413,7 @@ def file(tmp_path):
 
 
 def test_a_csv_file_is_read(file):
-    for content, asked, values in (
+    for content, column, values in (
         (GOOD, {}, (1.0, 2.0, 3.0, 4.0)),
         (GOOD, {"column": "e"}, (5.0, 6.0, 7.0, 8.0)),
         (GOOD.replace("t,", "seconds,"), {}, (1.0, 2.0, 3.0, 4.0)),
@@ -424,12 +424,12 @@ def test_a_csv_file_is_read(file):
         (GOOD.replace("t,d,e", "time [s],d [N],e [m]"), {"column": "e [m]"}, (5.0, 6.0, 7.0, 8.0)),
         ('"t","d, N"\n0,1\n0.1,2\n0.2,3\n0.3,4e0', {"column": "d, N"}, (1.0, 2.0, 3.0, 4.0)),
     ):
-        series = TimeSeries.from_csv(file(content), **asked)
+        series = TimeSeries.from_csv(file(content), **column)
         assert series == TimeSeries((0.0, 0.1, 0.2, 0.3), values)
 
 
 def test_a_csv_file_that_is_not_sound_is_refused_with_its_line(file, refused):
-    for content, asked, parts in (
+    for content, column, parts in (
         (GOOD.replace("2,6", "nan,6"), {}, ("line 3", "d is 'nan'", "finite")),
         ("0,1\n0.1,\n0.2,3\n", {}, ("line 2", "column 2 is ''")),
         ("nan,nan\n0,1\n1,2\n", {}, ("line 1", "column 1 is 'nan'")),  # no header
@@ -453,7 +453,7 @@ def test_a_csv_file_that_is_not_sound_is_refused_with_its_line(file, refused):
         (b"t,d\n0,1\0\n", {}, ("CSV", "commas")),
     ):
         refused(
-            lambda content=content, asked=asked: TimeSeries.from_csv(file(content), **asked),
+            lambda content=content, column=column: TimeSeries.from_csv(file(content), **column),
             "wind.csv",
             *parts,
         )
@@ -464,10 +464,13 @@ def test_a_csv_file_that_is_not_sound_is_refused_with_its_line(file, refused):
 
 def test_a_signal_survives_json():
     for signal in (*EVERY, BLOW):
-        made = scenario(
+        written_out = scenario(
             disturbance=[signal, Constant(1.0)], reference=signal if signal in LED else LED[0]
         )
-        assert scenario_json.restore(json.loads(json.dumps(scenario_json.describe(made)))) == made
+        assert (
+            scenario_json.restore(json.loads(json.dumps(scenario_json.describe(written_out))))
+            == written_out
+        )
 
 
 @dataclasses.dataclass(frozen=True)

@@ -165,8 +165,8 @@ def test_every_plant_and_law_comes_back(tmp_path):
                 duration=2e-3,
             )
         )
-    for one, trace in zip(many, smc.run(many), strict=True):
-        assert smc.load(trace.save(tmp_path / "a.npz")).scenario == one
+    for scenario_of_trace, trace in zip(many, smc.run(many), strict=True):
+        assert smc.load(trace.save(tmp_path / "a.npz")).scenario == scenario_of_trace
 
 
 def test_a_law_of_one_s_own_keeps_its_name_and_gains_but_not_its_code(traces, tmp_path, refused):
@@ -195,20 +195,20 @@ def test_a_law_of_one_s_own_is_never_taken_for_the_library_s(tmp_path, refused):
 
 
 def test_a_file_brings_the_parts_and_signals_that_nothing_has_used(tmp_path):
-    made = smc.Scenario(
+    scenario_of_code = smc.Scenario(
         plant="duffing",
         law="none",
         duration=0.01,
         friction=smc.hardware.Sigmoid(1.0, 2.0),
         reference=smc.signals.TimeSeries((0.0, 1.0), (0.0, 0.1)),
     )
-    path = smc.run(made).save(tmp_path / "a.npz")
+    path = smc.run(scenario_of_code).save(tmp_path / "a.npz")
     code = (
         f"import smc_mujoco as smc; s = smc.load({str(path)!r}).scenario; print(s.reference, "
         "s.friction)"
     )
     done = python("-c", code)
-    assert done.stdout.strip() == f"{made.reference} {made.friction}"
+    assert done.stdout.strip() == f"{scenario_of_code.reference} {scenario_of_code.friction}"
 
 
 def test_the_arrays_are_read_only_wherever_a_trace_comes_from(trace, tmp_path):
@@ -309,8 +309,8 @@ def test_pickled_objects_are_not_loaded(tmp_path, refused):
 def test_a_file_with_a_flipped_byte_is_no_trace_or_the_same_one(trace, tmp_path):
     path = trace.save(tmp_path / "a.npz")
     good = path.read_bytes()
-    for at in range(0, len(good), len(good) // 100):
-        path.write_bytes(good[:at] + bytes([good[at] ^ 0xFF]) + good[at + 1 :])
+    for place in range(0, len(good), len(good) // 100):
+        path.write_bytes(good[:place] + bytes([good[place] ^ 0xFF]) + good[place + 1 :])
         with contextlib.suppress(smc.ScenarioError):
             assert identical(smc.load(path), trace)
 

@@ -17,7 +17,7 @@ VALUES = (0.1, 0.6, -0.4, 0.0, 0.3)
 
 def of(signal, t):
     """r, r' and r'' at times t."""
-    return np.array([signal.value(float(one), None, signal.data) for one in t]).T
+    return np.array([signal.value(float(time), None, signal.data) for time in t]).T
 
 
 def jerk_squared(times, states):
@@ -72,9 +72,9 @@ def test_waypoints_has_the_least_jerk_of_all_through_its_points():
     states = data[1:].T
     least = jerk_squared(TIMES, states)
     for _ in range(20):
-        other = states.copy()
-        other[1:-1, 1:] += rng.normal(size=(3, 2)) * (0.01, 0.1)
-        assert jerk_squared(TIMES, other) > least
+        moved = states.copy()
+        moved[1:-1, 1:] += rng.normal(size=(3, 2)) * (0.01, 0.1)
+        assert jerk_squared(TIMES, moved) > least
 
 
 def test_a_run_follows_waypoints_in_both_loops(tmp_path):
@@ -91,7 +91,9 @@ def test_a_run_follows_waypoints_in_both_loops(tmp_path):
     )
     trace = smc.run(scenario)
     assert_same(trace, reference.run(scenario))
-    np.testing.assert_array_equal(trace.r, np.array([of(one, trace.t)[0] for one in signals]).T)
+    np.testing.assert_array_equal(
+        trace.r, np.array([of(signal_of_joint, trace.t)[0] for signal_of_joint in signals]).T
+    )
     assert smc.load(trace.save(tmp_path / "a.npz")).scenario == scenario
 
 
@@ -118,8 +120,12 @@ def test_cartesian_path_moves_the_tip_through_its_points():
     for i in range(3):
         lines.append(smc.signals.Waypoints(times, [point[i] for point in points]))
     t = np.linspace(0.0, 1.8, 41) + 0.003  # between the knots
-    found = np.array([tip(x) for x in np.array([of(one, t)[0] for one in path]).T])
-    np.testing.assert_allclose(found, np.array([of(one, t)[0] for one in lines]).T, atol=2e-6)
+    tips = np.array(
+        [tip(x) for x in np.array([of(signal_of_joint, t)[0] for signal_of_joint in path]).T]
+    )
+    np.testing.assert_allclose(
+        tips, np.array([of(signal_of_joint, t)[0] for signal_of_joint in lines]).T, atol=2e-6
+    )
 
 
 def test_a_run_of_the_arm_follows_a_path_in_space():

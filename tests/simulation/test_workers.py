@@ -89,17 +89,17 @@ def test_searches_on_workers_find_the_same_gains_and_their_folder_makes_none_twi
 
 def test_results_come_as_they_end_and_no_more_calls_are_out_than_allowed(monkeypatch):
     monkeypatch.setattr(workers, "MAX_SENT", 2)
-    found = {}
+    results = {}
     with Elsewhere(1) as pool:
 
         def calls():
             for k in range(5):
-                assert pool.calls - len(found) <= 2
+                assert pool.calls - len(results) <= 2
                 yield (-k,)
 
         for i, result in called(pool, abs, calls()):
-            found[i] = result
-    assert found == {k: k for k in range(5)}
+            results[i] = result
+    assert results == {k: k for k in range(5)}
 
 
 @pytest.mark.parametrize("end", [died, cancelled, shut_down])
