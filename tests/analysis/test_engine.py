@@ -97,19 +97,19 @@ def check(plant, law, conditions, duration=10.0, of=EVERY):
         metrics = set(metrics).difference(filter(holds, metrics))
     metrics = sorted(metrics)
     assert not any(group.why_not(case, metrics) for case in cases)
-    made = group.FormGroup(cases, metrics)
-    made.rows[:, SETTING.logging] = 1.0
+    form_group = group.FormGroup(cases, metrics)
+    form_group.rows[:, SETTING.logging] = 1.0
     logs = np.full((len(cases), base.samples + 1, base.plant.n, len(LOGGED)), np.nan)
-    scores = cpu.run_rows(made.form, made.rows, made.tables, 1, logs)
+    scores = cpu.run_rows(form_group.form, form_group.rows, form_group.tables, 1, logs)
     near = [_beside(cases, offset) for offset in BESIDE]
     close = list(map(smc.run, near))
     others_scores = []
-    for some in near:
-        moved = group.FormGroup(some, metrics)
+    for near_scores in near:
+        moved = group.FormGroup(near_scores, metrics)
         others_scores.append(moved.run(moved.rows))
     for i, (name, trace) in enumerate(zip(conditions, smc.run(cases), strict=True)):
         score = scores[i]
-        others = [traces[i] for traces in close]
+        beside_traces = [traces[i] for traces in close]
         if trace.diverged_at is not None:
             assert score[FAILURE] != state.FINE
             step = trace.scenario.resolved.physics_step
@@ -120,17 +120,20 @@ def check(plant, law, conditions, duration=10.0, of=EVERY):
             for j, column in enumerate(LOGGED):
                 samples = getattr(trace, column)
                 apart = np.abs(logs[i, : len(samples), :, j] - samples).max()
-                room = 3.0 * max(np.abs(getattr(one, column) - samples).max() for one in others)
+                room = 3.0 * max(
+                    np.abs(getattr(scores_of_run, column) - samples).max()
+                    for scores_of_run in beside_traces
+                )
                 assert apart <= AGREES * max(1.0, np.abs(samples).max()) + room, (name, column)
-        beside = [catalogue.score(trace), *map(catalogue.score, others)]
-        scores_beside = [score, *(some[i] for some in others_scores)]
+        beside = [catalogue.score(trace), *map(catalogue.score, beside_traces)]
+        scores_beside = [score, *(near_scores[i] for near_scores in others_scores)]
         for j, metric in enumerate(metrics):
             # of all starts, because one alone may lie at an end of what rounding makes of it
-            values = [one[metric] for one in beside]
-            found = [one[SCORES + j] for one in scores_beside]
-            room = AGREES + 3.0 * max(_spread(values), _spread(found))
+            values = [scores_of_run[metric] for scores_of_run in beside]
+            values_found = [scores_of_run[SCORES + j] for scores_of_run in scores_beside]
+            room = AGREES + 3.0 * max(_spread(values), _spread(values_found))
             expected = pytest.approx(np.median(values), rel=AGREES, abs=room)
-            assert np.median(found) == expected, (name, metric)
+            assert np.median(values_found) == expected, (name, metric)
 
 
 def _spread(values):
@@ -221,9 +224,9 @@ def test_a_run_beside_another_is_that_run_alone():
         )
     ):
         cases.append(dataclasses.replace(base, seed=seed, **fields))
-    made = group.FormGroup(cases, ("itae", "tv"))
-    together = made.run(made.rows, threads=1)
-    alone = [made.run(made.rows[i : i + 1])[0] for i in range(len(cases))]
+    form_group = group.FormGroup(cases, ("itae", "tv"))
+    together = form_group.run(form_group.rows, threads=1)
+    alone = [form_group.run(form_group.rows[i : i + 1])[0] for i in range(len(cases))]
     np.testing.assert_array_equal(together, alone)
     fine, raised, diverged = state.FINE, state.RAISED, state.DIVERGED
     assert together[:, FAILURE].tolist() == [fine, raised, fine, raised, diverged, fine, fine]
@@ -270,8 +273,10 @@ SLOW = [pytest.param(kind, marks=pytest.mark.slow) for kind in ("cart", "arm", "
 def test_a_law_or_a_machine_of_another_kind_runs_as_in_mujoco(kind):
     plant, law, fields = OTHERS[kind]
     noisy = {"noise": smc.Noise(1e-4, 5e-4), "disturbance": SINE, "input_delay": 2e-3}
-    of = EVERY if kind in ("joints", "sticking") else FEW  # of several channels, and of friction
-    check(plant, law, {"plain": fields, "noise": fields | noisy}, duration=2.0, of=of)
+    metrics_of_kind = (
+        EVERY if kind in ("joints", "sticking") else FEW
+    )  # of several channels, and of friction
+    check(plant, law, {"plain": fields, "noise": fields | noisy}, duration=2.0, of=metrics_of_kind)
 
 
 def solved(plant, **numbers):
@@ -422,8 +427,8 @@ def test_a_new_row_is_in_the_score_of_a_trace_and_in_the_engine(monkeypatch):
     expected = np.sqrt(np.mean(trace.v[400:] ** 2))
     assert late_speed(trace) == smc.score(trace)["late_speed"] == pytest.approx(expected)
     assert not group.why_not(case, ("late_speed",))
-    found = group.FormGroup([case], ("late_speed",)).scored("cpu", 1)[0][0]
-    assert found == pytest.approx([expected], rel=AGREES)
+    by_engine = group.FormGroup([case], ("late_speed",)).scored("cpu", 1)[0][0]
+    assert by_engine == pytest.approx([expected], rel=AGREES)
 
 
 def test_a_spring_beside_bristles_is_refused_for_what_it_is():
@@ -455,15 +460,15 @@ def test_the_limit_cycle_of_a_run_is_that_of_its_trace(monkeypatch):
     for case in cases:
         trace = smc.run(case)
         assert not group.why_not(case, names)
-        ((found, failed),) = group.FormGroup([case], names).scored("cpu", 1)
+        ((cycle, failed),) = group.FormGroup([case], names).scored("cpu", 1)
         assert (failed is None) == (trace.diverged_at is None)
         if failed is None:
             values = catalogue.score(trace)
             expected = [values[name] for name in names]
-            assert found == pytest.approx(expected, rel=1e-6, nan_ok=True)
+            assert cycle == pytest.approx(expected, rel=1e-6, nan_ok=True)
         else:
-            assert np.isnan(found).all()
-        alone.append((found, failed))
+            assert np.isnan(cycle).all()
+        alone.append((cycle, failed))
     assert not np.isnan(alone[0][0] + alone[1][0]).any()  # they chatter
     monkeypatch.undo()
     assert group.FormGroup(cases[:2], names).scored("cpu", 2) == alone[:2]

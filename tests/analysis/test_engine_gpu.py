@@ -110,12 +110,12 @@ def test_a_device_that_cannot_be_used_is_refused(monkeypatch, refused):
     def version():
         raise RuntimeError
 
-    for where, name, fake, told in [
+    for where, name, fake, words in [
         (gpu.cuda, "is_available", lambda: False, "no card"),
         (gpu.cuda, "is_available", lambda: True, ""),
         (gpu.cuda.cudadrv.driver, "get_version", lambda: (0, 0), "older"),
         (gpu.cuda.runtime, "get_version", version, "pip install"),
     ]:
         monkeypatch.setattr(where, name, fake)
-        if told:
-            refused(lambda: smc.score([], device="cuda"), told)
+        if words:
+            refused(lambda: smc.score([], device="cuda"), words)

@@ -14,8 +14,8 @@ def test_frictions_of_one_joint_add(turn):
     parts = (smc.Coulomb(0.2), smc.Viscous(0.1))[::turn]
     plant = smc.plant("pendulum_network", n=2)
     scenario = smc.Scenario(plant=plant, law="classical", friction=parts, duration=0.1)
-    made = group.FormGroup([scenario], ["itae"])
-    first = made.layout.row
-    row = made.rows[0]
+    form_group = group.FormGroup([scenario], ["itae"])
+    first = form_group.layout.row
+    row = form_group.rows[0]
     np.testing.assert_allclose(row[first.damping : first.damping + 2], [0.1, 0.1])
     np.testing.assert_allclose(row[first.levels : first.levels + 2], [0.2, 0.2])

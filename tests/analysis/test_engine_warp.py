@@ -71,10 +71,10 @@ def check(cases):
     from smc_mujoco.analysis.engine import warp
 
     assert warp.why_not(cases[0]) == ""
-    made = worlds.WorldGroup(cases, METRICS)
-    found = warp.run_rows(made.runs, made.rows, "cpu")
-    assert (found[:, FAILURE] == state.FINE).all()
-    for scores, trace in zip(found, smc.run(cases), strict=True):
+    world_group = worlds.WorldGroup(cases, METRICS)
+    scores_found = warp.run_rows(world_group.runs, world_group.rows, "cpu")
+    assert (scores_found[:, FAILURE] == state.FINE).all()
+    for scores, trace in zip(scores_found, smc.run(cases), strict=True):
         expected = [getattr(catalogue, name)(trace) for name in METRICS]
         np.testing.assert_allclose(scores[SCORES:], expected, rtol=AGREES)
 
@@ -90,8 +90,8 @@ MACHINES = {
 @pytest.mark.slow
 @pytest.mark.parametrize("machine", MACHINES)
 def test_worlds_of_mujoco_warp_have_other_masses_and_the_scores_of_runs(machine):
-    made, law, conditions, duration = MACHINES[machine]
-    check(cases_of(made(), law, conditions, duration))
+    plant, law, conditions, duration = MACHINES[machine]
+    check(cases_of(plant(), law, conditions, duration))
 
 
 @with_warp
@@ -101,12 +101,19 @@ def test_contacts_that_do_not_fit_are_run_again_with_more_room(monkeypatch, refu
     from smc_mujoco.analysis.engine import warp
 
     plant = smc.plant_from(FLOOR, ["slide"])
-    made = worlds.WorldGroup([smc.Scenario(plant=plant, law="pid", duration=0.02)], METRICS)
-    expected = warp.run_rows(made.runs, made.rows, "cpu")
+    world_group = worlds.WorldGroup([smc.Scenario(plant=plant, law="pid", duration=0.02)], METRICS)
+    expected = warp.run_rows(world_group.runs, world_group.rows, "cpu")
     monkeypatch.setattr(warp, "CONTACTS", 1)
-    np.testing.assert_array_equal(warp.run_rows(made.runs, made.rows, "cpu"), expected)
+    np.testing.assert_array_equal(
+        warp.run_rows(world_group.runs, world_group.rows, "cpu"), expected
+    )
     monkeypatch.setattr(warp, "MOST_CONTACTS", 2)
-    refused(lambda: warp.run_rows(made.runs, made.rows, "cpu"), "floor", "2 a world", "'cpu'")
+    refused(
+        lambda: warp.run_rows(world_group.runs, world_group.rows, "cpu"),
+        "floor",
+        "2 a world",
+        "'cpu'",
+    )
 
 
 @with_warp
@@ -140,15 +147,15 @@ def test_own_machines_are_scored_in_worlds_and_the_rest_by_mujoco(on_card):
     )
     few = cases_of(PLANTS["cart"](), "pid", (), 0.1)
     runs = ScoredRuns({"itae": catalogue.itae}, "cuda", worlds=True)
-    every = [alike[0], jump, *alike[1:], *few]
-    found = runs.scored(every)
-    for (values, failed), trace in zip(found, smc.run(every), strict=True):
+    scenarios = [alike[0], jump, *alike[1:], *few]
+    scored = runs.scored(scenarios)
+    for (values, failed), trace in zip(scored, smc.run(scenarios), strict=True):
         assert failed is None
         assert values == [pytest.approx(catalogue.itae(trace), rel=1e-12)]
-    told = runs.checked()
-    assert "MuJoCo repeated 3 runs of another engine: 0 failed" in told
-    assert "MuJoCo made 1 runs: its parameters jump" in told
-    assert "MuJoCo made 2 runs: they are fewer than 3 of one model" in told
+    sentence = runs.checked()
+    assert "MuJoCo repeated 3 runs of another engine: 0 failed" in sentence
+    assert "MuJoCo made 1 runs: its parameters jump" in sentence
+    assert "MuJoCo made 2 runs: they are fewer than 3 of one model" in sentence
 
 
 def test_a_map_of_an_own_machine_is_made_in_worlds(on_card, monkeypatch):
@@ -156,10 +163,10 @@ def test_a_map_of_an_own_machine_is_made_in_worlds(on_card, monkeypatch):
 
     base = smc.Scenario(plant=hinge(), law=smc.law("pid"), duration=0.3)
     axes = (0.0, 0.3), (0.0, 1.0)
-    found = basin_of(base, *axes, device="cuda")
+    on_device = basin_of(base, *axes, device="cuda")
     expected = basin_of(base, *axes)
-    assert found.outcome.tolist() == expected.outcome.tolist()
-    assert "MuJoCo repeated 4 states, 0" in found.checked
+    assert on_device.outcome.tolist() == expected.outcome.tolist()
+    assert "MuJoCo repeated 4 states, 0" in on_device.checked
     assert expected.checked == ""
 
 
@@ -168,12 +175,12 @@ def test_random_members_of_a_worst_case_are_run_in_worlds(on_card, monkeypatch):
     base = smc.Scenario(plant=hinge(), law=smc.law("pid"), duration=0.1)
     # forces with a slope are signals of one kind, and their loop is compiled once
     within = smc.Uncertainty(disturbance=0.5, slope=50.0, parameters={"m": (0.7, 1.3)})
-    found = smc.worst_case(base, within=within, budget=40, device="cuda")
+    on_device = smc.worst_case(base, within=within, budget=40, device="cuda")
     expected = smc.worst_case(base, within=within, budget=40)
-    assert found.value == expected.value
-    assert found.scenario == expected.scenario
-    assert found.median == pytest.approx(expected.median, rel=1e-12)
-    assert "MuJoCo repeated 20 runs of another engine: 0 failed" in found.checked
+    assert on_device.value == expected.value
+    assert on_device.scenario == expected.scenario
+    assert on_device.median == pytest.approx(expected.median, rel=1e-12)
+    assert "MuJoCo repeated 20 runs of another engine: 0 failed" in on_device.checked
 
 
 def test_parameter_sets_of_an_identified_machine_are_worlds_of_one_model(on_card):

@@ -91,7 +91,7 @@ def check(plant, law, conditions, duration=0.3, seeds=2, of=EVERY):
         cases.append(
             smc.Scenario(plant=plant, law=law, duration=duration, seed=seed, x0=x0, **conditions)
         )
-    moving = not all(isinstance(one, smc.Constant) for one in cases[0].references)
+    moving = not all(isinstance(signal, smc.Constant) for signal in cases[0].references)
     metrics = catalogue.CATALOGUE.keys() & of
     metrics = sorted(metrics.difference(RESTING if moving else ()))
     metrics = [
@@ -99,9 +99,9 @@ def check(plant, law, conditions, duration=0.3, seeds=2, of=EVERY):
     ]
     assert worlds.why_not(cases[0], metrics, "cpu") == ""
     assert len(set(map(worlds.WorldGroup.key_of, cases))) == 1
-    made = worlds.WorldGroup(cases, metrics)
-    found = mujoco_worlds.run_rows(made, made.rows)
-    for scores, trace in zip(found, smc.run(cases), strict=True):
+    world_group = worlds.WorldGroup(cases, metrics)
+    scores_found = mujoco_worlds.run_rows(world_group, world_group.rows)
+    for scores, trace in zip(scores_found, smc.run(cases), strict=True):
         if trace.diverged_at is not None:
             assert scores[FAILURE] != state.FINE
             step = trace.scenario.resolved.physics_step
@@ -182,10 +182,10 @@ def test_a_world_that_fails_leaves_the_others_as_they_are():
     for law, duration in [(raising(), 0.1), (raising(reach=0.0), 0.1), (raising(k=-1e4), 0.1)]:
         cases.append(smc.Scenario(plant=plant, law=law, duration=duration, u_max=1e9))
     cases.append(smc.Scenario(plant=plant, law=raising(), duration=0.03))
-    made = worlds.WorldGroup(cases, ("itae",))
-    found = mujoco_worlds.run_rows(made, made.rows)
-    assert found[:, FAILURE].tolist()[:2] == [state.FINE, state.RAISED]
-    assert found[3, FAILURE] == state.FINE
+    world_group = worlds.WorldGroup(cases, ("itae",))
+    scores = mujoco_worlds.run_rows(world_group, world_group.rows)
+    assert scores[:, FAILURE].tolist()[:2] == [state.FINE, state.RAISED]
+    assert scores[3, FAILURE] == state.FINE
     traces = smc.run([cases[0], cases[3]])
     expected = [catalogue.score(trace)["itae"] for trace in traces]
-    np.testing.assert_allclose(found[[0, 3], SCORES], expected, rtol=AGREES)
+    np.testing.assert_allclose(scores[[0, 3], SCORES], expected, rtol=AGREES)

@@ -23,14 +23,14 @@ def zero(y, gains, memory):
 
 
 def test_gain_keeps_its_unit_and_the_decorators_sign():
-    made = smc.law_function(
+    template = smc.law_function(
         gains={"a": Gain(1.0, RATE), "b": 2.0}, positive=("a",), nonnegative=("b",)
     )(zero)
-    assert made.gains == {
+    assert template.gains == {
         "a": Gain(1.0, RATE, positive=True),
         "b": Gain(2.0, nonnegative=True),
     }
-    assert made.defaults == {"a": 1.0, "b": 2.0}
+    assert template.defaults == {"a": 1.0, "b": 2.0}
 
 
 def test_a_channel_without_a_gain_in_a_list_has_the_last_and_one_number_is_each_channel_s():
@@ -58,35 +58,35 @@ AS_PYTHON = (
 
 def meaning(words):
     """The function of the gains that a condition's words describe."""
-    words, _, some = words.partition(" for some ")
+    words, _, variables = words.partition(" for some ")
     for pattern, python in AS_PYTHON:
         words = re.sub(pattern, python, words)
     code = compile(words, words, "eval")
-    if some:  # r > b
+    if variables:  # r > b
         return lambda g: any(eval(code, {"r": g["b"] * ratio}, g) for ratio in RATIOS)
     return lambda g: eval(code, {"abs": abs, "sqrt": math.sqrt}, g)
 
 
 def test_a_condition_holds_exactly_where_its_words_say():
-    both = 0  # conditions whose words are a formula, which is true and false of some values
+    formulas = 0  # conditions whose words are a formula, which is true and false of some values
     for template in TEMPLATES:
         for words, holds in template.conditions.items():
             names = [name for name in template.gains if re.search(rf"\b{name}\b", words)]
             allowed = []
             for name in names:
                 allowed.append([v for v in VALUES if v or not template.gains[name].positive])
-            every = []
+            conditions = []
             for values in itertools.product(*allowed):
-                every.append(dict(zip(names, values, strict=True)))
+                conditions.append(dict(zip(names, values, strict=True)))
             with contextlib.suppress(SyntaxError, NameError):  # of a sentence
                 means = meaning(words)
-                said = [bool(means(gains)) for gains in every]
-                assert said == [holds(SimpleNamespace(**gains)) for gains in every], (
+                said = [bool(means(gains)) for gains in conditions]
+                assert said == [holds(SimpleNamespace(**gains)) for gains in conditions], (
                     template.name,
                     words,
                 )
-                both += {False, True} == set(said)
-    assert both >= 30
+                formulas += {False, True} == set(said)
+    assert formulas >= 30
 
 
 @pytest.mark.parametrize("template", TEMPLATES, ids=lambda one: f"{one.kind} {one.name}")

@@ -49,15 +49,15 @@ def seen(shape=()):
     """
     random = np.random.default_rng(7)
     sizes = 10.0 ** np.linspace(0.0, -3.0, COUNT).reshape(-1, *(1 for _ in shape))
-    e, de, others = (random.normal(size=(COUNT, *shape)) for _ in range(3))
+    e, de, further = (random.normal(size=(COUNT, *shape)) for _ in range(3))
     e = e * sizes
     de = de * sizes
     e[20] = de[30] = e[40] = de[40] = 0.0
-    return zip(e, de, others, strict=True)
+    return zip(e, de, further, strict=True)
 
 
 def measurements(model, has_surface):
-    for k, (e, de, other) in enumerate(seen()):
+    for k, (e, de, numbers) in enumerate(seen()):
         yield Measurement(
             t=0.5 + DT * k,
             dt=DT,
@@ -68,17 +68,17 @@ def measurements(model, has_surface):
             r=0.3,
             dr=-0.2,
             ddr=0.7,
-            f=other,
+            f=numbers,
             g=1.7,
-            a=2.0 * other,
+            a=2.0 * numbers,
             limit=3.0,
             model=model,
             has_surface=has_surface,
             s=e - 0.5 * de,
-            v_eq=0.4 * other,
+            v_eq=0.4 * numbers,
             q=e + 0.1 * de,
             dq=de - 0.1 * e,
-            fq=-other,
+            fq=-numbers,
             gq=0.6,
         )
 
@@ -98,7 +98,7 @@ def joint_measurements(model, n):
     M = np.array([[2.0, 0.3, 0.1], [0.3, 1.5, 0.2], [0.1, 0.2, 1.1]])
     ones = np.ones(n)
     M = np.kron(np.eye(n // JOINTS), M)
-    for k, (e, de, other) in enumerate(seen((n,))):
+    for k, (e, de, numbers) in enumerate(seen((n,))):
         yield JointMeasurement(
             t=DT * k,
             dt=DT,
@@ -110,12 +110,12 @@ def joint_measurements(model, n):
             de=de,
             r=0.3 * ones,
             dr=-0.2 * ones,
-            ddr=0.7 * other,
-            a=other,
+            ddr=0.7 * numbers,
+            a=numbers,
             limit=3.0 * ones,
             M=M,
-            h=0.5 * other - de,
-            g=0.5 * other,
+            h=0.5 * numbers - de,
+            g=0.5 * numbers,
         )
 
 
@@ -140,13 +140,13 @@ def ways(template):
             "alone": joint_measurements(0.0, n),
             "with the model": joint_measurements(1.0, n),
         }
-    both = {
+    by_way = {
         "alone": measurements(0.0, 0.0),
         "with the model": measurements(1.0, 0.0),
     }
     if template.kind == "law":
-        return both | {"on a surface": measurements(1.0, 1.0)}
-    return both
+        return by_way | {"on a surface": measurements(1.0, 1.0)}
+    return by_way
 
 
 def computed(component, inputs):

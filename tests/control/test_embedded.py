@@ -83,7 +83,7 @@ def test_single_precision_rounds_every_operation_to_24_bits():
     for _ in range(2):
         T = (T + T) / (f(1.0) + T * T)
     assert T.dtype == f
-    found = forces(
+    commands = forces(
         smc.law(
             "observer_free_single",
             lam=LAM,
@@ -92,8 +92,8 @@ def test_single_precision_rounds_every_operation_to_24_bits():
         e,
         de,
     )
-    np.testing.assert_array_equal(found[:, 0], -(f(LAM) * T).astype(float))
-    np.testing.assert_array_equal(found[:, 1], s.astype(float))
+    np.testing.assert_array_equal(commands[:, 0], -(f(LAM) * T).astype(float))
+    np.testing.assert_array_equal(commands[:, 1], s.astype(float))
 
 
 # fixed point
@@ -144,7 +144,7 @@ def test_fixed_point_is_what_16_bit_words_and_32_bit_sums_compute():
     ).T
     e[:100], de[:100] = 1e4 * e[:100], 1e4 * de[:100]  # far out of range
     u, s = firmware(e, de)
-    found = forces(
+    commands = forces(
         smc.law(
             "observer_free_q15",
             lam=LAM,
@@ -153,8 +153,8 @@ def test_fixed_point_is_what_16_bit_words_and_32_bit_sums_compute():
         e,
         de,
     )
-    np.testing.assert_array_equal(found[:, 0], u)
-    np.testing.assert_array_equal(found[:, 1], s)
+    np.testing.assert_array_equal(commands[:, 0], u)
+    np.testing.assert_array_equal(commands[:, 1], s)
 
 
 def test_fixed_point_is_as_close_as_its_words_allow():

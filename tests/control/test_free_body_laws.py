@@ -256,10 +256,10 @@ def test_the_adaptive_gains_grow_by_the_published_rule_and_stay_within_their_bou
         "stays": 0,
     }
     for k in range(400):
-        at = 0.4 if k < 200 else 1e-4
+        error = 0.4 if k < 200 else 1e-4
         y = measured(
-            np.array([at, -at, at, 1.5 * at, -at, at]),
-            np.array([at, at, at, 3.0 * at, -at, 2.0 * at]),
+            np.array([error, -error, error, 1.5 * error, -error, error]),
+            np.array([error, error, error, 3.0 * error, -error, 2.0 * error]),
             dt,
         )
         _, s = base(y, gains, memory)
@@ -339,7 +339,7 @@ def test_commands_are_those_of_the_law_in_python(drone, law):
     gains = SimpleNamespace(**own.gains)
     memory = np.zeros((6, own.memory))
     for k, t in enumerate(trace.t[:-1]):
-        r = np.array([[of(one, t) for one in PATH] for of in (value, rate, acceleration)])
+        r = np.array([[part(signal, t) for signal in PATH] for part in (value, rate, acceleration)])
         u, s = function(
             measured(trace.x[k].copy(), trace.v[k].copy(), 2e-3, r, limit=limits), gains, memory
         )
@@ -502,12 +502,12 @@ def test_a_turn_across_the_back_takes_the_shorter_way(drone, law):
         (40.0, 0.0),
     ):
         goal = [smc.Constant(value) for value in (0.0, 0.0, 1.0, 0.0, 0.0, math.radians(end))]
-        at = (0.0, 0.0, 1.0, 0.0, 0.0, math.radians(start))
+        pose = (0.0, 0.0, 1.0, 0.0, 0.0, math.radians(start))
         trace = smc.run(
             smc.Scenario(
                 plant=drone,
                 law=law,
-                x0=at,
+                x0=pose,
                 reference=goal,
                 duration=4.0,
             )
@@ -536,7 +536,7 @@ def rate_by_differences(F, r, dr, h=1e-6):
 )
 def test_the_rate_of_the_wanted_attitude_is_that_of_its_differences(F):
     F, dF, r, dr = (
-        np.array(one) for one in (F, (0.4, -1.1, 0.8), (0.2, -0.3, 0.6), (1.0, 0.5, -2.0))
+        np.array(vector) for vector in (F, (0.4, -1.1, 0.8), (0.2, -0.3, 0.6), (1.0, 0.5, -2.0))
     )
     expected = rate_by_differences(lambda t: F + t * dF, r, dr)
     np.testing.assert_allclose(
@@ -632,7 +632,8 @@ def test_commands_of_a_body_that_tumbles_are_the_formula_coded_again(drone, law,
     free, h = 0, 1e-5  # torques within their bounds
     for k, t in enumerate(trace.t[:-1]):
         r, dr, ddr = (
-            np.array([of(one, t) for one in PATH[:3]]) for of in (value, rate, acceleration)
+            np.array([part(signal, t) for signal in PATH[:3]])
+            for part in (value, rate, acceleration)
         )
         R = Rotation.from_rotvec(trace.x[k, 3:].copy())
         w = trace.v[k, 3:]

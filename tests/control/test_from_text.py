@@ -77,7 +77,7 @@ def tuned():
 def test_a_text_is_its_law(files, text, name, gains):
     law = smc.law(text)
     assert law.name == name
-    assert {each: law.gains[each] for each in gains} == gains
+    assert {gain: law.gains[gain] for gain in gains} == gains
     assert law.source.kind == ("given" if "(" in text else "default" if law.gains else "none")
 
 

@@ -25,10 +25,10 @@ def shipped(gain_set: str, plant: str) -> dict[str, gains.TunedGains]:
     yet.
     """
     if gain_set == "tuned":
-        others = gains.general_laws([plant], gain_set)
+        general = gains.general_laws([plant], gain_set)
     else:
-        others = ()
-    return {name: gains.tuned(plant, name, gain_set) for name in {*gains.LAWS, *others}}
+        general = ()
+    return {name: gains.tuned(plant, name, gain_set) for name in {*gains.LAWS, *general}}
 
 
 @pytest.mark.slow
@@ -39,18 +39,18 @@ def test_every_general_law_of_a_release_has_gains():
 
 @pytest.mark.parametrize(("gain_set", "plant"), SETS)
 def test_every_law_of_a_set_has_gains_and_these_are_all_that_tuning_moves(gain_set, plant):
-    for name, known in shipped(gain_set, plant).items():
+    for name, tuned in shipped(gain_set, plant).items():
         law = gains.law(plant, name, gain_set)
         scales = search_space.scales(grid.as_plant(plant), gaber_study.U_MAX)
-        for one in known.sets:
-            assert set(one) == set(search_space.box(law, scales)), name
+        for gain_set_of_search in tuned.sets:
+            assert set(gain_set_of_search) == set(search_space.box(law, scales)), name
 
 
 @pytest.mark.parametrize(("gain_set", "plant"), SETS)
 def test_every_shipped_set_is_within_its_laws_theorem(gain_set, plant):
     """Of those that are not: python benchmarks/gains.py NAME."""
-    for name, known in shipped(gain_set, plant).items():
-        for i in range(len(known.sets)):
+    for name, tuned in shipped(gain_set, plant).items():
+        for i in range(len(tuned.sets)):
             assert not gains.law(plant, name, gain_set, i).source.outside, (name, i)
 
 
@@ -65,18 +65,18 @@ def test_a_law_by_its_name_alone_has_its_shipped_gains_or_says_that_it_has_its_d
     assert own.source.kind == "given"
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        for given in (smc.law("pid"), smc.law("pid").template, "pid(kp=9)"):
-            made = smc.Scenario(plant="duffing", law=given).law
-            assert dict(made.gains) | {"kp": 0.0} == dict(smc.law("pid").gains) | {"kp": 0.0}
-        made = smc.Scenario(plant="cart_pole", law="hierarchical").law
-        assert made == smc.law("hierarchical")
+        for written in (smc.law("pid"), smc.law("pid").template, "pid(kp=9)"):
+            law = smc.Scenario(plant="duffing", law=written).law
+            assert dict(law.gains) | {"kp": 0.0} == dict(smc.law("pid").gains) | {"kp": 0.0}
+        law = smc.Scenario(plant="cart_pole", law="hierarchical").law
+        assert law == smc.law("hierarchical")
     # tuned without a model, without a surface, for positions
     for fields in ({"model": "nominal"}, {"surface": "linear(c=3)"}, {"tracks": "speed"}):
         with pytest.warns(
             ScenarioWarning, match="'classical' runs on duffing with its default gains"
         ):
-            made = smc.Scenario(plant="duffing", law="classical", **fields).law
-        assert made.gains == smc.law("classical").gains
+            law = smc.Scenario(plant="duffing", law="classical", **fields).law
+        assert law.gains == smc.law("classical").gains
     network = smc.Scenario(plant="pendulum_network", law=["pid", smc.law("pid")] + ["pid"] * 3)
     assert network.law.of_channel(0) == gains.law("pendulum_network", "pid")
     assert network.law.of_channel(1) == smc.law("pid")
@@ -92,11 +92,11 @@ def test_a_law_by_its_name_alone_has_its_shipped_gains_or_says_that_it_has_its_d
 
 
 def test_run_i_of_a_law_has_gain_set_i():
-    made = grid.grid("duffing", ["observer_free", "power_rate"], "nominal", 50)
+    scenarios = grid.grid("duffing", ["observer_free", "power_rate"], "nominal", 50)
     for name in ("observer_free", "power_rate"):
         sets = gains.tuned("duffing", name).sets
         assert len(sets) > 1
-        ran = [s.law.gains for s in made if s.law.name == name]
+        ran = [s.law.gains for s in scenarios if s.law.name == name]
         for k, law in enumerate(ran):
             for gain, value in sets[k % len(sets)].items():
                 assert law[gain] == value
@@ -112,23 +112,23 @@ def test_run_i_of_a_law_has_gain_set_i():
 )
 def test_shipped_gains_cost_what_their_record_says(gain_set, law):
     """Set i in the runs of search i."""
-    known = gains.tuned("duffing", law, gain_set)
+    tuned = gains.tuned("duffing", law, gain_set)
     goal = objective.OBJECTIVES[gains.OBJECTIVES[gain_set]]
     goal = dataclasses.replace(goal, u_max=gaber_study.U_MAX)
-    for i, expected in enumerate(known.objectives[:3]):
-        cases = goal.scenarios("duffing", gains.law("duffing", law, gain_set, i), known.seed, i)
+    for i, expected in enumerate(tuned.objectives[:3]):
+        cases = goal.scenarios("duffing", gains.law("duffing", law, gain_set, i), tuned.seed, i)
         # another processor rounds otherwise, and switching laws under noise magnify it
         assert goal.evaluation(cases[0], run(cases)).objective == pytest.approx(expected, rel=1e-2)
 
 
 @pytest.mark.slow
 def test_the_first_shipped_search_comes_out_again():
-    known = gains.tuned("duffing", "observer_free")
+    tuned = gains.tuned("duffing", "observer_free")
     again = search.tune(
         "duffing",
         "observer_free",
-        seed=known.seed,
+        seed=tuned.seed,
         searches=1,
     )
     # another processor rounds otherwise
-    assert again.objective == pytest.approx(known.objectives[0], rel=1e-3)
+    assert again.objective == pytest.approx(tuned.objectives[0], rel=1e-3)

@@ -93,7 +93,7 @@ def test_super_twisting_reaches_and_stays_at_second_order_in_the_period():
             duration=2.5,
         )
         d_a = np.array(
-            [np.linalg.solve(inertia(x), one) for x, one in zip(trace.x, trace.d, strict=True)]
+            [np.linalg.solve(inertia(x), load) for x, load in zip(trace.x, trace.d, strict=True)]
         )
         assert np.abs(np.diff(d_a, axis=0)).max() / dt < L
         residuals.append(np.abs(trace.s[trace.t > 2.0]).max())
@@ -123,7 +123,12 @@ def test_passivity_based_lowers_v_as_its_theorem_says():
         disturbance=smc.Sine(0.2, 7.0),
     )
     s = trace.s
-    V = np.array([one @ inertia(x) @ one / 2 for x, one in zip(trace.x, s, strict=True)])
+    V = np.array(
+        [
+            s_of_sample @ inertia(x) @ s_of_sample / 2
+            for x, s_of_sample in zip(trace.x, s, strict=True)
+        ]
+    )
     claimed = -np.sum(s * (K * s + k * np.clip(s / width, -1, 1) - trace.d), axis=1)
     # the mean of both ends of a period, as u is held in it: what remains is O(dt)
     np.testing.assert_allclose(
@@ -144,16 +149,19 @@ def test_observer_free_joint_rests_at_its_reference_where_gravity_is_compensated
         lam=lam,
         k1=k1,
     )
-    given = run(
+    compensated = run(
         law,
         model="nominal",
         reference=smc.Constant(0.3),
         duration=30.0,
     )
-    e = given.x - given.r
+    e = compensated.x - compensated.r
     assert np.abs(e[-1]).max() < 1e-6
     kinetic = np.array(
-        [v @ inertia(x) @ v / 2 for x, v in zip(given.x[:4000], given.v[:4000], strict=True)]
+        [
+            v @ inertia(x) @ v / 2
+            for x, v in zip(compensated.x[:4000], compensated.v[:4000], strict=True)
+        ]
     )
     V = kinetic + np.sum(lam / k1 * np.log(np.cosh(k1 * e[:4000])), axis=1)
     assert np.diff(V).max() < 1e-3 * V[0] * 1e-3

@@ -51,14 +51,14 @@ def traces():
     longest to settle.
     """
     common = {"integrator": "Euler", "control_period": 2e-3, "physics_step": 2e-3}
-    found = {}
+    by_law = {}
     for name in smc.laws():
         # one half of the laws each, whichever laws there are beside it
         first = zlib.crc32(name.encode()) % 2
         models = itertools.cycle(("none", "nominal") if first else ("nominal", "none"))
         if name in MODELLED or name == "none":
             models = itertools.repeat("nominal" if name in MODELLED else "none")
-        found[name] = [
+        by_law[name] = [
             smc.Scenario(
                 plant=plant,
                 law=at_defaults(name),
@@ -68,8 +68,8 @@ def traces():
             )
             for plant, model in zip(plants(name), models, strict=False)
         ]
-    ran = iter(smc.run([scenario for scenarios in found.values() for scenario in scenarios]))
-    return {name: [next(ran) for _ in scenarios] for name, scenarios in found.items()}
+    ran = iter(smc.run([scenario for scenarios in by_law.values() for scenario in scenarios]))
+    return {name: [next(ran) for _ in scenarios] for name, scenarios in by_law.items()}
 
 
 @ACTING

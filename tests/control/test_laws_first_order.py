@@ -405,9 +405,9 @@ def test_observer_free_integral_is_locally_stable_just_where_routh_and_hurwitz_s
 )
 def winding(y, gains, memory):
     """observer_free_integral without its condition."""
-    whole = y.de + gains.k1 * y.e + gains.ki * memory[0]
+    sigma = y.de + gains.k1 * y.e + gains.ki * memory[0]
     memory[0] += y.dt * y.e
-    return -gains.lam * math.tanh(whole), whole
+    return -gains.lam * math.tanh(sigma), sigma
 
 
 def test_observer_free_integral_does_not_wind_up():
@@ -487,6 +487,6 @@ def test_surface_and_own_sliding_variable_give_the_same_first_order_law():
             **state,
         )
         y = on_surface(-0.3 + 1.7 * 0.2, eq=1.7 * 0.3, **state)
-        given = called(law, y._replace(e=0.2, de=-0.3), np.zeros(law.memory))
+        by_surface = called(law, y._replace(e=0.2, de=-0.3), np.zeros(law.memory))
         rounds = {"observer_free_single": 1e-6, "observer_free_q15": 1e-2}.get(name, 1e-12)
-        np.testing.assert_allclose(own, given, rtol=rounds)
+        np.testing.assert_allclose(own, by_surface, rtol=rounds)

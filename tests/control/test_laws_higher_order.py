@@ -94,7 +94,7 @@ def test_a_disturbance_of_slope_below_k2_is_followed_and_one_above_is_not(name):
 
 def test_conditioned_super_twisting_bounds_the_command_itself_and_so_knows_the_model():
     """With f and g known, s' = -5 + 4 u + d is the plant s' = v + d with v in [-13, 3]."""
-    given = {
+    fields = {
         "f": -5.0,
         "g": 4.0,
         "model": 1.0,
@@ -109,7 +109,7 @@ def test_conditioned_super_twisting_bounds_the_command_itself_and_so_knows_the_m
         wave,
         s=-20.0,
         duration=20.0,
-        **given,
+        **fields,
     )
     assert run.residual() < 20 * 1e-3**2
     assert run.s.max() < 3.0**2 / (2 * 1.1)
@@ -228,8 +228,8 @@ def powers(law, d, plant=plant_b, duration=6.0):
 
 @pytest.mark.parametrize("name", SECOND)
 def test_discontinuous_laws_of_degree_2_are_accurate_to_the_second_power_of_the_period(name):
-    found, runs = powers(law(name), HUM)
-    assert found == pytest.approx([2.0, 1.0], abs=0.25)
+    exponents, runs = powers(law(name), HUM)
+    assert exponents == pytest.approx([2.0, 1.0], abs=0.25)
     assert runs[1].reached(1e-3) < 4.0
 
 
@@ -247,8 +247,8 @@ def test_terminal_laws_are_accurate_to_the_power_of_their_surface_or_better(name
 
 
 def test_continuous_twisting_is_of_third_order_and_its_command_becomes_the_disturbance():
-    found, runs = powers(law("continuous_twisting"), HUM)
-    assert found == pytest.approx([3.0, 2.0], abs=0.25)
+    exponents, runs = powers(law("continuous_twisting"), HUM)
+    assert exponents == pytest.approx([3.0, 2.0], abs=0.25)
     late = runs[2].t > 4.0
     assert np.abs(runs[2].u + [HUM(t) for t in runs[2].t])[late].max() < 0.01
 
@@ -317,7 +317,7 @@ def test_without_the_model_k_must_cover_what_g_makes_of_the_equivalent_control_t
 def test_the_model_takes_the_plant_out_of_a_law_of_degree_2(name):
     """f = -9.81 and g = 4 known: the run is that of e'' = v + d."""
     bare = plant_b(law(name), HUM, duration=3.0)
-    given = plant_b(
+    with_model = plant_b(
         law(name),
         HUM,
         duration=3.0,
@@ -325,7 +325,7 @@ def test_the_model_takes_the_plant_out_of_a_law_of_degree_2(name):
         g=4.0,
         model=1.0,
     )
-    np.testing.assert_allclose(given.s, bare.s, atol=1e-3)
+    np.testing.assert_allclose(with_model.s, bare.s, atol=1e-3)
     assert (
         plant_b(
             law(name),
@@ -380,8 +380,8 @@ def test_twisting_is_siconos_explicit_one():
 
 
 def test_nested_law_of_degree_3_is_accurate_to_the_third_power_of_the_period():
-    found, runs = powers(law("nested_third_order", a=5.0, w=1.0), sine(0.5, 2.0), plant_c, 10.0)
-    assert found == pytest.approx([3.0, 2.0, 1.0], abs=0.3)
+    exponents, runs = powers(law("nested_third_order", a=5.0, w=1.0), sine(0.5, 2.0), plant_c, 10.0)
+    assert exponents == pytest.approx([3.0, 2.0, 1.0], abs=0.3)
     assert runs[1].reached(1e-4) < 7.0
 
 
@@ -423,8 +423,8 @@ BEHIND_A_LAG = [
 # a step of 5 us.
 @pytest.mark.parametrize(
     ("name", "plant", "L"),
-    [("nested_third_order", *each) for each in BEHIND_A_LAG]
-    + [("observer_free_third", *each) for each in BEHIND_A_LAG if each[0] != "pendulum_network"],
+    [("nested_third_order", *case) for case in BEHIND_A_LAG]
+    + [("observer_free_third", *case) for case in BEHIND_A_LAG if case[0] != "pendulum_network"],
 )
 def test_laws_of_degree_3_settle_a_plant_behind_an_actuator_lag(plant, L, name):
     """With a differentiator of order 2 whose L is of the size of x''': claim 15 of the paper."""
@@ -449,8 +449,8 @@ def third_order(L=1.0, **more):
 
 def test_third_order_super_twisting_is_of_third_order_and_its_integral_becomes_the_disturbance():
     load = sine(1.0) + constant(0.5)  # |d''| <= 1
-    found, runs = powers(third_order(), load, plant_a, duration=20.0)
-    assert found[0] == pytest.approx(3.0, abs=0.25)
+    exponents, runs = powers(third_order(), load, plant_a, duration=20.0)
+    assert exponents[0] == pytest.approx(3.0, abs=0.25)
     late = runs[2].t > 15.0
     assert np.abs(runs[2].u + [load(t) for t in runs[2].t])[late].max() < 0.01
 

@@ -88,8 +88,8 @@ def controlled(controller, **more):
 )
 def test_reaching_laws_agree(law, theirs):
     ours = own(law)
-    other = theirs()
-    along(lambda e, de: ours(0.0, de)[0], lambda e, de: other.compute(de))
+    of_opensmc = theirs()
+    along(lambda e, de: ours(0.0, de)[0], lambda e, de: of_opensmc.compute(de))
 
 
 # controllers: ours with the model, on e and de
@@ -166,8 +166,8 @@ def test_reaching_laws_agree(law, theirs):
 )
 def test_controllers_agree(law, theirs):
     ours = own(law, model=1.0)
-    other = controlled(theirs())
-    along(lambda e, de: ours(e, de)[0], other, rtol=1e-9)
+    controller = controlled(theirs())
+    along(lambda e, de: ours(e, de)[0], controller, rtol=1e-9)
 
 
 # surfaces and estimators
@@ -198,5 +198,5 @@ def test_controllers_agree(law, theirs):
 )
 def test_surfaces_agree(ours, theirs):
     mine = own(ours)
-    other = theirs()
-    along(lambda e, de: mine(e, de)[0], lambda e, de: float(other.compute(e, de)))
+    surface_of_opensmc = theirs()
+    along(lambda e, de: mine(e, de)[0], lambda e, de: float(surface_of_opensmc.compute(e, de)))

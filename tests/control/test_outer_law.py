@@ -83,7 +83,7 @@ def test_a_gain_that_an_outer_law_keeps_acts_and_one_that_it_drops_is_refused(na
     template = catalogue()[name]
     if template.plants:
         return
-    whole = template.on_computed_torque()
-    for gain in {*template.gains} - {*whole.gains}:
+    with_outer_law = template.on_computed_torque()
+    for gain in {*template.gains} - {*with_outer_law.gains}:
         refused(lambda gain=gain: template(**{gain: 7.0}).on_computed_torque(), gain, 7)
-    assert not {gain for gain in whole.gains.values() if gain.unit == INPUT_GAIN}
+    assert not {gain for gain in with_outer_law.gains.values() if gain.unit == INPUT_GAIN}

@@ -26,12 +26,12 @@ JUMP = 4e-3  # of the range of u; the words of the fixed-point law make steps of
 def changes(name):
     """The fields of the measurement that change u or memory of a law in any of many states."""
     law = smc.law(name)
-    found = set()
+    changing = set()
     random = np.random.default_rng(0)
     for _ in range(40):
         numbers = random.normal(size=len(Measurement._fields))
         model, has_surface = random.choice([0.0, 1.0], size=2)
-        known = {
+        fixed = {
             "t": abs(numbers[0]),
             "dt": 1e-3,
             "limit": 3.0,
@@ -39,19 +39,22 @@ def changes(name):
             "has_surface": has_surface,
             "g": 2.0,
         }
-        y = Measurement(*numbers)._replace(**known)
+        y = Measurement(*numbers)._replace(**fixed)
         # at the first sample, and later
         memory = np.abs(random.normal(size=law.memory)) * random.choice([0.0, 1.0])
-        one = memory.copy()
-        result = [*called(law, y, one), *one]
-        for field in {*Measurement._fields} - found:
+        memory_of_first = memory.copy()
+        result = [*called(law, y, memory_of_first), *memory_of_first]
+        for field in {*Measurement._fields} - changing:
             for value in (getattr(y, field) + 0.7, -getattr(y, field) - 0.3, 30.0):
-                other = memory.copy()
+                memory_of_second = memory.copy()
                 if field != "dt":
-                    again = [*called(law, y._replace(**{field: value}), other), *other]
+                    again = [
+                        *called(law, y._replace(**{field: value}), memory_of_second),
+                        *memory_of_second,
+                    ]
                     if not np.array_equal(again, result, equal_nan=True):
-                        found.add(field)
-    return found
+                        changing.add(field)
+    return changing
 
 
 @pytest.mark.slow
@@ -158,13 +161,13 @@ def arrival(name):
     falls as exp(-t).
     """
     law = smc.law(name)
-    known = catalogue()[name]
-    h = 1e-4 if known.relative_degree == 1 else 5e-4
+    template = catalogue()[name]
+    h = 1e-4 if template.relative_degree == 1 else 5e-4
     ran = plant_a(law, rest, h=h, duration=2.0)
-    if known.relative_degree > 1:
-        g = 20.0 if known.relative_degree == 3 else 1.0  # as behind a lag of 50 ms
-        ran = chain(law, rest, (1.0, 0.0, 0.0)[: known.relative_degree], h, 15.0, g=g)
-    values = np.abs(ran.s if known.finite_time == "e" else ran.sigma)
+    if template.relative_degree > 1:
+        g = 20.0 if template.relative_degree == 3 else 1.0  # as behind a lag of 50 ms
+        ran = chain(law, rest, (1.0, 0.0, 0.0)[: template.relative_degree], h, 15.0, g=g)
+    values = np.abs(ran.s if template.finite_time == "e" else ran.sigma)
     times = []
     for level in (0.1, 0.01, 0.001):
         times.append(np.flatnonzero(np.append(True, values > level))[-1] * h)

@@ -43,12 +43,12 @@ def answer(law, memory, omega, h, samples=80_000):
             called(
                 law,
                 measured(
-                    e=math.cos(omega * one),
+                    e=math.cos(omega * time),
                     dt=h,
                 ),
                 memory,
             )[0]
-            for one in t
+            for time in t
         ]
     )
     last = t > t[-1] - 4.0 * math.pi / omega
@@ -116,7 +116,7 @@ def test_with_the_model_the_law_controls_the_acceleration(name, limit):
         name, **{key: value for key, value in plain.gains.items() if key not in UNIT}
     )
     own = np.zeros(plain.memory)
-    other = np.zeros(plain.memory)
+    memory_with_model = np.zeros(plain.memory)
     g = -2.0
     for _ in range(200):
         e, de, f = rng.normal(size=3)
@@ -130,7 +130,7 @@ def test_with_the_model_the_law_controls_the_acceleration(name, limit):
         )
         u = call(
             informed,
-            other,
+            memory_with_model,
             e=e,
             de=de,
             f=f,
@@ -202,8 +202,8 @@ def loop_of_hodob(wc, l, g, h):
     law = smc.law("hodob", wc=wc, l=l, b=1.0)
 
     def after(state):
-        e, de, *kept = state
-        memory = np.array([1.0, *kept])
+        e, de, *slots = state
+        memory = np.array([1.0, *slots])
         u, _ = called(law, measured(e=e, de=de, dt=h), memory)
         return [e + h * de + h * h / 2.0 * g * u, de + h * g * u, *memory[1:]]
 
@@ -224,9 +224,9 @@ def test_hodob_is_stable_from_the_input_gain_of_its_docstring_on(wc, l):
     least = wc * l / (wc * wc + 3.0 * wc * l + l * l)
     P = math.exp(-1.0)
     most = 1.0 + (1.0 + P) ** 2 / ((1.0 - P) * (3.0 + P))
-    for bound, inside, *its in ((least, 1.02, wc, l, 1e-4), (most, 0.98, 1e-3, 1.0, 1.0)):
+    for bound, inside, *numbers in ((least, 1.02, wc, l, 1e-4), (most, 0.98, 1e-3, 1.0, 1.0)):
         for factor, holds in ((inside, True), (1.0 / inside, False)):
-            loop = loop_of_hodob(*its[:2], factor * bound, its[2])
+            loop = loop_of_hodob(*numbers[:2], factor * bound, numbers[2])
             assert (np.abs(np.linalg.eigvals(loop)).max() < 1.0) == holds
 
 
@@ -279,9 +279,9 @@ def test_lqi_tracks_back_from_the_bound_with_its_time_constant():
     h = 1e-3
     law = smc.law("lqi", q0=q0, tt=tt, **UNIT)
     memory = np.zeros(5)
-    asked = []
+    commands = []
     for _ in range(3000):
-        asked.append(
+        commands.append(
             called(
                 law,
                 measured(
@@ -295,7 +295,7 @@ def test_lqi_tracks_back_from_the_bound_with_its_time_constant():
         )
     end = -math.sqrt(q0) * e * tt
     k = np.arange(3000)
-    beyond = np.array(asked) + 1.0
+    beyond = np.array(commands) + 1.0
     np.testing.assert_allclose(beyond, end + (beyond[0] - end) * (1.0 - h / tt) ** k, rtol=1e-9)
 
 
@@ -305,15 +305,15 @@ def test_lqi_tracks_back_from_the_bound_with_its_time_constant():
 @pytest.mark.parametrize("plant", PLANTS)
 def test_the_end_s_weight_of_mpc_solves_the_discrete_riccati_equation(plant):
     a1, a2, b = plant
-    whole = expm(0.03 * np.array([[0.0, 1.0, 0.0], [a1, a2, b], [0.0, 0.0, 0.0]]))
+    augmented = expm(0.03 * np.array([[0.0, 1.0, 0.0], [a1, a2, b], [0.0, 0.0, 0.0]]))
     A11, A12, A21, A22, B1, B2 = mpc.sampled(a1, a2, b, 0.03)
     np.testing.assert_allclose(
         [[A11, A12, B1], [A21, A22, B2]],
-        whole[:2],
+        augmented[:2],
         rtol=1e-12,
         atol=1e-15,
     )
-    P = solve_discrete_are(whole[:2, :2], whole[:2, 2:], np.diag([100.0, 16.0]), np.eye(1))
+    P = solve_discrete_are(augmented[:2, :2], augmented[:2, 2:], np.diag([100.0, 16.0]), np.eye(1))
     got = mpc.riccati(A11, A12, A21, A22, B1, B2, 100.0, 16.0)
     np.testing.assert_allclose(got, (P[0, 0], P[0, 1], P[1, 1]), rtol=1e-9)
 
@@ -457,11 +457,11 @@ def test_loop_shaping_s_observer_is_sampled_exactly():
     called(law, measured(e=0.1, de=0.0, dt=h), memory)
     A, _, C = shaped(*plant, k, wi)
     M = A + np.outer(loop_shaping.design(*plant, k, wi)[3:6], C)
-    whole = expm(h * np.block([[M, np.eye(3)], [np.zeros((3, 6))]]))[:3]
+    augmented = expm(h * np.block([[M, np.eye(3)], [np.zeros((3, 6))]]))[:3]
     got = memory[loop_shaping.PHI :].reshape(2, 3, 3)
     np.testing.assert_allclose(
         got,
-        (whole[:, :3], whole[:, 3:]),
+        (augmented[:, :3], augmented[:, 3:]),
         rtol=1e-12,
         atol=1e-15,
     )

@@ -53,8 +53,8 @@ def test_a_law_is_the_users_only_with_gains_of_the_user():
 @pytest.mark.parametrize("kind", sets())
 def test_copies_keep_the_source(kind, tmp_path):
     law = sets()[kind]
-    its = law.source
-    kept = [
+    source = law.source
+    copies = [
         pickle.loads(pickle.dumps(law)),
         pickle.loads(pickle.dumps(law.named("other"))),
         copy.deepcopy(law),
@@ -70,8 +70,8 @@ def test_copies_keep_the_source(kind, tmp_path):
             duration=0.01,
         )
     )
-    kept.append(smc.load(trace.save(tmp_path / "trace.npz")).scenario.law)
-    assert [one.source for one in kept] == [its] * len(kept)
+    copies.append(smc.load(trace.save(tmp_path / "trace.npz")).scenario.law)
+    assert [copied.source for copied in copies] == [source] * len(copies)
 
 
 @law_function(gains={"k": 2.0, "c": 1.0}, conditions={"c < k": lambda g: g.c < g.k})
@@ -85,32 +85,32 @@ def bounded(y, gains, memory):
 )
 def test_gains_outside_the_theorem_are_marked_wherever_their_source_is_told(law, tmp_path):
     outside = {"bounded": {"k": 0.5}, "twisting": {"r1": 0.5}, "terminal": {"p": 0.3}}[law.name]
-    given = law(**outside)
+    beyond = law(**outside)
     name = next(iter(outside))
     assert "outside" not in str(law().source) + str(law(**law.defaults).source)
-    trace = smc.run(smc.Scenario(plant=PLANT, law=given, duration=0.01))
+    trace = smc.run(smc.Scenario(plant=PLANT, law=beyond, duration=0.01))
     alike = [
-        pickle.loads(pickle.dumps(given)),
-        given.named("other"),
-        dataclasses.replace(law(), gains=given.gains),
+        pickle.loads(pickle.dumps(beyond)),
+        beyond.named("other"),
+        dataclasses.replace(law(), gains=beyond.gains),
         law(**{name: (law.defaults[name], outside[name])}),
-        by_channel([law(), given]),
-        by_channel([given, smc.law("pid")]),
-        given.on_computed_torque(),
+        by_channel([law(), beyond]),
+        by_channel([beyond, smc.law("pid")]),
+        beyond.on_computed_torque(),
         smc.load(trace.save(tmp_path / "trace.npz")).scenario.law,
     ]
-    for one in alike:
-        assert "outside its theorem" in str(one.source), one
-    assert "outside" not in str(by_channel([law(), given]).of_channel(0).source)
+    for marked_law in alike:
+        assert "outside its theorem" in str(marked_law.source), marked_law
+    assert "outside" not in str(by_channel([law(), beyond]).of_channel(0).source)
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_tables_latex_and_figures_mark_gains_outside_the_theorem(tmp_path):
-    given = bounded(k=0.5)
-    trace = smc.run(smc.Scenario(plant=PLANT, law=given, duration=0.01))
+    beyond = bounded(k=0.5)
+    trace = smc.run(smc.Scenario(plant=PLANT, law=beyond, duration=0.01))
     table = smc.compare(
-        [given, "pid"],
+        [beyond, "pid"],
         PLANT,
         "nominal",
         seeds=1,
@@ -138,7 +138,7 @@ def test_replaced_gains_are_the_users():
 def test_gains_by_channel_are_of_their_common_source():
     default = smc.law("pid")
     shipped = gain_sets.law("duffing", "pid")
-    both = by_channel(
+    of_channels = by_channel(
         [
             shipped,
             dataclasses.replace(
@@ -146,7 +146,7 @@ def test_gains_by_channel_are_of_their_common_source():
             ),
         ]
     )
-    assert both.source.kind == both.of_channel(1).source.kind == "shipped"
+    assert of_channels.source.kind == of_channels.of_channel(1).source.kind == "shipped"
     assert by_channel([default, shipped]).source.kind == "given"
     assert by_channel([smc.law("classical"), default]).source.kind == "default"
 
@@ -169,12 +169,12 @@ def test_the_gains_of_one_law_are_told_with_their_search_and_of_several_by_their
     assert source.in_words({"a": shipped}) == (
         "gains: shipped (CMA-ES, 90 evaluations, 3 searches, whose final J values differ by up to 3 %)"
     )
-    others = {
+    further = {
         "a": shipped,
         "b": [smc.law("pid").source],
         "c": [smc.law("none").source],
     }
-    assert source.in_words(others) == "gains: shipped for a, default for b"
+    assert source.in_words(further) == "gains: shipped for a, default for b"
 
 
 def test_files_in_which_given_gains_were_called_yours_can_still_be_read():

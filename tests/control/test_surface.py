@@ -179,15 +179,15 @@ def test_on_a_terminal_surface_the_error_ends_at_the_stated_time(name, speed, du
     assert at(slid, np.zeros(slid.memory), e, -speed(slid.gains, e))[0] == pytest.approx(
         0.0, abs=1e-12
     )
-    whole = quad(lambda r: 1 / speed(slid.gains, r), 0.0, e)[0]
+    duration = quad(lambda r: 1 / speed(slid.gains, r), 0.0, e)[0]
     if due is not None:
-        assert due(slid.gains, e) == pytest.approx(whole, rel=1e-6)
+        assert due(slid.gains, e) == pytest.approx(duration, rel=1e-6)
     trace = slide(name, e=e, de=-speed(slid.gains, e))
     outside = np.flatnonzero(np.abs(trace.x[:, 0]) > 0.01)
     assert trace.t[outside[-1]] == pytest.approx(
         quad(lambda r: 1 / speed(slid.gains, r), 0.01, e)[0], rel=0.02
     )
-    assert np.abs(trace.x[trace.t > 1.05 * whole + 0.05]).max() < 2e-3
+    assert np.abs(trace.x[trace.t > 1.05 * duration + 0.05]).max() < 2e-3
 
 
 def shares(name, law):

@@ -93,15 +93,15 @@ def test_estimator_does_the_same_in_every_system_of_units(name, gains):
             for i, (x, v, *_) in enumerate(WAY)
         ]
 
-    one = estimator.estimator(name, **gains)
-    plain = called(one, seen(1.0, 1.0)).reshape(len(WAY), -1)
+    of_gains = estimator.estimator(name, **gains)
+    plain = called(of_gains, seen(1.0, 1.0)).reshape(len(WAY), -1)
     for system in SYSTEMS:
         X = system["X"]
         T = system["T"]
         units = [X / T, X / T**2][: plain.shape[1]]
-        found = called(converted(one, system), seen(X, T)).reshape(len(WAY), -1)
+        outputs = called(converted(of_gains, system), seen(X, T)).reshape(len(WAY), -1)
         np.testing.assert_allclose(
-            found,
+            outputs,
             plain * units,
             rtol=1e-9,
             atol=1e-9,

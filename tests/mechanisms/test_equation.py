@@ -76,8 +76,8 @@ def oracle(scenarios, factor=1.0):
     multiplies the true mass.
     """
     s = scenarios[0].resolved
-    for other in scenarios:
-        assert dataclasses.replace(other, law=s.law) == scenarios[0]
+    for scenario in scenarios:
+        assert dataclasses.replace(scenario, law=s.law) == scenarios[0]
     equation = EQUATION[s.plant.name]
     h = s.physics_step
     delay = round(s.input_delay / h)

@@ -18,7 +18,8 @@ from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.mechanisms.plant import catalogue, plant, write
 
 PLANTS = {
-    name: one if one.n == one.sizes[0] else plant(name, n=12) for name, one in catalogue().items()
+    name: machine_of_name if machine_of_name.n == machine_of_name.sizes[0] else plant(name, n=12)
+    for name, machine_of_name in catalogue().items()
 }
 NOT_READ = {"reach", "friction", "n", "contacts", "mechanisms"}
 PHYSICS = {  # what blows and springs are made of
@@ -94,9 +95,9 @@ def machine(one, how):
     )
     names = []
     for kind in kinds:
-        for each in kind:
-            if each.name:
-                names.append(each.name)
+        for joint_kind in kind:
+            if joint_kind.name:
+                names.append(joint_kind.name)
     model = compiled(spec)
     write(model, fields(model, values))
     return names, model
@@ -107,13 +108,13 @@ def sizes(model):
     changed, not which.
     """
     parts = [[[*model.opt.gravity]], [[*model.stat.center, model.stat.extent]]]
-    for found, arrays in zip(parts, (PHYSICS, SEEN), strict=True):
-        found += [
+    for counts, arrays in zip(parts, (PHYSICS, SEEN), strict=True):
+        counts += [
             getattr(model, f"{kind}_{array}") for kind, names in arrays.items() for array in names
         ]
     return [
-        weighed(np.concatenate([np.ravel(np.asarray(array, float)) for array in found]))
-        for found in parts
+        weighed(np.concatenate([np.ravel(np.asarray(array, float)) for array in counts]))
+        for counts in parts
     ]
 
 
@@ -126,9 +127,9 @@ def weighed(array):
 
 @pytest.mark.parametrize("name", recorded(__file__, PLANTS))
 def test_a_machine_says_and_shows_what_is_recorded(name, snapshot):
-    one = PLANTS[name]
-    lines = [said(one), equation(one)]
-    for how in ("alone", *one.contacts, *one.mechanisms):
-        names, model = machine(one, how)
+    machine_plant = PLANTS[name]
+    lines = [said(machine_plant), equation(machine_plant)]
+    for how in ("alone", *machine_plant.contacts, *machine_plant.mechanisms):
+        names, model = machine(machine_plant, how)
         lines.append(f"{how}: {len(names)} names, {' '.join(sizes(model))}")
     assert "\n".join(lines) == snapshot

@@ -54,10 +54,10 @@ def expected(p, x, v, u):
     """x'' by the plant's nominal equation, (n,), and the size of its largest term."""
     parameters = SimpleNamespace(**p.parameters)
     if isinstance(p.nominal, NominalModel):
-        others = (u,)
+        inputs = (u,)
     else:
-        others = ()
-    terms = [p.nominal(x, v, i, parameters, *others) for i in range(p.n)]
+        inputs = ()
+    terms = [p.nominal(x, v, i, parameters, *inputs) for i in range(p.n)]
     # that of the joint it moves with
     forces = []
     for i in range(p.n):
@@ -73,7 +73,7 @@ def within(p, x):
     """
     if not p.ranges:
         return x
-    low, high = np.array([each[1:] for each in p.ranges]).T
+    low, high = np.array([channel_range[1:] for channel_range in p.ranges]).T
     return low + (high - low) * (x + 2) / 4
 
 
@@ -104,13 +104,13 @@ def test_the_model_obeys_its_equation_with_its_own_and_with_other_parameters(nam
     rng = np.random.default_rng(1)
     p = sized(name, n)
     assert worst_error(p, p.load(), rng) < 1e-9
-    others = [changed(name, n, rng) for _ in range(2)]
-    for other in others:
-        assert worst_error(other, other.load(), rng) < 1e-9
+    changes = [changed(name, n, rng) for _ in range(2)]
+    for change in changes:
+        assert worst_error(change, change.load(), rng) < 1e-9
     model = p.load()  # as a jump does in a running simulation
-    write(model, others[0].fields(model, others[0].values({})))
+    write(model, changes[0].fields(model, changes[0].values({})))
     mujoco.mj_setConst(model, mujoco.MjData(model))
-    assert worst_error(others[0], model, rng) < 1e-9
+    assert worst_error(changes[0], model, rng) < 1e-9
 
 
 def test_a_long_chain_obeys_its_equation():
@@ -168,7 +168,8 @@ def test_nothing_moves_but_the_equation(name, n):
     assert not model.tendon_armature.any()
     assert model.jnt_limited.all() if p.ranges else not model.jnt_limited.any()
     np.testing.assert_array_equal(
-        model.jnt_range[joint_ids(model)] if p.ranges else (), [each[1:] for each in p.ranges]
+        model.jnt_range[joint_ids(model)] if p.ranges else (),
+        [channel_range[1:] for channel_range in p.ranges],
     )
     assert not model.geom_contype.any()
     assert not model.geom_conaffinity.any()

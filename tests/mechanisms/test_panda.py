@@ -136,7 +136,7 @@ def torques(q, v, a, payload=0.0, lp=0.04, links=LINKS):
             force = force + f
             moment = moment + cross(centre, f) + inertia @ dw + cross(w, inertia @ w)
         loads.append((force, moment))
-    found = np.zeros(7)
+    published = np.zeros(7)
     force = np.zeros(3)
     moment = np.zeros(3)
     for i in range(6, -1, -1):
@@ -145,8 +145,8 @@ def torques(q, v, a, payload=0.0, lp=0.04, links=LINKS):
             force = turns[i + 1] @ force
         force = force + loads[i][0]
         moment = moment + loads[i][1]
-        found[i] = moment[2]
-    return found
+        published[i] = moment[2]
+    return published
 
 
 @pytest.mark.parametrize("payload", [0.0, 2.0])
@@ -176,9 +176,9 @@ def test_gravity_torques_of_a_thousand_states_are_the_published_ones():
     still = np.zeros(7)
     for _ in range(STATES):
         q = rng.uniform(LOW, HIGH)
-        found = plant.nominal.dynamics(q, still, values)
-        np.testing.assert_allclose(found.g, torques(q, still, still), atol=1e-11)
-        np.testing.assert_array_equal(found.g, found.h)
+        dynamics = plant.nominal.dynamics(q, still, values)
+        np.testing.assert_allclose(dynamics.g, torques(q, still, still), atol=1e-11)
+        np.testing.assert_array_equal(dynamics.g, dynamics.h)
 
 
 def test_the_second_set_obeys_newton_and_euler():
@@ -200,11 +200,11 @@ def test_the_second_set_obeys_newton_and_euler():
 
 def test_a_blend_of_both_sets_has_the_blend_of_their_inertia():
     """M and g are linear in masses, first and second moments."""
-    found = []
+    inertias = []
     for delta in (0.0, 0.3, 1.0):
         plant = smc.plant("panda", delta=delta)
-        found.append(plant.nominal.dynamics(HOME + 0.2, np.zeros(7), plant.values({})))
-    first, blend, second = found
+        inertias.append(plant.nominal.dynamics(HOME + 0.2, np.zeros(7), plant.values({})))
+    first, blend, second = inertias
     np.testing.assert_allclose(blend.M, 0.7 * first.M + 0.3 * second.M, atol=1e-12)
     np.testing.assert_allclose(blend.g, 0.7 * first.g + 0.3 * second.g, atol=1e-12)
 
@@ -254,12 +254,12 @@ def test_the_flange_is_where_the_makers_frames_put_it():
 
 
 def test_a_mismatch_and_a_jump_add_kilograms_to_the_payload():
-    known = {"law": "computed_torque_sliding", "duration": 0.1, "control_period": 2e-3}
+    fields = {"law": "computed_torque_sliding", "duration": 0.1, "control_period": 2e-3}
     unknown = smc.Scenario(
         plant="panda",
         mismatch={"payload": 0.5},
         jump=smc.Jump(0.05, {"payload": 1.5}),
-        **known,
+        **fields,
     )
     assert unknown.factors(0) == {"payload": 0.5}
     late = unknown.factors(unknown.jump_step)
@@ -275,7 +275,7 @@ def test_a_mismatch_and_a_jump_add_kilograms_to_the_payload():
             smc.Scenario(
                 plant="panda",
                 mismatch={"payload": 0.5},
-                **known,
+                **fields,
             ),
         ]
     )
@@ -336,7 +336,7 @@ def test_the_probe_presses_on_a_surface_and_does_not_pass_through(kind):
         "duration": 1.2,
     }
     depths = {}
-    for trace in smc.run([smc.Scenario(**common, contact=each) for each in (kind, "none")]):
+    for trace in smc.run([smc.Scenario(**common, contact=surface) for surface in (kind, "none")]):
         assert trace.failure is None
         model = trace.scenario.plant.load()
         depth = []
@@ -345,8 +345,8 @@ def test_the_probe_presses_on_a_surface_and_does_not_pass_through(kind):
             data.qpos[:] = q
             mujoco.mj_kinematics(model, data)
             depth.append(way * (data.geom("probe").xpos[axis] - place) + 0.012)
-        asked = trace.scenario.contact
-        depths[asked[0].kind if asked else "none"] = np.array(depth)
+        contact = trace.scenario.contact
+        depths[contact[0].kind if contact else "none"] = np.array(depth)
     assert depths["none"].max() > 0.004
     assert depths[kind][0] < -0.05
     assert depths[kind].max() < 1e-3

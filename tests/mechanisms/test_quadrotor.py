@@ -61,9 +61,9 @@ def newton_euler(duration, period, p, wind):
         M = 6e-4 * math.sin(5.0 * t), 3e-4 * math.cos(7.0 * t), 2e-4 * math.sin(3.0 * t + 1.0)
         # as in the firmware's power distribution
         signs = np.array([(-1, -1, -1), (-1, 1, 1), (1, 1, -1), (1, -1, 1)])
-        asked = F / 4 + signs @ np.array([M[0] / p["a"], M[1] / p["a"], M[2] / p["c"]]) / 4
-        asked = np.clip(asked - max(0.0, asked.max() - p["fmax"]), 0.0, p["fmax"])
-        reported = np.array([speed(p, f) for f in asked])
+        thrusts = F / 4 + signs @ np.array([M[0] / p["a"], M[1] / p["a"], M[2] / p["c"]]) / 4
+        thrusts = np.clip(thrusts - max(0.0, thrusts.max() - p["fmax"]), 0.0, p["fmax"])
+        reported = np.array([speed(p, f) for f in thrusts])
 
         def rates(t, y, reported=reported):
             q = y[3:7] / np.linalg.norm(y[3:7])
@@ -226,7 +226,7 @@ def test_a_rotor_follows_its_equation_for_whatever_step(numbers, first, reported
             b = fall2
         return [a * (reported - W[0]) + b * (reported**2 - W[0] ** 2)]
 
-    found, slope = spun.py_func(rotor, first, reported, 0.3)
+    speed, slope = spun.py_func(rotor, first, reported, 0.3)
     expected = solve_ivp(
         rate,
         (0.0, 0.3),
@@ -235,14 +235,14 @@ def test_a_rotor_follows_its_equation_for_whatever_step(numbers, first, reported
         rtol=1e-12,
         atol=1e-9,
     ).y[0, -1]
-    assert found == pytest.approx(expected, rel=1e-9)
+    assert speed == pytest.approx(expected, rel=1e-9)
     assert slope == pytest.approx(
-        rate(0.0, [found])[0],
+        rate(0.0, [speed])[0],
         rel=1e-6,
         abs=1e-9,
     )
     half = spun.py_func(rotor, first, reported, 0.1)[0]
-    assert spun.py_func(rotor, half, reported, 0.2)[0] == pytest.approx(found, rel=1e-12)
+    assert spun.py_func(rotor, half, reported, 0.2)[0] == pytest.approx(speed, rel=1e-12)
 
 
 def falling(**fields):
@@ -320,8 +320,8 @@ def test_turbulence_has_its_rms_and_its_correlation_whatever_the_step(step):
     lag = 10  # samples, 0.5 s
     x = lag * 0.05 / times
     expected = np.exp(-x) * np.array([1.0, 1.0 - x[1] / 2, 1.0 - x[2] / 2])
-    found = (d[:, lag:] * d[:, :-lag]).mean(axis=(0, 1)) / (d**2).mean(axis=(0, 1))
-    np.testing.assert_allclose(found, expected, atol=0.05)
+    correlation = (d[:, lag:] * d[:, :-lag]).mean(axis=(0, 1)) / (d**2).mean(axis=(0, 1))
+    np.testing.assert_allclose(correlation, expected, atol=0.05)
     assert np.abs(np.corrcoef(d.reshape(-1, 3).T)[np.triu_indices(3, 1)]).max() < 0.15
 
 
@@ -350,13 +350,13 @@ def hovering(**parameters):
 
 
 def test_a_weak_battery_and_a_fading_rotor_lose_their_share_of_the_thrust():
-    whole = P["m"] * G
-    assert hovering() == pytest.approx(whole, rel=1e-12)
-    assert hovering(fade=0.4) == pytest.approx(0.9 * whole, rel=1e-6)
-    found = hovering(sag=0.32)
-    W = speed(P, whole / 4) * (1 - 0.32 * found)
-    assert found == pytest.approx(4 * (P["k1"] * W + P["k2"] * W * W), rel=1e-9)
-    assert 0.80 * whole < found < 0.85 * whole
+    weight = P["m"] * G
+    assert hovering() == pytest.approx(weight, rel=1e-12)
+    assert hovering(fade=0.4) == pytest.approx(0.9 * weight, rel=1e-6)
+    sagging = hovering(sag=0.32)
+    W = speed(P, weight / 4) * (1 - 0.32 * sagging)
+    assert sagging == pytest.approx(4 * (P["k1"] * W + P["k2"] * W * W), rel=1e-9)
+    assert 0.80 * weight < sagging < 0.85 * weight
 
 
 def test_a_payload_that_is_dropped_is_weight_until_then():

@@ -69,15 +69,15 @@ def double_pendulum(p, q, v, u):
     """(q1'', q2''): each link's mass at its centre, by Jacobians, its inertia and the rotors'."""
     mass = np.zeros((2, 2))
     force = np.array(u, float)
-    one = q[0]
+    first = q[0]
     two = q[0] + q[1]
     turns = (np.array([1.0, 0.0]), np.array([1.0, 1.0]))  # of each link, by the joints
     for m, I, r, arm, turn in (
         (p.m1, p.I1, p.r1, (), turns[0]),
         (p.m2, p.I2, p.r2, (p.l1,), turns[1]),
     ):
-        parts = [(length, one, turns[0]) for length in arm] + [
-            (r, one if turn is turns[0] else two, turn)
+        parts = [(length, first, turns[0]) for length in arm] + [
+            (r, first if turn is turns[0] else two, turn)
         ]
         jacobian = sum(length * np.outer([math.cos(a), math.sin(a)], by) for length, a, by in parts)
         drift = np.sum(
@@ -156,8 +156,8 @@ def test_nominal_is_the_equation_without_dry_friction(name):
     for x, v, u in list(states(name, plant, rng))[:50]:
         expected = acceleration(name, p, x, v, u)
         for i in range(plant.n):
-            others = (u,) if name == "double_pendulum" else ()
-            f, g = plant.nominal(x, v, i, p, *others)
+            inputs = (u,) if name == "double_pendulum" else ()
+            f, g = plant.nominal(x, v, i, p, *inputs)
             assert f + g * u[i % plant.driven] == pytest.approx(expected[i], rel=1e-10, abs=1e-10)
 
 
@@ -192,7 +192,7 @@ def test_two_seconds_of_free_motion_at_2_ms_follow_an_eighth_order_integration(n
         return np.concatenate([y[n:], acceleration(name, p, y[:n], y[n:], np.zeros(plant.driven))])
 
     start = np.concatenate([trace.x[0], trace.v[0]])
-    found = solve_ivp(
+    integrated = solve_ivp(
         slope,
         (0, 2),
         start,
@@ -201,14 +201,14 @@ def test_two_seconds_of_free_motion_at_2_ms_follow_an_eighth_order_integration(n
         rtol=1e-11,
         atol=1e-12,
     )
-    assert np.abs(found.y[:n].T - trace.x).max() < 1e-6
+    assert np.abs(integrated.y[:n].T - trace.x).max() < 1e-6
     assert np.ptp(trace.x) > 0.2
 
 
 def runge_kutta(p, x, torque, period=2e-3, seconds=2.0):
     """q of an independent RK4 at 2 ms of the double pendulum, (K+1, 2), under torques (K, 2)."""
     y = np.array([*x, 0.0, 0.0])
-    found = [x]
+    states = [x]
 
     def slope(y, u):
         return np.concatenate([y[2:], double_pendulum(p, y[:2], y[2:], u)])
@@ -219,8 +219,8 @@ def runge_kutta(p, x, torque, period=2e-3, seconds=2.0):
         k3 = slope(y + period / 2 * k2, u)
         k4 = slope(y + period * k3, u)
         y = y + period / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        found.append(y[:2])
-    return np.array(found)
+        states.append(y[:2])
+    return np.array(states)
 
 
 @functools.cache

@@ -67,7 +67,7 @@ def bound(trace):
     """
     assert trace.failure is None
     start = max(map(abs, trace.scenario.resolved.x0))
-    return max(each["ultimate_bound"] for each in smc.scores(trace).values()) / start
+    return max(scores["ultimate_bound"] for scores in smc.scores(trace).values()) / start
 
 
 def surface(trace, law=LAW):
@@ -130,13 +130,13 @@ def energies(p, trace):
     model = p.load()
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
     data = mujoco.MjData(model)
-    found = []
+    totals = []
     for x, v in zip(trace.x, trace.v, strict=True):
         data.qpos[:] = x
         data.qvel[:] = v
         mujoco.mj_forward(model, data)
-        found.append(data.energy.sum())
-    return np.array(found)
+        totals.append(data.energy.sum())
+    return np.array(totals)
 
 
 @PLANTS
@@ -278,7 +278,7 @@ def test_a_matched_force_is_tolerated_up_to_k_and_beyond_it_s_is_the_rest_over_r
     b = abs(LAW.a * g + gq)
     small = 0.8 * LAW.k / b
     large = 1.5 * LAW.k / b
-    held, left = smc.run(
+    held, beyond = smc.run(
         [
             scenario(
                 name,
@@ -290,7 +290,7 @@ def test_a_matched_force_is_tolerated_up_to_k_and_beyond_it_s_is_the_rest_over_r
     )
     assert bound(held) <= 0.05
     assert np.abs(surface(held)[-1000:]).max() <= 3e-3 * LAW.k
-    np.testing.assert_allclose(np.abs(surface(left)[-1000:]), 0.5 * LAW.k / LAW.rate, rtol=0.02)
+    np.testing.assert_allclose(np.abs(surface(beyond)[-1000:]), 0.5 * LAW.k / LAW.rate, rtol=0.02)
 
 
 ROUTH = [  # a L, c1, c2

@@ -95,8 +95,8 @@ def test_a_delay_of_all_actuators_is_an_input_delay_to_the_last_bit(integrator, 
     plant = arm(SERVO % late, MOTOR % late, timestep="4e-3")
     fields = {"duration": 1.0, "integrator": integrator, "sensor": sensor}
     own = run(plant, **fields)
-    given = run(arm(SERVO % "", MOTOR % ""), input_delay=0.012, **fields)
-    np.testing.assert_array_equal(own.x, given.x)
+    by_input_delay = run(arm(SERVO % "", MOTOR % ""), input_delay=0.012, **fields)
+    np.testing.assert_array_equal(own.x, by_input_delay.x)
 
 
 def test_all_stages_of_rk4_read_one_command_where_the_last_of_mujoco_reads_the_next():
@@ -166,9 +166,9 @@ def link(actuator, **channel):
 def test_a_delay_is_that_which_mujoco_has_at_the_timestep_of_the_file(delay, samples, dead_time):
     part = f'<motor joint="j" ctrlrange="-3 3" delay="{delay}" nsample="{samples}"/>'
     scenario = smc.Scenario(plant=link(part), law="pid")
-    (kept,) = scenario.actuator
-    assert isinstance(kept, CommandDelay)
-    assert kept.dead_time == pytest.approx(dead_time)
+    (of_file,) = scenario.actuator
+    assert isinstance(of_file, CommandDelay)
+    assert of_file.dead_time == pytest.approx(dead_time)
     assert scenario.efforts == ("N m",)
     assert scenario.limits == (3.0,)
 
@@ -203,22 +203,22 @@ BARE = """<mujoco><compiler angle="radian"/><option timestep="1e-3" gravity="0 0
 )
 def test_predicted_chattering_has_the_delay_and_the_filter_of_an_actuator(own, given):
     fields = {"law": smc.law("classical", k=0.5, c=8.0), "x0": 0.1}
-    kept = smc.plant_from(BARE.replace("<motor", "<general") % own, ["j"])
-    predicted = smc.design.chattering(smc.Scenario(plant=kept, **fields))
+    of_file = smc.plant_from(BARE.replace("<motor", "<general") % own, ["j"])
+    predicted = smc.design.chattering(smc.Scenario(plant=of_file, **fields))
     plain = smc.Scenario(plant=smc.plant_from(BARE % "", ["j"]), **fields, **given)
     assert predicted.frequency == pytest.approx(smc.design.chattering(plain).frequency)
 
 
 def test_the_default_step_divides_the_delay_of_an_actuator():
-    given = {"plant": link(MOTOR.replace('"b"', '"j"') % ""), "law": "pid"}
+    fields = {"plant": link(MOTOR.replace('"b"', '"j"') % ""), "law": "pid"}
     steps = []
     for delay in (0.02, 0.0025, 1.0 / 240.0):
-        steps.append(smc.Scenario(actuator=CommandDelay(delay), **given).resolved.physics_step)
+        steps.append(smc.Scenario(actuator=CommandDelay(delay), **fields).resolved.physics_step)
     assert steps == [1e-3, 5e-4, 2.5e-4]
     with pytest.raises(ScenarioError, match=r"dead_time 0.003 s would be 0.005 s at .* divides it"):
-        smc.Scenario(actuator=CommandDelay(0.003), physics_step=5e-3, control_period=5e-3, **given)
+        smc.Scenario(actuator=CommandDelay(0.003), physics_step=5e-3, control_period=5e-3, **fields)
     with pytest.raises(ScenarioError, match=r"before DCMotor, whose state .* give input_delay"):
-        smc.Scenario(actuator=(CommandDelay(0.02), smc.DCMotor()), **given)
+        smc.Scenario(actuator=(CommandDelay(0.02), smc.DCMotor()), **fields)
 
 
 def test_a_delay_that_is_interpolated_is_that_of_mujoco():

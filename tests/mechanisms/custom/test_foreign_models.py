@@ -67,10 +67,10 @@ def model(name: str) -> tuple:
     package, file, channels = ROAD[name]
     if package is None:
         return file, channels
-    found = importlib.util.find_spec(package)
-    if found is None or not found.submodule_search_locations:
+    module = importlib.util.find_spec(package)
+    if module is None or not module.submodule_search_locations:
         pytest.skip(f"{package} is not installed")
-    return Path(found.submodule_search_locations[0]) / file, channels
+    return Path(module.submodule_search_locations[0]) / file, channels
 
 
 FOREIGN = pytest.mark.filterwarnings(
@@ -121,8 +121,8 @@ def test_a_foreign_model_is_drawn_seen_tuned_and_written_in_c(name, tmp_path):
     labels = []
     for ax in smc.figure(traces, tmp_path / "a.png").axes:
         labels.append(ax.get_ylabel())
-    shown = {label.split(" e ")[0] for label in labels} & {*joints}
-    assert len(shown) == min(len(joints), MAX_WORST), labels  # of many those with large errors
+    labelled = {label.split(" e ")[0] for label in labels} & {*joints}
+    assert len(labelled) == min(len(joints), MAX_WORST), labels  # of many those with large errors
     for label in labels:
         assert "mean" not in label
     if gl.missing() is None:

@@ -73,10 +73,10 @@ def newton_euler(duration, period):
         Mz = 2e-4 * math.sin(3.0 * t + 1.0)
         # as in the firmware's power distribution
         signs = np.array([(-1, -1, -1), (-1, 1, 1), (1, 1, -1), (1, -1, 1)])
-        asked = F / 4 + signs @ np.array([Mx / LEVER, My / LEVER, Mz / YAW]) / 4
-        asked = np.clip(asked - max(0.0, asked.max() - MOST), 0.0, MOST)
+        thrusts = F / 4 + signs @ np.array([Mx / LEVER, My / LEVER, Mz / YAW]) / 4
+        thrusts = np.clip(thrusts - max(0.0, thrusts.max() - MOST), 0.0, MOST)
 
-        def rates(t, y, asked=asked):
+        def rates(t, y, thrusts=thrusts):
             q = y[3:7] / np.linalg.norm(y[3:7])
             v = y[7:10]
             w = y[10:13]
@@ -94,7 +94,7 @@ def newton_euler(duration, period):
                     dq,
                     acceleration,
                     np.linalg.solve(J, torque - np.cross(w, J @ w)),
-                    (asked - f) / LAG,
+                    (thrusts - f) / LAG,
                 ]
             )
 
@@ -199,14 +199,14 @@ def test_rotation_vectors_and_quaternions_are_those_of_scipy():
         Rotation.from_rotvec([3.1, 0.5, 0.0]),
     ]:
         q = turn.as_quat(scalar_first=True)
-        other = Rotation.random(rng=random)
+        second = Rotation.random(rng=random)
         np.testing.assert_allclose(rotation.rotation_vector(*q), turn.as_rotvec(), atol=1e-14)
         assert rotation.rotation_vector(*-q) == pytest.approx(
             rotation.rotation_vector(*q), abs=1e-14
         )
-        error = rotation.relative(tuple(q), tuple(other.as_quat(scalar_first=True)))
+        error = rotation.relative(tuple(q), tuple(second.as_quat(scalar_first=True)))
         np.testing.assert_allclose(
-            rotation.rotation_vector(*error), (turn.inv() * other).as_rotvec(), atol=1e-13
+            rotation.rotation_vector(*error), (turn.inv() * second).as_rotvec(), atol=1e-13
         )
         np.testing.assert_allclose(
             rotation.turned(tuple(q), 1.0, 2.0, 3.0), turn.apply([1.0, 2.0, 3.0]), atol=1e-14
@@ -430,18 +430,18 @@ def test_scores_are_of_the_position_the_heading_and_the_actuators(drone):
             duration=6.0,
         )
     )
-    found = smc.score(trace)
+    scores = smc.score(trace)
     e = trace.e
     t = trace.t
-    assert found["itae"] == pytest.approx(np.trapezoid(t * np.abs(e[:, :3]).sum(axis=1), t))
-    assert found["tv"] == pytest.approx(np.abs(np.diff(trace.applied, axis=0)).sum(axis=0).max())
+    assert scores["itae"] == pytest.approx(np.trapezoid(t * np.abs(e[:, :3]).sum(axis=1), t))
+    assert scores["tv"] == pytest.approx(np.abs(np.diff(trace.applied, axis=0)).sum(axis=0).max())
     last = []
     for part, size in (
         (e[:, :3], 0.2),
         (e[:, 5:], 0.3),
     ):
         last.append(t[np.flatnonzero(np.abs(part).max(axis=1) > 0.02 * size)[-1] + 1])
-    assert found["settling_time"] == pytest.approx(max(last))
+    assert scores["settling_time"] == pytest.approx(max(last))
     pushed = smc.run(
         smc.Scenario(
             plant=drone,
@@ -461,9 +461,9 @@ def test_the_objective_of_a_free_body_is_that_of_its_traces(drone):
         u_max=0.48,
     )
     cases = goal.scenarios(drone, smc.law("geometric"))
-    (made,) = Evaluator(goal, cases, ("kx", "kR"))([(5.0, 300.0)])
+    (evaluation,) = Evaluator(goal, cases, ("kx", "kR"))([(5.0, 300.0)])
     traces = smc.run(
-        [dataclasses.replace(one, law=smc.law("geometric", kx=5.0, kR=300.0)) for one in cases]
+        [dataclasses.replace(case, law=smc.law("geometric", kx=5.0, kR=300.0)) for case in cases]
     )
     tracking = variation = 0.0
     for trace in traces:
@@ -472,9 +472,9 @@ def test_the_objective_of_a_free_body_is_that_of_its_traces(drone):
                 np.trapezoid(trace.t * np.abs(part).sum(axis=1), trace.t) / np.abs(part[0]).sum()
             )
         variation += np.max(np.abs(np.diff(trace.u, axis=0)).sum(axis=0) / drone.limits) / 0.4
-    assert made.tracking == pytest.approx(tracking)
-    assert made.variation == pytest.approx(variation)
-    assert made.objective == goal.evaluation(cases[0], traces).objective
+    assert evaluation.tracking == pytest.approx(tracking)
+    assert evaluation.variation == pytest.approx(variation)
+    assert evaluation.objective == goal.evaluation(cases[0], traces).objective
 
 
 SLUNG = """<mujoco><worldbody><body name="body"><freejoint/><site name="a" pos=".1 .1 0"/>

@@ -160,10 +160,10 @@ def test_a_law_reads_the_whole_mass_matrix_and_gives_u_of_the_driven():
 def test_where_a_base_is_counts_only_if_the_reference_says_where_it_should_be(gains):
     plant = wheels()
     law = state_feedback(np.array(gains["wheels"]), "balance")
-    kept = smc.Constant(0.0)
-    asked = {"left": kept, "right": kept, "base_x": smc.Constant(0.3)}
+    still = smc.Constant(0.0)
+    with_base = {"left": still, "right": still, "base_x": smc.Constant(0.3)}
     bounds = []
-    for reference in (None, asked):
+    for reference in (None, with_base):
         scenario = smc.Scenario(
             plant=plant,
             law=law,

@@ -104,16 +104,16 @@ def test_a_locked_joint_leaves_every_pose_and_the_channel_s_load(name, seed):
     model, data, dof = posed(name, x)
     locked = plant(name, "locked").load()
     assert locked.nv == locked.nu == 1
-    at = mujoco.MjData(locked)
-    at.qpos[:] = x
-    mujoco.mj_forward(locked, at)
-    np.testing.assert_allclose(at.xpos, data.xpos, atol=1e-12)
-    np.testing.assert_allclose(at.xmat, data.xmat, atol=1e-12)
-    wanted = data.qfrc_bias[dof] - data.qfrc_passive[dof]
-    assert at.qfrc_bias[0] - at.qfrc_passive[0] == pytest.approx(wanted, abs=1e-10)
+    data_locked = mujoco.MjData(locked)
+    data_locked.qpos[:] = x
+    mujoco.mj_forward(locked, data_locked)
+    np.testing.assert_allclose(data_locked.xpos, data.xpos, atol=1e-12)
+    np.testing.assert_allclose(data_locked.xmat, data.xmat, atol=1e-12)
+    load = data.qfrc_bias[dof] - data.qfrc_passive[dof]
+    assert data_locked.qfrc_bias[0] - data_locked.qfrc_passive[0] == pytest.approx(load, abs=1e-10)
     # links that never met do not meet now
     pairs = {tuple(model.geom_bodyid[contact.geom]) for contact in data.contact}
-    assert {tuple(locked.geom_bodyid[contact.geom]) for contact in at.contact} <= pairs
+    assert {tuple(locked.geom_bodyid[contact.geom]) for contact in data_locked.contact} <= pairs
     assert plant(name, "locked").unmodelled == ""
 
 
@@ -128,19 +128,19 @@ def moved(made):
     data.qpos[:] = model.key_qpos[0] if model.nkey else model.qpos0
     first = data.qpos.copy()
     joint = model.joint(model.actuator_trnid[-1, 0])
-    at = joint.qposadr[0]
+    address = joint.qposadr[0]
     dof = joint.dofadr[0]
-    (goal,), (data.qpos[at],) = made.origin, scales.beside_goal(made)
+    (goal,), (data.qpos[address],) = made.origin, scales.beside_goal(made)
     far = np.zeros(model.nq)
     load = scales.at_goal(made).load[0]
     for _ in range(4000):
         data.ctrl[-1] = load + model.dof_M0[dof] * (
-            400.0 * (goal - data.qpos[at]) - 40.0 * data.qvel[dof]
+            400.0 * (goal - data.qpos[address]) - 40.0 * data.qvel[dof]
         )
         mujoco.mj_step(model, data)
         far = np.maximum(far, np.abs(data.qpos - first))
     names = [model.joint(i).name for i in range(model.njnt)]
-    return {n: far[i] for i, n in enumerate(names) if n != joint.name}, data.qpos[at] - goal
+    return {n: far[i] for i, n in enumerate(names) if n != joint.name}, data.qpos[address] - goal
 
 
 @pytest.mark.parametrize("mode", [None, *others.OTHERS])
@@ -174,8 +174,8 @@ fromto="0 0 0 0 0 -.3" contype="0"/></body></body></worldbody><actuator><motor j
 def test_a_servo_whose_range_leaves_out_0_holds_as_in_mujoco_alone(servo, limits, ctrl, held):
     """Against a loop of MuJoCo's own, whose servo has the keyframe's place as its command."""
     text = KNEE.format(servo=servo, limits=limits, ctrl=ctrl)
-    made = smc.plant_from(text, ["hip"], keyframe="home", others="file")
-    trace = smc.run(smc.Scenario(plant=made, law="none", x0=0.4, duration=8.0))
+    machine = smc.plant_from(text, ["hip"], keyframe="home", others="file")
+    trace = smc.run(smc.Scenario(plant=machine, law="none", x0=0.4, duration=8.0))
     plain = text.replace(limits, "").replace(f"<{servo} ", "<position ")
     model = mujoco.MjModel.from_xml_string(plain)
     data = mujoco.MjData(model)
@@ -193,28 +193,30 @@ def test_text_and_record_make_the_same_plant_again(name, mode, tmp_path, monkeyp
     text, joint = MACHINES[name]
     monkeypatch.chdir(tmp_path)
     (tmp_path / "m.xml").write_text(text)
-    made = as_plant(f"m.xml:{joint}(motor)@home+{mode}")
-    assert made.argument == f"m.xml:{joint}(motor)@home+{mode}"
-    assert as_plant(made.argument).spec().to_xml() == made.spec().to_xml()
-    again = scenario_json.restore(scenario_json.describe(smc.Scenario(plant=made, law="pid"))).plant
-    assert again.spec().to_xml() == made.spec().to_xml()
-    assert again.rest == made.rest
-    assert again.argument == made.argument
+    machine = as_plant(f"m.xml:{joint}(motor)@home+{mode}")
+    assert machine.argument == f"m.xml:{joint}(motor)@home+{mode}"
+    assert as_plant(machine.argument).spec().to_xml() == machine.spec().to_xml()
+    again = scenario_json.restore(
+        scenario_json.describe(smc.Scenario(plant=machine, law="pid"))
+    ).plant
+    assert again.spec().to_xml() == machine.spec().to_xml()
+    assert again.rest == machine.rest
+    assert again.argument == machine.argument
 
 
 def test_a_text_takes_the_keyframe_and_holds_other_motors_and_says_so(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "m.xml").write_text(ARM)
-    with pytest.warns(ScenarioWarning) as told:
-        made = as_plant("m.xml:b")
-    assert made == smc.plant_from("m.xml", ["b"], keyframe="home", others="held")
-    assert made.argument == "m.xml:b@home+held"
-    said = " ".join(str(one.message) for one in told)
+    with pytest.warns(ScenarioWarning) as caught:
+        machine = as_plant("m.xml:b")
+    assert machine == smc.plant_from("m.xml", ["b"], keyframe="home", others="held")
+    assert machine.argument == "m.xml:b@home+held"
+    said = " ".join(str(warning.message) for warning in caught)
     assert "@home after the joints" in said
     assert "nothing commands 2 motors of m.xml (c, roll), so a stiff PD holds" in said
     with warnings.catch_warnings():
         warnings.filterwarnings("error", ".*without this line")
-        assert as_plant(made.argument) == made
+        assert as_plant(machine.argument) == machine
     # of Python's plant, which takes neither, the text says so
     with pytest.warns(ScenarioWarning, match="nothing commands"):
         drawn = smc.plant_from("m.xml", ["b"])
@@ -241,16 +243,18 @@ def test_a_keyframe_without_a_name_is_told_in_a_text(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "m.xml").write_text(ARM.replace('<key name="home"', "<key"))
     with pytest.warns(ScenarioWarning, match="keyframe without a name.*give the keyframe a name"):
-        made = as_plant("m.xml:b+held")
+        machine = as_plant("m.xml:b+held")
     with warnings.catch_warnings():
         warnings.filterwarnings("error", ".*without a name")
-        assert as_plant("m.xml:b@+held") == made
+        assert as_plant("m.xml:b@+held") == machine
 
 
 def test_motors_that_nothing_commands_are_told_with_a_cure_that_works():
-    with pytest.warns(ScenarioWarning, match="nothing commands, 'c' and 'roll'") as told:
+    with pytest.warns(ScenarioWarning, match="nothing commands, 'c' and 'roll'") as caught:
         plant("arm", None)
-    text = next(str(one.message) for one in told if "nothing commands" in str(one.message))
+    text = next(
+        str(warning.message) for warning in caught if "nothing commands" in str(warning.message)
+    )
     for word in re.findall(r"'(held|locked|file)'", text):
         with warnings.catch_warnings():
             warnings.filterwarnings("error", ".*nothing commands")
@@ -267,19 +271,19 @@ def two_links(stiffness):
 
 
 def test_scales_are_those_of_two_links_by_hand():
-    made = two_links(0.0)
-    at = scales.at_goal(made)
+    machine = two_links(0.0)
+    moments = scales.at_goal(machine)
     ball = 0.4 * 0.05**2  # of each, over its mass
     b = 0.3**2 + ball
     M = np.array([[2 * 0.16 + 2 * ball + 0.7**2 + ball, 0.7 * 0.3 + ball], [0.7 * 0.3 + ball, b]])
-    np.testing.assert_allclose(at.M, M, rtol=1e-9)
-    assert at.load == pytest.approx(-9.81 * 0.3, rel=1e-9)
-    assert at.D[1, 1] == pytest.approx(0.3, rel=1e-6)
+    np.testing.assert_allclose(moments.M, M, rtol=1e-9)
+    assert moments.load == pytest.approx(-9.81 * 0.3, rel=1e-9)
+    assert moments.D[1, 1] == pytest.approx(0.3, rel=1e-6)
     need = 2 * 9.81 * 0.3 + (60 * b + 8 * 0.3) * 0.3 + 1.5 * 0.2
-    assert scales.needs(made) == (pytest.approx(need, rel=0.05),)
-    assert smc.Scenario(plant=made, law="pid").limits == scales.needs(made)
+    assert scales.needs(machine) == (pytest.approx(need, rel=0.05),)
+    assert smc.Scenario(plant=machine, law="pid").limits == scales.needs(machine)
     # a limp joint answers freely, a stiff one as if it were locked
-    assert scales.mobility(made, 1.0, 0.3)[0] == pytest.approx(np.linalg.inv(M)[1, 1], rel=1e-2)
+    assert scales.mobility(machine, 1.0, 0.3)[0] == pytest.approx(np.linalg.inv(M)[1, 1], rel=1e-2)
     assert scales.mobility(two_links(1e6), 1.0, 0.3)[0] == pytest.approx(1.0 / b, rel=1e-3)
 
 
@@ -295,35 +299,35 @@ def test_the_goal_is_in_the_range_and_runs_start_beside_it(key, limits, goal, to
     text = ARM.replace('range="-2.4 -.5"', f'range="{limits}"')
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        made = smc.plant_from(
+        machine = smc.plant_from(
             text,
             ["c"],
             keyframe=key,
             others="locked",
         )
     assert any("outside its range" in str(w.message) for w in caught) == told
-    assert made.origin == made.x0 == (goal,)
-    assert np.all(smc.run(smc.Scenario(plant=made, law="pid", duration=0.01)).r == goal)
+    assert machine.origin == machine.x0 == (goal,)
+    assert np.all(smc.run(smc.Scenario(plant=machine, law="pid", duration=0.01)).r == goal)
     low, high = map(float, limits.split())
     room = max(high - goal, goal - low)
-    for run in smc.grid(made, PID, seeds=4):
+    for run in smc.grid(machine, PID, seeds=4):
         (x,) = run.resolved.x0
         assert abs(x - goal) == pytest.approx(min(0.3, 0.6 * room), rel=0.201)
         assert low < x < high
-    given = smc.grid(
-        made,
+    started = smc.grid(
+        machine,
         PID,
         starts=smc.starts(x0=goal + 0.01),
         seeds=3,
     )[2].resolved.x0[0]
-    assert 0.008 <= given - goal <= 0.012
+    assert 0.008 <= started - goal <= 0.012
     for beyond in (smc.Constant(high + 0.1), smc.Sine(high - low, 9.0, about="goal")):
         with pytest.raises(smc.ScenarioError, match=f"'c' of arm .* {re.escape(f'{low:g}')}"):
-            smc.Scenario(plant=made, law="pid", reference=beyond)
+            smc.Scenario(plant=machine, law="pid", reference=beyond)
 
 
 def test_joints_left_out_hold_their_goal_and_a_sine_is_about_it():
-    made = smc.plant_from(
+    machine = smc.plant_from(
         ARM,
         {"b": {}, "c": {}},
         keyframe="home",
@@ -334,7 +338,7 @@ def test_joints_left_out_hold_their_goal_and_a_sine_is_about_it():
     for reference in ({"c": sine}, {"c": smc.Constant(-1.1) + smc.Sine(0.1, 3.0)}):
         runs.append(
             smc.Scenario(
-                plant=made,
+                plant=machine,
                 law="pid",
                 reference=reference,
                 duration=0.5,
@@ -342,8 +346,8 @@ def test_joints_left_out_hold_their_goal_and_a_sine_is_about_it():
         )
     assert runs[0] == runs[1] == scenario_json.restore(scenario_json.describe(runs[0]))
     trace = smc.run(runs[0])
-    wanted = np.stack([0 * trace.t - 0.6, -1.1 + 0.1 * np.sin(3.0 * trace.t)], axis=1)
-    np.testing.assert_allclose(trace.r, wanted, atol=1e-12)
+    expected = np.stack([0 * trace.t - 0.6, -1.1 + 0.1 * np.sin(3.0 * trace.t)], axis=1)
+    np.testing.assert_allclose(trace.r, expected, atol=1e-12)
     with pytest.raises(smc.ScenarioError, match="only a reference"):
         dataclasses.replace(runs[0], disturbance=sine)
 
@@ -351,10 +355,10 @@ def test_joints_left_out_hold_their_goal_and_a_sine_is_about_it():
 @pytest.mark.parametrize("mode", [pytest.param("held", marks=pytest.mark.slow), "locked"])
 @pytest.mark.parametrize("name", ["arm", pytest.param("hand", marks=pytest.mark.slow)])
 def test_a_joint_is_tuned_and_settles(name, mode):
-    made = plant(name, mode)
+    machine = plant(name, mode)
     goal = search.Objective(**FAST)
     tuned = smc.tune(
-        made,
+        machine,
         "pid",
         budget=8,
         searches=1,
@@ -362,7 +366,7 @@ def test_a_joint_is_tuned_and_settles(name, mode):
         threads=1,
     )
     assert tuned.scales["X"] == pytest.approx(0.3)
-    trace = smc.run(smc.grid(made, tuned.law, duration=3.0)[0])
+    trace = smc.run(smc.grid(machine, tuned.law, duration=3.0)[0])
     assert np.abs(trace.e[-500:]).max() < 0.05
     assert arrived(trace)
     assert not leans(trace)
@@ -397,9 +401,9 @@ def test_a_light_base_on_springs_does_not_fall_and_its_bound_is_told_once(capfd)
     assert capfd.readouterr().err == ""
     laws = [smc.law(name) for name in ("pid", "adrc")]
     smc.grid(light, laws)  # here the warning is ignored
-    with pytest.warns(ScenarioWarning, match="nothing limits the force on joint 'h'") as told:
+    with pytest.warns(ScenarioWarning, match="nothing limits the force on joint 'h'") as caught:
         smc.grid(light, laws, seeds=2)
-    assert len(told) == 1
+    assert len(caught) == 1
 
 
 def test_a_robot_that_falls_is_told_so_and_never_settles(monkeypatch, tmp_path):
@@ -419,14 +423,14 @@ def test_a_robot_that_falls_is_told_so_and_never_settles(monkeypatch, tmp_path):
     monkeypatch.setattr(search, "failure_of_law", None)  # told before the first run of a search
     with pytest.warns(ScenarioWarning, match="'locked'"), pytest.raises(TypeError, match="NoneT"):
         smc.tune(limp, "pid", searches=1)
-    asked = {"laws": ["pid"], "quick": True, "out": tmp_path}
+    fields = {"laws": ["pid"], "quick": True, "out": tmp_path}
     with pytest.raises(smc.ScenarioError, match=r"no law of a joint .* falling=True"):
-        smc.which(limp, **asked)
+        smc.which(limp, **fields)
     with (
         pytest.warns(ScenarioWarning, match="nothing lim"),
         pytest.raises(TypeError, match="NoneT"),
     ):
-        smc.which(limp, falling=True, **asked)
+        smc.which(limp, falling=True, **fields)
     assert scales.falls(plant("walker", "locked")) == ""
 
 
@@ -503,13 +507,13 @@ SKI = '<geom name="ski" type="box" size=".5 .02 .01" pos="0 0 -.295" mass=".1"/>
 @pytest.mark.parametrize("low", [-3, -40])
 def test_a_start_that_nobody_chose_is_clear_of_the_floor_too(low):
     leg = smc.plant_from(LEG.format(low=low, ski=""), ["knee"], others="locked")
-    given = scales.beside_goal(leg)
-    assert -0.3 <= given[0] < 0.0
+    start = scales.beside_goal(leg)
+    assert -0.3 <= start[0] < 0.0
     run = smc.grid(leg, PID, seeds=9, duration=0.05)
-    assert len({one.x0 for one in run}) == len(run)
-    for one in run:
+    assert len({scenario.x0 for scenario in run}) == len(run)
+    for scenario in run:
         model = layout.loaded(leg)
-        data = layout.posed(model, one.x0)
+        data = layout.posed(model, scenario.x0)
         mujoco.mj_forward(model, data)
         assert min((contact.dist for contact in data.contact), default=0.0) > -1e-3
     with pytest.raises(smc.ScenarioError, match=r"x0 \(0.3,\) of leg .*24 mm inside .*another x0"):
@@ -548,11 +552,11 @@ def test_a_robot_that_rises_from_its_floor_is_taken_and_told(mode, x0, foot):
     with pytest.warns(
         ScenarioWarning, match=r"start of the text of model 'dog' has 'floor' \d+ mm inside"
     ) as said:
-        made = smc.plant_from(text, knee, keyframe="home", others=mode)
-    inside = next(str(one.message) for one in said if "inside" in str(one.message))
-    wanted = 1e3 * (0.15 * math.cos(x0 or 0.0) + 0.05 - 0.182)
-    assert int(re.search(r"(\d+) mm", inside)[1]) == pytest.approx(wanted, abs=1)  # pyright: ignore[reportOptionalSubscript]
-    assert smc.run(smc.Scenario(plant=made, law=PID, duration=0.5)).failure is None
+        machine = smc.plant_from(text, knee, keyframe="home", others=mode)
+    inside = next(str(warning.message) for warning in said if "inside" in str(warning.message))
+    depth = 1e3 * (0.15 * math.cos(x0 or 0.0) + 0.05 - 0.182)
+    assert int(re.search(r"(\d+) mm", inside)[1]) == pytest.approx(depth, abs=1)  # pyright: ignore[reportOptionalSubscript]
+    assert smc.run(smc.Scenario(plant=machine, law=PID, duration=0.5)).failure is None
     with pytest.raises(smc.ScenarioError, match="18 mm inside 'foot0': give a keyframe"):
         smc.plant_from(text, knee, keyframe="home", others="locked")
 
@@ -578,9 +582,11 @@ def test_a_link_of_a_urdf_may_touch_all_but_the_one_that_carries_it(tmp_path, pa
             with pytest.raises(smc.ScenarioError, match=r"mm inside .*one of these links no <coll"):
                 smc.plant_from(file, {"j": smc.Channel(motor=True)}, others=mode)
             continue
-        made = smc.plant_from(file, {"j": smc.Channel(motor=True)}, others=mode)
+        machine = smc.plant_from(file, {"j": smc.Channel(motor=True)}, others=mode)
         law = smc.law("pid", kp=9.0, ki=1.0, kd=2.0)
-        moved.append(smc.run(smc.Scenario(plant=made, law=law, x0=0.3, u_max=5.0, duration=0.3)).x)
+        moved.append(
+            smc.run(smc.Scenario(plant=machine, law=law, x0=0.3, u_max=5.0, duration=0.3)).x
+        )
     assert np.ptp(moved[0]) > 0.1
     np.testing.assert_allclose(moved[0], moved[-1], atol=2e-4)
 
@@ -634,7 +640,7 @@ def test_an_assumed_bound_holds_a_joint_wherever_its_limits_let_it_be(length):
     text = f"""<mujoco><compiler angle="radian"/><worldbody><body><joint name="j" axis="0 1 0"
      range="0 1.57"/><geom pos="0 0 {length}" size=".005" mass=".02" contype="0" conaffinity="0"/>
      </body></worldbody></mujoco>"""
-    made = smc.plant_from(text, {"j": smc.Channel(motor=True)})
-    assert scales.needs(made)[0] == pytest.approx(2.0 * weight, rel=0.06)
+    machine = smc.plant_from(text, {"j": smc.Channel(motor=True)})
+    assert scales.needs(machine)[0] == pytest.approx(2.0 * weight, rel=0.06)
     law = smc.law("pid", kp=5.0, kd=0.02, ki=0.0)
-    assert abs(smc.run(smc.Scenario(plant=made, law=law, x0=0.3, duration=2.0)).x[-1, 0]) < 0.01
+    assert abs(smc.run(smc.Scenario(plant=machine, law=law, x0=0.3, duration=2.0)).x[-1, 0]) < 0.01

@@ -59,8 +59,8 @@ def test_a_text_says_of_a_channel_what_python_says(folder):
     seen = as_plant("mine.xml:lift(motor)+tilt( measured )")
     assert seen == smc.plant_from("mine.xml", {"lift": smc.Channel(motor=True)}, measured=["tilt"])
     assert seen.argument == "mine.xml:lift(motor)+tilt(measured)"
-    both = as_plant("mine.xml:lift(motor,u_max=30)+tilt(motor, u_max=5)")
-    assert smc.Scenario(plant=both, law="classical").resolved.u_max == (30.0, 5.0)
+    of_text = as_plant("mine.xml:lift(motor,u_max=30)+tilt(motor, u_max=5)")
+    assert smc.Scenario(plant=of_text, law="classical").resolved.u_max == (30.0, 5.0)
 
 
 def test_a_urdf_keeps_its_visual_shapes_and_its_motion(folder):
@@ -76,9 +76,9 @@ def test_a_urdf_keeps_its_visual_shapes_and_its_motion(folder):
 
 
 def test_a_joint_of_a_urdf_with_an_effort_gets_an_ideal_motor(folder):
-    with pytest.warns(ScenarioWarning) as told:
+    with pytest.warns(ScenarioWarning) as caught:
         plant = as_plant("arm.urdf:j1")
-    said = " ".join(str(one.message) for one in told)
+    said = " ".join(str(warning.message) for warning in caught)
     assert "no actuators, so joint 'j1' gets an ideal motor" in said
     assert plant.argument == "arm.urdf:j1(motor)+held"
     assert plant == as_plant("arm.urdf:j1(motor)+held")

@@ -60,8 +60,8 @@ def test_a_law_does_not_know_of_a_payload(arm):
 
 
 def test_a_payload_that_no_body_can_have_is_refused(arm):
-    for name, told in (("hnd", "did you mean 'hand.payload'"), ("world", "unknown parameter")):
-        with pytest.raises(smc.ScenarioError, match=told):
+    for name, words in (("hnd", "did you mean 'hand.payload'"), ("world", "unknown parameter")):
+        with pytest.raises(smc.ScenarioError, match=words):
             smc.Scenario(plant=arm, mismatch={f"{name}.payload": 1.0}, **RUN)
     with pytest.raises(smc.ScenarioError, match=r"becomes -0\.1: give other"):
         smc.Scenario(plant=arm, mismatch={"hand.payload": -0.1}, **RUN)
@@ -80,17 +80,17 @@ def test_an_adversary_chooses_a_payload_and_a_friction_of_an_own_model(arm):
 def test_a_payload_is_found_from_a_log(arm):
     motion = sines([0.0, 0.0], [0.5, 0.3], [0.4, 1.1])
     run = log(HEAVY, {}, motion, [40.0, 15.0], [3.0, 1.0], joints=("lift", "bend"), duration=2.0)
-    found = smc.identify(arm, run, ["hand.payload"])
-    off = abs(found.values["hand.payload"] - 0.4)
-    assert off < max(2.0 * found.errors["hand.payload"], 1e-3)
+    identified = smc.identify(arm, run, ["hand.payload"])
+    off = abs(identified.values["hand.payload"] - 0.4)
+    assert off < max(2.0 * identified.errors["hand.payload"], 1e-3)
 
 
 def test_figures_tell_a_run_with_a_payload_from_one_without(arm):
     cases = {"empty": {}, "loaded": {"hand.payload": 0.4}, "heavy": {"mass": 1.2}}
     runs = [smc.Scenario(plant=arm, mismatch=mismatch, **RUN) for mismatch in cases.values()]
     empty, loaded, heavy = smc.run(runs)
-    told = [style.differences(trace, [empty, loaded]) for trace in (empty, loaded)]
-    assert told == ["", "hand.payload = 0.4"]
+    differences = [style.differences(trace, [empty, loaded]) for trace in (empty, loaded)]
+    assert differences == ["", "hand.payload = 0.4"]
     assert "hand.payload = 0.4" in style.differences(loaded, [loaded, heavy])
 
 

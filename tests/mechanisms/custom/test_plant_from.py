@@ -60,9 +60,11 @@ BALL = '<body name="ball"><joint name="ball" type="ball"/><geom size=".1 .1" mas
 
 def installed(package: str, path: str) -> Path:
     """A file of an installed package, which is not imported."""
-    if (found := importlib.util.find_spec(package)) is None or not found.submodule_search_locations:
+    if (
+        module := importlib.util.find_spec(package)
+    ) is None or not module.submodule_search_locations:
         pytest.skip(f"{package} is not installed")
-    return Path(found.submodule_search_locations[0]) / path
+    return Path(module.submodule_search_locations[0]) / path
 
 
 def suite(name: str) -> Path:
@@ -225,8 +227,8 @@ def test_seven_coupled_joints_settle_as_the_error_equation_says():
             x0=-0.29,
         )
     )
-    wanted = e0 * (1 + 10 * trace.t) * np.exp(-10 * trace.t)
-    assert np.abs(trace.x + 0.3 - wanted[:, None]).max() < 1e-4
+    solution = e0 * (1 + 10 * trace.t) * np.exp(-10 * trace.t)
+    assert np.abs(trace.x + 0.3 - solution[:, None]).max() < 1e-4
     assert np.abs(trace.x[-1] + 0.3).max() < 1e-4
 
 
@@ -382,8 +384,8 @@ def test_a_channel_s_limit_is_what_the_file_s_motor_gives(arm, tmp_path, name):
         tmp_path / "arm.xml", {"elbow": smc.Channel(motor=name.startswith("ideal"))}
     )
     assert plant.limits == ((limit,) if limit < math.inf else ())
-    wanted = needs(plant) if limit == math.inf else (limit,)
-    assert smc.Scenario(plant=plant, law="none").limits == wanted
+    limits = needs(plant) if limit == math.inf else (limit,)
+    assert smc.Scenario(plant=plant, law="none").limits == limits
     raw = read(plant)
     data = mujoco.MjData(raw)
     # MuJoCo agrees: with a large ctrl of either sign the weaker way gives the limit
@@ -454,8 +456,8 @@ def test_a_keyframe_is_where_runs_start(arm):
     moving = rest.replace('-0.5"', '-0.5" qvel="1 1"').replace(
         "</keyframe>", '<key name="other" qpos="9 9"/></keyframe>'
     )
-    other = arm({"elbow": smc.Channel(motor=True)}, MORE_KEYS, keyframe="home")
-    trace = smc.run(smc.Scenario(plant=other, law="none", duration=0.1))
+    with_motor = arm({"elbow": smc.Channel(motor=True)}, MORE_KEYS, keyframe="home")
+    trace = smc.run(smc.Scenario(plant=with_motor, law="none", duration=0.1))
     assert trace.failure is None
     for part in (None, smc.Backlash(0.02)):  # which adds joints
         scenario = smc.Scenario(
@@ -626,10 +628,10 @@ def test_dry_friction_that_creeps_is_told_with_its_speed_and_each_cure_holds(kin
         plant = smc.plant_from(text, joints)
     sentence = next(str(w.message) for w in caught if "creeps" in str(w.message))
     assert ("solreffriction" in sentence) == bool(solref)
-    told, bound = (float(text) for text in re.findall(r"by ([0-9.e-]+)", sentence))
+    speed, bound = (float(text) for text in re.findall(r"by ([0-9.e-]+)", sentence))
     trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.3))
-    assert told == pytest.approx(np.abs(trace.v[-1]).max(), rel=0.1)
-    assert told < bound
+    assert speed == pytest.approx(np.abs(trace.v[-1]).max(), rel=0.1)
+    assert speed < bound
     cured = hard if solref else text.replace("<worldbody>", f"{NO_CONTACT}<worldbody>")
     with warnings.catch_warnings():
         warnings.simplefilter("error" if not solref else "ignore")
@@ -648,12 +650,12 @@ def test_dry_friction_creeps_under_the_weight_where_runs_start(x0):
     with pytest.warns(smc.errors.ScenarioWarning, match="creeps") as caught:
         plant = smc.plant_from(HANGING, {"j": smc.Channel(x0=x0)})
     sentence = next(str(w.message) for w in caught if "creeps" in str(w.message))
-    told = re.search(r"by ([0-9.e-]+) rad/s \(m/s\) under the weight", sentence)
+    reported = re.search(r"by ([0-9.e-]+) rad/s \(m/s\) under the weight", sentence)
     if x0 is None:
-        assert told is None  # it hangs, and nothing pulls
+        assert reported is None  # it hangs, and nothing pulls
         return
     trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.3))
-    assert float(told[1]) == pytest.approx(np.abs(trace.v[-1]).max(), rel=0.1)  # pyright: ignore[reportOptionalSubscript]
+    assert float(reported[1]) == pytest.approx(np.abs(trace.v[-1]).max(), rel=0.1)  # pyright: ignore[reportOptionalSubscript]
 
 
 def test_a_file_is_hashed_parsed_and_compiled_once_for_a_plant(tmp_path, monkeypatch):
@@ -712,9 +714,9 @@ def test_a_warning_says_how_far_an_equality_gives_way(solref):
       <equality><joint joint1="j" solref="{solref}"/></equality></mujoco>"""
     with pytest.warns(smc.errors.ScenarioWarning, match="equality constraints") as caught:
         plant = smc.plant_from(text, {"j": {"motor": True}})
-    (told,) = map(float, re.findall(r"by ([0-9.]+) m", str(caught[0].message)))
+    (reported,) = map(float, re.findall(r"by ([0-9.]+) m", str(caught[0].message)))
     trace = smc.run(smc.Scenario(plant=plant, law="none", v0=1.0, duration=0.5))
-    assert 1e-3 * told == pytest.approx(trace.x.max(), rel=0.15)
+    assert 1e-3 * reported == pytest.approx(trace.x.max(), rel=0.15)
 
 
 @pytest.mark.filterwarnings("default:.* give way by")
@@ -742,7 +744,7 @@ def test_contacts_and_limits_that_give_way_have_a_plain_sentence_each():
       </body></worldbody><actuator><motor joint="j"/></actuator></mujoco>"""
     with pytest.warns(smc.errors.ScenarioWarning, match="give way by") as caught:
         smc.plant_from(text.replace('contype="0"', ""), ["j"])
-    assert [str(one.message) for one in caught if "give way" in str(one.message)] == [
+    assert [str(warning.message) for warning in caught if "give way" in str(warning.message)] == [
         "contacts of the text of model 'two' give way by 7.4 mm if hit at 1 m/s, and by 0.2 mm under "
         "the weight: a smaller first number of solref makes them harder",
         "joint limits of the text of model 'two' give way by 7.4 mrad (mm) if hit at 1 rad/s (m/s): "
@@ -925,8 +927,8 @@ WRONG = {
 
 
 def test_a_mistake_is_one_sentence(arm, refused):
-    for given in WRONG.values():
-        refused(lambda given=given: arm(**given))
+    for mistake in WRONG.values():
+        refused(lambda mistake=mistake: arm(**mistake))
 
 
 def test_a_broken_file_that_is_included_is_one_sentence(arm, tmp_path):
@@ -1088,8 +1090,8 @@ def test_a_model_that_is_no_file_moves_as_its_file_does_and_is_kept_with_its_run
     assert again.scenario == trace.scenario
     assert run_key.key(again.scenario) == run_key.key(scenario)
     np.testing.assert_array_equal(smc.run(again.scenario).x, trace.x)
-    other = MESHED.replace("7.1234567890123", "7.1234567890124")
-    changed = smc.plant_from(other, channels, assets={"c.obj": content})
+    edited = MESHED.replace("7.1234567890123", "7.1234567890124")
+    changed = smc.plant_from(edited, channels, assets={"c.obj": content})
     assert run_key.key(dataclasses.replace(scenario, plant=changed)) != run_key.key(scenario)
 
 

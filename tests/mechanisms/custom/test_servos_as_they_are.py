@@ -136,8 +136,8 @@ def test_a_bound_and_a_goal_follow_from_the_file():
     assert b.kp == 20.0
     assert b.kv > 0.0
     assert b.bound is None
-    given = servo(HOBBY % POSITION, u_max=0.7)
-    assert smc.Scenario(plant=given, law="pid").limits == (0.7,)
+    bounded = servo(HOBBY % POSITION, u_max=0.7)
+    assert smc.Scenario(plant=bounded, law="pid").limits == (0.7,)
     assert arm.argument == "FILE.xml:a(servo)+b(servo)@home"
 
 
@@ -211,9 +211,9 @@ def test_an_actuator_is_used_as_it_is_and_u_is_told_where_it_is_no_force(drive, 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         taken = smc.plant_from(HOBBY % drive, ["j"], name="servo")
-    told = [str(one.message) for one in caught if "u of 'j'" in str(one.message)]
-    assert len(told) == bool(u)
-    assert all(u in sentence for sentence in told)
+    sentences = [str(warning.message) for warning in caught if "u of 'j'" in str(warning.message)]
+    assert len(sentences) == bool(u)
+    assert all(u in sentence for sentence in sentences)
     # it is the plant of one who says so, also in texts and records
     said = smc.plant_from(HOBBY % drive, {"j": smc.Channel(servo=bool(u))}, name="servo")
     assert taken == said
@@ -230,7 +230,7 @@ def test_what_servo_true_does_not_take_is_said(case):
     xml = HOBBY % actuator
     if "range" in fields:
         xml = xml.replace('range="-1.9 1.9"/>', "/>")
-    channel = {"servo": True} | {name: one for name, one in fields.items() if name != "range"}
+    channel = {"servo": True} | {name: value for name, value in fields.items() if name != "range"}
     with pytest.raises(ScenarioError) as error:
         smc.plant_from(xml, {"j": channel})
     for word in words:
@@ -477,7 +477,7 @@ def test_a_tuning_is_silent_on_gains_that_it_only_tries():
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         smc.tune(plant, "pid", conditions=["nominal"], budget=2, searches=1)
-    assert not [one for one in caught if "default gains" in str(one.message)]
+    assert not [warning for warning in caught if "default gains" in str(warning.message)]
 
 
 def test_sizes_of_conditions_and_blows_follow_from_the_servo_s_force():
@@ -487,8 +487,8 @@ def test_sizes_of_conditions_and_blows_follow_from_the_servo_s_force():
     assert friction.drive_train.forces == [2.94]
     ideal = smc.plant_from(HOBBY % POSITION, {"j": smc.Channel(motor=True)}, name="hobby")
     blows = [
-        MARGIN_KINDS["blow"].size(smc.Scenario(plant=one, law="pid", x0=0.3))
-        for one in (plant, ideal)
+        MARGIN_KINDS["blow"].size(smc.Scenario(plant=machine, law="pid", x0=0.3))
+        for machine in (plant, ideal)
     ]
     assert blows[0] == pytest.approx(blows[1])
 
@@ -505,8 +505,10 @@ def test_the_fast_engine_says_what_of_a_servo_it_cannot():
 
 
 def test_a_comparison_leaves_out_the_conditions_with_another_drive():
-    left = applicable(["nominal", "dc_motor", "lag_20ms", "fault", "backlash"], [servo(BARE)], 1.0)
-    assert left == ["nominal", "lag_20ms", "backlash"]
+    remaining = applicable(
+        ["nominal", "dc_motor", "lag_20ms", "fault", "backlash"], [servo(BARE)], 1.0
+    )
+    assert remaining == ["nominal", "lag_20ms", "backlash"]
 
 
 def test_a_voltage_beside_a_set_point_is_never_pooled_with_it():

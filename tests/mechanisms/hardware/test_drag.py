@@ -43,8 +43,8 @@ def test_thrust_ends_at_the_speed_at_which_drag_takes_it():
     end = math.sqrt(8.0 / 2.0)
     for friction in (Drag(0.0, 2.0), {"surge": Drag(0.0, 2.0)}):
         assert trace(friction, law=thrust(), duration=20.0).v[-1, 0] == pytest.approx(end)
-    both = trace((Drag(0.0, 2.0), smc.Coulomb(4.0)), law=thrust(), duration=20.0)
-    assert both.v[-1, 0] == pytest.approx(math.sqrt((8.0 - 4.0) / 2.0))
+    rubbing = trace((Drag(0.0, 2.0), smc.Coulomb(4.0)), law=thrust(), duration=20.0)
+    assert rubbing.v[-1, 0] == pytest.approx(math.sqrt((8.0 - 4.0) / 2.0))
 
 
 def test_drag_of_a_plant_of_the_library_is_simulated_by_mujoco_and_compensated():

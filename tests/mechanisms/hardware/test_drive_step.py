@@ -197,10 +197,10 @@ def test_a_rate_limit_behind_a_lag_errs_by_less_than_the_lag_moves_in_a_step(tau
         above = above + (lagged > force)
         below = below + (lagged < force)
     error = np.abs(mean - total)
-    whole = (above + below == 0) | (above == parts) | (below == parts)
+    one_sided = (above + below == 0) | (above == parts) | (below == parts)
     np.testing.assert_allclose(last, lagged, rtol=1e-12)
-    assert 100 < whole.sum() < 500
-    assert error[whole].max() < 1e-3
+    assert 100 < one_sided.sum() < 500
+    assert error[one_sided].max() < 1e-3
     assert (error <= np.abs(last - first) + 1e-3).all()
 
 
@@ -432,22 +432,24 @@ def test_callback_equals_plain_loop_and_company_and_threads_change_no_bit():
     scenarios = hard()
     alone = [smc.run(s) for s in scenarios]
     for threads in (1, 2):
-        for one, trace in zip(alone, smc.run(scenarios, threads=threads), strict=True):
+        for by_itself, trace in zip(alone, smc.run(scenarios, threads=threads), strict=True):
             assert trace.failure is None
             for name in LOGGED:
                 np.testing.assert_array_equal(
-                    getattr(trace, name), getattr(one, name), err_msg=f"{name} of {one!r}"
+                    getattr(trace, name),
+                    getattr(by_itself, name),
+                    err_msg=f"{name} of {by_itself!r}",
                 )
     for s, trace in zip(scenarios, alone, strict=True):
-        other = reference.run(s)
+        in_python = reference.run(s)
         for name in LOGGED:
             if s.plant.name == "cart_pole":  # its nominal model compiles to other roundings
                 np.testing.assert_allclose(
-                    getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9
+                    getattr(trace, name), getattr(in_python, name), rtol=1e-9, atol=1e-9
                 )
             else:
                 np.testing.assert_array_equal(
-                    getattr(trace, name), getattr(other, name), err_msg=f"{name} of {s!r}"
+                    getattr(trace, name), getattr(in_python, name), err_msg=f"{name} of {s!r}"
                 )
 
 

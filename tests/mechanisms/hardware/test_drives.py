@@ -78,11 +78,11 @@ def test_a_free_rotors_speed_rises_in_its_mechanical_time_constant():
     volts = 6.0
     t, _, speed, torque = driven(bare(motor), lambda t: volts, 8.0).T
     time_constant = motor.resistance * inertia / motor.constant**2
-    left = np.exp(-t / time_constant)
-    assert speed == pytest.approx(volts / motor.constant * (1.0 - left), rel=1e-2)
+    decay = np.exp(-t / time_constant)
+    assert speed == pytest.approx(volts / motor.constant * (1.0 - decay), rel=1e-2)
     early = t < 3 * time_constant
     assert torque[early] == pytest.approx(
-        motor.constant * volts / motor.resistance * left[early], rel=1e-2
+        motor.constant * volts / motor.resistance * decay[early], rel=1e-2
     )
 
 

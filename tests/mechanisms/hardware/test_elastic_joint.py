@@ -99,8 +99,8 @@ def test_a_joint_of_an_arm_bends_where_the_others_move_it():
     trace = smc.run(scenario)
     z0 = [*start, 0.0, 0.0, start[1], 0.0]
     times = (0.0, trace.t[-1])
-    found = solve_ivp(rates, times, z0, "DOP853", trace.t, rtol=1e-11, atol=1e-12).y[:2].T
-    assert np.abs(found - trace.x).max() < 1e-6
+    integrated = solve_ivp(rates, times, z0, "DOP853", trace.t, rtol=1e-11, atol=1e-12).y[:2].T
+    assert np.abs(integrated - trace.x).max() < 1e-6
 
 
 @pytest.mark.parametrize(
@@ -162,7 +162,7 @@ def test_a_sensor_on_the_motor_side_reads_the_rotor_late_and_by_name():
         {"elbow": smc.Encoder(**PERFECT, side="motor", delay=2e-3)},
     ]
     at_once, skewed, by_shoulder, by_elbow = smc.run(
-        [smc.Scenario(actuator={"elbow": soft}, sensor=one, **fields) for one in sensors]
+        [smc.Scenario(actuator={"elbow": soft}, sensor=sensor, **fields) for sensor in sensors]
     )
     np.testing.assert_array_equal(at_once.s[:, 0], at_once.x[:, 0])
     assert np.abs(at_once.s[:, 1] - at_once.x[:, 1]).max() > 0.05

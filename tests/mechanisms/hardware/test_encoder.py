@@ -191,14 +191,14 @@ def expected(sensor, changes, name):
     fine = getattr(smc.run(steps), name)
     h = late.resolved.physics_step
     delay = round(sensor.delay / h)
-    found = []
+    readings = []
     for k in range(late.samples + 1):
         step = k * late.steps - delay
         if sensor.period:
-            each = round(sensor.period / h)
-            step = step // each * each
-        found.append(fine[max(step, 0)])
-    return np.array(found)
+            period_steps = round(sensor.period / h)
+            step = step // period_steps * period_steps
+        readings.append(fine[max(step, 0)])
+    return np.array(readings)
 
 
 TIMES = [

@@ -107,8 +107,8 @@ FORMULAS = {
     "behind a motor": Formula(Stribeck(), smc.DCMotor(inductance=0.0)),
 }
 for model in ("m1", "m3", "m5", "m6"):
-    made = smc.hardware.servo("mx64", model)
-    FORMULAS[f"servo {model}"] = Formula(made.friction, made.motor)
+    servo_of_model = smc.hardware.servo("mx64", model)
+    FORMULAS[f"servo {model}"] = Formula(servo_of_model.friction, servo_of_model.motor)
 
 
 @smc.law_function(gains={"kp": 1.0, "kd": 1.0})
@@ -136,7 +136,7 @@ def by_tiny_steps(friction, motor, kp, kd, sine, duration):
         voltage = motor.voltage
     x = 0.2
     v = 0.0
-    found = [x]
+    positions = [x]
     for k in range(round(duration / PERIOD)):
         r = sine.amplitude * math.sin(sine.omega * k * PERIOD)
         dr = sine.amplitude * sine.omega * math.cos(sine.omega * k * PERIOD)
@@ -153,8 +153,8 @@ def by_tiny_steps(friction, motor, kp, kd, sine, duration):
             speed = h * (stops - min(max(stops, low), high)) / inertia
             x += 0.5 * h * (v + speed)
             v = speed
-        found.append(x)
-    return np.array(found)
+        positions.append(x)
+    return np.array(positions)
 
 
 @pytest.mark.parametrize(

@@ -91,8 +91,8 @@ def test_u_with_it_stays_within_the_bound_and_the_trace_is_read_back(joint, tmp_
 
 
 def test_a_grid_draws_its_error_by_seed(joint):
-    given = smc.Feedforward(RUBS, error=0.3)
-    condition = smc.condition("compensated", friction=RUBS, feedforward=given, reference=SINE)
+    feedforward = smc.Feedforward(RUBS, error=0.3)
+    condition = smc.condition("compensated", friction=RUBS, feedforward=feedforward, reference=SINE)
     runs = smc.grid(joint, [PD, smc.law("adrc")], condition, seeds=40)
     errors = np.array([getattr(scenario.feedforward, "error", None) for scenario in runs]).reshape(
         2, 40
@@ -118,7 +118,7 @@ STEADY.append((own(level=0.4), lambda v: 0.4 + 0.2 * math.exp(-v / 0.1)))
 def test_it_adds_the_force_of_a_steady_speed(joint, friction, steady):
     trace = run(joint, smc.Feedforward(friction, eps=0.1, error=-0.2), friction=None, duration=0.3)
     v = 0.9 * np.cos(3.0 * trace.t)
-    expected = [0.8 * math.tanh(one / 0.1) * steady(one) for one in v.tolist()]
+    expected = [0.8 * math.tanh(speed / 0.1) * steady(speed) for speed in v.tolist()]
     np.testing.assert_allclose(np.ravel(trace.compensation), expected, rtol=1e-9)
 
 

@@ -42,7 +42,7 @@ def scenario(friction, plant="cart_pole", **fields):
 @EACH
 @CARTS
 def test_a_part_alone_is_on_the_driven_joint_and_by_name_on_any(part, plant, driven, free):
-    alone, named, hinge, both, none = smc.run(
+    alone, named, hinge, on_both, none = smc.run(
         [
             scenario(
                 friction,
@@ -56,23 +56,23 @@ def test_a_part_alone_is_on_the_driven_joint_and_by_name_on_any(part, plant, dri
     assert np.array_equal(alone.x, named.x)
     assert np.all(named.reaction[:, 1] == 0.0)
     assert np.all(hinge.reaction[:, 0] == 0.0)
-    for one in (named, hinge, both):
-        assert not np.array_equal(one.x, none.x)
+    for trace in (named, hinge, on_both):
+        assert not np.array_equal(trace.x, none.x)
     if not isinstance(part, smc.Viscous):  # which is no reaction, but the plant's damping
-        assert both.reaction[1:].all(axis=1).any()
+        assert on_both.reaction[1:].all(axis=1).any()
 
 
 @pytest.mark.parametrize("friction", FORMS, ids=range(len(FORMS)))
 def test_joints_survive_text_json_and_a_batch(friction):
-    made = scenario(friction)
-    data = json.loads(to_json(scenario_json.describe(made)))
-    assert scenario_json.restore(data) == made
+    rubbing = scenario(friction)
+    data = json.loads(to_json(scenario_json.describe(rubbing)))
+    assert scenario_json.restore(data) == rubbing
     worn = smc.condition("worn", friction=friction)
     assert "on=()" not in str(worn)
-    again = conditions.parse(str(worn)).on(made.plant, 1.0)["friction"]
-    assert scenario(again) == made
-    batch = smc.run([scenario(other) for other in FORMS])[FORMS.index(friction)]
-    assert np.array_equal(batch.x, smc.run(made).x)
+    again = conditions.parse(str(worn)).on(rubbing.plant, 1.0)["friction"]
+    assert scenario(again) == rubbing
+    batch = smc.run([scenario(form) for form in FORMS])[FORMS.index(friction)]
+    assert np.array_equal(batch.x, smc.run(rubbing).x)
 
 
 def test_one_joint_may_be_given_by_its_name_alone():
@@ -112,16 +112,16 @@ def test_named_frictions_are_shares_of_the_bound_on_each_driven_joint(name, plan
     machine = smc.plant(plant)
     if machine.pose:
         return
-    made = smc.Scenario(plant=plant, law="none", **conditions.NAMED[name].on(machine, 1.0))
+    rubbing = smc.Scenario(plant=plant, law="none", **conditions.NAMED[name].on(machine, 1.0))
     largest = {}
-    for part in made.friction:
+    for part in rubbing.friction:
         for joint in part.joint_names(machine):
             level = (
                 part.static if name == "lugre" else part.level if hasattr(part, "level") else 0.0
             )
             largest[joint] = max(level, largest.get(joint, 0.0))
-    assert list(largest.values()) == pytest.approx([bound / 60.0 for bound in made.limits])
-    assert math.isclose(largest[next(iter(largest))], made.limits[0] / 60.0)
+    assert list(largest.values()) == pytest.approx([bound / 60.0 for bound in rubbing.limits])
+    assert math.isclose(largest[next(iter(largest))], rubbing.limits[0] / 60.0)
 
 
 @njit
@@ -195,10 +195,10 @@ def test_the_verdict_on_a_cart_is_that_of_a_set_valued_integration(plant, machin
     )
     where = ("slide", "hinge").index(joint)
     truth = by_tiny_steps(*machine, level, where, 10.0)
-    found, known = (smc.scores(t) for t in (trace, dataclasses.replace(trace, x=truth)))
-    for group in found:
-        ours = found[group]["settling_time"]
-        theirs = known[group]["settling_time"]
+    scores, true_scores = (smc.scores(t) for t in (trace, dataclasses.replace(trace, x=truth)))
+    for group in scores:
+        ours = scores[group]["settling_time"]
+        theirs = true_scores[group]["settling_time"]
         assert theirs < 9.0
         assert ours == pytest.approx(theirs, rel=5e-3)
     assert np.abs(trace.x - truth).max() < 5e-3 * np.abs(truth).max()
@@ -241,11 +241,11 @@ def test_a_joint_of_a_file_that_is_no_channel_has_friction_by_name(part):
     )
     runs = {}
     for joint in ("slide", "hinge", "*"):
-        made = smc.Scenario(
+        rubbing = smc.Scenario(
             plant=alone, law="none", friction={joint: part}, v0=0.1, duration=1.0, u_max=6.0
         )
-        runs[joint] = smc.run(made)
-        assert made.friction[0].on == (("slide", "hinge") if joint == "*" else (joint,))
+        runs[joint] = smc.run(rubbing)
+        assert rubbing.friction[0].on == (("slide", "hinge") if joint == "*" else (joint,))
     assert not np.array_equal(runs["slide"].x, runs["*"].x)
     assert np.all(runs["hinge"].reaction == 0.0)  # of the cart
     with pytest.raises(smc.ScenarioError, match="unknown joint of Sigmoid"):
@@ -263,9 +263,9 @@ def test_named_parts_of_an_own_machine_are_shares_of_its_own_bounds(name, bounds
     lift, turn = bounds
     text = ARM % (lift, lift, turn, turn)
     machine = smc.plant_from(text, channels=["lift", "turn"], name="arm")
-    made = smc.Scenario(plant=machine, law="none", **conditions.NAMED[name].on(machine, 1.0))
+    rubbing = smc.Scenario(plant=machine, law="none", **conditions.NAMED[name].on(machine, 1.0))
     for joint, bound in zip(("lift", "turn"), bounds, strict=True):
-        parts = made.friction + made.actuator
+        parts = rubbing.friction + rubbing.actuator
         here = [part for part in parts if joint in part.joint_names(machine)]
         field = {"lugre": "static", "dc_motor": "stall"}.get(name, "level")
         share = {"dc_motor": 1.84975}.get(name, 1.0 / 60.0)

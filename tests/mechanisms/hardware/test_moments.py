@@ -118,7 +118,7 @@ def test_a_part_of_level_zero_changes_no_bit(name, plant):
 
 @pytest.mark.parametrize("delay", [0, 3])
 def test_parts_act_after_the_command_arrives(delay):
-    one = scenario(
+    late = scenario(
         "cart_pole",
         "hierarchical",
         friction=seen(),
@@ -126,11 +126,11 @@ def test_parts_act_after_the_command_arrives(delay):
         physics_step=H,
         input_delay=delay * H,
     )
-    trace = smc.run(one)
-    told = np.zeros_like(trace.u)
-    told[delay + 1 :] = 1e-9 * trace.u[: len(told) - delay - 1]
-    assert np.abs(told).max() > 0.0
-    assert np.array_equal(trace.reaction[1:, 0], told[1:, 0])
+    trace = smc.run(late)
+    commanded = np.zeros_like(trace.u)
+    commanded[delay + 1 :] = 1e-9 * trace.u[: len(commanded) - delay - 1]
+    assert np.abs(commanded).max() > 0.0
+    assert np.array_equal(trace.reaction[1:, 0], commanded[1:, 0])
 
 
 def test_the_force_of_a_friction_is_that_of_its_function():
@@ -163,11 +163,11 @@ def test_the_force_of_a_friction_is_that_of_its_function():
 )
 @pytest.mark.parametrize("plant", ["inverted_pendulum", "double_pendulum"])
 def test_a_part_called_in_python_gives_the_same_bits(parts, plant):
-    one = scenario(plant, duration=0.02, **parts)
+    with_parts = scenario(plant, duration=0.02, **parts)
     with callback.installed():
-        batch = ScenarioBatch([prepare(one)], threads=1, python=True)
+        batch = ScenarioBatch([prepare(with_parts)], threads=1, python=True)
         in_python = batch.run(lambda steps: None)[0]
-    assert same(smc.run(one), in_python)
+    assert same(smc.run(with_parts), in_python)
 
 
 @pytest.mark.parametrize(
@@ -229,8 +229,8 @@ def test_a_part_of_a_user_is_kept_with_its_code(tmp_path):
 
 def test_an_own_motor_takes_the_place_of_a_command():
     plain = scenario(disturbance=smc.Sine(0.2, 5.0))
-    whole = scenario(disturbance=smc.Sine(0.2, 5.0), actuator=motor())
+    with_motor = scenario(disturbance=smc.Sine(0.2, 5.0), actuator=motor())
     halved = scenario(disturbance=smc.Sine(0.2, 5.0), actuator=motor(gain=0.5))
-    assert same(smc.run(plain), smc.run(whole))
+    assert same(smc.run(plain), smc.run(with_motor))
     trace = smc.run(halved)
     assert trace.force[1:] == pytest.approx(0.5 * trace.applied[:-1], abs=1e-12)

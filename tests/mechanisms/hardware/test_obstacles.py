@@ -107,13 +107,13 @@ def distances(trace):
     scenario = trace.scenario
     model = models.with_values(models.compile_model(scenario), scenario)
     data = mujoco.MjData(model)
-    found = []
+    gaps = []
     for pose in states(trace, trace.t)[0]:
         data.qpos[:] = pose
         mujoco.mj_kinematics(model, data)
         pairs = zip(model.pair_geom1, model.pair_geom2, strict=True)
-        found.append(min(mujoco.mj_geomDistance(model, data, *pair, 9.0, None) for pair in pairs))
-    return np.array(found)
+        gaps.append(min(mujoco.mj_geomDistance(model, data, *pair, 9.0, None) for pair in pairs))
+    return np.array(gaps)
 
 
 def held(name):
@@ -206,14 +206,14 @@ def test_the_force_of_contact_is_what_changes_the_momentum_of_a_ball(name):
         0.2,
         **held(name),
     )
-    found = contacts(trace)
-    struck = np.flatnonzero(found.force)
+    pressed = contacts(trace)
+    struck = np.flatnonzero(pressed.force)
     first = struck[0] - 1
-    last = struck[0] + np.argmax(found.force[struck[0] :] == 0.0)
+    last = struck[0] + np.argmax(pressed.force[struck[0] :] == 0.0)
     v = states(trace, trace.t)[1][:, -6:-3]
     fallen = np.array([0, 0, -9.81]) * (trace.t[last] - trace.t[first])
     momentum = 0.1 * (v[last] - v[first] - fallen)
-    impulse = -np.trapezoid(found.push[first : last + 1], trace.t[first : last + 1], axis=0)
+    impulse = -np.trapezoid(pressed.push[first : last + 1], trace.t[first : last + 1], axis=0)
     assert np.linalg.norm(impulse) > 0.1
     assert impulse == pytest.approx(momentum, abs=0.02 * np.linalg.norm(momentum))
 
@@ -238,11 +238,11 @@ def test_obstacles_are_data(name, tmp_path):
     again = smc.load(trace.save(tmp_path / "run.npz"))
     assert again.scenario == trace.scenario
     assert hash(again.scenario) == hash(trace.scenario)
-    asked = smc.condition("hit", contact=parts)
-    read = conditions.find_condition(str(asked))
+    condition = smc.condition("hit", contact=parts)
+    read = conditions.find_condition(str(condition))
     assert read.on(trace.scenario.plant, 1.0)["contact"] == parts
-    other = dataclasses.replace(parts[0], restitution=0.6)
-    assert dataclasses.replace(trace.scenario, contact=other) != trace.scenario
+    bouncier = dataclasses.replace(parts[0], restitution=0.6)
+    assert dataclasses.replace(trace.scenario, contact=bouncier) != trace.scenario
 
 
 @EVERY

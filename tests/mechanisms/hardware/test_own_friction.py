@@ -101,10 +101,11 @@ def test_a_level_is_the_friction_of_the_library_with_its_numbers():
     fields = {"law": smc.law("pid"), "disturbance": smc.Sine(0.5, 5.0), "duration": 2.0}
     ours, same = (cart(friction=part, **fields) for part in (stribeck(), theirs))
     np.testing.assert_allclose(ours.x, same.x, atol=1e-9)
-    both = smc.plant("double_pendulum")
+    double = smc.plant("double_pendulum")
     fields["law"] = smc.law("computed_torque")
     ours, same = (
-        smc.run(smc.Scenario(plant=both, friction=part, **fields)) for part in (stribeck(), theirs)
+        smc.run(smc.Scenario(plant=double, friction=part, **fields))
+        for part in (stribeck(), theirs)
     )
     np.testing.assert_allclose(ours.x, same.x, atol=1e-9)
 
@@ -191,9 +192,9 @@ def test_a_level_is_the_same_whether_it_is_known_or_called():
     """It differs a little where the other forces alone stop the joint."""
     fields = {"law": smc.law("pid"), "disturbance": smc.Sine(3.0, 60.0), "duration": 2.0}
     numbers = {"coulomb": (0.4,), "static": (0.5,), "speed": 0.1}
-    known, called = (cart(friction=kind(**numbers), **fields) for kind in (stribeck, with_time))
-    assert np.abs(known.x).max() > 2e-3
-    np.testing.assert_allclose(known.x, called.x, atol=2e-8)
+    of_speed, called = (cart(friction=kind(**numbers), **fields) for kind in (stribeck, with_time))
+    assert np.abs(of_speed.x).max() > 2e-3
+    np.testing.assert_allclose(of_speed.x, called.x, atol=2e-8)
 
 
 def test_a_joint_rests_and_slides_by_one_value_of_a_variable_that_changes(monkeypatch):
@@ -202,9 +203,13 @@ def test_a_joint_rests_and_slides_by_one_value_of_a_variable_that_changes(monkey
         monkeypatch.setattr(sys.modules[__name__], "SHARED", value)
         for more in (0.0, 0.01):
             friction = of_file(more=more)
-            kept = 1.0 - cart(friction=friction, v0=1.0, duration=1.0).v[-1, 0]
-            held = cart(friction=friction, feedforward=smc.Constant(0.99 * kept), duration=1.0)
-            gone = cart(friction=friction, feedforward=smc.Constant(1.01 * kept), duration=1.0)
+            lost_speed = 1.0 - cart(friction=friction, v0=1.0, duration=1.0).v[-1, 0]
+            held = cart(
+                friction=friction, feedforward=smc.Constant(0.99 * lost_speed), duration=1.0
+            )
+            gone = cart(
+                friction=friction, feedforward=smc.Constant(1.01 * lost_speed), duration=1.0
+            )
             assert np.abs(held.x).max() < 1e-12
             assert gone.x[-1, 0] > 1e-4
 
@@ -224,8 +229,8 @@ def test_a_memory_moves_once_a_step():
 @pytest.mark.parametrize("plant", ["duffing", "double_pendulum"])
 def test_the_reference_loop_has_the_same_bits(kind, plant):
     fields = {"law": smc.law("classical"), "disturbance": smc.Sine(0.5, 5.0), "duration": 0.3}
-    one = smc.Scenario(plant=plant, friction=kind(), **fields)
-    assert_same(smc.run(one), reference.run(one))
+    rubbing = smc.Scenario(plant=plant, friction=kind(), **fields)
+    assert_same(smc.run(rubbing), reference.run(rubbing))
 
 
 @friction_function(numbers={"forward": 0.2, "backward": 0.5})
@@ -236,17 +241,17 @@ def one_sided(y, p, memory):
 @pytest.mark.parametrize("kind", [stribeck, viscous, one_sided])
 def test_the_reference_loop_has_the_same_bits_where_other_forces_turn_a_joint(kind):
     fields = {"law": "none", "disturbance": smc.Sine(30.0, 200.0), "duration": 0.3}
-    one = smc.Scenario(plant="duffing", friction=kind(), **fields)
-    assert_same(smc.run(one), reference.run(one))
+    rubbing = smc.Scenario(plant="duffing", friction=kind(), **fields)
+    assert_same(smc.run(rubbing), reference.run(rubbing))
 
 
 @pytest.mark.parametrize("kind", [stribeck, bounded, warming])
 def test_the_fast_engine_runs_it(kind):
     fields = {"law": smc.law("pid"), "disturbance": smc.Sine(0.5, 5.0), "duration": 0.5}
-    one = smc.Scenario(plant="duffing", friction=kind(), **fields)
-    assert group.why_not(one, ("itae",)) == ""
-    trace = smc.run(one)
-    scored = group.FormGroup([one], ("itae",)).scored("cpu", 1)[0][0][0]
+    rubbing = smc.Scenario(plant="duffing", friction=kind(), **fields)
+    assert group.why_not(rubbing, ("itae",)) == ""
+    trace = smc.run(rubbing)
+    scored = group.FormGroup([rubbing], ("itae",)).scored("cpu", 1)[0][0][0]
     assert scored == pytest.approx(smc.score(trace)["itae"], rel=1e-9)
 
 

@@ -54,30 +54,32 @@ def scenario(**fields):
 @pytest.mark.parametrize(("field", "pair"), EACH, ids=str)
 def test_a_joint_with_its_own_part_moves_as_if_all_joints_had_it(field, pair, model):
     law = smc.law("observer_free", lam=6.0, k1=3.0)
-    made = []
-    given = {joint: part for joint, part in zip("ab", pair, strict=True) if part is not None}
-    for parts in (given, *pair):
-        made.append(scenario(model=model, law=law, **{field: parts}))
-    both, first, second = smc.run(made)
-    assert both.failure is None
+    scenarios = []
+    by_joint = {joint: part for joint, part in zip("ab", pair, strict=True) if part is not None}
+    for parts in (by_joint, *pair):
+        scenarios.append(scenario(model=model, law=law, **{field: parts}))
+    on_both, first, second = smc.run(scenarios)
+    assert on_both.failure is None
     for i, alone in enumerate((first, second)):
         for name in ("x", "v", "u", "s", "applied", "force", "reaction"):
-            ours, theirs = (getattr(trace, name)[:, i] for trace in (both, alone))
+            ours, theirs = (getattr(trace, name)[:, i] for trace in (on_both, alone))
             np.testing.assert_allclose(ours, theirs, rtol=1e-8, atol=1e-8, err_msg=name)
-        assert both.scenario.limits[i] == alone.scenario.limits[i]
-        assert both.scenario.efforts[i] == alone.scenario.efforts[i]
+        assert on_both.scenario.limits[i] == alone.scenario.limits[i]
+        assert on_both.scenario.efforts[i] == alone.scenario.efforts[i]
     assert not np.array_equal(first.x[:, 1], second.x[:, 1])
 
 
 @pytest.mark.parametrize(("field", "pair"), EACH, ids=str)
 def test_they_survive_text_json_and_the_order_of_a_mapping(field, pair):
-    given = {joint: part for joint, part in zip("ab", pair, strict=True) if part is not None}
-    made = scenario(**{field: given})
-    assert scenario_json.restore(json.loads(to_json(scenario_json.describe(made)))) == made
-    assert scenario(**{field: dict(reversed(given.items()))}) == made
-    text = str(smc.condition("own", **{field: given}))
-    assert scenario(**conditions.parse(text).on(PLANT, 1.0)) == made
-    part = next(iter(given.values()))
+    by_joint = {joint: part for joint, part in zip("ab", pair, strict=True) if part is not None}
+    with_parts = scenario(**{field: by_joint})
+    assert (
+        scenario_json.restore(json.loads(to_json(scenario_json.describe(with_parts)))) == with_parts
+    )
+    assert scenario(**{field: dict(reversed(by_joint.items()))}) == with_parts
+    text = str(smc.condition("own", **{field: by_joint}))
+    assert scenario(**conditions.parse(text).on(PLANT, 1.0)) == with_parts
+    part = next(iter(by_joint.values()))
     everywhere, plain = (scenario(**{field: parts}) for parts in ({"*": part}, part))
     assert everywhere == plain
     assert "on=" not in str(smc.condition("own", **{field: part}))

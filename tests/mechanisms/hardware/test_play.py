@@ -88,10 +88,10 @@ def test_a_limit_cycle_is_that_between_plastic_stops_at_the_default_step():
 
 
 def test_a_cycle_of_the_adaptive_law_does_not_depend_on_the_step():
-    made = smc.paper.comparison(
+    compared = smc.paper.comparison(
         "inverted_pendulum", duration=3.0, changes={"actuator": smc.Backlash(GAP)}
     )
-    scenario = next(scenario for scenario in made.values() if scenario.law.name == "adaptive")
+    scenario = next(scenario for scenario in compared.values() if scenario.law.name == "adaptive")
     steps = []
     for k in (1, 2, 4):
         steps.append(scenario.resolved.physics_step / k)

@@ -148,7 +148,7 @@ def test_joints_that_move_together_hold_a_load_below_their_limits_however_sudden
     M = panda.nominal.dynamics(np.array(panda.rest), np.zeros(7), panda.values({})).M
     roots = np.sqrt(panda.load().dof_M0[:7])
     load = roots * np.linalg.eigh(M / np.outer(roots, roots))[1][:, -1]
-    holds = np.array([limits(i)[int(one > 0.0)] for i, one in enumerate(load)])
+    holds = np.array([limits(i)[int(push > 0.0)] for i, push in enumerate(load)])
     load = load / (load / holds).max()  # one joint is at its limit
     runs = []
     for share in (0.97, 1.03):
@@ -244,8 +244,8 @@ def by_tiny_steps(values, numbers, start, kp, kd, seconds):
         a1, a2, W11, W12, W22 = accelerations(*x, *v, *values)
         W = np.array([[W11, W12], [W12, W22]])
         levels = []
-        for speed, one in zip(v, numbers, strict=True):
-            f, low, _ = Stribeck.value(float(speed), 0.0, 0.0, one)
+        for speed, p in zip(v, numbers, strict=True):
+            f, low, _ = Stribeck.value(float(speed), 0.0, 0.0, p)
             levels.append(abs(f) if abs(speed) > 1e-9 else -low)
         new = v + h * (np.array([a1, a2]) + W @ u)
         for _ in range(100):
@@ -395,8 +395,8 @@ def test_a_rigid_play_puts_no_load_of_its_own_on_a_gearbox(friction):
 
 
 def test_callback_equals_reference_loop_with_a_friction_by_a_formula():
-    several = list(scenarios())
-    for scenario, trace in zip(several, smc.run(several), strict=True):
+    scenarios_run = list(scenarios())
+    for scenario, trace in zip(scenarios_run, smc.run(scenarios_run), strict=True):
         assert trace.failure is None
         assert_same(trace, reference.run(scenario))
         # a joint turned back, so it stuck
@@ -493,7 +493,7 @@ def test_flags_that_turn_dry_friction_off_are_refused_beside_a_formula(flag, ref
 def test_a_jump_that_ends_the_dry_friction_of_another_joint_is_refused(refused):
     rough = {"elbow": smc.hardware.ServoFriction(kc=0.15)}
     plant = smc.plant("double_pendulum", cf1=0.2, cf2=0.0)
-    given = {"plant": plant, "law": "none", "friction": rough, "duration": 0.3}
-    refused(lambda: smc.run(smc.Scenario(**given, jump=smc.Jump(0.2, {"cf1": 0.0}))), "1e-9")
-    little = smc.run(smc.Scenario(**given, x0=(1.0, 0.5), jump=smc.Jump(0.2, {"cf1": 1e-9})))
+    fields = {"plant": plant, "law": "none", "friction": rough, "duration": 0.3}
+    refused(lambda: smc.run(smc.Scenario(**fields, jump=smc.Jump(0.2, {"cf1": 0.0}))), "1e-9")
+    little = smc.run(smc.Scenario(**fields, x0=(1.0, 0.5), jump=smc.Jump(0.2, {"cf1": 1e-9})))
     assert np.abs(little.reaction[250:, 1]).max() > 0.1

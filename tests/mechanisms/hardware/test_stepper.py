@@ -86,12 +86,12 @@ class Generator:
 
     def next_step(self):
         """Return the period of a step that is added, 0 for none."""
-        wanted, rate = self.wish
-        if self.way and wanted != self.way and self.n > 0:
+        speed, rate = self.wish
+        if self.way and speed != self.way and self.n > 0:
             self.n -= 1
             return self.period
-        if wanted != self.way:
-            self.way = wanted
+        if speed != self.way:
+            self.way = speed
             self.n = 0
             self.period = math.inf
         if not self.way:
@@ -128,11 +128,11 @@ def steps_by_events(motor, commands, phase, duration):
 
     def add(now):
         nonlocal free
-        at = max(now, free)
+        time = max(now, free)
         before = generator.way
         if length := generator.next_step():
-            steps.append((at, generator.way or before))
-            free = at + length
+            steps.append((time, generator.way or before))
+            free = time + length
         return length
 
     events.sort()
@@ -207,9 +207,9 @@ def moved(motor, steps, plant, x0, times, inertia, substep=2e-5):
         free = 1.0 / g  # the plant's inertia, to which the rotor's is added
         return (f * free + torque(place, x) - motor.gear**2 * motor.damping * v) / (free + inertia)
 
-    wanted = set(times)
+    instants = set(times)
     for a, b in itertools.pairwise(grid):
-        if a in wanted:
+        if a in instants:
             rows.append((x, v, impulse))
         h = b - a
         # the field is continuous from the right at a, and from the left at b
@@ -263,17 +263,17 @@ def looped(one):
 def test_the_steps_are_those_of_an_event_integration(kind):
     motor, push = KINDS[kind]
     # so that the queue has room for all
-    one = scenario(dataclasses.replace(motor, speed=400.0), push)
-    _, steps = by_events(one)
-    state, queue = (own := looped(one).motors[0]).state, own.queue
-    made = []
+    pushed = scenario(dataclasses.replace(motor, speed=400.0), push)
+    _, steps = by_events(pushed)
+    state, queue = (own := looped(pushed).motors[0]).state, own.queue
+    expected = []
     for i in range(int(state.tail)):
-        made.append((queue[2 * i], queue[2 * i + 1]))
-    made = [step for step in made if step[0] < one.duration]
+        expected.append((queue[2 * i], queue[2 * i + 1]))
+    expected = [step for step in expected if step[0] < pushed.duration]
     assert len(steps) > 30
     assert {way for _, way in steps} == {-1, 1}
-    assert [way for _, way in made] == [way for _, way in steps]
-    assert [t for t, _ in made] == pytest.approx([t for t, _ in steps], abs=1e-12)
+    assert [way for _, way in expected] == [way for _, way in steps]
+    assert [t for t, _ in expected] == pytest.approx([t for t, _ in steps], abs=1e-12)
 
 
 MOVED = ("slips", "without queue", "jumps", "geared")  # the others: seconds each
@@ -283,14 +283,16 @@ REST = [pytest.param(kind, marks=pytest.mark.slow) for kind in KINDS if kind not
 @pytest.mark.parametrize("kind", [*MOVED, *REST])
 def test_the_joint_moves_as_behind_these_steps(kind):
     motor, push = KINDS[kind]
-    one = scenario(
+    pushed = scenario(
         motor,
         push,
         duration=0.8,
         physics_step=1.25e-4,
     )
-    trace, steps = by_events(one)
-    x, v, force = moved(motor, steps, one.plant, 0.3, trace.t, motor.gear**2 * motor.rotor_inertia)
+    trace, steps = by_events(pushed)
+    x, v, force = moved(
+        motor, steps, pushed.plant, 0.3, trace.t, motor.gear**2 * motor.rotor_inertia
+    )
     # RK4 gets the mean and the first moment of a jump within a step
     rough = 5e3 if kind == "jumps" else 1.0
     assert trace.x[:, 0] == pytest.approx(x, abs=rough * 1e-9)
@@ -329,31 +331,31 @@ def test_the_callback_is_the_reference_loop_to_the_last_bit(name):
         "feedforward": SLOW,
         "x0": 0.3,
     } | CONDITIONS[name]
-    one = smc.Scenario(
+    stepped = smc.Scenario(
         **fields,
         duration=0.4,
         control_period=PERIOD,
         seed=2,
     )
-    compiled = smc.run(one)
-    looped = reference.run(one)
+    compiled = smc.run(stepped)
+    looped = reference.run(stepped)
     for column, values in compiled.arrays().items():
         assert np.array_equal(values, looped.arrays()[column]), column
 
 
 def test_a_missed_sample_adds_no_speed_and_the_next_adds_that_of_both():
     """A field without a generator turns at the speed that the firmware sums."""
-    one = scenario(
+    missing = scenario(
         dataclasses.replace(MOTOR, steps=math.inf), SLOW, clock=smc.Clock(missed=0.3), duration=0.5
     )
-    loop = looped(one)
+    loop = looped(missing)
     speed = 0.0
     last = 0.0
-    for k, t in enumerate(PERIOD * np.arange(one.samples)):
+    for k, t in enumerate(PERIOD * np.arange(missing.samples)):
         if loop.late(k) >= 0:
             speed = speed + loop.log["u"][k, 0] * (t - last)
             last = t
-    assert 10 < sum(loop.late(k) < 0 for k in range(one.samples)) < 50
+    assert 10 < sum(loop.late(k) < 0 for k in range(missing.samples)) < 50
     assert loop.motors[0].state.speed == pytest.approx(speed, rel=1e-12)
 
 

@@ -54,10 +54,10 @@ def test_an_offset_larger_than_the_friction_drives_the_joint():
     for sign in (1.0, -1.0):
         trace = cart(friction=Stribeck(0.1, offset=-0.3 * sign), duration=2.0)
         np.testing.assert_allclose(sign * trace.x[:, 0], 0.5 * 0.2 * trace.t**2, atol=1e-9)
-    there = {"slide": Stribeck(0.1, offset=0.3)}
+    friction = {"slide": Stribeck(0.1, offset=0.3)}
     hanging = smc.plant("overhead_crane", M=1.0, m=1e-6)
     trace = smc.run(
-        smc.Scenario(plant=hanging, law="none", x0=(0.0, 0.0), friction=there, duration=2.0)
+        smc.Scenario(plant=hanging, law="none", x0=(0.0, 0.0), friction=friction, duration=2.0)
     )
     assert trace.x[-1, 0] == pytest.approx(-0.4, rel=1e-2)
 
@@ -84,9 +84,9 @@ def test_numbers_that_no_friction_has_are_refused(make, words):
 
 
 def test_a_steady_speed_needs_the_force_of_the_bristles_that_are_alike():
-    at = SimpleNamespace(v=0.07)
+    y = SimpleNamespace(v=0.07)
     theirs = LuGre(0.2, 0.35, 0.1).steady(
-        at, SimpleNamespace(coulomb=0.2, static=0.35, stribeck=0.1), None
+        y, SimpleNamespace(coulomb=0.2, static=0.35, stribeck=0.1), None
     )
     p = SimpleNamespace(
         **dict(zip(PART.names, Stribeck(0.2, 0.35, 0.1).parameters(0), strict=True))
