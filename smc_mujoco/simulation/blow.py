@@ -20,7 +20,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array, Pair
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.custom.scales import at_goal, usual_start
-from smc_mujoco.mechanisms.hardware.obstacles import Stops
+from smc_mujoco.mechanisms.hardware.obstacles import BLOW_DEPTH, Stops
 from smc_mujoco.mechanisms.layout import channel_names, driven_ids, loaded, posed
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.scenario import Scenario
@@ -29,6 +29,7 @@ from smc_mujoco.simulation.signals import Impulse
 # All chosen.
 REACH = 1.5  # energy of a blow over what can be taken from it
 WIDTH = 5e-3  # s, of a blow
+PASSED = 0.2  # of the way from the goal to a stop, by which a joint may go into it
 NEAR, FAR = (
     1 / 3,
     1.5,
@@ -46,6 +47,7 @@ class Stopped(NamedTuple):
     side: float  # 1 or -1: where it goes
     joint: str
     ends: Pair  # rad or m, its stops
+    depth: float  # rad per rad/s (m per m/s), of its stops
 
 
 def bump(plant: Plant, time: float, rubs: float) -> tuple[Stops, Impulse]:
@@ -63,8 +65,8 @@ def bump(plant: Plant, time: float, rubs: float) -> tuple[Stops, Impulse]:
             f"condition 'contact' finds no driven joint of {plant.name} that stops could hold: "
             "give an obstacle yourself, as bump: contact=Ball('body', mass=0.1)"
         )
-    momentum, side, joint, ends = min(stopped)
-    stops = Stops({joint: ends})
+    momentum, side, joint, ends, depth = min(stopped)
+    stops = Stops({joint: ends}, depth=depth)
     return stops, Impulse(side * momentum, time=time, width=WIDTH)
 
 
@@ -128,7 +130,10 @@ def _stopped(plant: Plant, rubs: float) -> list[Stopped]:
         near_end = goal[j] + side * near
         ends = sorted((near_end, goal[j] - side * far))
         ends_of_reach = (float(ends[0]), float(ends[1]))
-        stopped = Stopped(float(momentum), side, names[j], ends_of_reach)
+        depth = BLOW_DEPTH
+        if plant.is_user_model:  # a light joint is fast
+            depth = min(depth, PASSED * near / (momentum * float(gained[j])))
+        stopped = Stopped(float(momentum), side, names[j], ends_of_reach, float(depth))
         candidates.append(stopped)
     return candidates
 

@@ -93,6 +93,7 @@ def longest_step(s: Any) -> float:
     """
     bounds = [s.clock.jitter / MIN_JITTER_STEPS or MAX_STEP]
     bounds += [part.longest_step(s.plant) for part in s.actuator]
+    bounds += [part.longest_step for part in s.contact]
     bounds.append(_step_of_mechanism(s))
     longest = min(MAX_STEP, *bounds)
     if bounds[-1] == REALISTIC_STEP:  # which resolves drives, too

@@ -99,3 +99,24 @@ def test_a_blow_that_comes_before_the_law_has_arrived_is_said_to_meet_nothing(da
     low, high = scenario.contact[0].limits["j"]
     assert bool(np.any((trace.x < low) | (trace.x > high))) == meets
     assert bool(trace.unmet) != meets
+
+
+FINGER = """<mujoco><compiler angle="radian"/><worldbody><body><joint name="j" axis="0 1 0"
+damping="1e-5" armature="1e-6"/><geom type="capsule" fromto="0 0 0 0 0 -.05" size=".0025"
+mass=".006" contype="0" conaffinity="0"/></body></worldbody>
+<actuator><motor joint="j" ctrlrange="-.02 .02"/></actuator></mujoco>"""
+
+
+@pytest.mark.filterwarnings("ignore:.*default gains")
+def test_a_light_joint_is_stopped_within_a_quarter_of_its_way():
+    """A finger went through a stop 0.1 rad from its goal by up to 0.14 rad."""
+    plant = smc.plant_from(FINGER, ["j"])
+    for law in ("pid", "super_twisting"):
+        (scenario,) = smc.grid(plant, smc.law(law), "contact", duration=2.0)
+        trace = smc.run(scenario)
+        low, high = scenario.contact[0].limits["j"]
+        near = min(-low, high)
+        into = max((trace.x - high).max(), (low - trace.x).max())
+        assert 0.0 < into < 0.25 * near
+        assert scenario.resolved.physics_step <= 0.25 * scenario.contact[0].depth
+        assert trace.failure is None

@@ -73,6 +73,7 @@ class Obstacle(Part):
 
     loose: ClassVar[bool] = False  # whether it moves by itself
     solid: ClassVar[bool] = True  # whether geoms meet it
+    longest_step: ClassVar[float] = math.inf  # s, of the default physics steps that resolve it
 
     def check(self, plant: Plant) -> None:
         """Raise ScenarioError if the plant cannot have it."""

@@ -12,6 +12,7 @@ of one body that collide, or all of its geoms if none does. Their blows are thos
 
 import dataclasses
 import functools
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated
 
@@ -36,6 +37,7 @@ Placed = tuple[mujoco.MjModel, np.ndarray, list[int], int]
 # m per m/s (rad per rad/s) of a blow: chosen, so that 2 m/s goes 4 mm deep and leaves again within
 # 15 ms, in which the machine hardly moves, and in which MuJoCo's steps of 0.25 ms meet e within 5 %
 BLOW_DEPTH = 0.002
+DEPTH_SHARE = 0.25  # of the depth for a speed, a time: the longest step that resolves it; chosen
 INK = (0.16, 0.17, 0.20, 1.0)
 STEEL = (0.70, 0.72, 0.75, 1.0)
 RED = (0.85, 0.30, 0.20, 1.0)
@@ -54,18 +56,21 @@ HIDDEN = UNTOUCHED | {"group": 5, "rgba": (0.0, 0.0, 0.0, 0.0)}
 class Stops(Obstacle):
     """End stops of joints, in place of their own limits.
 
-    A blow of 1 rad/s (m/s) goes 2 mrad (mm) deep.
+    A blow of 1 rad/s (m/s) goes 2 mrad (mm) deep by default.
 
     Attributes:
       limits: joint -> its lowest and highest position, rad or m. Any hinge or slide, also one
         without a channel.
       restitution: ratio of the speeds after and before a blow, 0 .. 0.98.
+      depth: how deep a blow goes for its speed, rad per rad/s (m per m/s), greater than 0. Harder
+        stops need shorter physics steps, which a scenario then takes by default.
     """
 
     solid = False
 
     limits: Mapping[str, Pair]
     restitution: Restitution = 0.3
+    depth: Positive = BLOW_DEPTH
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -83,6 +88,10 @@ class Stops(Obstacle):
         for joint in self.limits:
             find(f"joint of {plant.name} in Stops", joint, names)
 
+    @property
+    def longest_step(self) -> float:
+        return math.inf if self.depth >= BLOW_DEPTH else DEPTH_SHARE * self.depth
+
     def edit_on(self, plant: Plant, spec: mujoco.MjSpec) -> None:
         _enable(spec, "LIMIT")
         for name in self.limits:
@@ -90,7 +99,7 @@ class Stops(Obstacle):
             joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
             joint.range = (-1.0, 1.0)  # `fields` has it in rad, whatever the file's unit
             joint.margin = 0.0
-            joint.solref_limit = solref(self.restitution, FIRM_IMPEDANCE, BLOW_DEPTH, 1.0)
+            joint.solref_limit = solref(self.restitution, FIRM_IMPEDANCE, self.depth, 1.0)
             joint.solimp_limit[:2] = FIRM_IMPEDANCE
         for name, place in _posts(self, plant):
             before = spec.joint(name).parent.parent
