@@ -39,7 +39,7 @@ TIME = "that changes in the course of the log"
 WARMTH = "of friction that changes in the course of the log, as it warms up"
 COMMAND = (
     "as the fast part of its command: what was applied between samples differs from the log, so "
-    "record every command of the loop"
+    "record every command of the loop; or a spring is between motor and joint, an ElasticJoint"
 )
 LEFT_OUT = {
     "armature": "in proportion to its acceleration",

@@ -10,6 +10,7 @@ from smc_mujoco.common.aliases import AnyPath, Array, Data, Fields, Numbers
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.identification import first_guess, log_quality, model_file, servo_columns
+from smc_mujoco.identification.compliance import compliance
 from smc_mujoco.identification.lack_of_fit import Lack
 from smc_mujoco.identification.lacking_forces import lacking_forces
 from smc_mujoco.identification.log_rig import LogRig, of_runs
@@ -50,11 +51,12 @@ class OwnRig(LogRig):
         return doubts + log_quality.doubts(self, data)
 
     def lacks(self, replays: Replays, slopes: Slopes) -> list[Lack]:
-        """Return what the model may lack: forces of many shapes, and dry friction that gives
-        way.
+        """Return what the model may lack: forces of many shapes, dry friction that gives way, and
+        a spring before a joint.
         """
         solved = self.with_values(replays.values(slopes.point))
-        return lacking_forces(solved, replays, slopes) + presliding(solved, replays, slopes)
+        lacks = lacking_forces(solved, replays, slopes) + presliding(solved, replays, slopes)
+        return lacks + compliance(solved, replays, slopes)
 
     def save_model(self, path: Path) -> Path:
         """Write the machine's model file with the rig's values, and return the path."""

@@ -4,18 +4,23 @@ the start of a piece, of logs by an integration of both equations.
 
 import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
 from helpers.machine_logs import chain, sines
 
 import smc_mujoco as smc
+from smc_mujoco.identification import gauss_newton, lack_of_fit
+from smc_mujoco.identification.compliance import compliance
 from smc_mujoco.identification.first_guess import first_guess
 from smc_mujoco.identification.hidden_starts import begun, hidden_starts
 from smc_mujoco.identification.own_rig import own_rig
 from smc_mujoco.identification.replays import Point, Replays
+from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.simulation.readings import readings
 
+RANDOM = np.random.default_rng(0)
 STEP, RATE = 2e-5, 500.0  # s, Hz
 SPRING = smc.hardware.ElasticJoint(500.0, 0.5, 0.03)
 PLAY = smc.Backlash(0.02, 0.03)
@@ -80,6 +85,27 @@ def test_a_piece_that_begins_in_motion_begins_with_a_bent_spring(arm, logs, side
     state = replays.state(point, 0)
     assert state is not None
     assert state[0] == pytest.approx(bend[first], abs=2e-4)
+
+
+@pytest.mark.slow
+def test_a_spring_that_the_model_lacks_is_named_with_the_encoder_s_side(arm, logs):
+    names = ["j1.damping", "j1.armature", "input_delay"]
+    rig = first_guess(own_rig(arm, names), [logs["motor"]])
+    replays = Replays(rig, names, [logs["motor"]], False)
+    slopes = gauss_newton.refine(replays, replays.slopes(replays.start), 6)
+    solved = rig.with_values(replays.values(slopes.point))
+    lacks = compliance(solved, replays, slopes)
+    link, motor = lack_of_fit._shares(slopes, lacks)
+    assert motor.explained > max(0.5, link.explained)
+    assert motor.deviations > lack_of_fit.SIGNIFICANT
+    (text,) = [lack.text for lack in lacks if "reads the motor" in lack.text]
+    (written,) = re.findall(r'--condition "(.+)"', text)
+    assert smc.condition("geared", **find_condition(written).on(arm, 1.0))
+    spread = replays.pieces[0].spread["x"]
+    quiet = [1e-9 * row / spread for row in slopes.residuals]
+    noisy = dict(logs["motor"], x=logs["motor"]["x"] + 1e-3 * RANDOM.standard_normal(600))
+    rounded = Replays(rig, names, [noisy], False)
+    assert compliance(solved, rounded, dataclasses.replace(slopes, residuals=quiet)) == []
 
 
 def test_hidden_starts_are_put_into_the_parts_of_their_joints_within_the_play(arm):
