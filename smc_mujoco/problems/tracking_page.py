@@ -14,7 +14,12 @@ from smc_mujoco.common.files import replacing
 from smc_mujoco.common.text import joined, number
 from smc_mujoco.control.component import gains_text
 from smc_mujoco.problems.tracking_entry import tracking_entry
-from smc_mujoco.problems.tracking_results import ProblemBoard, TrackingBoard, tracking_board
+from smc_mujoco.problems.tracking_results import (
+    ProblemBoard,
+    TrackingBoard,
+    bounds,
+    tracking_board,
+)
 from smc_mujoco.problems.tracking_search import SEARCHES, SETS, UNSEEN
 
 TAGS = Path(__file__).parent / "boards_tags.toml"
@@ -96,7 +101,9 @@ def problem_table(board: TrackingBoard, result: ProblemBoard) -> Iterator[str]:
         )
     share = f"{100 * result.told_apart:.0f} %"
     more = len(result.names) - len(stands)
+    still, oracle = bounds(next(p for p in board.suite.problems if p.name == result.problem))
     yield ""
+    yield f"With u = 0 the error is {number(still)}, of an oracle {number(oracle)} counts."
     yield f"{more} more entries; {share} of all pairs can be told apart."
 
 

@@ -7,6 +7,7 @@ and its better one where it trails: one law leads another if it is better in eve
 searches, by the test of `analysis.ranking` over the instances. So a lead is none of a lucky search.
 """
 
+import dataclasses
 import datetime
 import functools
 import json
@@ -16,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from smc_mujoco.analysis.ranking import Comparison
+from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.answers.facts import EnteredFacts, ProblemStanding
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import AnyPath, Names
@@ -26,11 +28,26 @@ from smc_mujoco.common.files import read_json, reading, replacing, slug, write_j
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import number
 from smc_mujoco.common.version import versions
-from smc_mujoco.problems.tracking import TrackingSuite, tracking_suite
+from smc_mujoco.control.law import law
+from smc_mujoco.problems.tracking import (
+    TrackingProblem,
+    TrackingSuite,
+    filtered_difference,
+    tracking_suite,
+)
 from smc_mujoco.problems.tracking_entry import tracking_entry
-from smc_mujoco.problems.tracking_search import SEARCHES, SETS, Found, search_problem
+from smc_mujoco.problems.tracking_search import (
+    FIRST_UNSEEN,
+    SEARCHES,
+    SETS,
+    Found,
+    search_problem,
+)
+from smc_mujoco.simulation.run import run
 
 SHIPPED = Path(__file__).parent / "boards"
+BOUNDING = 3  # instances of the bounds
+ORACLE_SPEEDS = (1.5, 4.0)  # bandwidths of the oracle times the scale of time
 FLOOR = 0.5  # counts: smaller errors count as equal, as no encoder shows them
 SAME = 1.1  # an error is not of the load where that without it is no more than so many times less
 
@@ -220,6 +237,29 @@ class TrackingBoard:
                 counts[entry] += 1
         ordered = sorted(counts, key=lambda entry: (-counts[entry], entry))
         return {entry: counts[entry] / len(self.problems) for entry in ordered}
+
+
+def bounds(problem: TrackingProblem) -> tuple[float, float]:
+    """Return the error without a law, u = 0, and that of an oracle, counts: medians of BOUNDING
+    unseen instances. The oracle knows state, friction and load without noise and delay, and has the
+    best of some bandwidths.
+    """
+    scales = search_space.scales(problem.machine, problem.bound, problem.start, 1.0)
+    knows = {"model": "true", "sensor": None, "noise": None, "velocity": None, "input_delay": 0.0}
+    runs = []
+    for instance in range(FIRST_UNSEEN, FIRST_UNSEEN + BOUNDING):
+        still = problem.scenario(law("none"), filtered_difference(problem.period), None, instance)
+        runs.append(still)
+        for speed in ORACLE_SPEEDS:
+            wc = speed / scales["T"]
+            oracle = law("pid", kp=wc**2, kd=2.0 * wc, ki=0.0, tau=0.0)
+            runs.append(dataclasses.replace(still, law=oracle, **knows))
+    errors = []
+    for trace in run(runs):
+        e = (trace.x - trace.r)[-problem.late :, 0]
+        errors.append(float(np.sqrt(np.mean(e**2)) / problem.count))
+    still, *oracles = np.median(np.reshape(errors, (BOUNDING, -1)), axis=0).tolist()
+    return still, min(oracles)
 
 
 def tracking_board(suite: str, folder: AnyPath | None = None) -> TrackingBoard:
