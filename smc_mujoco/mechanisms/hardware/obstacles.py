@@ -10,6 +10,8 @@ of one body that collide, or all of its geoms if none does. Their blows are thos
 `hardware.contact`, without friction.
 """
 
+# pyright: reportIncompatibleVariableOverride=false
+# (a constant of the base class is a property here)
 import dataclasses
 import functools
 import math
