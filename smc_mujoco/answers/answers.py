@@ -537,6 +537,18 @@ def claims_lines(facts: ClaimsFacts) -> list[str]:
     return labelled(pairs)
 
 
+# lists
+
+
+def names_lines(names_by_kind: Iterable[tuple[str, Sequence[str]]]) -> list[str]:
+    """Return the names of each kind, and how to see more about one of them."""
+    pairs = []
+    for kind, names in names_by_kind:
+        pairs.append((kind, ", ".join(names)))
+    pairs.append(("more", f"{PROGRAM} list laws has a line about each, list NAME a page"))
+    return labelled(pairs)
+
+
 # lines that all answers have
 
 

@@ -32,6 +32,7 @@ CALLS = {
     "list pid": ["cli.law_pages.print_pages"],
     "list --need continuous,two-gains --json l.json": ["cli.law_pages.print_suitable"],
     "list --plant duffing": ["cli.law_pages.print_suitable"],
+    "list --full": ["cli.commands.listing._print_all"],
     "list law.c": ["exchange.c.law_from_c.check"],
     "explain star": ["cli.commands.glossary.meaning"],
     "run duffing": ["cli.run_scene.perform"],

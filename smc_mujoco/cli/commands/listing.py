@@ -52,6 +52,7 @@ def list_(
     needs: Needs = None,
     plant: Plant = None,
     json: options.Json = None,
+    full: options.Full = False,
 ) -> None:
     """List plants, laws, surfaces, velocity estimators, scenes and conditions, or show a law in
     full.
@@ -70,6 +71,7 @@ def list_(
     Example: smc-mujoco list my_law.c
     """
     options.only_for(ctx, ("needs",), name is None, "lists: leave out NAME")
+    options.only_for(ctx, ("full",), name is None, "the whole list: leave out NAME")
     if name is not None and plant is not None:
         with delay_signals():
             from smc_mujoco.simulation.conditions import NAMED
@@ -97,7 +99,7 @@ def list_(
             from smc_mujoco.cli import law_pages
         law_pages.print_suitable(options.names(needs), plant, terminal)
     else:
-        _print_all(terminal, name or "", plant)
+        _print_all(terminal, name or "", plant, names_alone=name is None and not full)
     terminal.finish()
 
 
@@ -107,12 +109,15 @@ def _about(metric: "Metric") -> str:
     return f"{metric.summary} [{' or '.join(units)}]".removesuffix(" []")
 
 
-def _print_all(terminal: Terminal, kind: str, plant: str | None = None) -> None:
+def _print_all(
+    terminal: Terminal, kind: str, plant: str | None = None, names_alone: bool = False
+) -> None:
     """Print a line about each plant, law, surface, estimator, scene and condition, about each of a
-    kind, or about what has this name, which may be a metric's. Conditions are those of the plant,
-    by default one that has stops, and numbers for jumps.
+    kind, or about what has this name, which may be a metric's; or their names alone. Conditions are
+    those of the plant, by default one that has stops, and numbers for jumps.
     """
     with delay_signals():
+        from smc_mujoco.answers import answers
         from smc_mujoco.cli import law_pages, tables
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.mechanisms.plant import catalogue as plants
@@ -137,6 +142,13 @@ def _print_all(terminal: Terminal, kind: str, plant: str | None = None) -> None:
         conditions.append((name, words))
     lists[f"Conditions, on {machine.name} for 10 s"] = conditions
     lists["Metrics"] = [(metric.name, _about(metric)) for metric in metrics()]
+    if names_alone:
+        terminal.printed += [tables.catalogue(title, rows) for title, rows in lists.items()]
+        pairs = [
+            (title.partition(",")[0], [name for name, _ in rows]) for title, rows in lists.items()
+        ]
+        terminal.note("\n".join(answers.names_lines(pairs)))
+        return
     for title, rows in lists.items():
         listed = rows
         if kind not in title.lower():
