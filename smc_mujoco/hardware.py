@@ -3,6 +3,7 @@
 from smc_mujoco.mechanisms.hardware.command_delay import CommandDelay
 from smc_mujoco.mechanisms.hardware.command_filter import CommandFilter
 from smc_mujoco.mechanisms.hardware.contact import Contact
+from smc_mujoco.mechanisms.hardware.current_motor import CurrentMotor
 from smc_mujoco.mechanisms.hardware.drag import Drag
 from smc_mujoco.mechanisms.hardware.drives import RateLimit
 from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
@@ -23,5 +24,5 @@ __all__ = [
     "LuGre",
     "PositionServo",
 ]
-__all__ += ["RateLimit", "ServoFriction", "Sigmoid", "Stepper", "Stribeck"]
+__all__ += ["CurrentMotor", "RateLimit", "ServoFriction", "Sigmoid", "Stepper", "Stribeck"]
 __all__ += ["actuator_function", "friction_function", "servo"]

@@ -29,6 +29,7 @@ from smc_mujoco.identification.paths import (
 )
 from smc_mujoco.identification.records import Record
 from smc_mujoco.identification.rig import RecordPart, Rig, Source, Values
+from smc_mujoco.mechanisms.hardware.current_motor import CurrentMotor
 from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
 from smc_mujoco.mechanisms.layout import channel_names, driven_names
 from smc_mujoco.mechanisms.plant import Plant
@@ -377,7 +378,7 @@ class LogRig(Rig):
             joint, _, kind = name.rpartition(".")
             if kind == "zero" and joint:
                 zeros.append(name)
-            elif kind in ("gain", "offset") and joint:
+            elif joint and (kind == "offset" or (kind == "gain" and not self.base.force_command)):
                 motors.append(name)
                 if joint in joints:
                     faulty.add(joint)
@@ -391,7 +392,8 @@ def moves(x: Array) -> bool:
 
 def of_runs(rig: LogRig, values: Values) -> Fields:
     """Return the fields of a Scenario of the machine with some values: in runs a delay is a whole
-    number of physics steps, and gain and offset are a Fault from the start.
+    number of physics steps, a gain is that of a motor whose u is a current, and an offset is a
+    Fault from the start.
     """
     base = rig.base
     fields = rig.numbers_of(values)
@@ -401,9 +403,17 @@ def of_runs(rig: LogRig, values: Values) -> Fields:
     if late := vars(values).get(DELAY, base.input_delay):
         step = base.control_period / math.ceil(base.control_period / RUN_STEP - 1e-9)
         fields |= {DELAY: round(late / step) * step, "physics_step": step}
-    for joint in driven_names(rig.plant):
+    for i, joint in enumerate(driven_names(rig.plant)):
         gain = vars(values).get(f"{joint}.gain", 1.0)
         bias = vars(values).get(f"{joint}.offset", 0.0)
+        if gain != 1.0 and base.force_command:  # u is in the unit of the log, a current
+            largest = base.plant.limits[i] if base.plant.limits else math.inf
+            motor = CurrentMotor(gain, largest, on=(joint,))
+            parts = fields.get("actuator", ())
+            drives = [part for part in parts if part.drives]
+            beside = [part for part in parts if not part.drives]
+            fields["actuator"] = (*drives, motor, *beside)
+            gain, bias = 1.0, bias / gain
         alone = f"{joint}.offset" not in rig.not_in_runs and f"{joint}.gain" not in rig.not_in_runs
         if (gain, bias) != (1.0, 0.0) and alone:
             on = joint if rig.plant.driven > 1 else None

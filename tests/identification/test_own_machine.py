@@ -563,13 +563,31 @@ def test_a_trace_counts_as_the_log_of_a_machine(arm):
     assert identified.values["j1.frictionloss"] == pytest.approx(0.3, rel=0.02)
 
 
-def test_two_gains_are_left_out_of_runs_and_said_so(found):
-    rig = own_rig(smc.plant_from(TWO, ["j1", "j2"]), ["j1.gain", "j2.gain"])
-    assert rig.not_in_runs == ("j1.gain", "j2.gain")
+def test_two_offsets_are_left_out_of_runs_and_said_so(found):
+    rig = own_rig(smc.plant_from(TWO, ["j1", "j2"]), ["j1.offset", "j2.offset"])
+    assert rig.not_in_runs == ("j1.offset", "j2.offset")
     without_numbers = dataclasses.replace(
         found, rig=rig, values={}, errors={}, correlations=np.zeros((0, 0))
     )
-    assert any("j1.gain, j2.gain" in note for note in without_numbers.notes)
+    assert any("j1.offset, j2.offset" in note for note in without_numbers.notes)
+
+
+def test_a_gain_is_a_motor_whose_u_is_a_current_within_the_joint_s_force():
+    bounded = ONE.replace('joint="j1"/>', 'joint="j1" ctrllimited="true" ctrlrange="-150 150"/>')
+    arm = smc.plant_from(bounded, ["j1"])
+    rig = own_rig(arm, ["j1.gain", "j1.offset"])
+    rig = rig.with_values({"j1.gain": 8.478, "j1.offset": 3.0})
+    fields = rig.condition_fields()
+    scenario = smc.Scenario(
+        plant=arm, law="none", feedforward=smc.Constant(100.0), x0=0.0, duration=0.01, **fields
+    )
+    assert scenario.limits == (pytest.approx(150.0 / 8.478),)
+    trace = smc.run(scenario)
+    assert trace.units()["u"] == "A"
+    assert trace.u[-1, 0] == pytest.approx(17.693, abs=1e-3)
+    start = smc.run(dataclasses.replace(scenario, feedforward=smc.Constant(1.0)))
+    inertia = float(arm.load().dof_M0[0])
+    assert start.v[-1, 0] == pytest.approx((8.478 + 3.0) * 0.01 / inertia, rel=0.02)
 
 
 def test_a_chirp_is_recommended_and_a_staircase_is_last_because_it_rests(arm, tmp_path):
