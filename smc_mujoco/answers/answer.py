@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from smc_mujoco.answers.explain import explain
 from smc_mujoco.common import html
-from smc_mujoco.common.aliases import AnyPath
+from smc_mujoco.common.aliases import AnyPath, Names
 from smc_mujoco.common.files import replacing
 from smc_mujoco.common.tabular import Tables, Tabular
 
@@ -47,6 +48,11 @@ class Answer(Tables):
     @property
     def pictures(self) -> Sequence[html.Html]:
         """The pictures of the page."""
+        return ()
+
+    @property
+    def words(self) -> Names:
+        """The words that the page explains below its tables."""
         return ()
 
     @property
@@ -90,6 +96,9 @@ class Answer(Tables):
         parts = [self._html_lines, *self.pictures]
         for table in self.tables:
             parts.append(table._repr_html_())
+        if self.words:
+            rows = [explain(word).split("\n", 1) for word in self.words]
+            parts.append(html.table(("word", "meaning"), rows, max_rows=len(rows)))
         page = html.page(self.title, parts)
         with replacing(Path(path)) as file:
             file.write_text(page, encoding="utf-8")

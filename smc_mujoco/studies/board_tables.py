@@ -56,6 +56,14 @@ UNDER = {
 }
 
 
+# what boards and comparisons explain on their pages
+WORDS = (
+    *("star", "may be the best", "lead", "tied", "open", "not ranked", "floor", "interval"),
+    *("J", "settled", "settling time", "ultimate bound", "ITAE", "TV rate", "arrived"),
+    *("shipped", "set of gains", "some runs"),
+)
+
+
 class Boards(Answer, list[Board]):
     """Boards: a list that terminals, notebooks and `print` show as one screen; `full` has the
     tables.
@@ -111,6 +119,11 @@ class Boards(Answer, list[Board]):
         if not compared:
             return ["no boards: no metric applies", *self.absent]
         return answers.compare_lines(CompareFacts(contests=compared, bewares=self.bewares))
+
+    @property
+    def words(self) -> Names:
+        """The words that the page explains."""
+        return WORDS
 
     @property
     def tables(self) -> list[Tabular]:

@@ -21,7 +21,7 @@ from smc_mujoco.answers.answer import Answer
 from smc_mujoco.answers.command import again
 from smc_mujoco.answers.facts import Barred, Beware, CompareFacts, Contest, More, NextStep, Open
 from smc_mujoco.common import html
-from smc_mujoco.common.aliases import AnyPath, Fields
+from smc_mujoco.common.aliases import AnyPath, Fields, Names
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, constrained
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown, warn_once
@@ -370,6 +370,11 @@ class Compared(Answer):
         """The title of the page: the laws and the plants."""
         laws = dict.fromkeys(itertools.chain.from_iterable(self.gains.values()))
         return f"{joined([*map(style.law_name, laws)])} on {joined(self._plant_names)}"
+
+    @property
+    def words(self) -> Names:
+        """The words that the page explains."""
+        return self.leaderboard.words
 
     @property
     def pictures(self) -> list[html.Html]:
