@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.common import column_units
 from smc_mujoco.common.aliases import AnyPath, Array, ArrayPair, Data, Floats, Names
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import csv_rows, reading
-from smc_mujoco.identification import column_units
 from smc_mujoco.simulation import trace as traces
 from smc_mujoco.simulation.python_functions import evaluate
 from smc_mujoco.simulation.readings import readings

@@ -5,12 +5,12 @@ space.
 import dataclasses
 import itertools
 import math
-import re
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from numba import njit
 
+from smc_mujoco.common import column_units
 from smc_mujoco.common.aliases import AnyPath, Array, Floats
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown
 from smc_mujoco.common.files import csv_rows
@@ -21,8 +21,6 @@ from smc_mujoco.simulation.signals import EARLY, Signal
 
 # longest step over the median step; chosen: a logger's jitter is below, a missing row above
 MAX_GAP_STEPS = 1.5
-NAME_WITH_UNIT = re.compile(r"(.*\S)\s*\[([^\]]*)\]")  # name of a column
-SECOND_SPELLINGS = ("s", "sec", "second", "seconds")
 KNOT_SPACING = (
     0.01  # s, of a path in space; chosen: between knots the tip leaves its path by micrometres
 )
@@ -110,14 +108,15 @@ class TimeSeries(Signal):
 
         Args:
           path: the file. Its first row may name the columns, perhaps with a unit: "d [N m]", as
-            Trace.export writes it. Times, s, are in the column "t" or "time", else in the first.
+            Trace.export writes it; degrees, ms and the like become SI units. Times are in the
+            column "t" or "time", else in the first.
           column: name of the column of values, with its unit or without. Default: the first besides
             time.
 
         Raises:
-          ScenarioError: there is no such file or column, times are not in s or do not increase, a
-            cell is empty or not a finite number, or a step of time is longer than 1.5 median steps.
-            The error names the line.
+          ScenarioError: there is no such file or column, two columns have one name, the unit of
+            time is not known, times do not increase, a cell is empty or not a finite number, or a
+            step of time is longer than 1.5 median steps. The error names the line.
         """
         rows = csv_rows(path)
         if not rows or len(rows[0][1]) < 2:
@@ -127,9 +126,11 @@ class TimeSeries(Signal):
         names = rows[0][1]
         if all(_number(name) is None for name in names):
             rows = rows[1:]
+            names, factors = column_units.headings(names, str(path))
         else:
             names = [f"column {i + 1}" for i in range(len(names))]
-        places = _columns(path, names, column)
+            factors = [1.0] * len(names)
+        places = _columns(path, names, factors, column)
         for line, row in rows:
             if len(row) != len(names):
                 raise ScenarioError(
@@ -142,8 +143,8 @@ class TimeSeries(Signal):
                         f"{path}, line {line}: {names[i]} is {shown(row[i])}: {cure}"
                     )
         of_time, of_value = places
-        times = [float(row[of_time]) for _, row in rows]
-        values = [float(row[of_value]) for _, row in rows]
+        times = [factors[of_time] * float(row[of_time]) for _, row in rows]
+        values = [factors[of_value] * float(row[of_value]) for _, row in rows]
         _check(str(path), times, lambda i: f"line {rows[i][0]}")
         steps = np.diff(times)
         median = np.quantile(
@@ -273,21 +274,29 @@ def _check(what: str, times: Sequence[float], where: Callable[[int], str]) -> No
         )
 
 
-def _columns(path: AnyPath, names: list[str], column: str | None) -> tuple[int, int]:
-    """Return the indices of the columns of times and values; `column` may leave out the unit in a
-    name.
+def _columns(
+    path: AnyPath, names: list[str], factors: list[float], column: str | None
+) -> tuple[int, int]:
+    """Return the indices of the columns of times and values, which have these names and factors to
+    SI units; `column` may have its unit or leave it out.
     """
-    plain = [NAME_WITH_UNIT.sub(r"\1", name) for name in names]
-    time_column = next((plain.index(name) for name in ("t", "time") if name in plain), 0)
-    if (unit := NAME_WITH_UNIT.fullmatch(names[time_column])) and unit[2] not in SECOND_SPELLINGS:
+    time_column = next((names.index(name) for name in ("t", "time") if name in names), 0)
+    plain_time = names[time_column] in ("t", "time")
+    odd = column_units.with_unit("t", names) or column_units.with_unit("time", names)
+    if odd and not plain_time:
         raise ScenarioError(
-            f"time column {names[time_column]!r} of {path} is not in seconds: give times in s"
+            f"time column {odd!r} of {path} has a unit that is not known: give times in s"
         )
     if column is None:
         return time_column, int(time_column == 0)
-    if not isinstance(column, str) or column not in (*names, *plain):
+    plain = column
+    if isinstance(column, str):
+        (plain,), (factor,) = column_units.headings([column], str(path))
+        if plain in names and factor not in (1.0, factors[names.index(plain)]):
+            raise unknown(f"column of {path}", column, names)
+    if not isinstance(plain, str) or plain not in names:
         raise unknown(f"column of {path}", column, names)
-    return time_column, (names if column in names else plain).index(column)
+    return time_column, names.index(plain)
 
 
 def _number(cell: str) -> float | None:

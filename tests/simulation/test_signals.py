@@ -422,6 +422,8 @@ def test_a_csv_file_is_read(file):
         ("\ufeff" + GOOD.replace(",", ";").replace(".", ","), {}, (1.0, 2.0, 3.0, 4.0)),
         (GOOD.replace("t,d,e", "t [s],d [N m],e"), {"column": "d"}, (1.0, 2.0, 3.0, 4.0)),
         (GOOD.replace("t,d,e", "time [s],d [N],e [m]"), {"column": "e [m]"}, (5.0, 6.0, 7.0, 8.0)),
+        ("t [ms],d [kN]\n0,.001\n100,.002\n200,.003\n300,.004", {}, (1.0, 2.0, 3.0, 4.0)),
+        ("t,d [mm]\n0,1000\n.1,2000\n.2,3000\n.3,4000", {"column": "d [mm]"}, (1.0, 2.0, 3.0, 4.0)),
         ('"t","d, N"\n0,1\n0.1,2\n0.2,3\n0.3,4e0', {"column": "d, N"}, (1.0, 2.0, 3.0, 4.0)),
     ):
         series = TimeSeries.from_csv(file(content), **column)
@@ -443,10 +445,13 @@ def test_a_csv_file_that_is_not_sound_is_refused_with_its_line(file, refused):
         (GOOD.replace("0.1,2,6\n", ""), {}, ("gap after line 2", "0 s to 0.2 s")),
         (GOOD, {"column": "f"}, ("column", "'f'", "d, e, t")),
         (
-            GOOD.replace("t,", "t [ms],"),
+            GOOD.replace("t,", "t [fortnights],"),
             {},
-            ("time column 't [ms]'", "not in seconds", "give times in s"),
+            ("time column 't [fortnights]'", "not known", "give times in s"),
         ),
+        (GOOD.replace("t,d,e", "t,d,d"), {}, ("two columns d", "rename one")),
+        (GOOD.replace("t,d,e", "t,d,e [A]"), {"column": "e"}, ("column", "'e'", "e [A]")),
+        (GOOD.replace("t,d,e", "t,d [rad],e"), {"column": "d [deg]"}, ("column", "d [deg]")),
         ("t,d\n", {}, ("0 points", "two")),
         ("t d\n0 1\n0.1 2\n", {}, ("no two columns", "commas")),
         (b"\x89PNG\r\n\x1a\n\0\0", {}, ("not text", "commas")),

@@ -7,7 +7,8 @@ import pytest
 from helpers.machine_logs import chain
 
 import smc_mujoco as smc
-from smc_mujoco.identification import column_units, records
+from smc_mujoco.common import column_units
+from smc_mujoco.identification import records
 from smc_mujoco.identification.own_rig import own_rig
 
 
