@@ -12,7 +12,7 @@ import functools
 import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -28,9 +28,6 @@ from smc_mujoco.mechanisms.hardware.part import Actuator, Part
 from smc_mujoco.mechanisms.plant import SEEN, Plant, Values
 from smc_mujoco.simulation.cfunctions import OF_JOINTS
 from smc_mujoco.simulation.signals import Signal
-
-if TYPE_CHECKING:
-    from smc_mujoco.simulation.scenario import Resolved, Scenario
 
 USER_EXCEPTIONS = (Exception, SystemExit)  # of a user's function; they end one run
 RETURN_VALUES = {  # kind of a component -> what it returns, for messages
@@ -163,7 +160,7 @@ class NominalDynamics:
     control.joint_law.
     """
 
-    def __init__(self, scenario: "Scenario", x: np.ndarray, v: np.ndarray):
+    def __init__(self, scenario: Any, x: np.ndarray, v: np.ndarray):
         self.scenario = scenario
         self.x = x
         self.v = v
@@ -313,7 +310,7 @@ class Memories:
         return self.arrays[address]
 
 
-def of_component(c: Component, s: "Resolved") -> PythonFunction:
+def of_component(c: Component, s: Any) -> PythonFunction:
     """Return a law, a surface or an estimator of a run: for one channel, or for all joints."""
     if c.joint:
         dynamics = functools.partial(NominalDynamics, s)
