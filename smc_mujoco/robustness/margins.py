@@ -596,11 +596,11 @@ def _other_sets(base: Scenario, law: object, gains: str) -> list[Scenario]:
     if isinstance(law, Component) and law.source.kind != source.DEFAULT:
         return []
     count = len(sets.tuned(base.plant, base.law.name, gains).sets)
-    others = []
+    scenarios = []
     for seed in range(1, count):
         of_set = sets.law(base.plant, base.law.name, gains, seed)
-        others.append(dataclasses.replace(base, law=of_set).named(base.condition))
-    return others
+        scenarios.append(dataclasses.replace(base, law=of_set).named(base.condition))
+    return scenarios
 
 
 def margins_of(
@@ -758,9 +758,9 @@ class OverSets:
 
     def ranges(self, cells: Iterable[int]) -> dict[int, tuple[float, float]]:
         """Return the range over all sets of each of these cells that has several."""
-        several = [i for i in cells if self.siblings[i // self.kinds]]
+        with_sets = [i for i in cells if self.siblings[i // self.kinds]]
         ends: dict[tuple[int, str], float | None] = {}
-        for i in several:
+        for i in with_sets:
             search = self.cells.searches[i]
             ends |= {(i, "none"): None, (i, "low"): search.low}
             if search.high < math.inf:
@@ -769,7 +769,7 @@ class OverSets:
         holding = self.held(ends, everyone)
         ranges: dict[int, list[float]] = {}
         groups: dict[tuple[int, str], list[int]] = {}  # sets that hold less, or more
-        for i in several:
+        for i in with_sets:
             value = self.cells.searches[i].low
             steady = bool(holding[i, "none"].all())
             ranges[i] = [value if steady else math.nan, value]

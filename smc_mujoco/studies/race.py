@@ -59,6 +59,7 @@ FIRST = 3  # sets after which a law may be dropped; chosen
 FAR = 2.0  # times the leader's worst J, above which it is; chosen
 STUCK = 2.0  # times the least J of its law's others, above which a search is made again; chosen
 LAST_ROOM = 0.7  # of the time left, which first searches take before tables; chosen
+LEAST_ROOM = 0.3  # of a law's time for its first set, which its search has at least; chosen
 SHORTER = (1, 2, 4)  # by which the evaluations of a first search may be divided; chosen
 DECIDED_RUNS = 3  # sets of gains that a quick search runs as a judgement does
 WITHOUT = "none"  # the law u = 0
@@ -353,7 +354,8 @@ def _shorten(course: RaceCourse, entrant: SearchedEntrant, waiting: int) -> floa
         entrant.share = share
         if clock.search_seconds(_work(course, entrant)) <= room:
             break
-    return now + room
+    after = clock.pace * clock.unit * (1 + judgements([0]))  # the best set is decided and judged
+    return now + max(room - after, LEAST_ROOM * room)
 
 
 def _search_round(

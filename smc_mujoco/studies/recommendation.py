@@ -330,9 +330,9 @@ class Recommendation(Answer):
             if margin.kind == "delay" and delay and not margin.open and beyond <= NO_ROOM * delay:
                 cautions.append(Caution(kind="no room", value=delay, most=beyond))
         if self.tolerance.helped and any(margin.kind == "friction" for margin in self.margins):
-            other = self.tolerance.opposed
-            value = other.value if other else math.nan
-            unit = other.unit if other else ""
+            opposed = self.tolerance.opposed
+            value = opposed.value if opposed else math.nan
+            unit = opposed.unit if opposed else ""
             names = joined(self.tolerance.helped)
             cautions.append(Caution(kind="helped", where=names, value=value, unit=unit))
         return cautions
@@ -521,10 +521,10 @@ class Recommendation(Answer):
             if rest := self.rests.get(law.name):
                 swing = f"{number(rest.size)} {rest.unit}"
                 share = f"{100 * rest.share:.2g} %"
-                at = f"{rest.frequency:.3g}" if rest.shakes else ""
+                frequency = f"{rest.frequency:.3g}" if rest.shakes else ""
                 over = "" if math.isnan(rest.overshoot) else f"{rest.overshoot:.3g} %"
                 where = rest.condition, rest.overshoots_in
-                rows.append((law.name, swing, share, at, where[0], over, where[1]))
+                rows.append((law.name, swing, share, frequency, where[0], over, where[1]))
         headings = "law", "swing of u", "of its bound", "Hz", "under", "overshoot", "under"
         return Tabular(headings=headings, rows=rows, title="At rest, without noise", left=1)
 
