@@ -589,6 +589,7 @@ CAUTIONS = {
         "{where}: --need calm",
     ),
     "overshoots": ("overshoot", "{value:.3g} % under {where}: --need 'overshoot<10'"),
+    "limit": ("limit", "{count} of {of} runs break {where}, or fail"),
     "breaks": ("overshoot", "{value:.3g} % under {where}, above the limit of {most:g} %"),
     "no room": ("no room", "tuned at a delay of {ms:g} ms, it fails at {most_ms:g} ms"),
     "no margin": ("margins", "none: the error does not end below 5 % of its start"),
@@ -691,7 +692,7 @@ def _evidence_of_law(facts: WhichFacts) -> list[Labelled]:
         pairs.append(("withstands", text))
     if facts.without and facts.form != "unneeded":
         text = f"{_counts(facts.without.runs)} runs settle"
-        if facts.over_none and not math.isnan(facts.over_none.low):
+        if facts.over_none and facts.over_none.low > 0.0:
             text += f"; the law's J is {percent(facts.over_none.low, facts.over_none.high)} below"
         pairs.append(("without a law", text))
     return pairs
@@ -778,9 +779,11 @@ def which_next(facts: WhichFacts, call: Sequence[str]) -> NextStep:
 
 def _compared(facts: WhichFacts, call: Sequence[str]) -> list[str]:
     """Return the command that compares the laws that may be best."""
-    words = _without(_without(call, "--minutes"), "--law")
+    words = [*call]
+    for option in ("--minutes", "--law", "--need", "--out"):
+        words = _without(words, option)
     command, _, *rest = words
-    return [command, "compare", *rest, "--law", ",".join(facts.undecided)]
+    return [command, "compare", *rest, "--law", ",".join(facts.undecided[:MOST_NAMED])]
 
 
 def _without(call: Sequence[str], option: str) -> list[str]:

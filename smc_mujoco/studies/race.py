@@ -62,6 +62,7 @@ LAST_ROOM = 0.7  # of the time left, which first searches take before tables; ch
 LEAST_ROOM = 0.3  # of a law's time for its first set, which its search has at least; chosen
 SHORTER = (1, 2, 4)  # by which the evaluations of a first search may be divided; chosen
 DECIDED_RUNS = 3  # sets of gains that a quick search runs as a judgement does
+TOLD = 5  # laws that the bar names
 WITHOUT = "none"  # the law u = 0
 
 
@@ -276,7 +277,8 @@ def race(course: RaceCourse, entrants: Sequence[Entrant], relevant: float) -> Ra
                 for name in dropped:
                     del running[name]
                 if dropped:
-                    progress.says(f"{joined(dropped)} dropped: set of gains")
+                    names = joined([*dropped]) if len(dropped) < TOLD else f"{len(dropped)} laws"
+                    progress.says(f"{names} dropped: set of gains")
             if k + 1 in LOOKS:
                 comparison, looked = judged(running, course.goal, relevant), k + 1
                 if comparison is None or comparison.winners[0] or needed(comparison) > WITHIN:

@@ -25,6 +25,7 @@ from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective, weighe
 from smc_mujoco.analysis.tuning.result import Tuned
 from smc_mujoco.analysis.tuning.run_limits import CALM, LIMIT_COST, overshoot, swing
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError
+from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import source
@@ -69,6 +70,7 @@ from smc_mujoco.studies.recommendation import (
     Recommendation,
     Settled,
     Tolerance,
+    lost_runs,
 )
 from smc_mujoco.studies.table import Table
 
@@ -126,7 +128,8 @@ def recommend(
     settled = _settled(table)
     rests = {name: _at_rest(course, law) for name, law in chosen.items()}
     shaky = [name for name, rest in rests.items() if rest and rest.share > CALM]
-    order = in_order({law: settled[law] for law in chosen}, fixed, raced, shaky)
+    broken = {law: runs for law, runs in lost_runs(fixed).items() if goal.limits}
+    order = in_order({law: settled[law] for law in chosen}, fixed, raced, shaky, broken)
     metrics = list(question.metrics)
     least = {law: least_share(settled[law]) for law in chosen}
     if min(least.values()) < 1.0 and SETTLES not in metrics:
@@ -238,21 +241,24 @@ def in_order(
     fixed: Comparison | None,
     raced: Race | None,
     shaky: Sequence[str] = (),
+    broken: Mapping[str, int] = frozen({}),
 ) -> list[str]:
     """Return the laws, the one to use first: those that settle reliably, then those that settle in
-    some run. Among equals the one that runs name where sets of gains name no winner; where nothing
-    does, those that rest before the `shaky`, of the laws that may be the best.
+    some run, and of each those first with which the fewest runs break a limit. Among equals the one
+    that runs name where sets of gains name no winner; where nothing does, those that rest before
+    the `shaky`, of the laws that may be the best.
     """
     winner = raced.winner if raced else None
     better = fixed.winners[0] if fixed and not winner else None
     undecided = raced.first if raced and not winner and not better else []
 
-    def place(law: str) -> tuple[bool, ...]:
+    def place(law: str) -> tuple[int, ...]:
         of_law = settled[law]
         never = not any(done for done, _ in of_law.values())
         behind = bool(undecided) and law not in undecided
         shakes = bool(undecided) and law in shaky
-        return least_share(of_law) < RELIABLE, never, law != better, behind, shakes
+        lost = broken.get(law, 0)
+        return least_share(of_law) < RELIABLE, never, lost, law != better, behind, shakes
 
     return sorted(settled, key=place)
 

@@ -341,6 +341,11 @@ class Recommendation(Answer):
     def _of_race(self) -> list[Caution]:
         """What the race leaves open."""
         cautions = []
+        lost = lost_runs(self.fixed).get(self.law.name, 0)
+        if self.limits and lost and self.fixed:
+            where = joined([*map(str, self.limits)])
+            of = len(self.fixed.cells[0, 0])
+            cautions.append(Caution(kind="limit", where=where, count=lost, of=of))
         if self.tuned and self.tuned.at_bound:
             cautions.append(Caution(kind="at bound", where=joined(self.tuned.at_bound)))
         if self.no_law and self.no_law.needless and self.form != "unneeded":
@@ -623,7 +628,7 @@ def _lead(comparison: Comparison, law: str, rival: str = "") -> Lead:
     effects = {name: comparison.effect(0, law, name) for name in rivals}
     nearest = max(effects, key=lambda name: effects[name].high)
     effect = effects[nearest]
-    lost = dict(zip(comparison.laws, comparison.away[:, 0].sum(axis=1).tolist(), strict=True))
+    lost = lost_runs(comparison)
     if lost[nearest]:
         return Lead(
             law=law,
@@ -633,6 +638,13 @@ def _lead(comparison: Comparison, law: str, rival: str = "") -> Lead:
             gaps=f"{lost[nearest]} of {effect.samples}",
         )
     return Lead(law=law, rival=nearest, metric="J", low=1.0 - effect.high, high=1.0 - effect.low)
+
+
+def lost_runs(comparison: Comparison | None) -> dict[str, int]:
+    """Return law -> how many of its units in a comparison fail or break a limit."""
+    if comparison is None:
+        return {}
+    return dict(zip(comparison.laws, comparison.away[:, 0].sum(axis=1).tolist(), strict=True))
 
 
 def _cost(J: float) -> str:

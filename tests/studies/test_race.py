@@ -369,5 +369,6 @@ def test_where_nothing_decides_a_law_that_rests_comes_before_one_that_shakes():
     settled = {law: {"noise": (10, 10)} for law in "abc"}
     undecided = types.SimpleNamespace(winner=None, first=["a", "b"])
     assert in_order(settled, None, undecided, ["a"]) == ["b", "a", "c"]
+    assert in_order(settled, None, undecided, ["a"], {"b": 1, "c": 2}) == ["a", "b", "c"]
     decided = types.SimpleNamespace(winner="a", first=["a"])
     assert in_order(settled, None, decided, ["a"]) == ["a", "b", "c"]
