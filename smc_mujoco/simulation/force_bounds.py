@@ -3,6 +3,7 @@
 Here `s` is a Scenario, which imports this module.
 """
 
+import contextlib
 import math
 from typing import Any
 
@@ -17,8 +18,10 @@ INSTANTS = 101  # of a run, in which its reference is looked at
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
 
 
-def default_bound(s: Any) -> float | tuple[float, ...]:
-    """Return the default of u_max: of each joint that of its motor, or what the plant suggests."""
+def default_bound(s: Any, reference: Any) -> float | tuple[float, ...]:
+    """Return the default of u_max: of each joint that of its motor, or what the plant suggests; of
+    a set-point what a run with this reference asks for.
+    """
     suggested = suggested_u_max(s.plant)
     if not any(part.bound is not None or part.unit == SET_POINT for part in s.actuator):
         return suggested
@@ -28,7 +31,7 @@ def default_bound(s: Any) -> float | tuple[float, ...]:
     for i, motor in enumerate(s.drive_train.motors):
         if servo_of(s.plant, i) is not None:
             if own[i] is None and motor.unit == SET_POINT:
-                bounds[i] = min(bounds[i], _asked(s, i, motor))
+                bounds[i] = min(bounds[i], _asked(s, i, motor, reference))
         elif motor.bound is not None and not any(part.unit for part in drives_of_file(s.plant, i)):
             bounds[i] = motor.bound
     return tuple(bounds) if len(set(bounds)) > 1 else bounds[0]
@@ -52,27 +55,26 @@ def _reach(plant: Plant, i: int, servo: Any) -> float:
     return max(high - servo.goal, servo.goal - low)
 
 
-def _asked(s: Any, i: int, servo: Any) -> float:
+def _asked(s: Any, i: int, servo: Any, reference: Any) -> float:
     """Return how far from the goal a run asks for the set-point of a servo, rad (m), with two
     digits: as far as the joint starts and its reference goes, and farther by what makes the servo
     give all its force there, or what it needs to move and to hold, but by no less than the way
     from the start.
     """
     from smc_mujoco.mechanisms.custom.scales import FARTHEST, needs, usual_start
-    from smc_mujoco.simulation.coerce import suggested_reference
-    from smc_mujoco.simulation.python_functions import evaluate
 
     starts = [usual_start(s.plant)[i] - servo.goal]
     starts += [] if s.x0 is None else [s.x0[i] - servo.goal]
     way = FARTHEST * max(map(abs, starts))
-    reference = suggested_reference(s.plant) if s.reference is None else s.reference
     signal = getattr(reference, "signals", (reference,) * s.plant.driven)[i]
     farthest = way
     lead = 0.0
-    for t in np.linspace(0.0, s.duration, INSTANTS):
-        r, dr, _ = evaluate(signal, float(t))
-        farthest = max(farthest, abs(r - servo.goal))
-        lead = max(lead, servo.kv * abs(dr) / servo.kp)
+    series = (signal.data,) if signal.series else ()
+    for t in np.linspace(0.0, s.duration, INSTANTS).tolist():
+        with contextlib.suppress(Exception):  # of a user's signal, which the run says
+            r, dr, _ = type(signal).value(t, signal, *series)
+            farthest = max(farthest, abs(r - servo.goal))
+            lead = max(lead, servo.kv * abs(dr) / servo.kp)
     stall = math.inf if servo.stall is None else servo.stall
     need = needs(s.plant)[i] / servo.kp
     return float(f"{farthest + lead + min(stall / servo.kp, max(way, need)):.2g}")

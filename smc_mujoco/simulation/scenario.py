@@ -571,7 +571,9 @@ def _defaults(s: Scenario) -> dict[str, Any]:
     defaults = {
         "model": lambda: "nominal" if s.law.requires_model else "none",
         "physics_step": lambda: s.control_period / integration.default_steps(s),
-        "u_max": lambda: force_bounds.default_bound(s),
+        "u_max": lambda: force_bounds.default_bound(
+            s, coerce.suggested_reference(s.plant) if s.reference is None else s.reference
+        ),
         "x0": lambda: _start(s),
         "v0": lambda: (0.0,) * s.plant.n,
         "reference": lambda: coerce.suggested_reference(s.plant),
