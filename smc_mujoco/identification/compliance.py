@@ -28,8 +28,10 @@ from smc_mujoco.mechanisms.plant import Values as Parameters
 
 ABOVE_NOISE = 1.5  # rms of residuals over the noise, from which a spring is looked for; chosen
 BEND = 2e-3  # rad (m), of the spring under the rms of the command; chosen
-ROTOR_SHARE = 0.3  # of the joint's inertia, where the model has no armature; chosen
+# of the joint's inertia: the rotor's, at least, and what of the armature it takes, at most; chosen
+ROTOR_SHARE, MOST_OF_ROTOR = 0.1, 0.9
 LOSS = 0.1  # of the root of stiffness and inertia: the spring's damping; chosen
+SHORTEST_STEP = 2e-5  # s
 MOST_POLE = 0.3  # of a step times the fastest pole; chosen
 
 
@@ -94,8 +96,9 @@ def _spring(rig: LogRig, replays: Replays, i: int) -> tuple[ElasticJoint, float]
     plant = rig.numbers_of(Values(**rig.values))["plant"]
     model = plant.load()
     dof = dof_ids(model)[i]
-    inertia, armature = float(model.dof_M0[dof]), float(model.dof_armature[dof])
-    rotor = armature or ROTOR_SHARE * inertia
+    inertia = float(model.dof_M0[dof])
+    armature = min(float(model.dof_armature[dof]), MOST_OF_ROTOR * inertia)
+    rotor = max(armature, ROTOR_SHARE * inertia)
     stiffness = force / BEND
     damping = LOSS * math.sqrt(stiffness * rotor)
     joint = driven_names(rig.plant)[i]
@@ -117,7 +120,7 @@ def _changes(elastic: LogRig, replays: Replays, slopes: Slopes) -> list[Array]:
     trial = Replays(elastic, [], replays.data, False)
     (spring,) = (part for part in elastic.base.actuator if isinstance(part, ElasticJoint))
     control = elastic.repeated(trial.pieces[0].part).control_period  # pyright: ignore[reportArgumentType]
-    longest = min(RUN_STEP, MOST_POLE / spring.fastest_pole(elastic.plant))
+    longest = min(RUN_STEP, max(MOST_POLE / spring.fastest_pole(elastic.plant), SHORTEST_STEP))
     trial.steps = {"physics_step": control / math.ceil(control / longest - 1e-9)}
     hidden = np.zeros((len(trial.pieces), len(elastic.hidden)))
     point = Point(np.zeros(0), np.hstack([hidden, slopes.point.states]))

@@ -792,7 +792,7 @@ def test_a_range_in_degrees_that_was_meant_in_rad_is_told(refused):
     refused(lambda: smc.Scenario(plant=arm, law="none", reference=smc.Constant(0.5)), *words)
     t = np.arange(0.0, 2.0, 0.002)
     run = {"t": t, "x": 0.5 * np.sin(3.0 * t), "u": np.sin(3.0 * t)}
-    note = smc.identify(arm, run, ["j1.damping"]).notes[0]
+    note = own_rig(arm, ["j1.damping"]).doubts([run])[0]
     assert "x reaches 0.5 rad, beyond the range of j1" in note, note
     assert all(word in note for word in words)
     far = smc.plant_from(limited, ["j1"])
