@@ -134,7 +134,7 @@ class Recommendation(Answer):
     untried_laws: Sequence[str]  # the package's laws that suit, too, and were not tried
     judged: Mapping[str, bool]  # the conditions that J is of, and whether each was asked for
     folder: Path  # where the files are
-    pictured: bool = True  # whether there is time for the picture of the report
+    pictured: bool = True  # whether there is time to run `worst_run` again, for the report
     call: Sequence[str] = ()  # the words of this call as a command; () where they are not known
 
     @property
@@ -268,7 +268,7 @@ class Recommendation(Answer):
         cautions = []
         for name, runs in self.unsettled_in.items():
             cautions.append(Caution(kind="unsettled", where=name, count=runs.count, of=runs.total))
-        if self.form != "untried" and self.unsettled_in and leans(self.worst_trace):
+        if self.pictured and self.unsettled_in and leans(self.worst_trace):
             cautions.append(Caution(kind="leans", where=str(self.worst_run.condition)))
         if self.together and self.together[0] < RELIABLE * self.together[1]:
             done, runs = self.together
