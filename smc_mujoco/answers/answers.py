@@ -130,9 +130,12 @@ def use(fact: Use) -> str:
 def leads(facts: Sequence[Lead]) -> list[Labelled]:
     """Return a line for each law: by how much it leads, and over which runner-up."""
     by_rival: dict[tuple[str, str], list[str]] = {}
-    for fact in facts:
-        by_rival.setdefault((fact.law, fact.rival), []).append(lead_size(fact))
     parts_by_law: dict[str, list[str]] = {}
+    for fact in facts:
+        if fact.metric == SHARE:
+            parts_by_law.setdefault(fact.law, []).append("more settled runs than any rival")
+        else:
+            by_rival.setdefault((fact.law, fact.rival), []).append(lead_size(fact))
     for (law, rival), sizes in by_rival.items():
         parts_by_law.setdefault(law, []).append(f"{joined(sizes)} below {rival or 'every rival'}")
     return [(law, "; ".join(parts)) for law, parts in parts_by_law.items()]
@@ -216,7 +219,7 @@ def barred(facts: Sequence[Barred]) -> list[Labelled]:
     for laws, metrics in defaults.items():
         parts.append(f"{joined(metrics)}: no law may win over the default gains of {joined(laws)}")
     if lost:
-        parts.append(f"{joined(lost)}: every law has runs that fail or do not arrive")
+        parts.append(f"{joined(lost)}: every law has runs that fail, do not arrive or lack it")
     return [("no winner", "; ".join(parts))] if parts else []
 
 

@@ -149,7 +149,7 @@ class Compared(Answer):
             of_plant = gains.setdefault(plant, {})
             for law, *_ in candidates:
                 finite = {k: v for k, v in law.gains.items() if v != math.inf}
-                of_plant[law.name] = ", ".join(f"{k}={number(v)}" for k, v in finite.items())
+                of_plant[law.name] = ", ".join(f"{k}={v:.3g}" for k, v in finite.items())
                 if law.name not in catalogue():
                     own[law.name] = None
         return contests(self.leaderboard, gains, tuple(own))
@@ -161,11 +161,13 @@ class Compared(Answer):
         needed = max((fact.needed for fact in facts if isinstance(fact, Open)), default=0)
         laws = dict.fromkeys(itertools.chain.from_iterable(self.gains.values()))
         seeds = max(contest.sample.seeds for contest in self._contests)
+        of_runs = all(fact.unit == "runs" for fact in facts if isinstance(fact, Open))
+        more_runs = {"--seeds": f"{needed}"} if of_runs else _sets(needed)
         barred = any(isinstance(fact, Barred) and fact.defaults for fact in facts)
         undecided = any(contest.use and contest.use.rivals for contest in self._contests)
         steps = [
             (not facts, {"--law": ",".join(laws | dict.fromkeys(RIVALS))}, "adds rivals"),
-            (needed, _sets(needed), "makes enough runs for a winner"),
+            (needed, more_runs, "makes enough runs for a winner"),
             (barred, {"--allow-defaults": ""}, "lets a law win over default gains"),
             (undecided, _sets(2 * max(SEARCHES, seeds)), "shows smaller leads"),
             (self._together, {"--condition": self._together}, "tries them all at once"),

@@ -34,6 +34,12 @@ def test_a_lead_names_law_rival_metric_and_both_ends():
     assert re.findall(r"\d+", lines["mine"]) == ["20", "34"]
 
 
+def test_more_settled_runs_are_no_value_below_a_rival_s():
+    fact = Lead(law="a", rival="", metric=answers.SHARE)
+    ((law, text),) = answers.leads([fact])
+    assert (law, "more" in text, "below" in text) == ("a", True, False)
+
+
 @pytest.mark.parametrize(
     ("low", "high", "text"),
     [
