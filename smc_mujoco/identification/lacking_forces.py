@@ -35,6 +35,7 @@ DIRECTION = "of viscous friction that differs between the directions"
 SPEED = "that grows faster than the speed, as a drag"
 PLACE = "that depends on its position, as of another mass or centre of mass, a spring or cogging"
 RUBS = "of friction that depends on its position"
+LOAD = "of friction that grows with the load: give a Stribeck with km"
 TIME = "that changes in the course of the log"
 WARMTH = "of friction that changes in the course of the log, as it warms up"
 COMMAND = (
@@ -58,7 +59,8 @@ class JointMotion(NamedTuple):
     speed: Array  # over its rms in all logs
     acceleration: Array  # over its rms in all logs
     time: Array  # from 0 to 1, over the log
-    command: Array  # of its motor
+    command: Array  # of its motor, its fast part
+    load: Array  # the rest of that command
 
     @property
     def direction(self) -> Array:
@@ -84,6 +86,7 @@ def shapes(motion: JointMotion) -> Iterator[tuple[str, Array]]:
         yield TIME, np.cos(k * math.pi * motion.time)
         yield WARMTH, direction * np.cos(k * math.pi * motion.time)
     yield COMMAND, motion.command
+    yield LOAD, direction * np.abs(motion.load)
 
 
 def left_out(motion: JointMotion, joint: str, names: Sequence[str]) -> Iterator[tuple[str, Array]]:
@@ -157,7 +160,8 @@ def _motions(rig: LogRig, replays: Replays, point: Point, i: int) -> list[JointM
                 speed=v[k] / fast,
                 acceleration=a[k] / strong,
                 time=(before + share) / records.count(piece.record),
-                command=_fast_part(piece, i),
+                command=_command(piece, i) - _slow_part(piece, i),
+                load=_slow_part(piece, i),
             )
         )
     return motions
@@ -174,15 +178,19 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) or 1.0
 
 
-def _fast_part(piece: Piece, i: int) -> Array:
-    """Return the command of motor i less its average over some samples, (N,)."""
-    from scipy.ndimage import uniform_filter1d
-
+def _command(piece: Piece, i: int) -> Array:
+    """Return the command of motor i, (N,)."""
     part = piece.part
     assert isinstance(part, LogPart)
-    command = part.u[part.before :: part.stride, i]
+    return part.u[part.before :: part.stride, i]
+
+
+def _slow_part(piece: Piece, i: int) -> Array:
+    """Return the command of motor i averaged over some samples, (N,)."""
+    from scipy.ndimage import uniform_filter1d
+
     size = 2 * max(1, round(AVERAGED / 2.0 / _period(piece))) + 1
-    return command - uniform_filter1d(command, size, mode="nearest")
+    return uniform_filter1d(_command(piece, i), size, mode="nearest")
 
 
 def _pushed(pieces: Sequence[Piece], forces: Sequence[Array], i: int) -> list[Piece]:
