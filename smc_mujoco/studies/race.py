@@ -598,10 +598,11 @@ def _judgement(course: RaceCourse, entrant: Entrant, k: int) -> CachedResult[Uns
     path = trial.folder / "unseen" / f"{plant.name}-{entrant.law.name}-set-{k}.json"
 
     def save(J: Unseen, file: Path) -> None:
-        file.write_text(json.dumps([J.value, None if math.isnan(J.half) else J.half]))
+        content = json.dumps([J.value, None if math.isnan(J.half) else J.half])
+        file.write_text(content, encoding="utf-8")
 
     def load(file: Path) -> Unseen:
-        value, half = json.loads(file.read_text())
+        value, half = json.loads(file.read_text(encoding="utf-8"))
         return Unseen(value, math.nan if half is None else half)
 
     return CachedResult(path, [run_key.key(case), goal.describe(), first + k, k], save, load)
