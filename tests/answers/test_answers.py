@@ -34,6 +34,15 @@ def test_a_lead_names_law_rival_metric_and_both_ends():
     assert re.findall(r"\d+", lines["mine"]) == ["20", "34"]
 
 
+def test_a_line_of_evidence_has_the_ratio_with_its_interval_and_the_samples():
+    fact = Lead(
+        law="a", rival="b", metric="J", low=0.211, high=0.255, ratio=0.767, ahead=11, samples=12
+    )
+    text = answers.verdict(fact)
+    assert "ratio 0.767, 0.745 to 0.789" in text
+    assert "11 of 12 runs" in text
+
+
 def test_more_settled_runs_are_no_value_below_a_rival_s():
     fact = Lead(law="a", rival="", metric=answers.SHARE)
     ((law, text),) = answers.leads([fact])

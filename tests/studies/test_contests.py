@@ -1,5 +1,6 @@
 """One screen of a comparison: it fits, and each of its numbers is that of the boards."""
 
+import dataclasses
 import math
 import re
 
@@ -97,12 +98,14 @@ def test_an_own_law_that_loses_has_its_ratio(contest):
     assert fact.ahead[0] == fact.leader == LAWS[-1]
 
 
-def test_a_law_with_a_run_that_does_not_arrive_is_not_to_be_used():
-    runs = table()
-    winner = np.flatnonzero(runs.column("law") == LAWS[-1])
-    runs.columns["arrived"][winner[0]] = False
-    (contest,) = contests(leaderboard(runs, by=("plant", "condition")), OWN, ())
-    assert contest.use is None or contest.use.law != LAWS[-1]
+def test_a_law_with_a_run_that_does_not_arrive_is_not_to_be_used(boards):
+    """J is of other runs, in which it may arrive."""
+    *first, last = boards
+    (block,) = last.blocks
+    lost = dataclasses.replace(block, away=(LAWS[-1],))
+    (contest,) = contests([*first, dataclasses.replace(last, blocks=(lost,))], OWN, ())
+    assert contest.grid.winners[0] == LAWS[-1]
+    assert contest.use is None
 
 
 def test_more_than_five_plants_and_conditions_are_one_table_of_winners():
@@ -145,13 +148,12 @@ def test_every_word_of_answers_and_tables_is_explained(word):
 
 
 def test_the_share_of_the_bound_stands_beside_the_variation_of_u(boards):
-    import dataclasses
-
     (board,) = [one for one in boards if one.metric == "tv_rate"]
     blocks = tuple(dataclasses.replace(block, bound=250.0) for block in board.blocks)
     (contest,) = contests([dataclasses.replace(board, blocks=blocks)], {}, ())
     ((_, unit),) = contest.grid.columns
     assert "of bound" in unit
     for law, (text,) in contest.grid.rows:
-        share = float(re.search(r"\(([\d.]+) %\)", text)[1])
+        (number,) = re.findall(r"\(([\d.]+) %\)", text)
+        share = float(number)
         assert math.isclose(share, 100 * blocks[0].medians[law] / 250.0, rel_tol=0.06)
