@@ -183,7 +183,7 @@ def test_what_cannot_jump_is_refused(refused):
         return smc.Scenario(plant="duffing", law="pid", duration=0.2, jump=jump, **fields)
 
     refused(lambda: pendulum("friction.level"), "friction.level")
-    refused(lambda: pendulum("friction.zz", friction=two), "friction.zz", "friction.static")
+    refused(lambda: pendulum("friction.statik", friction=two), "friction.statik", "friction.static")
     refused(lambda: pendulum("friction.level", -1.0, friction=two), "Coulomb", "level", "-0.1")
     wave = smc.Sine(1.0, 2.0)
     refused(lambda: pendulum("disturbance.amplitude", disturbance=wave), "disturbance", "Held")
