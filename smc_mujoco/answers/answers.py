@@ -746,7 +746,7 @@ def _caution(fact: Caution) -> Labelled:
         share=100 * fact.share,
         frequency=fact.frequency,
         count=fact.count,
-        of=fact.of,
+        of=fact.run_count,
         reason=fact.reason,
         side=side,
     )

@@ -193,7 +193,7 @@ class Caution:
     share: float = math.nan
     frequency: float = math.nan  # Hz
     count: int = 0
-    of: int = 0
+    run_count: int = 0
     reason: str = ""  # in the words of an error
 
 

@@ -77,7 +77,7 @@ class Tabular:
     rows: Sequence[Sequence[Cell | str]]
     title: str = ""
     notes: Sequence[str] = ()  # paragraphs below the table
-    left: int = 1  # columns of names, which are aligned to the left
+    name_columns: int = 1  # columns of names, which are aligned to the left
     label: str = ""  # what LaTeX prints instead of the title
     under: Sequence[str] = ()  # paragraphs that LaTeX prints below the table
 
@@ -94,7 +94,7 @@ class Tabular:
         columns = self._columns(options.max_width)
         if self.title:
             yield Text(self.title, "bold")
-        for part in _parts(list(map(_widest, columns)), options.max_width, self.left):
+        for part in _parts(list(map(_widest, columns)), options.max_width, self.name_columns):
             bodies = []
             for i in part:
                 bodies.append(columns[i][1:])
@@ -110,7 +110,7 @@ class Tabular:
             for i in part:
                 head = columns[i][0]
                 above = Text("\n" * (lines - head.plain.count("\n")))
-                side = "left" if i < self.left else "right"
+                side = "left" if i < self.name_columns else "right"
                 table.add_column(above.append_text(head), justify=side, overflow="fold")
             for row in zip(*bodies, strict=True):
                 table.add_row(*row)
@@ -122,11 +122,11 @@ class Tabular:
         """Return the columns of names, then those of numbers. Where space is short the widest
         numbers are narrow; where it is for names alone, the first of these.
         """
-        names = list(map(self._names, range(self.left)))
-        for i in range(self.left):
-            if sum(map(_widest, names)) + self.left - 1 > width:
+        names = list(map(self._names, range(self.name_columns)))
+        for i in range(self.name_columns):
+            if sum(map(_widest, names)) + self.name_columns - 1 > width:
                 names[i] = self._names(i, NARROW_WIDTH)
-        numbers = range(self.left, len(self.headings))
+        numbers = range(self.name_columns, len(self.headings))
         columns = list(map(self._column, numbers))
         narrow = [self._column(i, narrow=True) for i in numbers]
         while sum(map(_widest, [*names, *columns])) + len(self.headings) - 1 > width:
@@ -182,7 +182,7 @@ class Tabular:
     def _repr_html_(self) -> str:
         lines = [list(map(_html, row)) for row in self.rows]
         note = html.Html("<br>".join(map(html.text, self.notes)))
-        numbers = range(self.left, len(self.headings))
+        numbers = range(self.name_columns, len(self.headings))
         heads = [heading.replace("^2", "²") for heading in self.headings]
         return html.table(
             heads,
@@ -215,7 +215,7 @@ class Tabular:
         heads = []
         columns = []
         for i in range(len(self.headings)):
-            letters = marks if i >= self.left else {}
+            letters = marks if i >= self.name_columns else {}
             cells = [_cell(row[i]) for row in self.rows]
             widest = max((_tex_width(cell, letters) for cell in cells), default=0.0)
             head = self._heading(i, math.ceil(widest / TEX_CHARACTER)).splitlines()
@@ -223,8 +223,9 @@ class Tabular:
             heads.append([*map(tex, head)][::-1])
             columns.append([_tex_cell(cell, letters) for cell in cells])
         width = max(sum(widths), TEX_WIDTH)
+        sides = "l" * self.name_columns + "r" * (len(self.headings) - self.name_columns)
         lines = [
-            f"\\begin{{tabular}}{{{'l' * self.left}{'r' * (len(self.headings) - self.left)}}}",
+            f"\\begin{{tabular}}{{{sides}}}",
             "\\toprule",
             *self._tex_words([self.label or self.title], width),
             "\\midrule",
@@ -249,7 +250,7 @@ class Tabular:
         """Return words below numbers -> the letter that LaTeX prints instead."""
         marks: dict[str, str] = {}
         for row in self.rows:
-            for value in row[self.left :]:
+            for value in row[self.name_columns :]:
                 for line in _below(_cell(value)):
                     if " " in line:
                         again, letter = divmod(len(marks), 26)

@@ -286,7 +286,7 @@ class Identified(Answer):
                 headings=("log", "column", "fit, %", "in pieces of 1 s, %"),
                 rows=fits,
                 title="Fits",
-                left=2,
+                name_columns=2,
             ),
             Tabular(headings=("", *self.values), rows=rows, title="Correlations of the errors"),
         ]

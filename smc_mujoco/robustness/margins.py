@@ -491,7 +491,7 @@ class Margins(Answer, list[Margin]):
             extra = *["all sets"] * over_sets, *["theory"] * in_theory
             heads = "plant", "law", "margin", "to within", *extra, "unit"
             title = f"largest {kind} tolerated, in runs of {self.duration:g} s"
-            tables.append(Tabular(headings=heads, rows=rows, title=title, left=2))
+            tables.append(Tabular(headings=heads, rows=rows, title=title, name_columns=2))
         if tables and self.gains:
             tables[-1] = dataclasses.replace(tables[-1], notes=[self.gains])
         return tables

@@ -40,8 +40,8 @@ def sizes(values: Sequence[float], metric: str) -> list[str]:
     """Return numbers of one cell as text, each as `size` does, in one notation."""
     texts = []
     for value, text in zip(values, in_one_notation(values), strict=True):
-        other = metric == SETTLES or not math.isfinite(value)
-        texts.append(size(value, metric) if other else text)
+        is_word = metric == SETTLES or not math.isfinite(value)
+        texts.append(size(value, metric) if is_word else text)
     return texts
 
 

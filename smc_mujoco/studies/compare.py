@@ -271,7 +271,7 @@ class Compared(Answer):
                 times.append((plant, law, *of_law))
         if times:
             about = {"headings": TIME_HEADINGS, "title": TIMES, "notes": [TIME_NOTE]}
-            tables.append(Tabular(rows=times, left=2, **about))
+            tables.append(Tabular(rows=times, name_columns=2, **about))
         return [*tables, self._table_of_runs, self._table_of_gains]
 
     @property
@@ -297,7 +297,9 @@ class Compared(Answer):
         units = f"{SI} {COUNTS}" if "counts=" in "".join(notes) else SI
         failed = len(self.table) - self.table.data["failure"].null_count
         count = f"{counted(len(self.table), 'run')}, {failed} stopped early."
-        return Tabular(headings=RUNS, rows=rows, title="Runs", notes=[*notes, units, count], left=3)
+        return Tabular(
+            headings=RUNS, rows=rows, title="Runs", notes=[*notes, units, count], name_columns=3
+        )
 
     def _runs(self, plant: str, law: str) -> list[Scenario]:
         """Return the runs of a law on a plant; other laws have the same but for their own law."""
@@ -334,7 +336,7 @@ class Compared(Answer):
                 tried, apart = (f"{search.evaluations}", search.apart) if search else ("", "")
                 of_law = law.source.words, f"{len(sets)}", tried, apart, gains_text(best)
                 gains.append((plant, law.name, *of_law))
-        return Tabular(headings=GAINS, rows=gains, title="Gains", notes=notes, left=7)
+        return Tabular(headings=GAINS, rows=gains, title="Gains", notes=notes, name_columns=7)
 
     @property
     def _without_times(self) -> list[Tabular]:

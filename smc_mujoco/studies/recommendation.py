@@ -267,13 +267,15 @@ class Recommendation(Answer):
         """What the runs of the law warn of."""
         cautions = []
         for name, runs in self.unsettled_in.items():
-            cautions.append(Caution(kind="unsettled", where=name, count=runs.count, of=runs.total))
+            cautions.append(
+                Caution(kind="unsettled", where=name, count=runs.count, run_count=runs.total)
+            )
         if self.pictured and self.unsettled_in and leans(self.worst_trace):
             cautions.append(Caution(kind="leans", where=str(self.worst_run.condition)))
         if self.together and self.together[0] < RELIABLE * self.together[1]:
             done, runs = self.together
             names = "+".join(map(str, self.settled[self.law.name]))
-            cautions.append(Caution(kind="together", where=names, count=done, of=runs))
+            cautions.append(Caution(kind="together", where=names, count=done, run_count=runs))
         if ahead := self._lower_J:
             cautions.append(Caution(kind="lower", where=ahead))
         return cautions
@@ -344,8 +346,8 @@ class Recommendation(Answer):
         lost = lost_runs(self.fixed).get(self.law.name, 0)
         if self.limits and lost and self.fixed:
             where = joined([*map(str, self.limits)])
-            of = len(self.fixed.cells[0, 0])
-            cautions.append(Caution(kind="limit", where=where, count=lost, of=of))
+            run_count = len(self.fixed.cells[0, 0])
+            cautions.append(Caution(kind="limit", where=where, count=lost, run_count=run_count))
         if self.tuned and self.tuned.at_bound:
             cautions.append(Caution(kind="at bound", where=joined(self.tuned.at_bound)))
         if self.no_law and self.no_law.needless and self.form != "unneeded":
@@ -472,7 +474,7 @@ class Recommendation(Answer):
                 rows.append([name, cell, f"{len(J)}", far])
         headings = ["law", "J (s²)", "sets judged", "remark"]
         title = f"J over {joined([*self.judged])}, on unseen runs"
-        return Tabular(headings=headings, rows=rows, title=title, left=1)
+        return Tabular(headings=headings, rows=rows, title=title, name_columns=1)
 
     @property
     def _table_of_verdicts(self) -> Tabular:
@@ -496,7 +498,7 @@ class Recommendation(Answer):
                 wins = "yes" if comparison.winners[0] else "no"
                 rows.append((about, first, rival, ratio, ahead, p, wins))
         headings = "units", "law", "rival", "J over the rival's", "ahead", "p", "wins"
-        return Tabular(headings=headings, rows=rows, title="Verdicts on J", left=3)
+        return Tabular(headings=headings, rows=rows, title="Verdicts on J", name_columns=3)
 
     @property
     def _table_of_settling(self) -> Tabular:
@@ -516,7 +518,7 @@ class Recommendation(Answer):
             done, runs = self.together
             rows.append((self.law.name, "all at once", f"{done} of {runs}", "", ""))
         headings = "law", "condition", "runs that settle", "share of J", "without a law"
-        return Tabular(headings=headings, rows=rows, title="Settled runs", left=2)
+        return Tabular(headings=headings, rows=rows, title="Settled runs", name_columns=2)
 
     @property
     def _table_of_rest(self) -> Tabular:
@@ -531,7 +533,7 @@ class Recommendation(Answer):
                 where = rest.condition, rest.overshoots_in
                 rows.append((law.name, swing, share, frequency, where[0], over, where[1]))
         headings = "law", "swing of u", "of its bound", "Hz", "under", "overshoot", "under"
-        return Tabular(headings=headings, rows=rows, title="At rest, without noise", left=1)
+        return Tabular(headings=headings, rows=rows, title="At rest, without noise", name_columns=1)
 
     @property
     def _table_of_margins(self) -> Tabular:
@@ -551,7 +553,7 @@ class Recommendation(Answer):
             rows.append((kind, "no time", "", "", self.tolerance.beside))
         headings = "margin", "withstood", "not", "unit", "beside"
         title = f"What {self.law.name} withstands, each alone; |u| at most {self._bounds}"
-        return Tabular(headings=headings, rows=rows, title=title, left=1)
+        return Tabular(headings=headings, rows=rows, title=title, name_columns=1)
 
     @property
     def _table_of_laws(self) -> Tabular:
@@ -570,7 +572,9 @@ class Recommendation(Answer):
             rows.append(
                 (f"{len(self.untried_laws)} others", "not tried", joined(self.untried_laws))
             )
-        return Tabular(headings=("law", "gains are", "gains"), rows=rows, title="Laws", left=3)
+        return Tabular(
+            headings=("law", "gains are", "gains"), rows=rows, title="Laws", name_columns=3
+        )
 
     @property
     def _table_of_assumptions(self) -> Tabular:
@@ -585,7 +589,7 @@ class Recommendation(Answer):
             added = " (added: no condition had noise)" if noise.added else ""
             rows.append((f"{noise.condition}{added}", "", "", size))
         headings = "condition", "u changes every", "velocity", "noise (standard deviations)"
-        return Tabular(headings=headings, rows=rows, title="Assumed", left=4)
+        return Tabular(headings=headings, rows=rows, title="Assumed", name_columns=4)
 
     @property
     def worst_words(self) -> str:

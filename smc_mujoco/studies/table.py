@@ -269,7 +269,7 @@ class Table:
             notes.append("Medians; below each the least and the largest value.")
         if rest := len(rows_of) - len(cases):
             notes.append(f"And {rest} more: Table.select.")
-        return Tabular(headings=[*CASE, *values], rows=cells, notes=notes, left=len(CASE))
+        return Tabular(headings=[*CASE, *values], rows=cells, notes=notes, name_columns=len(CASE))
 
     def _repr_html_(self) -> str:
         names = []

@@ -51,7 +51,7 @@ TABLE = Tabular(
     ],
     notes=["A note.", "Another."],
     under=["A word: 5 %.", "A paragraph after 10 ms."],
-    left=2,
+    name_columns=2,
 )
 
 
@@ -158,7 +158,7 @@ def test_names_too_wide_for_a_line_are_broken_after_underscores():
     """Seven columns of names are 83 characters wide."""
     row = ["inverted_pendulum", "super_twisting", "tuned here", "12", "1045", "7 %", "k1=2, k2=13"]
     headings = ["plant", "law", "gains", "searches", "evaluations", "J spread", "best set"]
-    lines = str(Tabular(headings=headings, rows=[row], left=7)).splitlines()
+    lines = str(Tabular(headings=headings, rows=[row], name_columns=7)).splitlines()
     assert max(map(len, lines)) <= tabular.PLAIN_WIDTH
     assert [line.split()[:2] for line in lines[-2:]] == [
         ["inverted_", "super_twisting"],

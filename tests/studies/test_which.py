@@ -264,7 +264,7 @@ def test_cautions_are_lines_with_their_numbers(raced):
     rare = dataclasses.replace(
         recommendation, settled={name: {"coulomb": (2, 4)}}, settles={name: 0.5}
     )
-    assert (2, 4) in [(caution.count, caution.of) for caution in rare.cautions]
+    assert (2, 4) in [(caution.count, caution.run_count) for caution in rare.cautions]
     delay = recommendation.margins[0]
     tight = dataclasses.replace(delay, value=0.01, resolution=0.005)
     late = dataclasses.replace(recommendation.worst_run, input_delay=0.01)
