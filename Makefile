@@ -43,10 +43,11 @@ mutants: ## small faults of ROOM=metrics, drawn from SEED, and which of them its
 	@./setup.sh requirements-test.lock
 	@ROOM="$(ROOM)" SEED="$(SEED)" COUNT="$(COUNT)" $(BIN)/python tests/mutants.py
 
-check: ## lint, format and types
+check: ## lint, format, types, and names that say what they hold
 	@./setup.sh requirements-test.lock
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/python -m pytest -q tests/test_names.py
 	@# without this variable pyright asks the package index for a newer version of itself
 	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright --pythonpath $(BIN)/python
 	@# what a user's type checkers say of README's and the tutorial's scripts
