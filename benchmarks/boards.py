@@ -14,11 +14,11 @@ from collections.abc import Collection, Sequence
 
 import realaigym
 from realaigym.published import GlobalRow, RobustnessRow, Row
+from rich import box
 from rich.console import Console
 from rich.table import Column, Table
 
 import smc_mujoco as smc
-from smc_mujoco.cli.tables import titled
 from smc_mujoco.problems import entry as entries
 
 BOARDS = {  # kind of row -> title, headings of columns, digits after the point
@@ -42,7 +42,15 @@ def table(
     """Return a board for a robot, with the rows named in `bold` in bold."""
     title, headings, digits = BOARDS[type(rows[0])]
     columns = [Column(heading, justify="right") for heading in headings]
-    sheet = titled(f"{robot}, {title}", "controller", *columns, pad_edge=False)
+    sheet = Table(
+        "controller",
+        *columns,
+        title=f"{robot}, {title}",
+        title_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+    )
     for row in rows:
         cells = [f"{value:.{places}f}" for value, places in zip(row[1:], digits, strict=False)]
         sheet.add_row(row.name, *cells, style="bold" if row.name in bold else None)
