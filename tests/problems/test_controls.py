@@ -76,10 +76,10 @@ def test_no_law_of_an_entry_is_told_anything():
     ],
 )
 def test_the_oracle_of_flight_alone_knows_a_payload(name, reported):
-    one = smc.problem("quadrotor/payload@2")
+    problem = smc.problem("quadrotor/payload@2")
     law = controls.oracle_of("quadrotor", 8.0, 1.5) if name == "oracle" else smc.law(name)
-    (scenario,) = controls.scenarios(one, law, [0])
-    payload = 0.006 * one.instance(0).disturbance
+    (scenario,) = controls.scenarios(problem, law, [0])
+    payload = 0.006 * problem.instance(0).disturbance
     assert (scenario.plant.parameters["payload"], scenario.mismatch.get("payload")) == (
         (payload, None) if reported else (0.0, payload)
     )
@@ -88,16 +88,16 @@ def test_the_oracle_of_flight_alone_knows_a_payload(name, reported):
 @pytest.mark.slow
 def test_the_oracle_of_flight_leaves_no_error_behind_a_rotor_that_fades():
     """A fading rotor's torque is what its feedback alone, without an integral, would not take."""
-    one = smc.problem("quadrotor/fading_rotor@2")
+    problem = smc.problem("quadrotor/fading_rotor@2")
     for trace in smc.run(
-        controls.scenarios(one, controls.oracle_of("quadrotor", 8.0, 1.5), [0, 3])
+        controls.scenarios(problem, controls.oracle_of("quadrotor", 8.0, 1.5), [0, 3])
     ):
-        assert one.measures(trace)["accuracy"] == 1e-6
+        assert problem.measures(trace)["accuracy"] == 1e-6
 
 
 def test_who_does_nothing_holds_a_quadrotor_in_the_air():
     """So that it fails for want of feedback, not because it falls."""
-    one = smc.problem("quadrotor/slow_rotors@2")
-    (scenario,) = one.scenarios(controls.zero("quadrotor"), [0])
+    problem = smc.problem("quadrotor/slow_rotors@2")
+    (scenario,) = problem.scenarios(controls.zero("quadrotor"), [0])
     trace = smc.run(scenario)
     np.testing.assert_allclose(trace.e, trace.e[0] * np.ones((len(trace.t), 1)), rtol=0, atol=1e-9)

@@ -49,16 +49,16 @@ def small(monkeypatch):
 
 
 def test_an_entry_has_its_gains_on_each_plant(tmp_path):
-    one = entry.read(written(tmp_path / "one", gains="[gains.all]\nk = 2.5"))
-    assert one.law("duffing").gains["k"] == 2.5
-    assert one.law("furuta").gains["k"] == 2.5
+    fixed = entry.read(written(tmp_path / "one", gains="[gains.all]\nk = 2.5"))
+    assert fixed.law("duffing").gains["k"] == 2.5
+    assert fixed.law("furuta").gains["k"] == 2.5
     # of the library: shipped gains, defaults
     assert [entry.read(name).division for name in ("pid", "geometric")] == ["search", "one set"]
     free = entry.read(written(tmp_path / "free", gains="[gains.duffing]\nk = 2.5", division="free"))
     assert free.law("duffing").gains["k"] == 2.5
     assert free.law("van_der_pol").gains["k"] == 4.0
     assert free.law("duffing").name == "own law"
-    assert one.digest != free.digest
+    assert fixed.digest != free.digest
 
 
 def test_an_entry_has_one_law(tmp_path):
@@ -87,19 +87,19 @@ def test_entering_twice_gives_equal_bytes_and_a_changed_table_is_refused(tmp_pat
         )
         == target
     )
-    found = smc.results(target.parent)
-    about = found.entries["own law"].about
+    entered = smc.results(target.parent)
+    about = entered.entries["own law"].about
     assert about["seed"] == 7
     assert about["failed"] == 0
-    assert found.title == "smc-30@1, seed 7"
-    drawn = found.entries["own law"].runs.columns(PROBLEMS[0])["itae"]
+    assert entered.title == "smc-30@1, seed 7"
+    drawn = entered.entries["own law"].runs.columns(PROBLEMS[0])["itae"]
     assert not np.array_equal(
         drawn, entry_runs.EntryRuns(visible / "runs.parquet").columns(PROBLEMS[0])["itae"]
     )
     with pytest.raises(ScenarioError, match="seed 7"):
-        found.compare(smc.results(visible.parent))
+        entered.compare(smc.results(visible.parent))
     archive = shutil.make_archive(str(tmp_path / "packed"), "zip", target.parent)
-    assert str(found.compare(smc.results(archive))).count("0 worse, 0 better") == 4
+    assert str(entered.compare(smc.results(archive))).count("0 worse, 0 better") == 4
     written(tmp_path / "entry", gains="[gains.all]\nk = 2.0")
     with pytest.raises(ScenarioError, match="not what"):
         entering.enter(folder, out=out, instances=2, verify=True)
@@ -135,8 +135,8 @@ def test_a_file_about_an_entry_may_begin_with_a_byte_order_mark(tmp_path):
 
 def test_an_entry_that_is_stopped_goes_on_and_gives_the_same_bytes(tmp_path, small, monkeypatch):
     """What is done is not computed twice, unless the law or the instances are others."""
-    whole = entering.enter(written(tmp_path / "entry"), out=tmp_path / "whole", instances=2)
-    assert sorted(path.name for path in whole.iterdir()) == ["result.json", "runs.parquet"]
+    uninterrupted = entering.enter(written(tmp_path / "entry"), out=tmp_path / "whole", instances=2)
+    assert sorted(path.name for path in uninterrupted.iterdir()) == ["result.json", "runs.parquet"]
     table, parts = tmp_path / "runs.parquet", tmp_path / "parts"
     job = {"problems": PROBLEMS, "count": 2, "seed": 0, "table": table, "parts": parts}
     job["folder"] = tmp_path / "entry"
@@ -156,7 +156,7 @@ def test_an_entry_that_is_stopped_goes_on_and_gives_the_same_bytes(tmp_path, sma
     table.touch()
     entering.run(**job)
     assert computed == [*PROBLEMS]
-    assert table.read_bytes() == (whole / "runs.parquet").read_bytes()
+    assert table.read_bytes() == (uninterrupted / "runs.parquet").read_bytes()
     for changed in ({"count": 1}, {"seed": 7}, {}):
         if not changed:
             (tmp_path / "entry" / "beside.py").write_text("")
@@ -171,27 +171,30 @@ def test_failed_runs_are_told_and_stand_last(tmp_path, small):
         written(tmp_path / "entry", LAW % "gains.k * y.e / 0.0 * 0.0"), out=out, instances=1
     )
     entering.enter(written(tmp_path / "fine", name="fine law"), out=out, instances=1)
-    found = smc.results(out / "smc-30@1")
-    about = found.entries["own law"].about
+    entered = smc.results(out / "smc-30@1")
+    about = entered.entries["own law"].about
     assert about["failed"] == 2
     assert "duffing" in about["failures"][0]
-    assert [one.entry for one in found.boards()["speed"].standings] == ["fine law", "own law"]
+    assert [standing.entry for standing in entered.boards()["speed"].standings] == [
+        "fine law",
+        "own law",
+    ]
 
 
 def made(medians):
     """Return results of entries with given medians on the problems of smc-30@1, (entry -> factor of
     each problem).
     """
-    found = results.Results("smc-30@1", 0, {})
+    suite_results = results.Results("smc-30@1", 0, {})
     for name, values in medians.items():
-        one = object.__new__(results.EntryResult)
+        result = object.__new__(results.EntryResult)
         rows = {}
-        for cell, value in zip(found.problems, values, strict=True):
+        for cell, value in zip(suite_results.problems, values, strict=True):
             rows[cell] = dict.fromkeys(entry_runs.VALUES, value)
-        one.__dict__["medians"] = rows
-        one.targets = lambda problems, measure: np.zeros(0)  # pyright: ignore[reportAttributeAccessIssue]
-        found.entries[name] = one
-    return found
+        result.__dict__["medians"] = rows
+        result.targets = lambda problems, measure: np.zeros(0)  # pyright: ignore[reportAttributeAccessIssue]
+        suite_results.entries[name] = result
+    return suite_results
 
 
 def test_equal_entries_share_a_place_and_one_that_is_better_is_first():
@@ -205,8 +208,8 @@ def test_equal_entries_share_a_place_and_one_that_is_better_is_first():
         }
     ).board("speed")
     places = {}
-    for one in board.standings:
-        places[one.entry] = (one.place, one.rank, one.best)
+    for standing in board.standings:
+        places[standing.entry] = (standing.place, standing.rank, standing.best)
     assert places == {
         "c": (1, 1.0, True),
         "a": (2, 2.5, False),
@@ -214,8 +217,8 @@ def test_equal_entries_share_a_place_and_one_that_is_better_is_first():
         "d": (4, 4.0, False),
     }
     close = made({"a": middle, "b": middle * np.where(np.arange(30) % 2, 0.9, 1.1)}).board("speed")
-    for one in close.standings:
-        assert one.best
+    for standing in close.standings:
+        assert standing.best
 
 
 def test_a_change_says_where_and_by_how_much():
@@ -234,12 +237,12 @@ def test_variation_of_u_counts_only_where_the_easiest_accuracy_is_kept(tmp_path)
     five in the other.
     """
     groups = []
-    for name, kept in zip(PROBLEMS, (2, 4), strict=True):
+    for name, accurate in zip(PROBLEMS, (2, 4), strict=True):
         easiest = f"accuracy_{len(smc.problem(name).targets['accuracy'])}"
         group = []
         for i in range(5):
             row = dict.fromkeys(entry_runs.VALUES, 0.1 * (i + 1)) | {"problem": name, "instance": i}
-            group.append(row | {easiest: 1.0 if i < kept else np.nan})
+            group.append(row | {easiest: 1.0 if i < accurate else np.nan})
         groups.append(group)
     entry_runs.write(tmp_path / "runs.parquet", groups)
     medians = entry_runs.EntryRuns(tmp_path / "runs.parquet").medians()

@@ -61,16 +61,16 @@ def test_a_scenario_has_what_its_instance_drew_and_the_rules_bounds():
         ("duffing/sine@1", "amplitude"),
         ("duffing/process_noise@1", "sigma"),
     ):
-        one = smc.problem(name)
-        drawn, (scenario,) = one.instance(5, SEED), one.scenarios("pid", [5], SEED)
+        problem = smc.problem(name)
+        drawn, (scenario,) = problem.instance(5, SEED), problem.scenarios("pid", [5], SEED)
         assert scenario.x0 == (drawn.side * drawn.start * 1.5,)
         assert scenario.mismatch == {"mass": drawn.mass}
         assert scenario.seed == drawn.seed
         assert getattr(scenario.disturbance[0], field) == 0.2 * drawn.disturbance
-        assert scenario.u_max == one.u_max
-        assert scenario.duration == one.duration
+        assert scenario.u_max == problem.u_max
+        assert scenario.duration == problem.duration
         assert scenario.control_period == 1e-3
-        assert scenario.condition == one.condition
+        assert scenario.condition == problem.condition
     (heavy,) = smc.problem("duffing/heavy@1").scenarios("pid", [3])
     assert heavy.mismatch == {
         "mass": pytest.approx(1.3 * smc.problem("duffing/heavy@1").instance(3).mass)
@@ -92,8 +92,8 @@ def test_a_scenario_has_what_its_instance_drew_and_the_rules_bounds():
 def test_an_instance_of_flight_scales_what_its_condition_adds_and_its_distance_from_rest(
     condition, fields
 ):
-    one = smc.problem(f"quadrotor/{condition}@2")
-    drawn, (scenario,) = one.instance(3), one.scenarios("geometric", [3])
+    problem = smc.problem(f"quadrotor/{condition}@2")
+    drawn, (scenario,) = problem.instance(3), problem.scenarios("geometric", [3])
     far = 0.2 * drawn.side * drawn.start
     assert scenario.x0 == pytest.approx((far, -far, 1.0 - far, 0.0, 0.0, 2.0 * far), abs=1e-15)
     assert {name: getattr(scenario, name) for name in fields(1.0)} == fields(drawn.disturbance)
@@ -102,20 +102,20 @@ def test_an_instance_of_flight_scales_what_its_condition_adds_and_its_distance_f
 
 
 def test_calm_of_flight_is_of_the_rotors_commands():
-    one = smc.problem("quadrotor/wind@2")
-    whole = smc.run(one.scenarios("none", [0])[0])
-    applied = np.zeros_like(whole.applied)
+    problem = smc.problem("quadrotor/wind@2")
+    trace = smc.run(problem.scenarios("none", [0])[0])
+    applied = np.zeros_like(trace.applied)
     # half of a rotor's bound; of the last channel there is no rotor
     applied[::2, 2], applied[::2, 5] = 0.06, 1.0
-    assert one.measures(dataclasses.replace(whole, applied=applied))["calm"] == pytest.approx(
+    assert problem.measures(dataclasses.replace(trace, applied=applied))["calm"] == pytest.approx(
         6000 * 0.5 / 6.0
     )
 
 
 def test_visible_instances_are_the_first_and_a_name_has_its_best_shipped_gains():
-    one = smc.problem("duffing/noise@1")
-    visible = one.scenarios("pid")
-    assert visible == one.scenarios("pid", range(15))
+    problem = smc.problem("duffing/noise@1")
+    visible = problem.scenarios("pid")
+    assert visible == problem.scenarios("pid", range(15))
     assert len({scenario.seed for scenario in visible}) == 15
     assert visible[7].law.source.kind == "shipped"
 
@@ -123,13 +123,13 @@ def test_visible_instances_are_the_first_and_a_name_has_its_best_shipped_gains()
 def made_trace(one: problems.Problem, e: np.ndarray, u: np.ndarray) -> smc.Trace:
     """A trace of a problem's first instance with errors, relative to the start, and commands."""
     (scenario,) = one.scenarios("pid", [0])
-    whole = smc.run(scenario)
-    return dataclasses.replace(whole, x=(e * whole.x[0, 0])[:, None], u=u[:, None])
+    trace = smc.run(scenario)
+    return dataclasses.replace(trace, x=(e * trace.x[0, 0])[:, None], u=u[:, None])
 
 
 def test_measures_by_hand():
-    one = smc.problem("duffing/noise@1")
-    vars(one)["_frozen"] = {
+    problem = smc.problem("duffing/noise@1")
+    vars(problem)["_frozen"] = {
         "accuracy": [0.01, 0.1],
         "settling": [1.5, 2.5],
         "calm": [0.4, 0.6],
@@ -137,9 +137,9 @@ def test_measures_by_hand():
     e = np.where(np.arange(4001) < 1000, 1.0, 0.05)  # 5 % of the start from 1 s on
     # eight changes by 1.5 in 4 s, of 6: 1/2 per second
     u = np.where(np.arange(4001) % 1000 < 500, 0.0, 1.5)
-    found = one.measures(made_trace(one, e, u))
+    measures = problem.measures(made_trace(problem, e, u))
     itae = 0.5 + 0.05 * (16 - 1) / 2  # the integral of t |e|
-    assert found == {
+    assert measures == {
         "failed": 0.0,
         "accuracy": pytest.approx(0.05),
         "itae": pytest.approx(itae, abs=1e-3),
@@ -152,7 +152,9 @@ def test_measures_by_hand():
         "calm_1": pytest.approx(math.nan, nan_ok=True),
         "calm_2": 1.0,
     }
-    settled = one.measures(made_trace(one, e * np.where(np.arange(4001) < 2000, 1.0, 1e-9), u))
+    settled = problem.measures(
+        made_trace(problem, e * np.where(np.arange(4001) < 2000, 1.0, 1e-9), u)
+    )
     names = "settling", "accuracy", "accuracy_1", "settling_2", "calm_2"
     assert tuple(settled[name] for name in names) == (2.0, 1e-6, 2.0, 2.0, 1.0)
     assert math.isnan(settled["settling_1"])
@@ -160,17 +162,17 @@ def test_measures_by_hand():
 
 def test_an_error_that_is_small_by_chance_at_the_end_is_not_kept():
     """As that of a pendulum which swings through its goal."""
-    one = smc.problem("duffing/noise@1")
-    vars(one)["_frozen"] = {
+    problem = smc.problem("duffing/noise@1")
+    vars(problem)["_frozen"] = {
         "accuracy": [0.1],
         "settling": [4.0],
         "calm": [9.0],
     }
-    found = one.measures(
-        made_trace(one, np.where(np.arange(4001) < 3900, 1.0, 0.0), np.zeros(4001))
+    measures = problem.measures(
+        made_trace(problem, np.where(np.arange(4001) < 3900, 1.0, 0.0), np.zeros(4001))
     )
-    assert found.pop("settling") == math.inf
-    assert {name for name, value in found.items() if not math.isnan(value)} == {
+    assert measures.pop("settling") == math.inf
+    assert {name for name, value in measures.items() if not math.isnan(value)} == {
         "failed",
         "accuracy",
         "itae",
@@ -183,12 +185,12 @@ def test_a_failed_run_reaches_nothing():
     def broken(y, gains, memory):
         return math.nan, 0.0
 
-    one = smc.problem("duffing/sine@1")
-    found = one.measures(smc.run(one.scenarios(broken(), [0])[0]))
-    assert found.pop("failed") == 1.0
-    assert found.pop("accuracy") == math.inf
-    assert found.pop("calm") == math.inf
-    assert [name for name, value in found.items() if value < math.inf] == []
+    problem = smc.problem("duffing/sine@1")
+    measures = problem.measures(smc.run(problem.scenarios(broken(), [0])[0]))
+    assert measures.pop("failed") == 1.0
+    assert measures.pop("accuracy") == math.inf
+    assert measures.pop("calm") == math.inf
+    assert [name for name, value in measures.items() if value < math.inf] == []
 
 
 @pytest.mark.parametrize("contact", ['Wall("pendulum", (1, 0, 0), 0.2)', 'Ball("pendulum")'])

@@ -59,8 +59,8 @@ UPRIGHT_GAINS = {
 @pytest.fixture(scope="module")
 def traces():
     """The run of our entry of each robot."""
-    found = smc.run([boards.entry(robot) for robot in boards.ROBOTS])
-    return dict(zip(boards.ROBOTS, found, strict=True))
+    robot_traces = smc.run([boards.entry(robot) for robot in boards.ROBOTS])
+    return dict(zip(boards.ROBOTS, robot_traces, strict=True))
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -100,8 +100,8 @@ def test_criteria_of_a_motion_are_those_of_its_formula():
     u = np.where(np.arange(1001) % 2, 1.0, -1.0)
     q[:, 0] = np.where(t < 3.995, 0.0, math.pi)  # up from the sample at 4 s
     v[:, 1] = 2.0
-    found = of_arrays(t, q, v, u, "pendubot")
-    assert found == pytest.approx((4.0, math.pi, 1.0, 10.0, 10.0, 2.0, 40.0))
+    criteria = of_arrays(t, q, v, u, "pendubot")
+    assert criteria == pytest.approx((4.0, math.pi, 1.0, 10.0, 10.0, 2.0, 40.0))
     q[900, 0] = 0.0  # falls once
     assert of_arrays(t, q, v, u, "acrobot").swing_up_time == pytest.approx(9.01)
     q[-2:, 0] = 0.0
@@ -147,8 +147,8 @@ def test_a_minute_is_that_of_the_published_simulator(seed):
     pushed = np.flatnonzero(np.abs(run.torques).sum(axis=1))
     ends = np.flatnonzero(np.diff(pushed) > 1)
     begun = pushed[[0, *(ends + 1)]]
-    both = np.column_stack([begun[:2], pushed[ends][:2]])
-    np.testing.assert_allclose(2e-3 * both, PUSHED[seed], atol=1e-9)
+    angles = np.column_stack([begun[:2], pushed[ends][:2]])
+    np.testing.assert_allclose(2e-3 * angles, PUSHED[seed], atol=1e-9)
     first = run.torques[begun[0] : begun[0] + 4]
     if seed == 333:
         np.testing.assert_allclose(

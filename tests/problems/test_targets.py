@@ -19,7 +19,7 @@ FRESH = 5  # a seed from which nothing was frozen
 
 def runs(accuracy: list[float], settling: float = 1.0, calm: float = 1.0) -> np.ndarray:
     """The measures of some runs, which differ in accuracy."""
-    return np.array([[0.0, one, 1.0, settling, calm] for one in accuracy])
+    return np.array([[0.0, final_error, 1.0, settling, calm] for final_error in accuracy])
 
 
 def frozen(unit: float, oracle: list[float], zero: list[float], seen: float = 1e-9) -> dict | None:
@@ -36,15 +36,15 @@ def frozen(unit: float, oracle: list[float], zero: list[float], seen: float = 1e
 @pytest.mark.quick
 def test_levels_are_the_quantiles_of_the_medians():
     """Of 1, 2, ... 21 the quantiles at 10, 25, 50, 75 and 90 % are 3, 6, 11, 16 and 19."""
-    found = frozen(0.001, [1e-6], [1.0])
-    assert found is not None
+    levels = frozen(0.001, [1e-6], [1.0])
+    assert levels is not None
     for measure, unit in (
         ("accuracy", 0.001),
         ("settling", 0.1),
         ("calm", 1.0),
     ):
-        assert found[measure] == pytest.approx([unit * i for i in (3, 6, 11, 16, 19)])
-    assert found["oracle"] == [16.0, 0.5]
+        assert levels[measure] == pytest.approx([unit * i for i in (3, 6, 11, 16, 19)])
+    assert levels["oracle"] == [16.0, 0.5]
 
 
 @pytest.mark.quick
@@ -62,8 +62,8 @@ def test_levels_are_the_quantiles_of_the_medians():
 def test_a_level_is_no_harder_than_the_oracles_worst_and_no_easier_than_the_best_of_nothing(
     oracle, zero, levels
 ):
-    found = frozen(0.01, oracle, zero)
-    assert (found and found["accuracy"]) == (levels and pytest.approx(levels))
+    frozen_levels = frozen(0.01, oracle, zero)
+    assert (frozen_levels and frozen_levels["accuracy"]) == (levels and pytest.approx(levels))
 
 
 @pytest.mark.quick
@@ -76,9 +76,9 @@ def test_a_level_is_no_harder_than_the_oracles_worst_and_no_easier_than_the_best
 )
 def test_a_level_is_no_harder_than_the_oracles_worst_on_visible_instances(seen, hardest):
     """There it has no margin: of drawn ones the worst, 0.04, has one of 1.25."""
-    found = frozen(0.01, [0.04], [0.9], seen)
-    assert found
-    assert found["accuracy"][0] == pytest.approx(hardest)
+    levels = frozen(0.01, [0.04], [0.9], seen)
+    assert levels
+    assert levels["accuracy"][0] == pytest.approx(hardest)
 
 
 @pytest.mark.quick
@@ -104,7 +104,7 @@ def test_a_suite_takes_each_plant_and_condition_equally_often_and_no_law_has_a_s
 
 @pytest.mark.quick
 def test_every_problem_of_every_suite_has_five_ordered_levels_and_informs_a_board():
-    for name in {name for one in suite.suites() for name in suite.suite(one)}:
+    for name in {name for suite_name in suite.suites() for name in suite.suite(suite_name)}:
         targets = smc.problem(name).targets
         assert set(targets) == set(problem.MEASURES), name
         for levels in targets.values():
@@ -119,16 +119,16 @@ def test_every_problem_of_every_suite_has_five_ordered_levels_and_informs_a_boar
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "name", sorted({name for one in suite.suites() for name in suite.suite(one)})
+    "name", sorted({name for suite_name in suite.suites() for name in suite.suite(suite_name)})
 )
 def test_both_controls_on_instances_that_nobody_saw(name):
-    one = smc.problem(name)
+    problem = smc.problem(name)
     instances = range(1) if "/worst" in name else range(4)
-    for control, law in controls.frozen(one).items():
+    for control, law in controls.frozen(problem).items():
         reached = control == "oracle"
-        for trace in smc.run(controls.scenarios(one, law, instances, FRESH)):
+        for trace in smc.run(controls.scenarios(problem, law, instances, FRESH)):
             times = {}
-            for key, time in one.measures(trace).items():
+            for key, time in problem.measures(trace).items():
                 if key.rpartition("_")[2].isdigit():
                     times[key] = time
             assert len(times) == 15

@@ -22,7 +22,9 @@ GAINS = {"kp": 40.0, "ki": 60.0, "kd": 12.0, "tt": 0.5, TAU: 0.01}
 
 
 def problem(suite, name) -> TrackingProblem:
-    (chosen,) = [each for each in tracking_suite(suite).problems if each.name == name]
+    (chosen,) = [
+        candidate for candidate in tracking_suite(suite).problems if candidate.name == name
+    ]
     return chosen
 
 
@@ -33,14 +35,14 @@ def rms(trace, problem):
 
 @SUITES
 def test_a_window_is_whole_periods_of_what_is_periodic_and_of_control(name):
-    for each in tracking_suite(name).problems:
-        assert each.window / each.period == pytest.approx(each.late, abs=1e-6)
-        omegas = [each.omega] if each.swing else []
-        for signal in np.atleast_1d(np.array(each.fields.get("disturbance", ()), object)):
+    for task in tracking_suite(name).problems:
+        assert task.window / task.period == pytest.approx(task.late, abs=1e-6)
+        omegas = [task.omega] if task.swing else []
+        for signal in np.atleast_1d(np.array(task.fields.get("disturbance", ()), object)):
             if isinstance(signal, Sine):
                 omegas.append(signal.omega)
         for omega in omegas:
-            periods = each.window * omega / math.tau
+            periods = task.window * omega / math.tau
             assert periods == pytest.approx(round(periods), abs=2e-3)
             assert periods > 0.99
 
@@ -48,13 +50,13 @@ def test_a_window_is_whole_periods_of_what_is_periodic_and_of_control(name):
 @SUITES
 def test_without_the_load_only_its_forces_differ(name):
     entry = tracking_entry("pid")
-    for each in tracking_suite(name).problems:
-        loaded, free = (scenario_of(each, entry, GAINS, 3, loaded) for loaded in (True, False))
+    for task in tracking_suite(name).problems:
+        loaded, free = (scenario_of(task, entry, GAINS, 3, loaded) for loaded in (True, False))
         changed = set()
         for field in dataclasses.fields(loaded):
             if getattr(loaded, field.name) != getattr(free, field.name):
                 changed.add(field.name)
-        assert changed == {"friction" if each.friction else "disturbance"}
+        assert changed == {"friction" if task.friction else "disturbance"}
 
 
 @pytest.mark.parametrize(
@@ -65,22 +67,22 @@ def test_without_the_load_only_its_forces_differ(name):
     ],
 )
 def test_mujoco_gives_the_error_and_the_rate_that_the_search_sees(suite, name, text):
-    each = problem(suite, name)
+    task = problem(suite, name)
     entry = tracking_entry(text)
-    trials = GainTrials(each, entry, 1)
+    trials = GainTrials(task, entry, 1)
     values = np.array([list(GAINS.values())])
     error, rate = trials.run(trials.choosing, values)[0, 0]
-    trace = smc.run(scenario_of(each, entry, GAINS, 0))
-    changes = np.abs(np.diff(trace.u[-each.late - 1 :, 0])).sum()
-    assert rms(trace, each) == pytest.approx(error, rel=1e-9)
-    assert changes / each.window / each.bound == pytest.approx(rate, rel=1e-9)
+    trace = smc.run(scenario_of(task, entry, GAINS, 0))
+    changes = np.abs(np.diff(trace.u[-task.late - 1 :, 0])).sum()
+    assert rms(trace, task) == pytest.approx(error, rel=1e-9)
+    assert changes / task.window / task.bound == pytest.approx(rate, rel=1e-9)
 
 
 def test_a_search_keeps_the_limit_and_the_theorem_and_is_the_same_again(monkeypatch):
     for name, value in (("SETS", 48), ("DRAWN", 24)):
         monkeypatch.setattr(tracking_search, name, value)
-    each = problem("smc-load@1", "pendulum-middle")
-    trials = GainTrials(each, tracking_entry("classical"), 1)
+    task = problem("smc-load@1", "pendulum-middle")
+    trials = GainTrials(task, tracking_entry("classical"), 1)
     steps = []
     gains = trials.searched(0, steps.append)
     assert sum(steps) == 48
@@ -89,7 +91,7 @@ def test_a_search_keeps_the_limit_and_the_theorem_and_is_the_same_again(monkeypa
     logs = np.log([list(gains.values())])
     _, allowed = trials.judged(logs)
     worst = trials.run(trials.choosing, np.exp(logs)).max(axis=1)
-    assert bool(allowed[0]) == (worst[0, 1] <= tracking_search.MARGIN * each.limit)
+    assert bool(allowed[0]) == (worst[0, 1] <= tracking_search.MARGIN * task.limit)
 
 
 @pytest.mark.parametrize(
@@ -129,7 +131,7 @@ def board_of(*results):
 
 
 def test_an_entry_leads_only_if_it_is_better_in_every_pairing_of_the_searches():
-    a, b = [each.name for each in tracking_suite("smc-load@1").problems[:2]]
+    a, b = [task.name for task in tracking_suite("smc-load@1").problems[:2]]
     lucky = result("pid", {a: (1.0, 9.0), b: (1.0, 1.1)}, seed=1)
     steady = result("adrc", {a: (3.0, 3.1), b: (3.0, 3.1)}, seed=2)
     boards = board_of(lucky, steady).problems
@@ -142,7 +144,7 @@ def test_an_entry_leads_only_if_it_is_better_in_every_pairing_of_the_searches():
 
 
 def test_errors_below_the_floor_are_level_and_one_that_is_the_same_without_is_marked():
-    a, b = [each.name for each in tracking_suite("smc-load@1").problems[:2]]
+    a, b = [task.name for task in tracking_suite("smc-load@1").problems[:2]]
     fine = result("pid", {a: (0.1, 0.1), b: (0.31, 0.31)}, seed=3)
     finer = result("adrc", {a: (0.2, 0.2), b: (5.0, 5.0)}, seed=4)
     boards = board_of(fine, finer).problems
@@ -152,7 +154,7 @@ def test_errors_below_the_floor_are_level_and_one_that_is_the_same_without_is_ma
 
 
 def test_an_entry_changes_a_page_by_its_row_and_what_it_tops_alone():
-    a, b = [each.name for each in tracking_suite("smc-load@1").problems[:2]]
+    a, b = [task.name for task in tracking_suite("smc-load@1").problems[:2]]
     first = result("pid", {a: (1.0, 1.1), b: (1.0, 1.1)}, seed=1)
     last = result("hodob", {a: (7.0, 7.1), b: (7.0, 7.1)}, seed=2)
     before = tracking_page.page(board_of(first), "p.svg").splitlines()
@@ -194,6 +196,6 @@ def test_a_law_of_ones_own_enters_and_the_same_command_goes_on(tmp_path, monkeyp
     entered = read_result(file)
     assert entered.name == "mine"
     assert {*json.loads(file.read_text())["problems"]} == {
-        each.name for each in tracking_suite("smc-load@1").problems
+        task.name for task in tracking_suite("smc-load@1").problems
     }
     shutil.rmtree(tmp_path / "smc-load@1")

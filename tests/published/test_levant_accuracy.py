@@ -59,7 +59,7 @@ def check(found, theorem, row, column):
         rf"^\| `{row}.*", (ROOT / "docs" / "published.md").read_text(), re.MULTILINE
     )
     np.testing.assert_allclose(
-        found, [float(one) for one in line.split("|")[column].split(",")], rtol=0, atol=TOLD
+        found, [float(figure) for figure in line.split("|")[column].split(",")], rtol=0, atol=TOLD
     )
 
 

@@ -16,7 +16,7 @@ def held(slope, law, gains, start, goal, period, substeps, count):
     """Positions and u (count, n) of x'' = slope(x, v, u) at the samples of a law that holds u."""
     h = period / substeps
     y = np.array(start, float)
-    found = []
+    trajectories = []
     for k in range(count):
         x, v = np.split(y, 2)
         r, dr, ddr = goal(k * period)
@@ -24,7 +24,7 @@ def held(slope, law, gains, start, goal, period, substeps, count):
         if not law.joint:
             see = {"e": x[0], "de": v[0], "q": x[1], "dq": v[1]}
         u, _ = law.function(SimpleNamespace(**see), SimpleNamespace(**gains), None)
-        found.append((x, u))
+        trajectories.append((x, u))
 
         def rate(y, u=u):
             return np.append(y[y.size // 2 :], slope(*np.split(y, 2), u))
@@ -34,7 +34,7 @@ def held(slope, law, gains, start, goal, period, substeps, count):
             k2 = rate(y + h / 2 * k1)
             k3 = rate(y + h / 2 * k2)
             y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + rate(y + h * k3))
-    x, u = zip(*found, strict=True)
+    x, u = zip(*trajectories, strict=True)
     return np.array(x), np.array(u)
 
 
@@ -80,16 +80,16 @@ def test_the_cart_is_the_study_s_equation_and_its_rows_are_the_study_s(level):
     np.testing.assert_allclose(trace.u[:251, 0], u, atol=0.01)
     for t, row in studies.LIMA.items():
         k = round(t / 2e-3)
-        found = (*trace.x[k], trace.u[k - 1, 0])
+        row_simulated = (*trace.x[k], trace.u[k - 1, 0])
         # only with a force that pushes
-        assert np.allclose(found, row, rtol=0.01, atol=1e-4) == (level > 0.0 or k == 1)
+        assert np.allclose(row_simulated, row, rtol=0.01, atol=1e-4) == (level > 0.0 or k == 1)
 
 
 @pytest.mark.slow
 def test_in_forty_seconds_the_cart_s_command_is_that_of_the_study_s_table():
     u = smc.run(studies.cart()).u[:-1, 0]
-    found = np.abs(u).mean(), np.abs(np.diff(u, prepend=0.0)).sum()
-    assert found == pytest.approx((studies.LIMA_MEAN, studies.LIMA_STEPS), rel=0.01)
+    command_figures = np.abs(u).mean(), np.abs(np.diff(u, prepend=0.0)).sum()
+    assert command_figures == pytest.approx((studies.LIMA_MEAN, studies.LIMA_STEPS), rel=0.01)
 
 
 @pytest.mark.parametrize(

@@ -123,31 +123,31 @@ def test_the_range_over_sets_is_that_of_their_own_margins(monkeypatch):
         return dataclasses.replace(pushed(level <= base.law.gains["lam"]), law=base.law)
 
     monkeypatch.setitem(margins.MARGIN_KINDS, "push", kind_of(put))
-    first, *others = (dataclasses.replace(pushed(True), law=law) for law in laws)
+    first, *variants = (dataclasses.replace(pushed(True), law=law) for law in laws)
 
     def found(siblings):
         return margins.margins_of([first], ["push"], siblings=[siblings])[0]
 
-    own = [margins.margins_of([base], ["push"])[0] for base in (first, *others)]
-    margin = found(others)
+    own = [margins.margins_of([base], ["push"])[0] for base in (first, *variants)]
+    margin = found(variants)
     assert margin.value == own[0].value
     assert margin.sets == 5
-    assert margin.low == pytest.approx(min(one.value for one in own), rel=2 * FINE)
-    assert margin.high == pytest.approx(max(one.value for one in own), rel=2 * FINE)
-    same = found(others[1:2])
+    assert margin.low == pytest.approx(min(set_margin.value for set_margin in own), rel=2 * FINE)
+    assert margin.high == pytest.approx(max(set_margin.value for set_margin in own), rel=2 * FINE)
+    same = found(variants[1:2])
     assert (same.low, same.high) == (margin.value, margin.value)
     assert found([]).over_sets == ""
-    wide = dataclasses.replace(others[0], law=smc.law("observer_free", lam=9.0, k1=2.0))
+    wide = dataclasses.replace(variants[0], law=smc.law("observer_free", lam=9.0, k1=2.0))
     assert found([wide]).over_sets.endswith(" to ≥ 4.00")
-    broken = dataclasses.replace(others[0], disturbance=(smc.Constant(50.0),))
+    broken = dataclasses.replace(variants[0], disturbance=(smc.Constant(50.0),))
     assert found([broken]).over_sets == f"fails to {margin.text}"
 
 
 def test_other_sets_are_the_shipped_ones_of_a_law_that_was_named():
     base = smc.grid("duffing", "classical")[0]
-    others = margins._other_sets(base, "classical", "tuned")
-    sets = {tuple(run.law.gains.values()) for run in (base, *others)}
-    assert len(sets) == len(others) + 1 == 12
+    siblings = margins._other_sets(base, "classical", "tuned")
+    sets = {tuple(run.law.gains.values()) for run in (base, *siblings)}
+    assert len(sets) == len(siblings) + 1 == 12
     assert margins._other_sets(base, base.law, "tuned") == []
     assert margins._other_sets(base, "classical", "default") == []
 
@@ -166,7 +166,7 @@ def test_both_signs_of_a_disturbance_are_tolerated(monkeypatch):
     runs = smc.run(
         [dataclasses.replace(wound, disturbance=smc.Constant(sign * 4.5)) for sign in (1.0, -1.0)]
     )
-    assert [margins.tolerates(one) for one in runs] == [True, False]
+    assert [margins.tolerates(run) for run in runs] == [True, False]
     assert margin.value < 4.5
 
 
@@ -212,7 +212,7 @@ def test_linear_theory_is_only_for_the_loop_that_it_describes():
     """None for a plant that is pushed or changed, a law that reads an encoder or the model, or
     another reference.
     """
-    base, noisy, *others = (
+    base, noisy, *undescribed = (
         smc.grid("duffing", "observer_free", condition)[0]
         for condition in ("nominal", "noise", "constant", "heavy", "encoder")
     )
@@ -222,11 +222,11 @@ def test_linear_theory_is_only_for_the_loop_that_it_describes():
         {"reference": smc.Sine(0.1, 1.0)},
         {"feedforward": smc.Constant(2.0)},
     ):
-        others.append(dataclasses.replace(base, **fields))
+        undescribed.append(dataclasses.replace(base, **fields))
     for kind in ("delay", "disturbance", "friction"):
         expected = margins.MARGIN_KINDS[kind].expected
         assert None not in map(expected, (base, noisy))
-        assert {*map(expected, others)} == {None}
+        assert {*map(expected, undescribed)} == {None}
     estimated = dataclasses.replace(base, velocity="filtered_difference")  # changes nothing at rest
     assert margins.MARGIN_KINDS["delay"].expected(estimated) is None
     assert margins.MARGIN_KINDS["disturbance"].expected(estimated) is not None
@@ -260,9 +260,9 @@ def test_theory_knows_the_weakest_motor(poles):
     strong = smc.law("boundary_layer", k=30.0, phi=0.01, c=5.0)
     base = smc.Scenario(plant=poles(), law=strong, x0=(1.0, 1.0))
     # rad: there it gives its 15 N m, of which gravity takes m g l sin(x) and ever more
-    at = 15.0 / (30.0 * 5.0 / 0.01)
+    angle = 15.0 / (30.0 * 5.0 / 0.01)
     expected = margins.MARGIN_KINDS["disturbance"].expected(base)
-    assert expected == pytest.approx(15.0 - 9.81 * math.sin(at), rel=1e-3)
+    assert expected == pytest.approx(15.0 - 9.81 * math.sin(angle), rel=1e-3)
 
 
 @pytest.mark.parametrize("kind", margins.MARGIN_KINDS)
@@ -278,8 +278,8 @@ def test_a_level_of_each_kind_changes_the_run(kind):
 def test_the_mass_ratio_is_of_the_nominal_mass_under_whichever_name():
     heavier = margins.MARGIN_KINDS["mass"].put
     for name in ("mass", "M"):
-        known = dataclasses.replace(BASE, mismatch={name: 1.5, "alpha": 2.0})
-        assert heavier(known, 2.0).mismatch == {name: 2.0, "alpha": 2.0}
+        named = dataclasses.replace(BASE, mismatch={name: 1.5, "alpha": 2.0})
+        assert heavier(named, 2.0).mismatch == {name: 2.0, "alpha": 2.0}
     assert heavier(BASE, 2.0).mismatch == {"mass": 2.0}
     (margin,) = margins.margins_of(
         [dataclasses.replace(BASE, mismatch={"M": 1.1}, duration=1.0)], ["mass"], COARSE
@@ -364,9 +364,9 @@ def test_a_blow_comes_at_half_time_in_shares_of_the_momentum_that_u_stops_in_its
     kind = margins.MARGIN_KINDS["blow"]
     (level, *_) = kind.search(BASE, COARSE).levels
     inertia = 1.0 / abs(BASE.plant.nominal(np.zeros(1), np.zeros(1), 0, BASE.plant.values({}))[1])
-    whole = np.sqrt(inertia * abs(BASE.resolved.x0[0]) * BASE.limits[0])
-    assert level == pytest.approx(margins.BLOWS[0] * whole)
-    blows = [one.disturbance[-1] for one in kind.scenarios(BASE, level)]
+    full_impulse = np.sqrt(inertia * abs(BASE.resolved.x0[0]) * BASE.limits[0])
+    assert level == pytest.approx(margins.BLOWS[0] * full_impulse)
+    blows = [run.disturbance[-1] for run in kind.scenarios(BASE, level)]
     width = 5e-3  # s, as the help of `margins` and the answer of `which` say
     assert [(blow.impulse, blow.time, blow.width) for blow in blows] == [
         (level, BASE.duration / 2, width),
@@ -392,8 +392,8 @@ DRAWN = [
 
 
 def test_a_bar_ends_at_the_margin_and_a_line_at_what_is_not_tolerated():
-    delay, mass, *others = margins.Margins(DRAWN).figure().axes
-    assert others == []
+    delay, mass, *extra_axes = margins.Margins(DRAWN).figure().axes
+    assert extra_axes == []
     assert delay.get_xlabel() == "input delay (ms)"
     assert [label.get_text() for label in delay.get_yticklabels()] == [
         "PID",
@@ -412,8 +412,8 @@ def test_a_bar_ends_at_the_margin_and_a_line_at_what_is_not_tolerated():
 
 
 def test_each_plant_has_its_own_panels_in_its_own_units():
-    other = a_margin(plant="inverted_pendulum", kind="disturbance", unit="N m", value=2.0)
-    page = margins.Margins([a_margin(kind="disturbance", unit="N"), other]).figure()
+    pendulum_margin = a_margin(plant="inverted_pendulum", kind="disturbance", unit="N m", value=2.0)
+    page = margins.Margins([a_margin(kind="disturbance", unit="N"), pendulum_margin]).figure()
     first, second = page.axes
     titles = first.get_title(loc="left"), second.get_title(loc="left")
     assert titles == ("Duffing oscillator", "Inverted pendulum")

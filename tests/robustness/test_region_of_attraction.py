@@ -151,8 +151,8 @@ def test_an_early_verdict_needs_a_run_that_approaches_rests_or_fails():
 def test_a_law_below_the_smallest_lambda_converges_from_nowhere_else():
     law = smc.law("observer_free", lam=0.2, k1=3.0)
     assert law.gains["lam"] < linear_theory.smallest_lam(smc.plant("duffing"), 3.0)
-    found = maps.basin_of(base("duffing", law, 20.0), [-1.5, -0.5, 0.5, 1.5], [-1.0, 1.0])
-    assert (found.outcome == DOES_NOT).all()
+    basin = maps.basin_of(base("duffing", law, 20.0), [-1.5, -0.5, 0.5, 1.5], [-1.0, 1.0])
+    assert (basin.outcome == DOES_NOT).all()
 
 
 def test_a_run_that_still_approaches_at_the_end_is_undecided():
@@ -171,19 +171,19 @@ def test_a_run_that_leaves_slowly_does_not_converge_early():
     plant = smc.plant("duffing")
     assert lam < linear_theory.smallest_lam(plant, k1)
     slow = base("duffing", smc.law("observer_free", lam=lam, k1=k1), 10.0)
-    found = maps.basin_of(slow, [-3.0, -0.05, -0.02, 0.02, 0.05, 3.0], [-9.0, 0.0, 9.0])
-    assert (found.outcome[1] != CONVERGES).all()
+    basin = maps.basin_of(slow, [-3.0, -0.05, -0.02, 0.02, 0.05, 3.0], [-9.0, 0.0, 9.0])
+    assert (basin.outcome[1] != CONVERGES).all()
 
 
 @pytest.mark.slow
 def test_sticking_under_a_growing_command_is_not_decided_early():
     stuck = base("duffing", smc.law("pid"), 10.0)
     stuck = dataclasses.replace(stuck, friction=smc.Coulomb(3.0), u_max=math.inf)
-    early, whole = (
+    early, full_run = (
         run(stuck, [0.1, 0.5], [0.0]).outcome.tolist() for run in (maps.basin_of, to_the_end)
     )
-    assert early == whole
-    assert DOES_NOT not in whole[0]
+    assert early == full_run
+    assert DOES_NOT not in full_run[0]
 
 
 @pytest.mark.slow
@@ -191,9 +191,9 @@ def test_distance_is_measured_from_the_reference(refused):
     held = dataclasses.replace(
         base("duffing", smc.law("lqr"), 12.0), model="nominal", reference=smc.Constant(0.3)
     )
-    found = maps.basin_of(held, [0.0, 0.6], [0.0, 0.1])
-    assert found.outcome.tolist() == [[CONVERGES] * 2] * 2
-    assert found.decided_at.max() < 5.0
+    basin = maps.basin_of(held, [0.0, 0.6], [0.0, 0.1])
+    assert basin.outcome.tolist() == [[CONVERGES] * 2] * 2
+    assert basin.decided_at.max() < 5.0
     refused(
         lambda: maps.basin_of(
             dataclasses.replace(held, reference=smc.Sine(0.3, 1.0)), [0.0, 0.6], [0.0, 0.1]
@@ -202,18 +202,18 @@ def test_distance_is_measured_from_the_reference(refused):
 
 
 def test_rest_a_turn_away_does_not_converge_and_the_way_back_from_there_takes_time():
-    found = maps.basin_of(
+    basin = maps.basin_of(
         base("inverted_pendulum", counts_no_turns, 3.0), [0.0, 2 * math.pi], [0.0]
     )
-    assert found.outcome.tolist() == [[CONVERGES, DOES_NOT]]
+    assert basin.outcome.tolist() == [[CONVERGES, DOES_NOT]]
     for duration, outcome in (
         (3.0, UNDECIDED),
         (6.0, CONVERGES),
     ):
-        found = maps.basin_of(
+        basin = maps.basin_of(
             base("inverted_pendulum", smc.law("lqr"), duration), [2 * math.pi], [0.0]
         )
-        assert found.outcome.tolist() == [[outcome]]
+        assert basin.outcome.tolist() == [[outcome]]
 
 
 @pytest.mark.slow
@@ -249,11 +249,11 @@ def test_what_a_switching_law_holds_has_converged_whatever_the_beat_of_its_rippl
 
 def test_mujoco_decides_as_the_fast_engine_does(weak):
     assert weak.checked == "MuJoCo repeated 20 states, 0 with another outcome"
-    some = slice(1, None, 4)
-    found = maps.basin_of(base("inverted_pendulum", WEAK), weak.x[some], weak.v[some])
-    assert found.checked == ""
+    fourths = slice(1, None, 4)
+    basin = maps.basin_of(base("inverted_pendulum", WEAK), weak.x[fourths], weak.v[fourths])
+    assert basin.checked == ""
     # the grid of fewer states has a smaller reach, so a run may be decided at another time
-    assert (found.outcome == weak.outcome[some, some]).all()
+    assert (basin.outcome == weak.outcome[fourths, fourths]).all()
 
 
 # analytic limits
@@ -262,10 +262,10 @@ def test_mujoco_decides_as_the_fast_engine_does(weak):
 def test_beyond_the_angle_that_the_torque_can_hold_a_pendulum_at_rest_falls():
     p = PENDULUM.parameters
     limit = math.asin(WEAK.gains["lam"] / (p["m"] * p["grav"] * p["l"]))
-    found = maps.basin_of(
+    basin = maps.basin_of(
         base("inverted_pendulum", WEAK), [0.9 * limit, 1.02 * limit, 2.0 * limit], [0.0, 9.0]
     )
-    assert found.outcome[0].tolist() == [CONVERGES, DOES_NOT, DOES_NOT]
+    assert basin.outcome[0].tolist() == [CONVERGES, DOES_NOT, DOES_NOT]
 
 
 def test_a_pendulum_beyond_the_saddle_of_full_torque_comes_back_only_by_a_swing(weak):

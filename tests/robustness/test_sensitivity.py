@@ -35,13 +35,13 @@ def test_indices_of_ishigami_s_function_are_its_closed_forms():
     x = three * designs - math.pi
     scores = np.sin(x[:, 0]) + 7.0 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
     axes = module.indices(space(*"abcd"), scores, n, designs[: 2 * n], scores[: 2 * n], 0)
-    whole = 49.0 / 8.0 + 0.1 * math.pi**4 / 5.0 + 0.01 * math.pi**8 / 18.0 + 0.5
-    first = 0.5 * (1.0 + 0.1 * math.pi**4 / 5.0) ** 2 / whole, 49.0 / 8.0 / whole, 0.0, 0.0
-    both = 8.0 * 0.01 * math.pi**8 / 225.0 / whole
+    variance = 49.0 / 8.0 + 0.1 * math.pi**4 / 5.0 + 0.01 * math.pi**8 / 18.0 + 0.5
+    first = 0.5 * (1.0 + 0.1 * math.pi**4 / 5.0) ** 2 / variance, 49.0 / 8.0 / variance, 0.0, 0.0
+    interaction = 8.0 * 0.01 * math.pi**8 / 225.0 / variance
     for axis, alone, more in zip(
         axes,
         first,
-        (both, 0.0, both, 0.0),
+        (interaction, 0.0, interaction, 0.0),
         strict=True,
     ):
         assert axis.first.median == pytest.approx(alone, abs=0.02)
@@ -81,8 +81,8 @@ def test_no_axis_explains_more_alone_than_with_others(seed):
     scores = designs[:, 0] + 0.1 * designs[:, 1:].sum(axis=1) - 1.0
     axes = module.indices(space(*"abcd"), scores, n, designs[: 2 * n], scores[: 2 * n], seed)
     for axis in axes:
-        for one, more in zip(axis.first[:3], axis.total[:3], strict=True):
-            assert one <= more
+        for alone, more in zip(axis.first[:3], axis.total[:3], strict=True):
+            assert alone <= more
     assert axes[0].first.median > 0.8
 
 
@@ -109,10 +109,10 @@ def test_sums_of_first_indices_are_at_most_1_and_of_total_ones_at_least(seed):
 
 
 def test_estimates_beyond_what_indices_obey_are_brought_within():
-    found = module.possible(np.array([1.2, 0.8, -0.1]), np.array([0.9, 0.6, 0.0]))
-    np.testing.assert_allclose(found, [[0.6, 0.4, 0.0], [0.9, 0.6, 0.0]])
-    found = module.possible(np.array([0.5, 0.3]), np.array([0.4, 0.4]))
-    np.testing.assert_allclose(found, [[0.5, 0.3], [0.5, 0.5]])
+    corrected = module.possible(np.array([1.2, 0.8, -0.1]), np.array([0.9, 0.6, 0.0]))
+    np.testing.assert_allclose(corrected, [[0.6, 0.4, 0.0], [0.9, 0.6, 0.0]])
+    corrected = module.possible(np.array([0.5, 0.3]), np.array([0.4, 0.4]))
+    np.testing.assert_allclose(corrected, [[0.5, 0.3], [0.5, 0.5]])
     assert not module.possible(np.zeros(2), np.zeros(2)).any()
 
 
@@ -142,7 +142,10 @@ def test_first_indices_leave_out_what_two_samples_have_in_common_by_chance():
         np.testing.assert_allclose(total[0], np.ravel(theirs.total_order), atol=1e-12)
         true = np.array([100.0] + [0.09] * 7) / (100.0 + 7 * 0.09)
         errors.append(
-            [np.square(its - true).mean() for its in (first[0], np.ravel(theirs.first_order))]
+            [
+                np.square(indices - true).mean()
+                for indices in (first[0], np.ravel(theirs.first_order))
+            ]
         )
     ours, saltelli = np.sqrt(np.mean(errors, axis=0))
     assert ours < saltelli / 3.0
@@ -232,11 +235,13 @@ def test_failures_on_one_side_on_both_or_between_have_their_bounds(fails, bounds
 
 @pytest.mark.slow
 def test_failures_by_chance_have_no_region():
-    found = 0
+    region_count = 0
     for seed in range(20):
         rng = np.random.default_rng(seed)
-        found += len(module.regions(space(*"abcdefg"), rng.random((64, 7)), rng.random(64) < 0.3))
-    assert found <= 1
+        region_count += len(
+            module.regions(space(*"abcdefg"), rng.random((64, 7)), rng.random(64) < 0.3)
+        )
+    assert region_count <= 1
 
 
 def test_an_axis_of_chance_bounds_no_region_and_is_not_improved():
@@ -262,7 +267,7 @@ def test_a_run_is_a_plain_scenario_and_an_axis_that_acts_on_nothing_has_the_inde
     """
     base = scenario(law="none", plant="van_der_pol")
     over = smc.Uncertainty(mass=(0.5, 2.0), bound=(0.2, 1.0))
-    found, alone = (
+    result, alone = (
         smc.sensitivity(
             base,
             over,
@@ -271,57 +276,58 @@ def test_a_run_is_a_plain_scenario_and_an_axis_that_acts_on_nothing_has_the_inde
         )
         for threads in (None, 1)
     )
-    indices = {axis.name: axis for axis in found.axes}
+    indices = {axis.name: axis for axis in result.axes}
     assert indices["mass"].total.median > 0.8
     assert indices["bound"].total[:3] == indices["bound"].first[:3] == (0.0, 0.0, 0.0)
-    np.testing.assert_array_equal(found.values, alone.values)
-    row = found.space.scenario_at(found.shares[5])
+    np.testing.assert_array_equal(result.values, alone.values)
+    row = result.space.scenario_at(result.shares[5])
     assert (
-        row.mismatch["mass"] == found.space.column(found.space.names.index("mass"), found.shares)[5]
+        row.mismatch["mass"]
+        == result.space.column(result.space.names.index("mass"), result.shares)[5]
     )
-    assert smc.score(smc.run(row))["rms_error"] == found.values[5]
-    assert found.runs == 16 * 4
+    assert smc.score(smc.run(row))["rms_error"] == result.values[5]
+    assert result.runs == 16 * 4
 
 
 def test_a_run_fails_where_its_force_is_too_small_and_one_without_a_score_has_the_worst():
     base = scenario(plant="inverted_pendulum", law=smc.law("observer_free"), duration=4.0)
-    found = smc.sensitivity(
+    result = smc.sensitivity(
         base,
         smc.Uncertainty(bound=(0.05, 1.0)),
         "settling_time",
         points=16,
     )
-    bounds = found.space.column(0, found.shares)
-    assert 0 < found.failed.sum() < 16
-    assert bounds[found.failed].max() < bounds[~found.failed].min()
-    worst = found.values[found.failed]
-    assert math.isfinite(found.values.max())
-    assert (worst == found.values.max()).all()
+    bounds = result.space.column(0, result.shares)
+    assert 0 < result.failed.sum() < 16
+    assert bounds[result.failed].max() < bounds[~result.failed].min()
+    worst = result.values[result.failed]
+    assert math.isfinite(result.values.max())
+    assert (worst == result.values.max()).all()
 
 
 def test_the_share_that_says_whether_a_run_ends_at_rest_may_be_the_metric():
     case = scenario(law=smc.law("boundary_layer"), duration=3.0)
-    found = smc.sensitivity(case, smc.Uncertainty(bound=(0.02, 1.0)), "rest_share", points=16)
-    assert 0 < found.failed.sum() < 16
-    assert (found.failed == (found.values > 0.05)).all()
+    result = smc.sensitivity(case, smc.Uncertainty(bound=(0.02, 1.0)), "rest_share", points=16)
+    assert 0 < result.failed.sum() < 16
+    assert (result.failed == (result.values > 0.05)).all()
 
 
 def test_levels_and_chance_are_axes():
     """A level scales the force and the errors that chance draws; equal chances draw the same."""
-    found = module.Space(
+    class_space = module.Space(
         scenario(), smc.Uncertainty(disturbance=2.0, position_noise=1e-3, delay=(0.0, 0.01))
     )
-    assert found.names == ["delay", "disturbance", "noise", "chance"]
+    assert class_space.names == ["delay", "disturbance", "noise", "chance"]
     rows = [1.0, 0.5, 0.2, 0.3], [0.0, 1.0, 0.4, 0.3], [0.0, 1.0, 0.4, 0.6]
-    low, high, other = (found.scenario_at(np.array(row)) for row in rows)
-    assert [one.input_delay for one in (low, high, other)] == [0.01, 0.0, 0.0]
-    forces = [np.array(one.disturbance[0].values) for one in (low, high, other)]
+    low, high, redraw = (class_space.scenario_at(np.array(row)) for row in rows)
+    assert [drawn.input_delay for drawn in (low, high, redraw)] == [0.01, 0.0, 0.0]
+    forces = [np.array(drawn.disturbance[0].values) for drawn in (low, high, redraw)]
     errors = []
-    for one in (low, high, other):
-        errors.append(np.array(vars(one.noise.position_error)["values"]))
-    for half, whole, others in (forces, errors):
-        np.testing.assert_allclose(2.0 * half, whole, atol=1e-15)
-        assert np.abs(whole - others).max() > 0.1 * np.abs(whole).max()
+    for drawn in (low, high, redraw):
+        errors.append(np.array(vars(drawn.noise.position_error)["values"]))
+    for half, full, redrawn in (forces, errors):
+        np.testing.assert_allclose(2.0 * half, full, atol=1e-15)
+        assert np.abs(full - redrawn).max() > 0.1 * np.abs(full).max()
     assert np.abs(forces[1]).max() <= 2.0
     assert np.abs(errors[1]).max() <= 0.4e-3
 
@@ -332,12 +338,12 @@ def test_encoder_bound_and_period_take_all_of_their_ranges():
         [base], smc.Uncertainty(encoder=(256, 4096), bound=(0.5, 1.0), period=(0.4, 3.0))
     )
     low, middle, high = (members.with_constants(np.full(3, share)) for share in (0.0, 0.5, 1.0))
-    assert [vars(one.sensor)["counts"] for one in (low, middle, high)] == [256, 1024, 4096]
-    assert [one.u_max for one in (low, middle, high)] == [2.0, 3.0, 4.0]
-    assert [one.control_period for one in (low, high)] == pytest.approx([0.5e-3, 3e-3])
-    assert {one.physics_step for one in (low, middle, high)} == {0.5e-3}
-    kept = dataclasses.replace(base, sensor=smc.Encoder(64, bias=0.1))
-    assert Members([kept], smc.Uncertainty(encoder=(256, 512))).with_constants(
+    assert [vars(drawn.sensor)["counts"] for drawn in (low, middle, high)] == [256, 1024, 4096]
+    assert [drawn.u_max for drawn in (low, middle, high)] == [2.0, 3.0, 4.0]
+    assert [drawn.control_period for drawn in (low, high)] == pytest.approx([0.5e-3, 3e-3])
+    assert {drawn.physics_step for drawn in (low, middle, high)} == {0.5e-3}
+    biased = dataclasses.replace(base, sensor=smc.Encoder(64, bias=0.1))
+    assert Members([biased], smc.Uncertainty(encoder=(256, 512))).with_constants(
         np.ones(1)
     ).sensor == smc.Encoder(512, bias=0.1)
     with pytest.raises(smc.ScenarioError, match="period cannot differ: leave it out of within"):
@@ -355,8 +361,8 @@ def test_a_jitter_keeps_the_delays_of_a_fine_step_and_an_axis_of_one_value_is_re
 
 
 def test_the_default_class_has_the_axes_of_machines():
-    found = module.Space(base := scenario(), default_class(base))
-    assert set(found.names) == {
+    class_space = module.Space(base := scenario(), default_class(base))
+    assert set(class_space.names) == {
         "mass",
         "friction",
         "delay",
@@ -396,12 +402,12 @@ def test_runs_without_a_score_are_counted_and_too_many_are_not_explained():
             "settling_time",
             points=16,
         )
-    found = smc.sensitivity(
+    result = smc.sensitivity(
         dataclasses.replace(base, duration=4.0), over, "settling_time", points=16
     )
-    assert 0 < found.unscored < 16
-    assert f"{found.unscored} runs have none, and count as the worst" in found.sentences[0]
-    many = dataclasses.replace(found, unscored=20)
+    assert 0 < result.unscored < 16
+    assert f"{result.unscored} runs have none, and count as the worst" in result.sentences[0]
+    many = dataclasses.replace(result, unscored=20)
     assert many.sentences[1].startswith("First: no axis")
 
 
@@ -420,28 +426,28 @@ def test_a_broken_law_is_named():
 
 def test_one_axis_is_named_only_if_the_intervals_part():
     over = smc.Uncertainty(mass=(0.5, 2.0), bound=(0.2, 1.0))
-    found = smc.sensitivity(scenario(law="none"), over, points=16)
-    assert found.sentences[1].startswith("First: mass, ")
-    total = found.axes[0].total
-    first = found.axes[0]._replace(total=total._replace(low=0.8))
-    reached = found.axes[1]._replace(total=total._replace(median=0.0, low=0.0, high=0.9))
-    same = dataclasses.replace(found, axes=(first, reached))
+    result = smc.sensitivity(scenario(law="none"), over, points=16)
+    assert result.sentences[1].startswith("First: mass, ")
+    total = result.axes[0].total
+    first = result.axes[0]._replace(total=total._replace(low=0.8))
+    reached = result.axes[1]._replace(total=total._replace(median=0.0, low=0.0, high=0.9))
+    same = dataclasses.replace(result, axes=(first, reached))
     assert same.sentences[1].startswith("First: open")
-    assert "no axis" in dataclasses.replace(found, values=np.ones(32)).sentences[1]
-    some = dataclasses.replace(found, failed=np.arange(32) < 5, regions=())
-    assert some.sentences[2].startswith("Failed: 5 of 32 (")
+    assert "no axis" in dataclasses.replace(result, values=np.ones(32)).sentences[1]
+    partly_failed = dataclasses.replace(result, failed=np.arange(32) < 5, regions=())
+    assert partly_failed.sentences[2].startswith("Failed: 5 of 32 (")
 
 
 def test_what_cannot_be_answered_is_refused():
     over = smc.Uncertainty(mass=(0.7, 1.3))
-    for given, fields, sentence in [
+    for case, fields, sentence in [
         (scenario(), {"points": 33}, "points is 33: give a power of 2, such as 32"),
         (scenario(), {"within": 3}, "within is 3: give a class"),
         ("duffing", {}, "sensitivity is of a Scenario, not 'duffing'"),
         (scenario(), {"metric": "speed"}, "metric"),
     ]:
         with pytest.raises(smc.ScenarioError, match=sentence):
-            smc.sensitivity(given, **{"within": over} | fields)
+            smc.sensitivity(case, **{"within": over} | fields)
 
 
 @pytest.mark.slow
@@ -450,8 +456,8 @@ def test_with_many_runs_the_fast_engine_makes_them_and_mujoco_repeats_some(monke
     case = scenario(law=smc.law("boundary_layer"), duration=1.0)
     expected = smc.sensitivity(case, within, points=8)
     monkeypatch.setattr(scored_runs, "MIN_WORK", 0)
-    found = smc.sensitivity(case, within, points=8)
-    assert found.values == pytest.approx(expected.values, rel=1e-9)
-    assert (found.failed == expected.failed).all()
-    assert "MuJoCo repeated 20 runs of another engine: 0 failed" in str(found)
+    result = smc.sensitivity(case, within, points=8)
+    assert result.values == pytest.approx(expected.values, rel=1e-9)
+    assert (result.failed == expected.failed).all()
+    assert "MuJoCo repeated 20 runs of another engine: 0 failed" in str(result)
     assert not expected.checked

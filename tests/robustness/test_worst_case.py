@@ -70,17 +70,17 @@ def test_the_worst_scenario_replays_in_the_class_whatever_the_threads(name):
         assert np.abs(np.diff(trace.d[:, 0])).max() <= within.slope * base.control_period * (
             1 + 1e-9
         )
-    made = worst.scenario
-    assert 0.0 <= made.input_delay <= within.delay[1]
+    worst_scenario = worst.scenario
+    assert 0.0 <= worst_scenario.input_delay <= within.delay[1]
     for error, bound in zip(
-        made.noise.errors, (within.position_noise, within.velocity_noise), strict=True
+        worst_scenario.noise.errors, (within.position_noise, within.velocity_noise), strict=True
     ):
         assert np.abs(error.values if error else 0.0).max() <= bound
         assert error is None or np.allclose(np.diff(error.times), within.hold)
-    for changed, factor in made.mismatch.items():
+    for changed, factor in worst_scenario.mismatch.items():
         low, high = {"mass": within.mass, **within.parameters}[changed]
         assert low <= factor <= high
-    assert np.abs(np.array(made.resolved.x0) - 1.5).max() <= 1.5 * within.x0 * (1 + 1e-12)
+    assert np.abs(np.array(worst_scenario.resolved.x0) - 1.5).max() <= 1.5 * within.x0 * (1 + 1e-12)
 
 
 def test_the_ends_of_a_class_are_within_it():
@@ -99,7 +99,7 @@ def test_the_ends_of_a_class_are_within_it():
     assert high.input_delay == 2e-3
     assert low.clock.jitter == 0.0
     assert high.clock.jitter == 1.25e-4
-    assert [one.friction[0].level for one in (low, high)] == pytest.approx([0.05, 0.35])
+    assert [end.friction[0].level for end in (low, high)] == pytest.approx([0.05, 0.35])
     assert low.mismatch["mass"] == 0.12
     assert high.mismatch["mass"] == 1.14
     for few in (
@@ -130,12 +130,12 @@ def test_a_force_is_kept_at_its_jumps_if_few_of_its_values_change_and_else_at_it
 def test_errors_of_measurement_reach_the_law_alike_in_both_loops():
     error = smc.signals.Held([0.0, 0.05], [0.02, -0.02])
     steps = smc.signals.TimeSeries([0.0, 0.2], [0.1, -0.1])
-    made = scenario(
+    measured = scenario(
         duration=0.1, noise=smc.Noise(position=1e-3, position_error=error, velocity_error=steps)
     )
-    fast = smc.run(made)
-    slow = reference.run(made)
-    plain = smc.run(dataclasses.replace(made, noise=smc.Noise(position=1e-3)))
+    fast = smc.run(measured)
+    slow = reference.run(measured)
+    plain = smc.run(dataclasses.replace(measured, noise=smc.Noise(position=1e-3)))
     for name in ("x", "v", "u", "s"):
         np.testing.assert_array_equal(getattr(fast, name), getattr(slow, name))
     assert fast.s[0, 0] - plain.s[0, 0] == pytest.approx(2.874 * 0.02 + 0.1)
@@ -237,13 +237,15 @@ def test_the_adversary_chooses_the_set_of_parameters_and_the_scale_of_friction()
     for factor in (1.0, 3.0, 0.4):
         sets.append(scenario(mismatch={"M": factor}, friction=friction))
     worst = smc.worst_case(sets, within=smc.Uncertainty(friction_scale=(0.0, 2.0)), budget=6)
-    made = []
-    for one, scale in itertools.product(sets, (0.0, 2.0)):
-        made.append(
-            dataclasses.replace(one, friction=(smc.Coulomb(0.2 * scale), smc.Viscous(0.5 * scale)))
+    members = []
+    for parameter_set, scale in itertools.product(sets, (0.0, 2.0)):
+        members.append(
+            dataclasses.replace(
+                parameter_set, friction=(smc.Coulomb(0.2 * scale), smc.Viscous(0.5 * scale))
+            )
         )
-    assert worst.value == max(smc.score(trace)["rms_error"] for trace in smc.run(made))
-    assert worst.scenario in made
+    assert worst.value == max(smc.score(trace)["rms_error"] for trace in smc.run(members))
+    assert worst.scenario in members
     assert "any of 3 parameter sets, friction scale 0 to 2" in str(worst)
 
 
@@ -274,7 +276,7 @@ def test_constants_and_relays_reach_what_another_adversary_found():
     """Rms errors in m on duffing within |d| <= 2 N, by an evolution of 144 straight lines and by
     constants.
     """
-    found = {
+    worst_by_law = {
         smc.law("implicit_first_order", k=4.744, c=4.382): 0.1165,
         smc.law(
             "extended_state",
@@ -291,7 +293,7 @@ def test_constants_and_relays_reach_what_another_adversary_found():
         ): 0.0505,
         smc.law("observer_free", lam=5.784, k1=3.193): 0.1206,
     }
-    for law, value in found.items():
+    for law, value in worst_by_law.items():
         worst = smc.worst_case(scenario(law=law, duration=8.0), within=CLASSES["force"], budget=8)
         assert round(worst.value, 4) >= value
 
@@ -351,17 +353,17 @@ def test_bad_values_get_a_sentence(refused):
 def test_a_class_beyond_the_theorem_of_the_law_is_said_to_be_outside(change, bounds, expected):
     """The limits are k = 1.9 of the theorem and 6 N of the drives."""
     case = dataclasses.replace(scenario(law=smc.law("classical", k=1.9)), **change)
-    found = outside(case, smc.Uncertainty(**bounds))
-    assert found.startswith(expected)
-    assert bool(found) == bool(expected)
+    warning = outside(case, smc.Uncertainty(**bounds))
+    assert warning.startswith(expected)
+    assert bool(warning) == bool(expected)
 
 
 def searching(tried: list[tuple[Any, float, int]], **members: Any) -> WorstCaseSearch:
     """A search that has tried members of these values and origins; nothing is run."""
-    made: Any = SimpleNamespace(**members)
+    members_stub: Any = SimpleNamespace(**members)
     metric: Any = None
     search = WorstCaseSearch(
-        made, metric, 10**6, ScoredRuns({}, worth_compiling=False), lambda done: None
+        members_stub, metric, 10**6, ScoredRuns({}, worth_compiling=False), lambda done: None
     )
     search.tried = [
         attack.TriedMember(member, (value, 0.0), origin) for member, value, origin in tried
@@ -395,10 +397,10 @@ def test_with_many_runs_the_fast_engine_searches_and_the_worst_is_mujoco_s(monke
     within = smc.Uncertainty(**bounds, mass=(0.7, 1.3))
     expected = smc.worst_case(case, within=within, budget=40)
     monkeypatch.setattr(scored_runs, "MIN_WORK", 0)
-    found = smc.worst_case(case, within=within, budget=40)
-    assert found.value == smc.score(smc.run(found.scenario))["rms_error"]
-    assert found.value == pytest.approx(expected.value, rel=1e-3)
-    assert found.median == pytest.approx(expected.median, rel=1e-3)
-    for text in (found, found.tables[0].notes):
+    result = smc.worst_case(case, within=within, budget=40)
+    assert result.value == smc.score(smc.run(result.scenario))["rms_error"]
+    assert result.value == pytest.approx(expected.value, rel=1e-3)
+    assert result.median == pytest.approx(expected.median, rel=1e-3)
+    for text in (result, result.tables[0].notes):
         assert "MuJoCo repeated 20 runs of another engine: 0 failed" in str(text)
     assert not expected.checked

@@ -125,9 +125,9 @@ def test_a_bad_law_fails_with_a_table_of_its_metrics(session):
     ],
 )
 def test_a_pair_of_limits_holds_from_both_sides(value, kept):
-    found = bound("overshoot", value, "%", (1.0, 2.0))
-    assert found.within == kept
-    assert found.limit == "1 .. 2"
+    check = bound("overshoot", value, "%", (1.0, 2.0))
+    assert check.within == kept
+    assert check.limit == "1 .. 2"
     assert bound("driven chattering_amplitude", math.nan, "rad", 0.0).within  # no limit cycle
     assert bound("overshoot", value, "%", 2.0).within == (value <= 2.0)
     assert bound("overshoot", value, "%", 1.9).within == (value < 1.9)
@@ -278,13 +278,13 @@ def test_as_ever(step_response, smc_golden):
 
 def test_golden_metrics_are_asked_for_recorded_and_compared(session, pytester):
     good = GOLDEN.replace("PHI", "0.3")
-    other = GOLDEN.replace("PHI", "0.35")
+    regolden = GOLDEN.replace("PHI", "0.35")
     said = session(good, failed=1)
     assert "has no golden settling_time, overshoot of test_as_ever: run pytest --smc-up" in said
     said = session(good, "--smc-update", passed=1)
     assert f"golden metrics recorded in {pytester.path / 'test_my_laws.golden.json'}" in said
     session(good, passed=1)
-    said = session(other, failed=1)
+    said = session(regolden, failed=1)
     assert set(re.findall(r"^(\S+\.py):\d+: ", said, re.MULTILINE)) == {"test_my_laws.py"}
     assert re.search(
         r"^E +AssertionError: settling_time is 0\.\d+ s, golden 0\.422 ± 0\.001 \(",
@@ -293,8 +293,8 @@ def test_golden_metrics_are_asked_for_recorded_and_compared(session, pytester):
     )
     assert "if it is meant, run pytest --smc-update)" in said
     assert re.search(r"^E +overshoot +1\.\d+ % +1\.\d+ ± 0\.5 +yes$", said, re.MULTILINE)
-    session(other, "--smc-update", passed=1)
-    session(other, passed=1)
+    session(regolden, "--smc-update", passed=1)
+    session(regolden, passed=1)
 
 
 def test_a_golden_file_is_plain_and_holds_each_call(session, pytester):

@@ -101,8 +101,11 @@ def test_a_metric_that_a_response_lacks_is_no_attribute(step_response):
 
 def test_with_tolerances_only_their_metrics_count(step_response, tmp_path):
     r = step_response("duffing", law("duffing", "boundary_layer"), STEP, duration=0.5)
-    known = {"itae": {"value": r.itae, "tolerance": 0.0}, "max_u": {"value": 0.0, "tolerance": 0.0}}
-    (tmp_path / "a.json").write_text(json.dumps({"one": known}))
+    recorded_metrics = {
+        "itae": {"value": r.itae, "tolerance": 0.0},
+        "max_u": {"value": 0.0, "tolerance": 0.0},
+    }
+    (tmp_path / "a.json").write_text(json.dumps({"one": recorded_metrics}))
     golden.compare(tmp_path / "a.json", "one", r, {"itae": 1e-9})
     with pytest.raises(AssertionError, match="max_u"):
         golden.compare(tmp_path / "a.json", "one", r, {})
