@@ -127,7 +127,7 @@ class Notes(list):
         def noted(*given, **options):
             words = [
                 *map(reported, given),
-                *(f"{key}={reported(one)}" for key, one in options.items()),
+                *(f"{key}={reported(option)}" for key, option in options.items()),
             ]
             self.append(f"{name.rpartition('.')[2]}({', '.join(words)})")
             if callable(gives):
@@ -148,7 +148,7 @@ class Notes(list):
 def audited(about, ids, sets, quick, threads, report):
     report(1, 2)
     save = lambda path: path  # noqa: E731
-    claims = Claims(one for one in CLAIMS if one.id in (ids or "34"))
+    claims = Claims(claim for claim in CLAIMS if claim.id in (ids or "34"))
     return SimpleNamespace(claims=claims, paper=about, save=save)
 
 
@@ -329,13 +329,13 @@ def called(tmp_path, monkeypatch, capsys):
         with pytest.raises(SystemExit) as ended:
             main.main(line.split())
         said = capsys.readouterr()
-        left = []
+        files = []
         for path in tmp_path.glob("*.json"):
-            left.append(json.dumps(json.loads(path.read_text())))
+            files.append(json.dumps(json.loads(path.read_text())))
         return (
             ended.value.code or 0,
             notes,
-            f"{said.out}\n{said.err if notes else ''}{' '.join(left)}",
+            f"{said.out}\n{said.err if notes else ''}{' '.join(files)}",
             said.err,
         )
 

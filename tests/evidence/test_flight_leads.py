@@ -19,11 +19,15 @@ def test_a_lead_is_of_laws_that_the_other_half_of_the_runs_chose():
     values = {"classical": 3.0 * noise, "observer_free": 9.0 * noise**0}
     values |= {"adrc": np.full(RUNS, 2.0), "pid": np.full(RUNS, 5.0)}
     sets = dict.fromkeys(values, np.arange(RUNS))
-    found = flight.lead(values, sets, 0.0, FAMILIES)
-    assert found is not None
-    assert (found.first, found.second, found.laws) == ("rivals", "sliding", ("adrc",))
-    assert 1.0 < found.low < found.times < found.high
-    assert found.times == pytest.approx(1.5, rel=0.02)
+    flight_lead = flight.lead(values, sets, 0.0, FAMILIES)
+    assert flight_lead is not None
+    assert (flight_lead.first, flight_lead.second, flight_lead.laws) == (
+        "rivals",
+        "sliding",
+        ("adrc",),
+    )
+    assert 1.0 < flight_lead.low < flight_lead.times < flight_lead.high
+    assert flight_lead.times == pytest.approx(1.5, rel=0.02)
     unseen = flight.lead(values, sets, 100.0, FAMILIES)
     assert unseen is not None
     assert unseen.times == 1.0

@@ -134,8 +134,10 @@ def test_every_period_has_every_start():
         smc.plant("duffing"), fine, "twisting", (4e-3, 2e-3), (3, 5), "tuned", 1.5, None
     )
     runs = []
-    for one in setup.scenarios:
-        runs.append((one.seed, one.control_period, one.physics_step, one.duration))
+    for scenario in setup.scenarios:
+        runs.append(
+            (scenario.seed, scenario.control_period, scenario.physics_step, scenario.duration)
+        )
     steps = []
     for seed in (3, 5):
         for period in (4e-3, 2e-3):

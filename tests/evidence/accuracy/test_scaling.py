@@ -27,11 +27,11 @@ def measured(errors, theory=2.0):
 
 
 def test_a_power_law_has_its_exponent_whatever_the_factors_of_its_starts():
-    found = measured(np.array([[3.0], [0.2]]) * H**2)
-    assert (found.order, found.low, found.high) == pytest.approx((2.0, 2.0, 2.0))
-    assert found.used == PERIODS
-    assert found.why == ""
-    assert found.largest == pytest.approx(tuple(3.0 * H**2))
+    scaling_law = measured(np.array([[3.0], [0.2]]) * H**2)
+    assert (scaling_law.order, scaling_law.low, scaling_law.high) == pytest.approx((2.0, 2.0, 2.0))
+    assert scaling_law.used == PERIODS
+    assert scaling_law.why == ""
+    assert scaling_law.largest == pytest.approx(tuple(3.0 * H**2))
 
 
 def test_the_interval_covers_where_errors_and_slopes_scatter():
@@ -59,10 +59,10 @@ def test_rounding_failed_and_unsettled_periods_are_left_out_and_said():
     parts[1, 0] = math.inf
     parts[0, 1] = 9.5e-6, 6e-6, 3.9e-6
     parts[0, 4, 2] = 1e-13
-    found = scaling(parts, PERIODS, 2.0, 1e-12, ["1 of 10 runs failed"])
-    assert found.used == PERIODS[2:4]
-    assert found.order == pytest.approx(2.0)
-    assert found.why.split("; ") == [
+    scaling_law = scaling(parts, PERIODS, 2.0, 1e-12, ["1 of 10 runs failed"])
+    assert scaling_law.used == PERIODS[2:4]
+    assert scaling_law.order == pytest.approx(2.0)
+    assert scaling_law.why.split("; ") == [
         "1 of 10 runs failed",
         "at 0.25 ms up to 1e-12, which is rounding",
         "at 2 ms still falling at the end of the run",
@@ -87,9 +87,9 @@ def test_rounding_failed_and_unsettled_periods_are_left_out_and_said():
     ],
 )
 def test_an_order_that_is_not_the_promised_one_has_a_remark(errors, theory, why):
-    found = measured(errors, theory=theory).why
-    assert why in found
-    assert bool(why) == bool(found)
+    remark = measured(errors, theory=theory).why
+    assert why in remark
+    assert bool(why) == bool(remark)
 
 
 def test_its_explanation_has_the_numbers_of_the_code():

@@ -50,7 +50,7 @@ UNIVERSALS = {"11", "18", "19", "20", "24", "50", "59"}
 
 
 def test_a_check_holds_just_where_its_relation_does():
-    for relation, below, at, above in (
+    for relation, below, on_limit, above in (
         ("<", 1, 0, 0),
         ("<=", 1, 1, 0),
         (">", 0, 0, 1),
@@ -58,7 +58,7 @@ def test_a_check_holds_just_where_its_relation_does():
     ):
         assert [check("x", value, relation, 2.0).holds for value in (1.0, 2.0, 3.0)] == [
             below,
-            at,
+            on_limit,
             above,
         ]
 
@@ -120,7 +120,7 @@ def test_the_verdict_is_of_the_checks_alone(found, expected):
     assert verdict(found) == expected
 
 
-ABOUT = [one._replace(sentence="a") for one in (YES, NO)]
+ABOUT = [entry._replace(sentence="a") for entry in (YES, NO)]
 OTHER = YES._replace(what="other", sentence="b")
 
 
@@ -142,13 +142,13 @@ def test_a_sentence_holds_with_all_its_checks_and_an_existential_one_with_one(
 
 
 def test_one_counter_example_refutes_what_is_said_of_all_gains():
-    found = {"study": SUPPORTED, "tuned": REFUTED}
+    verdicts = {"study": SUPPORTED, "tuned": REFUTED}
     part = {"study": PARTLY, "tuned": REFUTED}
-    assert combined(found, UNIVERSAL)[0] == REFUTED
-    assert combined(found, EXISTENTIAL)[0] == SUPPORTED
-    assert combined(found, NAMED)[0] == PARTLY
+    assert combined(verdicts, UNIVERSAL)[0] == REFUTED
+    assert combined(verdicts, EXISTENTIAL)[0] == SUPPORTED
+    assert combined(verdicts, NAMED)[0] == PARTLY
     assert combined({"study": PARTLY, "tuned": SUPPORTED}, UNIVERSAL)[0] == PARTLY
-    assert combined(found, over="all")[0] == REFUTED
+    assert combined(verdicts, over="all")[0] == REFUTED
     assert (
         combined({"study": SUPPORTED, "tuned": NOT_SHOWN}, UNIVERSAL, over="some")[0] == SUPPORTED
     )
@@ -157,7 +157,7 @@ def test_one_counter_example_refutes_what_is_said_of_all_gains():
 
 
 def test_universal_claims_are_those_of_the_list():
-    assert {id for id, one in GABER.claims.items() if one.quantifier == UNIVERSAL} == UNIVERSALS
+    assert {id for id, entry in GABER.claims.items() if entry.quantifier == UNIVERSAL} == UNIVERSALS
 
 
 def entry(id="900", found=(YES,), note=""):
@@ -180,7 +180,7 @@ def only(monkeypatch):
     """A paper with the claims given alone."""
 
     def put(*entries):
-        short = dataclasses.replace(GABER, claims={one.id: one for one in entries})
+        short = dataclasses.replace(GABER, claims={entry.id: entry for entry in entries})
         monkeypatch.setattr(audit, "find_paper", lambda which: short)
 
     return put
@@ -188,13 +188,13 @@ def only(monkeypatch):
 
 def test_a_claim_says_what_it_depends_on(only):
     only(entry(found={"study": [YES, ASIDE], "tuned": [NO]}, note="Mind the gap."))
-    (one,) = claims(gains=["study", "tuned"])
-    assert (one.verdict, one.flips, one.verdicts) == (
+    (claim,) = claims(gains=["study", "tuned"])
+    assert (claim.verdict, claim.flips, claim.verdicts) == (
         PARTLY,
         True,
         {"study": SUPPORTED, "tuned": REFUTED},
     )
-    assert one.numbers["study"] == {
+    assert claim.numbers["study"] == {
         "yes": {
             "value": 1.0,
             "relation": "<",
@@ -203,10 +203,10 @@ def test_a_claim_says_what_it_depends_on(only):
             "sentence": "",
         }
     }
-    assert one.beside == {"study": {"theory": 7.0}, "tuned": {}}
-    assert one.note.startswith("Mind the gap. The verdict depends on the gains")
-    assert one.checks("tuned") == [NO]
-    assert one.decisive("tuned") == NO
+    assert claim.beside == {"study": {"theory": 7.0}, "tuned": {}}
+    assert claim.note.startswith("Mind the gap. The verdict depends on the gains")
+    assert claim.checks("tuned") == [NO]
+    assert claim.decisive("tuned") == NO
 
 
 @pytest.mark.parametrize(
@@ -254,10 +254,10 @@ def test_late_claims_come_last_and_every_one_is_reported(only):
         entry("1"), late=True, evidence=lambda runs: order.append("1") or [YES]
     )
     only(late, dataclasses.replace(entry("2"), evidence=lambda runs: order.append("2") or [YES]))
-    made = audit.audit(
+    report = audit.audit(
         gains=["study", "tuned"], report=lambda done, whole: reported.append((done, whole))
     )
-    assert [one.id for one in made.claims] == ["1", "2"]
+    assert [claim.id for claim in report.claims] == ["1", "2"]
     assert order == ["2", "1", "2", "1"]
     assert reported == [(done, 4) for done in range(1, 5)]
 
@@ -279,15 +279,15 @@ def short(runs, name="duffing", **changes):
 
 
 def test_a_run_is_made_once(runs, monkeypatch):
-    made = []
+    streamed = []
     stream = claim_runs.stream
     monkeypatch.setattr(
-        claim_runs, "stream", lambda some, threads: made.extend(some) or stream(some, threads)
+        claim_runs, "stream", lambda some, threads: streamed.extend(some) or stream(some, threads)
     )
     first = runs.scores([short(runs), short(runs), short(runs, seed=1)])
     assert first[0] == first[1]
     assert runs.scores([short(runs, seed=1), short(runs)]) == [first[2], first[0]]
-    assert len(made) == 2
+    assert len(streamed) == 2
 
 
 def test_a_run_that_fails_is_infinitely_bad_in_everything(runs):
@@ -315,7 +315,7 @@ def test_the_rows_of_a_table_stand_for_their_runs(runs):
         GABER, "study", table=claim_runs.of_table(SimpleNamespace(rows=lambda: [row]))
     )
     assert table.scores([scenario])[0]["itae"] == 1.5
-    assert [one.gains for one in table.results()] == [{"lam": 6.0}]
+    assert [run.gains for run in table.results()] == [{"lam": 6.0}]
 
 
 @pytest.mark.parametrize("condition", ["nominal", "noise", "jump_hard", "encoder"])
@@ -342,8 +342,8 @@ def test_a_mutant_stands_for_its_law_alone():
 
 def test_an_input_gain_multiplies_the_command_at_each_sample(runs):
     law = runs.law("duffing", OURS)
-    made = (law, *(variant(law, name) for name in ("reversed", "zero", "squeezed")))
-    traces = runs.traces([short(runs, law=one) for one in made])
+    variants = (law, *(variant(law, name) for name in ("reversed", "zero", "squeezed")))
+    traces = runs.traces([short(runs, law=law_variant) for law_variant in variants])
     for trace, gain in zip(
         traces,
         (lambda x: 1.0, lambda x: -1.0, lambda x: 0.0, lambda x: 1 / (1 + x**2)),
@@ -356,18 +356,22 @@ def test_an_input_gain_multiplies_the_command_at_each_sample(runs):
 
 def test_each_variant_of_each_law_has_its_own_file_in_numba_s_cache():
     laws = [smc.law(name) for name in ("classical", "pid")]
-    made = []
+    variants = []
     for law in laws:
         for name in VARIANTS:
-            made.append(variant(law, name))
-    assert len({getattr(variant.function, "__qualname__", "") for variant in made}) == len(made)
+            variants.append(variant(law, name))
+    assert len({getattr(variant.function, "__qualname__", "") for variant in variants}) == len(
+        variants
+    )
 
 
 def test_an_input_gain_multiplies_what_the_actuator_gives_and_not_what_the_law_asks_for(runs):
     strong = with_gains(runs.law("duffing", OURS), lam=26.0)  # of which 6 N come
     (trace,) = runs.traces([short(runs, law=variant(strong, "squeezed"))])
-    asked = -26.0 * np.tanh(trace.v + strong.gains["k1"] * trace.x)
-    np.testing.assert_allclose(trace.u, np.clip(asked, -6.0, 6.0) / (1.0 + trace.x**2), rtol=1e-12)
+    command = -26.0 * np.tanh(trace.v + strong.gains["k1"] * trace.x)
+    np.testing.assert_allclose(
+        trace.u, np.clip(command, -6.0, 6.0) / (1.0 + trace.x**2), rtol=1e-12
+    )
 
 
 # Lyapunov
@@ -439,10 +443,10 @@ def about(plants, **options):
 
 def test_the_smallest_lambda_found_is_that_of_the_sampled_linear_theory():
     runs = about(("inverted_pendulum", "duffing"))
-    for name, found in measured.smallest_stable(runs).items():
+    for name, smallest_lambda in measured.smallest_stable(runs).items():
         loop = runs.law(name, OURS).gains["k1"], measured.LONG_PERIOD
-        assert critical_delay(find_plant(name), found, *loop) > 0.0, name
-        assert critical_delay(find_plant(name), found / 1.02, *loop) == 0.0, name
+        assert critical_delay(find_plant(name), smallest_lambda, *loop) > 0.0, name
+        assert critical_delay(find_plant(name), smallest_lambda / 1.02, *loop) == 0.0, name
 
 
 def test_the_smallest_lambda_is_of_starts_near_rest_without_velocity(monkeypatch):
@@ -459,8 +463,8 @@ def test_the_smallest_lambda_is_of_starts_near_rest_without_velocity(monkeypatch
 @pytest.mark.slow
 def test_a_law_without_effect_stabilises_what_hangs_alone():
     runs = about(("duffing", "pendulum_network"), quick=True, substitute=substituted("zero"))
-    found = measured.smallest_stable(runs)
-    assert found == {"duffing": math.inf, "pendulum_network": measured.MIN_LAMBDA}
+    smallest = measured.smallest_stable(runs)
+    assert smallest == {"duffing": math.inf, "pendulum_network": measured.MIN_LAMBDA}
 
 
 # the audit

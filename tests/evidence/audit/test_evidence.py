@@ -95,13 +95,13 @@ def test_a_clean_process_writes_the_same_file_of_another_folder(done, folder, tm
     for file in folder.glob("*.*"):
         (copy / file.name).write_bytes(file.read_bytes().replace(b"\n", b"\r\n"))
     code = "import sys, smc_mujoco as smc; smc.audit(sys.argv[1], threads=1).save(sys.argv[2])"
-    there = tmp_path / "there.json"
+    elsewhere = tmp_path / "there.json"
     subprocess.run(
-        [sys.executable, "-c", code, str(copy), str(there)],
+        [sys.executable, "-c", code, str(copy), str(elsewhere)],
         check=True,
         cwd=Path(__file__).parents[3],
     )
-    assert here.read_bytes() == there.read_bytes()
+    assert here.read_bytes() == elsewhere.read_bytes()
 
 
 def test_a_claim_leads_to_its_runs_numbers_threshold_and_verdict(reported):
@@ -133,12 +133,12 @@ def test_it_holds_what_is_recorded(reported, snapshot):
     runs = sorted(
         reported["runs"].values(), key=lambda run: json.dumps([run["condition"], run["gains"]])
     )
-    lines = [f"claim {json.dumps(one)}" for one in reported["claims"]] + [
-        f"run {json.dumps(one)}" for one in runs
+    lines = [f"claim {json.dumps(item)}" for item in reported["claims"]] + [
+        f"run {json.dumps(item)}" for item in runs
     ]
     lines += [
-        f"{name} {json.dumps(one)}"
-        for name, one in reported.items()
+        f"{name} {json.dumps(item)}"
+        for name, item in reported.items()
         if name not in ("claims", "runs", "software")
     ]
     text = "\n".join([*lines, f"software {' '.join(reported['software'])}"])

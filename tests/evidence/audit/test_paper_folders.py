@@ -88,7 +88,7 @@ def test_a_threshold_decides(text, value, holds):
     first, *beside = Threshold.read("size", text).evidence({"": value})
     assert isinstance(first, Check)
     assert first.holds == holds
-    assert [one.value for one in beside] == (
+    assert [number.value for number in beside] == (
         [] if text[0] in "<>" else [pytest.approx(value, nan_ok=True)]
     )
 
@@ -97,9 +97,12 @@ def test_each_case_has_its_check():
     checks = list(
         Threshold.read("size", "2 +- 0.1", "first").evidence({"duffing": 2.0, "arm": 3.0})
     )
-    assert [type(one) for one in checks] == [Check, Beside] * 2
-    assert [one.what for one in checks if isinstance(one, Beside)] == ["duffing: size", "arm: size"]
-    assert {one.sentence for one in checks if isinstance(one, Check)} == {"first"}
+    assert [type(check) for check in checks] == [Check, Beside] * 2
+    assert [check.what for check in checks if isinstance(check, Beside)] == [
+        "duffing: size",
+        "arm: size",
+    ]
+    assert {check.sentence for check in checks if isinstance(check, Check)} == {"first"}
 
 
 # the template
@@ -108,18 +111,18 @@ def test_each_case_has_its_check():
 def test_the_template_runs_and_the_wrong_sign_loses_its_claims(tmp_path):
     written = new(tmp_path / "levant")
     assert [path.name for path in written] == [PAPER_FILE, CODE_FILE]
-    found = paper(tmp_path / "levant")
-    assert found.name == "levant"
-    assert list(found.claims) == ["1", "2"]
-    assert list(found.sets) == ["paper"]
-    first, second = claims(paper=found)
+    template = paper(tmp_path / "levant")
+    assert template.name == "levant"
+    assert list(template.claims) == ["1", "2"]
+    assert list(template.sets) == ["paper"]
+    first, second = claims(paper=template)
     assert [first.verdict, second.verdict] == ["yes", SUPPORTED]  # a question, and a sentence
     assert list(first.numbers["paper"]) == [
-        f"{plant}: ultimate bound / |x0|" for plant in found.claims["1"].plants
+        f"{plant}: ultimate bound / |x0|" for plant in template.claims["1"].plants
     ]
     assert list(second.numbers["paper"]) == ["exponent, distance from 2"]
     assert list(second.beside["paper"]) == ["exponent"] + [
-        f"{k}: largest |s|" for k in found.claims["2"].values["periods"]
+        f"{k}: largest |s|" for k in template.claims["2"].values["periods"]
     ]
     with pytest.raises(ScenarioError, match="is there already"):
         new(tmp_path / "levant")
@@ -144,9 +147,9 @@ def test_a_law_of_the_paper_has_the_gains_of_the_set_and_its_mutants(folder):
         OWN.format("soft")
         + "def small(runs):\n    return {'size': runs.law('duffing', 'soft').gains['k'] / 4.0}\n"
     )
-    (one,) = claims(paper=folder(data, code))
-    assert one.numbers["hard"]["size"]["value"] == 7.0 / 4.0
-    assert one.numbers["own"]["size"]["value"] == 1.0
+    (claim,) = claims(paper=folder(data, code))
+    assert claim.numbers["hard"]["size"]["value"] == 7.0 / 4.0
+    assert claim.numbers["own"]["size"]["value"] == 1.0
     mutants = ClaimRuns(
         paper(folder(data, code)), "own", substitute={"soft": lambda law: with_gains(law, k=12.0)}
     )
@@ -159,8 +162,8 @@ def test_laws_plants_and_conditions_are_the_paper_s_the_suite_s_or_written_out(f
         "{ k = 3.0 }\n"
     )
     code = OWN.format("soft") + "made = soft(k=5.0)\n" + SMALL
-    found = paper(folder("sets = ['paper', 'tuned', 'default']\n" + data, code))
-    gains = lambda *names: dict(found.law(*names).gains)  # noqa: E731
+    folder_paper = paper(folder("sets = ['paper', 'tuned', 'default']\n" + data, code))
+    gains = lambda *names: dict(folder_paper.law(*names).gains)  # noqa: E731
     assert gains("duffing", "soft", "tuned") == gains("duffing", "soft", "paper") == {"k": 5.0}
     assert gains("duffing", "fixed_time", "tuned") == gains("duffing", "fixed_time", "default")
     assert gains("duffing", "classical", "tuned") != gains("duffing", "classical", "default")
@@ -168,12 +171,12 @@ def test_laws_plants_and_conditions_are_the_paper_s_the_suite_s_or_written_out(f
         ScenarioError,
         match=r"the gains 'paper' of classical lack some.*write in .gains.paper. what.* c = ",
     ):
-        found.law("duffing", "classical", "paper")
-    assert found.plant("bent").parameters["beta"] == 0.75
-    assert found.plant("duffing").name == "duffing"
-    assert found.condition("noise").name == "noise"
-    assert found.condition("far: x0=0.25").on(found.plant("bent"), 1.0)["x0"] == 0.25
-    assert found.contents == "1 of its sentences; full text read"
+        folder_paper.law("duffing", "classical", "paper")
+    assert folder_paper.plant("bent").parameters["beta"] == 0.75
+    assert folder_paper.plant("duffing").name == "duffing"
+    assert folder_paper.condition("noise").name == "noise"
+    assert folder_paper.condition("far: x0=0.25").on(folder_paper.plant("bent"), 1.0)["x0"] == 0.25
+    assert folder_paper.contents == "1 of its sentences; full text read"
 
 
 def test_fields_are_the_paper_s_then_the_condition_s_the_claim_s_and_the_changes(folder):
@@ -182,17 +185,17 @@ def test_fields_are_the_paper_s_then_the_condition_s_the_claim_s_and_the_changes
         + MINIMAL
         + 'runs = "seed=3, u_max=3.0"\n'
     )
-    found = paper(folder(data + '[conditions]\nfar = "x0=0.2, u_max=2.0"'))
-    one = (
-        ClaimRuns(found, "default")
-        .of(found.claims["1"])
+    folder_paper = paper(folder(data + '[conditions]\nfar = "x0=0.2, u_max=2.0"'))
+    fields = (
+        ClaimRuns(folder_paper, "default")
+        .of(folder_paper.claims["1"])
         .scenario("duffing", "pid", "far", u_max=4.0)
     )
-    assert one.duration == 1.0
-    assert one.x0 == (0.2,)
-    assert one.seed == 3
-    assert one.u_max == 4.0
-    assert one.condition == "far"
+    assert fields.duration == 1.0
+    assert fields.x0 == (0.2,)
+    assert fields.seed == 3
+    assert fields.u_max == 4.0
+    assert fields.condition == "far"
 
 
 def test_claims_may_import_other_files_of_their_folder(folder):
@@ -200,8 +203,8 @@ def test_claims_may_import_other_files_of_their_folder(folder):
         MINIMAL, "from .shared import VALUE\ndef small(runs):\n    return {'size': VALUE * 1.5}\n"
     )
     (home / "shared.py").write_text("VALUE = 1.0\n")
-    (one,) = claims(paper=home)
-    assert one.numbers["default"]["size"]["value"] == 1.5
+    (claim,) = claims(paper=home)
+    assert claim.numbers["default"]["size"]["value"] == 1.5
     assert set(evidence.files(paper(home))) == {"paper.toml", "claims.py", "shared.py"}
 
 
@@ -289,18 +292,18 @@ def test_a_check_takes_its_limit_from_the_file_and_may_be_relative_to_a_run(fold
     )
     code = "def small(runs):\n    it = runs.check('size', 'it', 5, times=3.0)\n"
     code += "    return [it, runs.check('size', 'other', 3)]\n"
-    (one,) = claims(paper=folder(data, code))
-    assert one.holds_if == "small, or so"
-    assert one.numbers["default"]["it"]["limit"] == 6.0
-    assert one.numbers["default"]["other"]["limit"] == 2.0
-    assert {check.sentence for check in one.checks("default")} == {"small"}
-    assert [check.holds for check in one.checks("default")] == [True, False]
+    (claim,) = claims(paper=folder(data, code))
+    assert claim.holds_if == "small, or so"
+    assert claim.numbers["default"]["it"]["limit"] == 6.0
+    assert claim.numbers["default"]["other"]["limit"] == 2.0
+    assert {check.sentence for check in claim.checks("default")} == {"small"}
+    assert [check.holds for check in claim.checks("default")] == [True, False]
     with pytest.raises(ScenarioError, match="unknown threshold 'sise'"):
         claims(paper=folder(data, code.replace("'size',", "'sise',")))
 
 
 def test_an_edited_folder_is_read_again(folder):
     assert claims(paper=folder())[0].verdict == SUPPORTED
-    (one,) = claims(paper=folder(code=SMALL.replace("1.0", "7.0, 'also': {'a': 3}")))
-    assert one.verdict == REFUTED
-    assert one.beside == {"default": {"a: also": 3.0}}
+    (claim,) = claims(paper=folder(code=SMALL.replace("1.0", "7.0, 'also': {'a': 3}")))
+    assert claim.verdict == REFUTED
+    assert claim.beside == {"default": {"a: also": 3.0}}

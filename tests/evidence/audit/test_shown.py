@@ -41,7 +41,7 @@ def claim(id, evidence, **about):
 
 @pytest.fixture(scope="module")
 def claims():
-    both = [*EXPONENT.evidence({"": 2.0288, "late": 2.5}), *SHARE.evidence({"arm": 1.0})]
+    slow_evidence = [*EXPONENT.evidence({"": 2.0288, "late": 2.5}), *SHARE.evidence({"arm": 1.0})]
     return Claims(
         [
             claim("1", {"slow": [NEAR, BESIDE], "tuned": [NEAR]}),
@@ -59,7 +59,7 @@ def claims():
                 how="by (3)",
             ),
             claim("4", {"slow": [FAR], "tuned": [NEAR]}, quantifier=EXISTENTIAL),
-            claim("5", {"slow": both, "tuned": list(EXPONENT.evidence({"": 2.0}))}),
+            claim("5", {"slow": slow_evidence, "tuned": list(EXPONENT.evidence({"": 2.0}))}),
             claim("6", {"slow": [NEAR], "tuned": [NEAR._replace(sentence="a"), LOST]}, whose=OURS),
             claim("7", {"slow": [BESIDE], "tuned": []}, note="Nothing to see."),
         ]
@@ -113,18 +113,18 @@ VERDICTS = {  # of each claim: verdict, by gains, what decides by gains, slack o
 
 
 def test_an_audit_says_verdicts_what_decides_and_how_far_a_check_is_from_its_limit(claims):
-    for one in claims:
-        whole, slow, tuned, first, second, slack = VERDICTS[one.id]
-        assert one.verdict == whole
-        assert one.verdicts == {"slow": slow, "tuned": tuned}
-        assert one.flips == (slow != tuned)
-        assert first in str(one.decided("slow"))
-        assert second in str(one.decided("tuned"))
-        found = []
-        for gains in one.verdicts:
-            for each in one.checks(gains):
-                found.append(each.slack)
-        assert found == pytest.approx(slack, abs=1e-9)
+    for claim in claims:
+        verdict, slow, tuned, first, second, slack = VERDICTS[claim.id]
+        assert claim.verdict == verdict
+        assert claim.verdicts == {"slow": slow, "tuned": tuned}
+        assert claim.flips == (slow != tuned)
+        assert first in str(claim.decided("slow"))
+        assert second in str(claim.decided("tuned"))
+        slacks = []
+        for gains in claim.verdicts:
+            for audit_check in claim.checks(gains):
+                slacks.append(audit_check.slack)
+        assert slacks == pytest.approx(slack, abs=1e-9)
     assert re.findall("(.) ([0-9])", summary(claims)) == [*zip("●◐–○◧", "22111", strict=True)]
     assert re.findall("(.) ([0-9])", summary([])) == []
 
@@ -146,5 +146,5 @@ def test_a_comparison_is_printed_so_that_it_can_be_read(case):
 
 
 def test_a_number_outside_a_range_is_not_printed_as_its_end():
-    (one,) = [claim("1", {"slow": list(SHARE.evidence({"": 15.0004}))})]
-    assert one.decided("slow") == "share = 15.0004 (2 to 15 asked)"
+    (audited,) = [claim("1", {"slow": list(SHARE.evidence({"": 15.0004}))})]
+    assert audited.decided("slow") == "share = 15.0004 (2 to 15 asked)"

@@ -49,8 +49,8 @@ def written(tmp_path):
 
 
 def decided(folder):
-    (found,) = audit(folder).claims
-    return found.verdict, found.beside["paper"]
+    (claim,) = audit(folder).claims
+    return claim.verdict, claim.beside["paper"]
 
 
 def test_all_gains_are_refuted_by_one_that_the_theorem_allows_with_its_margin(written):
@@ -100,13 +100,13 @@ def test_gains_outside_the_conditions_are_no_counter_example(written):
 
 
 def test_some_gains_are_enough_on_each_plant_and_the_set_s_own_are_tried_first(written):
-    both = '["duffing", "van_der_pol"]'
+    two_plants = '["duffing", "van_der_pol"]'
     verdict, beside = decided(
         written(
             DATA.format(
                 over="some",
                 limit="> 3",
-                plants=both,
+                plants=two_plants,
                 margins="",
             )
         )
@@ -118,7 +118,7 @@ def test_some_gains_are_enough_on_each_plant_and_the_set_s_own_are_tried_first(w
             DATA.format(
                 over="some",
                 limit="> 1",
-                plants=both,
+                plants=two_plants,
                 margins="",
             )
         )
@@ -131,7 +131,7 @@ def test_some_gains_are_enough_on_each_plant_and_the_set_s_own_are_tried_first(w
                 DATA.format(
                     over="some",
                     limit="> 9",
-                    plants=both,
+                    plants=two_plants,
                     margins="",
                 )
             )
@@ -166,14 +166,14 @@ def test_a_set_of_rivals_gains_decides_by_a_search_and_other_sets_are_told_besid
     data = data.replace("[allowed", TWO_SETS.format() + "[allowed").replace(
         "over =", f'rivals = "{rivals}"\nover ='
     )
-    (found,) = audit(written(data)).claims
+    (claim,) = audit(written(data)).claims
     (beside,) = {"paper", "other"} - {rivals}
-    assert (found.verdict, found.flips, found.verdicts[beside]) == (verdict, True, "refuted")
+    assert (claim.verdict, claim.flips, claim.verdicts[beside]) == (verdict, True, "refuted")
     count = int(verdict == "supported")
-    assert over_gains([found]).startswith(f"Of the paper's {count} supported sentences 0 hold")
-    assert "sets of gains tried" not in found.beside[beside]
+    assert over_gains([claim]).startswith(f"Of the paper's {count} supported sentences 0 hold")
+    assert "sets of gains tried" not in claim.beside[beside]
     if verdict == "not shown":
-        assert found.beside[rivals]["sets of gains tried"] == 51
+        assert claim.beside[rivals]["sets of gains tried"] == 51
 
 
 def test_a_search_may_be_over_the_gains_of_another_law_than_the_first(written):
@@ -202,7 +202,7 @@ def test_the_gains_tried_are_halton_s_points_within_the_bounds_then_some_around_
     ]
     said = []
     for over, limit, quick in cases:
-        (found,) = audit(
+        (claim,) = audit(
             written(
                 DATA.format(
                     over=over,
@@ -214,7 +214,7 @@ def test_the_gains_tried_are_halton_s_points_within_the_bounds_then_some_around_
             quick=quick,
         ).claims
         numbers = []
-        for value in found.beside["paper"].values():
+        for value in claim.beside["paper"].values():
             numbers.append(f"{value:.9g}")
-        said += [f"{over} {limit} {'quick' * quick}: {found.verdict} {' '.join(numbers)}"]
+        said += [f"{over} {limit} {'quick' * quick}: {claim.verdict} {' '.join(numbers)}"]
     assert said == snapshot

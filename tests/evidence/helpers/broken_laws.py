@@ -46,7 +46,7 @@ def survivors(
         each mutant another.
     """
     audited = paper if isinstance(paper, Paper) else find_paper(paper)
-    kept = {entry.id: entry for entry in select_claims(audited, only) if not entry.immune}
+    claims = {entry.id: entry for entry in select_claims(audited, only) if not entry.immune}
     names = sets(audited, gains, quick)
 
     def measured(
@@ -69,18 +69,18 @@ def survivors(
 
     intact: dict[tuple[str, str], Evidence] = {}
     holding = set()  # claims of which some sentence holds under the law itself
-    for id, name, evidence in measured(kept.values(), "", ""):
+    for id, name, evidence in measured(claims.values(), "", ""):
         intact[id, name] = evidence or []
-        if any(sentences(intact[id, name], kept[id].quantifier).values()):
+        if any(sentences(intact[id, name], claims[id].quantifier).values()):
             holding.add(id)
     for done, mutant in enumerate(MUTANTS, 1):
         report(done, 1 + len(MUTANTS))
-        for law in sorted({first_law(entry) for entry in kept.values()}):
-            about = [entry for entry in kept.values() if first_law(entry) == law]
+        for law in sorted({first_law(entry) for entry in claims.values()}):
+            about = [entry for entry in claims.values() if first_law(entry) == law]
             for id, name, evidence in measured(about, law, mutant):
-                if id in kept and lost(kept[id], intact[id, name], evidence, id in holding):
-                    del kept[id]
-    return {id: KEPT if id in holding else BLIND for id in kept}
+                if id in claims and lost(claims[id], intact[id, name], evidence, id in holding):
+                    del claims[id]
+    return {id: KEPT if id in holding else BLIND for id in claims}
 
 
 def first_law(entry: ClaimEntry) -> str:

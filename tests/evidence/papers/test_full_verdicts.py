@@ -33,7 +33,10 @@ def known(name: str) -> Shown:
 
 def full(name: str) -> Shown:
     """Return what the page is to show of a paper."""
-    return {one.id: (one.verdict, decided(one), one.for_every_set) for one in audit(name).claims}
+    return {
+        claim.id: (claim.verdict, decided(claim), claim.for_every_set)
+        for claim in audit(name).claims
+    }
 
 
 def decided(claim: Claim) -> str:
@@ -77,16 +80,16 @@ def test_readme_counts_the_claims_of_gaber_s_paper():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PAPERS)
 def test_full_verdicts_are_those_of_the_page(name):
-    found = full(name)
-    shown = known(name)
-    assert [*found] == [*shown]
-    for id, (verdict, words, everywhere) in found.items():
-        reported, said, known_everywhere = shown[id]
+    audited = full(name)
+    on_page = known(name)
+    assert [*audited] == [*on_page]
+    for id, (verdict, words, everywhere) in audited.items():
+        reported, said, known_everywhere = on_page[id]
         assert everywhere == known_everywhere
         assert (verdict, NUMBER.split(words)) == (reported, NUMBER.split(said)), id
         numbers = []
         for text in (words, said):
-            numbers.append([float(one) for one in NUMBER.findall(text)])
+            numbers.append([float(figure) for figure in NUMBER.findall(text)])
         assert numbers[0] == pytest.approx(numbers[1], rel=0.05, abs=1e-8), id
 
 

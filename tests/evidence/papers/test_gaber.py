@@ -52,8 +52,8 @@ class Stub(ClaimRuns):
 
     def scores(self, scenarios):
         assert self.reported is not None
-        others = dict.fromkeys((m.name for m in metrics()), 0.0) | {"settling_time": 1.0}
-        return [others | self.reported(scenario) for scenario in scenarios]
+        metric_scores = dict.fromkeys((m.name for m in metrics()), 0.0) | {"settling_time": 1.0}
+        return [metric_scores | self.reported(scenario) for scenario in scenarios]
 
     def traces(self, scenarios):
         return [self.trace(scenario) for scenario in scenarios]
@@ -70,9 +70,9 @@ class Stub(ClaimRuns):
 def of(runs: ClaimRuns, id: str) -> list[Check]:
     """The checks of a claim, without what stands beside them."""
     return [
-        one
-        for one in measure(GABER.claims[id], runs.of(GABER.claims[id]))
-        if isinstance(one, Check)
+        check
+        for check in measure(GABER.claims[id], runs.of(GABER.claims[id]))
+        if isinstance(check, Check)
     ]
 
 
@@ -120,12 +120,12 @@ def drawn_by_lot(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
 
 def ends(values: list[float]) -> str:
     """Return a number, or the mean, the least and the largest of several."""
-    several = []
-    for one in (np.mean(values), np.min(values), np.max(values)):
-        several.append(f"{one:.4g}")
-    if several[1] == several[2]:
-        return several[0]
-    return "{} ({} to {})".format(*several)
+    texts = []
+    for value in (np.mean(values), np.min(values), np.max(values)):
+        texts.append(f"{value:.4g}")
+    if texts[1] == texts[2]:
+        return texts[0]
+    return "{} ({} to {})".format(*texts)
 
 
 @pytest.mark.slow
@@ -138,9 +138,9 @@ def test_the_evidence_of_runs_drawn_by_lot_is_the_recorded_one(snapshot, monkeyp
     monkeypatch.setitem(CODE, "nanoseconds", lambda laws: {law: 1.0 + len(law) for law in laws})
 
     def reported(s: Scenario) -> dict[str, float]:
-        found = lots(s, *(m.name for m in metrics()))
+        scores = lots(s, *(m.name for m in metrics()))
         small = 0.7 * TOLERATED_ERROR * max(map(abs, s.resolved.x0)) * (1.0 + 10.0 * s.input_delay)
-        return found | {"ultimate_bound": small * found["ultimate_bound"]}
+        return scores | {"ultimate_bound": small * scores["ultimate_bound"]}
 
     said = {}
     for id, quick in [(id, id == "18") for id in GABER.claims] + [
@@ -148,17 +148,17 @@ def test_the_evidence_of_runs_drawn_by_lot_is_the_recorded_one(snapshot, monkeyp
     ]:
         runs = Stub(reported, drawn_by_lot, quick=quick).of(GABER.claims[id])
         groups: dict[tuple[str, ...], list[Check | Beside]] = {}
-        for one in measure(GABER.claims[id], runs):
-            if isinstance(one, Check):
-                asked = (one.relation, one.sentence)
+        for check in measure(GABER.claims[id], runs):
+            if isinstance(check, Check):
+                criterion = (check.relation, check.sentence)
             else:
-                asked = ()
-            groups.setdefault((one.what.rpartition(": ")[2], *asked), []).append(one)
+                criterion = ()
+            groups.setdefault((check.what.rpartition(": ")[2], *criterion), []).append(check)
         numbers = []
-        for (_, *asked), several in groups.items():
-            limits = [one.limit for one in several if isinstance(one, Check)]
-            asks = f" {asked[0]} {ends(limits)}" if asked else ""
-            numbers.append(f"{ends([one.value for one in several])}{asks}, {len(several)}")
+        for (_, *criterion), checks in groups.items():
+            limits = [check.limit for check in checks if isinstance(check, Check)]
+            asks = f" {criterion[0]} {ends(limits)}" if criterion else ""
+            numbers.append(f"{ends([check.value for check in checks])}{asks}, {len(checks)}")
         said[f"{id}{', quick' * quick}"] = "; ".join(numbers)
     assert said == snapshot
 
@@ -181,10 +181,12 @@ def coupled(
     ours: tuple[float, float, float], classical: tuple[float, float, float], slower: float
 ) -> Told:
     """Overshoot at the three couplings."""
-    at = {0.0: 0, 0.5: 1, 5.0: 2}
+    column_of_coupling = {0.0: 0, 0.5: 1, 5.0: 2}
 
     def reported(s: Scenario) -> dict[str, float]:
-        over = {OURS: ours, CLASSICAL: classical}[s.law.name][at[s.plant.parameters["kc"]]]
+        over = {OURS: ours, CLASSICAL: classical}[s.law.name][
+            column_of_coupling[s.plant.parameters["kc"]]
+        ]
         return {"overshoot": over, "settling_time": slower if s.law.name == CLASSICAL else 1.0}
 
     return reported
@@ -366,7 +368,7 @@ def test_a_verdict_follows_the_scores_to_the_threshold(id):
         for which, reported, expected in SCORED
         if which == id
     ]
-    assert [found for found, _ in verdicts] == [expected for _, expected in verdicts]
+    assert [reached for reached, _ in verdicts] == [expected for _, expected in verdicts]
 
 
 def away(s: Scenario, share: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -412,7 +414,7 @@ def test_a_verdict_follows_the_traces_to_the_threshold(id):
         for which, drawn, expected in DRAWN
         if which == id
     ]
-    assert [found for found, _ in verdicts] == [expected for _, expected in verdicts]
+    assert [reached for reached, _ in verdicts] == [expected for _, expected in verdicts]
 
 
 @pytest.mark.parametrize(
@@ -513,9 +515,9 @@ def test_exponential_convergence_has_one_rate_at_all_distances(slowed, expected)
         far = s.resolved.x0[0] / s.plant.x0[0]
         return s.resolved.x0[0] * np.exp(-4.0 * (1.0 - slowed * far) * T), 0.0 * T
 
-    found = of(Stub(drawn=drawn), "57")
-    assert verdict(found, GABER.claims["57"].quantifier) == expected
-    assert [one.value for one in found[:2]] == pytest.approx([slowed, 2 * slowed], abs=0.02)
+    checks = of(Stub(drawn=drawn), "57")
+    assert verdict(checks, GABER.claims["57"].quantifier) == expected
+    assert [check.value for check in checks[:2]] == pytest.approx([slowed, 2 * slowed], abs=0.02)
 
 
 def test_the_decay_rate_of_an_exponential_is_its_own_and_of_an_oscillation_its_envelopes():
@@ -616,25 +618,25 @@ def test_the_cells_that_runs_decide_follow_them():
         (opposite, False),
     ):
         cells = []
-        for one in of(Stub(reported), "T"):
-            if one.what.startswith(rows):
-                cells.append(one)
+        for cell in of(Stub(reported), "T"):
+            if cell.what.startswith(rows):
+                cells.append(cell)
         assert len(cells) == 12
         fixed = set()
         for row in rows[:2]:
             fixed.add(f"{row}: classical (paper: --)")
-        assert {one.holds for one in cells if one.what.split(",")[0] not in fixed} == {expected}
-        assert {one.holds for one in cells if one.what.split(",")[0] in fixed} == {True}
+        assert {cell.holds for cell in cells if cell.what.split(",")[0] not in fixed} == {expected}
+        assert {cell.holds for cell in cells if cell.what.split(",")[0] in fixed} == {True}
         assert {
-            one.what.split(",")[0] for one in cells if one.what.endswith("cannot fail")
+            cell.what.split(",")[0] for cell in cells if cell.what.endswith("cannot fail")
         } == fixed
 
 
 def test_the_table_has_its_twenty_cells_with_the_papers_marks():
     """Rows as the paper prints them: classical, HOSMC, adaptive, proposed."""
     marks = []
-    for one in of(Stub(paper_like), "T"):
-        marks.append(one.what.partition("(paper: ")[2].partition(")")[0])
+    for cell in of(Stub(paper_like), "T"):
+        marks.append(cell.what.partition("(paper: ")[2].partition(")")[0])
     assert [" ".join(marks[row : row + 4]) for row in range(0, 20, 4)] == [
         "-- + + +",
         "+ -- -- +",
@@ -686,13 +688,13 @@ def test_real_runs_give_the_verdicts_of_the_first_gains():
     """Super-twisting swings the pendulum beyond upright, the paper's law Van der Pol, and noise
     stays small.
     """
-    found = {}
-    for one in claims(only=["29", "31", "45", "49"], gains="study"):
-        found[one.id] = one
-    assert {id: one.verdict for id, one in found.items()} == dict.fromkeys(
+    claims_by_id = {}
+    for claim in claims(only=["29", "31", "45", "49"], gains="study"):
+        claims_by_id[claim.id] = claim
+    assert {id: claim.verdict for id, claim in claims_by_id.items()} == dict.fromkeys(
         ("29", "31", "45", "49"), SUPPORTED
     )
-    (over,) = found["29"].checks("study")
+    (over,) = claims_by_id["29"].checks("study")
     run = smc.run(ClaimRuns(GABER, "study").scenario("inverted_pendulum", HOSMC))
     assert over.value == pytest.approx(-100 * run.x.min() / 0.5)
 

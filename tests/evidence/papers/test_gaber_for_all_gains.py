@@ -96,9 +96,9 @@ def test_printed_gains_meet_their_limit_in_mujoco(id, name):
         for threshold in entry.thresholds:
             checks += threshold.evidence(measured[threshold.measure])
     else:
-        checks = [one for one in measured if isinstance(one, Check)]
+        checks = [check for check in measured if isinstance(check, Check)]
     assert checks
-    assert [one for one in checks if not one.holds] == []
+    assert [check for check in checks if not check.holds] == []
 
 
 def test_each_limit_has_the_paper_s_words_or_is_ours_and_then_refutes_nothing():

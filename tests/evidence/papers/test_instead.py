@@ -45,8 +45,8 @@ def share(name):
     actuator.
     """
     gains = gain_sets.law(name, "observer_free").gains
-    given = np.minimum(gains["lam"] * np.tanh(gains["k1"] * X), U_MAX)
-    return 1.0 - (force(name) / given).max()
+    command = np.minimum(gains["lam"] * np.tanh(gains["k1"] * X), U_MAX)
+    return 1.0 - (force(name) / command).max()
 
 
 def slope(name):
@@ -70,8 +70,8 @@ def test_the_theorem_is_not_about_van_der_pol():
 
 def test_each_claim_that_does_not_hold_has_a_sentence_and_where_it_is_shown():
     lost = []
-    for id, its in VERDICTS.items():
-        if its["verdict"] != "supported":
+    for id, claim in VERDICTS.items():
+        if claim["verdict"] != "supported":
             lost.append(id)
     assert len(lost) > 20
     for id in lost:

@@ -13,13 +13,21 @@ from smc_mujoco.evidence.audit.paper import paper, shipped
 def test_every_claim_says_what_where_how_and_whose(name):
     about = paper(name)
     assert all((about.title, about.authors, about.source, about.read))
-    for one in about.claims.values():
+    for claim in about.claims.values():
         assert all(
-            (one.text, one.where, one.measured, one.holds_if, one.laws, one.whose, one.read)
-        ), one.id
-        assert one.evidence.__doc__, one.id
-        assert one.whose == "paper" or one.how, one.id
-        assert one.plants or one.varies, one.id
+            (
+                claim.text,
+                claim.where,
+                claim.measured,
+                claim.holds_if,
+                claim.laws,
+                claim.whose,
+                claim.read,
+            )
+        ), claim.id
+        assert claim.evidence.__doc__, claim.id
+        assert claim.whose == "paper" or claim.how, claim.id
+        assert claim.plants or claim.varies, claim.id
 
 
 @pytest.mark.slow

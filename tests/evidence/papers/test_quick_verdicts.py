@@ -51,14 +51,14 @@ def quick_verdicts(name: str, only: list[str] | None = None) -> dict[str, Record
     """Return claim -> record of a quick audit, without timings; check whose runs it used."""
     # the verdicts are those of two, in less time
     with mock.patch.object(gain_search, "QUICK_SPREAD_SETS", 1):
-        found = audit(name, only, GAINS.get(name), quick=True)
-    for id, sets in found.used.items():
-        check_runs(name, id, [one.scenario for used in sets.values() for one in used.values()])
-    kept = []
-    for one in found.claims:
-        if (name, one.id) not in TIMINGS:
-            kept.append(one)
-    return {one.id: record(one, paper(name).claims[one.id].late) for one in kept}
+        report = audit(name, only, GAINS.get(name), quick=True)
+    for id, sets in report.used.items():
+        check_runs(name, id, [run.scenario for used in sets.values() for run in used.values()])
+    untimed = []
+    for claim in report.claims:
+        if (name, claim.id) not in TIMINGS:
+            untimed.append(claim)
+    return {claim.id: record(claim, paper(name).claims[claim.id].late) for claim in untimed}
 
 
 def record(claim: Claim, late: bool) -> Record:
@@ -69,10 +69,10 @@ def record(claim: Claim, late: bool) -> Record:
     """
     numbers = {}
     for gains in claim.verdicts:
-        for one in claim.checks(gains):
+        for check in claim.checks(gains):
             numbers |= {
-                f"{gains}: {one.what}": one.value,
-                f"{gains}: {one.what} {one.relation}": one.limit,
+                f"{gains}: {check.what}": check.value,
+                f"{gains}: {check.what} {check.relation}": check.limit,
             }
         numbers |= {
             f"{gains}: {what}": value for what, value in claim.beside[gains].items() if not late
@@ -89,22 +89,26 @@ def agrees(value: float, known: float | list[float]) -> bool:
 
 def check_golden(found: dict[str, Record], known: dict[str, Record]) -> None:
     """Fail unless claims, verdicts, what was measured and its numbers are those of a golden."""
-    assert {id: one | {"numbers": [*one["numbers"]]} for id, one in found.items()} == {
-        id: one | {"numbers": [*one["numbers"]]} for id, one in known.items()
+    assert {
+        id: claim_record | {"numbers": [*claim_record["numbers"]]}
+        for id, claim_record in found.items()
+    } == {
+        id: claim_record | {"numbers": [*claim_record["numbers"]]}
+        for id, claim_record in known.items()
     }
-    other = {}
-    for id, one in found.items():
-        for what, value in one["numbers"].items():
+    differing = {}
+    for id, claim_record in found.items():
+        for what, value in claim_record["numbers"].items():
             if not agrees(value, known[id]["numbers"][what]):
-                other[(id, what)] = (value, known[id]["numbers"][what])
-    assert other == {}
+                differing[(id, what)] = (value, known[id]["numbers"][what])
+    assert differing == {}
 
 
 def check_runs(name: str, id: str, scenarios: list[Scenario]) -> None:
     """Runs are of the plants and laws that the claim names."""
     about = paper(name)
     entry = paper(name).claims[id]
-    plants = {about.plant(one).name for one in entry.plants}
+    plants = {about.plant(plant_name).name for plant_name in entry.plants}
     laws = {*entry.laws, *(law + variant for law in entry.laws for variant in VARIANTS)}
     assert {scenario.plant.name for scenario in scenarios} <= plants, id
     assert {scenario.law.name for scenario in scenarios} <= laws, id
@@ -113,7 +117,7 @@ def check_runs(name: str, id: str, scenarios: list[Scenario]) -> None:
 @contextlib.contextmanager
 def runs_made_once(nudge: float = 0.0) -> Iterator[None]:
     """Simulate each run once, as claims share a third of all steps; move its start by a little."""
-    made = {}
+    trace_of_key = {}
     stream = claim_runs.stream
 
     def kept(scenarios, threads):
@@ -121,15 +125,15 @@ def runs_made_once(nudge: float = 0.0) -> Iterator[None]:
         new = {
             name: scenario
             for name, scenario in zip(keys, scenarios, strict=True)
-            if name not in made
+            if name not in trace_of_key
         }
         for i, trace in stream([moved(scenario, nudge) for scenario in new.values()], threads):
             name = list(new)[i]
             if nudge:
-                made[name] = dataclasses.replace(trace, scenario=new[name])
+                trace_of_key[name] = dataclasses.replace(trace, scenario=new[name])
             else:
-                made[name] = trace
-        return ((i, made[name]) for i, name in enumerate(keys))
+                trace_of_key[name] = trace
+        return ((i, trace_of_key[name]) for i, name in enumerate(keys))
 
     claim_runs.stream = kept
     try:
@@ -144,7 +148,9 @@ def moved(scenario: Scenario, nudge: float) -> Scenario:
         return scenario
     start = {}
     for name in ("x0", "v0"):
-        start[name] = tuple(one * (1.0 + nudge) + nudge for one in getattr(scenario.resolved, name))
+        start[name] = tuple(
+            component * (1.0 + nudge) + nudge for component in getattr(scenario.resolved, name)
+        )
     return dataclasses.replace(scenario, **start)
 
 
@@ -191,24 +197,27 @@ def written(name: str) -> dict[str, Record]:
         with runs_made_once(nudge):
             audits.append(quick_verdicts(name))
     first = audits[0]
-    for id, one in first.items():
-        for what in one["numbers"]:
-            one["numbers"][what] = spread([other[id]["numbers"][what] for other in audits])
+    for id, claim_record in first.items():
+        for what in claim_record["numbers"]:
+            claim_record["numbers"][what] = spread(
+                [audited[id]["numbers"][what] for audited in audits]
+            )
     return first
 
 
 if __name__ == "__main__":
     if GOLDEN.exists():
-        known = json.loads(GOLDEN.read_text(encoding="utf-8"))
+        verdicts_by_paper = json.loads(GOLDEN.read_text(encoding="utf-8"))
     else:
-        known = {}
-    known |= {name: written(name) for name in sys.argv[1:] or shipped()}
+        verdicts_by_paper = {}
+    verdicts_by_paper |= {name: written(name) for name in sys.argv[1:] or shipped()}
     reported = {
         name: ",\n".join(
-            f"  {json.dumps(id)}: {json.dumps(one)}" for id, one in known[name].items()
+            f"  {json.dumps(id)}: {json.dumps(claim_record)}"
+            for id, claim_record in verdicts_by_paper[name].items()
         )
         for name in shipped()
-        if name in known
+        if name in verdicts_by_paper
     }
     lines = (f" {json.dumps(name)}: {{\n{claims}\n }}" for name, claims in reported.items())
     GOLDEN.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")

@@ -32,10 +32,10 @@ PAPERS = [name for name in shipped() if name != "gaber"]
 def test_at_least_five_papers_ship_with_4_to_12_claims_each():
     assert len(PAPERS) >= 5
     for name in PAPERS:
-        found = paper(name)
-        assert 4 <= len(found.claims) <= 12, name
-        assert found.access, name
-        for claim in found.claims.values():
+        shipped_paper = paper(name)
+        assert 4 <= len(shipped_paper.claims) <= 12, name
+        assert shipped_paper.access, name
+        for claim in shipped_paper.claims.values():
             assert claim.where, name
             assert claim.thresholds, name
 
@@ -100,7 +100,7 @@ def test_the_least_bound_of_fixed_time_is_the_integral():
         (1.0, 2.0, 0.5, 2.0),
         (3.0, 1.0, 0.3, 1.5),
     ):
-        made = law(
+        fixed_time = law(
             "fixed_time",
             k1=k1,
             k2=k2,
@@ -115,8 +115,8 @@ def test_the_least_bound_of_fixed_time_is_the_integral():
             80.0,
             limit=400,
         )
-        assert least_bound(made) == pytest.approx(integral, rel=1e-6)
-        assert classical_bound(made) > integral
+        assert least_bound(fixed_time) == pytest.approx(integral, rel=1e-6)
+        assert classical_bound(fixed_time) > integral
     # at the end of what the general formula is for
     without = {
         "A": 1.0,
@@ -209,9 +209,9 @@ def test_the_observer_of_equation_60_solves_its_equation_and_predicts_a_period_a
         )
     )
     position = velocity = 1.0
-    for x, u, shown in zip(trace.x[:-1, 0], trace.u[:-1, 0], trace.s[:-1, 0], strict=True):
+    for x, u, surface_value in zip(trace.x[:-1, 0], trace.u[:-1, 0], trace.s[:-1, 0], strict=True):
         b = x - position
-        assert shown == pytest.approx(b, abs=1e-9)
+        assert surface_value == pytest.approx(b, abs=1e-9)
         sign = b / (h * h * k3)
         error = 0.0
         if abs(sign) > 1.0:
@@ -232,14 +232,14 @@ def test_the_observer_of_equation_60_solves_its_equation_and_predicts_a_period_a
 def test_a_paper_s_own_laws_are_those_recorded(snapshot):
     said = {}
     for name in PAPERS:
-        for law, one in paper(name).laws.items():
-            if isinstance(one, Template) and f"paper_{name}" in one.function.__module__:
+        for law, template in paper(name).laws.items():
+            if isinstance(template, Template) and f"paper_{name}" in template.function.__module__:
                 gains = ", ".join(
-                    f"{gain} = {its.default:g}{' > 0' * its.positive}"
-                    for gain, its in one.gains.items()
+                    f"{gain} = {gain_range.default:g}{' > 0' * gain_range.positive}"
+                    for gain, gain_range in template.gains.items()
                 )
                 said[f"{name} {law}"] = (
-                    f"{gains}; memory {one.memory}, relative degree {one.relative_degree}"
+                    f"{gains}; memory {template.memory}, relative degree {template.relative_degree}"
                 )
     assert said == snapshot
 

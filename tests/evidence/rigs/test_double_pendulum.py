@@ -73,8 +73,8 @@ def test_noise_of_the_encoders_does_not_make_a_link_lighter(swung):
     noisy = record | {
         f"pos_meas{i}": record[f"pos_meas{i}"] + rng.normal(0.0, 1e-3, 2001) for i in (1, 2)
     }
-    found = smc.identify(rig, noisy, ("r2", "I2"), starts=1)
-    assert found.values["I2"] == pytest.approx(rig.values["I2"], rel=0.05)
+    identified = smc.identify(rig, noisy, ("r2", "I2"), starts=1)
+    assert identified.values["I2"] == pytest.approx(rig.values["I2"], rel=0.05)
 
 
 def test_the_published_dry_friction_is_what_its_arctangent_reaches():
@@ -107,12 +107,12 @@ def test_torques_of_unused_records_are_as_far_off_as_the_page_tells(known):
     reported = np.array(re.findall(r"(\.\d{3}) / (\.\d{3})", text), float).reshape(2, 3, 2)
     for rig, rows in zip((RIG, RIG.set("model_1_0")), reported, strict=True):
         for name, row in zip(UNUSED[:3], rows, strict=True):
-            found = np.sqrt(np.mean(apart(rig, known[name]) ** 2, axis=1))
-            np.testing.assert_allclose(found, row, rtol=0.0, atol=6e-4)
+            errors = np.sqrt(np.mean(apart(rig, known[name]) ** 2, axis=1))
+            np.testing.assert_allclose(errors, row, rtol=0.0, atol=6e-4)
 
 
 @pytest.mark.slow
 def test_the_numbers_are_those_that_the_records_give(known):
-    found = smc.identify(RIG, [known[name] for name in TRAIN], starts=1, most=3)
+    identified = smc.identify(RIG, [known[name] for name in TRAIN], starts=1, most=3)
     for name in ("r1", "r2", "I1", "I2", "cf1", "cf2"):
-        assert found.values[name] == pytest.approx(RIG.values[name], rel=0.01)
+        assert identified.values[name] == pytest.approx(RIG.values[name], rel=0.01)

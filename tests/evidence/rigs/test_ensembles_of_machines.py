@@ -75,7 +75,7 @@ def test_laws_are_tuned_on_every_set_of_the_machine_by_one_rule():
         assert len(cases) == count
         assert {case.limits for case in cases} == {rig.scenario("none").limits}
         assert [case.plant for case in cases] == [
-            one.scenario("none").plant for one in rig.members().values()
+            member.scenario("none").plant for member in rig.members().values()
         ]
     goal = ensemble.objective(smc.rig("qube_servo"))
     boxes = {
@@ -94,21 +94,21 @@ def test_runs_take_the_gains_of_the_searches_in_turn_and_firmware_keeps_its_own(
     two = []
     for k in (300.0, 600.0):
         two.append(dataclasses.replace(regulator, gains=dict(regulator.gains) | {"k": k}))
-    found = ensemble.Candidate(two[1], tuple(two))
+    candidate = ensemble.Candidate(two[1], tuple(two))
     (linear,) = ensemble.tuned(rig, ["linear"], searches=1, budget=1)
     assert linear.sets == (rig.laws[0],)
     assert linear.remark == "not tuned: law 'linear' has no gain to tune: choose another"
     runs = []
-    for one in ensemble.runs(rig, [found, linear], seeds=3, duration=0.5):
-        if one.condition == "set 2":
-            runs.append(one)
-    assert [one.law.gains["k"] for one in runs if one.law.name == "regulator"] == [
+    for scenario in ensemble.runs(rig, [candidate, linear], seeds=3, duration=0.5):
+        if scenario.condition == "set 2":
+            runs.append(scenario)
+    assert [scenario.law.gains["k"] for scenario in runs if scenario.law.name == "regulator"] == [
         300.0,
         600.0,
         300.0,
     ]
     # are alike
-    assert {one.law.name: one.limits[0] for one in runs} == {
+    assert {scenario.law.name: scenario.limits[0] for scenario in runs} == {
         "regulator": math.inf,
         "linear": math.inf,
     }

@@ -41,19 +41,21 @@ def reported(value):
         case Component():
             text = f"{value.name} {reported(value.gains)}, {value.source}"
         case Mapping():
-            text = "{" + ", ".join(f"{name}: {reported(one)}" for name, one in value.items()) + "}"
+            text = (
+                "{" + ", ".join(f"{name}: {reported(part)}" for name, part in value.items()) + "}"
+            )
         case tuple():
             text = f"({', '.join(map(reported, value))})"
         case float():
             text = f"{value:.9g}"
         case _ if dataclasses.is_dataclass(value):
-            given = {}
-            for one in dataclasses.fields(value):
-                given[one.name] = getattr(value, one.name)
-            plain = {one.name: one.default for one in dataclasses.fields(value)}
+            parts = {}
+            for field in dataclasses.fields(value):
+                parts[field.name] = getattr(value, field.name)
+            plain = {field.name: field.default for field in dataclasses.fields(value)}
             text = (
                 f"{type(value).__name__} "
-                f"{reported({name: one for name, one in given.items() if one is not plain[name]})}"
+                f"{reported({key: part for key, part in parts.items() if part is not plain[key]})}"
             )
         case _:
             text = "a function" if callable(value) else str(value)
@@ -65,9 +67,9 @@ def lines(rig):
     scenarios.
     """
     sources: dict[str, list[str]] = {}
-    for name, one in rig.quantities.items():
-        sources.setdefault(one.source, []).append(f"{name} {reported(one)}")
-    yield from (f"{source}: {'; '.join(known)}" for source, known in sources.items())
+    for name, quantity in rig.quantities.items():
+        sources.setdefault(quantity.source, []).append(f"{name} {reported(quantity)}")
+    yield from (f"{source}: {'; '.join(quantities)}" for source, quantities in sources.items())
     for field in dataclasses.fields(PublishedRig):
         value = getattr(rig, field.name)
         if field.name not in ("quantities", "machine") and value:
@@ -75,8 +77,9 @@ def lines(rig):
                 parts = value
             else:
                 parts = (value,)
-            yield from (f"{field.name}: {reported(one)}" for one in parts)
-    yield f"scenario {'; '.join(f'{name}: {reported(one)}' for name, one in machine(rig).items())}"
+            yield from (f"{field.name}: {reported(part)}" for part in parts)
+    parts = (f"{name}: {reported(part)}" for name, part in machine(rig).items())
+    yield f"scenario {'; '.join(parts)}"
     if rig.dynamics:
         yield f"dynamics: {reported(rig.dynamics(Values(**rig.values)))}"
 
@@ -95,10 +98,10 @@ def test_each_quantity_changes_the_machine(name):
     """From values where no term is 0."""
     rig = smc.rig(name)
     ends = {
-        key: np.clip([one.value, 2 * one.value, 0.01], one.least, one.most)
-        for key, one in rig.quantities.items()
+        key: np.clip([quantity.value, 2 * quantity.value, 0.01], quantity.least, quantity.most)
+        for key, quantity in rig.quantities.items()
     }
-    rig = rig.with_values({key: float(one[1] or one[2]) for key, one in ends.items()})
+    rig = rig.with_values({key: float(clipped[1] or clipped[2]) for key, clipped in ends.items()})
     for key in rig.quantities:
-        other = rig.with_values({key: 0.5 * rig.values[key]})
-        assert reported(machine(other)) != reported(machine(rig)), key
+        halved = rig.with_values({key: 0.5 * rig.values[key]})
+        assert reported(machine(halved)) != reported(machine(rig)), key

@@ -91,15 +91,15 @@ def test_parts_of_records_have_the_brushes_of_the_whole_but_for_those_that_the_d
     """
     values = Values(**RIG.values)
     off = []
-    for record, whole in brushes:
+    for record, angle_of_record in brushes:
         ends = np.linspace(round(START_TIME / PERIOD), len(record["t"]), parts + 1).astype(int)
         for first, last in itertools.pairwise(ends):
             part = {}
             for name, column in record.items():
                 part[name] = column[first - ends[0] : last]
             off += [
-                (found - whole + PITCH / 2) % PITCH - PITCH / 2
-                for found in zero(values, part).values()
+                (angle_of_part - angle_of_record + PITCH / 2) % PITCH - PITCH / 2
+                for angle_of_part in zero(values, part).values()
             ]
     assert len(off) == read
     assert np.sum(np.abs(off) > PITCH / 16) == wrong
@@ -121,5 +121,5 @@ def test_a_brush_is_read_from_a_run_and_is_unknown_if_the_torque_is_even(brush, 
         "alpha": trace.x[:, 1],
         "plant_input": trace.u[:, 0],
     }
-    found = zero(Values(**RIG.values), measured)
-    assert found == ({"brush": pytest.approx(brush, abs=np.radians(1.0))} if brush else {})
+    offsets = zero(Values(**RIG.values), measured)
+    assert offsets == ({"brush": pytest.approx(brush, abs=np.radians(1.0))} if brush else {})

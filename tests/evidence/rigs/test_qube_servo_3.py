@@ -67,7 +67,7 @@ def test_a_motor_that_brakes_damps_falls_more():
     a = []
     for volts in (None, 0.0):
         a.append(np.abs(moved(rig, volts, np.radians(25.0), 0.6)[2]))
-    late = [one[200:].max() for one in a]
+    late = [angles[200:].max() for angles in a]
     assert late[1] < 0.9 * late[0]
 
 
@@ -75,7 +75,7 @@ def test_each_quantity_that_was_found_is_needed():
     """Halved, each spoils the step or the falls."""
     rig = smc.rig("qube_servo_3")
     for name in rig.free:
-        other = rig.with_values({name: 0.5 * rig.values[name]})
-        frequency, damping = falls(other)
+        halved = rig.with_values({name: 0.5 * rig.values[name]})
+        frequency, damping = falls(halved)
         apart = abs(frequency / FREQUENCY - 1.0), abs(damping / DAMPING - 1.0)
-        assert step_error(other) > 0.02 or apart[0] > 0.02 or apart[1] > 0.06, name
+        assert step_error(halved) > 0.02 or apart[0] > 0.02 or apart[1] > 0.06, name

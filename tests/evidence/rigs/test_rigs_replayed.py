@@ -51,14 +51,14 @@ def record():
 
 def test_every_number_has_a_source_and_its_licence():
     for name in smc.rigs():
-        for quantity, known in smc.rig(name).quantities.items():
-            assert len(known.source) > 5, (name, quantity)
-            if not known.source.startswith(("identified here", "chosen", "part of")):
-                assert re.search(r"\((MIT|BSD-3|no licence stated)\)", known.source), (
+        for quantity, number in smc.rig(name).quantities.items():
+            assert len(number.source) > 5, (name, quantity)
+            if not number.source.startswith(("identified here", "chosen", "part of")):
+                assert re.search(r"\((MIT|BSD-3|no licence stated)\)", number.source), (
                     name,
                     quantity,
                 )
-            assert known.least <= known.value <= known.most, (name, quantity)
+            assert number.least <= number.value <= number.most, (name, quantity)
 
 
 @pytest.mark.parametrize("name", smc.rigs())
@@ -96,9 +96,9 @@ def test_a_quanser_motor_pushes_and_brakes_as_published(name, stall, brake):
 
 
 def test_a_changed_quantity_changes_the_machine_and_its_source():
-    other = smc.rig("qube_servo", arm_length=0.1)
-    assert other.scenario("none").plant.parameters["L"] == 0.1
-    assert other.quantities["arm_length"].source == "given"
+    shorter = smc.rig("qube_servo", arm_length=0.1)
+    assert shorter.scenario("none").plant.parameters["L"] == 0.1
+    assert shorter.quantities["arm_length"].source == "given"
     assert QUBE.scenario("none").plant.parameters["L"] != 0.1
 
 

@@ -40,7 +40,7 @@ LAYER = {
 
 @pytest.mark.parametrize("kind", LAYER)
 def test_a_law_is_within_its_layer_the_linear_law_that_was_read(kind):
-    at = {
+    linearised_at = {
         "ALPHA": 0.6,
         "ALPHA_RATE": 2.0,
         "THETA": 1.0,
@@ -52,8 +52,11 @@ def test_a_law_is_within_its_layer_the_linear_law_that_was_read(kind):
         return firmware.acceleration(kind, moved["ALPHA"], memory(**moved), 1.0, 0.0)[0] / STEPS
 
     slopes = []
-    for name, value in at.items():
-        slopes.append((of(**at | {name: value + h}) - of(**at | {name: value - h})) / (2.0 * h))
+    for name, value in linearised_at.items():
+        slopes.append(
+            (of(**linearised_at | {name: value + h}) - of(**linearised_at | {name: value - h}))
+            / (2.0 * h)
+        )
     assert slopes == pytest.approx(LAYER[kind], abs=0.1)
 
 
@@ -110,9 +113,9 @@ def test_the_compiled_run_is_that_of_the_reference_loop(law):
         "seed": 3,
         "duration": 2.5,
     } | {"reference": smc.Step(0.2, 1.0)}
-    one = smc.rig("stepper_furuta").scenario(law, **fields)
-    trace = smc.run(one)
-    assert_same(trace, reference.run(one))
+    scenario = smc.rig("stepper_furuta").scenario(law, **fields)
+    trace = smc.run(scenario)
+    assert_same(trace, reference.run(scenario))
     assert np.abs(trace.x[-200:, 1]).max() < 0.2  # it stands
     assert np.ptp(trace.x[:, 0]) > 0.02  # and moves
 
@@ -123,13 +126,13 @@ def test_no_run_falls_before_its_law_acts(name):
     rig = smc.rig("stepper_furuta")
     twin = rig.set(name) if name in rig.published else rig.members()[name]
     for law in rig.laws[:3]:
-        one = twin.scenario(
+        scenario = twin.scenario(
             law,
             x0=reported.start(8),
             seed=8,
             duration=0.1,
         )
-        assert np.abs(smc.run(one).u[:, 0]).max() > 0.0
+        assert np.abs(smc.run(scenario).u[:, 0]).max() > 0.0
 
 
 def test_a_machine_that_tips_stops_its_motor():
@@ -159,20 +162,20 @@ def test_the_figures_of_known_signals_are_theirs():
     """
     w = 2.0 * math.pi * 50.0 * 26.0 / 256.0
     lag = math.radians(80.0)
-    found = reported.figures(
+    figures = reported.figures(
         record(
             lambda t: 2.0 * np.sin(w * t),
             lambda t: -np.sin(w * t),
             lambda t: STEPS / 1.2 * w * -np.cos(w * t + lag),
         )
     )
-    assert found["alpha_rms"] == pytest.approx(math.sqrt(2.0), rel=1e-3)
-    assert found["centroid"] == pytest.approx(50.0 * 26.0 / 256.0, abs=0.02)
-    assert found["ratio"] == pytest.approx(2.0, rel=1e-6)
-    assert found["phase"] == pytest.approx(-180.0, abs=1e-6)
-    assert found["gain"] == pytest.approx(1.2, rel=1e-3)
-    assert found["lag"] == pytest.approx(-80.0, abs=0.1)
-    assert found["acceleration_rms"] == 10.0
+    assert figures["alpha_rms"] == pytest.approx(math.sqrt(2.0), rel=1e-3)
+    assert figures["centroid"] == pytest.approx(50.0 * 26.0 / 256.0, abs=0.02)
+    assert figures["ratio"] == pytest.approx(2.0, rel=1e-6)
+    assert figures["phase"] == pytest.approx(-180.0, abs=1e-6)
+    assert figures["gain"] == pytest.approx(1.2, rel=1e-3)
+    assert figures["lag"] == pytest.approx(-80.0, abs=0.1)
+    assert figures["acceleration_rms"] == 10.0
 
 
 def test_rests_count_from_a_fifth_of_a_second():
@@ -182,10 +185,10 @@ def test_rests_count_from_a_fifth_of_a_second():
         phase = np.round(t / 0.02) % 32
         return np.where((phase < 5) | ((phase >= 12) & (phase < 17)), 60.0, 49.0)
 
-    found = reported.figures(record(speed=speed, duration=67.0))
-    assert found["running"] == pytest.approx(10 / 32, abs=0.01)
-    assert found["resting"] == pytest.approx(15 / 32, abs=0.01)
-    assert found["starts"] == pytest.approx(60.0 * 2 / 0.64, rel=0.02)
+    figures = reported.figures(record(speed=speed, duration=67.0))
+    assert figures["running"] == pytest.approx(10 / 32, abs=0.01)
+    assert figures["resting"] == pytest.approx(15 / 32, abs=0.01)
+    assert figures["starts"] == pytest.approx(60.0 * 2 / 0.64, rel=0.02)
 
 
 def test_seconds_count_about_their_mean_and_rests_by_their_angle():
@@ -194,13 +197,13 @@ def test_seconds_count_about_their_mean_and_rests_by_their_angle():
     def alpha(t):
         return np.where(t < 43.0, 2.0, np.where(t < 63.0, -4.0, 9.0 * np.sin(math.tau * t)))
 
-    found = reported.figures(
+    figures = reported.figures(
         record(alpha=alpha, speed=lambda t: np.where(t < 63.0, 0.0, 60.0), duration=73.0)
     )
-    assert found["second_50"] == pytest.approx(0.0, abs=1e-9)
-    assert found["second_90"] == pytest.approx(9.0 / math.sqrt(2.0), rel=1e-3)
-    assert found["resting_50"] == 2.0
-    assert found["resting_90"] == 4.0
+    assert figures["second_50"] == pytest.approx(0.0, abs=1e-9)
+    assert figures["second_90"] == pytest.approx(9.0 / math.sqrt(2.0), rel=1e-3)
+    assert figures["resting_50"] == 2.0
+    assert figures["resting_90"] == 4.0
 
 
 def test_a_run_is_logged_as_the_firmware_sees_it():
@@ -208,8 +211,8 @@ def test_a_run_is_logged_as_the_firmware_sees_it():
     accelerations.
     """
     rig = smc.rig("stepper_furuta")
-    one = rig.scenario(x0=reported.start(1), seed=1, duration=25.0)
-    trace = smc.run(one)
+    scenario = rig.scenario(x0=reported.start(1), seed=1, duration=25.0)
+    trace = smc.run(scenario)
     rows = reported.logged(trace)
     gaps = np.diff(rows["timestamp_ms"])
     assert pytest.approx(np.median(gaps)) == 20.0
@@ -244,9 +247,9 @@ def test_the_recorded_figures_are_those_of_the_machines_file(condition):
     file = RECORDS / f"linear_{condition}.csv"
     if not file.exists():
         pytest.skip("the recordings have no licence, and are not here")
-    found = reported.figures(reported.load(file))
+    figures = reported.figures(reported.load(file))
     for name, value in reported.RECORDED[condition].items():
-        assert found[name] == pytest.approx(value, rel=0.05), name
+        assert figures[name] == pytest.approx(value, rel=0.05), name
 
 
 @pytest.mark.parametrize(
@@ -278,6 +281,9 @@ def test_the_plain_twin_has_the_machines_order_reversed(monkeypatch):
     for law, runs in plain["set 1"].items():
         alone[law] = reported.standing(runs, "alpha_rms")
     assert alone["linear"] > 100.0 * max(alone["two_states"], alone["four_states"])
-    whole = reported.predicted(rig, "hold", 2)["set 1"]
-    assert {law: len(runs) for law, runs in whole.items()} == dict.fromkeys(reported.ORDER, 2)
-    assert reported.standing(whole["two_states"], "alpha_rms").min() > 100.0 * alone["two_states"]
+    predictions = reported.predicted(rig, "hold", 2)["set 1"]
+    assert {law: len(runs) for law, runs in predictions.items()} == dict.fromkeys(reported.ORDER, 2)
+    assert (
+        reported.standing(predictions["two_states"], "alpha_rms").min()
+        > 100.0 * alone["two_states"]
+    )

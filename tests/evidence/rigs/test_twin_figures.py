@@ -20,18 +20,20 @@ DATA = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
 
 
 def row(machine, record, figure, variant=""):
-    every = twin_figures.rows(machine)
-    (one,) = [r for r in every if (r.record, r.figure, r.variant) == (record, figure, variant)]
-    return one
+    rows = twin_figures.rows(machine)
+    (match,) = [r for r in rows if (r.record, r.figure, r.variant) == (record, figure, variant)]
+    return match
 
 
 def test_whether_a_record_was_used_follows_from_the_rig(monkeypatch):
     held = row("qube_servo", "11", "theta rms")
     assert held.use == twin_figures.HELD_OUT
     assert row("qube_servo", "06", "theta rms").use == twin_figures.FITTED
-    assert {one.use for one in twin_figures.rows("emps")} == {twin_figures.UNFITTED}
-    other = dataclasses.replace(smc.rig("qube_servo"), identified_from=("11",))
-    monkeypatch.setattr(twin_figures, "catalogue", lambda: {**rig.catalogue(), "qube_servo": other})
+    assert {figure.use for figure in twin_figures.rows("emps")} == {twin_figures.UNFITTED}
+    fitted_rig = dataclasses.replace(smc.rig("qube_servo"), identified_from=("11",))
+    monkeypatch.setattr(
+        twin_figures, "catalogue", lambda: {**rig.catalogue(), "qube_servo": fitted_rig}
+    )
     assert held.use == twin_figures.FITTED
     assert row("qube_servo", "06", "theta rms").use == twin_figures.HELD_OUT
 
@@ -39,8 +41,8 @@ def test_whether_a_record_was_used_follows_from_the_rig(monkeypatch):
 def test_every_record_that_a_rig_was_identified_from_has_rows():
     # two rigs are one double pendulum, with the same records
     reported = set()
-    for one in twin_figures.rows():
-        reported.add(one.record)
+    for figure in twin_figures.rows():
+        reported.add(figure.record)
     for name in smc.rigs():
         assert set(smc.rig(name).identified_from) <= reported, name
 
@@ -63,8 +65,8 @@ def test_rows_are_those_of_the_records():
     assert reported.twin == pytest.approx(np.std(predicted["tau_meas2"]), rel=1e-3)
     assert reported.fit == pytest.approx(twin.fit(record)["tau_meas2"], abs=0.05)
     sets = []
-    for one in twin.members().values():
-        sets.append(np.std(one.predictions([record])[0][0]["tau_meas2"]))
+    for member in twin.members().values():
+        sets.append(np.std(member.predictions([record])[0][0]["tau_meas2"]))
     assert reported.low == pytest.approx(min(sets), rel=1e-3)
     assert reported.high == pytest.approx(max(sets), rel=1e-3)
 
@@ -77,41 +79,43 @@ def test_a_summary_is_over_the_known_figures_of_whole_twins():
         "unit": "m",
         "runs": 1,
     }
-    kept = common | {"machine": 2.0, "low": 1.0, "high": 3.0}
+    fields = common | {"machine": 2.0, "low": 1.0, "high": 3.0}
     rows = [
         TwinFigure(
             figure="a",
             twin=2.2,
             published=3.0,
-            **kept,
+            **fields,
         ),
-        TwinFigure(figure="b", twin=1.0, **kept | {"low": 0.5, "high": 1.5}),
+        TwinFigure(figure="b", twin=1.0, **fields | {"low": 0.5, "high": 1.5}),
         TwinFigure(
             figure="b",
             twin=90.0,
             variant="without a part",
-            **kept,
+            **fields,
         ),
-        TwinFigure(figure="c", twin=90.0, **kept | {"machine": math.nan}),
+        TwinFigure(figure="c", twin=90.0, **fields | {"machine": math.nan}),
     ]
     half = pytest.approx(0.5)
-    found = ("emps", twin_figures.UNFITTED, 2, pytest.approx(0.3), half, 1, half)
-    assert twin_figures.summaries(rows) == [found]
+    summary = ("emps", twin_figures.UNFITTED, 2, pytest.approx(0.3), half, 1, half)
+    assert twin_figures.summaries(rows) == [summary]
 
 
 def test_the_page_has_the_rows_of_benchmarks():
     page = (ROOT / "docs" / "rigs.md").read_text(encoding="utf-8")
-    for one in twin_figures.summaries(twin_figures.rows()):
-        (cells,) = re.findall(rf"^\| `{one.rig}` \| {one.use} \| (.*) \|$", page, re.MULTILINE)
+    for summary in twin_figures.summaries(twin_figures.rows()):
+        (cells,) = re.findall(
+            rf"^\| `{summary.rig}` \| {summary.use} \| (.*) \|$", page, re.MULTILINE
+        )
         count, apart, inside, published = cells.split("|")
         reported = []
         for number in re.findall(r"[\d.]+", apart):
             reported.append(float(number))
-        assert reported == pytest.approx([100.0 * one.median, 100.0 * one.largest], abs=0.5)
-        assert int(count) == one.count
-        assert int(inside) == one.inside
+        assert reported == pytest.approx([100.0 * summary.median, 100.0 * summary.largest], abs=0.5)
+        assert int(count) == summary.count
+        assert int(inside) == summary.inside
         assert published.strip() == (
-            "" if math.isnan(one.published) else f"{100.0 * one.published:.1f} %"
+            "" if math.isnan(summary.published) else f"{100.0 * summary.published:.1f} %"
         )
 
 
@@ -119,7 +123,7 @@ def test_laws_of_the_twin_stand_in_the_machines_order_in_the_hold():
     """Of the stepper's twin, found from the linear law's figures; not of the plain one. Under
     nudges the order cannot be told, as the page says.
     """
-    whole, plain = (
+    of_all_sets, plain = (
         next(
             order
             for order in twin_figures.orders("stepper_furuta")
@@ -127,7 +131,7 @@ def test_laws_of_the_twin_stand_in_the_machines_order_in_the_hold():
         )
         for variant in ("", "without all of these, noise and vibration")
     )
-    assert whole.ordered >= 0.75 * whole.sets
+    assert of_all_sets.ordered >= 0.75 * of_all_sets.sets
     assert plain.ordered == 0
 
 
@@ -140,8 +144,10 @@ def test_laws_of_the_twin_stand_in_the_machines_order_in_the_hold():
     ],
 )
 def test_what_is_beyond_the_axis_is_a_triangle_at_its_end(twin, marks):
-    one = dataclasses.replace(row("emps", "program of 24.8 s", "rms error"), machine=1.0, twin=twin)
-    assert marks_of(one) == marks
+    figure = dataclasses.replace(
+        row("emps", "program of 24.8 s", "rms error"), machine=1.0, twin=twin
+    )
+    assert marks_of(figure) == marks
 
 
 @pytest.mark.parametrize(
@@ -154,9 +160,9 @@ def test_what_is_beyond_the_axis_is_a_triangle_at_its_end(twin, marks):
     ],
 )
 def test_a_range_that_the_frame_cuts_ends_in_a_triangle(low, high, marks):
-    one = row("emps", "program of 24.8 s", "rms error")
-    one = dataclasses.replace(one, machine=1.0, twin=1.0, low=low, high=high)
-    assert marks_of(one) == marks
+    figure = row("emps", "program of 24.8 s", "rms error")
+    figure = dataclasses.replace(figure, machine=1.0, twin=1.0, low=low, high=high)
+    assert marks_of(figure) == marks
 
 
 def marks_of(one):
@@ -170,15 +176,15 @@ def marks_of(one):
 
 
 def test_every_figure_has_a_mark_in_the_row_of_its_machine_and_use():
-    shown = twin_figures.laid_out(twin_figures.rows())
-    drawn = [one for kept in shown for one in kept.figures]
+    groups = twin_figures.laid_out(twin_figures.rows())
+    drawn = [figure for group in groups for figure in group.figures]
     assert sorted(map(repr, drawn)) == sorted(map(repr, twin_figures.known(twin_figures.rows())))
     top = 0.0
-    for kept in shown:
-        assert len({(one.rig, one.use) for one in kept.figures}) == 1
-        assert len(kept.places) == len(kept.figures)
-        assert top < min(kept.places) <= max(kept.places) < kept.end
-        top = kept.end
+    for group in groups:
+        assert len({(figure.rig, figure.use) for figure in group.figures}) == 1
+        assert len(group.places) == len(group.figures)
+        assert top < min(group.places) <= max(group.places) < group.end
+        top = group.end
 
 
 def test_the_rows_of_the_figure_fit_its_height():
@@ -191,5 +197,5 @@ def test_the_rows_of_the_figure_fit_its_height():
         assert below.y1 <= above.y0
     assert frame.y0 <= boxes[-1].y0 < boxes[0].y1 <= frame.y1
     assert min(box.x0 for box in boxes) >= 0.0
-    whole = page.bbox
-    assert whole.height <= 1.25 * whole.width  # else it is too high for a slide
+    page_box = page.bbox
+    assert page_box.height <= 1.25 * page_box.width  # else it is too high for a slide
