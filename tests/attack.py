@@ -234,33 +234,33 @@ def undisturbed(kind: str) -> tuple[Any, float]:
     """What a call gives that nobody stops, and how long it takes when all is compiled, s."""
     for folder in ("compiling", "undisturbed"):
         begun = time.monotonic()
-        found = KEPT[kind](Path(folder, kind))
-    return found, time.monotonic() - begun
+        result = KEPT[kind](Path(folder, kind))
+    return result, time.monotonic() - begun
 
 
 def pressed(random: Random, call: Callable[[], Any], longest: float) -> Any:
     """What a call gives that is stopped one to three times, after at most so many seconds; None
     where it does not come to its end.
     """
-    left = random.randint(1, 3)
+    calls_to_wait = random.randint(1, 3)
 
     def press(number: int, frame: Any) -> None:
-        nonlocal left
-        left -= 1
-        if left <= 0:
+        nonlocal calls_to_wait
+        calls_to_wait -= 1
+        if calls_to_wait <= 0:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
         raise KeyboardInterrupt
 
     before = signal.signal(signal.SIGALRM, press)
-    found = None
+    result = None
     with contextlib.suppress(KeyboardInterrupt):  # the second may come while the first is caught
         try:
             signal.setitimer(signal.ITIMER_REAL, random.uniform(1e-3, longest), 0.05)
-            found = call()
+            result = call()
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
     signal.signal(signal.SIGALRM, before)
-    return found
+    return result
 
 
 def interrupts(random: Random) -> str:
@@ -268,23 +268,23 @@ def interrupts(random: Random) -> str:
     was kept is there, is not made again, and the end is that of a call that nobody stopped.
     """
     kind = random.choice(sorted(KEPT))
-    whole, seconds = undisturbed(kind)
-    found = None
-    kept: dict[Path, int] = {}
+    undisturbed_result, seconds = undisturbed(kind)
+    result = None
+    finished: dict[Path, int] = {}
     stops = 0
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        while found is None:
-            found = pressed(random, lambda: KEPT[kind](folder), seconds)
-            stops += found is None
+        while result is None:
+            result = pressed(random, lambda: KEPT[kind](folder), seconds)
+            stops += result is None
             files = [path for path in folder.rglob("*") if path.is_file()]
             if odd := [path.name for path in files if path.name.startswith(".")]:
                 raise Found(f"{kind} leaves {odd}")
             now = {path: path.stat().st_mtime_ns for path in files if path.stem != "results"}
-            if not kept.items() <= now.items():
+            if not finished.items() <= now.items():
                 raise Found(f"{kind} loses what was kept, or makes it again")
-            kept = now
-    if found != whole:
+            finished = now
+    if result != undisturbed_result:
         raise Found(f"{kind} ends with something else after {stops} stops")
     return "stopped" if stops else "ran"
 
@@ -361,19 +361,19 @@ def grown(random: Random, node: Any) -> Any:
 
 def damaged(random: Random, data: bytes) -> bytes:
     """Bytes with some flipped, cut, doubled or replaced."""
-    at = random.randrange(len(data))
+    place = random.randrange(len(data))
     match random.randrange(5):
         case 0:
-            return data[:at]
+            return data[:place]
         case 1:
-            return data[:at] + random.randbytes(random.randint(1, 40)) + data[at:]
+            return data[:place] + random.randbytes(random.randint(1, 40)) + data[place:]
         case 2:
-            return data[:at] + data[at + random.randint(1, 40) :]
+            return data[:place] + data[place + random.randint(1, 40) :]
         case 3:
             return (
-                data[:at]
+                data[:place]
                 + random.choice([b"nan", b"1e999", b"null", b"[", b"-", b"\0", b",,"])
-                + data[at + 1 :]
+                + data[place + 1 :]
             )
     many = bytearray(data)
     for _ in range(random.randint(1, 4)):
@@ -416,11 +416,11 @@ def files(random: Random) -> str:
     else:
         place.write_bytes(damaged(random, data))
     try:
-        found = read(place)
-        if isinstance(found, smc.Table):
-            found.rows()
-            for i in range(min(len(found), 2)):
-                found.scenario(i)
+        content = read(place)
+        if isinstance(content, smc.Table):
+            content.rows()
+            for i in range(min(len(content), 2)):
+                content.scenario(i)
     except smc.ScenarioError as error:
         sentence(str(error))
         return "refused"
@@ -515,8 +515,8 @@ def lines(process: subprocess.Popen) -> Iterator[bytes]:
         limit = LIMIT
         if not (read := os.read(pipe.fileno(), 2**16)):
             return
-        *whole, held = (held + read).split(b"\n")
-        yield from whole
+        *full_lines, held = (held + read).split(b"\n")
+        yield from full_lines
     yield b""
 
 
@@ -559,22 +559,22 @@ def main() -> int:
     parser.add_argument("--cases", type=int, help="how many of each part")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     parser.add_argument("--child", action="store_true", help=argparse.SUPPRESS)
-    given = parser.parse_args()
-    if given.seed is None:
+    options = parser.parse_args()
+    if options.seed is None:
         seed = random.SystemRandom().randrange(10**6)
     else:
-        seed = given.seed
-    if given.child:
-        child(given.part, seed, given.start, given.cases)
+        seed = options.seed
+    if options.child:
+        child(options.part, seed, options.start, options.cases)
         return 0
-    if given.part == "all":
+    if options.part == "all":
         parts = list(PARTS)
     else:
-        parts = [given.part]
+        parts = [options.part]
     print(f"seed {seed}; a case may take {LIMIT:g} s", flush=True)
     return int(
         sum(
-            attacked(part, seed, given.start, given.cases or CASES[part], given.jobs)
+            attacked(part, seed, options.start, options.cases or CASES[part], options.jobs)
             for part in parts
         )
         > 0

@@ -70,7 +70,7 @@ def mutate(node: ast.AST) -> ast.AST | None:
 def mutants(path: Path) -> list[tuple[int, str, Callable[[], str]]]:
     """Return (line, words, a function that makes the mutated file) for each mutant of a file."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    found = []
+    mutations = []
     for parent in ast.walk(tree):
         for field, value in ast.iter_fields(parent):
             if isinstance(value, list):
@@ -94,8 +94,8 @@ def mutants(path: Path) -> list[tuple[int, str, Callable[[], str]]]:
                     return text
 
                 before, after = (ast.unparse(n).splitlines()[0] for n in (child, mutant))
-                found.append((child.lineno, f"{before}  ->  {after}", make))
-    return found
+                mutations.append((child.lineno, f"{before}  ->  {after}", make))
+    return mutations
 
 
 def main() -> None:
@@ -111,8 +111,8 @@ def main() -> None:
             f"ROOM is {room!r}: name a folder of smc_mujoco that tests/ has too, such as metrics"
         )
     files = sorted((ROOT / "smc_mujoco" / room).rglob("*.py"))
-    every = [(file.relative_to(ROOT), *mutant) for file in files for mutant in mutants(file)]
-    drawn = random.Random(seed).sample(every, min(count, len(every)))
+    all_mutants = [(file.relative_to(ROOT), *mutant) for file in files for mutant in mutants(file)]
+    drawn = random.Random(seed).sample(all_mutants, min(count, len(all_mutants)))
     with tempfile.TemporaryDirectory() as folder:
         for name in COPIED:
             shutil.copytree(
@@ -129,7 +129,7 @@ def main() -> None:
             shutil.copy(ROOT / path, Path(folder, path))
             lived += not failed
             print(f"{'died ' if failed else 'LIVED'} {path}:{line}  {words}  {failed}", flush=True)
-    print(f"{len(drawn) - lived} of {len(drawn)} mutants of {len(every)} died")
+    print(f"{len(drawn) - lived} of {len(drawn)} mutants of {len(all_mutants)} died")
 
 
 def run_tests(folder: Path, room: str) -> str:

@@ -150,8 +150,8 @@ def line(random: Random) -> list[str]:
     for word in random.choice(LINES[name]).split():
         words.append(text(random) if word == "?" else word)
     command: Any = typer.main.get_command(main.app)
-    known = [option for option in command.commands[name].params if option.opts[0][:2] == "--"]
-    for option in random.sample(known, random.randint(0, 2)):
+    options = [option for option in command.commands[name].params if option.opts[0][:2] == "--"]
+    for option in random.sample(options, random.randint(0, 2)):
         if option.name in ("help", "worst", "site", "mutants", "film", "browser"):
             continue
         words.append(option.opts[0])
@@ -262,8 +262,8 @@ def calls(random: Random, sentence: Callable[[str], None]) -> str:
     for name, right in CALLS[function].items():
         arguments[name] = trace if right is TRACE else right
     odd = [name for name, value in arguments.items() if value is ...]
-    known = sorted({*arguments, *PARAMETERS[function]} - {"progress", "report"})
-    odd += random.sample(known, random.randint(0 if odd else 1, min(2, len(known))))
+    keywords = sorted({*arguments, *PARAMETERS[function]} - {"progress", "report"})
+    odd += random.sample(keywords, random.randint(0 if odd else 1, min(2, len(keywords))))
     for name in odd:
         arguments[name] = wild.value(random)
     first, *_ = arguments

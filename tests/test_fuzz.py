@@ -100,11 +100,11 @@ sys.exit(attack.main())
 """)
     monkeypatch.setattr(attack, "SCRIPT", str(script))
     monkeypatch.setattr(attack, "LIMIT", 1.0)
-    (first, fine, _), (second, found, why), *rest = attack.slice_of(part, 0, 0, 4)
+    (first, fine, _), (second, outcome, why), *rest = attack.slice_of(part, 0, 0, 4)
     assert first == 0
     assert fine == "ran"
     assert second == 1
-    assert found == "found"
+    assert outcome == "found"
     assert re.search(words, why)
     assert [i for i, _, _ in rest] == [2, 3]
 

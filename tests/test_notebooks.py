@@ -117,8 +117,8 @@ def test_a_notebook_runs_and_shows_what_its_text_says(path, tmp_path):
     said = textwrap.dedent(SAID[path.stem])
     done = python(KERNEL, path, "shown.json", QUICK, said, folder=tmp_path)
     assert done.stdout == ""
-    shown = json.loads((tmp_path / "shown.json").read_text())
-    for text, outputs in zip(code(path), shown, strict=True):
+    printed = json.loads((tmp_path / "shown.json").read_text())
+    for text, outputs in zip(code(path), printed, strict=True):
         last = ast.parse(text).body[-1]
         if not isinstance(last, ast.Expr) or "print(" in text:
             continue

@@ -90,8 +90,11 @@ def test_a_title_of_two_lines_is_drawn_on_one(trace):
 
 
 def test_a_trace_has_the_metrics_that_are_asked_for(trace):
-    every = smc.score(trace)
-    assert smc.score(trace, ["itae", "peak"]) == {"itae": every["itae"], "peak": every["peak"]}
+    all_metrics = smc.score(trace)
+    assert smc.score(trace, ["itae", "peak"]) == {
+        "itae": all_metrics["itae"],
+        "peak": all_metrics["peak"],
+    }
     with pytest.raises(smc.ScenarioError, match="unknown metric 'peeks'"):
         smc.score(trace, ["peeks"])
 

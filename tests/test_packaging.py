@@ -162,16 +162,16 @@ def test_the_package_is_a_program_and_a_star_import_gives_its_public_names(binar
     ],
 )
 def test_a_shell_completes_commands_and_names(binaries, tmp_path, shell, typed, meant):
-    asked = {
+    environment = {
         "COMP_WORDS": typed,
         "COMP_CWORD": str(typed.count(" ")),
         "_TYPER_COMPLETE_ARGS": typed,
     }
-    asked |= {
+    environment |= {
         "_TYPER_COMPLETE_FISH_ACTION": "get-args",
         "_SMC_MUJOCO_COMPLETE": f"complete_{shell}",
     }
-    done = run(binaries / "smc-mujoco", cwd=tmp_path, **asked)
+    done = run(binaries / "smc-mujoco", cwd=tmp_path, **environment)
     assert meant in done.stdout
     assert "basin" not in done.stdout
 
@@ -268,7 +268,7 @@ MISSING = {
 def refused(tmp_path_factory) -> dict[str, str]:
     """What is said where each of these needs an extra that is missing; nothing is written."""
     folder = tmp_path_factory.mktemp("refused")
-    asked = f"""
+    code = f"""
 import smc_mujoco as smc
 t = smc.run(smc.Scenario(plant='duffing', law='none', duration=0.01))
 for code in {list(MISSING)}:
@@ -278,7 +278,7 @@ for code in {list(MISSING)}:
     except ImportError as error:
         print(isinstance(error, smc.ScenarioError), error)
 """
-    lines = without_extras(asked, folder).splitlines()
+    lines = without_extras(code, folder).splitlines()
     assert list(folder.iterdir()) == []
     return dict(zip(MISSING, lines, strict=True))
 
@@ -357,9 +357,9 @@ def test_set_up_without_network_is_one_sentence_and_is_taken_up_again(checkout):
     import pip
 
     link = f'ln -s "{Path(pip.__file__).parent}" .venv/lib/python*/site-packages/'
-    made = f'"{sys.executable}" -m venv --without-pip --clear .venv && {link}'
+    venv = f'"{sys.executable}" -m venv --without-pip --clear .venv && {link}'
     script = (
-        f'case "$*" in "-m venv --clear .venv") {made};; *) exec "{sys.executable}" "$@";; esac'
+        f'case "$*" in "-m venv --clear .venv") {venv};; *) exec "{sys.executable}" "$@";; esac'
     )
     offline = {
         "PIP_INDEX_URL": "http://127.0.0.1:9",

@@ -30,7 +30,7 @@ def test_records_of_cases_that_quick_leaves_out_are_kept_and_not_called_unused(
     # in processes of their own: syrupy has one session for each
     assert pytester.runpytest_subprocess("--snapshot-update").ret == 0
     (records,) = pytester.path.glob("__snapshots__/*.ambr")
-    both = records.read_text(encoding="utf-8")
+    all_records = records.read_text(encoding="utf-8")
     for arguments in (
         ["--quick"],
         ["--quick", "--snapshot-update"],
@@ -38,11 +38,11 @@ def test_records_of_cases_that_quick_leaves_out_are_kept_and_not_called_unused(
         run = pytester.runpytest_subprocess(*arguments)
         run.assert_outcomes(passed=1, deselected=1)
         assert run.ret == 0
-        assert records.read_text(encoding="utf-8") == both
+        assert records.read_text(encoding="utf-8") == all_records
     for arguments in (["--collect-only"], ["--collect-only", "--snapshot-update"]):
         run = pytester.runpytest_subprocess(*arguments)
         run.stdout.no_fnmatch_line("*delete unused*")
-        assert records.read_text(encoding="utf-8") == both
+        assert records.read_text(encoding="utf-8") == all_records
 
 
 @pytest.mark.slow

@@ -45,8 +45,10 @@ def commands(text: str) -> list[str]:
             lines.append(line)
     prose = re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
     lines += re.findall(r"`((?:smc-mujoco|make|python) [^`]+)`", prose)
-    found = [re.split(r"\s+#|\s+or:", line)[0].strip().removeprefix(".venv/bin/") for line in lines]
-    return list(dict.fromkeys(found))
+    command_lines = [
+        re.split(r"\s+#|\s+or:", line)[0].strip().removeprefix(".venv/bin/") for line in lines
+    ]
+    return list(dict.fromkeys(command_lines))
 
 
 BY_NUMBERS = "mathematics.md"  # test_docs.py runs its code, and compares what it prints
@@ -134,22 +136,22 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(
     said.seek(0)
     assert end is None or not end.value.code
     assert ("print(" in block or end is not None) == (said.read().strip() != "")
-    wanted = set(re.findall(r'"([\w-]+\.(?:npz|csv|json|mat|svg|png|tex|c|fmu))"', block))
-    wanted |= set(re.findall(r'study\(.*"(\w+)"', block)) | (
+    named_files = set(re.findall(r'"([\w-]+\.(?:npz|csv|json|mat|svg|png|tex|c|fmu))"', block))
+    named_files |= set(re.findall(r'study\(.*"(\w+)"', block)) | (
         {"compared"} if "smc.compare(" in block else set()
     )
     written = {path.name for path in tmp_path.iterdir()} - {"block.py", "examples", *titled(page)}
-    assert wanted <= written
-    assert bool(written) == bool(wanted or end)
+    assert named_files <= written
+    assert bool(written) == bool(named_files or end)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=named)
 def test_command_lines_name_commands_options_and_files_that_exist(page):
     program = typer.main.get_command(main.app)
-    known = program.commands  # pyright: ignore[reportAttributeAccessIssue]
+    commands_by_name = program.commands  # pyright: ignore[reportAttributeAccessIssue]
     for line in (line for where, line in LINES if where == page and line.startswith("smc-mujoco ")):
         if not annexes.lacking(line):
-            check_command(line, known)
+            check_command(line, commands_by_name)
 
 
 def check_command(line: str, known: dict) -> None:
@@ -165,19 +167,22 @@ def check_command(line: str, known: dict) -> None:
         if option.startswith("-") and option.partition("=")[0] not in options:
             unknown.append(option)
     assert unknown == [], line
-    given = []
+    arguments = []
     for argument in rest:
         if not argument.startswith("-"):
-            given.append(argument)
+            arguments.append(argument)
     of_template = set()
     for path in (ROOT / "examples").glob("*/*/scenes/*.py"):
         of_template.add(path.stem)
-    if word == "run" and given and given[0] not in {"NAME", *of_template}:
+    if word == "run" and arguments and arguments[0] not in {"NAME", *of_template}:
         assert isinstance(
-            scene.read(scene.find(str(ROOT / given[0]) if "/" in given[0] else given[0])), smc.Scene
+            scene.read(
+                scene.find(str(ROOT / arguments[0]) if "/" in arguments[0] else arguments[0])
+            ),
+            smc.Scene,
         )
     if word == "show":
-        assert given[0] in results(Path(given[0]).parent)
+        assert arguments[0] in results(Path(arguments[0]).parent)
 
 
 @pytest.mark.slow
@@ -212,11 +217,11 @@ def results(folder: Path) -> set[str]:
 
 
 def test_make_targets_exist():
-    wanted = set()
+    targets = set()
     for _, line in LINES:
         if line.startswith("make "):
-            wanted.add(re.match(r"make (\w+)", line))
-    assert {"demo", "test"} <= {found[1] for found in wanted if found} <= TARGETS
+            targets.add(re.match(r"make (\w+)", line))
+    assert {"demo", "test"} <= {match[1] for match in targets if match} <= TARGETS
 
 
 def test_files_that_command_lines_name_exist():

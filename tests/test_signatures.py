@@ -22,17 +22,19 @@ HOMES = (
 )
 PUBLIC = {name: getattr(home, name) for home in HOMES for name in home.__all__}
 NAMES: dict[str, list[str]] = {room: [] for room in ("core", *annexes.HERE)}
-for one, made in PUBLIC.items():
-    if callable(made):
-        NAMES[annexes.of(made.__module__.removeprefix("smc_mujoco.")) or "core"].append(one)
+for public_name, public_object in PUBLIC.items():
+    if callable(public_object):
+        NAMES[annexes.of(public_object.__module__.removeprefix("smc_mujoco.")) or "core"].append(
+            public_name
+        )
 
 
 def signature(name):
     """Return a call with its parameters and their defaults, without types."""
-    whole = inspect.signature(PUBLIC[name])
+    full_signature = inspect.signature(PUBLIC[name])
     plain = []
-    for one in whole.parameters.values():
-        plain.append(one.replace(annotation=one.empty))
+    for parameter in full_signature.parameters.values():
+        plain.append(parameter.replace(annotation=parameter.empty))
     return name + re.sub(" at 0x[0-9a-f]+", "", str(inspect.Signature(plain)))
 
 

@@ -58,11 +58,15 @@ def written_out(command: str, workflow: str) -> list[str]:
     """A command for each package of the matrix that it names."""
     if "${{" not in command:
         return [command]
-    every = []
+    strategies = []
     for job in jobs(ROOT / ".github/workflows" / workflow).values():
-        every.append(job.get("strategy", {}))
-    found = [one["matrix"]["package"] for one in every if one]
-    return [command.replace("${{ matrix.package }}", one) for packages in found for one in packages]
+        strategies.append(job.get("strategy", {}))
+    package_lists = [strategy["matrix"]["package"] for strategy in strategies if strategy]
+    return [
+        command.replace("${{ matrix.package }}", package)
+        for packages in package_lists
+        for package in packages
+    ]
 
 
 def test_a_workflow_s_command_is_one_of_the_makefile_or_of_a_page():
@@ -70,9 +74,9 @@ def test_a_workflow_s_command_is_one_of_the_makefile_or_of_a_page():
         if command.startswith("make "):
             assert command.split()[1] in TARGETS, workflow
         else:
-            assert {SHARED.sub("", one) for one in written_out(command, workflow)} <= KNOWN, (
-                workflow
-            )
+            assert {
+                SHARED.sub("", plain_command) for plain_command in written_out(command, workflow)
+            } <= KNOWN, workflow
 
 
 def test_what_a_change_must_pass_is_one_list_which_ci_runs_and_the_workflows_share():
@@ -86,14 +90,14 @@ def test_what_a_change_must_pass_is_one_list_which_ci_runs_and_the_workflows_sha
         of_push.append(yaml.safe_load(file.read_text(encoding="utf-8")))
     # YAML 1.1 reads `on` as true
     of_push = [data["jobs"] for data in of_push if "push" in data[True]]
-    made = set()
+    commands = set()
     for named in of_push:
         for job in named.values():
             for step in job["steps"]:
                 if "run" in step:
-                    made.add(step["run"])
+                    commands.add(step["run"])
     targets = set()
-    for command in made:
+    for command in commands:
         if command.startswith("make "):
             targets.add(command.split()[1])
     assert targets == {*promised.split()}
@@ -101,10 +105,10 @@ def test_what_a_change_must_pass_is_one_list_which_ci_runs_and_the_workflows_sha
 
 def test_what_only_slow_tests_hold_runs_once_a_day_and_so_does_the_rest_without_an_annex():
     daily = ROOT / ".github" / "workflows" / "daily.yml"
-    made = set()
+    commands = set()
     for job in jobs(daily).values():
-        made.add(job["steps"][-1]["run"])
-    assert made == {"make slow", "make without", "make cardless"}
+        commands.add(job["steps"][-1]["run"])
+    assert commands == {"make slow", "make without", "make cardless"}
     assert jobs(daily)["without"]["strategy"]["matrix"]["annex"] == sorted(ANNEXES)
     for annex in annexes.HERE:
         assert (ROOT / "smc_mujoco" / annex).is_dir()
@@ -207,7 +211,7 @@ def test_the_action_enters_a_folder_with_the_suite_and_the_results_it_is_given(t
     action = yaml.safe_load(ACTION.read_text(encoding="utf-8"))
     *_, step = action["runs"]["steps"]
     assert "${{" not in step["run"]
-    given = {
+    inputs = {
         "folder": "my law; echo no",
         "suite": action["inputs"]["suite"]["default"],
         "against": against,
@@ -217,7 +221,7 @@ def test_the_action_enters_a_folder_with_the_suite_and_the_results_it_is_given(t
     program.chmod(0o755)
     read = {}
     for name, value in step["env"].items():
-        read[name] = given[value.removeprefix("${{ inputs.").removesuffix(" }}")]
+        read[name] = inputs[value.removeprefix("${{ inputs.").removesuffix(" }}")]
     environment = {
         **os.environ,
         "PATH": f"{tmp_path}:{os.environ['PATH']}",
@@ -232,7 +236,7 @@ def test_the_action_enters_a_folder_with_the_suite_and_the_results_it_is_given(t
     ).stdout
     assert out.splitlines() == [
         "enter",
-        given["folder"],
+        inputs["folder"],
         "--suite",
         "smc-30@1",
         *["--against", against] * bool(against),
@@ -246,5 +250,5 @@ def test_every_action_of_others_is_pinned_to_a_commit():
         for step in yaml.safe_load(ACTION.read_text(encoding="utf-8"))["runs"]["steps"]
         if "uses" in step
     ]
-    for one in used:
-        assert re.fullmatch(r"[\w./-]+@[0-9a-f]{40}", one) or one.startswith("./")
+    for action in used:
+        assert re.fullmatch(r"[\w./-]+@[0-9a-f]{40}", action) or action.startswith("./")

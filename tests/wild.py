@@ -280,7 +280,7 @@ def changed(
 def smooth(random: Random) -> smc.Signal:
     """A signal without noise."""
     times = random.choice([lambda: random.uniform(0.0, 0.03), lambda: wide(random)])
-    at = sorted({times() for _ in range(random.randint(2, 9))})
+    sample_times = sorted({times() for _ in range(random.randint(2, 9))})
     return random.choice(
         [
             lambda: smc.Constant(wide(random)),
@@ -290,7 +290,7 @@ def smooth(random: Random) -> smc.Signal:
             lambda: smc.signals.Impulse(wide(random), times(), positive(random)),
             lambda: smc.signals.Ramp(wide(random), times()),
             lambda: smc.signals.MinimumJerk(wide(random), times(), positive(random)),
-            lambda: smc.signals.TimeSeries(at, [wide(random) for _ in at]),
+            lambda: smc.signals.TimeSeries(sample_times, [wide(random) for _ in sample_times]),
         ]
     )()
 
@@ -374,12 +374,12 @@ def law(random: Random) -> Any:
 def factors(random: Random, plant: Any) -> dict[str, float]:
     """Factors on parameters that the plant has, now and then on one that it lacks."""
     if isinstance(plant, Plant) and random.random() < 0.98:
-        known = [*plant.parameters, "mass"]
+        parameter_names = [*plant.parameters, "mass"]
     else:
-        known = ["mass", "no"]
+        parameter_names = ["mass", "no"]
     return {
         key: random.choice([random.uniform(0.1, 10.0), positive(random)])
-        for key in few(random, known, 2)
+        for key in few(random, parameter_names, 2)
     }
 
 
@@ -480,15 +480,15 @@ def fields(random: Random) -> dict[str, Any]:
     }
     names = {*few(random, sorted(sane), random.choice([2, 5, len(sane)])), "law", "duration"}
     sane |= {"law": lambda: law(random), "duration": lambda: random.uniform(1e-3, 0.03)}
-    found = {}
+    scenario_fields = {}
     for name in sorted(names):
         if random.random() < 1 / 40:
-            found[name] = value(random)
+            scenario_fields[name] = value(random)
         else:
-            found[name] = sane[name]()
+            scenario_fields[name] = sane[name]()
     if random.random() < 1 / 200:
-        found[random.choice(["sed", "lawn", "x_0", "", "controlperiod"])] = value(random)
-    return {"plant": where} | found
+        scenario_fields[random.choice(["sed", "lawn", "x_0", "", "controlperiod"])] = value(random)
+    return {"plant": where} | scenario_fields
 
 
 def starts(random: Random, n: int) -> Any:
@@ -496,29 +496,29 @@ def starts(random: Random, n: int) -> Any:
     if random.random() < 0.5:
         return None
     x0 = random.choice([None, random.uniform(-3, 3), [wide(random) for _ in range(n)]])
-    given = {"x0": x0} | {name: positive(random) for name in few(random, ["spread", "by"], 2)}
+    arguments = {"x0": x0} | {name: positive(random) for name in few(random, ["spread", "by"], 2)}
     if random.random() < 1 / 40:
-        given[random.choice(["x0", "spread", "by", "bye"])] = value(random)
-    return smc.starts(**given)
+        arguments[random.choice(["x0", "spread", "by", "bye"])] = value(random)
+    return smc.starts(**arguments)
 
 
 def gridded(random: Random, fields: dict[str, Any]) -> list[smc.Scenario]:
     """The fields as a user's condition, by itself, with one of the suite's or as text, on a grid of
     two seeds.
     """
-    left = {}
+    condition_fields = {}
     for name, held in fields.items():
         if name not in ("plant", "law", "duration", "model", "surface"):
-            left[name] = held
-    seeds = [0, left.pop("seed", 7)]
+            condition_fields[name] = held
+    seeds = [0, condition_fields.pop("seed", 7)]
     ours = random.choice(sorted(NAMED))
-    if left:
-        mine = smc.condition("wild", **left)
+    if condition_fields:
+        mine = smc.condition("wild", **condition_fields)
     else:
         mine = find_condition(ours)
     around = starts(random, fields["plant"].n if isinstance(fields["plant"], Plant) else 1)
     way = random.randrange(3)
-    if way == 0 and left:
+    if way == 0 and condition_fields:
         condition = mine + find_condition(ours)
     else:
         condition = mine
@@ -534,10 +534,10 @@ def gridded(random: Random, fields: dict[str, Any]) -> list[smc.Scenario]:
             starts=around,
         )
 
-    made = grid(condition)
-    if way == 1 and (read := _read(str(mine))) is not None and grid(read) != made:
+    scenarios = grid(condition)
+    if way == 1 and (read := _read(str(mine))) is not None and grid(read) != scenarios:
         raise AssertionError(f"{shown(str(mine))} is read as another condition")
-    return made
+    return scenarios
 
 
 def _read(text: str) -> Any:
