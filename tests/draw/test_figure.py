@@ -99,18 +99,18 @@ def test_short_impacts_are_marked_beyond_the_range_of_lasting_reactions_and_told
     spikes = np.zeros_like(pair[0].u)
     spikes[100:103], spikes[200] = 900.0, -400.0
     calm = []
-    for one in pair:
-        calm.append(dataclasses.replace(one, reaction=one.reaction * 0.0 + 20.0))
+    for trace in pair:
+        calm.append(dataclasses.replace(trace, reaction=trace.reaction * 0.0 + 20.0))
     for first, title in (
         (dataclasses.replace(calm[0], reaction=20.0 + spikes), "|reaction| up to 920 N"),
         (dataclasses.replace(calm[0], reaction=spikes), "|reaction| up to 900 N"),
         (calm[0], ""),
     ):
         ax = Figure().add_subplot()
-        shown = types.SimpleNamespace(
+        panel_stub = types.SimpleNamespace(
             traces=[first, calm[1]], group=groups(first.scenario.plant)[0]
         )
-        panels.clip_impacts(ax, shown, ["r", "b"])  # pyright: ignore[reportArgumentType]
+        panels.clip_impacts(ax, panel_stub, ["r", "b"])  # pyright: ignore[reportArgumentType]
         # pyright: ignore
         marks = []
         for line in ax.lines:
@@ -123,7 +123,7 @@ def test_short_impacts_are_marked_beyond_the_range_of_lasting_reactions_and_told
         ]
         assert ax.get_title(loc="right") == title
         assert marks == (sides if title else [])
-    alike = [dataclasses.replace(one, reaction=20.0 + spikes) for one in pair]
+    alike = [dataclasses.replace(trace, reaction=20.0 + spikes) for trace in pair]
     (ax,) = draw_figure.figure(alike, panels=["reaction"]).axes
     assert ax.get_ylim() == pytest.approx((-23.2, 23.2)), "words would lie over what is cut"
     (ax,) = draw_figure.figure(calm, panels=["reaction"]).axes
@@ -152,8 +152,8 @@ def test_chattering_is_drawn_as_its_mean_without_teeth():
         mean = decimate.smooth(u, 100)
         assert np.abs(mean).max() < 0.15  # to the ends
         assert np.abs(mean[50:-50]).max() < 0.02
-        at, low, high = decimate.band(t, u[:, None])
-        assert len(at) <= 360
+        band_times, low, high = decimate.band(t, u[:, None])
+        assert len(band_times) <= 360
         assert low.min() == -6.0
         assert high.max() == 6.0
     assert (
@@ -169,8 +169,8 @@ def test_chattering_is_six_reversals_close_together_and_reaches_over_short_rests
 
     def parts(*pieces):
         return [
-            (int(each.start), int(each.stop))
-            for each in decimate.chattering_parts(np.concatenate(pieces), 40)
+            (int(part.start), int(part.stop))
+            for part in decimate.chattering_parts(np.concatenate(pieces), 40)
         ]
 
     def switching(count, size=1.0):
@@ -252,27 +252,27 @@ def test_a_line_of_a_u_that_rises_within_half_a_window_rises_with_it():
 def test_a_line_never_leaves_its_own_band_and_is_u_where_that_does_not_chatter(condition):
     laws = ["adrc", "boundary_layer", "adaptive", "twisting"]
     for trace in smc.run(smc.grid("inverted_pendulum", laws, condition, 1)):
-        for shown in trace, horizon.until(trace, 0.27), horizon.until(trace, 0.8):
-            u = shown.u[:, 0]
-            t, line = panels.curve(shown, u, "u")
+        for run in trace, horizon.until(trace, 0.27), horizon.until(trace, 0.8):
+            u = run.u[:, 0]
+            t, line = panels.curve(run, u, "u")
             calm = np.ones(len(u), bool)
-            for part in decimate.chattering_parts(u, panels.window(shown)):
+            for part in decimate.chattering_parts(u, panels.window(run)):
                 calm[part] = False
-            at = np.rint(t / trace.scenario.control_period).astype(int)
-            assert (line == u[at])[calm[at]].all()
-            middles, low, high = decimate.band(shown.t, shown.u)
+            samples = np.rint(t / trace.scenario.control_period).astype(int)
+            assert (line == u[samples])[calm[samples]].all()
+            middles, low, high = decimate.band(run.t, run.u)
             inside = (line >= np.interp(t, middles, low)) & (line <= np.interp(t, middles, high))
-            assert (inside | (line == u[at])).all()
+            assert (inside | (line == u[samples])).all()
 
 
 @pytest.mark.parametrize("count", [569, 10_093])
 def test_a_run_that_ends_soon_after_a_switch_ends_in_its_mean(count):
     u = switching([15] * 700)[:count]  # the last value is held for 14 samples, or 13
     t = 1e-3 * np.arange(count)
-    at, line = decimate.line(t, u, 100)
+    line_times, line = decimate.line(t, u, 100)
     _, low, high = decimate.band(t, u[:, None])
     assert (low[-1], high[-1]) == (-6.0, 6.0)
-    assert np.abs(line[at > t[-1] - 0.05]).max() < 0.5
+    assert np.abs(line[line_times > t[-1] - 0.05]).max() < 0.5
 
 
 def test_the_mean_at_the_edge_of_a_panel_is_that_of_the_whole_run():
@@ -288,18 +288,18 @@ def test_the_mean_at_the_edge_of_a_panel_is_that_of_the_whole_run():
 def test_the_close_up_shows_no_round_off(pair, level):
     """Of a run that ends in 1 part of 1e9 around a level; or that never leaves it."""
     held = level + 1e-9 * np.random.default_rng(0).normal(size=pair[0].u.shape)
-    (shown,) = panels.over_groups(pair[:1], "x")
+    (position_panel,) = panels.over_groups(pair[:1], "x")
     ends = np.where(pair[0].t[:, None] < 0.5, pair[0].u, held)
     for u in (ends, held, np.full_like(held, level)):
         ax = Figure().subplots()
         run = dataclasses.replace(pair[0], u=u)
-        panels.last_samples(ax, shown._replace(traces=[run]), ["#000000"])
+        panels.last_samples(ax, position_panel._replace(traces=[run]), ["#000000"])
         low, high = ax.get_ylim()
         assert high - low >= 0.0199 * np.abs(u).max() <= np.ptp(quantities.limits([run], "u"))
         assert (low + high) / 2 == pytest.approx(level, abs=1e-6)
     full = Figure().subplots()
     switching = dataclasses.replace(pair[0], u=np.sign(held - level))
-    panels.last_samples(full, shown._replace(traces=[switching]), ["#000000"])
+    panels.last_samples(full, position_panel._replace(traces=[switching]), ["#000000"])
     assert full.get_ylim() == pytest.approx((-1.24, 1.24))  # what is large fills it
 
 

@@ -107,8 +107,8 @@ def arm(tmp_path_factory) -> list[smc.Trace]:
 )
 def test_words_are_apart_and_on_the_page(kind, size, one, arm, monkeypatch):
     jumps = []
-    for at in (0.5, 0.6):
-        jumps.append(dataclasses.replace(one.scenario, jump=smc.Jump(at, {"mass": 2.0})))
+    for jump_time in (0.5, 0.6):
+        jumps.append(dataclasses.replace(one.scenario, jump=smc.Jump(jump_time, {"mass": 2.0})))
     traces = {
         "one": [one],
         "ten": ten(one),
@@ -230,8 +230,8 @@ def test_runs_of_one_law_are_told_apart_by_what_differs(one):
     fast = dataclasses.replace(
         one, scenario=dataclasses.replace(scenario, law=smc.law("classical", k=3.0, c=5.0))
     )
-    other = under(one, "pid", 0.5)
-    assert style.labels([slow, fast, other], None) == [
+    pid_run = under(one, "pid", 0.5)
+    assert style.labels([slow, fast, pid_run], None) == [
         "Classical: c = 2",
         "Classical: c = 5",
         "PID",
@@ -276,11 +276,11 @@ def test_words_above_the_curves_tell_which_agree_and_until_when(one):
 
 def test_words_in_the_panel_of_s_name_the_laws_without_a_surface(one):
     none = dataclasses.replace(one, s=np.full_like(one.s, np.nan))
-    other = dataclasses.replace(one, s=-one.s)
+    mirrored = dataclasses.replace(one, s=-one.s)
     for runs, words in (
-        ([one, none, other, none], ["no s: b and d"]),
+        ([one, none, mirrored, none], ["no s: b and d"]),
         ([one, none, one], ["a and c agree; no s: b"]),
-        ([one, other], []),
+        ([one, mirrored], []),
     ):
         (ax,) = figure(runs, labels=list("abcd")[: len(runs)], panels=["s"]).axes
         assert [text.get_text() for text in ax.texts] == words
@@ -317,14 +317,14 @@ def test_panels_over_time_do_not_end_before_each_run_has_settled(one):
 
 
 def test_panels_over_time_end_where_all_rest_and_never_before_something_happens(one):
-    at = int(0.2 * len(one.t))
+    rest_sample = int(0.2 * len(one.t))
     still = dataclasses.replace(
-        one, x=np.where(np.arange(len(one.t)) < at, 1.0, 0.01)[:, None], d=0.0 * one.d
+        one, x=np.where(np.arange(len(one.t)) < rest_sample, 1.0, 0.01)[:, None], d=0.0 * one.d
     )
-    assert horizon.horizon([still]) == pytest.approx(1.3 * one.t[at - 1])
-    whole = one.t[-1]
+    assert horizon.horizon([still]) == pytest.approx(1.3 * one.t[rest_sample - 1])
+    end_time = one.t[-1]
     late = np.where(np.arange(len(one.t)) < 0.9 * len(one.t), 0.0, 1.0)[:, None]
-    jump = dataclasses.replace(one.scenario, jump=smc.Jump(0.9 * whole, {"mass": 2.0}))
+    jump = dataclasses.replace(one.scenario, jump=smc.Jump(0.9 * end_time, {"mass": 2.0}))
     for change in (
         {"x": still.x + late},
         {"d": late},
@@ -332,13 +332,13 @@ def test_panels_over_time_end_where_all_rest_and_never_before_something_happens(
         {"scenario": jump},
     ):
         assert horizon.horizon([still, dataclasses.replace(still, **change)]) == pytest.approx(
-            whole
+            end_time
         )
     lost = failed(under(still, "pid", 0.5), int(0.9 * len(one.t)))
-    assert horizon.horizon([still, lost]) == pytest.approx(whole)
+    assert horizon.horizon([still, lost]) == pytest.approx(end_time)
     over_time, settling = figure([still], panels=["x", "settling"]).axes
-    assert over_time.get_xlim()[1] == pytest.approx(1.3 * one.t[at - 1])
-    assert settling.get_xlim()[1] == pytest.approx(whole)
+    assert over_time.get_xlim()[1] == pytest.approx(1.3 * one.t[rest_sample - 1])
+    assert settling.get_xlim()[1] == pytest.approx(end_time)
 
 
 @pytest.mark.parametrize("size", [PAGE, COLUMN])
@@ -427,10 +427,10 @@ def test_a_figure_is_returned_in_any_size_and_written_where_asked(one, tmp_path)
     assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
     mine = Figure(figsize=(9.0, 6.0))
     assert figure(one, fig=mine) is mine
-    left, right = Figure(figsize=(12.0, 6.0), layout="constrained").subfigures(1, 2, squeeze=False)[
-        0
-    ]
-    assert figure(one, fig=left) is left.get_figure(root=True)
+    left_part, right = Figure(figsize=(12.0, 6.0), layout="constrained").subfigures(
+        1, 2, squeeze=False
+    )[0]
+    assert figure(one, fig=left_part) is left_part.get_figure(root=True)
     assert len(right.axes) == 0
 
 
@@ -559,7 +559,9 @@ def test_marks_of_a_board_are_medians_by_law_from_above_and_a_law_that_never_set
             for dot in dots
             if to_hex(dot.get_color()) == to_hex(colour)
         ]
-        assert mine == [[pytest.approx(np.median(each)), k + 4 * i] for i, each in enumerate(sizes)]
+        assert mine == [
+            [pytest.approx(np.median(law_sizes)), k + 4 * i] for i, law_sizes in enumerate(sizes)
+        ]
     fills = {
         str(dot.get_mfc()).lower() for dot in settling.lines if dot.get_marker() in ("o", "s", "D")
     }
@@ -582,8 +584,8 @@ def test_the_ticks_of_a_board_are_apart_in_a_column():
         if low <= tick.get_loc() <= high:
             boxes.append(tick.label1.get_window_extent())
     digit = boxes[0].width / 5
-    for one, other in itertools.pairwise(boxes):
-        assert one.x1 + 2 * digit < other.x0
+    for label_box, next_box in itertools.pairwise(boxes):
+        assert label_box.x1 + 2 * digit < next_box.x0
 
 
 @pytest.mark.parametrize(
@@ -659,8 +661,8 @@ def test_a_disturbance_that_all_runs_have_is_one_line_that_says_so(one):
     (ax,) = figure([pushed, under(pushed, "pid", 0.9)], panels=["d"]).axes
     assert [line.get_color() for line in curves(ax)] == [style.DISTURBANCE]
     assert ax.get_title(loc="right") == "the same in all runs"
-    other = dataclasses.replace(under(pushed, "pid", 0.9), d=0.5 * pushed.d)
-    (ax,) = figure([pushed, other], panels=["d"]).axes
+    half_pushed = dataclasses.replace(under(pushed, "pid", 0.9), d=0.5 * pushed.d)
+    (ax,) = figure([pushed, half_pushed], panels=["d"]).axes
     assert len(curves(ax)) == 2
 
 
@@ -691,13 +693,13 @@ def test_a_page_is_dark_where_the_caller_s_style_is_and_all_on_it_can_be_seen(on
 
 def test_a_panel_is_drawn_into_axes_of_the_caller_whose_legend_names_the_runs(one, tmp_path):
     runs = [one, under(one, "pid", 0.9)]
-    fig, (left, right) = plt.subplots(1, 2)
-    assert figure(runs, ax=left) is fig
+    fig, (left_axes, right) = plt.subplots(1, 2)
+    assert figure(runs, ax=left_axes) is fig
     assert figure(runs, tmp_path / "two.png", format="png", ax=right, panels=["phase"]) is fig
     assert (tmp_path / "two.png").exists()
-    for ax in (left, right):
+    for ax in (left_axes, right):
         assert [text.get_text() for text in ax.legend().get_texts()] == ["Classical", "PID"]
-    assert left.get_ylabel() == "position x (m)"
+    assert left_axes.get_ylabel() == "position x (m)"
     assert any(np.array_equal(line.get_xdata(), (one.x - one.r)[:, 0]) for line in curves(right))
     plt.close(fig)
 
@@ -705,11 +707,11 @@ def test_a_panel_is_drawn_into_axes_of_the_caller_whose_legend_names_the_runs(on
 def test_a_metric_s_axis_is_of_one_kind_on_all_plants():
     class Two(Rows):
         def column(self, name):
-            found = super().column(name)
+            values = super().column(name)
             if name == "tv_rate":
                 wide = self.column("plant") == "duffing"
-                found = np.where(wide, np.geomspace(1.0, 1e4, len(found)), found)
-            return found
+                values = np.where(wide, np.geomspace(1.0, 1e4, len(values)), values)
+            return values
 
     page = smc.plot(Two(), metrics=["tv_rate", "settling_time"])
     scales = [ax.get_xscale() for ax in page.axes]
@@ -724,8 +726,10 @@ def test_an_axis_of_less_than_two_decades_has_two_numbers_and_ticks_between(one)
     panels.number_decades(ax.xaxis, (0.15, 0.9))
     ticks = ax.get_xticks(minor=True)
     texts = [ax.xaxis.get_minor_formatter()(tick, None) for tick in ticks]
-    shown = {text: tick for text, tick in zip(texts, ticks, strict=True) if 0.15 <= tick <= 0.9}
-    assert [*shown] == ["0.2", "", "0.5"]
+    ticks_between = {
+        text: tick for text, tick in zip(texts, ticks, strict=True) if 0.15 <= tick <= 0.9
+    }
+    assert [*ticks_between] == ["0.2", "", "0.5"]
     assert sum(0.15 <= tick <= 0.9 for tick in ticks) == 8
 
 
@@ -742,8 +746,8 @@ def test_where_gains_come_from_is_a_sentence_beside_the_title_or_in_the_key(one)
     runs = [one, *[dataclasses.replace(one, scenario=own)] * 2]
     for names in (["a", "b", "c"], ["that with default gains", "another relay", "a third relay"]):
         page = figure(runs, labels=names)
-        first, *others = names
-        words = f"gains: default for {first}, given for {' and '.join(others)}"
+        first, *rest = names
+        words = f"gains: default for {first}, given for {' and '.join(rest)}"
         beside = [text.get_text() for text in page.artists if isinstance(text, Text)]
         key = str(page.get_label())
         assert (words in beside) == (words not in key) == (first == "a")

@@ -147,7 +147,9 @@ def balance():
         response=complex(-0.02, 0.003),
     )
     changes = [StepChange(0.06, 0.0), StepChange(0.04, 0.05)]
-    return nyquist(scenarios, 0, [cycle, Chattering()], [made(one) for one in scenarios], changes)
+    return nyquist(
+        scenarios, 0, [cycle, Chattering()], [made(scenario) for scenario in scenarios], changes
+    )
 
 
 def basins() -> list[Basin]:
@@ -192,10 +194,10 @@ def places(line: Line2D) -> np.ndarray:
 
 def every(page) -> list[Axes]:
     """All axes that show data, also those within others."""
-    found = list(page.axes)
+    drawn_axes = list(page.axes)
     for ax in page.axes:
-        found += ax.child_axes
-    return [ax for ax in found if ax.lines or ax.collections]
+        drawn_axes += ax.child_axes
+    return [ax for ax in drawn_axes if ax.lines or ax.collections]
 
 
 @pytest.mark.parametrize("kind", PAGES)
@@ -209,7 +211,9 @@ def test_every_axis_has_its_unit_every_colour_its_name_and_every_mark_a_place(ki
     assert all(ax.get_ylabel() for ax in outer)
     labelled = [ax for ax in every(page) if ax.get_xlabel()]
     for ax in every(page):
-        assert ax in labelled or any(np.allclose(ax.get_xlim(), one.get_xlim()) for one in labelled)
+        assert ax in labelled or any(
+            np.allclose(ax.get_xlim(), labelled_axes.get_xlim()) for labelled_axes in labelled
+        )
         low, high = sorted(ax.get_xlim())
         for line in ax.lines:
             if line.get_transform() == ax.transData and len(places(line)) == 1:
@@ -222,8 +226,10 @@ def test_every_axis_has_its_unit_every_colour_its_name_and_every_mark_a_place(ki
     legends: list = page.findobj(Legend)
     for legend in legends:
         assert all(text.get_text() for text in legend.get_texts())
-        for one in legend.legend_handles:
-            entries.add(to_hex(one.get_color() if isinstance(one, Line2D) else one.get_facecolor()))
+        for handle in legend.legend_handles:
+            entries.add(
+                to_hex(handle.get_color() if isinstance(handle, Line2D) else handle.get_facecolor())
+            )
     drawn = {to_hex(line.get_color()) for ax in every(page) for line in ax.lines} - NEUTRAL
     assert drawn <= entries
 
@@ -375,7 +381,7 @@ def test_the_settling_band_is_two_percent_around_the_reference():
     traces = machines()
     ax = shown(figure(traces), "position x (m)")
     band = next(
-        one for one in ax.collections if to_hex(one.get_facecolor()[0]) == to_hex(style.BAND)
+        patch for patch in ax.collections if to_hex(patch.get_facecolor()[0]) == to_hex(style.BAND)
     )
     low, high = band.get_paths()[0].get_extents().intervaly
     half = 0.02 * abs(traces[0].x[0, 0] - traces[0].r[0, 0])
@@ -432,8 +438,8 @@ def test_no_axis_has_an_exponent_and_its_numbers_are_in_its_unit(size, unit, fac
         numbers[float(text.get_text().replace("−", "-"))] = float(text.get_position()[1])
     assert [value * factor for value in numbers.values()] == pytest.approx([*numbers])
     linear = []
-    for each in every(page):
-        for axis in (each.xaxis, each.yaxis):
+    for axes in every(page):
+        for axis in (axes.xaxis, axes.yaxis):
             if axis.get_scale() == "linear":
                 linear.append(axis)
     assert not [axis.offsetText.get_text() for axis in linear if axis.offsetText.get_text()]
@@ -471,7 +477,7 @@ def test_the_key_of_a_map_has_its_colours(page):
 
 def test_shares_of_a_map_are_those_of_its_states_and_add_up():
     page = region_figure.draw(basins())
-    for ax, its in zip(page.axes, basins(), strict=True):
+    for ax, basin in zip(page.axes, basins(), strict=True):
         legend = ax.get_legend()
         assert legend is not None
         texts = [text.get_text() for text in legend.get_texts()]
@@ -493,10 +499,10 @@ def test_shares_of_a_map_are_those_of_its_states_and_add_up():
             colours.append(to_hex(colour))
         assert (
             colours[0]
-            == style.ramp(style.law_colour(its.law), 3, region_figure.LIGHTEST)[2].lower()
+            == style.ramp(style.law_colour(basin.law), 3, region_figure.LIGHTEST)[2].lower()
         )
         assert colours[4] == style.FAILED.lower(), "grey, not another law's orange"
-        assert ax.get_title(loc="left") == style.law_name(its.law)
+        assert ax.get_title(loc="left") == style.law_name(basin.law)
     assert page.legends[0].get_title().get_text() == "Van der Pol oscillator"
     assert "gains: tuned here" in [text.get_text() for text in page.texts + page.artists]
 
@@ -561,9 +567,9 @@ REFUSED = {  # call -> arguments, and what replaces them
 
 @pytest.mark.parametrize("call", REFUSED, ids=lambda call: call.__name__)
 def test_what_cannot_be_drawn_is_refused(call, refused):
-    given, changes = REFUSED[call]
+    arguments_given, changes = REFUSED[call]
     for change in changes:
-        refused(lambda arguments=given | change: call(**arguments))
+        refused(lambda arguments=arguments_given | change: call(**arguments))
 
 
 def test_a_free_body_has_the_errors_that_count_and_the_forces_of_its_actuators():
@@ -576,9 +582,11 @@ def test_a_free_body_has_the_errors_that_count_and_the_forces_of_its_actuators()
     )
     labels = [panel.label for panel in panels.worst_first(traces)]
     assert sorted(labels) == ["body_rz e (rad)", "body_x e (m)", "body_y e (m)", "body_z e (m)"]
-    shown = panels.actuators(traces)
-    assert [panel.label for panel in shown] == [f"actuator {i} u (N)" for i in (1, 2, 3, 4)]
-    for i, panel in enumerate(shown):
+    actuator_panels = panels.actuators(traces)
+    assert [panel.label for panel in actuator_panels] == [
+        f"actuator {i} u (N)" for i in (1, 2, 3, 4)
+    ]
+    for i, panel in enumerate(actuator_panels):
         np.testing.assert_array_equal(panel.traces[0].u, traces[0].applied[:, i : i + 1])
     drawn = " ".join(ax.get_ylabel() for ax in figure(traces[0]).axes)
     assert sorted(map("".join, re.findall(r"actuator (\d)|\bu (\d)", drawn))) == [

@@ -38,11 +38,11 @@ def test_a_blow_and_a_payload_are_marked_and_named(trace):
     )
     hit = dataclasses.replace(trace, scenario=dataclasses.replace(trace.scenario, disturbance=push))
     page = figure([hit])
-    shown = page.axes[:4]
-    assert shown[3].get_ylabel().startswith("tip off its path")
-    assert [text.get_text() for ax in shown for text in ax.texts] == ["blow of 50 N for 20 ms"]
+    time_axes = page.axes[:4]
+    assert time_axes[3].get_ylabel().startswith("tip off its path")
+    assert [text.get_text() for ax in time_axes for text in ax.texts] == ["blow of 50 N for 20 ms"]
     assert page.get_label().endswith("dots: blow")
-    for ax in shown:
+    for ax in time_axes:
         assert [0.1, 0.1] in [list(line.get_xdata()) for line in ax.lines]
     push = smc.signals.Push(
         "link5",

@@ -39,16 +39,18 @@ def test_no_drawn_range_is_smaller_than_the_data_s(n):
 def test_a_band_is_as_narrow_as_channels_that_cross(samples):
     """Two lines through one point were a block of 20 ms there, far beyond both."""
     t = np.linspace(0.0, 1.0, samples + 1)
-    at, low, high = decimate.band(t, np.stack([t - 0.5, 0.5 - t], axis=1))
-    np.testing.assert_allclose(high, np.abs(at - 0.5), atol=2e-3)
-    np.testing.assert_allclose(low, -np.abs(at - 0.5), atol=2e-3)
+    band_times, low, high = decimate.band(t, np.stack([t - 0.5, 0.5 - t], axis=1))
+    np.testing.assert_allclose(high, np.abs(band_times - 0.5), atol=2e-3)
+    np.testing.assert_allclose(low, -np.abs(band_times - 0.5), atol=2e-3)
 
 
 def test_a_band_has_no_gaps_of_20_ms_between_swings_and_keeps_longer_ones():
     t = np.linspace(0.0, 3.0, 3001)
     pauses = (t % 0.1 < 0.015) | ((t > 1.0) & (t < 1.2))
-    at, low, high = decimate.band(t, np.where(pauses, 0.0, (-1.0) ** np.arange(3001))[:, None])
-    rest = (at > 1.02) & (at < 1.18)
+    band_times, low, high = decimate.band(
+        t, np.where(pauses, 0.0, (-1.0) ** np.arange(3001))[:, None]
+    )
+    rest = (band_times > 1.02) & (band_times < 1.18)
     assert high[rest].max() == 0.0 == low[rest].min()
-    assert (high[(at > 0.05) & (at < 0.95)] == 1.0).all()
-    assert (low[(at > 1.25) & (at < 2.95)] == -1.0).all()
+    assert (high[(band_times > 0.05) & (band_times < 0.95)] == 1.0).all()
+    assert (low[(band_times > 1.25) & (band_times < 2.95)] == -1.0).all()

@@ -47,12 +47,12 @@ def test_letters_have_11_px_in_a_readme_and_a_slide_has_three_panels_with_letter
 ):
     """At 800 px ticks had 8 px. A column's PNG had 150 dots an inch."""
     trace = smc.run(smc.Scenario(plant="duffing", law=smc.law("classical"), duration=0.2))
-    whole = smc.figure(trace)
+    full_page = smc.figure(trace)
     sizes = []
-    for text in whole.findobj(Text):
+    for text in full_page.findobj(Text):
         if text.get_text().strip():
             sizes.append(float(text.get_fontsize()))
-    assert min(sizes) / 72 * 800 / whole.get_figwidth() > 10.7
+    assert min(sizes) / 72 * 800 / full_page.get_figwidth() > 10.7
     slide = smc.figure(trace, size="slide")
     assert slide.get_size_inches().tolist() == [13.3, 7.5]
     assert len(slide.axes) == 3

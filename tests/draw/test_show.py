@@ -31,15 +31,15 @@ def trace() -> smc.Trace:
 @pytest.fixture
 def cell(monkeypatch) -> list[str]:
     """A notebook's cell: the HTML that it shows, in order."""
-    shown: list[str] = []
+    texts: list[str] = []
     display = types.ModuleType("IPython.display")
     display.HTML = str
     display.display = lambda text, **_: (
-        shown.append(text) or types.SimpleNamespace(update=lambda text: None)
+        texts.append(text) or types.SimpleNamespace(update=lambda text: None)
     )
     monkeypatch.setitem(sys.modules, "IPython.display", display)
     monkeypatch.setattr(html, "in_notebook", lambda: True)
-    return shown
+    return texts
 
 
 def content(shown: str) -> bytes:
@@ -84,8 +84,8 @@ def test_frames_are_those_of_the_film_again_and_again(trace):
 @without_charts
 def test_mediapy_takes_the_frames_with_their_speed(trace):
     mediapy = pytest.importorskip("mediapy")
-    shown = mediapy.show_video(smc.film(trace, **FILM), return_html=True)
-    assert probe(content(shown)) == (320, 180, 20.0, 5)
+    video = mediapy.show_video(smc.film(trace, **FILM), return_html=True)
+    assert probe(content(video)) == (320, 180, 20.0, 5)
 
 
 @renders
@@ -93,11 +93,11 @@ def test_mediapy_takes_the_frames_with_their_speed(trace):
 def test_show_films_traces_and_frames(cell, trace):
     smc.show([trace, trace], labels=["a", "b"], **FILM)
     smc.show(smc.film(trace, **FILM))
-    assert [probe(content(shown)) for shown in cell if shown] == [(320, 180, 20.0, 5)] * 2
-    for shown in cell:
-        if shown:
-            assert 'width="320"' in shown
-            assert "max-width:100%" in shown
+    assert [probe(content(text)) for text in cell if text] == [(320, 180, 20.0, 5)] * 2
+    for text in cell:
+        if text:
+            assert 'width="320"' in text
+            assert "max-width:100%" in text
     assert content(cell[0]) != content(cell[-1])
 
 

@@ -71,10 +71,10 @@ def test_a_browser_shows_the_machine(port, words):
                 page = browser.new_page()
                 page.goto(address)
                 page.wait_for_timeout(8000)
-                other = browser.new_page()
-                without = other.goto(f"http://127.0.0.1:{port}/").status
-                other.goto("data:text/html,<p>other</p>")
-                knows = other.evaluate(FOREIGN, address)
+                foreign_page = browser.new_page()
+                without = foreign_page.goto(f"http://127.0.0.1:{port}/").status
+                foreign_page.goto("data:text/html,<p>other</p>")
+                knows = foreign_page.evaluate(FOREIGN, address)
                 fewer = page.evaluate("document.getElementById('canvas').width / innerWidth")
                 picture = np.asarray(Image.open(io.BytesIO(page.screenshot()))).astype(int)
         finally:

@@ -122,9 +122,9 @@ def test_studio_s_second_port_is_for_this_process_alone(server):
     with Door(server).bind_inner() as inner:
         address = inner.getsockname()
         code = f"import socket; print(socket.create_connection({address}).recv(9))"
-        with subprocess.Popen([sys.executable, "-SEc", code], stdout=subprocess.PIPE) as other:
+        with subprocess.Popen([sys.executable, "-SEc", code], stdout=subprocess.PIPE) as stranger:
             with pytest.raises(ConnectionAbortedError):
                 inner.accept()
-            assert other.communicate()[0] == b"b''\n"
+            assert stranger.communicate()[0] == b"b''\n"
         with socket.create_connection(address) as own, inner.accept()[0] as taken:
             assert taken.getpeername() == own.getsockname()

@@ -28,26 +28,26 @@ def test_labels_do_not_touch(width, low, high):
         ax = page.add_axes((0.1, 0.4, 0.8, 0.5), xlim=(low, high))
         pages.space_ticks(page)
         page.draw_without_rendering()
-    shown = []
+    labels = []
     for tick in ax.xaxis.get_major_ticks():
         if low <= tick.get_loc() <= high:
-            shown.append(tick.label1)
-    boxes = sorted((label.get_window_extent() for label in shown), key=lambda box: box.x0)
+            labels.append(tick.label1)
+    boxes = sorted((label.get_window_extent() for label in labels), key=lambda box: box.x0)
     assert 1 <= len(boxes) <= pages.MAX_TICKS + 1
     assert len(boxes) >= 2 or width == 1.0
-    for one, other in itertools.pairwise(boxes):
-        assert one.x1 < other.x0
+    for label_box, next_box in itertools.pairwise(boxes):
+        assert label_box.x1 < next_box.x0
 
 
 def test_ticks_that_were_set_and_logarithmic_axes_stay():
     page = Figure()
-    one, other = page.subplots(2)
-    one.set_xticks([0.1, 0.2])
-    other.set(xscale="log", xlim=(1.0, 1e4))
-    before = other.get_xticks()
+    linear_axes, log_axes = page.subplots(2)
+    linear_axes.set_xticks([0.1, 0.2])
+    log_axes.set(xscale="log", xlim=(1.0, 1e4))
+    before = log_axes.get_xticks()
     pages.space_ticks(page)
-    assert one.get_xticks() == pytest.approx([0.1, 0.2])
-    assert other.get_xticks() == pytest.approx(before)
+    assert linear_axes.get_xticks() == pytest.approx([0.1, 0.2])
+    assert log_axes.get_xticks() == pytest.approx(before)
 
 
 @pytest.mark.parametrize(
@@ -58,10 +58,10 @@ def test_a_logarithmic_axis_has_two_numbers_at_least_in_one_line(ends):
     ax = page.add_axes((0.1, 0.4, 0.8, 0.5), xscale="log", xlim=ends)
     panels.number_decades(ax.xaxis, ends)
     page.draw_without_rendering()
-    shown = []
+    labels = []
     for label in ax.get_xticklabels(which="both"):
         if label.get_text() and ends[0] <= label.get_position()[0] <= ends[1]:
-            shown.append(label)
-    assert len(shown) >= 2
-    tops = [label.get_window_extent().y1 for label in shown]
+            labels.append(label)
+    assert len(labels) >= 2
+    tops = [label.get_window_extent().y1 for label in labels]
     assert max(tops) - min(tops) < 0.5  # pixels

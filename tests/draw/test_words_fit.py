@@ -44,9 +44,9 @@ def check_curves(page):
 def runs(name):
     """The runs of a scene's film, and what it calls them."""
     scene = scenes.read(scenes.find(name))
-    shown = scene.conditions[scene.film]
+    scenarios = scene.conditions[scene.film]
     short = []
-    for scenario in shown.values():
+    for scenario in scenarios.values():
         change = scenario.jump.time if scenario.jump else 0.0
         if scenario.fault:
             change = scenario.fault.at
@@ -55,7 +55,7 @@ def runs(name):
     title = scene.title
     if len(scene.conditions) > 1:
         title += f", {scene.film}"
-    return smc.run(short), [*map(style.label, shown)], title, scene.camera
+    return smc.run(short), [*map(style.label, scenarios)], title, scene.camera
 
 
 SCENES = []
@@ -75,8 +75,8 @@ def test_a_scene_s_pictures_cut_and_overprint_nothing(name, monkeypatch):
     words_of(page, monkeypatch, whole=True)
     if all(trace.diverged_at is None for trace in traces):
         check_curves(page)
-    at = 0.5 * min(trace.t[-1] for trace in traces)
-    [*_] = film.Frames(traces, labels, title, camera=chosen, at=at)
+    half_time = 0.5 * min(trace.t[-1] for trace in traces)
+    [*_] = film.Frames(traces, labels, title, camera=chosen, at=half_time)
     check(boxes)
     assert min(shares) >= SMALLEST
 

@@ -76,19 +76,19 @@ def test_a_trail_is_drawn_until_now_from_a_second_before_if_followed(
     t = np.linspace(0.0, 2.0, 41)
     path = np.stack([t, 0.0 * t, np.ones(41)], axis=1)
     monkeypatch.setattr(tip, "tip_paths", lambda trace: (path, path[:1]))
-    shown = overlay(dataclasses.replace(trace, t=t), np.array([1.48, 1.5]))
-    shown.stage.followed = followed
-    inked = (shown.over(paper(), 0)[100] == style.rgb(COLOUR)).all(axis=1)
+    arm_overlay = overlay(dataclasses.replace(trace, t=t), np.array([1.48, 1.5]))
+    arm_overlay.stage.followed = followed
+    inked = (arm_overlay.over(paper(), 0)[100] == style.rgb(COLOUR)).all(axis=1)
     assert np.flatnonzero(inked)[[0, -1]] == pytest.approx([first, 200], abs=2)
 
 
 def test_no_path_is_drawn_below_the_floor(trace, monkeypatch):
     low = np.array([[0.0, 0.0, 0.5], [0.5, 0.0, -0.5], [1.0, 0.0, -40.0]])
     monkeypatch.setattr(tip, "tip_paths", lambda trace: (low, low))
-    shown = overlay(dataclasses.replace(trace, t=np.array([0.0, 0.1, 0.2])))
+    arm_overlay = overlay(dataclasses.replace(trace, t=np.array([0.0, 0.1, 0.2])))
     floor = project(np.zeros((1, 3)))[0, 1]
-    for path in (shown.path, shown.wanted):
-        rows = np.flatnonzero((drawn(shown, path) != 255).any(axis=(1, 2)))
+    for path in (arm_overlay.path, arm_overlay.wanted):
+        rows = np.flatnonzero((drawn(arm_overlay, path) != 255).any(axis=(1, 2)))
         assert floor - 55 <= rows.min() <= floor - 45
         assert rows.max() <= floor + 2
 
@@ -104,8 +104,8 @@ def test_a_blow_is_an_arrow_that_ends_before_its_body(trace):
         ),
     )
     body = (2.0, 0.0, 1.0)  # 250, 100 px
-    shown = overlay(hit, body=body)
-    before, during = (shown.over(paper(), frame) for frame in (0, 1))
+    arm_overlay = overlay(hit, body=body)
+    before, during = (arm_overlay.over(paper(), frame) for frame in (0, 1))
     hue = np.array(style.rgb(style.DISTURBANCE))
     y, x = np.nonzero((during == hue).all(axis=2) & ~(before == hue).all(axis=2))
     assert 250 - 100 * arm.BLOW_DISTANCE - 3 <= x.max() <= 250 - 100 * arm.BLOW_DISTANCE + 1
@@ -115,7 +115,7 @@ def test_a_blow_is_an_arrow_that_ends_before_its_body(trace):
     frames = []
     for frame in range(5):
         frames.append(overlay(hit, edges, body, 0.12).over(paper(), frame))
-    assert [(each[y, x] == hue).all() for each in frames] == [False, True, True, True, False]
+    assert [(picture[y, x] == hue).all() for picture in frames] == [False, True, True, True, False]
 
 
 def test_the_usual_force_of_a_contact_sets_the_scale_of_its_arrow(trace, monkeypatch):
@@ -124,9 +124,9 @@ def test_the_usual_force_of_a_contact_sets_the_scale_of_its_arrow(trace, monkeyp
     push = np.outer(force, [0.0, 0.0, 1.0])
     monkeypatch.setattr(tip, "knows_contacts", lambda scenario: True)
     monkeypatch.setattr(tip, "contacts", lambda trace: SimpleNamespace(push=push, force=force))
-    shown = overlay(trace, body=(2.0, 0.0, 1.0))
+    arm_overlay = overlay(trace, body=(2.0, 0.0, 1.0))
     for frame, length in ((0, 220 - 100 - arm.RIM), (1, 100 * arm.FORCE_ARROW)):
-        inked = shown.over(paper(), frame)[:, 250] == np.array(style.rgb(style.REACTION))
+        inked = arm_overlay.over(paper(), frame)[:, 250] == np.array(style.rgb(style.REACTION))
         rows = np.flatnonzero(inked.all(axis=1))
         assert 1 + np.ptp(rows) == pytest.approx(length, abs=3)
         assert (np.diff(rows) > 1).any() == (frame == 0)  # the one that is cut has a break mark
@@ -143,8 +143,8 @@ def test_a_blow_on_an_arm_is_shown_in_slow_motion(trace, monkeypatch):
             width=0.02,
         ),
     )
-    found = pace.clock([hit], 30.0)
-    slow = np.abs(found.times - 0.31) < 0.02
-    assert set(found.speeds[slow]) == {0.5**pace.MAX_HALVINGS}
+    film_clock = pace.clock([hit], 30.0)
+    slow = np.abs(film_clock.times - 0.31) < 0.02
+    assert set(film_clock.speeds[slow]) == {0.5**pace.MAX_HALVINGS}
     monkeypatch.setattr(pace, "MAX_LENGTH", (1.0, 0.0))
     assert len(pace.clock([hit], 30.0).times) <= 0.5 * 30 + 2

@@ -71,12 +71,12 @@ def test_an_own_model_s_camera_is_found_by_its_name(trace):
 @pytest.mark.slow
 @renders
 def test_links_without_a_colour_have_the_law_s_and_other_bodies_their_own(trace):
-    with staged(trace, SIZE) as shown:
-        (link,) = shown.links
-        ball = next(i for i in range(shown.model.ngeom) if shown.model.geom_rgba[i, 1] > 0.8)
+    with staged(trace, SIZE) as stage:
+        (link,) = stage.links
+        ball = next(i for i in range(stage.model.ngeom) if stage.model.geom_rgba[i, 1] > 0.8)
         # blue, not MuJoCo's grey
-        assert shown.model.geom_rgba[link, 2] > 2 * shown.model.geom_rgba[link, 0]
-        assert shown.model.geom_rgba[ball, :3] == pytest.approx([0.2, 0.9, 0.2])
+        assert stage.model.geom_rgba[link, 2] > 2 * stage.model.geom_rgba[link, 0]
+        assert stage.model.geom_rgba[ball, :3] == pytest.approx([0.2, 0.9, 0.2])
 
 
 def test_joints_without_a_channel_move_as_in_the_run(trace):
@@ -88,13 +88,13 @@ def test_joints_without_a_channel_move_as_in_the_run(trace):
     assert arm == pytest.approx(np.interp(times, trace.t, trace.x[:, 0]), abs=1e-9)
     assert motion.poses[:, 3] == pytest.approx(2.0 - 9.81 * times**2 / 2, abs=1e-2)
     assert motion.at(0.2)[3] == motion.poses[1, 3]
-    shown = puppet.Puppet.of(trace.scenario)
-    assert shown.qpos(np.array([1.0]), rest=motion.poses[2])[[0, 3]] == pytest.approx(
+    machine = puppet.Puppet.of(trace.scenario)
+    assert machine.qpos(np.array([1.0]), rest=motion.poses[2])[[0, 3]] == pytest.approx(
         [1.0, motion.poses[2, 3]]
     )
     (run,) = tracks([trace], ["#0072B2"])
     run.motion = motion
-    points, placed = shown.placed(run, shown.course(run), False, FRONT)
+    points, placed = machine.placed(run, machine.course(run), False, FRONT)
     low = points[:, 2].min() - placed.height
     # the ball is in the picture
     assert low == pytest.approx(motion.poses[:, 3].min() - 0.1, abs=0.2)
@@ -129,10 +129,10 @@ def test_fixed_things_that_are_apart_or_larger_than_four_times_what_moves_may_le
             x0=0.0,
         )
     )
-    shown = puppet.Puppet.of(trace.scenario)
+    machine = puppet.Puppet.of(trace.scenario)
     (run,) = tracks([trace], ["#0072B2"])
-    course = shown.course(run)
-    points, placed = shown.placed(run, course, False, FRONT)
+    course = machine.course(run)
+    points, placed = machine.placed(run, course, False, FRONT)
     reach, _ = placed.surrounded(points, [course], camera.turn(90.0, -12.0))
     assert bool(np.ptp(reach[:, 0]) > 1.01) is seen
 
@@ -142,12 +142,12 @@ def test_camera_sees_all_points_as_near_as_it_can():
     turn = np.array([[1.0, 0, 0], [0, 0.3, -(0.91**0.5)], [0, 0.91**0.5, 0.3]])
     room = camera.Room(100, 50, 1200, 400)
     px = camera.project(points, turn, camera.fit(points, turn, (1280, 460), room), (1280, 460))
-    (left, top), (right, bottom) = px.min(axis=0), px.max(axis=0)
-    assert left >= 100 - 1e-6
+    (leftmost, top), (right, bottom) = px.min(axis=0), px.max(axis=0)
+    assert leftmost >= 100 - 1e-6
     assert right <= 1200 + 1e-6
     assert top >= 50 - 1e-6
     assert bottom <= 400 + 1e-6
-    assert right - left == pytest.approx(1100) or bottom - top == pytest.approx(350)
+    assert right - leftmost == pytest.approx(1100) or bottom - top == pytest.approx(350)
 
 
 def test_a_camera_that_follows_goes_back_while_the_reference_is_far_but_not_for_one_that_flees():

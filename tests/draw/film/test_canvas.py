@@ -25,14 +25,14 @@ def changed(one, other):
 
 def test_a_changed_colour_or_shape_is_drawn():
     jump = smc.Jump(0.5, {"l": 1.5})
-    with stage("inverted_pendulum", jump=jump) as shown:
-        shown.arrange(np.zeros(1))
-        first = shown.render()
-        shown.set_colour("#A9AFB6")
-        grey = shown.render()
-        shown.arrange(np.zeros(1), time=0.6)
-        for other in (first, shown.render()):
-            assert (changed(other, grey) > 50).sum() > 50
+    with stage("inverted_pendulum", jump=jump) as view:
+        view.arrange(np.zeros(1))
+        first = view.render()
+        view.set_colour("#A9AFB6")
+        grey = view.render()
+        view.arrange(np.zeros(1), time=0.6)
+        for unlike in (first, view.render()):
+            assert (changed(unlike, grey) > 50).sum() > 50
 
 
 def test_the_ground_of_van_der_pol_has_no_law_s_colour_and_two_greys():
@@ -44,10 +44,10 @@ def test_the_ground_of_van_der_pol_has_no_law_s_colour_and_two_greys():
 
 
 def test_shadows_lie_on_the_floor_where_the_light_casts_them_with_smooth_edges():
-    with stage("inverted_pendulum") as shown:
-        lit = shown.render().astype(int)
-        shown.canvas.casts[:] = False
-        bare = shown.render().astype(int)
+    with stage("inverted_pendulum") as view:
+        lit = view.render().astype(int)
+        view.canvas.casts[:] = False
+        bare = view.render().astype(int)
     darker = (bare - lit).min(axis=2)
     shadow = np.median(darker[darker > 10])
     edge = (darker > 0.2 * shadow) & (darker < 0.8 * shadow)
@@ -56,38 +56,38 @@ def test_shadows_lie_on_the_floor_where_the_light_casts_them_with_smooth_edges()
 
 
 def test_an_outline_stands_where_the_reference_is():
-    with stage("van_der_pol") as shown:
-        shown.arrange(np.array([1.5]))
-        alone = shown.render()
-        shown.arrange(np.array([1.5]), goal=np.array([0.1]))
-        outline = changed(shown.render(), alone) > 20
+    with stage("van_der_pol") as view:
+        view.arrange(np.array([1.5]))
+        alone = view.render()
+        view.arrange(np.array([1.5]), goal=np.array([0.1]))
+        outline = changed(view.render(), alone) > 20
         columns = np.flatnonzero(outline.any(axis=0))
         assert outline.sum() > 100
         assert columns.max() < 0.6 * SIZE[0]
-        shown.arrange(np.array([1.5]))
-        assert (changed(shown.render(), alone) > SEEN).mean() < 3e-4
+        view.arrange(np.array([1.5]))
+        assert (changed(view.render(), alone) > SEEN).mean() < 3e-4
 
 
 def test_an_outline_is_a_line_and_covers_nothing():
     """A machine of the drone's grey was mistaken for its reference."""
-    with stage("inverted_pendulum") as shown:
-        shown.arrange(np.array([0.6]))
-        alone = shown.render()
-        shown.arrange(np.array([0.6]), goal=np.array([0.0]))
-        outline = changed(shown.render(), alone) > 20
-        shown.arrange(np.array([0.0]))
-        there = changed(shown.render(), alone) > 20
-    assert 50 < outline.sum() < 0.3 * there.sum()
+    with stage("inverted_pendulum") as view:
+        view.arrange(np.array([0.6]))
+        alone = view.render()
+        view.arrange(np.array([0.6]), goal=np.array([0.0]))
+        outline = changed(view.render(), alone) > 20
+        view.arrange(np.array([0.0]))
+        machine = changed(view.render(), alone) > 20
+    assert 50 < outline.sum() < 0.3 * machine.sum()
 
 
 def test_an_outline_that_the_picture_s_edge_would_cut_is_not_drawn():
-    with stage("inverted_pendulum") as shown:
-        edge = shown.project(np.zeros((1, 3)))[0, 0]
-        metre = shown.project(shown.turn[:, :1].T)[0, 0] - edge
+    with stage("inverted_pendulum") as view:
+        edge = view.project(np.zeros((1, 3)))[0, 0]
+        metre = view.project(view.turn[:, :1].T)[0, 0] - edge
         for beyond, drawn in ((-60.0, True), (0.0, False)):  # px of the rod from the left edge
-            shown.model.cam_pos[shown.camera] += (edge + beyond) / metre * shown.turn[:, 0]
-            shown.arrange(np.array([0.6]))
-            alone = shown.render()
-            shown.arrange(np.array([0.6]), goal=np.array([0.0]))
-            assert (changed(shown.render(), alone).max() > 50) == drawn
-            shown.model.cam_pos[shown.camera] -= (edge + beyond) / metre * shown.turn[:, 0]
+            view.model.cam_pos[view.camera] += (edge + beyond) / metre * view.turn[:, 0]
+            view.arrange(np.array([0.6]))
+            alone = view.render()
+            view.arrange(np.array([0.6]), goal=np.array([0.0]))
+            assert (changed(view.render(), alone).max() > 50) == drawn
+            view.model.cam_pos[view.camera] -= (edge + beyond) / metre * view.turn[:, 0]

@@ -34,12 +34,12 @@ def test_carts_share_a_picture_in_which_each_is_in_its_colour_and_larger():
     place = placed(traces, list(laws))
     assert place.lanes is not None
     assert place.tiles[0, 2] == place.tiles[1, 0]
-    (shown,) = film.Frames(traces, size=SIZE, at=0.2)
+    (frame,) = film.Frames(traces, size=SIZE, at=0.2)
     for colour in style.trace_colours(traces):
         r, g, b = style.rgb(colour)
         hue = np.array([r, g, b]) / max(r, g, b)
-        pixels = shown.reshape(-1, 3) / np.maximum(shown.reshape(-1, 3).max(axis=1), 1)[:, None]
-        strong = shown.reshape(-1, 3).max(axis=1) > 60
+        pixels = frame.reshape(-1, 3) / np.maximum(frame.reshape(-1, 3).max(axis=1), 1)[:, None]
+        strong = frame.reshape(-1, 3).max(axis=1) > 60
         assert (strong & (np.abs(pixels - hue).max(axis=1) < 0.12)).sum() > 300, colour
 
 
@@ -75,10 +75,10 @@ def test_a_still_holds_a_hit_as_long_as_the_film_does():
     )
     touch = run.t[states.in_contact(run).any(axis=1)]
     last = float(touch[touch < touch[0] + 0.1].max())
-    for after, told in ((0.0, True), (0.08, False)):
+    for after, blow_told in ((0.0, True), (0.08, False)):
         clock = smc.film(run, at=last + after).clock
         (state,) = states.timeline(run, clock.times, clock.played)
-        assert (state is not None) == told
+        assert (state is not None) == blow_told
         assert state is None or state.peak
 
 
@@ -122,11 +122,11 @@ def test_a_picture_says_how_far_what_the_camera_follows_is_off_its_place(drives)
 @renders
 def test_in_one_picture_of_several_machines_words_say_their_order(monkeypatch):
     """In grey nothing else tells the carts apart."""
-    made = film.Sheet
+    sheet_class = film.Sheet
     keys = []
 
     def kept(*parts, **fields):
-        page = made(*parts, **fields)
+        page = sheet_class(*parts, **fields)
         keys.append(page.key)
         return page
 
@@ -134,12 +134,12 @@ def test_in_one_picture_of_several_machines_words_say_their_order(monkeypatch):
     runs = []
     for law in ("classical", "adaptive"):
         runs.append(smc.run(smc.Scenario(plant="duffing", law=smc.law(law), duration=0.1)))
-    for shown, title in (
+    for film_runs, title in (
         (runs, None),
         (runs, "Two carts of one oscillator"),
         (runs[:1], None),
     ):
-        next(iter(film.Frames(shown, title=title, size=SIZE, at=0.05)))
+        next(iter(film.Frames(film_runs, title=title, size=SIZE, at=0.05)))
     assert ["back to front" in key for key in keys] == [True, True, False]
 
 
@@ -156,12 +156,12 @@ def test_the_name_of_one_machine_takes_nothing_of_the_picture_s_width():
 def test_dots_lead_from_a_machine_that_is_followed_to_where_it_should_be(off):
     drone = smc.plant("quadrotor")
     run = smc.run(smc.Scenario(plant=drone, law="geometric", x0=drone.rest, duration=0.05))
-    wanted = run.x + off * np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-    with staged(dataclasses.replace(run, r=wanted), SIZE) as shown:
-        still = np.asarray(shown.shot(0, 0.0), int)
-        shown.followed = np.zeros((1, 3))
-        dotted = np.asarray(shown.shot(0, 0.0), int)
-        ends = shown.project(np.array([run.x[0, :3], wanted[0, :3]]))
+    reference = run.x + off * np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    with staged(dataclasses.replace(run, r=reference), SIZE) as stage:
+        still = np.asarray(stage.shot(0, 0.0), int)
+        stage.followed = np.zeros((1, 3))
+        dotted = np.asarray(stage.shot(0, 0.0), int)
+        ends = stage.project(np.array([run.x[0, :3], reference[0, :3]]))
     y, x = np.nonzero((np.abs(dotted - still) > 60).any(axis=2))
     if off == 0.0:
         assert not len(x)
@@ -181,9 +181,11 @@ def test_arrows_of_carts_on_one_picture_begin_on_the_roof_of_their_own():
         model, data = puppet.model, puppet.data[0]
         data.qpos[:] = puppet.start
         world.forward(model, data)
-        found = arrows.path(model, data, puppet.mounts[0], arrows.Arrow(0.0, 1.0, arrows.WHITE))
-        assert found
+        arrow_path = arrows.path(
+            model, data, puppet.mounts[0], arrows.Arrow(0.0, 1.0, arrows.WHITE)
+        )
+        assert arrow_path
         cart = arrows.arrow_geom(model, model.jnt_bodyid[puppet.ids[0]])
         box = world.boxes(model, data)[cart]
-        assert found[0][0, :2] == pytest.approx(box[:, :2].mean(axis=0), abs=1e-6)
-        assert found[0][0, 2] == pytest.approx(box[:, 2].max(), abs=1e-6)
+        assert arrow_path[0][0, :2] == pytest.approx(box[:, :2].mean(axis=0), abs=1e-6)
+        assert arrow_path[0][0, 2] == pytest.approx(box[:, 2].max(), abs=1e-6)

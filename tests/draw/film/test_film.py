@@ -88,10 +88,10 @@ def machines(picture: np.ndarray) -> np.ndarray:
 def share(picture: np.ndarray, colour: str) -> float:
     """Share of pixels whose hue is that of a colour, whatever the light."""
     pixels = machines(picture).reshape(-1, 3).astype(float)
-    wanted = np.array(style.rgb(colour), float)
-    pixels, wanted = pixels - pixels.min(axis=1, keepdims=True), wanted - wanted.min()
+    target = np.array(style.rgb(colour), float)
+    pixels, target = pixels - pixels.min(axis=1, keepdims=True), target - target.min()
     strong = pixels.max(axis=1) > 60
-    alike = pixels @ wanted > 0.985 * np.linalg.norm(pixels, axis=1) * np.linalg.norm(wanted)
+    alike = pixels @ target > 0.985 * np.linalg.norm(pixels, axis=1) * np.linalg.norm(target)
     return float((strong & alike).mean())
 
 
@@ -127,13 +127,13 @@ def test_a_torque_s_arrow_points_to_where_it_moves_the_pendulum():
     with staged(trace, (640, 360)) as scene:
         scene.arrange(np.array([0.0]))
         upright = scene.render().astype(int)
-        left, right = (
+        leftwards, right = (
             column(scene.render([(0, Arrow(0.0, end, (1.0, 0.0, 0.0, 1.0)))]))
             for end in (-1.0, 1.0)
         )
         scene.arrange(np.array([0.4]))
         leaning = column(scene.render())
-    assert leaning * right > 0.0 > leaning * left
+    assert leaning * right > 0.0 > leaning * leftwards
 
 
 @renders
@@ -190,8 +190,8 @@ VARIANTS = [
 
 
 def realistic(law: str = "observer_free", plant: str = "duffing", **parts) -> smc.Trace:
-    given = smc.paper.scenario(plant, law).law
-    return smc.run(smc.Scenario(plant=plant, law=given, **({"duration": 2.0} | parts)))
+    shipped_law = smc.paper.scenario(plant, law).law
+    return smc.run(smc.Scenario(plant=plant, law=shipped_law, **({"duration": 2.0} | parts)))
 
 
 def moods(trace: smc.Trace, fps: float = 30.0) -> list[tuple[str | None, int]]:
@@ -223,12 +223,12 @@ def test_a_film_shows_all_that_a_scenario_s_mechanism_has(plant, field, name):
         **{field: name},
     )
     model = world.compose(scenario, 0.0, SIZE, camera.turn(90.0, 0.0))
-    shown = {model.geom(i).name for i in range(model.ngeom)}
-    wanted = []
+    drawn_geoms = {model.geom(i).name for i in range(model.ngeom)}
+    solid_geoms = []
     for geom in models.spec(scenario).geoms:
         if geom.name not in ("", "floor"):
-            wanted.append(geom.name)
-    assert [geom for geom in wanted if f"m/{geom}" not in shown] == []
+            solid_geoms.append(geom.name)
+    assert [geom for geom in solid_geoms if f"m/{geom}" not in drawn_geoms] == []
     assert model.nskin == len(models.spec(scenario).skins)
 
 
@@ -261,8 +261,8 @@ def test_a_blow_of_milliseconds_is_told_with_its_size_as_long_as_it_takes_to_rea
     assert after is None
     assert frames / 30 >= states.HOLD_TIME
     reported = states.timeline(hit, seconds(hit))
-    told = [k for k, now in enumerate(reported) if now]
-    assert told[0] == np.ceil(touching[0] * 30)  # at once, and not before
+    frames_told = [k for k, now in enumerate(reported) if now]
+    assert frames_told[0] == np.ceil(touching[0] * 30)  # at once, and not before
     faded = [now.opacity for now in reported if now]
     assert faded[0] > 0.7
     assert faded[-1] < 0.4
@@ -274,8 +274,8 @@ def test_what_is_told_lasts_in_the_film_not_in_the_run(hit):
     slow = pace.clock([hit], 30.0, 0.125)
     lasts = []
     for times, played in ((slow.times, slow.played), (hit.t, None)):
-        told = [now is not None for now in states.timeline(hit, times, played)]
-        lasts.append(float(np.ptp(times[told])))
+        is_told = [now is not None for now in states.timeline(hit, times, played)]
+        lasts.append(float(np.ptp(times[is_told])))
     touch = float(np.ptp(hit.t[states.in_contact(hit)[:, 0]]))
     held = states.HOLD_TIME + states.MIN_STATE_TIME
     assert lasts[1] == pytest.approx(held, abs=0.01)
@@ -312,10 +312,10 @@ def test_of_a_failed_machine_the_failure_is_told(stuck):
 @renders
 def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
     slack = realistic(plant="inverted_pendulum", actuator=smc.Backlash(0.2), duration=0.5)
-    with staged(slack, (480, 170)) as shown:
-        rotor, joint = (shown.data.joint(f"m/{name}") for name in ("rotor:hinge", "hinge"))
+    with staged(slack, (480, 170)) as stage:
+        rotor, joint = (stage.data.joint(f"m/{name}") for name in ("rotor:hinge", "hinge"))
         for flank in (-1.0, 0.0, 1.0):
-            shown.arrange(np.array([0.3]), np.array([flank * 0.1]))
+            stage.arrange(np.array([0.3]), np.array([flank * 0.1]))
             assert (rotor.qpos[0], joint.qpos[0]) == pytest.approx((0.3 + flank * 0.1, 0.3))
     pushed = np.flatnonzero(slack.reaction[:, 0] > 0)[0]
     clock = FilmClock(slack.t, np.ones(len(slack.t)))
@@ -334,9 +334,9 @@ def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
     assert np.corrcoef(ahead[10:-10], force[10:-10])[0, 1] > 0.9
     assert np.abs(ahead).max() > 0.02
     resting = realistic(contact="floor", duration=0.2)
-    with staged(resting, (480, 170)) as shown:
-        shown.arrange(np.array([0.4]))
-        assert shown.data.joint("m/lift").qpos[0] == 0.0
+    with staged(resting, (480, 170)) as stage:
+        stage.arrange(np.array([0.4]))
+        assert stage.data.joint("m/lift").qpos[0] == 0.0
 
 
 def test_friction_draws_an_arrow_of_its_own(stuck):
@@ -408,15 +408,15 @@ def test_a_cut_arrow_is_broken_and_says_its_number():
     trace = smc.run(smc.Scenario(plant="inverted_pendulum", law="none", duration=0.01, x0=0.0))
     red = (1.0, 0.0, 0.0, 1.0)
     inked = []
-    with staged(trace, (640, 360)) as shown:
-        shown.arrange(np.array([0.0]))
-        upright = shown.render().astype(int)
+    with staged(trace, (640, 360)) as stage:
+        stage.arrange(np.array([0.0]))
+        upright = stage.render().astype(int)
         for value, cut, words in ((1.0, False, ""), (50.0, True, ""), (50.0, True, "310 N·m")):
             arrow = Arrow(0.0, value, red, cut=cut, words=words)
-            picture = shown.render([(0, arrow)]).astype(int)
+            picture = stage.render([(0, arrow)]).astype(int)
             inked.append(((picture - upright)[..., 1:].min(axis=2) < -60) & (picture[..., 0] > 200))
-    whole, broken, numbered = inked
-    assert (whole & ~broken).sum() > 20  # the break
+    unbroken, broken, numbered = inked
+    assert (unbroken & ~broken).sum() > 20  # the break
     assert not (broken & ~numbered).any()  # the number is not over the arrow
     assert (numbered & ~broken).sum() > 100
 
@@ -439,35 +439,37 @@ def test_a_brief_peak_of_the_mean_does_not_set_the_longest_arrow(peak, samples, 
     )
     force = np.zeros((1001, 3))
     force[:, 1] = 3.0 * np.where(np.arange(1001) < samples, -peak, 2.0)
-    found = scales([dataclasses.replace(trace, applied=force, d=force)])
-    scale = found[driven([trace])]
+    arrow_scales = scales([dataclasses.replace(trace, applied=force, d=force)])
+    scale = arrow_scales[driven([trace])]
     assert scale.longest == scale.full == pytest.approx(longest)
-    assert key([trace], found) == [f"→ mean u {words}"]
+    assert key([trace], arrow_scales) == [f"→ mean u {words}"]
 
 
 def test_each_joint_of_a_double_pendulum_has_its_own_arrow():
     """A shoulder and an elbow are not alike: their mean says nothing."""
     run = smc.Scenario(plant="double_pendulum", law=smc.law("pid"), duration=0.2)
     trace = smc.run(run)
-    found = scales([trace])
-    assert key([trace], found)[0].startswith("→ u ")
-    sizes = scales_by_channel(found)
+    arrow_scales = scales([trace])
+    assert key([trace], arrow_scales)[0].startswith("→ u ")
+    sizes = scales_by_channel(arrow_scales)
     drawn = arrow_frames(trace, np.array([0.0, 0.05]), np.zeros(1), sizes, "#112233")
     assert {channel for channel, _ in drawn[0].arrows} == {0, 1}
 
 
 def test_behind_a_drive_the_force_is_shown_and_the_command_pale():
     slow = realistic(plant="inverted_pendulum", actuator=smc.Lag(0.2), duration=0.2)
-    found = scales([slow])
-    assert found[driven([slow])].drive
-    both = arrows(loads(slow, np.array([0.05, 0.06])), 0, 0, found[driven([slow])], "#0072B2")
-    solid, pale = (arrow for arrow in both if arrow.head)
+    arrow_scales = scales([slow])
+    assert arrow_scales[driven([slow])].drive
+    force_arrows = arrows(
+        loads(slow, np.array([0.05, 0.06])), 0, 0, arrow_scales[driven([slow])], "#0072B2"
+    )
+    solid, pale = (arrow for arrow in force_arrows if arrow.head)
     assert abs(solid.high) < 0.5 * abs(pale.high)  # a quarter of the lag's time constant
     assert solid.rgba[3] == 1.0
     assert pale.rgba[3] == 0.45
     assert solid.layer == 0
     assert pale.layer == 1
-    assert key([slow], found)[0].startswith("→ drive ")
+    assert key([slow], arrow_scales)[0].startswith("→ drive ")
     strong = scales([dataclasses.replace(slow, force=3.0 * slow.applied)])[driven([slow])]
     assert strong.control == pytest.approx(3.0 * np.abs(slow.applied).max())
     for words in key(runs(laws=LAWS[:1]), scales(runs(laws=LAWS[:1]))):

@@ -55,54 +55,54 @@ def test_curves_do_not_depend_on_how_long_a_run_goes_on_at_rest():
     curves = []
     for duration in (1.5, 10.0):
         scenario = smc.Scenario(plant="inverted_pendulum", law="adrc", duration=duration)
-        shown = sheet([smc.run(scenario)], ["one"], SIZE)
-        assert shown.runs.span[0] < 0.7
+        page = sheet([smc.run(scenario)], ["one"], SIZE)
+        assert page.runs.span[0] < 0.7
         own = []
-        for one in shown.moving:
-            lines = [line for line in one.axes.lines if line.get_gid() != panels.REFERENCE]
+        for moving in page.moving:
+            lines = [line for line in moving.axes.lines if line.get_gid() != panels.REFERENCE]
             own.append(max(lines, key=lambda line: len(line.get_xdata())))
         curves.append(own)
-    for one, other in zip(*curves, strict=True):
-        ax = one.axes
+    for first, longer in zip(*curves, strict=True):
+        ax = first.axes
         time = np.linspace(0.0, ax.get_xlim()[1], 1000)
-        apart = np.interp(time, *one.get_data()) - np.interp(time, *other.get_data())
+        apart = np.interp(time, *first.get_data()) - np.interp(time, *longer.get_data())
         assert np.abs(apart).max() < 0.01 * np.ptp(ax.get_ylim())
 
 
 def cursor(page, time):
     """Where the cursor is in the first panel, as a share of its width; none if it is not there."""
-    left, top, right, _ = page.frames[0]
-    row = picture(page, time).astype(int)[top + 5, left:right]
+    left_edge, top, right, _ = page.frames[0]
+    row = picture(page, time).astype(int)[top + 5, left_edge:right]
     inked = np.flatnonzero(np.abs(row - style.rgb(style.MUTED)).max(axis=1) < 30)
-    return inked.mean() / (right - left) if len(inked) else None
+    return inked.mean() / (right - left_edge) if len(inked) else None
 
 
 def test_panels_show_the_time_until_all_rest_and_then_the_cursor_is_gone(page):
     window = horizon(page.runs.traces)
     assert window < 1.0
-    for one in page.moving:
-        assert one.axes.get_xlim() == pytest.approx((0.0, window))
+    for panel_drawn in page.moving:
+        assert panel_drawn.axes.get_xlim() == pytest.approx((0.0, window))
     assert cursor(page, window / 2) == pytest.approx(0.5, abs=0.01)
     assert cursor(page, 2.0) is None
     after = picture(page, 2.0)
-    for left, top, right, bottom in page.frames:
-        panel = np.s_[top:bottom, left:right]
+    for left_edge, top, right, bottom in page.frames:
+        panel = np.s_[top:bottom, left_edge:right]
         assert (after[panel] == page.full[panel][..., :3]).all()
 
 
 def test_all_panels_have_the_same_ticks(page):
-    first, second = (one.axes for one in page.moving)
+    first, second = (panel.axes for panel in page.moving)
     assert first.get_xticks().tolist() == second.get_xticks().tolist()
     assert first.get_xticklabels()[-1].get_text().endswith(" s")
 
 
 def test_a_mark_says_when_each_law_has_settled(page):
     """e falls to 2 % of 0.5 after ln 50 / rate."""
-    left, top, right, bottom = page.frames[0]
+    left_edge, top, right, bottom = page.frames[0]
     seen = picture(page, 4.0).astype(int)[top - 20 : bottom]
     window = horizon(page.runs.traces)
     for rate, colour in zip((8.0, 16.0), page.runs.colours, strict=True):
-        middle = round(left + (right - left) * np.log(50.0) / rate / window)
+        middle = round(left_edge + (right - left_edge) * np.log(50.0) / rate / window)
         alike = np.abs(seen - style.rgb(colour)).max(axis=2) < 12
         near = alike[:, middle - 6 : middle + 7].sum()
         assert near > alike[:, middle + 20 : middle + 33].sum() + 20, rate
@@ -145,16 +145,16 @@ def test_a_map_shows_the_paths_of_flights_up_to_the_clock_to_one_scale():
     reference = [smc.Sine(0.5, 6.0), *[smc.Constant(0.0)] * 5]
     run = made(smc.Scenario(plant="quadrotor", reference=reference, law="geometric", duration=1.0))
     x = np.stack([part(6.0 * run.t) for part in (np.sin, np.cos, *[np.zeros_like] * 4)], axis=1)
-    shown = sheet([dataclasses.replace(run, x=0.4 * x)], ["one"], SIZE)
-    (one,) = shown.flights
-    transform = one.past.axes.transData  # pyright: ignore[reportOptionalMemberAccess]
-    line = transform.transform(one.places.T)
+    page = sheet([dataclasses.replace(run, x=0.4 * x)], ["one"], SIZE)
+    (flight,) = page.flights
+    transform = flight.past.axes.transData  # pyright: ignore[reportOptionalMemberAccess]
+    line = transform.transform(flight.places.T)
     assert np.ptp(line[:, 1]) == pytest.approx(np.ptp(line[:, 0]), rel=0.01)
-    now = picture(shown, 0.5).astype(int)
+    now = picture(page, 0.5).astype(int)
     for time, flown in ((0.2, True), (0.9, False)):
-        across, up = np.round(line[np.searchsorted(one.times, time)]).astype(int)
+        across, up = np.round(line[np.searchsorted(flight.times, time)]).astype(int)
         pixel = now[SIZE[1] - 1 - up, across]
-        assert (np.abs(pixel - style.rgb(shown.runs.colours[0])).max() < 20) == flown
+        assert (np.abs(pixel - style.rgb(page.runs.colours[0])).max() < 20) == flown
     assert not sheet([dataclasses.replace(run, r=0.0 * run.r)], ["one"], SIZE).flights
 
 
@@ -162,10 +162,10 @@ def test_on_a_map_the_wanted_path_lies_over_those_that_are_flown():
     """Three laws on one path hid it."""
     reference = [smc.Sine(0.5, 6.0), *[smc.Constant(0.0)] * 5]
     run = made(smc.Scenario(plant="quadrotor", reference=reference, law="geometric", duration=1.0))
-    shown = sheet([dataclasses.replace(run, x=run.r)], ["one"], SIZE)
-    left, top, right, bottom = shown.box(shown.page.axes[1])
-    seen = picture(shown, 1.0)[top:bottom, left:right].astype(int)
-    for colour in (style.INK, shown.runs.colours[0]):
+    page = sheet([dataclasses.replace(run, x=run.r)], ["one"], SIZE)
+    left_edge, top, right, bottom = page.box(page.page.axes[1])
+    seen = picture(page, 1.0)[top:bottom, left_edge:right].astype(int)
+    for colour in (style.INK, page.runs.colours[0]):
         assert (np.abs(seen - style.rgb(colour)).max(axis=2) < 40).sum() > 20
 
 

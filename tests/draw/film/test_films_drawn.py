@@ -45,22 +45,22 @@ def test_labels_stay_below_their_tiles_on_as_many_lines_as_were_measured(wide):
     size = (640, 360)
     high = float(label_sizes(names, size, wide)[0][:, 1].max())
     tiles = np.array([[0, 60, wide, 160], [wide + 2, 60, 2 * wide + 2, 160]])
-    labels = np.array([[left, 160, right, 160 + high] for left, _, right, _ in tiles])
+    labels = np.array([[left_edge, 160, right, 160 + high] for left_edge, _, right, _ in tiles])
     runs = DrawnRuns.of(traces, names)
     page = Sheet(runs, size, tiles, labels)
     drawn = [text for text in page.page.texts if text.get_text().replace("\n", " ") in names]
     assert len(drawn) == 2
-    for text, (left, top, right, bottom) in zip(drawn, labels, strict=True):
+    for text, (left_edge, top, right, bottom) in zip(drawn, labels, strict=True):
         box = text.get_window_extent()
-        assert left <= box.x0 < box.x1 <= right
+        assert left_edge <= box.x0 < box.x1 <= right
         assert top <= size[1] - box.y1 < size[1] - box.y0 <= bottom + 1.0
     assert ("\n" in drawn[1].get_text()) == (wide == 150)
 
 
 def test_ticks_stay_on_the_page():
     page = sheet([machine("duffing"), machine("duffing", input_delay=0.01)])
-    for one in page.moving:
-        for label in one.axes.get_xticklabels():
+    for panel in page.moving:
+        for label in panel.axes.get_xticklabels():
             box = label.get_window_extent()
             assert 0.0 <= box.x0 <= box.x1 <= 1280.0, label.get_text()
 
@@ -100,12 +100,12 @@ def test_the_clock_the_pace_what_changed_and_what_is_said_are_told_at_their_time
         (0.3, 0.125, "0.300 s", "8× slower", True),
         (0.9, 4.0, "0.90 s", "4× faster", True),
     ):
-        shown = page.picture(Moment(time, speed, (hit, None)), (blank, blank))
+        frame = page.picture(Moment(time, speed, (hit, None)), (blank, blank))
         assert (page.clock.get_text(), page.pace.get_text()) == (clock, pace)
         assert (page.below.get_text() == "mass × 2 since 0.2 s") is changed
         assert [text.get_text() for text in page.says] == ["hit, 5 N", ""]
-        assert shown[60:160, :320].any()
-        assert not shown[60:160, 322:638].any()
+        assert frame[60:160, :320].any()
+        assert not frame[60:160, 322:638].any()
 
 
 def test_the_pace_is_apart_from_the_key_on_its_line():
@@ -132,12 +132,12 @@ def test_a_blow_is_told_with_its_times_and_then_no_more():
     push = smc.signals.Push("link", x=400.0, time=1.0, width=0.05)
     trace = machine(plant, "none", duration=3.0, disturbance=push)
     page = sheet([trace], ["one"])
-    told = {}
+    opacities = {}
     for time in (0.99, 1.02, 1.08, 1.5):
         picture(page, time, 0.125)
         if page.below.get_text() == "blow of 400 N, 1.00 to 1.05 s":
-            told[time] = page.below.get_alpha()
-    assert told == pytest.approx({1.02: 1.0, 1.08: 0.6})
+            opacities[time] = page.below.get_alpha()
+    assert opacities == pytest.approx({1.02: 1.0, 1.08: 0.6})
     assert page.below.get_alpha() == 1.0
 
 
@@ -146,14 +146,14 @@ def test_words_over_machines_are_on_one_line_where_they_have_room():
     trace = machine("duffing")
     key = ["→ u 6 N"]
     lines = []
-    for one, title, keys in (
+    for run, title, keys in (
         (trace, "Duffing", [key]),
         (trace, "Duffing under a title that is long", [key]),
         (trace, "Duffing", [key, ["last periods, deflections × 1000"] * 2]),
         (machine("duffing", jump=smc.Jump(0.2, {"mass": 2.0})), "Duffing", [key]),
         (machine("duffing", jump=smc.Jump(0.2, {"mass": 2.0})), " ", [key * 9]),
     ):
-        lines.append(head_lines(DrawnRuns.of([one], ["one"]), size, title, keys))
+        lines.append(head_lines(DrawnRuns.of([run], ["one"]), size, title, keys))
     assert lines == [1, 2, 2, 2, 1]
     for law, count in ((smc.law("pid", kp=9.0), 1), (at_defaults("pid"), 2)):
         runs = DrawnRuns.of([made(smc.Scenario(plant="duffing", law=law))], None)
@@ -209,9 +209,9 @@ def test_the_wind_on_a_drone_has_its_arrow_over_it_and_its_path_a_map():
         stage.forward()
         for way in np.eye(3):
             arrow = arrows.Arrow(0.0, 1.0, arrows.WHITE, way=way)
-            found = arrows.path(stage.model, stage.data, stage.mounts[0], arrow)
-            assert found
-            drawn = stage.project(found[0])[:, 1].max()
+            arrow_path = arrows.path(stage.model, stage.data, stage.mounts[0], arrow)
+            assert arrow_path
+            drawn = stage.project(arrow_path[0])[:, 1].max()
             tops = world.boxes(stage.model, stage.data)[stage.links].max(axis=1)
             assert drawn < stage.project(tops)[:, 1].min()
 
@@ -220,29 +220,29 @@ def test_panels_are_uncovered_up_to_the_clock_with_a_dot_where_each_run_is():
     parts = {"friction": smc.Coulomb(0.2), "jump": smc.Jump(0.4, {"mass": 2.0})}
     lost = failed(machine("duffing", "adaptive", **parts), 600, "the law raised ValueError: no")
     lost = dataclasses.replace(lost, x=0.5 * lost.x, u=0.3 * lost.u)
-    shown = sheet([machine("duffing", **parts), lost], ["one", "other"])
-    runs = shown.runs
-    full, faint = shown.full[..., :3], shown.faint[..., :3]
-    found = []
+    page = sheet([machine("duffing", **parts), lost], ["one", "other"])
+    runs = page.runs
+    full, faint = page.full[..., :3], page.faint[..., :3]
+    dots_seen = []
     for time in (0.3, 0.8):
-        image = picture(shown, time)
-        for (left, top, right, bottom), one in zip(shown.frames, shown.moving, strict=True):
-            now = round(left + (right - left) * time / one.axes.get_xlim()[1])
-            past = np.s_[top:bottom, left : now - 14]
+        image = picture(page, time)
+        for (left_edge, top, right, bottom), panel in zip(page.frames, page.moving, strict=True):
+            now = round(left_edge + (right - left_edge) * time / panel.axes.get_xlim()[1])
+            past = np.s_[top:bottom, left_edge : now - 14]
             future = np.s_[top:bottom, now + 14 : right]
             assert (image[past] == full[past]).all()
             assert (image[future] == faint[future]).all()
             column = image[: bottom + 20, now].astype(int)
             column[: top - 20] = 255
-            for colour, (_, t, y) in zip(runs.colours, reversed(one.dots), strict=True):
+            for colour, (_, t, y) in zip(runs.colours, reversed(panel.dots), strict=True):
                 dot = np.flatnonzero(np.abs(column - style.rgb(colour)).max(axis=1) < 3)
                 assert time <= t[-1] or not len(dot)  # a run that failed has none
-                found += [(colour, time)] * bool(len(dot))
+                dots_seen += [(colour, time)] * bool(len(dot))
                 if len(dot):
                     place = (time, np.interp(time, t, y))
-                    height = 720 - one.axes.transData.transform(place)[1]
+                    height = 720 - panel.axes.transData.transform(place)[1]
                     assert dot.mean() == pytest.approx(height, abs=3.0)
-    counts = [found.count(each) for each in itertools.product(runs.colours, (0.3, 0.8))]
+    counts = [dots_seen.count(pair) for pair in itertools.product(runs.colours, (0.3, 0.8))]
     assert counts == [2, 2, 1, 0]  # where both are in one place the first is on top
 
 
@@ -343,7 +343,7 @@ def test_a_machine_is_told_to_stick_touch_or_lie_on_a_flank_when_it_does(
     times = np.arange(0.0, 4.0, 1 / 30)
     reported = states.timeline(dataclasses.replace(trace, **moved), times)
     words = [now and now.words for now in reported]
-    told = states.HOLD_TIME + states.MIN_STATE_TIME + 0.02 if stops else 0.4
+    time_to_tell = states.HOLD_TIME + states.MIN_STATE_TIME + 0.02 if stops else 0.4
     for second, expected in (
         (0, moving),
         (1, resting),
@@ -351,7 +351,9 @@ def test_a_machine_is_told_to_stick_touch_or_lie_on_a_flank_when_it_does(
         (3, resting),
     ):
         assert {
-            word for word, t in zip(words, times, strict=True) if second + told < t < second + 0.95
+            word
+            for word, t in zip(words, times, strict=True)
+            if second + time_to_tell < t < second + 0.95
         } <= expected
     if touching:
         assert {
@@ -412,13 +414,13 @@ def test_words_on_joints_that_stop_one_after_the_other_do_not_flicker():
 
 def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
     """Of a film, a clip and a still; the pictures are blank."""
-    asked = []
+    calls = []
     wrote = []
     reported = []
 
     def blank(frames):
         times = frames.clock.times
-        asked.append(
+        calls.append(
             (
                 times[0],
                 times[-1],
@@ -448,7 +450,7 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
         "size": size,
         "camera": (10.0, -20.0),
     }
-    given = (["a"], "b", size, (10.0, -20.0))
+    film_arguments = (["a"], "b", size, (10.0, -20.0))
     film.film(
         trace,
         tmp_path / "a.mp4",
@@ -465,17 +467,21 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
         speed=1.0,
         **looks,
     )
-    assert asked == [(0.0, 5.0, 26, *given), (5.0, 5.0, 1, *given), (1.0, 1.5, 6, *given)]
-    asked.clear()
+    assert calls == [
+        (0.0, 5.0, 26, *film_arguments),
+        (5.0, 5.0, 1, *film_arguments),
+        (1.0, 1.5, 6, *film_arguments),
+    ]
+    calls.clear()
     film.film(trace, tmp_path / "first.mp4")
     film.film(trace, tmp_path / "a.png", at=0.5)
     film.film(trace, tmp_path / "a.webp", size=size)
-    assert [one[3:] for one in asked] == [(None, None, (1280, 720), None)] * 2 + [
+    assert [call[3:] for call in calls] == [(None, None, (1280, 720), None)] * 2 + [
         (None, None, size, None)
     ]
-    assert asked[0][:2] == (0.0, 5.0)
-    assert asked[1][:3] == (0.5, 0.5, 1)
-    assert asked[2][1] < 5.0  # a clip ends where little happens any more
+    assert calls[0][:2] == (0.0, 5.0)
+    assert calls[1][:3] == (0.5, 0.5, 1)
+    assert calls[2][1] < 5.0  # a clip ends where little happens any more
     assert wrote == [((180, 320), 10.0), ((720, 1280), 30.0)]
     assert set(reported) == {1}
     with Image.open(tmp_path / "b.webp") as clip, Image.open(tmp_path / "b.png") as still:

@@ -93,46 +93,46 @@ def test_a_stranger_that_goes_far_is_followed_and_fills_half_of_its_tile(base, c
         moved[:, 0] += 5.0 * times
         poses.append(track.Motion(times, moved))
     with filmed(traces, monkeypatch) as (stages, _):
-        for shown in stages:
-            boxes = world.boxes(shown.model, shown.data)
-            plane = shown.model.geom_type == world.PLANE
-            moves = ~world.still(shown.model) & ~plane
+        for stage in stages:
+            boxes = world.boxes(stage.model, stage.data)
+            plane = stage.model.geom_type == world.PLANE
+            moves = ~world.still(stage.model) & ~plane
             if base == "fixed":  # the other legs stand around the one that is driven
-                moves = shown.links
+                moves = stage.links
             moving = boxes[moves].reshape(-1, 3)
-            box = np.ptp(shown.project(moving), axis=0) / shown.size
+            box = np.ptp(stage.project(moving), axis=0) / stage.size
             assert box.max() > 0.5
-            assert (shown.project(moving) > -1.0).all()
+            assert (stage.project(moving) > -1.0).all()
 
 
 def test_a_rail_is_cut_to_what_moves_and_its_posts_and_marks_stay_true(monkeypatch):
     """The cart stays within 1 m of 0 on a rail of 4.2 m."""
     with filmed(two("cart_pole"), monkeypatch) as (stages, _):
-        shown = stages[0]
-        whole = smc.plant("cart_pole").load()
-        cut = shown.model
+        stage = stages[0]
+        uncut = smc.plant("cart_pole").load()
+        cut = stage.model
         rail, post, mark = (
             cut.geom(f"m/{name}").id for name in ("front_rail", "left_post", "half5")
         )
-        assert cut.geom_size[rail, 1] < 0.7 * whole.geom("front_rail").size[1]
-        end = shown.data.geom_xpos[rail, 0] - cut.geom_size[rail, 1]
-        assert shown.data.geom_xpos[post, 0] == pytest.approx(end)
-        assert shown.data.geom_xpos[mark, 0] == pytest.approx(0.5)  # m
+        assert cut.geom_size[rail, 1] < 0.7 * uncut.geom("front_rail").size[1]
+        end = stage.data.geom_xpos[rail, 0] - cut.geom_size[rail, 1]
+        assert stage.data.geom_xpos[post, 0] == pytest.approx(end)
+        assert stage.data.geom_xpos[mark, 0] == pytest.approx(0.5)  # m
         board = cut.geom("m/board").id
-        assert shown.data.geom_xpos[board, 0] == pytest.approx(shown.data.geom_xpos[rail, 0])
+        assert stage.data.geom_xpos[board, 0] == pytest.approx(stage.data.geom_xpos[rail, 0])
         rod = cut.geom("m/rod").id
-        ends = shown.data.geom_xpos[rod] + np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]])
+        ends = stage.data.geom_xpos[rod] + np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]])
         # px of a pole of 1 m: 81 with the whole rail
-        assert np.ptp(shown.project(ends)[:, 1]) > 120.0
+        assert np.ptp(stage.project(ends)[:, 1]) > 120.0
 
 
 def test_the_posts_of_a_network_come_closer_with_their_feet(monkeypatch):
     """They stand 0.22 m beside the outer pendulums."""
     with filmed(two("pendulum_network"), monkeypatch) as (stages, _):
-        shown = stages[0]
+        stage = stages[0]
         places = {}
         for name in ("front_post", "front_foot", "p0/bob"):
-            places[name] = shown.data.geom_xpos[shown.model.geom(f"m/{name}").id]
+            places[name] = stage.data.geom_xpos[stage.model.geom(f"m/{name}").id]
         assert 0.1 < places["p0/bob"][1] - places["front_post"][1] < 0.19
         assert places["front_foot"][1] == pytest.approx(places["front_post"][1])
 
@@ -141,20 +141,20 @@ def test_a_pendulum_s_picture_is_of_the_bob_s_arc(monkeypatch):
     stands, falls = two("inverted_pendulum")
     falls = dataclasses.replace(falls, x=falls.x + 3.0)
     with filmed([stands, falls], monkeypatch) as (stages, _):
-        shown = stages[0]
-        assert stages[1].puppet.height == shown.puppet.height  # their stands are cut alike
-        foot = shown.model.geom("m/foot")
-        assert shown.data.geom_xpos[foot.id, 2] == pytest.approx(0.014, abs=1e-3)  # on the floor
-        assert shown.model.geom("m/face").rgba[3] == pytest.approx(world.DIAL_OPACITY)
-        bob = shown.model.geom("m/bob")
+        stage = stages[0]
+        assert stages[1].puppet.height == stage.puppet.height  # their stands are cut alike
+        foot = stage.model.geom("m/foot")
+        assert stage.data.geom_xpos[foot.id, 2] == pytest.approx(0.014, abs=1e-3)  # on the floor
+        assert stage.model.geom("m/face").rgba[3] == pytest.approx(world.DIAL_OPACITY)
+        bob = stage.model.geom("m/bob")
         assert bob.size[0] == pytest.approx(1.3 * 0.065)
     rods = []
     for share in (puppet.OWN_STAND_SHARE, 0.8):
         monkeypatch.setattr(puppet, "OWN_STAND_SHARE", share)
         with filmed([stands], monkeypatch) as (stages, _):
-            shown = stages[0]
-            ends = shown.data.geom_xpos[[shown.model.geom("m/bob").id]]
-            rod = shown.project(ends)[0] - shown.project(shown.data.xanchor[:1])[0]
+            stage = stages[0]
+            ends = stage.data.geom_xpos[[stage.model.geom("m/bob").id]]
+            rod = stage.project(ends)[0] - stage.project(stage.data.xanchor[:1])[0]
             rods.append(np.linalg.norm(rod))
     assert rods[0] > 1.2 * rods[1]
 
@@ -164,27 +164,27 @@ def test_a_pole_is_seen_all_the_way_round_and_its_arrow_is_in_its_plane():
     run = made(smc.Scenario(plant="cart_pole", law=at_defaults("lqr"), duration=1.0))
     angles = np.linspace(0.0, 2.0 * np.pi, len(run.t))
     x = np.column_stack([np.zeros_like(angles), angles])
-    with staged(dataclasses.replace(run, x=x, r=0.0 * x), (400, 215)) as shown:
-        model = shown.model
+    with staged(dataclasses.replace(run, x=x, r=0.0 * x), (400, 215)) as stage:
+        model = stage.model
         pole = [model.geom(f"m/{name}").id for name in ("rod", "tip")]
         hit = np.zeros(1, np.int32)
         for sample in range(0, len(angles), 50):
-            shown.arrange(x[sample])
-            shown.forward()
+            stage.arrange(x[sample])
+            stage.forward()
             along = np.linspace(-0.9, 0.9, 10)[:, None] * model.geom_size[pole[0], 1]
-            middle = shown.data.geom_xpos[pole[0]]
-            turn = shown.data.geom_xmat[pole[0]].reshape(3, 3)
+            middle = stage.data.geom_xpos[pole[0]]
+            turn = stage.data.geom_xmat[pole[0]].reshape(3, 3)
             points = middle + along * turn[:, 2]
-            seen = shown.project(points)
-            assert ((seen > 0.0) & (seen < shown.size)).all()
+            seen = stage.project(points)
+            assert ((seen > 0.0) & (seen < stage.size)).all()
             for point in points:
-                way = point - shown.place
-                mujoco.mj_ray(model, shown.data, shown.place, way, None, 1, -1, hit)
+                way = point - stage.place
+                mujoco.mj_ray(model, stage.data, stage.place, way, None, 1, -1, hit)
                 assert hit[0] in pole, angles[sample]
             arrow = arrows.Arrow(0.0, 1.0, arrows.WHITE)
-            found = arrows.path(model, shown.data, shown.mounts[1], arrow)
-            assert found
-            assert found[0][:, 1] == pytest.approx(middle[1])
+            arrow_path = arrows.path(model, stage.data, stage.mounts[1], arrow)
+            assert arrow_path
+            assert arrow_path[0][:, 1] == pytest.approx(middle[1])
 
 
 def test_bent_arrows_are_around_their_joint_and_stay_in_the_tile(monkeypatch):
@@ -195,17 +195,17 @@ def test_bent_arrows_are_around_their_joint_and_stay_in_the_tile(monkeypatch):
             smc.run(smc.Scenario(plant=plant, law=at_defaults(law), duration=0.3, x0=0.1))
         )
     with filmed(traces, monkeypatch) as (stages, _):
-        assert len({shown.puppet.height for shown in stages}) == 1  # they stand on one floor
-        for shown, mount in itertools.product(stages, stages[0].mounts):
+        assert len({stage.puppet.height for stage in stages}) == 1  # they stand on one floor
+        for stage, mount in itertools.product(stages, stages[0].mounts):
             for part in (-1.0, 1.0):
-                whole = arrows.Arrow(0.0, part, (0.0,) * 4)
-                found = arrows.path(shown.model, shown.data, mount, whole)
-                assert found
-                line, _ = found
-                anchor = shown.project(shown.data.xanchor[[mount.joint]])
-                radius = np.linalg.norm(shown.project(line) - anchor, axis=1)
-                assert radius.max() == pytest.approx(0.12 * shown.size[1], rel=0.15)
-                assert shown.project(line).min() > 0.0
+                bent_arrow = arrows.Arrow(0.0, part, (0.0,) * 4)
+                arrow_path = arrows.path(stage.model, stage.data, mount, bent_arrow)
+                assert arrow_path
+                line, _ = arrow_path
+                anchor = stage.project(stage.data.xanchor[[mount.joint]])
+                radius = np.linalg.norm(stage.project(line) - anchor, axis=1)
+                assert radius.max() == pytest.approx(0.12 * stage.size[1], rel=0.15)
+                assert stage.project(line).min() > 0.0
 
 
 def test_five_machines_keep_room_above_their_words():
@@ -254,16 +254,16 @@ def test_all_of_a_robot_counts_only_if_its_driven_joint_carries_it(driven, carri
     plant = smc.plant_from(robot(driven), [driven])
     traces = [smc.run(smc.Scenario(plant=plant, law=smc.law("pid"), duration=0.2, x0=0.3))]
     with filmed(traces, monkeypatch) as (stages, _):
-        shown = stages[0]
-        boxes = world.boxes(shown.model, shown.data)
-        seen = shown.project(boxes[shown.links].reshape(-1, 3))
+        stage = stages[0]
+        boxes = world.boxes(stage.model, stage.data)
+        seen = stage.project(boxes[stage.links].reshape(-1, 3))
         assert (seen > 0.0).all()
-        assert (seen < shown.size).all()
-        share = np.ptp(seen, axis=0).max() / shown.size[1]
+        assert (seen < stage.size).all()
+        share = np.ptp(seen, axis=0).max() / stage.size[1]
         assert (share > 0.4) == (not carried)
-        trunk = ~world.still(shown.model) & (shown.model.geom_type != world.PLANE)
-        whole = shown.project(boxes[trunk].reshape(-1, 3))
-        assert (np.ptp(whole[:, 1]) <= shown.size[1]) == carried
+        trunk = ~world.still(stage.model) & (stage.model.geom_type != world.PLANE)
+        trunk_points = stage.project(boxes[trunk].reshape(-1, 3))
+        assert (np.ptp(trunk_points[:, 1]) <= stage.size[1]) == carried
 
 
 def test_labels_are_beside_machines_that_are_far_wider_than_high():
@@ -285,6 +285,6 @@ def test_a_label_has_all_the_width_that_it_asked_for():
     for wide in np.linspace(80.0, 82.0, 21).tolist():
         sizes = lambda room, wide=wide: (np.array([[wide, 90.3]]), 1.0)  # noqa: E731
         _, labels, _ = camera.layout(1, room, sizes, tall, camera.turn(90.0, 0.0))
-        left, top, right, bottom = labels[0].tolist()
-        assert right - left >= wide
+        left_edge, top, right, bottom = labels[0].tolist()
+        assert right - left_edge >= wide
         assert bottom - top >= 90.3

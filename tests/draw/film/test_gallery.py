@@ -30,8 +30,8 @@ def blocks(picture):
 
 # that with contacts and four bodies; the others take as long each, and run with the slow tests
 CLIPS = ["hard_stops"]
-for other in sorted(set(gallery.CLIPS) - {"hard_stops"}):
-    CLIPS.append(pytest.param(other, marks=pytest.mark.slow))
+for clip_name in sorted(set(gallery.CLIPS) - {"hard_stops"}):
+    CLIPS.append(pytest.param(clip_name, marks=pytest.mark.slow))
 
 
 def as_kept(picture):
@@ -40,8 +40,8 @@ def as_kept(picture):
     """
     file = io.BytesIO()
     Image.fromarray(picture).save(file, "WEBP", quality=75, method=4)
-    with Image.open(file) as kept:
-        return np.asarray(kept.convert("RGB"), float)
+    with Image.open(file) as clip:
+        return np.asarray(clip.convert("RGB"), float)
 
 
 def test_each_file_is_a_clip():
@@ -52,16 +52,16 @@ def test_each_file_is_a_clip():
 @pytest.mark.parametrize("name", CLIPS)
 def test_a_clip_is_what_the_code_would_make(name):
     frames = gallery.CLIPS[name].frames()
-    whole = frames.clock
-    with Image.open(gallery.FOLDER / f"{name}.webp") as kept:
-        assert kept.n_frames == len(frames)
-        assert kept.size == frames.size
+    full_clock = frames.clock
+    with Image.open(gallery.FOLDER / f"{name}.webp") as clip:
+        assert clip.n_frames == len(frames)
+        assert clip.size == frames.size
         for k in (len(frames) // 3, 2 * len(frames) // 3):
             part = slice(k - 1, k + 2)  # with those beside it: the last has a sample more
-            frames.clock = type(whole)(whole.times[part], whole.speeds[part])
+            frames.clock = type(full_clock)(full_clock.times[part], full_clock.speeds[part])
             _, new, _ = frames
-            kept.seek(k)
-            old = np.asarray(kept.convert("RGB"), float)
+            clip.seek(k)
+            old = np.asarray(clip.convert("RGB"), float)
             assert np.abs(blocks(old) - blocks(as_kept(new))).max() < MAX_DIFFERENCE, (
                 f"{name}: make gallery"
             )

@@ -41,8 +41,8 @@ def run():
 def test_a_blow_is_told_with_its_peak_from_its_start_and_fades(run):
     clock = pace.clock([run], 100.0, 0.1)
     said = {}
-    told = states.timeline(run, clock.times, clock.played)
-    for time, state in zip(clock.times, told, strict=True):
+    timeline = states.timeline(run, clock.times, clock.played)
+    for time, state in zip(clock.times, timeline, strict=True):
         if state and state.words == "blow, 200 N·m":
             said[round(float(time), 3)] = state
     first, *_, last = said
@@ -56,8 +56,8 @@ def test_a_blow_is_told_with_its_peak_from_its_start_and_fades(run):
 
 
 def test_an_impulse_that_lasts_is_no_blow():
-    told = states.timeline(struck(0.2), np.arange(0.1, 0.3, 1e-2))
-    assert not any(state.words.startswith("blow") for state in told if state)
+    timeline = states.timeline(struck(0.2), np.arange(0.1, 0.3, 1e-2))
+    assert not any(state.words.startswith("blow") for state in timeline if state)
 
 
 def test_every_first_contact_is_a_hit_with_its_peak_and_what_lasts_after_it_a_contact(run):
@@ -69,12 +69,12 @@ def test_every_first_contact_is_a_hit_with_its_peak_and_what_lasts_after_it_a_co
     force[np.searchsorted(t, 0.15)] = 63.0
     force[np.searchsorted(t, 0.3)] = 90.0
     words = "hit", "contact"
-    told = states.told(run, 4.0 * t, touches[:, None], force[:, None], words, style.REACTION)
-    said = [state.words if state else None for state in told]
+    timeline = states.told(run, 4.0 * t, touches[:, None], force[:, None], words, style.REACTION)
+    said = [state.words if state else None for state in timeline]
     assert [word for word, _ in itertools.groupby(said)] == [None, "hit, 63 N·m", "contact", None]
     assert t[said.index("hit, 63 N·m")] == pytest.approx(0.1)
     assert t[said.index("contact")] == pytest.approx(0.1 + states.HOLD_TIME / 4.0, abs=2e-3)
-    assert all(state.opacity == 1.0 for state in told[: np.searchsorted(t, 0.499)] if state)
+    assert all(state.opacity == 1.0 for state in timeline[: np.searchsorted(t, 0.499)] if state)
     since = states.told(run, t, (t < 0.5)[:, None], force[:, None], words, style.REACTION)
     assert {state.words for state in since if state} == {"contact"}
 
@@ -157,19 +157,19 @@ def test_the_arrow_of_a_reaction_is_hollow_and_that_of_a_disturbance_has_a_bar()
 
 @renders
 def test_no_number_is_written_over_what_is_said_of_the_machine(run):
-    with staged(run, (640, 360)) as shown:
-        shown.track.states[0] = states.State("blow, 200 N·m", style.INK)
-        shown.pose(0, 0.0)
-        (said,) = shown.words
-        high = arrows.LETTERS * shown.scale
+    with staged(run, (640, 360)) as stage:
+        stage.track.states[0] = states.State("blow, 200 N·m", style.INK)
+        stage.pose(0, 0.0)
+        (said,) = stage.words
+        high = arrows.LETTERS * stage.scale
         wide = style.width("blow, 200 N·m", high, bold=True)
         assert said[1] == pytest.approx([wide, 1.5 * high], rel=0.05)
         arrow = arrows.Arrow(0.0, -1.0, RED)
-        bare = shown.render([(0, arrow)]).astype(int)
+        bare = stage.render([(0, arrow)]).astype(int)
         taken = []
         for _ in range(3):  # the second and third are not where those before are
-            shown.words = taken
-            numbered = shown.render([(0, arrow._replace(words="9 N·m"))])
+            stage.words = taken
+            numbered = stage.render([(0, arrow._replace(words="9 N·m"))])
             y, x = np.nonzero((np.abs(numbered - bare) > 60).any(axis=2))
             assert len(x) > 100
             number = np.array([(x.min(), y.min()), (x.max(), y.max())])
@@ -180,21 +180,21 @@ def test_no_number_is_written_over_what_is_said_of_the_machine(run):
 @renders
 def test_the_arrow_of_a_hit_is_not_drawn_under_the_words_that_have_its_number(run):
     """Its head stood out of the digits."""
-    with staged(run, (640, 360)) as shown:
-        shown.pose(0, 0.0)
-        shown.words = []
-        bare = shown.render().astype(int)
+    with staged(run, (640, 360)) as stage:
+        stage.pose(0, 0.0)
+        stage.words = []
+        bare = stage.render().astype(int)
         arrow = arrows.Arrow(0.0, -1.0, RED)
-        y, x = np.nonzero((np.abs(shown.render([(0, arrow)]) - bare) > 60).any(axis=2))
+        y, x = np.nonzero((np.abs(stage.render([(0, arrow)]) - bare) > 60).any(axis=2))
         box = np.array([(x.min(), y.min()), (x.max(), y.max())], float)
         tail = np.array([(box[1, 0] - 5.0, box[0, 1]), box[1]])
-        for words, told, drawn in (
+        for words, on_blow, drawn in (
             (tail, True, False),
             (tail, False, True),
             (tail + 10.0, True, True),
         ):
-            shown.words = [words]
-            seen = shown.render([(0, arrow._replace(on_blow=told))])
+            stage.words = [words]
+            seen = stage.render([(0, arrow._replace(on_blow=on_blow))])
             assert (np.abs(seen - bare) > 60).any() == drawn
 
 
@@ -233,8 +233,8 @@ def test_a_strong_hit_is_told_until_it_fades_though_a_weak_one_follows(run):
         (force, ["hit, 50 N·m", "hit, 20 N·m"]),
         (70.0 * (force > 0.0) - force, ["hit, 20 N·m", "hit, 50 N·m"]),
     ):
-        told = states.told(run, 2.0 * t, acts, forces[:, None], words, style.REACTION)
-        said = [state.words if state else None for state in told]
+        timeline = states.told(run, 2.0 * t, acts, forces[:, None], words, style.REACTION)
+        said = [state.words if state else None for state in timeline]
         assert [word for word, _ in itertools.groupby(said)] == [None, *expected]
         turn = (
             0.1 + 0.5 * (states.HOLD_TIME + states.MIN_STATE_TIME)

@@ -75,15 +75,15 @@ def test_two_laws_that_chatter_are_told_apart(drawn):
     colour.
     """
     made_of, rows = drawn
-    shown = picture(made_of, 1.0).astype(int)
+    frame = picture(made_of, 1.0).astype(int)
     heights = []
     for lane, _, colour, _ in rows:
         box = lane.get_window_extent()
-        column = shown[int(SIZE[1] - box.y1) : int(SIZE[1] - box.y0), int(0.5 * (box.x0 + box.x1))]
+        column = frame[int(SIZE[1] - box.y1) : int(SIZE[1] - box.y0), int(0.5 * (box.x0 + box.x1))]
         paper = np.array([255.0] * 3)
         ink = np.array(style.rgb(colour), float)
-        wanted = paper + lanes.LANE_BAND * (ink - paper)
-        heights.append(int((np.abs(column - wanted).max(axis=1) < 12).sum()))
+        band_colour = paper + lanes.LANE_BAND * (ink - paper)
+        heights.append(int((np.abs(column - band_colour).max(axis=1) < 12).sum()))
     assert heights[0] <= 2
     assert heights[2] == pytest.approx(3.0 * heights[1], rel=0.25)
 
@@ -99,13 +99,15 @@ def test_the_cursor_passes_behind_words():
             box = text.get_window_extent()
             inverted = moving.axes.transData.inverted()
             time, _ = inverted.transform(((box.x0 + box.x1) / 2, box.y0))
-            shown = picture(same, float(time)).astype(int)
+            frame = picture(same, float(time)).astype(int)
             rows = np.s_[SIZE[1] - int(box.y1) + 1 : SIZE[1] - int(box.y0) - 1]
             middle = round((box.x0 + box.x1) / 2)
             cursor = np.array(style.rgb(style.MUTED))
-            found = np.abs(shown[:, middle - 2 : middle + 3] - cursor).max(axis=2).min(axis=1) < 20
-            assert found.sum() > 20  # beside the words
-            assert found[rows].sum() < 0.5 * (rows.stop - rows.start)
+            cursor_rows = (
+                np.abs(frame[:, middle - 2 : middle + 3] - cursor).max(axis=2).min(axis=1) < 20
+            )
+            assert cursor_rows.sum() > 20  # beside the words
+            assert cursor_rows[rows].sum() < 0.5 * (rows.stop - rows.start)
             hidden += 1
     assert hidden
 

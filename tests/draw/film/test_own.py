@@ -144,11 +144,11 @@ def test_a_blow_is_an_arrow_to_its_body_that_is_to_the_scale_of_the_others():
     assert not before.arrows
     ((_, arrow),) = during.arrows
     with staged(trace, (640, 360)) as scene:
-        shown = path(scene.model, scene.data, scene.mounts[0], arrow)
-        assert shown is not None
+        arrow_path = path(scene.model, scene.data, scene.mounts[0], arrow)
+        assert arrow_path is not None
         rod = scene.data.body("m/rod").xipos
         longest = MAX_SWEEP * scene.mounts[0].radius
-    line = shown[0]
+    line = arrow_path[0]
     assert (np.diff(line[:, 0]) > 0.0).all()
     assert 0.0 < rod[0] - line[-1, 0] < longest
     assert np.ptp(line[:, 0]) == pytest.approx(3.0 * longest)

@@ -34,9 +34,10 @@ def at(trace_s, times) -> list[float]:
         traces = trace_s
     else:
         traces = [trace_s]
-    found = pace.clock(traces, FPS)
+    film_clock = pace.clock(traces, FPS)
     return [
-        float(found.speeds[np.searchsorted(found.times, t + 1e-9, side="right") - 1]) for t in times
+        float(film_clock.speeds[np.searchsorted(film_clock.times, t + 1e-9, side="right") - 1])
+        for t in times
     ]
 
 
@@ -55,8 +56,9 @@ def test_a_jump_of_position_is_slow_and_a_rest_fast(base):
     """
     trace = moving(base, lambda t: np.clip((t - 2.0) / 0.1, 0.0, 1.0))
     assert at(trace, (0.5, 1.8, 2.05, 2.3, 3.0)) == [4.0, 1.0, 0.125, 1.0, 4.0]
-    found = pace.clock([trace], FPS)  # a frame lasts as long as its speed says, but for the last
-    np.testing.assert_allclose((np.diff(found.times) * FPS)[:-1], found.speeds[:-2])
+    film_clock = pace.clock([trace], FPS)
+    # a frame lasts as long as its speed says, but for the last
+    np.testing.assert_allclose((np.diff(film_clock.times) * FPS)[:-1], film_clock.speeds[:-2])
 
 
 @pytest.mark.parametrize(
@@ -77,9 +79,9 @@ def test_a_thing_takes_fifty_frames_or_more_to_cross_its_range(base, seconds, sp
 def test_films_have_a_longest_duration(base, monkeypatch):
     # more than a fifth of its range a frame, all the time
     trace = moving(base, lambda t: np.sin(20.0 * t))
-    found = pace.clock([trace], FPS)
-    assert 4.0 < len(found.times) / FPS <= 8.1
-    assert set(found.speeds) == {0.5}
+    film_clock = pace.clock([trace], FPS)
+    assert 4.0 < len(film_clock.times) / FPS <= 8.1
+    assert set(film_clock.speeds) == {0.5}
     monkeypatch.setattr(pace, "MAX_LENGTH", (1.5, 2.0))
     assert set(pace.clock([trace], FPS).speeds) == {1.0}
 
@@ -104,9 +106,9 @@ def test_impacts_are_slowest(monkeypatch):
 
 def test_frames_whose_middle_is_near_that_of_a_push_are_slowest(base, monkeypatch):
     monkeypatch.setattr(style, "pushes", lambda runs: [SimpleNamespace(time=2.0, width=0.1)])
-    grid, found = pace.speeds([moving(base, np.zeros_like)], FPS)
+    grid, grid_speeds = pace.speeds([moving(base, np.zeros_like)], FPS)
     # of middles 2.017, 2.05 and 2.083 s
-    assert (FPS * grid[found == 0.125]).round().tolist() == [60, 61, 62]
+    assert (FPS * grid[grid_speeds == 0.125]).round().tolist() == [60, 61, 62]
 
 
 def test_a_diverged_run_does_not_make_the_others_rest(base):
@@ -136,13 +138,13 @@ def test_where_nothing_is_seen_to_move_the_last_three_periods_follow_slowly_and_
     trace = made(smc.Scenario(plant="duffing", law=smc.law("classical"), duration=2.0, **parts))
     place = x(trace.t)[:, None]
     run = dataclasses.replace(trace, x=place, s=20.0 * place, u=np.sign(place), r=0.0 * place)
-    found = pace.clock([run], FPS)
-    assert (found.close is not None) is follows
-    if not found.close:
+    film_clock = pace.clock([run], FPS)
+    assert (film_clock.close is not None) is follows
+    if not film_clock.close:
         return
-    span = found.times[-1] - found.close.times[0]
+    span = film_clock.times[-1] - film_clock.close.times[0]
     assert span == pytest.approx(3 / 20.0, rel=0.1)
     size = float(pace.visible_sizes(run.scenario)[0])
-    assert 0.3 * size < 2e-4 * found.close.factor <= size
-    assert len(found.close.times) / FPS == pytest.approx(3.0, rel=0.5)
-    assert not found.part(0.0, 1.0).close
+    assert 0.3 * size < 2e-4 * film_clock.close.factor <= size
+    assert len(film_clock.close.times) / FPS == pytest.approx(3.0, rel=0.5)
+    assert not film_clock.part(0.0, 1.0).close

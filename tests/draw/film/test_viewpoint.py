@@ -41,11 +41,11 @@ def arm(axis="0 1 0", kind="hinge", plate="", camera="", turned=True):
 def way(plant, **fields):
     """Return the direction in which the film of a run looks, (3,), and the joint's axis, (3,)."""
     run = smc.Scenario(plant=plant, law="none", duration=0.1, **fields)
-    shown = puppet.Puppet.of(run)
-    data = shown.data[0]
-    data.qpos[:] = shown.start
-    world.forward(shown.model, data)
-    return -shown.turn(None)[:, 2], data.xaxis[shown.ids[0]]
+    machine = puppet.Puppet.of(run)
+    data = machine.data[0]
+    data.qpos[:] = machine.start
+    world.forward(machine.model, data)
+    return -machine.turn(None)[:, 2], data.xaxis[machine.ids[0]]
 
 
 @pytest.mark.parametrize("turned", [True, False])
@@ -98,17 +98,17 @@ def test_what_moves_fills_half_of_the_picture_and_every_run_has_the_same_view(si
     for x0 in (0.3, -0.6):
         law = smc.law("pid", kp=9.0, kd=1.0, ki=0.0)
         trace = smc.run(smc.Scenario(plant=plant, law=law, duration=1.0, x0=x0))
-        with staged(trace, size) as shown:
-            turns.append(shown.turn)
+        with staged(trace, size) as stage:
+            turns.append(stage.turn)
             places = []
             for sample in np.linspace(0, len(trace.t) - 1, 20).astype(int):
-                shown.arrange(trace.x[sample])
-                shown.forward()
-                boxes = world.boxes(shown.model, shown.data)[shown.links]
-                places.append(shown.project(boxes.reshape(-1, 3)))
+                stage.arrange(trace.x[sample])
+                stage.forward()
+                boxes = world.boxes(stage.model, stage.data)[stage.links]
+                places.append(stage.project(boxes.reshape(-1, 3)))
             box = np.ptp(np.concatenate(places), axis=0) / size
             assert box.max() > 0.5
-            assert shown.puppet.height == pytest.approx(0.0, abs=1e-6)  # it stands on the floor
+            assert stage.puppet.height == pytest.approx(0.0, abs=1e-6)  # it stands on the floor
     assert turns[0] == pytest.approx(turns[1])
 
 
@@ -165,16 +165,16 @@ def test_numbers_of_arrows_are_apart_and_none_is_written_twice():
     taken = arrows.boxes(drawn, 0.5)
     before = np.asarray(image).copy()
     arrows.write_numbers(image, drawn, 0.5, taken, image.width)
-    numbers = taken[sum(len(one.edge) for one in drawn) :]
+    numbers = taken[sum(len(drawn_arrow.edge) for drawn_arrow in drawn) :]
     assert len(numbers) == 3
     changed = (np.asarray(image) != before).any(axis=2)
     for number in numbers:
-        left, top, right, bottom = number.astype(int).ravel()
-        assert changed[top:bottom, left:right].any()
+        left_edge, top, right, bottom = number.astype(int).ravel()
+        assert changed[top:bottom, left_edge:right].any()
     for k, number in enumerate(numbers):
-        others = [*taken[:-3], *numbers[:k]]
-        assert arrows.is_apart(number, others)
-        assert not arrows.is_apart(number, [*others, number])
+        written_numbers = [*taken[:-3], *numbers[:k]]
+        assert arrows.is_apart(number, written_numbers)
+        assert not arrows.is_apart(number, [*written_numbers, number])
 
 
 @pytest.mark.parametrize(("wide", "count"), [(499.0, 1), (501.0, 2)])
