@@ -9,7 +9,8 @@ form, so a run is exact to rounding.
     model=1.0)
 
 A law of degree 1 sees plant A's s as what a surface gives, with eq = 0; a law of higher degree has
-no use for it. On plant B laws see e = x1, de = x2, on plant C also a = x3. The reference is 0.
+no use for it. On plant B laws see e = x1, de = x2, on plant C also a = x3. The reference is 0, or
+moves at a constant speed; then the states are those of the error.
 """
 
 import ctypes
@@ -54,8 +55,8 @@ def sine(size: float, omega: float = 1.0) -> Force:
     return Force(lambda n, t: size * omega**-n * np.sin(omega * t - n * math.pi / 2))
 
 
-T, X, V, E, DE, A, HAS_SURFACE, S = map(
-    Measurement._fields.index, ("t", "x", "v", "e", "de", "a", "has_surface", "s")
+T, X, V, R, DR, E, DE, A, HAS_SURFACE, S = map(
+    Measurement._fields.index, ("t", "x", "v", "r", "dr", "e", "de", "a", "has_surface", "s")
 )
 
 C_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 4)
@@ -153,6 +154,7 @@ def chain(
     reported=None,
     rates=None,
     memory=(),
+    speed=0.0,
 ):
     """A chain of len(x) = 1, 2 or 3 integrators under a law.
 
@@ -163,9 +165,10 @@ def chain(
       sign: -1 turns the control round.
       noise: (K,) or (K, n), added to the state that the law sees.
       f, g: constants of the plant; model: 1 where the law may use them.
-      limit: bound on |u|; told: what the law is told of it, limit unless given.
+      limit: bound on |u|; reported: what the law is told of it, limit unless given.
       rates: of the last state by each state, (n,): with them a linear plant, without d.
       memory: the first cells of the law's memory at the start.
+      speed: of the reference, of plants B and C.
     """
     count = round(duration / h)
     n = len(x)
@@ -180,6 +183,7 @@ def chain(
         )
     )
     y[HAS_SURFACE] = float(n == 1)
+    y[DR] = speed
     gains = np.array([*law.gains.values(), 0.0])
     out = np.zeros(2)
     cells = np.zeros(law.memory + 1)
@@ -253,8 +257,11 @@ def _chain(
         if n == 1:
             at[V] = at[DE] = at[S] = first
         else:
-            at[X] = at[E] = first
-            at[V] = at[DE] = state[1] + noise[row + 1]
+            at[R] = at[DR] * at[T]
+            at[E] = first
+            at[X] = first + at[R]
+            at[DE] = state[1] + noise[row + 1]
+            at[V] = at[DE] + at[DR]
             at[A] = state[2] + noise[row + 2] if n == 3 else 0.0
         for i in range(n):
             kept[row + i] = state[i]

@@ -1,5 +1,5 @@
 """PD beside an adapting level of Coulomb friction: u = -s + F tanh(r' / v0), s = kp e + kd de, F' =
--gamma s sgn(r'), 0 <= F <= the bound on u.
+-gamma s sgn(r'), 0 <= F <= the bound on u, or with the model the acceleration that it gives.
 
 No model and no level is given: F begins at 0. While the joint moves as its reference does, M x'' =
 u - F0 sgn(x') leaves M e'' + kd e' + kp e = (F - F0) sgn(r') - M r''. From that force to s the
@@ -16,7 +16,7 @@ Prentice Hall 1991, section 8.1 (positive real error systems). The condition is 
 
 import math
 
-from smc_mujoco.control.law import command, law_function, sgn
+from smc_mujoco.control.law import command, input_gain, law_function, sgn
 from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, RATE, SPEED, Gain
 
 
@@ -45,5 +45,5 @@ def adaptive_coulomb(y, gains, memory):
     s = gains.kp * y.e + gains.kd * y.de
     u = command(y, memory[0] * math.tanh(y.dr / gains.v0) - s)
     level = memory[0] - y.dt * gains.gamma * s * sgn(y.dr)
-    memory[0] = min(max(level, 0.0), y.limit)
+    memory[0] = min(max(level, 0.0), y.limit * abs(input_gain(y)))
     return u, s

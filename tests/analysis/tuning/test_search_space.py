@@ -56,6 +56,7 @@ VISIBLE = {
     "least": 3.0,
     "bound": 0.3,
     "w_max": 0.5,
+    "v0": 0.2,
 }
 
 
@@ -98,6 +99,7 @@ def run(law, X=1.0, T=1.0, F=1.0, model=0.0):
         g=2.0 * X / (T**n * F),
         limit=3.0 * F,
         model=model,
+        speed=-0.25 * X / T,
     )
     return done.x[:, 0] / X, done.u / F
 
