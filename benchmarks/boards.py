@@ -14,47 +14,45 @@ from collections.abc import Collection, Sequence
 
 import realaigym
 from realaigym.published import GlobalRow, RobustnessRow, Row
-from rich import box
 from rich.console import Console
-from rich.table import Column, Table
 
 import smc_mujoco as smc
+from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.problems import entry as entries
 
 BOARDS = {  # kind of row -> title, headings of columns, digits after the point
     Row: (
         "simulation, version 2",
-        ("up at\ns", "energy\nJ", "torque\nN²m²s", "smooth\nN m", "speed\nrad²/s", "score"),
+        ("up at (s)", "energy (J)", "torque (N²m²s)", "smooth (N m)", "speed (rad²/s)", "score"),
         (2, 2, 2, 3, 1, 3),
     ),
     RobustnessRow: (
         "survived, version 2",
-        ("model\n%", "noise\nof v %", "noise\nof u %", "lag\n%", "delay\n%", "blows\n%", "score"),
+        (
+            "model (%)",
+            "noise of v (%)",
+            "noise of u (%)",
+            "lag (%)",
+            "delay (%)",
+            "blows (%)",
+            "score",
+        ),
         (1, 1, 1, 1, 1, 1, 3),
     ),
-    GlobalRow: ("a minute of resets, version 3", ("swing-ups", "up for\ns", "score"), (1, 3, 3)),
+    GlobalRow: ("a minute of resets, version 3", ("swing-ups", "up for (s)", "score"), (1, 3, 3)),
 }
 
 
 def table(
     robot: str, rows: Sequence[Row | RobustnessRow | GlobalRow], bold: Collection[str]
-) -> Table:
+) -> Tabular:
     """Return a board for a robot, with the rows named in `bold` in bold."""
     title, headings, digits = BOARDS[type(rows[0])]
-    columns = [Column(heading, justify="right") for heading in headings]
-    sheet = Table(
-        "controller",
-        *columns,
-        title=f"{robot}, {title}",
-        title_justify="left",
-        title_style="bold",
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-    )
+    lines = []
     for row in rows:
         cells = [f"{value:.{places}f}" for value, places in zip(row[1:], digits, strict=False)]
-        sheet.add_row(row.name, *cells, style="bold" if row.name in bold else None)
-    return sheet
+        lines.append([Cell(row.name, strong=row.name in bold), *cells])
+    return Tabular(headings=["controller", *headings], rows=lines, title=f"{robot}, {title}")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
