@@ -237,10 +237,11 @@ def _cell(board: Board, entry: BoardEntry) -> Cell:
 def _floor(board: Board, law: str) -> str:
     """Return which floor a law's median is below, in the first block where it is."""
     for block in board.blocks:
+        where = f" under {block.condition}" if len(board.blocks) > 1 else ""
         if law in block.below:
-            return f"floor {block.floor}"
+            return f"floor {block.floor}{where}"
         if block.floor and law in block.rising:
-            return f"may exceed {block.floor}"
+            return f"may exceed {block.floor}{where}"
     return ""
 
 

@@ -270,8 +270,6 @@ def _board(
     for block_number, k in enumerate(scores.blocks):
         of_blocks.append(ran[k])
         floor = paired_runs.floor_words(ran[k], metric)
-        if floor and len(scores.blocks) > 1:
-            floor += f" under {group.blocks[k][1]}"
         block = _block(group.blocks[k], group.seeds[k], comparison, block_number, untuned, floor)
         blocks.append(dataclasses.replace(block, bound=_bound(ran[k])))
     repeated = not np.isnan(comparison.halves).all()

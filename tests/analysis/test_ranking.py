@@ -22,6 +22,7 @@ from smc_mujoco.analysis.ranking import (
     ranks,
 )
 from smc_mujoco.analysis.signed_rank import least_visible_lead
+from smc_mujoco.answers.facts import Barred, Lead, Open, Tied
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.simulation import gaber_study as paper
 from smc_mujoco.simulation import run_key
@@ -713,25 +714,40 @@ SHOWN = [
     (COARSE, "0.01 m"),
     (FINE, "0.00015 m"),
 ]
-BELOW = [  # factors of q of laws a, b and c, the winner, and what is said
-    ((0.3, 0.9), None, "medians of both are below the floor of {q} and count as equal"),
-    ((0.5, 0.6, 3.0), None, "medians of a and b are below the floor of {q} and count as equal"),
-    ((0.5, 1.01), None, "a is below the floor of {q}, unlike b's"),
+BELOW = [  # factors of q of laws a, b and c, the verdict, and what it says
+    ((0.3, 0.9), Tied, {"laws": ("a", "b"), "floor": "q"}),
+    ((0.5, 0.6, 3.0), Tied, {"laws": ("a", "b"), "floor": "q"}),
+    ((0.5, 1.01), Open, {"laws": ("a",)}),
     (
         (0.5, 4.0, 5.0),
-        "a",
-        "a wins, for these gains; its value is below the floor of {q}, and it is ahead of b in "
-        "12 of 12 runs; b's median is at least 4.",
+        Lead,
+        {
+            "law": "a",
+            "rival": "b",
+            "floor": "q",
+            "ahead": 12,
+            "low": pytest.approx(3 / 4, rel=0.01),
+        },
     ),
-    ((2.0, 3.0), "a", "a wins, for these gains; its value is 0.6"),
-    ((2.0, 2.0), None, "level within 10 %"),
+    (
+        (2.0, 3.0),
+        Lead,
+        {
+            "law": "a",
+            "rival": "b",
+            "floor": "",
+            "ahead": 12,
+            "ratio": pytest.approx(2 / 3, rel=0.01),
+        },
+    ),
+    ((2.0, 2.0), Tied, {"laws": ("a", "b"), "floor": ""}),
 ]
 
 
-@pytest.mark.parametrize(("factors", "winner", "words"), BELOW)
+@pytest.mark.parametrize(("factors", "kind", "fields"), BELOW)
 @pytest.mark.parametrize(("run", "q"), SHOWN)
 def test_laws_below_the_floor_are_not_ranked_and_a_lead_over_it_is_a_least_one(
-    run, q, factors, winner, words
+    run, q, factors, kind, fields
 ):
     least = paired_runs.floor(run, "ultimate_bound")
     scores = {}
@@ -739,17 +755,21 @@ def test_laws_below_the_floor_are_not_ranked_and_a_lead_over_it_is_a_least_one(
         scores["abc"[i]] = least * twelve(factor, spread=0.005, seed=i)
     rows = np.array([run_key.row(run)["scenario"]] * 12 * len(factors))
     table = table_of(scores, "ultimate_bound", scenario=rows)
-    (board,) = leaderboard(table, ["ultimate_bound"])
+    boards = leaderboard(table, ["ultimate_bound"])
+    (board,) = boards
     (block,) = board.blocks
-    assert board.winner == winner
-    assert words.format(q=q) in board.result
-    if "both" in words:  # and in another condition neither is
+    (fact,) = board.verdicts.values()
+    assert isinstance(fact, kind)
+    fields = {name: q if value == "q" else value for name, value in fields.items()}
+    assert {name: getattr(fact, name) for name in fields} == fields
+    assert board.winner == ("a" if kind is Lead else None)
+    if factors == (0.3, 0.9):  # and in another condition neither is
         two = {law: np.vstack([scores[law], 9.0 * scores["a"]]) for law in "ab"}
         table = table_of(two, "ultimate_bound", scenario=np.tile(rows, 2))
-        both = f"both are below the floor of {q} under c0 and count"
-        assert both in leaderboard(table, ["ultimate_bound"])[0].result
+        (both,) = leaderboard(table, ["ultimate_bound"])
+        assert [tied.floor for tied in both.verdicts.values()] == [q, ""]
     cells = {}
-    for row in board.tables[0].rows:
+    for row in boards.tables[0].rows:
         cells[row[0].text] = row[1]
     for law, factor in zip("abc", factors, strict=False):
         below = factor < 1.0
@@ -770,7 +790,6 @@ def test_a_median_below_the_floor_that_rises_says_that_it_may_pass_it():
     (shown,) = leaderboard(table, ["ultimate_bound"]).tables
     said = {row[0].text: row[1].below.splitlines()[-1] for row in shown.rows}
     assert said == {"a": "floor 0.00015 m", "b": "may exceed 0.00015 m"}
-    assert "'may exceed': the median is below the floor, but" in " ".join(shown.notes)
     assert "May exceed a floor: " in shown.under[-1]
 
 
@@ -831,9 +850,11 @@ def test_a_law_wins_nothing_with_a_run_that_has_not_arrived(metric, lost, others
 
 def test_where_no_law_arrives_none_wins_and_it_is_said():
     table = table_of({"a": A, "b": B}, "tv_rate", arrived=np.zeros(24, bool))
-    (board,) = leaderboard(table, ["tv_rate"])
-    assert board.result == "no winner; every law has runs that fail or do not arrive"
-    assert [row[1].text for row in board.tables[0].rows] == ["not arrived"] * 2
+    boards = leaderboard(table, ["tv_rate"])
+    (board,) = boards
+    (fact,) = board.verdicts.values()
+    assert fact == Barred(metric="TV rate", laws=("a", "b"), defaults=False)
+    assert [row[1].text for row in boards.tables[0].rows] == ["not arrived"] * 2
 
 
 def test_a_run_that_arrives_only_at_the_whole_step_is_charged():
