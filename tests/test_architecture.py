@@ -168,6 +168,8 @@ def test_the_core_works_without_the_annexes(tmp_path):
     shutil.copytree(PACKAGE, tmp_path / "smc_mujoco", ignore=left_out)
     for folder in ("models", "scenes"):
         shutil.copytree(ROOT / folder, tmp_path / "smc_mujoco" / folder)
+    (tmp_path / "smc_mujoco" / "docs").mkdir()
+    shutil.copy(ROOT / "docs" / "words.md", tmp_path / "smc_mujoco" / "docs")
     code = """
 import smc_mujoco as smc
 from smc_mujoco.cli.main import main

@@ -100,6 +100,9 @@ CALLS = {
     "export pid p.fmu --gains kp=50 --surface linear(c=4) --velocity levant --period 0.002 "
     "--u-max 6 --model nominal "
     "--joints 2 --no-binary": ["exchange.fmu.export_fmu.law_to_fmu"],
+    "export pid folder --ros2 --gains kp=50 --surface linear(c=4) --velocity levant "
+    "--period 0.002 --u-max 6 --joints 2": ["exchange.loop.package.law_to_package"],
+    "export pid folder --plain": ["exchange.loop.package.law_to_package"],
 }
 CALLS = {line: paths for line, paths in CALLS.items() if annexes.here(paths) == paths}
 
@@ -203,9 +206,9 @@ FLAGS = {
     "--quick",
     "--allow-defaults",
 }
-FLAGS |= {"--no-binary", "--full", "--falling"}
+FLAGS |= {"--no-binary", "--full", "--falling", "--ros2", "--plain"}
 # which function does the work; --need and --plant of `list`
-SWITCHES = {"--rig", "--need", "--plant", "--no-film", "--full"}
+SWITCHES = {"--rig", "--need", "--plant", "--no-film", "--full", "--ros2", "--plain"}
 AFTER = {"--figure", "--latex", "--json", "--out"}  # of what is done after the function
 FOLDERS = {"run", "compare", "which"}  # whose --out is a folder
 ALIASES = {

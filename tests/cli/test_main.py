@@ -442,7 +442,7 @@ def test_a_warning_that_parts_of_a_command_repeat_is_printed_once(call, monkeypa
 
 
 GARBAGE = """
-import smc_mujoco.cli.main
+import smc_mujoco.simulation.run
 class Garbage:
     def __del__(self): print("collected")
 Garbage.one = Garbage()
@@ -662,13 +662,18 @@ def test_a_film_of_an_answer_has_as_many_pictures_as_its_time_allows(tmp_path, m
     said = []
     note = lambda text, **how: said.append(text)  # noqa: E731
     terminal = types.SimpleNamespace(note=note, wrote=said.append)
-    studies._film(recommendation, tmp_path, time.monotonic() - 1.0, terminal)
-    assert said[0] == tmp_path / "worst_run_machine.png"
-    assert re.match(r"This picture stands in place of a film, which would take \d+ s\. ", said[1])
+    studies._film(recommendation, tmp_path, time.monotonic(), terminal)
+    assert "no time for a film" in said.pop()
+    assert not list(tmp_path.iterdir())
+    with monkeypatch.context() as patch:
+        patch.setattr(studies, "MADE", 0.0)  # no share of the time is left for pictures
+        studies._film(recommendation, tmp_path, time.monotonic() + 600.0, terminal)
+    assert said[0] == tmp_path / "worst.png"
+    assert re.search(r"in place of a film, which would take \d+ s\b", said[1])
     with Image.open(said[0]) as picture:
         assert picture.size == (1280, 720)
     studies._film(recommendation, tmp_path, time.monotonic() + 600.0, terminal)
-    assert said[2:] == [tmp_path / "worst_run.mp4"]
+    assert said[2:] == [tmp_path / "worst.mp4"]
     made = next(ffmpeg.read_frames(str(said[2])))
     assert made["fps"] == studies.MAX_FPS
     assert {path.name for path in tmp_path.iterdir()} == {said[0].name, said[2].name}
