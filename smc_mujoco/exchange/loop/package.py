@@ -71,7 +71,7 @@ controller: main.c @sources@
 def law_to_package(
     law: Any, folder: AnyPath, kind: Annotated[str, OneOf(names=KINDS)] = "ros2", **options: Any
 ) -> Path:
-    """Write a law as a folder that compiles as it is. Return its path.
+    """Write a law as a folder that compiles as it is.
 
         smc.exchange.law_to_package("super_twisting", "my_controller", "plain", u_max=6.0)
 
@@ -81,6 +81,9 @@ def law_to_package(
       folder: of the package; its name is that of the ROS package.
       kind: "ros2": a package for ros2_control. "plain": C with a main loop.
       options: surface, velocity, control_period, u_max and joints, as in `law_to_fmu`.
+
+    Returns:
+      The path of the folder.
 
     Raises:
       ScenarioError: as `law_to_fmu`; a law that reads the nominal model, or the joint beside its
