@@ -50,6 +50,7 @@ MAX_REFUTED = 8  # claims that an answer names; chosen
 GAP = "  "  # between columns
 HEADING = 12  # characters of a line of a heading; chosen
 NAMES = 24  # characters of a plant and a condition beside winners; chosen
+OVER = "over 99"  # percent, of larger shares
 LARGEST = 0.995  # a share that is printed: of the leads that might not show; chosen
 SHARE = "settled runs"  # the metric that is a share
 ON_PLANT = "J"  # the metric that is of all conditions of a plant
@@ -101,10 +102,10 @@ def _pasted(command: str, width: int) -> list[str]:
 
 
 def percent(low: float, high: float = math.nan) -> str:
-    """Return shares as text: "21 to 25 %", "21 %", "at least 21 %"."""
-    least, most = (f"{100 * share:.2g}" if abs(share) < LARGEST else "100" for share in (low, high))
+    """Return shares as text: "21 to 25 %", "21 %", "at least 21 %", "over 99 %"."""
+    least, most = (f"{100 * share:.2g}" if abs(share) < LARGEST else OVER for share in (low, high))
     if math.isnan(high):
-        return f"at least {least} %"
+        return f"{OVER} %" if least == OVER else f"at least {least} %"
     return f"{least} %" if least == most else f"{least} to {most} %"
 
 
@@ -393,8 +394,13 @@ def winners_lines(contests: Sequence[Contest]) -> list[str]:
     for contest in contests:
         fact_of = {fact.metric: fact for fact in contest.verdicts}
         cells = []
+        _, numbers = contest.grid.rows[0]
+        columns = [name for name, _ in contest.grid.columns]
+        number_of = dict(zip(columns, numbers, strict=True))
         for name in names:
             text = winner(fact_of[name], len(contest.grid.rows)) if name in fact_of else ""
+            if len(contest.grid.rows) == 1:  # nothing to compare it with
+                text = number_of[name]
             cells.append(textwrap.wrap(text, room))
         rows.append((f"{contest.plant} {contest.condition}", cells))
         if ON_PLANT in fact_of and contest.plant not in of_plants:
@@ -755,7 +761,12 @@ def _caution(fact: Caution) -> Labelled:
 
 def _minutes(minutes: float) -> str:
     """Return a time as text, such as "80 minutes"."""
-    return counted(math.ceil(minutes), "minute")
+    return counted(_whole_minutes(minutes), "minute")
+
+
+def _whole_minutes(minutes: float) -> int:
+    """Return a time that an estimate of it is likely to keep, min."""
+    return max(1, math.ceil(1.2 * minutes))
 
 
 def which_next(facts: WhichFacts, call: Sequence[str]) -> NextStep:
@@ -764,7 +775,7 @@ def which_next(facts: WhichFacts, call: Sequence[str]) -> NextStep:
     """
     size = facts.size
     needed = facts.minutes_needed
-    minutes = MORE_MINUTES if math.isnan(needed) else max(1, math.ceil(1.2 * needed))
+    minutes = MORE_MINUTES if math.isnan(needed) else _whole_minutes(needed)
     longer = [*_without(call, "--minutes"), "--minutes", f"{minutes}"]
     if facts.form in ("undecided", "untried") or size.raced < size.named:
         if facts.sets_needed:

@@ -1,5 +1,6 @@
 """The command that is running, so that an answer can give it again with other options."""
 
+import itertools
 import shlex
 from collections.abc import Mapping, Sequence
 from contextvars import ContextVar
@@ -28,20 +29,29 @@ def again(options: Mapping[str, str], without: Sequence[str] = ()) -> str:
     return shlex.join([PROGRAM, *words, *_flat(options)])
 
 
+def typed(option: str) -> str:
+    """Return the value of an option of the command that is running; "" without it."""
+    words = _typed.get()
+    for word, value in itertools.pairwise(words):
+        if word == option:
+            return value
+    return next((word.partition("=")[2] for word in words if word.startswith(f"{option}=")), "")
+
+
 def instead(command: str, options: Mapping[str, str], shared: Sequence[str] = ()) -> str:
     """Return another command with the arguments, and the `shared` options, of the one that is
     running, and further options; where Python runs, its name.
     """
-    typed = _typed.get()
-    if not typed:
+    words_typed = _typed.get()
+    if not words_typed:
         return f"smc.{command}"
     words = command.split()
-    for i, word in enumerate(typed[1:], 1):
+    for i, word in enumerate(words_typed[1:], 1):
         if not word.startswith("-"):
-            if not typed[i - 1].startswith("-"):
+            if not words_typed[i - 1].startswith("-"):
                 words.append(word)
-            elif typed[i - 1] in shared:
-                words += typed[i - 1 : i + 1]
+            elif words_typed[i - 1] in shared:
+                words += words_typed[i - 1 : i + 1]
     return shlex.join([PROGRAM, *words, *_flat(options)])
 
 

@@ -20,7 +20,7 @@ from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns, worth_compiling
 from smc_mujoco.answers import answers
 from smc_mujoco.answers.answer import Answer
-from smc_mujoco.answers.command import again
+from smc_mujoco.answers.command import again, instead, typed
 from smc_mujoco.answers.facts import Grid, Lead, NextStep, WorstFacts
 from smc_mujoco.common.aliases import Numbers
 from smc_mujoco.common.cache import cached
@@ -191,7 +191,10 @@ class WorstCases(Answer, list[WorstCase]):
             )
         columns = ("worst found", first.unit), ("median", first.unit)
         outside = [(case.nominal.law.name, case.outside) for case in self if case.outside]
-        draw = NextStep(again({"--figure": "worst"}), "draws the worst runs")
+        step = NextStep(again({"--figure": "worst"}), "draws the worst runs")
+        if typed("--figure"):
+            command = instead("margins", {}, ("--law", "--gains", "--condition"))
+            step = NextStep(command, "finds how much of each alone is tolerated")
         return answers.worst_lines(
             WorstFacts(
                 about=f"{first.nominal.plant.name}, {label}",
@@ -200,7 +203,7 @@ class WorstCases(Answer, list[WorstCase]):
                 grid=Grid(columns=columns, rows=tuple(rows), winners=("", "")),
                 lead=lead,
                 outside=tuple(outside),
-                next=draw,
+                next=step,
             )
         )
 

@@ -54,7 +54,8 @@ def test_more_settled_runs_are_no_value_below_a_rival_s():
     [
         (0.213, 0.254, "21 to 25 %"),
         (0.211, 0.212, "21 %"),
-        (0.0123, 0.9989, "1.2 to 100 %"),
+        (0.0123, 0.9989, "1.2 to over 99 %"),
+        (0.998, math.nan, "over 99 %"),
         (0.031, math.nan, "at least 3.1 %"),
     ],
 )

@@ -10,7 +10,7 @@ from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, restore
 from smc_mujoco.answers import answers
 from smc_mujoco.answers.answer import Answer
-from smc_mujoco.answers.command import again, instead
+from smc_mujoco.answers.command import again, instead, typed
 from smc_mujoco.answers.facts import NextStep, TuneFacts
 from smc_mujoco.common.aliases import AnyPath, Data, Fields
 from smc_mujoco.common.data import keyword_dataclass
@@ -96,10 +96,13 @@ class Tuned(Answer):
     def lines(self) -> list[str]:
         """The answer on one screen."""
         name = self.law.name
-        laws = ",".join(dict.fromkeys([name, *RIVALS]))
-        step = NextStep(
-            instead("compare", {"--law": laws}, ("--condition", "--x0")), "compares it with rivals"
-        )
+        file = typed("--out")
+        if file:
+            rivals = ",".join([file, *(law for law in RIVALS if law != name)])
+            command = instead("compare", {"--law": rivals}, ("--condition", "--x0"))
+            step = NextStep(command, "compares it with rivals, with these gains")
+        else:
+            step = NextStep(again({"--out": f"{name}.json"}), "keeps the gains in a file")
         if self.spread > FAR_APART:
             step = NextStep(again({"--budget": f"{4 * self.budget}"}), "searches longer")
         return answers.tune_lines(

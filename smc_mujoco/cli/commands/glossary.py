@@ -33,4 +33,12 @@ def explain(word: Word) -> None:
             if asked_word.casefold() in (metric.name, metric.label.casefold()):
                 terminal.note(f"{metric.label}\n{metric.summary}", wrap=True)
                 return
+        from smc_mujoco.control.law import all_laws
+        from smc_mujoco.mechanisms.plant import plants
+        from smc_mujoco.simulation.conditions import NAMED
+
+        for what, names in (("law", all_laws()), ("plant", plants()), ("condition", NAMED)):
+            if asked_word in names:
+                terminal.note(f"{asked_word} is a {what}: smc-mujoco list {asked_word}")
+                return
     terminal.note(meaning(asked_word))

@@ -10,10 +10,14 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from smc_mujoco.common.aliases import AnyPath
-from smc_mujoco.common.constraints import OneOf, constrained
+from smc_mujoco.common.constraints import OneOf, Positive, constrained
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import replacing
 from smc_mujoco.common.text import joined
+from smc_mujoco.control.component import Template
+from smc_mujoco.control.estimator import Estimator
+from smc_mujoco.control.law import Law
+from smc_mujoco.control.surface import Surface
 from smc_mujoco.exchange.fmu import contents
 from smc_mujoco.exchange.fmu.contents import ExportedLaw
 from smc_mujoco.exchange.fmu.export_fmu import controller_files, exported_law
@@ -69,9 +73,17 @@ controller: main.c @sources@
 
 @constrained
 def law_to_package(
-    law: Any, folder: AnyPath, kind: Annotated[str, OneOf(names=KINDS)] = "ros2", **options: Any
+    law: Law | Template | str | Scenario,
+    folder: AnyPath,
+    kind: Annotated[str, OneOf(names=KINDS)] = "ros2",
+    *,
+    surface: Surface | Template | str | None = None,
+    velocity: Estimator | Template | str | None = None,
+    control_period: Positive | None = None,
+    u_max: float | Sequence[float] | None = None,
+    joints: int | None = None,
 ) -> Path:
-    """Write a law as a folder that compiles as it is.
+    """Write a law as a folder that compiles as it is:
 
         smc.exchange.law_to_package("super_twisting", "my_controller", "plain", u_max=6.0)
 
@@ -80,7 +92,7 @@ def law_to_package(
         period, bound and Feedforward.
       folder: of the package; its name is that of the ROS package.
       kind: "ros2": a package for ros2_control. "plain": C with a main loop.
-      options: surface, velocity, control_period, u_max and joints, as in `law_to_fmu`.
+      surface, velocity, control_period, u_max, joints: as in `law_to_fmu`.
 
     Returns:
       The path of the folder.
@@ -89,7 +101,14 @@ def law_to_package(
       ScenarioError: as `law_to_fmu`; a law that reads the nominal model, or the joint beside its
         own, which no loop has.
     """
-    exported = exported_law(law, **options)
+    exported = exported_law(
+        law,
+        surface=surface,
+        velocity=velocity,
+        control_period=control_period,
+        u_max=u_max,
+        joints=joints,
+    )
     beyond = contents.inputs(exported) - GIVEN_BY_A_LOOP
     if beyond or exported.of_body:
         needs = joined(sorted(beyond)) if beyond else "the pose of a body"
