@@ -261,11 +261,6 @@ def called(function: Callable, arguments: tuple, named: dict[str, Any]) -> dict[
     signature = inspect.signature(function)
     bound = signature.bind(*arguments, **named).arguments
     plain = {name: one.default for name, one in signature.parameters.items()}
-    for name, parameter in signature.parameters.items():
-        if parameter.kind is parameter.VAR_KEYWORD:
-            options = bound.pop(name, {})
-            bound.update(options)
-            plain.update(dict.fromkeys(options))
     given = {}
     for name, one in bound.items():
         if type(one) is not type(plain[name]) or one != plain[name]:
