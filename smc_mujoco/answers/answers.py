@@ -453,7 +453,8 @@ def compare_lines(facts: CompareFacts) -> list[str]:
 
 def margins_lines(facts: MarginsFacts) -> list[str]:
     """Return the most that laws tolerate: a table for each plant, and who tolerates the most."""
-    lines = [f"The most that each law tolerates in runs of {facts.duration:g} s"]
+    about = f"The most that each law tolerates in runs of {facts.duration:g} s"
+    lines = textwrap.wrap(f"{about}, or the range in which it lies", WIDTH)
     most: dict[str, list[str]] = {}
     starred = False
     for plant, table in facts.grids:
@@ -477,7 +478,8 @@ def margins_lines(facts: MarginsFacts) -> list[str]:
 
 def worst_lines(facts: WorstFacts) -> list[str]:
     """Return the worst runs found of laws on a plant."""
-    about = f"{facts.about}, worst of {facts.runs} runs a law; bounds: {facts.bounds}"
+    runs = f"{facts.runs} runs a law, half of them drawn at random"
+    about = f"{facts.about}, worst of {runs}; bounds: {facts.bounds}"
     numbers, _ = grid_lines(facts.grid)
     lines = [*textwrap.wrap(about, WIDTH), *numbers, "Lower is better. A worse case may exist.", ""]
     pairs = leads([facts.lead] if facts.lead else [])

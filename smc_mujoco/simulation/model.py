@@ -6,7 +6,6 @@ mechanisms differ only in values of model fields. A Batch has those values separ
 simulation.
 """
 
-import collections
 import copy
 import dataclasses
 import functools
@@ -113,7 +112,7 @@ class Mechanism:
 
 # by structure
 _mechanisms: weakref.WeakValueDictionary[Hashable, Mechanism] = weakref.WeakValueDictionary()
-_recent: collections.deque[Mechanism] = collections.deque(maxlen=MAX_RECENT)
+_recent: list[Mechanism] = []  # replaced at once, as other threads read and replace it too
 
 
 def mechanism(scenario: Scenario) -> Mechanism:
@@ -125,9 +124,10 @@ def mechanism(scenario: Scenario) -> Mechanism:
     if (shared := _mechanisms.get(key)) is None:
         base = compile_model(scenario, USERDATA, scenery=False)
         shared = _mechanisms[key] = Mechanism(base, channels(base))
-        _recent.append(shared)
-        while sum(mujoco.mj_sizeModel(recent.model) for recent in _recent) > MAX_RECENT_BYTES:
-            _recent.popleft()
+        mechanisms = [*_recent, shared][-MAX_RECENT:]
+        while sum(mujoco.mj_sizeModel(recent.model) for recent in mechanisms) > MAX_RECENT_BYTES:
+            del mechanisms[0]
+        _recent[:] = mechanisms
     elif source := getattr(scenario.plant.build, "source", None):  # of a user's model
         source.check_unchanged()
     return shared

@@ -208,3 +208,20 @@ def test_runs_one_after_another_share_a_model_that_none_of_them_changes(monkeypa
     )
     assert len(compilations) == 1
     np.testing.assert_array_equal(again.x, first.x)
+
+
+def test_a_thread_may_keep_its_model_while_another_counts_the_bytes_of_those_kept(monkeypatch):
+    first, other = (smc.Scenario(plant=name, law="pid") for name in ("duffing", "van_der_pol"))
+    monkeypatch.setattr(model, "_recent", type(model._recent)())
+    monkeypatch.setattr(model, "_mechanisms", weakref.WeakValueDictionary())
+    size, meanwhile = mujoco.mj_sizeModel, [other]
+
+    def counted(compiled):
+        if meanwhile:  # as if the other thread ran now
+            model.mechanism(meanwhile.pop())
+        return size(compiled)
+
+    monkeypatch.setattr(mujoco, "mj_sizeModel", counted)
+    kept = model.mechanism(first)
+    assert kept in model._recent
+    assert not meanwhile
