@@ -46,11 +46,11 @@ class LeastLead(NamedTuple):
     def fact(self, metric: str, medians: Numbers) -> Lead:
         """Return the lead as a fact of an answer, with the medians by law."""
         effect = self.effect
-        share = {"low": 1.0 - effect.high, "high": 1.0 - effect.low, "ratio": effect.value}
+        interval = {"low": 1.0 - effect.high, "high": 1.0 - effect.low, "ratio": effect.value}
         if self.lacking:
-            share = {}
+            interval = {}
         elif self.floor:
-            share = {"low": 1.0 - effect.high}
+            interval = {"low": 1.0 - effect.high}
         median = medians[self.law], medians[self.rival]
         return Lead(
             law=self.law,
@@ -62,7 +62,7 @@ class LeastLead(NamedTuple):
             samples=effect.samples,
             unit="sets of gains" if effect.sets else self.unit,
             medians_differ=median[0] > median[1],
-            **share,
+            **interval,
         )
 
 

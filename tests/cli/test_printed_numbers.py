@@ -79,15 +79,15 @@ def test_margins_are_printed_in_their_unit(printed):
     line = "margins duffing --law pid --kind delay,mass --quick --json m.json"
     margins = json.loads(Path("m.json").read_text()) if printed(line) else []
     for out, full in ((printed(line), False), (printed(f"{line} --full"), True)):
-        for one in margins:
+        for margin in margins:
             if full:
-                words = row(out[out.index(f"largest {one['kind']}") :], "duffing", "pid")
-                assert near(words[2], one["value"])
-                assert near(words[3], one["resolution"])
-                assert words[-1] == one["unit"]
+                words = row(out[out.index(f"largest {margin['kind']}") :], "duffing", "pid")
+                assert near(words[2], margin["value"])
+                assert near(words[3], margin["resolution"])
+                assert words[-1] == margin["unit"]
             else:
                 numbers = [word for word in row(out, "pid")[1:] if word != "to"]
-                for end in (one["low"], one["high"]):
+                for end in (margin["low"], margin["high"]):
                     assert any(near(word, end) for word in numbers), (numbers, end)
 
 
@@ -109,10 +109,10 @@ def test_sensitivity_prints_shares_in_per_cent_and_ranges_in_their_unit(printed)
     out = printed(line)
     axes = json.loads(Path("s.json").read_text())["axes"]
     assert row(full, "delay")[:5] == ["delay", "0", "s", "20", "ms"]
-    for one in axes:
-        shares = [f"{100.0 * one[kind]['median']:.0f}" for kind in ("first", "total")]
-        assert shares == [word for word in row(full, one["name"])[-3:] if word.isdigit()][-2:]
-        assert row(out, one["name"])[-2] == shares[1]
+    for axis in axes:
+        shares = [f"{100.0 * axis[kind]['median']:.0f}" for kind in ("first", "total")]
+        assert shares == [word for word in row(full, axis["name"])[-3:] if word.isdigit()][-2:]
+        assert row(out, axis["name"])[-2] == shares[1]
     first = axes[0]
     low = f"{100.0 * first['total']['low']:.0f}"
     assert first["total"]["high"] > 0.995

@@ -222,6 +222,6 @@ def test_a_thread_may_keep_its_model_while_another_counts_the_bytes_of_those_kep
         return size(compiled)
 
     monkeypatch.setattr(mujoco, "mj_sizeModel", counted)
-    kept = model.mechanism(first)
-    assert kept in model._recent
+    shared = model.mechanism(first)
+    assert shared in model._recent
     assert not meanwhile

@@ -565,8 +565,8 @@ def test_a_lead_has_its_interval_as_shares_and_says_where_medians_differ(case, m
     assert (fact.law, fact.rival, fact.metric, fact.samples) == ("a", "b", "J", 8)
     assert fact.medians_differ == (medians[0] > medians[1])
     for name, value in fields.items():
-        kept = getattr(fact, name)
-        assert kept == (value if isinstance(value, str) else pytest.approx(value, nan_ok=True))
+        expected = value if isinstance(value, str) else pytest.approx(value, nan_ok=True)
+        assert getattr(fact, name) == expected
 
 
 def test_over_several_conditions_each_verdict_stands_once(pair):

@@ -301,8 +301,8 @@ def test_two_calls_write_the_same_bytes_whenever_wherever_and_with_any_threads(
     assert first.keys() == second.keys()
     report = "compared/report.html"  # with times of this machine
     pages = [
-        re.sub(rf"<section>[^\n]*{compare.TIMES}.*", "", one.pop(report).decode())
-        for one in written
+        re.sub(rf"<section>[^\n]*{compare.TIMES}.*", "", files.pop(report).decode())
+        for files in written
     ]
     assert pages[0] == pages[1]
     for name, content in first.items():

@@ -51,28 +51,28 @@ def test_runs_that_move_by_themselves_tell_nothing():
 def test_a_swing_is_of_the_last_fifth_with_its_frequency():
     t = 1e-3 * np.arange(STEPS)
     u = np.where(t < 1.6, 5.0, 0.3 * np.sin(2.0 * np.pi * 20.0 * t))[:, None]
-    found = swing(BASE, u)
-    assert found.size == pytest.approx(0.6, rel=1e-2)
-    assert found.share == pytest.approx(0.6 / BASE.limits[0], rel=1e-2)
-    assert found.frequency == pytest.approx(20.0, rel=0.05)
+    measured = swing(BASE, u)
+    assert measured.size == pytest.approx(0.6, rel=1e-2)
+    assert measured.share == pytest.approx(0.6 / BASE.limits[0], rel=1e-2)
+    assert measured.frequency == pytest.approx(20.0, rel=0.05)
 
 
 def test_gains_that_break_a_limit_cost_more_than_any_that_keep_it_and_less_than_a_failure():
     """In every engine, by the same numbers."""
     goal = Objective(conditions=("nominal",), duration=1.0)
-    kept = dataclasses.replace(goal, limits=(RunLimit("overshoot", 5.0),))
+    with_limit = dataclasses.replace(goal, limits=(RunLimit("overshoot", 5.0),))
     gains = [(30.0, 0.1, 0.5), (30.0, 0.1, 9.0)]
     cases = goal.scenarios(BASE.plant, smc.law("pid"))
     names = ("kp", "ki", "kd")
     plain = Evaluator(goal, cases, names)(gains)
-    bounded = Evaluator(kept, cases, names, by_equation=True)(gains)
+    bounded = Evaluator(with_limit, cases, names, by_equation=True)(gains)
     assert LIMIT_COST < bounded[0].objective < FAILURE_COST
     assert bounded[1] == plain[1]
     law = dataclasses.replace(
         cases[0].law, gains=dict(cases[0].law.gains) | dict(zip(names, gains[0], strict=True))
     )
     traces = [smc.run(dataclasses.replace(case, law=law)) for case in cases]
-    assert kept.evaluation(cases[0], traces).objective == pytest.approx(bounded[0].objective)
+    assert with_limit.evaluation(cases[0], traces).objective == pytest.approx(bounded[0].objective)
     over = overshoot(cases[0], traces[0].x)
     assert bounded[0].objective - plain[0].objective == pytest.approx(LIMIT_COST * over / 5.0)
 
@@ -100,9 +100,9 @@ def test_tuned_gains_keep_the_overshoot():
     """Where the same search without the limit goes far beyond it."""
     common = {"budget": 6, "searches": 1, "conditions": ["nominal"], "quick": True}
     cases = Objective(conditions=("nominal",)).scenarios(smc.plant("servo_axis"), smc.law("pid"))
-    found = {}
+    overshoots = {}
     for needs in (None, "overshoot<4"):
         tuned = smc.tune("servo_axis", "pid", needs=needs, **common)
         trace = smc.run(dataclasses.replace(cases[0], law=tuned.law))
-        found[needs] = overshoot(cases[0], trace.x)
-    assert found["overshoot<4"] <= 4.0 < found[None]
+        overshoots[needs] = overshoot(cases[0], trace.x)
+    assert overshoots["overshoot<4"] <= 4.0 < overshoots[None]
