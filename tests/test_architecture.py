@@ -272,7 +272,7 @@ print(*sys.modules)
     [
         ("smc_mujoco", set()),
         ("smc_mujoco.common.gl", set()),
-        ("smc_mujoco.cli.main", {"rich", "typer", "numpy"}),
+        ("smc_mujoco.cli.main", {"rich", "typer"}),
     ],
 )
 def test_an_import_brings_nothing_heavy_that_it_does_not_need(name, needed):

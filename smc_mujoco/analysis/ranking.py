@@ -74,6 +74,7 @@ from numpy.typing import ArrayLike
 
 from smc_mujoco.analysis.bootstrap import LEVEL, middle
 from smc_mujoco.analysis.differ import differ
+from smc_mujoco.analysis.relevant import RELEVANT
 from smc_mujoco.analysis.signed_rank import (
     MAX_LOG,
     interval,
@@ -83,7 +84,6 @@ from smc_mujoco.analysis.signed_rank import (
 )
 from smc_mujoco.common.constraints import Number, constrained
 
-RELEVANT = 0.03  # r, default share of the larger value that is relevant; chosen
 Relevant = Annotated[float, Number(low=0.0, high=0.5)]
 # p where the last part is a fifth of a run: a trend that lasts as long again goes on for 5 of them
 TREND_POWER = 5.0

@@ -400,7 +400,7 @@ def winners_lines(contests: Sequence[Contest]) -> list[str]:
         for name in names:
             text = winner(fact_of[name], len(contest.grid.rows)) if name in fact_of else ""
             if len(contest.grid.rows) == 1:  # nothing to compare it with
-                text = number_of[name]
+                text = number_of.get(name, "")  # a condition may leave a column out
             cells.append(textwrap.wrap(text, room))
         rows.append((f"{contest.plant} {contest.condition}", cells))
         if ON_PLANT in fact_of and contest.plant not in of_plants:

@@ -6,14 +6,16 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from smc_mujoco.answers.answer import Answer
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.files import with_ending, writable, write_json
 from smc_mujoco.common.scripts import users_traceback
+
+if TYPE_CHECKING:
+    from smc_mujoco.answers.answer import Answer
 
 
 @contextlib.contextmanager
@@ -72,7 +74,7 @@ class Terminal(Console):
         self.printed += objects
         super().print(*objects, **options)
 
-    def answer(self, result: Answer, full: bool = False) -> None:
+    def answer(self, result: "Answer", full: bool = False) -> None:
         """Print a result's answer, or with `full` its evidence; remember it for `finish`."""
         self.printed.append(result)
         if full:

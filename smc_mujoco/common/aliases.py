@@ -1,17 +1,31 @@
-"""Short names of types that many signatures share."""
+"""Short names of types that many signatures share.
+
+Those of arrays import numpy, and only where they are asked for, so that a command's help does not.
+"""
 
 import os
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+if TYPE_CHECKING:
+    import numpy as np
+
+    Array = np.ndarray
+    ArrayPair = tuple[Array, Array]
 
 AnyPath = str | os.PathLike[str]
-Array = np.ndarray
-ArrayPair = tuple[Array, Array]
 Data = Mapping[str, Any]  # values by name, to be read
 Fields = dict[str, Any]  # the same, to be filled
 Floats = tuple[float, ...]
 Names = tuple[str, ...]
 Numbers = Mapping[str, float]  # by name
 Pair = tuple[float, float]
+
+
+def __getattr__(name: str) -> Any:
+    """Return the alias of arrays."""
+    if name not in ("Array", "ArrayPair"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from numpy import ndarray
+
+    return ndarray if name == "Array" else tuple[ndarray, ndarray]

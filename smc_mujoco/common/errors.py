@@ -14,8 +14,6 @@ from collections.abc import Iterable, Mapping
 from contextvars import ContextVar
 from typing import Any, TypeVar
 
-import numpy as np
-
 T = TypeVar("T")
 MAX_NAME = 100  # characters: chosen, for tables and figures
 MAX_ITEMS = 1_000_000  # items of a list that a user gives, and runs of a grid: chosen
@@ -200,6 +198,8 @@ def _real(value: Any) -> Any:
     """Return a real number, also from an array without axes; None for anything else, such as flags
     and durations.
     """
+    import numpy as np  # which a command's help does without
+
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
         return None
     if isinstance(value, np.ndarray) and value.ndim == 0:
@@ -229,6 +229,8 @@ def has_items(value: object) -> bool:
     """Return whether a value has items, as a list or a generator has; an array without axes has
     none.
     """
+    import numpy as np
+
     return isinstance(value, Iterable) and not (isinstance(value, np.ndarray) and value.ndim == 0)
 
 

@@ -298,6 +298,12 @@ def discover(package: str, kind: type[T]) -> dict[str, T]:
     return {NAME(value): value for value in sorted(values, key=NAME)}
 
 
+def file_names(package: str) -> list[str]:
+    """Return the names of a package's modules, sorted, without importing them."""
+    path = importlib.import_module(package).__path__
+    return sorted(info.name for info in pkgutil.iter_modules(path))
+
+
 class Files(Mapping[str, T_co]):
     """The objects of a kind in a package's modules, one in each and named as it, imported when it
     is asked for.
@@ -306,10 +312,7 @@ class Files(Mapping[str, T_co]):
     def __init__(self, package: str, kind: type[T_co]):
         self.package = package
         self.kind = kind
-        names = []
-        for info in pkgutil.iter_modules(importlib.import_module(package).__path__):
-            names.append(info.name)
-        self.names = sorted(names)
+        self.names = file_names(package)
 
     def __getitem__(self, name: str) -> T_co:
         if name not in self.names:

@@ -747,6 +747,7 @@ def _motor(joint: JointSize) -> DCMotor:
     return motor.side_by_side(joint.limit / U_MAX / gear)
 
 
+# cli/names.py reads the names from the text
 IDEAL: dict[str, Recipe] = {
     "nominal": {},
     "noise": {"noise": SENSOR_NOISE},
@@ -755,12 +756,18 @@ IDEAL: dict[str, Recipe] = {
     "step": _disturbed(lambda half: Step(0.2, time=half)),
     "pulse": _disturbed(lambda half: Pulse(2.0, time=half, width=0.1)),
     "process_noise": _disturbed(lambda half: OrnsteinUhlenbeck(sigma=0.2, tau=0.1)),
-    **{f"delay_{ms}ms": {"input_delay": ms * 1e-3} for ms in (1, 5, 10, 20, 50)},
+    "delay_1ms": {"input_delay": 0.001},
+    "delay_5ms": {"input_delay": 0.005},
+    "delay_10ms": {"input_delay": 0.01},
+    "delay_20ms": {"input_delay": 0.02},
+    "delay_50ms": {"input_delay": 0.05},
     "light": {"mismatch": {"mass": 0.7}},
     "heavy": {"mismatch": {"mass": 1.3}},
     "jump_mild": _jump("mild"),
     "jump_hard": _jump("hard"),
-    **{f"period_{ms}ms": {"control_period": ms * 1e-3} for ms in (10, 20, 50)},
+    "period_10ms": {"control_period": 0.01},
+    "period_20ms": {"control_period": 0.02},
+    "period_50ms": {"control_period": 0.05},
     "differenced_5ms": {"velocity": DIFFERENCED},
     "differenced_5ms_noise": {"velocity": DIFFERENCED, "noise": Noise(position=0.01)},
 }

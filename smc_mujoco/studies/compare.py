@@ -13,7 +13,8 @@ import numpy as np
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.law_time import LawTime, law_time
-from smc_mujoco.analysis.ranking import RELEVANT, Relevant, needed_to_win
+from smc_mujoco.analysis.ranking import Relevant, needed_to_win
+from smc_mujoco.analysis.relevant import RELEVANT
 from smc_mujoco.analysis.tuning.effort import Search
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Budget, Searches
 from smc_mujoco.answers import answers

@@ -27,7 +27,8 @@ from smc_mujoco.analysis.paired_runs import (
     RunGroup,
     Scores,
 )
-from smc_mujoco.analysis.ranking import RELEVANT, Comparison, corrected, linked, ranks
+from smc_mujoco.analysis.ranking import Comparison, corrected, linked, ranks
+from smc_mujoco.analysis.relevant import RELEVANT
 from smc_mujoco.analysis.step_halving import first_order, repeats_every_run
 from smc_mujoco.common.aliases import Array, Names
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Annotated
 
 from smc_mujoco.analysis.engine import Device
-from smc_mujoco.analysis.ranking import RELEVANT, Relevant
+from smc_mujoco.analysis.ranking import Relevant
+from smc_mujoco.analysis.relevant import RELEVANT
 from smc_mujoco.analysis.tuning.effort import Search
 from smc_mujoco.analysis.tuning.run_limits import RunLimit, limits_in
 from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, constrained

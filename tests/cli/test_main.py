@@ -20,15 +20,18 @@ from helpers import commands
 from PIL import Image
 
 import smc_mujoco as smc
-from smc_mujoco.cli import console, main, tables
+from smc_mujoco.cli import console, law_pages, main, names, tables
 from smc_mujoco.cli import run_scene as show
 from smc_mujoco.cli.commands import options, studies
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
 from smc_mujoco.draw.film import pace
-from smc_mujoco.metrics.catalogue import metrics, score
+from smc_mujoco.mechanisms.plant import catalogue as plants
+from smc_mujoco.metrics.catalogue import CATALOGUE, metrics, score
 from smc_mujoco.simulation import run as runs
+from smc_mujoco.simulation.conditions import NAMED
 from smc_mujoco.simulation.grid import case
+from smc_mujoco.studies.scene import scenes
 
 LABEL = "a label that is forty characters in all."
 SCENE = f'''"""Does a user's scene run?"""
@@ -124,6 +127,18 @@ def refused(answer: tuple[int, str, str], *words: object) -> None:
 
 
 # list
+
+
+def test_names_that_are_read_from_the_source_are_those_of_the_catalogues():
+    catalogues = {
+        "Plants": plants(),
+        **{heading: templates() for heading, templates in law_pages.CATALOGUES.items()},
+        "Scenes": scenes(),
+        "Conditions": NAMED,
+        "Metrics": CATALOGUE,
+    }
+    assert names.names() == [(heading, [*entries]) for heading, entries in catalogues.items()]
+    assert not names.of_others()
 
 
 def test_list_names_everything_there_is_or_all_of_a_kind(call):
@@ -456,7 +471,9 @@ def test_a_command_does_not_wait_for_a_last_collection():
 HELP = """
 import contextlib, io, sys
 from smc_mujoco.cli.main import main
-for words in (["--help"], ["run", "--help"], ["show", "--help"], ["list", "--help"], ["--version"]):
+for words in (
+    ["--help"], ["run", "--help"], ["show", "--help"], ["list", "--help"], ["list"], ["--version"]
+):
     said = io.TextIOWrapper(io.BytesIO(), "utf-8")
     with contextlib.redirect_stdout(said):
         try:
@@ -465,11 +482,11 @@ for words in (["--help"], ["run", "--help"], ["show", "--help"], ["list", "--hel
             assert not end.code, end.code
     said.seek(0)
     print(repr(said.read()))
-print(*({"mujoco", "numba", "llvmlite", "matplotlib", "scipy", "PIL"} & set(sys.modules)))
+print(*({"numpy", "mujoco", "numba", "llvmlite", "matplotlib", "scipy", "PIL"} & {*sys.modules}))
 """
 
 
-def test_help_and_version_import_neither_mujoco_numba_nor_matplotlib(tmp_path):
+def test_help_version_and_names_import_neither_mujoco_numba_nor_matplotlib(tmp_path):
     done = python("-c", HELP, folder=tmp_path)
     assert done.stderr == ""
     *said, heavy = done.stdout.split("\n")[:-1]

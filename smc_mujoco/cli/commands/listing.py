@@ -1,11 +1,13 @@
 """smc-mujoco list: what there is to choose from, and a page about one of it."""
 
 import inspect
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from smc_mujoco.cli import names
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common import annexes
@@ -98,9 +100,17 @@ def list_(
         with delay_signals():
             from smc_mujoco.cli import law_pages
         law_pages.print_suitable(options.names(needs), plant, terminal)
+    elif name is None and not full and json is None and not names.of_others():
+        _print_names(terminal, names.names())
     else:
         _print_all(terminal, name or "", plant, names_alone=name is None and not full)
     terminal.finish()
+
+
+def _print_names(terminal: Terminal, names_by_kind: Sequence[tuple[str, Sequence[str]]]) -> None:
+    from smc_mujoco.answers import answers
+
+    terminal.note("\n".join(answers.names_lines(names_by_kind)))
 
 
 def _about(metric: "Metric") -> str:
@@ -117,7 +127,6 @@ def _print_all(
     those of the plant, by default one that has stops, and numbers for jumps.
     """
     with delay_signals():
-        from smc_mujoco.answers import answers
         from smc_mujoco.cli import law_pages, tables
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.mechanisms.plant import catalogue as plants
@@ -147,7 +156,7 @@ def _print_all(
         pairs = [
             (title.partition(",")[0], [name for name, _ in rows]) for title, rows in lists.items()
         ]
-        terminal.note("\n".join(answers.names_lines(pairs)))
+        _print_names(terminal, pairs)
         return
     for title, rows in lists.items():
         listed = rows

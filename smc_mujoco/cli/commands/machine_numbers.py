@@ -6,7 +6,6 @@ from typing import Annotated, Any
 
 import typer
 
-from smc_mujoco.answers.answers import identify_files
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.errors import ScenarioError
@@ -172,6 +171,7 @@ def identify(
     if machine is None or not files:
         raise ScenarioError("identify needs a machine and its logs, or --pairs FILE")
     with delay_signals():
+        from smc_mujoco.answers.answers import identify_files
         from smc_mujoco.identification import identify as identification
 
     identified = identification.identify(

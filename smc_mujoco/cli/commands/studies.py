@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from smc_mujoco.analysis.ranking import RELEVANT
+from smc_mujoco.analysis.relevant import RELEVANT
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.errors import ScenarioError
