@@ -24,8 +24,9 @@ from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.custom.model_numbers import dotted, model_numbers, with_model_numbers
 from smc_mujoco.mechanisms.hardware.contact import Contact, Obstacle, kinds
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
-from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
+from smc_mujoco.mechanisms.hardware.feedforward import Compensable, Feedforward
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, OnJoints, chains
+from smc_mujoco.mechanisms.hardware.stribeck import loaded
 from smc_mujoco.mechanisms.layout import all_joints, channel_names, driven_names
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
@@ -400,6 +401,12 @@ def friction(name: str, value: Frictions | None, s: Any) -> tuple[Friction, ...]
     Kinds on a joint must differ, and one at most keeps a state by which it holds the joint at rest.
     """
     items = _by_joint(name, value, s, Friction, "smc.Coulomb(0.05)", all_joints)
+    return _together(name, items, s)
+
+
+def _together(name: str, items: Sequence[Friction], s: Any) -> tuple[Friction, ...]:
+    """Return frictions sorted by kind, checked as `friction` says."""
+    items = [loaded(part) for part in items]
     for part, another in itertools.combinations(items, 2):
         if part.side != another.side:  # of a spring or a play: two bodies
             continue
@@ -418,8 +425,13 @@ def feedforward(name: str, value: object, s: Any) -> Signal | Feedforward | None
     them.
     """
     if isinstance(value, Feedforward):
-        parts = friction(f"friction of {name}", value.friction, s)  # pyright: ignore[reportArgumentType]
-        return dataclasses.replace(value, friction=parts)
+        where = f"friction of {name}"
+        kind: Any = Compensable
+        parts = _by_joint(where, value.friction, s, kind, "smc.Coulomb(0.05)", all_joints)
+        rubs = [part for part in parts if isinstance(part, Friction)]
+        driven = driven_names(s.plant)
+        plays = [_placed(where, part, s.plant, driven) for part in parts if part not in rubs]
+        return dataclasses.replace(value, friction=(*_together(where, rubs, s), *plays))
     if not isinstance(value, Signal | None):
         raise ScenarioError(
             f"{name} is {shown(value)}: give smc.Feedforward(friction), or one signal, such as "

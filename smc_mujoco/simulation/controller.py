@@ -232,15 +232,24 @@ def refer(view, i, k, t):
 
 
 @inlined
-def _compensate(view, k, t, i):
-    """Return whether it raised, and the u of channel i that compensates friction."""
+def lead(view, i, dr):
+    """Return how far the reference that the law of channel i sees leads, through a play."""
+    drive = drive_at(view.sim.drives, i)
+    if drive.lead == 0.0:
+        return 0.0
+    return drive.lead * math.tanh(dr / view.sim.eps)
+
+
+@inlined
+def _compensate(view, k, t, i, u):
+    """Return whether it raised, and the u of channel i that compensates friction beside u."""
     if view.sim.compensated == 0:
         return False, 0.0
-    return _compensation(view, k, t, i)
+    return _compensation(view, k, t, i, u)
 
 
 @not_inlined
-def _compensation(view, k, t, i):
+def _compensation(view, k, t, i, u):
     address, sim, _ = view
     x = pointer(sim.seen.x)[i]
     v = pointer(sim.seen.v)[i]
@@ -257,7 +266,9 @@ def _compensation(view, k, t, i):
     y.t = t
     y.x = x
     y.v = v
-    y.h = y.u = y.motor = y.load = 0.0
+    y.h = y.motor = y.load = 0.0
+    gain = drive_at(sim.drives, i).gain
+    y.u = gain * u
     force = 0.0
     for j in range(sim.compensated):
         part = part_at(sim.compensations, j)
@@ -266,7 +277,7 @@ def _compensation(view, k, t, i):
             if evaluate(part.function, 0, address + places.joint_state, address + places.exerted):
                 return True, 0.0
             force += sim.exerted.force
-    return False, sim.share * math.tanh(abs(size) / sim.eps) * force / drive_at(sim.drives, i).gain
+    return False, sim.share * math.tanh(abs(size) / sim.eps) * force / gain
 
 
 @inlined
@@ -443,6 +454,7 @@ _ask_channel = asking(
         partners=inlined(lambda view: view.sim.partners != 0),
         knows=inlined(lambda view: view.sim.other_forces != 0),
         refer=refer,
+        lead=lead,
         nominal=_nominal,
         slides=inlined(lambda view: view.sim.surface.address != 0),
         slide=_slide,

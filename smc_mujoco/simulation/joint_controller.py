@@ -13,7 +13,7 @@ from smc_mujoco.control.joint_law import begin_measurement, put_channel
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.moments import drive_at, evaluate
 from smc_mujoco.simulation import state as record
-from smc_mujoco.simulation.controller import View, evaluate_model, log_row, refer, ring
+from smc_mujoco.simulation.controller import View, evaluate_model, lead, log_row, refer, ring
 
 
 @not_inlined
@@ -46,7 +46,7 @@ def _measure(view, k, t):
             pointer(seen.v)[i],
             pointer(sim.a)[i],
             drive_at(sim.drives, i).limit,
-            motion.value,
+            motion.value + lead(view, i, motion.rate),
             motion.rate,
             motion.acceleration,
         )

@@ -25,7 +25,7 @@ from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.properties import read_by
-from smc_mujoco.mechanisms.hardware.feedforward import ON, Feedforward
+from smc_mujoco.mechanisms.hardware.feedforward import ON, Ahead, Feedforward
 from smc_mujoco.mechanisms.hardware.moments import CHANNEL_STATE, DRIVE, PART, READER, Run
 from smc_mujoco.mechanisms.hardware.part import Friction, Part
 from smc_mujoco.mechanisms.plant import Native, Plant
@@ -415,6 +415,20 @@ def compensation(s: Resolved) -> dict[str, Any]:
     return {"share": share, "eps": feedforward.eps, "compensates_on": on}
 
 
+def reference_leads(s: Resolved) -> list[float]:
+    """Return by how much the reference that the law of each driven channel sees leads at full
+    speed, rad (m): through a play.
+    """
+    feedforward = s.feedforward
+    if not isinstance(feedforward, Feedforward):
+        return [0.0] * s.plant.driven
+    leads = []
+    for i, lead in enumerate(feedforward.leads(s)):
+        moves = lead and feedforward.moves_reference(s, i)
+        leads.append((1.0 + feedforward.error) * lead if moves else 0.0)
+    return leads
+
+
 def settings(s: Resolved) -> dict[str, Any]:
     """Return the numbers of a record that set clock, delay and noise."""
     pause, samples = s.clock.pauses(s.control_period, s.physics_step)
@@ -582,13 +596,17 @@ def _parts(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
     return rows
 
 
-def compensations(scenario: Scenario) -> Iterator[tuple[Friction, int, Sequence[float]]]:
-    """Yield each friction that is compensated, each of its channels, and its numbers there."""
+def compensations(scenario: Scenario) -> Iterator[tuple[Friction | Ahead, int, Sequence[float]]]:
+    """Yield each part of u that compensates, each of its channels, and its numbers there."""
     s = scenario.resolved
     for part in s.compensated:
         numbers = part.numbers(run_of(scenario, part))
         for place, i in enumerate(part.channels(s.plant)):
             yield part, i, numbers[place if len(numbers) > 1 else 0]
+    if isinstance(s.feedforward, Feedforward):
+        for i, lead in enumerate(s.feedforward.leads(s)):
+            if lead and not s.feedforward.moves_reference(s, i):
+                yield Ahead(), i, (lead * s.drive_train.nominal[i].gain,)
 
 
 def _compensations(prepared: Prepared, buffer: Functions) -> list[dict[str, Any]]:
@@ -616,6 +634,7 @@ def _drives(s: Resolved) -> list[dict[str, Any]]:
         if part.sums_force:
             summed |= {*part.channels(s.plant)}
     limits = [*s.limits, *[0.0] * s.plant.free]
+    leads = reference_leads(s)
     rows = []
     for i, nominal in enumerate(s.drive_train.nominal):
         row = {"limit": limits[i], "scale": 1.0, "sums_force": i in summed}
@@ -623,6 +642,7 @@ def _drives(s: Resolved) -> list[dict[str, Any]]:
             torque = s.drive_train.torques[i]._asdict()
             row |= {"scale": s.drive_train.scales[i], "torque": torque}
             row["accelerates"] = s.drive_train.motors[i].accelerates
+            row["lead"] = leads[i]
         rows.append(row | nominal._asdict())
     return rows
 

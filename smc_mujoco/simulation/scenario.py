@@ -409,7 +409,7 @@ class Scenario:
     def compensated(self) -> tuple[Friction, ...]:
         """The frictions that the feedforward compensates."""
         feedforward = self.feedforward
-        return feedforward.friction if isinstance(feedforward, Feedforward) else ()  # pyright: ignore[reportReturnType]
+        return feedforward.frictions if isinstance(feedforward, Feedforward) else ()
 
     @property
     def references(self) -> tuple[Signal, ...]:

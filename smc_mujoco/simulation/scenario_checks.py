@@ -235,11 +235,11 @@ def check_mechanism(s: Any) -> None:
             "once a step: leave the integrator out"
         )
     if isinstance(s.feedforward, Feedforward):
-        s.feedforward.check(s.plant)
         if s.accelerates:
             raise ScenarioError(
                 "Feedforward gives a force, and u is an acceleration: leave feedforward out"
             )
+        s.feedforward.check(s)
     for step in (0, s.samples * s.steps):
         values = s.plant.values(s.factors(step))  # raises for those that the plant cannot have
         if s.mechanism != "equation":

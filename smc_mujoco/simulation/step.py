@@ -73,7 +73,7 @@ class Moments(NamedTuple):
     reading: Any = inlined(lambda view, i, k, t: k)  # -> the index of the sensor's reading
     # -> raised, x and v that the sensor makes of reading j
     read: Any = inlined(lambda view, i, j, x, v: (False, x, v))
-    # (view, k, t, i) -> raised, what compensates friction of channel i; after its law
+    # (view, k, t, i, u) -> raised, what compensates friction of channel i beside the u of its law
     compensate: Any = always((False, 0.0))
     commanded: Any = always(None)  # (view, i, u): after the bound
     finish: Any = always(FINE)  # (view, k) -> failure; after all laws
@@ -98,6 +98,8 @@ class Asked(NamedTuple):
     refer: Any  # (view, i, k, t) -> raised, r, r' and r''
     nominal: Any  # (view, i) -> raised, f and g
     law: Any  # (view, i, y) -> raised, u and s
+    # (view, i, dr) -> how far the reference that the law sees leads, through a play
+    lead: Any = always(0.0)
     slides: Any = always(False)  # (view) -> whether there is a surface
     slide: Any = always((False, 0.0, 0.0))  # (view, i, y) -> raised, s and v_eq
 
@@ -294,7 +296,7 @@ def _commanding(of: Moments) -> Any:
             failure, u, s = ask(view, k, t, i)
             if failure != FINE:
                 return failure
-            raised, compensation = compensate(view, k, t, i)
+            raised, compensation = compensate(view, k, t, i, u + forward)
             if raised:
                 return RAISED
             drive = drive_of(view, i)
@@ -325,6 +327,7 @@ def asking(of: Moments, asked: Asked) -> Any:
     slides = asked.slides
     slide = asked.slide
     law = asked.law
+    lead = asked.lead
     model = _modelling(of, asked)
 
     @inlined
@@ -336,6 +339,7 @@ def asking(of: Moments, asked: Asked) -> Any:
         if raised:
             return RAISED, 0.0, 0.0
         now_of(view, k, i).r = r
+        r += lead(view, i, dr)
         raised, f, g, partner = model(view, i)
         if raised:
             return RAISED, 0.0, 0.0

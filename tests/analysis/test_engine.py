@@ -79,6 +79,11 @@ APART = {
         "feedforward": smc.Feedforward(smc.Coulomb(0.2), on="error", eps=0.1),
         "reference": MinimumJerk(0.4, 1.0, 2.0),
     },
+    "compensation of a loss that grows with the load": {
+        "friction": smc.Coulomb(0.1, km=0.1),
+        "feedforward": smc.Feedforward(smc.Coulomb(0.1, km=0.1), on="speed", eps=0.1),
+        "reference": MinimumJerk(0.4, 1.0, 2.0),
+    },
     "lag": {"actuator": smc.Lag(0.01), "friction": smc.Coulomb(0.1), "input_delay": 3e-3},
     "drives": {"actuator": (smc.Lag(0.01), RateLimit(50.0))},
 }

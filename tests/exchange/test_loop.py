@@ -16,6 +16,7 @@ from helpers.pages import ROOT
 import smc_mujoco as smc
 from smc_mujoco.exchange.c import build
 from smc_mujoco.exchange.loop.package import law_to_package
+from smc_mujoco.simulation.readings import readings
 
 STUBS = ROOT / "tests" / "exchange" / "ros2_control"
 HEADERS = (
@@ -35,23 +36,43 @@ CASES = {
         "feedforward": smc.Feedforward(smc.Coulomb(0.3), on="speed", eps=0.05),
     },
 }
+LOADED = smc.Coulomb(0.1, km=0.2), smc.Viscous(0.1)
+PLAY = smc.Backlash(0.02, rotor_inertia=5e-3, rotor_damping=0.1)
+CASES |= {
+    "a loss that grows with the load": {
+        "law": smc.law("pid", kp=20.0, kd=3.0),
+        "friction": LOADED,
+        "feedforward": smc.Feedforward(LOADED, on="speed", eps=0.05),
+    },
+    "a play": {
+        "law": smc.law("pid", kp=20.0, kd=1.0),
+        "actuator": PLAY,
+        "sensor": smc.Encoder(4096, side="motor"),
+        "velocity": "levant",
+        "reference": smc.Sine(0.2, 6.0),
+        "feedforward": smc.Feedforward((smc.Coulomb(0.1), PLAY), eps=0.05),
+    },
+}
 needs_cpp = pytest.mark.skipif(shutil.which("g++") is None, reason="there is no C++ compiler here")
 
 
 def scenario_of(case):
-    reference = smc.Constant(0.2)
-    return smc.Scenario(
-        plant="duffing", reference=reference, u_max=9.0, x0=0.3, duration=0.3, **CASES[case]
-    )
+    fields = {"reference": smc.Constant(0.2)} | CASES[case]
+    return smc.Scenario(plant="duffing", u_max=9.0, x0=0.3, duration=0.3, **fields)
 
 
-def rows(trace, speeds, reference):
-    """A line for each sample: t, x, v, r, as a loop reads them."""
-    columns = [trace.x, trace.v] if speeds else [trace.x]
-    if reference:
-        columns.append(trace.r)
+def references(scenario, trace):
+    """r, r' and r'' at each sample, (K + 1, 3)."""
+    signal = scenario.resolved.references[0]
+    return np.array([type(signal).value(t, signal) for t in trace.t])
+
+
+def rows(scenario, trace, inputs):
+    """A line for each sample, as a loop reads them."""
+    r, dr, ddr = references(scenario, trace).T
+    columns = {"x": readings(trace)[:, 0], "v": trace.v[:, 0], "r": r, "dr": dr, "ddr": ddr}
     seen = io.StringIO()
-    np.savetxt(seen, np.hstack(columns), "%.17g")
+    np.savetxt(seen, np.column_stack([columns[name] for name in inputs]), "%.17g")
     return seen.getvalue()
 
 
@@ -68,7 +89,7 @@ def test_a_plain_loop_commands_what_a_run_does(case, tmp_path):
     (inputs,) = re.findall(r"inputs\[\] = \{(.*?)\}", (folder / "main.c").read_text())
     done = subprocess.run(
         folder / "main",
-        input=rows(trace, '"v"' in inputs, True),
+        input=rows(scenario, trace, re.findall(r"\w+", inputs)),
         capture_output=True,
         text=True,
         check=True,
@@ -96,9 +117,12 @@ def test_a_package_for_ros2_control_commands_what_a_run_does(case, tmp_path):
     command = ["g++", "-std=c++17", *SANITIZED, *in_cpp, *objects, "-o", "main"]
     subprocess.run(command, cwd=source, check=True)
     trace = smc.run(scenario)
-    speeds = "v" in _inputs(source)
+    names = _inputs(source)
+    speeds = "v" in names
     seen = io.StringIO()
-    np.savetxt(seen, np.tile(np.c_[trace.t, trace.x, trace.v], (2, 1)), "%.17g")
+    moved = references(scenario, trace)
+    lines = np.column_stack([trace.t, readings(trace)[:, 0], trace.v[:, 0], moved])
+    np.savetxt(seen, np.tile(lines, (2, 1)), "%.17g")
     done = subprocess.run(
         source / "main", input=seen.getvalue(), capture_output=True, text=True, check=True
     )

@@ -98,6 +98,7 @@ def why_not_sampled(s: Resolved, metrics: Sequence[str], device: str) -> str:
         "a function of its user's may index beyond its memory, which only the processor checks": (
             device == "cuda" and not all(map(_indexes_within, _users(s)))
         ),
+        "a Feedforward leads through a play": bool(getattr(s.feedforward, "plays", ())),
         "a disturbance acts on a body": any(map(_on_a_body, s.disturbance)),
         "numbers of its parts jump": len(s.machines) > 1,
         "its rotors do not start beside their joints": any(

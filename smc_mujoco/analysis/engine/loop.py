@@ -346,8 +346,8 @@ def _feeding(form: Form, compile_user: Compiler) -> Any:
 
 
 def _compensating(form: Form, compile_user: Compiler) -> Any:
-    """Return a function (view, k, t, i) -> whether it raised, and what compensates the friction of
-    channel i.
+    """Return a function (view, k, t, i, u) -> whether it raised, and what compensates the friction
+    of channel i beside u.
     """
     if not form.compensated:
         return always((False, 0.0))
@@ -360,7 +360,7 @@ def _compensating(form: Form, compile_user: Compiler) -> Any:
         steady = _with_steady(form, part_at, steady, compile_user)
 
     @inlined
-    def compensate(view, k, t, i):
+    def compensate(view, k, t, i, u):
         r = x = view.work[work_at.seen_x + i]
         v = view.work[work_at.seen_v + i]
         if not on_speed:
@@ -371,7 +371,7 @@ def _compensating(form: Form, compile_user: Compiler) -> Any:
             v = math.copysign(AT_REST, size)
         share = view.row[row_at.compensation]
         eps = view.row[row_at.compensation + 1]
-        y = JointState(t, 0.0, x, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        y = JointState(t, 0.0, x, v, u, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         return False, share * math.tanh(abs(size) / eps) * steady(view, i, y)
 
     return compensate

@@ -19,7 +19,8 @@ from smc_mujoco.mechanisms.hardware.moments import JointState
 from smc_mujoco.simulation.prepare import compensations
 from smc_mujoco.simulation.scenario import Scenario
 
-Compensate = Callable[..., None]  # (y, total) -> nothing; it sets total to what is added to u
+# (y, total) -> nothing; it sets total, which has the law's own u, to what is added to u
+Compensate = Callable[..., None]
 NAME = "smc_compensation"  # in C
 
 
@@ -34,6 +35,8 @@ def compensate_of(scenario: Scenario) -> Compensate | None:
     if not isinstance(feedforward, Feedforward):
         return None
     terms: list[list[tuple]] = [[] for _ in range(s.plant.driven)]
+    if not any(True for _ in compensations(scenario)):
+        return None
     for part, i, numbers in compensations(scenario):
         p = jit.named(part.names)(*numbers)
         memory = max(part.memory, 1)
@@ -75,12 +78,13 @@ def compensated(law: Callable, compensate: Compensate, joints: int) -> Callable:
     def of_channel(y, gains, memory):
         u, s = law(y, gains, memory)
         added = np.zeros(1)
+        added[0] = u
         compensate(y, added)
         return u + added[0], s
 
     def of_joints(y, gains, memory):
         u, s = law(y, gains, memory)
-        added = np.zeros(joints)
+        added = u + np.zeros(joints)
         compensate(y, added)
         return u + added, s
 
@@ -109,14 +113,14 @@ def add_nothing(y, total):
 
 def _of_channel(added: Callable) -> Compensate:
     def compensate(y, total):
-        total[0] = added(y.t, y.x, y.v, y.dr)
+        total[0] = added(y.t, y.x, y.v, y.dr, total[0])
 
     return compensate
 
 
 def _of_channel_on_error(added: Callable) -> Compensate:
     def compensate(y, total):
-        total[0] = added(y.t, y.x, y.v, y.r)
+        total[0] = added(y.t, y.x, y.v, y.r, total[0])
 
     return compensate
 
@@ -125,8 +129,9 @@ def _with_joint_on_error(others: Callable, added: Callable, i: int) -> Compensat
     """Return others, and what is added to u of joint i, whose error has the direction."""
 
     def compensate(y, total):
+        own = total[i]
         others(y, total)
-        total[i] = added(y.t, y.x[i], y.v[i], y.r[i])
+        total[i] = added(y.t, y.x[i], y.v[i], y.r[i], own)
 
     return compensate
 
@@ -135,8 +140,9 @@ def _with_joint(others: Compensate, added: Callable, i: int) -> Compensate:
     """Return others, and what is added to u of joint i."""
 
     def compensate(y, total):
+        own = total[i]
         others(y, total)
-        total[i] = added(y.t, y.x[i], y.v[i], y.dr[i])
+        total[i] = added(y.t, y.x[i], y.v[i], y.dr[i], own)
 
     return compensate
 
@@ -150,15 +156,15 @@ def _added(terms: Sequence[tuple], on: str, eps: float, gain: float) -> Callable
     for steady, p, size in terms:
         force = _with_friction(force, steady, p, size)
 
-    def added(t, x, v, dr):
+    def added(t, x, v, dr, u):
         v = speed(v, dr)
-        y = JointState(t, 0.0, x, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        y = JointState(t, 0.0, x, v, gain * u, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         return math.tanh(abs(v) / eps) * force(y) / gain
 
-    def on_error(t, x, v, r):
+    def on_error(t, x, v, r, u):
         size = r - x
         v = math.copysign(AT_REST, size)
-        y = JointState(t, 0.0, x, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        y = JointState(t, 0.0, x, v, gain * u, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         return math.tanh(abs(size) / eps) * force(y) / gain
 
     return on_error if on == "error" else added

@@ -27,6 +27,7 @@ from smc_mujoco.mechanisms.layout import PLACES
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.model import mixer
+from smc_mujoco.simulation.prepare import reference_leads
 from smc_mujoco.simulation.scenario import Scenario
 
 NUMBER_BYTES = {"double": 8, "float": 4, "q15": 8}  # of a number of memory, by type of numbers
@@ -70,6 +71,11 @@ def law_to_c(
                 "a scenario has its own joints: leave joints out, or give its law instead"
             )
         compensate = compensation.compensate_of(law)
+        if any(reference_leads(law.resolved)):
+            raise ScenarioError(
+                "the scenario's Feedforward leads the reference through a play, and a file of a "
+                "law reads the error that you give it: export a loop with --plain or --ros2"
+            )
         plant = law.resolved.plant
         law = law.resolved.law
         joints = plant.n if law.joint else None
@@ -157,12 +163,13 @@ def translated(
     joints: int = 0,
     plant: Plant | None = None,
     compensate: Compensate | None = None,
+    adds: bool = True,
 ) -> tuple[int, str]:
     """Return the memory slots and the C of a component, of a law of many joints for a number of
     these.
 
     Of a law of a free body, or for a plant that is one, it has `body.functions`, too. A law with a
-    compensation adds it to u.
+    compensation adds it to u, or has its function alone.
     """
     if plant is not None and not plant.pose:
         plant = None
@@ -174,10 +181,9 @@ def translated(
         assert component.function is not None  # see `writable`
         what += " with the scenario's Feedforward"
         functions = functions | compensation.function(compensate, joints)
-        law = component.function
-        assert law is not None  # `writable` refuses it
-        together = compensation.compensated(law, compensate, joints)
-        component = dataclasses.replace(component, function=together)
+        if adds:
+            together = compensation.compensated(component.function, compensate, joints)
+            component = dataclasses.replace(component, function=together)
     try:
         slots, code = translate(component, single, joints, functions)
     except Untranslatable as error:

@@ -89,7 +89,8 @@ void smc_actuators(const smc_measurement *y, const smc_real *u, smc_real *contro
 #endif
 
 /* What a scenario's Feedforward adds to u, a number for each joint, in files that smc_mujoco writes from such a scenario:
- * smc_law has added it already. */
+ * smc_law has added it already. Before the call compensation[] is the law's own u, which friction that grows with the
+ * load reads. */
 void smc_compensation(const smc_measurement *y, smc_real *compensation);
 
 /* Optional definitions: */

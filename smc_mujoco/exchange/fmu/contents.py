@@ -107,6 +107,8 @@ class ExportedLaw:
     joints: int = 0  # of a law of many joints; 0 for a law of one channel
     plant: Plant | None = None  # of a free body the law commands the actuators
     compensate: Compensate | None = None  # what is added to u
+    leads: tuple[float, ...] = ()  # of the reference of each joint through a play, rad or m, if any
+    eps: float = 0.0  # speed of the reference at which it leads by nearly all of it
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -131,7 +133,11 @@ class ExportedLaw:
             if kind != "law":
                 code[kind] = export_c.translated(part)
         of_law = export_c.translated(
-            self.law, joints=self.joints, plant=self.plant, compensate=self.compensate
+            self.law,
+            joints=self.joints,
+            plant=self.plant,
+            compensate=self.compensate,
+            adds=False,
         )
         return {"law": of_law, **code}
 
@@ -402,6 +408,8 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
         return ["for (int j = 0; j < SMC_JOINTS; j++) {", *inner, "}"]
 
     yield from _tables(listed, exported)
+    if exported.leads:
+        yield f"static const double leads[] = {{{', '.join(map(repr, exported.leads))}}};"
     yield "smc_measurement y = {0};"
     yield f"double out[{size}];"
     yield "int failure;"
@@ -419,6 +427,11 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
         yield from _call("surface", "&y", "surface_memory")
         yield f"y.has_surface = 1.0, y.s = out[0], y.v_eq = {value('v_eq')} = out[1];"
     yield from _call("law", "&y", "law_memory")
+    if exported.compensate:
+        added = value("compensation")
+        yield from for_each([f"{added} = out{u};"])
+        yield f"smc_compensation(&y, value + {place('compensation' + exported.places[0])});"
+        yield from for_each([f"out{u} += {added};"])
     yield from for_each(
         [
             f"const double u = fmin(fmax(out{u}, -y.limit{j}), y.limit{j}), s = out{s};",
@@ -427,8 +440,6 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
             "    return SMC_NOT_FINITE;",
         ]
     )
-    if exported.compensate:
-        yield f"smc_compensation(&y, value + {place('compensation' + exported.places[0])});"
     if exported.actuators:
         yield f"smc_actuators(&y, out, value + {place('control[1]')});"
     yield "return 0;"
@@ -466,6 +477,9 @@ def _measured(exported: ExportedLaw, value: Callable[..., str], j: str) -> Itera
     """
     yield f"y.limit{j} = number({value('u_max')});"
     yield f"y.x{j} = {value('x')}, y.r{j} = {value('r')}, y.dr{j} = {value('dr')};"
+    if exported.leads:
+        yield f"if (leads[{'j' if j else 0}] != 0.0)"
+        yield f"    y.r{j} += leads[{'j' if j else 0}] * tanh(y.dr{j} / {exported.eps!r});"
     yield f"y.ddr{j} = y.a{j} = {value('ddr')};"
     if exported.estimator:
         slots = exported.code["estimator"][0]

@@ -7,6 +7,7 @@ law with its gains as parameters, and on request a surface and a velocity estima
 precision it gives the bits of `smc.run`.
 """
 
+import dataclasses
 import hashlib
 import math
 import platform
@@ -33,9 +34,11 @@ from smc_mujoco.exchange.c.compensation import Compensate, compensate_of
 from smc_mujoco.exchange.c.export_c import number_of_joints, with_head, writable
 from smc_mujoco.exchange.fmu import contents, description
 from smc_mujoco.exchange.fmu.contents import ExportedLaw
+from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.law_checks import check_surface
+from smc_mujoco.simulation.prepare import reference_leads
 from smc_mujoco.simulation.scenario import Scenario
 
 FOLDER = Path(__file__).parent
@@ -162,6 +165,7 @@ def _of_scenario(scenario: Scenario, chosen: Data) -> Fields:
         )
     own = {name: getattr(s, name) for name in ("surface", "velocity", "control_period", "model")}
     own["compensate"] = compensate_of(scenario)
+    own |= leads_of(scenario)
     if s.law.joint:
         return own | {"u_max": list(scenario.limits), "joints": s.plant.n, "plant": s.plant}
     return own | {"u_max": limits.pop(), "joints": None}
@@ -177,6 +181,8 @@ def _exported(
     joints: int | None,
     plant: Plant | None = None,
     compensate: Compensate | None = None,
+    leads: tuple[float, ...] = (),
+    eps: float = 0.0,
 ) -> ExportedLaw:
     """Return what is exported, checked. Arguments and errors as in `law_to_fmu`."""
     sliding = coerce.surface("surface", surface, None)
@@ -205,7 +211,29 @@ def _exported(
         joints=count,
         plant=plant,
         compensate=compensate,
+        leads=leads,
+        eps=eps,
     )
+
+
+def leads_of(scenario: Scenario) -> Fields:
+    """Return how far the reference that the law of a scenario sees leads, through plays, as fields
+    of an ExportedLaw; none without a play.
+    """
+    feedforward = scenario.resolved.feedforward
+    if not isinstance(feedforward, Feedforward):
+        return {}
+    right = dataclasses.replace(feedforward, error=0.0)
+    leads = reference_leads(dataclasses.replace(scenario, feedforward=right).resolved)
+    if not any(leads):
+        return {}
+    if not scenario.law.joint and len({*leads}) > 1:
+        raise ScenarioError(
+            "the scenario's Feedforward has plays that differ between its channels, but a law of "
+            "one channel is written once for all: give one Backlash for all"
+        )
+    measured = [0.0] * (scenario.plant.n - len(leads))
+    return {"leads": (*leads, *measured), "eps": feedforward.eps}
 
 
 def _bounds(u_max: float | Sequence[float], joints: int) -> Floats:

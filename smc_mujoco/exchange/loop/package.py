@@ -138,6 +138,7 @@ def _files(exported: ExportedLaw, package: str, kind: str, law: Any) -> dict[str
         files[folder + name] = (TEMPLATES / name).read_text(encoding="utf-8")
     sources = [name for name in files if name.endswith(".c")]
     listed = contents.variables(exported)
+    read = contents.inputs(exported)
     interface = "effort"
     if isinstance(law, Scenario) and not law.force_command:
         interface = "position"
@@ -150,7 +151,7 @@ def _files(exported: ExportedLaw, package: str, kind: str, law: Any) -> dict[str
         "rest": "0.0",
         "numbers": str(len(listed) + 1),
         "joints": str(max(1, exported.joints)),
-        "inputs": _listed(exported, [name for name in "xvr" if name in contents.inputs(exported)]),
+        "inputs": _listed(exported, [name for name in contents.COMMON_INPUTS if name in read]),
         "outputs": _listed(exported, ["u"]),
     }
     texts = {"main.c": (TEMPLATES / "main.c").read_text(encoding="utf-8"), "Makefile": MAKE}

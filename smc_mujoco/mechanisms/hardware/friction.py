@@ -81,14 +81,19 @@ class Coulomb(Friction):
     hardest constraint that is 1e-4 h a0 for a physics step h: 2e-7 rad/s for a pendulum of 0.125 kg
     m^2 that holds 1 N m at h = 0.25 ms.
 
+    With `km` it is a `Stribeck` of the same numbers, in a scenario and its record.
+
     Attributes:
       level: N m, N on a slide; 0 (none) or more.
+      km: dry friction for each N m (N) that the gearbox carries, 0 or more, as in `Stribeck`.
     """
 
-    forces = names = ("level",)
+    names = ("level",)
+    forces = "level", "km"
     units: ClassVar[Mapping[str, str]] = {"level": "{f}"}
 
     level: Natural
+    km: Natural = 0.0
 
     @staticmethod
     def steady(y, p, memory):

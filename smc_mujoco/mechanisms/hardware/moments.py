@@ -101,7 +101,8 @@ class Torque(NamedTuple):
 
 # What is between a channel's command and its force: the bound on u; the control of its actuator per
 # unit of u; the force as a law's model knows it, gain u - drag v; whether u is an acceleration;
-# whether a part sums the force itself; and what MuJoCo makes of a control.
+# whether a part sums the force itself; by how much the reference leads through a play; and what
+# MuJoCo makes of a control.
 DRIVE = np.dtype(
     [
         ("limit", "f8"),
@@ -110,6 +111,7 @@ DRIVE = np.dtype(
         ("drag", "f8"),
         ("accelerates", "f8"),
         ("sums_force", "f8"),
+        ("lead", "f8"),
         ("torque", floats(Torque._fields)),
     ]
 )

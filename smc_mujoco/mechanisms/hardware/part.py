@@ -252,6 +252,11 @@ class Friction(OnJoints):
         del v, force
 
     @property
+    def loss_of_load(self) -> Any:
+        """The share of what it carries that it loses, also by joint, which compensation counts."""
+        return 0.0
+
+    @property
     def held(self) -> Any:
         """The part whose `force`, held over a step, is this friction; None if there is none."""
         return self if self.force is not None else None

@@ -231,8 +231,8 @@ def _steady(formula: Formula) -> Callable:
 
 @register_jitable
 def unloaded(y):
-    """Return the state of a joint on which no other force acts."""
-    return JointState(y.t, y.h, y.x, y.v, y.u, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    """Return the state of a joint on which no other force acts, and without a command."""
+    return JointState(y.t, y.h, y.x, y.v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @functools.cache

@@ -3,13 +3,15 @@
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from smc_mujoco.common.constraints import Each, Number
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.hardware.joint_force import PerJoint
+from smc_mujoco.mechanisms.hardware.part import Friction
 from smc_mujoco.mechanisms.hardware.sliding import NaturalPerJoint, PositivePerJoint, Sliding
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER
 
@@ -29,7 +31,8 @@ class Stribeck(Sliding):
 
     It has no bristles and no state of its own, unlike `LuGre`. With `km` it grows with what the
     gearbox carries: the torque of the motor and that from outside, as `ServoFriction` has them. A
-    `Feedforward` knows neither, and leaves that out.
+    `Feedforward` takes the law's own u for what the motor carries at a steady speed, and solves for
+    the u that gives it beside its own loss.
 
     Source: B. Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, A survey of models, analysis
     tools and compensation methods for the control of machines with friction, Automatica 30(7),
@@ -96,3 +99,28 @@ class Stribeck(Sliding):
             level += (p.static - p.coulomb) * math.exp(-((v / p.stribeck) ** 2))
         step = math.tanh(v / p.width) if p.width > 0.0 else math.copysign(1.0, v)
         return level * step + p.viscous * v + p.offset, p.offset - static, p.offset + static
+
+    @property
+    def loss_of_load(self) -> Any:
+        return self.km
+
+    @staticmethod
+    def steady(y, p, memory):  # pyright: ignore[reportIncompatibleMethodOverride] a property of the base
+        """Return what a motor that carries y.u needs besides: F, of which a share km is its own."""
+        v = y.v
+        level = p.coulomb
+        if not math.isnan(p.static):
+            level += (p.static - p.coulomb) * math.exp(-((v / p.stribeck) ** 2))
+        carried = math.copysign(1.0, v) * (2.0 * y.u + p.viscous * v + p.offset)
+        lost = (level + p.km * carried) / (1.0 - p.km)
+        if carried < -lost:  # the load drives
+            lost = (level - p.km * carried) / (1.0 + p.km)
+        step = math.tanh(v / p.width) if p.width > 0.0 else math.copysign(1.0, v)
+        return lost * step + p.viscous * v + p.offset
+
+
+def loaded(part: Friction) -> Friction:
+    """Return a friction, of a Coulomb with `km` the Stribeck that it is."""
+    if isinstance(part, Coulomb) and part.km:
+        return Stribeck(part.level, km=part.km, on=part.on, side=part.side)
+    return part

@@ -1,4 +1,5 @@
-// Prints the interfaces of the controller, then its command for each line "t x v" read, activated at each t = 0; 1 if it takes another rate.
+// Prints the interfaces of the controller, then its command for each line "t x v r r' r''" read, activated at each t = 0;
+// 1 if it takes another rate.
 #include <cstdio>
 
 #include "controller_interface/controller_interface.hpp"
@@ -17,13 +18,17 @@ int main()
   for (auto & name : controller->command_interface_configuration().names) std::printf("%s ", name.c_str());
   for (auto & name : controller->state_interface_configuration().names) std::printf("%s ", name.c_str());
   std::printf("\n");
-  double t, x, v;
-  while (std::scanf("%lf %lf %lf", &t, &x, &v) == 3) {
+  double t, x, v, r, dr, ddr;
+  while (std::scanf("%lf %lf %lf %lf %lf %lf", &t, &x, &v, &r, &dr, &ddr) == 6) {
     controller->state_interfaces_[0].value = x;
     controller->state_interfaces_[1].value = v;
     if (t == 0.0) {
       controller->on_activate({});
-      controller->node->last->callback({{0.2}});
+    }
+    if (dr != 0.0 || ddr != 0.0) {
+      controller->node->last->callback({{r, dr, ddr}});
+    } else {
+      controller->node->last->callback({{r}});
     }
     controller->update({}, {1e-3});
     std::printf("%.17g\n", controller->command_interfaces_[0].value);

@@ -4,10 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from helpers import arms
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine.group import why_not
+from smc_mujoco.common import jit
 from smc_mujoco.hardware import LuGre, ServoFriction, Sigmoid
+from smc_mujoco.mechanisms.hardware.moments import JointState
 
 # a joint that only friction resists
 JOINT = """<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="j" axis="0 1 0"/>
@@ -163,3 +166,148 @@ def remembering(y, p, memory):
 def test_what_it_cannot_compensate_is_refused(joint, feedforward, words):
     with pytest.raises(smc.ScenarioError, match=words):
         run(joint, feedforward())
+
+
+LOADED = smc.hardware.Stribeck(0.2, 0.3, 0.1, viscous=0.05, offset=0.02, km=0.15)
+
+
+@pytest.mark.parametrize("carried", [-6.0, -0.11, 0.0, 0.4, 6.0])
+@pytest.mark.parametrize("speed", [-0.3, 0.02, 1.0])
+def test_a_loss_that_grows_with_the_load_is_that_of_a_steady_motion(carried, speed):
+    """With it the motor of a joint that moves at a steady speed against -carried N m gives what
+    the part then takes: by `Stribeck.value`, which the run has, and not by the compensation's.
+    """
+    p = jit.named(LOADED.names)(*LOADED.parameters(0))
+    y = JointState(*np.zeros(len(JointState._fields)))._replace(v=speed, u=carried)
+    added = LOADED.steady(y, p, np.zeros(1))
+    taken = LOADED.value(speed, carried + added, -carried, p)[0]
+    assert added == pytest.approx(taken, rel=1e-12)
+
+
+LIFT = JOINT.replace('gravity="0 0 0"', 'gravity="0 0 -9.81"').replace("-10 10", "-20 20")
+
+
+def test_compensation_of_the_load_takes_a_lifting_arm_to_its_reference():
+    arm = smc.plant_from(LIFT, ["j"], name="arm")
+    loss = smc.Coulomb(0.1, km=0.2)
+    law = smc.law("computed_torque", kp=100.0, kd=20.0)
+    fields = {"plant": arm, "law": law, "model": "nominal", "friction": loss, "x0": 1.0}
+    errors = []
+    for given in (None, smc.Coulomb(0.1), loss):
+        ahead = smc.Feedforward(given) if given else None
+        moved = smc.Constant(1.0) + SINE
+        scenario = smc.Scenario(**fields, reference=moved, feedforward=ahead, duration=4.0)
+        errors.append(rms(smc.run(scenario)))
+    assert scenario.friction == (smc.hardware.Stribeck(0.1, km=0.2),)
+    assert errors[2] < errors[1] / 10.0 < errors[0] / 10.0
+
+
+# a position servo without gravity, before a play
+SERVO = """<mujoco><worldbody><body><joint name="j" axis="0 1 0" damping="0.1"/>
+<geom type="capsule" fromto="0 0 0 0 0 -.2" size=".02" mass="0.3"/></body></worldbody>
+<actuator><position joint="j" kp="17.8" kv="0.3" forcerange="-3 3" ctrlrange="-2 2"/></actuator>
+</mujoco>"""
+
+
+@smc.law_function(gains={"share": 1.0})
+def follow(y, gains, memory):
+    return gains.share * y.r, y.e
+
+
+def test_the_inverse_of_a_play_before_a_servo_gives_the_motion_without_play():
+    arm = smc.plant_from(SERVO, {"j": smc.Channel(servo=True)}, name="servo")
+
+    def error(gap, ahead):
+        play = smc.Backlash(gap, rotor_inertia=2e-3)
+        slow = smc.Sine(0.3, 1.5)
+        fields = {"friction": smc.Coulomb(0.1), "reference": slow, "x0": 0.0, "duration": 6.0}
+        scenario = smc.Scenario(plant=arm, law=follow(), actuator=play, feedforward=ahead, **fields)
+        return rms(smc.run(scenario))
+
+    inverse = smc.Feedforward(smc.Backlash(0.06))
+    rigid = error(0.0, None)
+    assert error(0.06, None) > 3.0 * rigid
+    assert error(0.06, inverse) == pytest.approx(rigid, rel=0.01)
+
+
+GEARED = {
+    "actuator": smc.Backlash(0.05, rotor_inertia=5e-3, rotor_damping=0.01),
+    "sensor": smc.Encoder(math.inf, side="motor"),
+    "friction": smc.Coulomb(0.3),
+    "law": smc.law("pid", kp=60.0, ki=0.0, kd=2.0),
+    "reference": SINE,
+    "duration": 5.0,
+    "x0": 0.0,
+}
+
+
+def test_the_inverse_of_a_play_moves_the_reference_of_a_law_that_sees_the_motor(joint):
+    """With friction's compensation the error falls to a fifth; r of the trace is the reference."""
+
+    def error(*parts, wrong=0.0):
+        ahead = smc.Feedforward(parts, eps=0.05, error=wrong) if parts else None
+        trace = smc.run(smc.Scenario(plant=joint, feedforward=ahead, **GEARED))
+        np.testing.assert_array_equal(trace.r[:, 0], 0.3 * np.sin(3.0 * trace.t))
+        return rms(trace)
+
+    rubs, play = GEARED["friction"], smc.Backlash(0.05)
+    right = error(rubs, play)
+    assert right < error(rubs, play, wrong=-0.3) < error(rubs) < error()
+    assert right < error() / 5.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"sensor": None}, "measures joint 'j' itself"),
+        ({"feedforward": smc.Feedforward(smc.Backlash(0.1), on="error")}, "leave on out"),
+        (
+            {"feedforward": smc.Feedforward(smc.Coulomb(0.1, km=1.0))},
+            "as much as it carries: give a km below 1",
+        ),
+    ],
+)
+def test_a_play_or_a_loss_that_has_no_inverse_is_refused(joint, changes, words):
+    fields = GEARED | {"feedforward": smc.Feedforward(smc.Backlash(0.05))} | changes
+    with pytest.raises(smc.ScenarioError, match=words):
+        smc.run(smc.Scenario(plant=joint, **fields))
+
+
+def test_the_load_of_a_set_point_is_not_known():
+    arm = smc.plant_from(SERVO, {"j": smc.Channel(servo=True)}, name="servo")
+    ahead = smc.Feedforward(smc.Coulomb(0.1, km=0.1))
+    with pytest.raises(smc.ScenarioError, match="is a set-point, which does not tell the load"):
+        smc.run(smc.Scenario(plant=arm, law="none", feedforward=ahead))
+
+
+def test_the_fast_engine_leaves_a_play_to_mujoco():
+    scenario = smc.Scenario(
+        plant="duffing", feedforward=smc.Feedforward(smc.Backlash(0.05)), **GEARED
+    )
+    assert "leads through a play" in why_not(scenario)
+
+
+@smc.law_function(gains={"share": 1.0}, joint=True)
+def follow_all(y, gains, memory):
+    return gains.share * y.r, y.e
+
+
+@pytest.mark.parametrize("law", [follow(), follow_all()], ids=["one joint", "many joints"])
+def test_the_reference_that_a_law_sees_leads_by_half_the_play(law):
+    ahead = smc.Feedforward({"lift": smc.Backlash(0.04)}, eps=0.1, error=-0.25)
+    moved = smc.Sine(0.2, 5.0)
+    scenario = smc.Scenario(
+        plant=arms.arm(),
+        law=law,
+        reference=moved,
+        feedforward=ahead,
+        actuator={"lift": smc.Backlash(0.04), "turn": smc.Backlash(0.02)},
+        sensor=smc.Encoder(side="motor"),
+        duration=0.05,
+    )
+    trace = smc.run(scenario)
+    r, dr = 0.2 * np.sin(5.0 * trace.t), np.cos(5.0 * trace.t)
+    led = r + 0.75 * 0.02 * np.tanh(dr / 0.1)
+    for i, name in enumerate(("reach", "turn", "lift")):
+        expected = led if name == "lift" else r
+        np.testing.assert_allclose(trace.u[:, i], expected, rtol=1e-9)

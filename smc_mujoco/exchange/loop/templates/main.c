@@ -1,6 +1,7 @@
 /* A loop around the controller: it reads a line for each sample, the positions, then the velocities if the controller
- * takes them, then the references, and writes the commands. Put your sensors in place of measured(), your motors in place
- * of commanded(), and call the body of the loop every smc_loop_period() seconds. */
+ * takes them, then the references, their rates and, if it takes them, their accelerations; it writes the commands. Put
+ * your sensors in place of measured(), your motors in place of commanded(), and call the body of the loop every
+ * smc_loop_period() seconds. */
 #include "smc_loop.h"
 
 #include <stdio.h>

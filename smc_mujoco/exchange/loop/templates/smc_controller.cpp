@@ -1,6 +1,7 @@
 // A ros2_control controller around an exported law. Its parameters: joints, interface (effort, or position for a servo's
 // set-point), and the gains, bounds and estimator's numbers by their names, such as law.k1 and u_max. Of many joints
-// law.k[1] is the parameter law.k_1. The reference comes as ~/reference, a number for each joint.
+// law.k[1] is the parameter law.k_1. The reference comes as ~/reference: a number for each joint, or these and then the
+// rates, or then the accelerations, too; what is left out is 0.
 #include <atomic>
 #include <cmath>
 #include <string>
@@ -26,7 +27,7 @@ public:
     value_.resize(static_cast<std::size_t>(smc_loop_numbers()));
     smc_loop_start(value_.data());
     joints_ = static_cast<std::size_t>(smc_loop_joints());
-    references_ = std::vector<std::atomic<double>>(joints_);
+    references_ = std::vector<std::atomic<double>>(3 * joints_);
     std::vector<std::string> names;
     for (std::size_t i = 0; i < joints_; i++) {
       names.push_back("joint" + std::to_string(i + 1));
@@ -57,9 +58,10 @@ public:
     }
     subscription_ = get_node()->create_subscription<std_msgs::msg::Float64MultiArray>(
       "~/reference", 1, [this](const std_msgs::msg::Float64MultiArray & message) {
-        if (message.data.size() == joints_) {
-          for (std::size_t i = 0; i < joints_; i++) {
-            references_[i] = message.data[i];
+        const std::size_t given = message.data.size();
+        if (given == joints_ || given == 2 * joints_ || given == 3 * joints_) {
+          for (std::size_t i = 0; i < references_.size(); i++) {
+            references_[i] = i < given ? message.data[i] : 0.0;
           }
         }
       });
@@ -82,7 +84,7 @@ public:
       names.push_back(name + "/position");
     }
     for (const auto & name : names_) {
-      if (takes_speeds()) {
+      if (takes("v")) {
         names.push_back(name + "/velocity");
       }
     }
@@ -100,6 +102,7 @@ public:
         return CallbackReturn::ERROR;
       }
       references_[i] = *x;  // hold the pose until a reference comes
+      references_[joints_ + i] = references_[2 * joints_ + i] = 0.0;
     }
     return CallbackReturn::SUCCESS;
   }
@@ -122,7 +125,11 @@ public:
       }
       at("x", i) = *x;
       at("r", i) = references_[i];
-      if (takes_speeds()) {
+      at("dr", i) = references_[joints_ + i];
+      if (takes("ddr")) {
+        at("ddr", i) = references_[2 * joints_ + i];
+      }
+      if (takes("v")) {
         const auto v = state_interfaces_[joints_ + i].get_optional();
         if (!v) {
           return return_type::ERROR;
@@ -166,7 +173,10 @@ private:
     return true;
   }
 
-  bool takes_speeds() const { return smc_loop_index(joints_ > 1 ? "v[1]" : "v") >= 0; }
+  bool takes(const std::string & name) const
+  {
+    return smc_loop_index((joints_ > 1 ? name + "[1]" : name).c_str()) >= 0;
+  }
 
   double & at(const std::string & name, std::size_t i)
   {
