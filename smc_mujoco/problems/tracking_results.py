@@ -20,7 +20,7 @@ from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.answers.facts import EnteredFacts, ProblemStanding
 from smc_mujoco.common import fingerprint
-from smc_mujoco.common.aliases import AnyPath, Names
+from smc_mujoco.common.aliases import AnyPath, Array, Names
 from smc_mujoco.common.cache import CachedResult
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError
@@ -146,6 +146,15 @@ def read_result(path: Path) -> TrackingResult:
         )
 
 
+def counted_errors(found: Found, limit: float) -> Array:
+    """Return the errors of a search; inf where its command varies more than the limit."""
+    return np.where(found.rate <= limit, found.errors, np.inf)
+
+
+def _typical(found: Found, limit: float) -> float:
+    return float(np.median(counted_errors(found, limit)))
+
+
 @keyword_dataclass
 class ProblemBoard:
     """The entries of a suite in one problem."""
@@ -177,13 +186,14 @@ class TrackingBoard:
 
     def problem(self, name: str) -> ProblemBoard:
         """Return who stands where in a problem."""
+        limit = next(task.limit for task in self.suite.problems if task.name == name)
         better, worse, without = {}, {}, {}
         for entry, result in self.entries.items():
             if name in result.searches:
-                logs = sorted(result.searches[name], key=lambda found: np.median(found.errors))
-                better[entry] = np.array(logs[0].errors)
-                worse[entry] = np.array(logs[-1].errors)
-                without[entry] = float(np.median(logs[-1].without))
+                searches = sorted(result.searches[name], key=lambda found: _typical(found, limit))
+                better[entry] = counted_errors(searches[0], limit)
+                worse[entry] = counted_errors(searches[-1], limit)
+                without[entry] = searches[-1].without
         comparison = Comparison(worse, FLOOR, halves=better)
         medians = {}
         for entry, errors in worse.items():

@@ -71,7 +71,7 @@ def test_mujoco_gives_the_error_and_the_rate_that_the_search_sees(suite, name, t
     entry = tracking_entry(text)
     trials = GainTrials(task, entry, 1)
     values = np.array([list(GAINS.values())])
-    error, rate = trials.run(trials.choosing, values)[0, 0]
+    error, rate = trials.run(trials.group([(0, True)]), values, np.array([0]))[0]
     trace = smc.run(scenario_of(task, entry, GAINS, 0))
     changes = np.abs(np.diff(trace.u[-task.late - 1 :, 0])).sum()
     assert rms(trace, task) == pytest.approx(error, rel=1e-9)
@@ -90,8 +90,38 @@ def test_a_search_keeps_the_limit_and_the_theorem_and_is_the_same_again(monkeypa
     assert gains != trials.searched(1, steps.append)
     logs = np.log([list(gains.values())])
     _, allowed = trials.judged(logs)
-    worst = trials.run(trials.choosing, np.exp(logs)).max(axis=1)
+    worst = in_all_runs(trials, logs)
     assert bool(allowed[0]) == (worst[0, 1] <= tracking_search.MARGIN * task.limit)
+
+
+def in_all_runs(trials, logs):
+    """The largest error and rate of sets of gains, each in all runs by which a search judges."""
+    count = len(trials.choosing.rows)
+    gains = np.repeat(np.exp(logs), count, axis=0)
+    runs = np.tile(np.arange(count), len(logs))
+    return trials.run(trials.choosing, gains, runs).reshape(len(logs), count, 2).max(axis=1)
+
+
+def test_sets_that_stop_early_cost_more_than_those_that_run_through(monkeypatch):
+    task = problem("smc-friction@1", "rail-5ms")
+    trials = GainTrials(task, tracking_entry("pid"), 1)
+    logs = np.random.default_rng(5).uniform(trials.box[:, 0], trials.box[:, 1], (24, 5))
+    worst = in_all_runs(trials, logs)
+    limit = tracking_search.MARGIN * task.limit
+    full_costs = worst[:, 0] * np.maximum(worst[:, 1] / limit, 1.0) ** 4
+    run_counts = []
+    run = trials.run
+    monkeypatch.setattr(
+        trials, "run", lambda group, *rows: run_counts.append(len(rows[0])) or run(group, *rows)
+    )
+    costs, allowed = trials.judged(logs)
+    best = np.argsort(full_costs)[: tracking_search.JUDGED]
+    assert costs[best] == pytest.approx(full_costs[best], rel=1e-12)
+    others = np.setdiff1d(np.arange(24), best)
+    assert (costs[others] >= costs[best].max()).all()
+    assert (costs <= full_costs * (1.0 + 1e-12)).all()
+    assert allowed[best].tolist() == (worst[best, 1] <= limit).tolist()
+    assert sum(run_counts) < 0.6 * 24 * len(trials.choosing.rows)
 
 
 @pytest.mark.parametrize(
@@ -108,7 +138,7 @@ def test_what_is_no_entry_is_refused_before_anything_is_searched(text, about, tm
     assert not list(tmp_path.rglob("*.json"))
 
 
-def result(name, levels, spread=0.02, seed=0):
+def result(name, levels, spread=0.02, seed=0, rate=5.0):
     """An entry whose medians in a problem are these, of two searches."""
     rng = np.random.default_rng(seed)
     searches = {}
@@ -116,8 +146,7 @@ def result(name, levels, spread=0.02, seed=0):
         results = []
         for level in pair:
             errors = (level * np.exp(rng.normal(0.0, spread, 24))).tolist()
-            free = [0.3] * 24
-            results.append(tracking_search.Found({"k": 1.0}, errors, free, [5.0] * 24))
+            results.append(tracking_search.Found({"k": 1.0}, errors, without=0.3, rate=rate))
         searches[problem_name] = tuple(results)
     return tracking_results.TrackingResult(
         name=name, text=name, law=name, date="2026-11-30", searches=searches
@@ -151,6 +180,15 @@ def test_errors_below_the_floor_are_level_and_one_that_is_the_same_without_is_ma
     assert {*boards[0].leaders} == {"pid", "adrc"}
     assert not boards[1].of_load("pid")
     assert boards[1].of_load("adrc")
+
+
+def test_a_search_that_varies_beyond_the_limit_has_no_error():
+    a, b = [task.name for task in tracking_suite("smc-load@1").problems[:2]]
+    busy = result("pid", {a: (1.0, 1.0), b: (1.0, 1.0)}, rate=11.0)
+    calm = result("adrc", {a: (5.0, 5.0), b: (5.0, 5.0)}, rate=10.0)
+    (board, _) = board_of(busy, calm).problems
+    assert board.leaders == ("adrc",)
+    assert board.errors["pid"] == (math.inf, math.inf)
 
 
 def test_an_entry_changes_a_page_by_its_row_and_what_it_tops_alone():
