@@ -117,7 +117,7 @@ def _with_spring(rig: LogRig, i: int, spring: ElasticJoint, armature: float, sid
 
 def _changes(elastic: LogRig, replays: Replays, slopes: Slopes) -> list[Array]:
     """Return what the spring changes in the residuals of each piece, from starts that suit it."""
-    trial = Replays(elastic, [], replays.data, False)
+    trial = Replays(elastic, [], replays.data, False, kept=replays.kept)
     (spring,) = (part for part in elastic.base.actuator if isinstance(part, ElasticJoint))
     control = elastic.repeated(trial.pieces[0].part).control_period  # pyright: ignore[reportArgumentType]
     longest = min(RUN_STEP, max(MOST_POLE / spring.fastest_pole(elastic.plant), SHORTEST_STEP))

@@ -41,6 +41,7 @@ from smc_mujoco.identification import (
     number_text,
     records,
 )
+from smc_mujoco.identification.kept_replays import KeptReplays
 from smc_mujoco.identification.lack_of_fit import lack_of_fit
 from smc_mujoco.identification.log_rig import SETTINGS
 from smc_mujoco.identification.own_rig import own_rig
@@ -356,6 +357,7 @@ def identify(
     seed: Seed = 0,
     most: Count = 30,
     progress: bool = False,
+    folder: AnyPath | None = None,
 ) -> Identified:
     """Estimate a machine's parameters from logs: friction, armature, delay, masses and more.
 
@@ -392,6 +394,8 @@ def identify(
       seed: of these starts. The same seed gives the same result.
       most: largest number of steps of the search.
       progress: whether to show a progress bar: a search may take minutes.
+      folder: a folder of its own for what is simulated. A call that was stopped goes on from it,
+        with the same result; it is removed when the result is there. None: nothing is kept.
 
     Returns:
       An Identified, which prints as a table: `values` and `errors` by name in SI units, `notes` on
@@ -408,6 +412,7 @@ def identify(
     names = _checked_names(twin, listed)
     fits_before = twin.fits(data)  # also refuses records that are too short
     doubts = twin.doubts(data)
+    batches = None if folder is None else KeptReplays(Path(folder))
     expected = _expected_sets(twin, names, most)
     with bar(f"identify {twin.name}", expected, shown=progress) as drawn:
 
@@ -416,7 +421,7 @@ def identify(
             drawn.reached(done, max(expected, AHEAD * done))
 
         replays, slopes, by_steps = _solved(
-            twin, names, data, doubts, starts, seed, most, corrected, report
+            twin, names, data, doubts, starts, seed, most, corrected, report, batches
         )
         lacking = lack_of_fit(slopes, twin.lacks(replays, slopes))
         by_model = np.hypot(by_steps, lacking.moved)
@@ -431,6 +436,10 @@ def identify(
     if len(data) > 1:
         deviation = between(slopes, [piece.record for piece in replays.pieces]) * replays.scales
         scatter = dict(zip(names, deviation.tolist(), strict=True))
+    by_pieces = [] if replays.whole else fits_by_pieces(replays, slopes)
+    checked = None if held_out is None else check(fitted, held_out, columns, batches)
+    if batches is not None:
+        batches.remove()
     return Identified(
         rig=fitted,
         before=twin,
@@ -442,9 +451,9 @@ def identify(
         predictions=tuple(fitted.predictions(data, states=states, **steps)),
         evaluations=replays.evaluations,
         independent=independent(lacking.slopes),
-        by_pieces=() if replays.whole else tuple(fits_by_pieces(replays, slopes)),
+        by_pieces=tuple(by_pieces),
         scatter=scatter,
-        held_out=None if held_out is None else check(fitted, held_out, columns),
+        held_out=checked,
         doubted=tuple(doubts),
         lacks=lacking.told(np.array(list(errors.values())) / replays.scales),
         data=tuple(data),
@@ -458,13 +467,18 @@ def _expected_sets(twin: Rig, names: Sequence[str], most: int) -> int:
     return searches * min(most, USUAL_STEPS) * (slopes + gauss_newton.TRIALS)
 
 
-def check(rig: Rig, log: Log, columns: Mapping[str, str] | None = None) -> HeldOutFit:
+def check(
+    rig: Rig,
+    log: Log,
+    columns: Mapping[str, str] | None = None,
+    batches: KeptReplays | None = None,
+) -> HeldOutFit:
     """Return how well a rig repeats a log that its numbers were not found from."""
     twin, data = rig.reading([records.as_columns(log, columns)])
     fit = twin.fits(data)[0]
     if twin.controller is not None or twin.dynamics is not None:
         return HeldOutFit(fit, {})
-    replays = Replays(twin, [], data, False)
+    replays = Replays(twin, [], data, False, kept=batches)
     slopes = gauss_newton.fit_starts(replays, PIECE_STEPS)
     return HeldOutFit(fit, fits_by_pieces(replays, slopes)[0])
 
@@ -635,11 +649,12 @@ def _solved(
     most: int,
     corrected: bool,
     report: Any,
+    batches: KeptReplays | None,
 ) -> tuple[Replays, Slopes, Array]:
     """Return the replays of the last search, their slopes at the solution, and its error due to
     steps, (p,).
     """
-    pieces = Replays(twin, names, data, False, report)
+    pieces = Replays(twin, names, data, False, report, kept=batches)
     first = pieces.slopes(pieces.start)
     if doubts and first.fit < 0.0:
         raise ScenarioError(doubts[0])
@@ -653,7 +668,7 @@ def _solved(
             return pieces, *gauss_newton.extrapolated(pieces, reached, most)
         slopes, moved = gauss_newton.accurate(pieces, reached)
         return pieces, gauss_newton.not_worse(pieces, slopes), moved
-    closed = Replays(twin, names, data, True, report)
+    closed = Replays(twin, names, data, True, report, kept=batches)
     points = [closed.start, Point(reached.point.values, closed.start.states)]
     if len(closed.free):  # a record may begin at rest with a jump of the command
         points += list(map(closed.at_rest, points))
@@ -676,7 +691,7 @@ def _starting_states(
         return [None] * len(data)
     if replays.closed:
         return [replays.state(point, k) for k in range(len(data))]
-    repeats = Replays(fitted, [], data, False, whole=True)
+    repeats = Replays(fitted, [], data, False, whole=True, kept=replays.kept)
     repeats.steps = replays.short_steps
     of_records = [piece.record for piece in replays.pieces]
     firsts = list(map(of_records.index, range(len(data))))

@@ -29,9 +29,11 @@ from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.data import frozen_data
 from smc_mujoco.common.errors import ScenarioWarning
 from smc_mujoco.identification import inverse_dynamics, records
+from smc_mujoco.identification.kept_replays import Batch, KeptReplays
 from smc_mujoco.identification.least_squares import least_squares
 from smc_mujoco.identification.records import Record
 from smc_mujoco.identification.rig import Quantity, RecordPart, Rig
+from smc_mujoco.simulation import run_key
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -173,18 +175,21 @@ class Replays:
         closed: bool,
         report: Callable[[int], None] = lambda count: None,
         whole: bool = False,
+        kept: KeptReplays | None = None,
     ):
         """Cut the records of a rig into pieces, to find the quantities `names`, (p,).
 
         If `closed`, each record is replayed as a whole, by the rig's own controller; else its
         pieces of the rig's `window` under the recorded command, or the `whole` record. `report` is
-        called with the number of replays of all records after a batch.
+        called with the number of replays of all records after a batch. `kept` has the batches of a
+        search that was stopped.
         """
         self.twin = twin
         self.names = names
         self.data = data
         self.closed = closed
         self.report = report
+        self.kept = kept
         self.whole = whole or closed or not twin.window
         self.quantities = []
         low = []
@@ -366,6 +371,32 @@ class Replays:
         """Return what `predicted` returns, without corrections; `fields` replace those of the
         replays' scenarios.
         """
+
+        def simulated() -> Batch:
+            return self._simulated(rigs, points, fields)
+
+        if self.kept is None:
+            return simulated()
+        return self.kept.batch(self._depends(rigs, points, fields), simulated)
+
+    def _depends(
+        self, rigs: Sequence[Rig], points: Sequence[Point], fields: Fields
+    ) -> Iterator[bytes]:
+        """Yield all that a batch of replays depends on."""
+        first = self.twin.repeated(self._part(0), state=self.state(points[0], 0), **fields)
+        yield run_key.key(first).encode()
+        for k, piece in enumerate(self.pieces):
+            yield repr((piece.record, piece.skipped, piece.stride, [*piece.measured])).encode()
+            for values in piece.measured.values():
+                yield values.tobytes()
+            for point in points:
+                state = self.state(point, k)
+                yield b"" if state is None else state.tobytes()
+        for rig in rigs:
+            yield repr([*rig.values.items()]).encode()
+
+    def _simulated(self, rigs: Sequence[Rig], points: Sequence[Point], fields: Fields) -> Batch:
+        """Return what `_replayed` returns, by a run of each piece of each rig."""
         scenarios = []
         with warnings.catch_warnings():  # about values that are only tried
             warnings.simplefilter("ignore", ScenarioWarning)

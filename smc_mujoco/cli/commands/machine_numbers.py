@@ -111,6 +111,7 @@ MotionsFigure = Annotated[
     Path | None, options.picture("the motions and the expected errors of each")
 ]
 FIGURE = Path("fit")
+REPLAYS = "replays"  # the folder beside the report from which a stopped search goes on
 FOUND = Path("found.txt")
 MotionFile = Annotated[
     Path | None, typer.Option(help="CSV file of the best motion: t, and r or r_JOINT.")
@@ -148,7 +149,8 @@ def identify(
     your own model is the mass of all that moves, in kg. Parameters of a part that --condition adds
     are named FIELD.NAME, such as friction.coulomb. The command prints each with its standard error,
     how well the logs are repeated, and what to doubt. It writes found.txt, which --condition of
-    other commands takes, the figure fit.svg, and all of it as fit/report.html.
+    other commands takes, the figure fit.svg, and all of it as fit/report.html. A stopped command
+    resumes when you start it again.
 
     With --pairs you need no machine: give the speed (rad/s or m/s) and torque (N m or N) of one
     joint, in time order. The torque must be that of friction alone, so subtract gravity and inertia
@@ -185,6 +187,7 @@ def identify(
         starts=starts,
         seed=seed,
         progress=True,
+        folder=(figure or FIGURE).with_suffix("") / REPLAYS,
     )
     terminal.answer(identified, full)
     picture = identified.figure(figure or FIGURE)[0]
