@@ -17,7 +17,7 @@ def answer(runs):
     return (
         "of those that settle, u varies least at the end under "
         f"{settled.least('tv_rate')}, and most under "
-        f"{settled.most('tv_rate')}; TV rate from nominal to noise: "
+        f"{settled.most('tv_rate')}; variation of u from nominal to noise: "
         f"{paper.changes('tv_rate', 'nominal', 'noise')}"
     )
 

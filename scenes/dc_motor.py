@@ -15,7 +15,7 @@ def answer(runs):
     return (
         f"{runs.count('settle')}; settling time from the ideal drive to the 3 V supply: "
         f"{runs.changes('settling_time', 'ideal', '3 V supply')}; "
-        "least TV rate of those that settle: "
+        "least variation of u of those that settle: "
         f"{runs.select().least('tv_rate')}"
     )
 

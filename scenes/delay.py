@@ -3,7 +3,7 @@
 The paper's table I calls the observer-free and the higher-order law delay-tolerant and the
 classical and adaptive ones not; it shows no run. Here every command arrives 10, 20 or 50 ms late.
 
-Look for: the delay at which each law stops settling, and what its ultimate bound has grown to by
+Look for: the delay at which each law stops settling, and what its final error has grown to by
 then.
 """
 
@@ -14,7 +14,7 @@ def answer(runs):
     last = list(runs.traces)[-1]
     return (
         "the longest delay of those tried up to which each settles: "
-        f"{runs.up_to()}; with {last} the ultimate bound is "
+        f"{runs.up_to()}; with {last} the final error is "
         f"least under {runs[last].least('ultimate_bound')}"
     )
 

@@ -12,7 +12,7 @@ import smc_mujoco as smc
 
 def answer(runs):
     return (
-        f"{runs.count('settle')}; TV rate from the ideal sensor to 512 counts: "
+        f"{runs.count('settle')}; variation of u from the ideal sensor to 512 counts: "
         f"{runs.changes('tv_rate', 'ideal', '512 counts')}"
     )
 

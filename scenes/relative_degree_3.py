@@ -16,7 +16,7 @@ def answer(runs):
     return (
         f"{runs.count('settle')}; first: {runs.least('settling_time')}; "
         f"last: {runs.most('settling_time')}; "
-        f"the largest ultimate bound: {runs.most('ultimate_bound')}"
+        f"the largest final error: {runs.most('ultimate_bound')}"
     )
 
 

@@ -17,7 +17,7 @@ def answer(runs):
         change[name] = paper.changes(name, "nominal", "sine")
     return (
         f"from nominal to sine, settling time: {change['settling_time']}; "
-        f"ultimate bound: {change['ultimate_bound']}; "
+        f"final error: {change['ultimate_bound']}; "
         f"with the sine the least bound: {runs['sine'].least('ultimate_bound')}"
     )
 

@@ -16,8 +16,8 @@ def answer(runs):
         change[name] = paper.changes(name, "nominal", "noise")
     return (
         f"from nominal to noise, settling time: {change['settling_time']}; "
-        f"ultimate bound: {change['ultimate_bound']}; "
-        f"TV rate of u: {change['tv_rate']}, with noise the least: "
+        f"final error: {change['ultimate_bound']}; "
+        f"variation of u: {change['tv_rate']}, with noise the least: "
         f"{runs['noise'].select().least('tv_rate')}"
     )
 

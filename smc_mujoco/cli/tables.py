@@ -24,7 +24,7 @@ from smc_mujoco.common.text import first_paragraph, number
 from smc_mujoco.control.source import in_words
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.layout import channel_names
-from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.metrics.catalogue import scores as metric_scores
 from smc_mujoco.metrics.conventions import CATALOGUE, ChannelGroup, Metric, groups
 from smc_mujoco.metrics.tip import tip_scores
@@ -48,16 +48,11 @@ TIP_COLUMNS = {  # of a table of an arm's tip: heading -> score, unit, factor on
     "deepest": ("depth", "mm", 1e3),
 }
 
-# Columns of a table of scores: heading -> metric.
-SCORE_COLUMNS = {
-    "settles": "settling_time",
-    "overshoot": "overshoot",
-    "ultimate bound": "ultimate_bound",
-    "ITAE": "itae",
-    "max |u|": "max_u",
-    "TV rate": "tv_rate",
-    "spread settles": "spread_settling_time",
-}
+# the metrics of a table of scores
+SCORES = (
+    *("settling_time", "overshoot", "ultimate_bound", "itae", "max_u", "tv_rate"),
+    "spread_settling_time",
+)
 FAILED = Cell("failed", colour="red")
 MAX_NAMED_JOINTS = 4  # in the heading of a group
 
@@ -105,10 +100,10 @@ def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) 
                 units[metric.name] = metric.unit_for(group.unit, group.effort)
         names = []
         heads = []
-        for head, name in SCORE_COLUMNS.items():
+        for name in SCORES:
             if name in units:
                 names.append(name)
-                heads.append(_head(head, units[name]))
+                heads.append(_head(CATALOGUE[name].label, units[name]))
         rows: dict[str, list[Cell]] = {}
         for label, runs in values.items():
             least = {}

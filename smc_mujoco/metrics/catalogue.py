@@ -248,7 +248,9 @@ def steady_error(trace: Trace) -> float:
     ...
 
 
-@folded("{x}", Fold("e", "largest", part="late"), need="accurate", error=True)
+@folded(
+    "{x}", Fold("e", "largest", part="late"), label="final error", need="accurate", error=True
+)
 def ultimate_bound(trace: Trace) -> float:
     """Largest |e| in the last part, worst channel."""
     ...
@@ -326,7 +328,10 @@ def tv(trace: Trace) -> float:
 
 
 @folded(
-    "{u}/s", Fold("u", "sum", part="late", change=True, rate=True), label="TV rate", need="calm"
+    "{u}/s",
+    Fold("u", "sum", part="late", change=True, rate=True),
+    label="variation of u",
+    need="calm",
 )
 def tv_rate(trace: Trace) -> float:
     """Total variation of u per second in the last part, worst channel.

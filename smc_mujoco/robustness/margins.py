@@ -1,7 +1,7 @@
 """Margins: the largest delay, disturbance, friction, mass ratio, blow, noise, jitter and lost gain
 that a law tolerates on a plant.
 
-A run tolerates a level if it does not fail and its ultimate bound after 10 s is at most 5 % of its
+A run tolerates a level if it does not fail and its final error after 10 s is at most 5 % of its
 scale (`conventions`). As a run starts at the scale, its envelope has then shrunk, which the paper's
 claim on delay requires. The search tries up to nine levels from small to large. Then it halves the
 interval below the FIRST level that is not tolerated, until the margin is known to one control
@@ -68,7 +68,7 @@ from smc_mujoco.simulation.trace import Trace, warn_of_broken
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-TOLERATED_ERROR = 0.05  # of the scale: the audit's threshold for an ultimate bound
+TOLERATED_ERROR = 0.05  # of the scale: the audit's threshold for a final error
 REST_SHARE = CATALOGUE["rest_share"]  # which must be below it
 # 1/s, noise of the velocity over that of the position: that of the study's sensor
 VELOCITY_NOISE_RATIO = 5.0

@@ -83,7 +83,7 @@ def _of_motion(trace: Any) -> Iterator[str]:
     elif coupled(trace.scenario.plant):
         yield (
             f"u of {name} chatters on coupled joints, so rounding errors alone may change the "
-            f"ultimate bound by a few percent, at any physics step; in Python {cure}"
+            f"final error by a few percent, at any physics step; in Python {cure}"
         )
 
 

@@ -193,7 +193,7 @@ class Board:
 
     @property
     def label(self) -> str:
-        """The metric in words, such as "ultimate bound"."""
+        """The metric in words, such as "final error"."""
         return LABELS.get(self.metric) or CATALOGUE[self.metric].label
 
     @property
@@ -201,11 +201,9 @@ class Board:
         """Condition -> who wins there, or why nobody does; None for a single law."""
         return {block.condition: self.verdict(block) for block in self.blocks}
 
-    def verdict(self, block: Block, name: str = "") -> Verdict | None:
-        """Return who wins a block, or why nobody does, in a metric of this name, by default its
-        label.
-        """
-        metric = name or self.label
+    def verdict(self, block: Block) -> Verdict | None:
+        """Return who wins a block, or why nobody does."""
+        metric = self.label
         laws = tuple(block.medians)
         if len(laws) < 2:
             return None

@@ -36,10 +36,10 @@ UNDER = {
     "if it settles before its last fifth.",
     "settling time": "Settling time is when the error enters its band to stay: 2 % of its initial "
     "value, or of the reference's range if that is larger.",
-    "ultimate bound": "The ultimate bound is the largest absolute error of any channel in the last "
+    "final error": "The final error is the largest absolute error of any channel in the last "
     "fifth of a run.",
     "ITAE": "ITAE is the integral of time times absolute error.",
-    "TV rate": "TV rate is the total variation of u per second, in the last fifth of a run.",
+    "variation of u": "Variation of u is its total variation per second, in the last fifth of a run.",
     "default": "Default gains are those of the law's own file.",
     "given": "Gains marked given are the authors' own choice.",
     "strong=True": "Bold: may be the best: no other law is shown to be better (a paired test at "
@@ -59,7 +59,7 @@ UNDER = {
 # what boards and comparisons explain on their pages
 WORDS = (
     *("star", "may be the best", "lead", "tied", "open", "not ranked", "floor", "interval"),
-    *("J", "settled", "settling time", "ultimate bound", "ITAE", "TV rate", "arrived"),
+    *("J", "settled", "settling time", "final error", "ITAE", "variation of u", "arrived"),
     *("shipped", "set of gains", "some runs"),
 )
 

@@ -20,8 +20,6 @@ from smc_mujoco.common.aliases import Names
 from smc_mujoco.studies.board import Block, Board
 from smc_mujoco.studies.board_numbers import in_order, size, unit_of
 
-# what one screen calls a metric, in plainer words than a table
-PLAIN = {"ultimate_bound": "final error", "tv_rate": "variation of u"}
 RATE = "tv_rate"  # the metric that is also given as a share of the bound on u
 Column = tuple[Board, Block]  # a metric, in one condition
 Gains = Mapping[str, Mapping[str, str]]  # plant -> law -> its best gains as text
@@ -56,7 +54,7 @@ def _contest(columns: Sequence[Column], gains: Mapping[str, str], own: Names) ->
     verdicts: list[Verdict] = []
     not_ranked: list[NotRanked] = []
     for board, block in columns:
-        fact = board.verdict(block, name(board))
+        fact = board.verdict(block)
         # that all laws settle in the same runs is seen in the number of runs that settle
         if fact and not (board.metric == SETTLES and isinstance(fact, Tied)):
             verdicts.append(fact)
@@ -70,7 +68,7 @@ def _contest(columns: Sequence[Column], gains: Mapping[str, str], own: Names) ->
         condition=last.condition,
         sample=last.sample,
         grid=Grid(
-            columns=tuple((name(board), _unit(board)) for board, _ in with_numbers),
+            columns=tuple((board.label, _unit(board)) for board, _ in with_numbers),
             rows=tuple(rows),
             winners=tuple(block.winner or "" for _, block in with_numbers),
         ),
@@ -80,11 +78,6 @@ def _contest(columns: Sequence[Column], gains: Mapping[str, str], own: Names) ->
         trails=tuple(_trails(*with_numbers[0], own)) if with_numbers else (),
         not_ranked=tuple(not_ranked),
     )
-
-
-def name(board: Board) -> str:
-    """Return what a screen calls the metric of a board."""
-    return PLAIN.get(board.metric, board.label)
 
 
 def _unit(board: Board) -> str:
@@ -130,7 +123,7 @@ def _trails(board: Board, block: Block, own: Names) -> list[Trails]:
                 Trails(
                     law=law,
                     leader=behind.leader,
-                    metric=name(board),
+                    metric=board.label,
                     times=behind.times,
                     ahead=behind.ahead,
                 )

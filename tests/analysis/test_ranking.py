@@ -853,7 +853,7 @@ def test_where_no_law_arrives_none_wins_and_it_is_said():
     boards = leaderboard(table, ["tv_rate"])
     (board,) = boards
     (fact,) = board.verdicts.values()
-    assert fact == Barred(metric="TV rate", laws=("a", "b"), defaults=False)
+    assert fact == Barred(metric="variation of u", laws=("a", "b"), defaults=False)
     assert [row[1].text for row in boards.tables[0].rows] == ["not arrived"] * 2
 
 

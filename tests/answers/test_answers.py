@@ -12,6 +12,7 @@ from smc_mujoco.answers.answer import Answer
 from smc_mujoco.answers.explain import explain, glossary
 from smc_mujoco.answers.facts import Lead, Open, Settles, Tied, Trails, Use
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import shipped
 from smc_mujoco.common.tabular import Cell, Tabular
 
 pytestmark = pytest.mark.quick
@@ -157,3 +158,11 @@ def test_a_word_is_found_in_any_case_and_number():
 def test_an_unknown_word_is_refused_with_a_near_one():
     with pytest.raises(ScenarioError, match="star"):
         explain("strar")
+
+
+def test_a_word_is_explained_in_one_place():
+    page = (shipped("docs") / "words.md").read_text(encoding="utf-8")
+    explained = []
+    for heading in re.findall(r"^## (.*)$", page, re.MULTILINE):
+        explained += [word.strip() for word in re.sub(r"\(.*?\)", "", heading).split(",")]
+    assert len(explained) == len(set(explained))

@@ -159,7 +159,7 @@ def test_html_and_latex_have_the_numbers_of_the_text(boards):
                 assert power.replace("–", "--") in line
     assert re.fullmatch(r"[34]\.\de-7", table.rows[0][1].text)  # 4e-7 times 0.9 to 1.1
     below = table.to_latex().partition("bottomrule")[2]
-    assert r"third wins: ITAE. The best laws are level within 10~\%: ultimate bound." in below
+    assert r"third wins: ITAE. The best laws are level within 10~\%: final error." in below
     assert "might go undetected" not in below
     (few,) = leaderboard(made(seeds=3), metrics=["itae"]).tables
     assert "wins" not in few.to_latex().partition("bottomrule")[2]
@@ -358,14 +358,14 @@ def test_a_title_in_latex_has_words_and_one_of_a_terminal_has_names():
     [
         ("settles", "settled runs"),
         ("settling_time", "settling time"),
-        ("ultimate_bound", "ultimate bound"),
+        ("ultimate_bound", "final error"),
         ("itae", "ITAE"),
-        ("tv_rate", "TV rate"),
+        ("tv_rate", "variation of u"),
     ],
 )
 def test_latex_says_in_print_what_its_own_columns_are(metric, heading):
     (table,) = leaderboard(made(), [metric]).tables
-    metrics = "settled runs", "settling time", "ultimate bound", "ITAE", "TV rate"
+    metrics = "settled runs", "settling time", "final error", "ITAE", "variation of u"
     said = [name for name in metrics if UNDER[name] in table.under[-1]]
     assert said == [heading]
     assert ("share" in table.under[-1]) == (metric == "settles")

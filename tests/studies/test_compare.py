@@ -196,7 +196,7 @@ def test_a_plot_that_has_no_room_for_all_metrics_keeps_those_in_which_a_law_wins
     ):
         page = found.plot(size="ieee-column")
     names = [ax.get_xlabel().partition("\n")[0] for ax in page.axes[:2]]
-    assert names == ["settling time", "TV rate"]
+    assert names == ["settling time", "variation of u"]
     assert page.get_size_inches()[1] < 9.25  # of a column
 
 

@@ -13,7 +13,7 @@ from smc_mujoco.answers.explain import explain
 from smc_mujoco.answers.facts import CompareFacts, Lead, More, NextStep, Settles, Trails
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies.board_numbers import size
-from smc_mujoco.studies.contests import PLAIN, contests
+from smc_mujoco.studies.contests import contests
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard
 
 pytestmark = pytest.mark.quick
@@ -64,7 +64,7 @@ def test_five_laws_in_one_condition_fit_a_screen_of_80_by_24(contest):
 def test_the_numbers_of_the_screen_are_those_of_the_boards(boards, contest):
     for row, numbers in contest.grid.rows:
         for (name, _), text in zip(contest.grid.columns, numbers, strict=True):
-            (board,) = [one for one in boards if PLAIN.get(one.metric, one.label) == name]
+            (board,) = [one for one in boards if one.label == name]
             (entry,) = [entry for entry in board.entries if entry.law == row]
             assert text == size(entry.interval.median, board.metric)
     assert dict(contest.settled) == dict.fromkeys(LAWS, Settles(SEEDS, SEEDS))
@@ -125,7 +125,7 @@ def test_more_than_five_plants_and_conditions_are_one_table_of_winners():
 @pytest.mark.parametrize(
     "word",
     [
-        *(PLAIN.get(name) or CATALOGUE[name].label for name in METRICS if name in CATALOGUE),
+        *(CATALOGUE[name].label for name in METRICS if name in CATALOGUE),
         *(CATALOGUE[name].label for name in METRICS if name in CATALOGUE),
         *("J", "settled", "settled runs", "floor", "star", "best", "lead", "below"),
         *("tied", "open", "not ranked", "no winner", "beware", "gains", "margin", "worst"),

@@ -33,7 +33,7 @@ Needs = Annotated[
         help="What the law must keep, and what tables show, separated by commas. Limits, which "
         "searches keep: no-overshoot, overshoot<10 (in % of the way to the goal), calm (u rests "
         "where nothing moves). Properties, such as no-velocity; `smc-mujoco list --help` lists "
-        "them under --need. Scores to show: fast (settling time), accurate (ultimate bound), "
+        "them under --need. Scores to show: fast (settling time), accurate (final error), "
         "on-track (ITAE), gentle (largest u), frugal (integral of u^2). Laws are compared by J, "
         "and those that settle reliably come first.",
     ),

@@ -453,7 +453,7 @@ def test_gains_tables_figures_and_files_have_the_unit_of_the_set_point(tmp_path)
         smc.grid(plant, [smc.law("pid")], "nominal", seeds=2, duration=0.1), tmp_path / "runs"
     )
     labels = [ax.get_xlabel().replace("\n", " ") for ax in smc.plot(table).axes]
-    assert "TV rate (rad/s)" in labels
+    assert "variation of u (rad/s)" in labels
     said = "u of 'j' of hobby is the set-point of its servo, in rad from its goal at 0."
     printed = " ".join(str(smc.leaderboard(table, ["tv_rate"])).split())
     assert said in printed
