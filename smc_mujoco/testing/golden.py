@@ -80,7 +80,7 @@ def compare(file: Path, key: str, response: StepResponse, tolerances: Numbers) -
         within = alike or abs(value - golden) <= tolerance
         expected = f"{quantity(golden)} ± {quantity(tolerance)}"  # pyright: ignore[reportArgumentType] NaN is None only in the file
         limits.append(Limit(name, quantity(value, unit), expected, within))
-    judge(limits, "golden", "golden", f"{response}; if it is meant, {UPDATE}")
+    judge(limits, "golden", ("run", str(response)), ("next", f"if it is meant, {UPDATE}"))
 
 
 def _checked(response: object, tolerances: Numbers) -> dict[str, float]:

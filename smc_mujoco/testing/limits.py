@@ -1,12 +1,13 @@
-"""Limits that a test sets on metrics, and the message with a table of them if one is violated."""
+"""Limits that a test sets on metrics, and the message if one is violated."""
 
 import functools
 import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, ParamSpec, TypeVar
 
+from smc_mujoco.answers.answers import labelled
 from smc_mujoco.common.errors import ScenarioError, number, shown
-from smc_mujoco.common.tabular import Tabular
+from smc_mujoco.common.text import number as shortened
 from smc_mujoco.metrics.catalogue import CATALOGUE
 
 __tracebackhide__ = True  # pytest hides the frames of a module that has it
@@ -36,9 +37,9 @@ def bound(metric: str, value: float, unit: str, limit: object) -> Limit:
     if math.isnan(value):
         compared = CATALOGUE[metric.rpartition(" ")[2]].absent
     what = f"limit of {metric}"
-    text = quantity(value, unit)
     if not isinstance(limit, tuple | list):
         high = number(what, limit, infinite=True)
+        text = _near(value, unit, [high])
         return Limit(metric, text, f"<= {quantity(high)}", compared <= high)
     if len(limit) != 2:
         raise ScenarioError(
@@ -48,20 +49,31 @@ def bound(metric: str, value: float, unit: str, limit: object) -> Limit:
     if low > high:
         raise ScenarioError(f"{what} is {shown(limit)}: give the lower one first")
     words = f"{quantity(low)} .. {quantity(high)}"
-    return Limit(metric, text, words, low <= compared <= high)
+    return Limit(metric, _near(value, unit, [low, high]), words, low <= compared <= high)
 
 
-def judge(limits: Sequence[Limit], kind: str, word: str, note: object) -> None:
-    """Raise an AssertionError with a table of all limits if one is violated."""
+def _near(value: float, unit: str, limits: Sequence[float]) -> str:
+    """Return a value with three digits, or with more where it lies that near to a limit."""
+    text = shortened(value)
+    if not math.isfinite(value) or any(shortened(limit) == text for limit in limits):
+        return quantity(value, unit)
+    return f"{text} {unit}".removesuffix(" 1").rstrip()
+
+
+def judge(limits: Sequence[Limit], word: str, *notes: tuple[str, str]) -> None:
+    """Raise an AssertionError if a limit is violated: which ones, those that hold, and labelled
+    notes, a line each.
+    """
     missed = []
-    rows = []
+    holding = []
     for metric, value, limit, within in limits:
-        rows.append((metric, value, limit, "yes" if within else "NO"))
-        if not within:
+        if within:
+            holding.append(f"{metric} {value}, {limit}")
+        else:
             missed.append(f"{metric} is {value}, {word} {limit}")
     if missed:
-        table = Tabular(headings=("metric", "value", kind, "ok"), rows=rows)
-        raise AssertionError(f"{'; '.join(missed)} ({note})\n{table}")
+        pairs = [("holds", "; ".join(holding)), *notes] if holding else notes
+        raise AssertionError("\n".join(["; ".join(missed), *labelled(pairs)]))
 
 
 def quantity(value: float, unit: str = "") -> str:

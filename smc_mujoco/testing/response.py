@@ -26,7 +26,7 @@ from smc_mujoco.testing.limits import bound, judge, quantity, without_frames
 
 __tracebackhide__ = True  # pytest hides the frames of a module that has it
 MAX_ID = 150  # characters of a test's id in a file's name: most file systems allow 255 bytes
-IN_REPR = ("settling_time", "overshoot", "tv_rate")  # metrics in the repr of a response
+IN_SHORT = ("settling_time", "overshoot", "tv_rate")  # metrics that are shown first
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -99,11 +99,15 @@ class StepResponse:
     def __repr__(self) -> str:
         if self.failure is not None:
             return f"StepResponse({self}: failed, {self.failure})"
+        return f"StepResponse({self}: {self._in_short()})"
+
+    def _in_short(self) -> str:
+        """Return the first metrics to look at, on one line."""
         values = []
-        for name in IN_REPR:
+        for name in IN_SHORT:
             if name in self.metrics:
                 values.append(f"{name} {quantity(*self.value(name))}")
-        return f"StepResponse({self}: {', '.join(values)})"
+        return ", ".join(values)
 
     def value(self, name: str) -> tuple[float, str]:
         """Return the value and the unit of one of `values`."""
@@ -148,7 +152,7 @@ class StepResponse:
         `r.check(settling_time=0.6, overshoot=5, rise_time=(0.05, 0.3))`.
 
         A limit is the highest value, or (lowest, highest), in the metric's unit. The AssertionError
-        has a table of all.
+        says which are missed, and which hold.
         """
         if not limits:
             raise ScenarioError(
@@ -158,12 +162,16 @@ class StepResponse:
         bounds = []
         for name, limit in limits.items():
             bounds.append(bound(name, *self.value(name), limit))
-        judge(bounds, "limit", "not", self)
+        judge(bounds, "not", ("run", str(self)))
 
-    def table(self) -> str:
-        """Return a table, as text, of the metrics that have a meaning for this run."""
+    def table(self, full: bool = True) -> str:
+        """Return the metrics that have a meaning for this run as text: a table of all, or a line
+        of the first.
+        """
         if self.failure is not None:
             return f"failed: {self.failure}"
+        if not full:
+            return self._in_short()
         rows = []
         for name in self.values:
             if self.applies(name):
@@ -210,16 +218,18 @@ def respond(
     return StepResponse(trace=run(scenario), step=height, condition=", ".join(words))
 
 
-def report_of(test: str, responses: Sequence[StepResponse], folder: Path, video: bool) -> str:
-    """Return tables of all responses, and the paths of the files that show them: a figure and a
-    film for each plant.
+def report_of(
+    test: str, responses: Sequence[StepResponse], folder: Path, *, video: bool, full: bool
+) -> str:
+    """Return the metrics of all responses, all of them if `full`, and the paths of the files that
+    show them: a figure and a film for each plant.
     """
     from smc_mujoco.draw.figure import figure
     from smc_mujoco.draw.film.film import film
 
     tables = []
     for response in responses:
-        tables.append(f"{response}\n{response.table()}")
+        tables.append(f"{response}\n{response.table(full)}")
     plants: dict[str, list[Trace]] = {}
     for response in responses:
         plants.setdefault(response.scenario.plant.name, []).append(response.trace)
@@ -232,6 +242,8 @@ def report_of(test: str, responses: Sequence[StepResponse], folder: Path, video:
         lines.append(_line("figure", titled, traces, folder / f"{name}.png"))
         if video:
             lines.append(_line("film", film, traces, folder / f"{name}.mp4"))
+    if not full:
+        lines.append("all metrics: pytest -v")
     return "\n\n".join([*tables, "\n".join(dict.fromkeys(lines))])
 
 
