@@ -13,9 +13,9 @@ def answer(runs):
     paper = runs.only("observer_free")
     settled = runs.select()
     return (
-        f"{paper.count('settle')} (settling time {paper.size('settling_time')}, variation of u at the end "
-        f"{paper.size('tv_rate')}); first of all: {settled.least('settling_time')}; least variation of u: "
-        f"{settled.least('tv_rate')}"
+        f"{paper.count('settle')} (settling time {paper.size('settling_time')}, variation of u at "
+        f"the end {paper.size('tv_rate')}); first of all: {settled.least('settling_time')}; least "
+        f"variation of u: {settled.least('tv_rate')}"
     )
 
 

@@ -41,6 +41,11 @@ class Answer(Tables):
         raise NotImplementedError
 
     @property
+    def page_lines(self) -> Sequence[str]:
+        """The answer on its page, which does not point at itself."""
+        return self.lines
+
+    @property
     def title(self) -> str:
         """The title of the page."""
         return self.lines[0]
@@ -73,11 +78,7 @@ class Answer(Tables):
 
     def _repr_html_(self) -> str:
         evidence = f"<details><summary>all tables</summary>{super()._repr_html_()}</details>"
-        return self._html_lines + evidence
-
-    @property
-    def _html_lines(self) -> str:
-        return f'<pre style="overflow-x:auto">{html.text(self)}</pre>'
+        return _preformatted(self.lines) + evidence
 
     def to_html(self, path: AnyPath) -> Path:
         """Write the answer and all its evidence as one page that needs no other file.
@@ -93,7 +94,7 @@ class Answer(Tables):
         Raises:
           ScenarioError: a file that cannot be written.
         """
-        parts = [self._html_lines, *self.pictures]
+        parts = [_preformatted(self.page_lines), *self.pictures]
         for table in self.tables:
             parts.append(table._repr_html_())
         if self.words:
@@ -103,3 +104,9 @@ class Answer(Tables):
         with replacing(Path(path)) as file:
             file.write_text(page, encoding="utf-8")
         return Path(path)
+
+
+def _preformatted(lines: Sequence[str]) -> str:
+    """Return lines as HTML, in their columns."""
+    text = "\n".join(lines)
+    return f'<pre style="overflow-x:auto">{html.text(text)}</pre>'

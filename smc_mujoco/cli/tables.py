@@ -24,7 +24,7 @@ from smc_mujoco.common.text import first_paragraph, number
 from smc_mujoco.control.source import in_words
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.layout import channel_names
-from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
+from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.catalogue import scores as metric_scores
 from smc_mujoco.metrics.conventions import CATALOGUE, ChannelGroup, Metric, groups
 from smc_mujoco.metrics.tip import tip_scores

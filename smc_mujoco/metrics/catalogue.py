@@ -248,9 +248,7 @@ def steady_error(trace: Trace) -> float:
     ...
 
 
-@folded(
-    "{x}", Fold("e", "largest", part="late"), label="final error", need="accurate", error=True
-)
+@folded("{x}", Fold("e", "largest", part="late"), label="final error", need="accurate", error=True)
 def ultimate_bound(trace: Trace) -> float:
     """Largest |e| in the last part, worst channel."""
     ...

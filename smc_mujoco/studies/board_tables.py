@@ -39,7 +39,8 @@ UNDER = {
     "final error": "The final error is the largest absolute error of any channel in the last "
     "fifth of a run.",
     "ITAE": "ITAE is the integral of time times absolute error.",
-    "variation of u": "Variation of u is its total variation per second, in the last fifth of a run.",
+    "variation of u": "Variation of u is its total variation per second in the last fifth of a "
+    "run.",
     "default": "Default gains are those of the law's own file.",
     "given": "Gains marked given are the authors' own choice.",
     "strong=True": "Bold: may be the best: no other law is shown to be better (a paired test at "

@@ -120,15 +120,19 @@ class Compared(Answer):
     @property
     def lines(self) -> list[str]:
         """The answer on one screen."""
+        return self._lines(More(self.report, CONTENTS if self.report else "", EXPLAINED))
+
+    @property
+    def page_lines(self) -> list[str]:
+        """The answer on its page."""
+        return self._lines(None)
+
+    def _lines(self, more: More | None) -> list[str]:
         if not self._contests:
             return self.leaderboard.lines
+        bewares = *self._defaults, *self.leaderboard.bewares
         return answers.compare_lines(
-            CompareFacts(
-                contests=self._contests,
-                bewares=(*self._defaults, *self.leaderboard.bewares),
-                next=self._next,
-                more=More(self.report, CONTENTS if self.report else "", EXPLAINED),
-            )
+            CompareFacts(contests=self._contests, bewares=bewares, next=self._next, more=more)
         )
 
     @property

@@ -427,6 +427,11 @@ class Recommendation(Answer):
         return answers.which_lines(self.facts, self.next_step)
 
     @property
+    def page_lines(self) -> list[str]:
+        """The answer on its page."""
+        return answers.which_lines(dataclasses.replace(self.facts, folder=""), self.next_step)
+
+    @property
     def _bounds(self) -> str:
         """The bounds on u in words, such as "20 N m at shoulder"."""
         return bounds_in_words(self.worst_run)

@@ -438,6 +438,8 @@ def test_one_command_runs_tables_and_draws(tmp_path, monkeypatch, capsys):
     printed = capsys.readouterr().out
     assert "the defaults of mine, not searched" in " ".join(printed.split())
     page = Path("results/report.html").read_text()
+    assert "results/report.html" in printed
+    assert "results/report.html" not in page
     assert "16 runs, 0 stopped early" in page
     assert "mine on inverted_pendulum and duffing: default gains" in page
     table = smc.Table.read("results")

@@ -126,7 +126,6 @@ def test_more_than_five_plants_and_conditions_are_one_table_of_winners():
     "word",
     [
         *(CATALOGUE[name].label for name in METRICS if name in CATALOGUE),
-        *(CATALOGUE[name].label for name in METRICS if name in CATALOGUE),
         *("J", "settled", "settled runs", "floor", "star", "best", "lead", "below"),
         *("tied", "open", "not ranked", "no winner", "beware", "gains", "margin", "worst"),
         *("shipped", "tuned here", "given", "default", "interval", "searches", "evaluations"),

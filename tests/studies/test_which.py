@@ -134,6 +134,7 @@ def test_the_folder_has_the_report_and_the_gains(raced):
     asked, recommendation, _ = raced
     folder = Path(asked["out"])
     page = (folder / "report.html").read_text()
+    assert "report.html" not in page
     assert recommendation.lines[0].split()[1] in page
     assert page.count("<table") == len(recommendation.tables)
     if recommendation.tuned:
