@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.interrupts import delay_signals
@@ -48,6 +49,8 @@ def enter(
     verify: Verify = False,
     against: Against = None,
     site: Site = False,
+    threads: options.Threads = None,
+    executor: options.Executor = None,
 ) -> None:
     """Enter a law in a benchmark: run it on a suite of problems, and say where it stands.
 
@@ -78,7 +81,7 @@ def enter(
     with delay_signals():
         from smc_mujoco.problems.tracking import tracking_suites
     if suite in tracking_suites():
-        _enter_tracking(folder, suite, results)
+        _enter_tracking(folder, suite, results, threads, executor)
         return
     with delay_signals():
         from smc_mujoco.problems import enter as entering
@@ -106,13 +109,15 @@ def enter(
             raise typer.Exit(1)
 
 
-def _enter_tracking(text: str, suite: str, results: Path) -> None:
+def _enter_tracking(
+    text: str, suite: str, results: Path, threads: int | None, executor: str | None
+) -> None:
     """Search for an entry's gains in a suite of tracking problems, and print where it stands."""
     from smc_mujoco.answers.answers import entered_lines
     from smc_mujoco.problems import tracking_page, tracking_results
 
     terminal = Terminal()
-    target = tracking_results.enter_tracking(text, suite, results, progress=True)
+    target = tracking_results.enter_tracking(text, suite, results, threads, True, executor)
     board = tracking_results.tracking_board(suite, results)
     entry = tracking_results.read_result(target).name
     page = tracking_page.write(board, target.parent / "board.md")

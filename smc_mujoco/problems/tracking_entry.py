@@ -27,14 +27,8 @@ from smc_mujoco.simulation.signals import Signal
 BESIDE = re.compile(
     r"(?P<kind>Feedforward|Dither)\(\s*(?P<share>[\d.eE+-]+)\s*(,\s*(?P<on>reference|speed)\s*)?\)"
 )
+PLUS = " + "
 DITHER = 8e-3  # s, of a square wave; two control periods at least
-# tags by which boards group entries: word -> what it says of an entry
-TAGS = {
-    "surface": "has a sliding variable that it drives to 0",
-    "integral": "keeps a state that grows with a lasting error",
-    "observer": "estimates the disturbance and subtracts it",
-    "compensation": "is told the friction",
-}
 
 
 @frozen_data
@@ -107,17 +101,23 @@ def _levels(problem: TrackingProblem) -> list[float]:
 
 def tracking_entry(text: str) -> TrackingEntry:
     """Return the entry of a text. Raise ScenarioError for what is none."""
-    head, plus, tail = text.partition(" + ")
-    law = law_of(head.strip())
+    kind, share, on = beside_of(text)
+    law = law_of(text.partition(PLUS)[0].strip())
+    return TrackingEntry(text=text, law=law, kind=kind, share=share, on=on)
+
+
+def beside_of(text: str) -> tuple[str, float, str]:
+    """Return what a text of an entry adds to its law: kind, share, and speed; see TrackingEntry.
+
+    Raise ScenarioError for what cannot be added.
+    """
+    _, plus, tail = text.partition(PLUS)
     if not plus:
-        return TrackingEntry(text=text, law=law)
+        return "", 0.0, "reference"
     beside = BESIDE.fullmatch(tail.strip())
     if beside is None:
         raise ScenarioError(
             f"entry {shown(text)} adds {shown(tail)} to its law: give Feedforward(1), "
             "Feedforward(0.7, speed) or Dither(1), a share of the problem's friction"
         )
-    share = float(beside["share"])
-    return TrackingEntry(
-        text=text, law=law, kind=beside["kind"], share=share, on=beside["on"] or "reference"
-    )
+    return beside["kind"], float(beside["share"]), beside["on"] or "reference"

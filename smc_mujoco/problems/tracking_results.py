@@ -11,17 +11,21 @@ import dataclasses
 import datetime
 import functools
 import json
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from smc_mujoco.analysis.bootstrap import median_of
 from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.answers.facts import EnteredFacts, ProblemStanding
 from smc_mujoco.common import fingerprint
-from smc_mujoco.common.aliases import AnyPath, Array, Names
+from smc_mujoco.common.aliases import AnyPath, Array, Names, Numbers
 from smc_mujoco.common.cache import CachedResult
+from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, reading, replacing, slug, write_json
@@ -34,34 +38,48 @@ from smc_mujoco.problems.tracking import (
     TrackingSuite,
     filtered_difference,
     tracking_suite,
+    tracking_suites,
 )
-from smc_mujoco.problems.tracking_entry import tracking_entry
+from smc_mujoco.problems.tracking_entry import TrackingEntry, tracking_entry
 from smc_mujoco.problems.tracking_search import (
     FIRST_UNSEEN,
     SEARCHES,
     SETS,
     Found,
-    search_problem,
+    GainTrials,
+    search,
 )
 from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.workers import Workers, called, opened
 
 SHIPPED = Path(__file__).parent / "boards"
+BOUNDS = SHIPPED / "bounds.json"
 BOUNDING = 3  # instances of the bounds
 ORACLE_SPEEDS = (1.5, 4.0)  # bandwidths of the oracle times the scale of time
 FLOOR = 0.5  # counts: smaller errors count as equal, as no encoder shows them
 SAME = 1.1  # an error is not of the load where that without it is no more than so many times less
 
 
+@constrained
 def enter_tracking(
     text: str,
     suite: str,
     out: AnyPath = "results",
     threads: int | None = None,
     progress: bool = False,
+    executor: Workers | None = None,
 ) -> Path:
     """Search for an entry's gains in every problem of a suite. Return the file of its result.
 
-    Problems that are done are kept beside it, and a call that was stopped goes on with the others.
+    Searches that are done are kept beside it, and a call that was stopped goes on with the others.
+
+    Args:
+      text: the entry, see `tracking_entry`.
+      suite: its name.
+      out: folder of the results.
+      threads: how many runs are made at once; None: as many as this machine has cores.
+      progress: whether to show a bar.
+      executor: where searches are made side by side, in place of threads of this process.
 
     Raises:
       ScenarioError: a text that is no entry, or an entry that the suite cannot run.
@@ -69,23 +87,23 @@ def enter_tracking(
     entry = tracking_entry(text)
     chosen = tracking_suite(suite)
     for problem in chosen.problems:
-        entry.beside(problem)  # refuses what does not suit before anything is searched
+        GainTrials(problem, entry, threads)  # refuses what does not suit before any search
     target = Path(out) / suite / f"{slug(entry.name)}.json"
     parts = target.with_suffix("")
     parts.mkdir(parents=True, exist_ok=True)
+    files = {}
+    for problem in chosen.problems:
+        for count in range(SEARCHES):
+            files[problem, count] = _search_file(parts, problem, entry, count)
+    stored = {call: file.read() for call, file in files.items()}
+    missing = [call for call in stored if stored[call] is None]
+    with bar(f"sets of gains of {entry.name}", len(missing) * SETS, progress) as shown_bar:
+        calls = [(problem, entry, count) for problem, count in missing]
+        for i, result in _made(calls, threads, executor, shown_bar.advance):
+            stored[missing[i]] = files[missing[i]].keep(result._asdict())
     searched = {}
-    set_count = len(chosen.problems) * SEARCHES * SETS
-    with bar(f"sets of gains of {entry.name}", set_count, progress) as shown_bar:
-        for problem in chosen.problems:
-            depends = [problem.name, str(problem), entry.name, fingerprint.of(entry.law.function)]
-            file = CachedResult(parts / f"{problem.name}.json", depends, _write, read_json)
-            stored = file.read()
-            if stored is None:
-                results = search_problem(problem, entry, threads, shown_bar.advance)
-                stored = file.keep([result._asdict() for result in results])
-            else:
-                shown_bar.advance(SEARCHES * SETS)
-            searched[problem.name] = stored
+    for problem in chosen.problems:
+        searched[problem.name] = [stored[problem, count] for count in range(SEARCHES)]
     about = {
         "suite": suite,
         "entry": text,
@@ -97,14 +115,39 @@ def enter_tracking(
     }
     with replacing(target) as file:
         file.write_text(_compact(about), encoding="utf-8")
-    for stored in parts.iterdir():
-        stored.unlink()
+    for part in parts.iterdir():
+        part.unlink()
     parts.rmdir()
     return target
 
 
-def _write(results: list, path: Path) -> None:
-    write_json(path, results)
+def _search_file(
+    folder: Path, problem: TrackingProblem, entry: TrackingEntry, count: int
+) -> CachedResult[dict]:
+    """Return the file of a search's result."""
+    depends = [str(problem), entry.name, fingerprint.of(entry.law.function), count]
+    return CachedResult(folder / f"{problem.name}-{count}.json", depends, _write, read_json)
+
+
+def _write(result: dict, path: Path) -> None:
+    write_json(path, result)
+
+
+def _made(
+    calls: Sequence[tuple[TrackingProblem, TrackingEntry, int]],
+    threads: int | None,
+    executor: Any,
+    advance: Callable[[float], None],
+) -> Iterator[tuple[int, Found]]:
+    """Yield the number and the result of each search, in the order in which they end."""
+    if executor is None:
+        for i, call in enumerate(calls):
+            yield i, search(*call, threads, advance)
+        return
+    with opened(executor) as pool:
+        for i, result in called(pool, search, [(*call, 1) for call in calls]):
+            advance(SETS)
+            yield i, result
 
 
 def _compact(about: Mapping) -> str:
@@ -164,7 +207,10 @@ class ProblemBoard:
     errors: Mapping[
         str, tuple[float, float]
     ]  # medians over instances, counts: better, worse search
+    intervals: Mapping[str, tuple[float, float]]  # 95 %, of the median of the worse search
     without: Mapping[str, float]  # of the worse search without the load
+    rates: Mapping[str, float]  # of the worse search, bounds a second
+    gains: Mapping[str, Numbers]  # of the worse search
     leaders: Names  # the entries that no other leads
     told_apart: float  # share of the pairs in which one leads the other
 
@@ -187,17 +233,18 @@ class TrackingBoard:
     def problem(self, name: str) -> ProblemBoard:
         """Return who stands where in a problem."""
         limit = next(task.limit for task in self.suite.problems if task.name == name)
-        better, worse, without = {}, {}, {}
+        better, worse, of_worse = {}, {}, {}
         for entry, result in self.entries.items():
             if name in result.searches:
                 searches = sorted(result.searches[name], key=lambda found: _typical(found, limit))
                 better[entry] = counted_errors(searches[0], limit)
                 worse[entry] = counted_errors(searches[-1], limit)
-                without[entry] = searches[-1].without
+                of_worse[entry] = searches[-1]
         comparison = Comparison(worse, FLOOR, halves=better)
-        medians = {}
+        medians, intervals = {}, {}
         for entry, errors in worse.items():
             medians[entry] = float(np.median(better[entry])), float(np.median(errors))
+            intervals[entry] = median_of(errors[None])[1:3]
         order = sorted(medians, key=lambda entry: medians[entry][1])
         leads = comparison.better[0]
         pairs = len(order) * (len(order) - 1) / 2
@@ -206,8 +253,13 @@ class TrackingBoard:
             problem=name,
             names=tuple(order),
             errors=medians,
-            without=without,
-            leaders=tuple(entry for entry in order if not beaten[entry]),
+            intervals=intervals,
+            without={entry: chosen.without for entry, chosen in of_worse.items()},
+            rates={entry: chosen.rate for entry, chosen in of_worse.items()},
+            gains={entry: chosen.gains for entry, chosen in of_worse.items()},
+            leaders=tuple(
+                entry for entry in order if not beaten[entry] and medians[entry][1] < math.inf
+            ),
             told_apart=float((leads | leads.T).sum() / 2 / pairs) if pairs else 0.0,
         )
 
@@ -270,6 +322,21 @@ def bounds(problem: TrackingProblem) -> tuple[float, float]:
         errors.append(float(np.sqrt(np.mean(e**2)) / problem.count))
     still, *oracles = np.median(np.reshape(errors, (BOUNDING, -1)), axis=0).tolist()
     return still, min(oracles)
+
+
+def shipped_bounds(suite: str) -> dict[str, tuple[float, float]]:
+    """Return problem -> its bounds as the package ships them, see `bounds`."""
+    return {name: tuple(pair) for name, pair in read_json(BOUNDS)[suite].items()}
+
+
+def write_bounds() -> None:
+    """Compute the bounds of all problems again, for the package to ship."""
+    by_suite = {}
+    for name in tracking_suites():
+        by_suite[name] = {}
+        for problem in tracking_suite(name).problems:
+            by_suite[name][problem.name] = [float(number(bound)) for bound in bounds(problem)]
+    write_json(BOUNDS, by_suite)
 
 
 def tracking_board(suite: str, folder: AnyPath | None = None) -> TrackingBoard:

@@ -16,6 +16,7 @@ The fast engine makes all runs.
 """
 
 import math
+import warnings
 import zlib
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -28,11 +29,13 @@ from smc_mujoco.analysis.engine.group import FormGroup, why_not
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.evaluator import with_gains
 from smc_mujoco.common.aliases import Array, Numbers
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.errors import BrokenLawError, ScenarioError, ScenarioWarning
+from smc_mujoco.common.jit import NotCompilable
 from smc_mujoco.control.component import Component
 from smc_mujoco.problems.tracking import TrackingProblem, filtered_difference
 from smc_mujoco.problems.tracking_entry import TrackingEntry
 from smc_mujoco.simulation import state
+from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 
 SEARCHES = 2
@@ -66,6 +69,7 @@ class GainTrials:
 
     def __init__(self, problem: TrackingProblem, entry: TrackingEntry, threads: int | None):
         self.problem = problem
+        self.entry = entry
         self.law = entry.law_on(problem)
         self.beside = entry.beside(problem)
         self.threads = threads
@@ -168,14 +172,33 @@ class GainTrials:
             return costs
 
         logs = rng.uniform(self.box[:, 0], self.box[:, 1], (DRAWN, len(self.box)))
-        best = logs[np.argmin(judge(logs))]
+        try:
+            costs = judge(logs)
+        except NotCompilable as error:
+            self._refuse_broken(logs[0])
+            raise ScenarioError(f"{self.law.name} does not compile: {error}") from None
+        best = logs[np.argmin(costs)]
+        if costs.min() >= LARGEST:
+            self._refuse_broken(best)
         cma = CMA(best, SPREAD, self.bounds, seed=number, population_size=POPULATION)
         for _ in range(DRAWN, SETS, POPULATION):
             logs = np.array([cma.ask() for _ in range(POPULATION)])
             cma.tell(list(zip(logs, judge(logs), strict=True)))
-        values = np.exp(best if chosen is None else chosen).tolist()
+        return self._named(best if chosen is None else chosen)
+
+    def _named(self, logs: Array) -> Numbers:
+        """Return a set of gains of four digits, by name, of its logarithms."""
+        values = np.exp(logs).tolist()
         names = (*self.names, TAU)
         return {name: _four_digits(value) for name, value in zip(names, values, strict=True)}
+
+    def _refuse_broken(self, logs: Array) -> None:
+        """Raise BrokenLawError if a run with a set of gains fails, with what failed."""
+        with warnings.catch_warnings():  # the error says it
+            warnings.simplefilter("ignore", ScenarioWarning)
+            trace = run(scenario_of(self.problem, self.entry, self._named(logs), 0))
+        if trace.failure:
+            raise BrokenLawError(f"no set of gains runs in {self.problem.name}: {trace.failure}")
 
     def unseen(self, gains: Numbers) -> Found:
         """Return what gains reach on instances that chose nothing."""
@@ -183,6 +206,8 @@ class GainTrials:
         runs = [(instance, loaded) for loaded in (True, False) for instance in instances]
         values = np.tile(list(gains.values()), (len(runs), 1))
         errors, rates = self.run(self.group(runs), values, np.arange(len(runs))).T
+        if not self._within_theorem(np.log(values[:1]))[0]:
+            errors[:] = np.inf
         without, rate = np.median(errors[UNSEEN:]), np.median(rates[:UNSEEN])
         return Found(
             gains, list(map(_four_digits, errors[:UNSEEN])), *map(_four_digits, (without, rate))
@@ -194,15 +219,16 @@ def _four_digits(value: float) -> float:
     return float(f"{value:.4g}")
 
 
-def search_problem(
+def search(
     problem: TrackingProblem,
     entry: TrackingEntry,
+    number: int,
     threads: int | None = None,
     advance: Callable[[float], None] = lambda work: None,
-) -> list[Found]:
-    """Return what each search for an entry's gains found in a problem."""
+) -> Found:
+    """Return what a search for an entry's gains chose in a problem, and its unseen runs."""
     trials = GainTrials(problem, entry, threads)
-    return [trials.unseen(trials.searched(number, advance)) for number in range(SEARCHES)]
+    return trials.unseen(trials.searched(number, advance))
 
 
 def scenario_of(

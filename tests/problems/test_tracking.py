@@ -4,6 +4,7 @@ import dataclasses
 import json
 import math
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -203,6 +204,10 @@ def test_an_entry_changes_a_page_by_its_row_and_what_it_tops_alone():
     assert row in after
 
 
+def interrupted(*call):
+    raise KeyboardInterrupt
+
+
 @pytest.mark.slow
 def test_a_law_of_ones_own_enters_and_the_same_command_goes_on(tmp_path, monkeypatch):
     for name, value in (("SETS", 24), ("DRAWN", 12)):
@@ -216,21 +221,27 @@ def test_a_law_of_ones_own_enters_and_the_same_command_goes_on(tmp_path, monkeyp
         "def mine(y, gains, memory):\n"
         "    return -gains.p * y.e - gains.d * y.de, y.e\n"
     )
-    searched = []
-    search = tracking_results.search_problem
+    pending = []
+    made = tracking_results._made
 
-    def counted(chosen, *rest):
-        if len(searched) == 2:
-            searched.append(None)
-            raise KeyboardInterrupt
-        searched.append(chosen.name)
-        return search(chosen, *rest)
+    def noted(calls, *rest):
+        pending.append(len(calls))
+        return made(calls, *rest)
 
-    monkeypatch.setattr(tracking_results, "search_problem", counted)
-    with pytest.raises(KeyboardInterrupt):
-        enter_tracking(str(law), "smc-load@1", tmp_path, 1)
-    file = enter_tracking(str(law), "smc-load@1", tmp_path, 1)
-    assert len(searched) == 1 + len(tracking_suite("smc-load@1").problems)
+    monkeypatch.setattr(tracking_results, "_made", noted)
+    searches = iter([*[tracking_results.search] * 3, interrupted])
+
+    def stopped(*call):
+        return next(searches)(*call)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(tracking_results, "search", stopped)
+        with pytest.raises(KeyboardInterrupt):
+            enter_tracking(str(law), "smc-load@1", tmp_path, 1)
+    with ThreadPoolExecutor(1) as pool:
+        file = enter_tracking(str(law), "smc-load@1", tmp_path, executor=pool)
+    count = 2 * len(tracking_suite("smc-load@1").problems)
+    assert pending == [count, count - 3]
     entered = read_result(file)
     assert entered.name == "mine"
     assert {*json.loads(file.read_text())["problems"]} == {
