@@ -70,6 +70,7 @@ from smc_mujoco.simulation.signals import Noise
 
 SHORT_TIME = 0.1  # s: a shorter one is printed in ms; chosen
 POOR_FIT = 80.0  # percent: a fit below may mean that the search ended in a wrong place; chosen
+UNSEEN = 0.3  # of a value, beyond which its error says that the log does not show it; chosen
 PERFECT_FIT = 99.99  # percent: residuals beyond it are the simulation's; chosen
 FLOOR = 0.05  # of a value, by which drawn sets differ at least; chosen: friction warms up by more
 USUAL_STEPS = 6  # of a search; chosen: only the progress that is shown depends on it
@@ -134,9 +135,14 @@ class Identified(Answer):
     def notes(self) -> list[str]:
         """What the logs cannot determine, and what to doubt."""
         notes = list(self.doubted)
+        unseen = {}
+        for name, value in self.values.items():
+            if self.errors[name] > UNSEEN * abs(value) and (sentence := self.rig.unseen(name)):
+                unseen[name] = sentence
+        notes += unseen.values()
         for (i, first), (j, second) in itertools.combinations(enumerate(self.values), 2):
             correlation = self.correlations[i, j]
-            if abs(correlation) > MAX_CORRELATION:
+            if abs(correlation) > MAX_CORRELATION and not {first, second} & {*unseen}:
                 notes.append(
                     f"{first} and {second} are hardly told apart (correlation {correlation:.3f})"
                 )
@@ -144,7 +150,7 @@ class Identified(Answer):
             quantity = self.rig.quantities[name]
             if value in (quantity.least, quantity.most):
                 notes.append(f"{name} is at the end of its range")
-            elif self.errors[name] > abs(value):
+            elif self.errors[name] > abs(value) and name not in unseen:
                 notes.append(f"{name} may as well be 0")
         worst = _worst(self.by_pieces or self.fits)
         for lack in self.lacks if worst < PERFECT_FIT else ():

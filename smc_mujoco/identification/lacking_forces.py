@@ -60,7 +60,7 @@ class JointMotion(NamedTuple):
     acceleration: Array  # over its rms in all logs
     time: Array  # from 0 to 1, over the log
     command: Array  # of its motor, its fast part
-    load: Array  # the rest of that command
+    load: Array | None  # the rest of that command; None of a set-point
 
     @property
     def direction(self) -> Array:
@@ -86,7 +86,8 @@ def shapes(motion: JointMotion) -> Iterator[tuple[str, Array]]:
         yield TIME, np.cos(k * math.pi * motion.time)
         yield WARMTH, direction * np.cos(k * math.pi * motion.time)
     yield COMMAND, motion.command
-    yield LOAD, direction * np.abs(motion.load)
+    if motion.load is not None:
+        yield LOAD, direction * np.abs(motion.load)
 
 
 def left_out(motion: JointMotion, joint: str, names: Sequence[str]) -> Iterator[tuple[str, Array]]:
@@ -150,6 +151,7 @@ def _motions(rig: LogRig, replays: Replays, point: Point, i: int) -> list[JointM
     fast = _rms(np.concatenate(v))
     strong = _rms(np.concatenate(a))
     records = [piece.record for piece in replays.pieces]
+    sets_position = rig.base.efforts[i] == rig.plant.units[i]
     motions = []
     for k, piece in enumerate(replays.pieces):
         share = np.arange(len(x[k])) / len(x[k])
@@ -161,7 +163,7 @@ def _motions(rig: LogRig, replays: Replays, point: Point, i: int) -> list[JointM
                 acceleration=a[k] / strong,
                 time=(before + share) / records.count(piece.record),
                 command=_command(piece, i) - _slow_part(piece, i),
-                load=_slow_part(piece, i),
+                load=None if sets_position else _slow_part(piece, i),
             )
         )
     return motions

@@ -124,7 +124,7 @@ def _scale_masses(spec: mujoco.MjSpec, model: mujoco.MjModel, factor: float) -> 
 def _set_servo(rig: LogRig, spec: mujoco.MjSpec, name: str, value: float) -> bool:
     """Set a number of a joint's servo; return whether it is one."""
     place = rig.places.get(name)
-    if place is None or place.name not in SERVO:
+    if place is None or place.name not in SERVO or place.name == "dead_band":
         return False
     servo = parts_of(rig.base, place.field)[place.part]
     if not isinstance(servo, PositionServo):

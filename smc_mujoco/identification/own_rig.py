@@ -2,6 +2,7 @@
 asks of it.
 """
 
+import math
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,13 +15,14 @@ from smc_mujoco.identification.compliance import compliance
 from smc_mujoco.identification.lack_of_fit import Lack
 from smc_mujoco.identification.lacking_forces import lacking_forces
 from smc_mujoco.identification.log_rig import LogRig, of_runs
-from smc_mujoco.identification.paths import known_paths, resolved, usual_paths
+from smc_mujoco.identification.paths import known_paths, resolved, usual_paths, with_plays
 from smc_mujoco.identification.presliding import presliding
 from smc_mujoco.identification.records import Columns, Record
 from smc_mujoco.identification.replays import Replays, Slopes
 from smc_mujoco.identification.rig import Values
-from smc_mujoco.mechanisms.layout import column_ends
+from smc_mujoco.mechanisms.layout import column_ends, dof_ids
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.part_numbers import parts_of
 from smc_mujoco.simulation.scenario import Scenario
 
 
@@ -49,6 +51,24 @@ class OwnRig(LogRig):
         """Return sentences on what may be wrong with columns of logs."""
         doubts = first_guess.doubts(self, data) + servo_columns.doubts(self, data)
         return doubts + log_quality.doubts(self, data)
+
+    def unseen(self, name: str) -> str:
+        """Return a sentence on why a log does not show a number, and what to do; "" if only the log
+        is known to lack it. A servo's stiffness shows where it moves a mass, or holds a weight.
+        """
+        place = self.places.get(name)
+        if place is None or place.name != "kp":
+            return ""
+        servo = parts_of(self.base, place.field)[place.part]
+        i = servo.channels(self.plant)[0]
+        model = self.plant.load()
+        rate = math.sqrt(servo.kp / model.dof_M0[dof_ids(model)[i]])
+        return (
+            f"the log does not show {name}: its joint follows the set-point slowly, or rests, and "
+            "then only friction over kp shows; record motion that is nearer to "
+            f"{rate:.2g} rad/s, at which the joint swings on its "
+            "servo, or let it hold a known weight"
+        )
 
     def lacks(self, replays: Replays, slopes: Slopes) -> list[Lack]:
         """Return what the model may lack: forces of many shapes, dry friction that gives way, and
@@ -79,6 +99,7 @@ class OwnRig(LogRig):
 def own_rig(given: Plant | Scenario, names: Sequence[str]) -> OwnRig:
     """Return the rig of a plant or a scenario whose quantities are the named paths."""
     base = given if isinstance(given, Scenario) else Scenario.recorded(plant=given, law="none")
+    base = with_plays(base, names)
     paths = resolved(base, names)
     ends = column_ends(base.plant)
     inputs = tuple(f"u{end}" for end in ends[: base.plant.driven])

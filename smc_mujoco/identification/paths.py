@@ -8,13 +8,15 @@ its search starts and within which range.
     hand.payload              kg, a point mass at the centre of mass of a body of the model
     m, grav                   kg and m/s^2: the mass of all that moves, and gravity; or other
                               parameters of a plant of the library
-    elbow.kp, .kv, .ki        of the joint's position servo in the model
+    elbow.kp, .kv, .ki, .dead_band  of the joint's position servo in the model
+    elbow.play                rad or m, between its motor and the joint
     friction.elbow.kc         a number of a part of the scenario: FIELD.JOINT.NAME, or FIELD.NAME
 
 Dry friction with another level in each direction is frictionloss and offset: the levels are
 frictionloss - offset and frictionloss + offset.
 """
 
+import dataclasses
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -31,6 +33,7 @@ from smc_mujoco.mechanisms.custom.model_numbers import (
     with_model_numbers,
 )
 from smc_mujoco.mechanisms.custom.plant_from import PARAMETER_UNITS
+from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.moments import JointState
 from smc_mujoco.mechanisms.hardware.part import Friction, Part
 from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
@@ -48,7 +51,10 @@ from smc_mujoco.simulation.part_numbers import (
 from smc_mujoco.simulation.scenario import Scenario
 
 DELAY = "input_delay"
-SERVO = "kp", "kv", "ki"  # of a position servo
+SERVO = "kp", "kv", "ki", "dead_band"  # of a position servo
+PLAY = "play"  # of a joint, between its motor and itself
+FIRST_PLAY = 0.01  # rad or m, at which a search starts where the scenario has none; chosen
+ROTOR_SHARE = 0.01  # of the inertia at the joint, that the rotor before a play then has; chosen
 MAX_DELAY = 0.05  # s, up to which a delay is looked for; chosen
 MAX_ZERO = 0.5  # rad or m, of an encoder; chosen
 MIN_GAIN = 1e-6  # chosen: a motor that does nothing cannot be found
@@ -107,6 +113,21 @@ def resolved(base: Scenario, names: Sequence[str]) -> Paths:
     return Paths(with_model_numbers(plant, of_joints.keys() & quantities), quantities, places)
 
 
+def with_plays(base: Scenario, names: Sequence[str]) -> Scenario:
+    """Return a scenario with a Backlash before each joint whose play is named and that has none,
+    with a light rotor.
+    """
+    plant = base.plant
+    added = []
+    for i, joint in enumerate(driven_names(plant)):
+        geared = any(isinstance(part, Backlash) for part in base.drive_train.chains[i])
+        if f"{joint}.{PLAY}" in names and not geared:
+            model = plant.load()
+            inertia = ROTOR_SHARE * float(model.dof_M0[model.joint(joint).dofadr[0]])
+            added.append(Backlash(FIRST_PLAY, rotor_inertia=inertia, on=(joint,)))
+    return dataclasses.replace(base, actuator=(*base.actuator, *added)) if added else base
+
+
 def known_paths(base: Scenario) -> list[str]:
     """Return every path to a number of a scenario."""
     plant = base.plant
@@ -117,6 +138,7 @@ def known_paths(base: Scenario) -> list[str]:
     for joint, motor in zip(driven_names(plant), base.drive_train.motors, strict=True):
         if isinstance(motor, PositionServo):
             paths += [f"{joint}.{kind}" for kind in SERVO]
+    paths += [f"{joint}.{PLAY}" for joint in driven_names(plant)]
     for field in FIELDS:
         paths += paths_of_parts(base, field)
     return paths
@@ -157,12 +179,14 @@ def _of_signals(base: Scenario, name: str) -> Quantity | None:
 
 
 def _path_of_part(base: Scenario, name: str) -> str:
-    """Return the path of a part's number: a name that is one, or JOINT.kp of a joint's servo; ""
-    for another name.
+    """Return the path of a part's number: a name that is one, JOINT.kp of a joint's servo, or
+    JOINT.play of its Backlash; "" for another name.
     """
     if is_path(name):
         return name
     joint, _, kind = name.rpartition(".")
+    if kind == PLAY and joint in driven_names(base.plant):
+        return f"actuator.{joint}.gap"
     if kind in SERVO and joint in driven_names(base.plant):
         motor = base.drive_train.motors[driven_names(base.plant).index(joint)]
         if isinstance(motor, PositionServo):

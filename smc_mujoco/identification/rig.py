@@ -224,6 +224,11 @@ class Rig:
         del data
         return []
 
+    def unseen(self, name: str) -> str:
+        """Return a sentence on why records do not show a quantity, and what to do; "" without."""
+        del name
+        return ""
+
     def lacks(self, replays: Any, slopes: Any) -> list[Any]:
         """Return what the model may lack, each a Lack, by replays at a solution."""
         del replays, slopes

@@ -78,13 +78,16 @@ def check_told_apart(replays: Replays, slopes: Slopes) -> None:
     for name, size in zip(names, sizes, strict=True):
         if size == 0.0:
             raise ScenarioError(
-                f"nothing in the records depends on {name}: leave it out, or give other records"
+                replays.twin.unseen(name)
+                or f"nothing in the records depends on {name}: leave it out, or give other records"
             )
     _, singular, rows = np.linalg.svd(J / sizes, full_matrices=False)
     if singular[-1] < SINGULAR_RATIO * singular[0]:
         first, second = np.argsort(-np.abs(rows[-1]))[:2]
+        unseen = filter(None, map(replays.twin.unseen, (names[first], names[second])))
         raise ScenarioError(
-            f"the records of {replays.twin.name} cannot tell {names[first]} and {names[second]} "
+            next(unseen, "")
+            or f"the records of {replays.twin.name} cannot tell {names[first]} and {names[second]} "
             "apart: leave one out, or give a longer record or one of a richer motion"
         )
 

@@ -39,6 +39,8 @@ class PartNumber(NamedTuple):
         at rest follows one while sliding that would pass it, and the other way round.
         """
         part = copy.copy(parts[self.part])
+        if getattr(part, "is_of_file", False):  # a scenario takes the file's own from the plant
+            object.__setattr__(part, "is_of_file", False)
         self._set(part, self.name, value)
         if partner := self.partner(parts):
             ordered: Names = getattr(part, "ordered", ())

@@ -9,8 +9,8 @@
 # pyright: reportIncompatibleVariableOverride=false
 # (a constant of the base class is a function or a property here)
 import math
-from collections.abc import Hashable, Iterator, Sequence
-from typing import Annotated, Any
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from typing import Annotated, Any, ClassVar
 
 import mujoco
 import numpy as np
@@ -50,6 +50,10 @@ class PositionServo(Actuator):
     goal at the start. A `Lag` or a `RateLimit` may stand before it. A law has no nominal model of
     it.
 
+    Within `dead_band` of the set-point kp and ki do nothing, and beyond it they take the rest of
+    the error, as firmware of hobby servos does. MuJoCo has none, so the set-point moves with the
+    joint at every stage of a step.
+
     With `ki` or `slewmax` it is MuJoCo's `<pid>`, whose speed set-point stays 0. MuJoCo integrates
     the error of the position from `integral`, and the set-point follows the command from the goal.
 
@@ -67,15 +71,23 @@ class PositionServo(Actuator):
       imax: bound on the integral of the error, rad s (m s); 0: none.
       slewmax: bound on the rate of the set-point, rad/s (m/s); 0: none.
       integral: of the error at the start of a run, rad s (m s).
+      dead_band: to each side of the set-point, rad (m), 0 or more.
 
     Raises:
       ScenarioError: `forcerange` does not contain 0 between its ends, a timeconst beside ki or
-        slewmax, imax or integral without ki, or euler without timeconst. In a scenario: another
+        slewmax, a dead_band beside timeconst or slewmax, imax or integral without ki, or euler
+        without timeconst. In a scenario: another
         drive of the joint, a Fault other than stuck=True, or a nominal model.
     """
 
     unit = "{x}"
-    names = ("goal", "step", "zero")
+    units: ClassVar[Mapping[str, str]] = {
+        "kp": "{f}/{x}",
+        "kv": "{f} s/{x}",
+        "ki": "{f}/({x} s)",
+        "dead_band": "{x}",
+    }
+    names = ("goal", "step", "zero", "dead_band", "low", "high")
 
     kp: Positive
     kv: Natural = 0.0
@@ -89,6 +101,7 @@ class PositionServo(Actuator):
     slewmax: Natural = 0.0
     euler: Boolean = False
     integral: Offset = 0.0
+    dead_band: Natural = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -102,6 +115,11 @@ class PositionServo(Actuator):
             raise ScenarioError(
                 f"PositionServo has timeconst {self.timeconst:g}, and a servo with ki or slewmax "
                 "has no filter: give one of them"
+            )
+        if self.dead_band and (self.timeconst or self.slewmax):
+            raise ScenarioError(
+                f"PositionServo has dead_band {self.dead_band:g} beside a timeconst or a slewmax, "
+                "which would take the place of the joint for the set-point: give one of them"
             )
         for name, base in (("imax", "ki"), ("integral", "ki"), ("euler", "timeconst")):
             if getattr(self, name) and not getattr(self, base):
@@ -153,15 +171,19 @@ class PositionServo(Actuator):
         return force if self.stall is None else min(force, self.stall)
 
     def force_of(self, u: Array, x: Array, v: Array) -> Array:
-        aim = np.clip(self.goal + u, *self.ctrlrange)
-        return np.clip(self.kp * (aim - x) - self.kv * v, *self.forcerange)
+        return np.clip(self.kp * self._errors(u, x) - self.kv * v, *self.forcerange)
+
+    def _errors(self, u: Array, x: Array) -> Array:
+        """Return the errors that kp and ki take: beyond the dead band."""
+        errors = np.clip(self.goal + u, *self.ctrlrange) - x
+        return errors - np.clip(errors, -self.dead_band, self.dead_band)
 
     def integrals(self, u: Array, x: Array, period: float) -> Array:
         """Return the integral of its error at K samples of u and x, `period` s apart, (K,): from 0
         at the first one, and within imax.
         """
         bound = self.imax or math.inf
-        errors = np.clip(self.goal + u[:-1], *self.ctrlrange) - 0.5 * (x[:-1] + x[1:])
+        errors = self._errors(u[:-1], 0.5 * (x[:-1] + x[1:]))
         integrals = np.zeros(len(u))
         for k, error in enumerate(errors.tolist()):
             integrals[k + 1] = min(max(integrals[k] + period * error, -bound), bound)
@@ -223,6 +245,7 @@ class PositionServo(Actuator):
         commands = model.actuator_ctrladr[ids]
         yield Field("actuator_gainprm", (ids, GAIN), gain)
         yield Field("actuator_biasprm", (ids, BIAS), (held, -self.kp, -self.kv))
+        low, high = low - self.dead_band, high + self.dead_band
         yield Field("actuator_ctrlrange", commands, (low - self.zero, high - self.zero))
         yield Field("actuator_forcerange", ids, self.forcerange)
         if self.by_pid:
@@ -248,12 +271,14 @@ class PositionServo(Actuator):
             act[first + model.actuator_actnum[ids] - 1] = self.integral
 
     def numbers(self, run: Run) -> list[Sequence[float]]:
-        return [(self.goal, self.step, self.zero)]
+        return [(self.goal, self.step, self.zero, self.dead_band, *self.ctrlrange)]
 
     @property
     def act(self) -> Any:
-        """The function that writes the set-point, if it is rounded or no u; else None."""
-        return placed if self.step or self.by_pid else None
+        """The function that writes the set-point, if it is rounded, moves with the joint, or is no
+        u; else None.
+        """
+        return placed if self.step or self.by_pid or self.dead_band else None
 
 
 numbers_at = record_at(floats(PositionServo.names))
@@ -262,12 +287,17 @@ numbers_at = record_at(floats(PositionServo.names))
 @register_jitable
 def placed(sim, data, part):
     """Write the control of MuJoCo's servo at the start of a step: the set-point, a multiple of
-    `step`, counted from `zero`.
+    `step`, counted from `zero`. With a dead band it is written at each stage: as far from what the
+    servo holds as the error beyond the band.
     """
-    if sim.stage == 0:
+    p = numbers_at(part.function.parameters, 0)
+    if sim.stage == 0 or p.dead_band != 0.0:
         channel = channel_at(sim.channels, part.channel)
-        p = numbers_at(part.function.parameters, 0)
         aim = p.goal + state_at(sim.states, part.channel).delayed
         if p.step != 0.0:
             aim = p.step * math.floor(aim / p.step + 0.5)
+        if p.dead_band != 0.0:
+            x = data.qpos[channel.shaft_qpos if channel.shaft_qpos >= 0 else channel.qpos]
+            error = min(max(aim, p.low), p.high) - x
+            aim = x + error - min(max(error, -p.dead_band), p.dead_band)
         data.ctrl[channel.ctrl] = aim - p.zero
