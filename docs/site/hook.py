@@ -119,6 +119,12 @@ def linked(markdown: str) -> str:
     return "\n".join(map(link, markdown.split("\n")))
 
 
+def names_of(path: str) -> list[str]:
+    """Return the words of a law or plant, apart and as one, from the path of its page."""
+    parts = path.rpartition("/")[2].split("_")
+    return [*parts, "".join(parts)] if "/" in path else []
+
+
 def on_page_content(html, page, config, files):
     """Typeset the equations, and keep intervals such as (1 to 2) on one line."""
     return re.sub(r"(\([\d.e-]+) to ([\d.e-]+\))", r"\1&nbsp;to&nbsp;\2", typeset(html))
@@ -133,9 +139,11 @@ def on_post_build(config):
     index = site / "search" / "search_index.json"
     search_index = json.loads(index.read_text(encoding="utf-8"))
     phrases = tomllib.loads((ROOT / "docs" / "site" / "phrases.toml").read_text(encoding="utf-8"))
+    names = {f"{page.path}.html": names_of(page.path) for page in PAGES}
     for entry in search_index["docs"]:
-        if words := phrases.pop(entry["location"], ""):
-            entry["tags"] = words.split()
+        location = entry["location"]
+        if words := [*names.get(location, ()), *phrases.pop(location, "").split()]:
+            entry["tags"] = words
     if phrases:
         raise ValueError(f"phrases.toml names no section of the site: {sorted(phrases)}")
     index.write_text(json.dumps(search_index), encoding="utf-8")

@@ -18,6 +18,7 @@ ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "notebooks"
 LISTED = "notebooks.md"  # the page that lists them
 KERNEL = Path(__file__).parent / "kernel.py"
+POINTER = re.compile(r"No pictures here\?.*\n\n")  # to the page itself
 FILM = re.compile(r'src="data:video/mp4;base64,([^"]+)"')
 
 
@@ -58,7 +59,7 @@ def _page(name: str, shown: list[list[dict[str, str]]]) -> tuple[list[str], dict
     for cell in cells:
         text = "".join(cell["source"])
         if cell["cell_type"] != "code":
-            parts.append(_linked(text))
+            parts.append(_linked(POINTER.sub("", text)))
             continue
         parts.append(f"```python\n{text}\n```")
         for output in next(of_cell):
