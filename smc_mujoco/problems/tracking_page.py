@@ -20,6 +20,7 @@ from smc_mujoco.problems.tracking_results import (
     ProblemBoard,
     TrackingBoard,
     TrackingResult,
+    relative_errors,
     shipped_bounds,
     tracking_board,
 )
@@ -40,7 +41,7 @@ def page(board: TrackingBoard, picture: str) -> str:
         "",
         summary(board),
         "",
-        f"![Error over variation of u of {len(board.entries)} entries]({picture})",
+        f"![Error of each entry over the least of its problem]({picture})",
         "",
         suite.about,
         "",
@@ -48,8 +49,7 @@ def page(board: TrackingBoard, picture: str) -> str:
         f"smc-mujoco enter my_law.py --suite {suite.name}",
         "```",
         "",
-        "searches for your law alone, and writes this page with its row. "
-        "[What an entry may be](problems.md#tracking-under-a-load-or-friction).",
+        "searches for your law alone, and writes this page with its row.",
         "",
         "## How to read it",
         "",
@@ -57,8 +57,8 @@ def page(board: TrackingBoard, picture: str) -> str:
         "a limit on the variation of u. The worse search counts; `other` is the better one.",
         f"- **The error** is the rms over whole periods in counts of the encoder: the median of "
         f"{UNSEEN} unseen runs, with its 95 % interval. Below {FLOOR:g} counts all are equal.",
-        "- **An entry leads another** if it is better in every pairing of their searches, by the "
-        "[paired test](winners.md). A star: no other entry leads it.",
+        "- **An entry leads another** if it is better in every pairing of their searches, by a "
+        "paired test (`smc-mujoco explain lead`). A star: no other entry leads it.",
         f"- **`without`** has the error of the same gains without the {load}; `=`: it is no less, "
         f"so it is not of the {load}.",
         "- **`never`**: u varies more than the limit, or a run failed.",
@@ -181,16 +181,6 @@ def tag_table(board: TrackingBoard) -> Iterator[str]:
         typical = np.median([np.median(ratios[name]) for name in names])
         problem_count = f"in {problems} of {len(board.problems)} problems"
         yield f"| {tag} | {value} | {len(names)} | {problem_count} | {number(float(typical))} |"
-
-
-def relative_errors(board: TrackingBoard) -> dict[str, list[float]]:
-    """Return entry -> its error over the least of each problem, of its worse search."""
-    ratios: dict[str, list[float]] = {name: [] for name in board.entries}
-    for result in board.problems:
-        least = min(worse for _, worse in result.errors.values())
-        for name, (_, worse) in result.errors.items():
-            ratios[name].append(worse / least if worse > least else 1.0)
-    return ratios
 
 
 def write(board: TrackingBoard, path: Path) -> Path:

@@ -1,71 +1,52 @@
-"""The picture of a board of tracking problems: error over variation of u, a mark an entry."""
+"""The picture of a board of tracking problems: a row for each entry, a dot for each problem."""
 
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from smc_mujoco.common.files import replacing
 from smc_mujoco.draw import style
-from smc_mujoco.problems.tracking_results import TrackingBoard
+from smc_mujoco.problems.tracking_results import TrackingBoard, relative_errors
 
-LARGEST = 1e3  # an error over the least; larger ones, and those of failed runs, count as this one
-
-
-class Mark(NamedTuple):
-    """An entry in the picture: means over the problems."""
-
-    entry: str
-    rate: float  # share of the limit
-    error: float  # over the least of the problem
-    on_front: bool  # whether no entry has less of one and no more of the other
+ROWS = 20  # entries, those with the least mean
+LARGEST = 100.0  # an error over the least; larger ones, and those of failed runs, count as this one
 
 
-def marks(board: TrackingBoard) -> list[Mark]:
-    """Return the entries as the picture has them, least error first."""
-    means = {}
-    limits = {problem.name: problem.limit for problem in board.suite.problems}
-    for entry in board.entries:
-        logs = []
-        for result in board.problems:
-            least = min(worse for _, worse in result.errors.values())
-            error = min(result.errors[entry][1] / least, LARGEST)
-            rate = min(result.rates[entry] / limits[result.problem], 1.0)
-            logs.append(np.log([max(rate, 1e-3), error]))
-        means[entry] = np.exp(np.mean(logs, axis=0)).tolist()
-    marked = []
-    for entry, (rate, error) in means.items():
-        led = any(rival[0] <= rate and rival[1] < error for rival in means.values())
-        marked.append(Mark(entry, rate, error, not led))
-    return sorted(marked, key=lambda mark: mark.error)
+def means(board: TrackingBoard) -> dict[str, float]:
+    """Return entry -> the geometric mean of its errors over the least of each problem, least
+    first.
+    """
+    typical = {}
+    for entry, ratios in relative_errors(board).items():
+        typical[entry] = float(np.exp(np.mean(np.log(np.minimum(ratios, LARGEST)))))
+    return dict(sorted(typical.items(), key=lambda pair: pair[1]))
 
 
 def draw(board: TrackingBoard, path: Path) -> None:
-    """Draw the picture as SVG: in colour the entries on the front, the others grey."""
+    """Draw the picture as SVG: in colour the entries that no other leads in some problem."""
+    errors = relative_errors(board)
+    typical = means(board)
+    rows = list(typical)[:ROWS][::-1]
+    leading = {entry for result in board.problems for entry in result.leaders}
     with style.page():
         import matplotlib.pyplot as plt
 
-        figure, ax = plt.subplots(figsize=(style.FULL_WIDTH, 5.2))
-        for mark in marks(board):
-            law = board.entries[mark.entry].law
-            colour = style.law_colour(law) if mark.on_front else style.MUTED
-            x = 100.0 * mark.rate
-            ax.plot([x], [mark.error], "o", ms=9 if mark.on_front else 5, color=colour, mew=0)
-            weight = "bold" if mark.on_front else "normal"
-            ax.annotate(
-                mark.entry,
-                (x, mark.error),
-                (7, 0),
-                textcoords="offset points",
-                va="center",
-                color=colour,
-                fontweight=weight,
-                fontsize=9.0 if mark.on_front else 7.0,
-            )
-        ax.set_yscale("log")
-        ax.set_xlabel("variation of u, % of the limit (mean of the problems)")
-        ax.set_ylabel("error over the least of the problem (mean)")
-        ax.grid(color=style.GRID)
+        figure, ax = plt.subplots(figsize=(style.FULL_WIDTH, 0.34 * len(rows) + 1.2))
+        for row, entry in enumerate(rows):
+            colour = style.MUTED
+            if entry in leading:
+                colour = style.law_colour(board.entries[entry].law)
+            dots = np.minimum(errors[entry], LARGEST)
+            ax.plot(dots, [row] * len(dots), "o", ms=4.5, alpha=0.45, color=colour, mew=0)
+            ax.plot([typical[entry]], [row], "D", ms=8, color=colour, mew=0)
+        ax.set_xscale("log")
+        ax.set_xlim(0.9, 1.2 * LARGEST)
+        ticks = [1, 2, 5, 10, 20, 50, 100]
+        ax.set_xticks(ticks, [*map(str, ticks[:-1]), "≥ 100"])
+        ax.minorticks_off()
+        ax.set_yticks(range(len(rows)), rows)
+        ax.set_xlabel("error over the least of its problem: a dot a problem, a diamond their mean")
+        ax.grid(axis="x", color=style.GRID)
         ax.set_axisbelow(True)
         figure.tight_layout()
         with replacing(path) as file:

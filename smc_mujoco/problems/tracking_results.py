@@ -301,6 +301,16 @@ class TrackingBoard:
         return {entry: counts[entry] / len(self.problems) for entry in ordered}
 
 
+def relative_errors(board: TrackingBoard) -> dict[str, list[float]]:
+    """Return entry -> its error over the least of each problem, of its worse search."""
+    ratios: dict[str, list[float]] = {name: [] for name in board.entries}
+    for result in board.problems:
+        least = min(worse for _, worse in result.errors.values())
+        for name, (_, worse) in result.errors.items():
+            ratios[name].append(worse / least if worse > least else 1.0)
+    return ratios
+
+
 def bounds(problem: TrackingProblem) -> tuple[float, float]:
     """Return the error without a law, u = 0, and that of an oracle, counts: medians of BOUNDING
     unseen instances. The oracle knows state, friction and load without noise and delay, and has the
