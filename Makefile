@@ -12,7 +12,7 @@ WITH_GPU = $(BIN)/python -c "import numba_cuda, mujoco_warp" 2>/dev/null || \
 	$(BIN)/python -m pip install --quiet -e ".[gpu]" || \
 	echo "smc-mujoco: could not install the extra gpu" >&2
 
-.PHONY: help demo promised test slow quick attack mutants check docs lowest without entered tagged build gains gallery bench size gpu cardless lock setup
+.PHONY: help demo promised test slow quick attack mutants check docs lowest without entered tagged build gains gallery bench size gpu cardless newer lock setup
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -115,9 +115,13 @@ cardless: ## the code of every law for a card, compiled without one, and MuJoCo 
 	@$(WITH_GPU)
 	$(BIN)/python -m pytest tests/analysis/test_engine_gpu.py tests/analysis/test_engine_warp.py
 
+newer: ## says when the index has a MuJoCo after 4.0.0, whose solver is wrong
+	@! python3 -m pip install --dry-run --no-deps --quiet "mujoco>4.0.0" >/dev/null 2>&1 || \
+		echo "::warning::the index has a MuJoCo after 4.0.0: see what its tests say"
+
 lock: ## the locks again from pyproject.toml, needs uv; delete a lock first to upgrade its packages
 	@command -v $(UV) >/dev/null || { echo "make lock needs uv: see docs.astral.sh/uv" >&2; exit 1; }
-	$(LOCK) pyproject.toml --extra dm --extra film --extra site --extra rl --group use -o requirements.lock
+	$(LOCK) pyproject.toml --extra dm --extra film --extra view --extra site --extra rl --group use -o requirements.lock
 	@# the other locks leave out what requirements.lock has, except what it has only for Windows
 	beside="-c requirements.lock $$(sed -n "/== 'win32'/!s/^\([a-z0-9.-]*\)==.*/--no-emit-package \1/p" requirements.lock)"; \
 	$(LOCK) pyproject.toml --extra all --extra dm --extra cluster --group test --group check $$beside -o requirements-test.lock && \

@@ -20,7 +20,7 @@ from smc_mujoco.draw.dot_plot import plot as plot
 from smc_mujoco.draw.figure import figure as figure
 from smc_mujoco.draw.film.film import film as film
 from smc_mujoco.draw.notebook import show as show
-from smc_mujoco.draw.studio import view as view
+from smc_mujoco.draw.view import view as view
 from smc_mujoco.evidence.audit.audit import audit as audit
 from smc_mujoco.evidence.audit.audit import claims as claims
 from smc_mujoco.exchange.law_from import law_from as law_from

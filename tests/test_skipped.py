@@ -3,6 +3,7 @@
 Run it as CI does, with what `make test` installs.
 """
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,7 +15,7 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[1]
 SKIPPED = {  # module -> why it is skipped
     "tests/analysis/test_engine_gpu.py": "it needs a CUDA device",
-    "tests/draw/test_studio.py": "the locks have MuJoCo 3, and Studio came with 4",
+    "tests/draw/test_view_browser.py": "it needs Chromium or Chrome, which CI's machines have",
     "tests/evidence/rigs/test_qube_servo.py": "the public records are not in the repository",
 }
 PRINT = """
@@ -48,4 +49,7 @@ def test_ci_skips_these_modules_and_no_other():
         [sys.executable, "-c", PRINT], cwd=ROOT, capture_output=True, text=True, check=True
     )
     (line,) = [line for line in done.stdout.splitlines() if line.startswith("skipped:")]
-    assert line.split()[1:] == sorted(SKIPPED)
+    skipped = set(SKIPPED)
+    if shutil.which("chromium") or shutil.which("google-chrome"):
+        skipped.remove("tests/draw/test_view_browser.py")
+    assert line.split()[1:] == sorted(skipped)

@@ -1,4 +1,6 @@
-"""MuJoCo's shared library, for C functions that its Python package does not offer."""
+"""MuJoCo's shared library, for C functions that its Python package does not offer, and the versions
+of its parts.
+"""
 
 import ctypes
 import functools
@@ -7,6 +9,29 @@ from pathlib import Path
 import mujoco
 
 from smc_mujoco.common.errors import ScenarioError
+
+PARTS = ("mujoco", "mujoco_core", "mujoco_studio")  # from MuJoCo 4 on it is three packages
+
+
+def check_parts(packages: Path) -> None:
+    """Raise ScenarioError if MuJoCo's parts in a folder of packages are of two versions.
+
+    pip puts an older mujoco over the newer parts without a word.
+    """
+    versions = {}
+    for info in sorted(packages.glob("mujoco*.dist-info")):
+        name, _, version = info.stem.partition("-")
+        if name in PARTS:
+            versions[name.replace("_", "-")] = version
+    if len(set(versions.values())) > 1:
+        parts = ", ".join(map(" ".join, versions.items()))
+        raise ScenarioError(
+            f"MuJoCo's parts are of two versions ({parts}): run `pip uninstall "
+            f"{' '.join(versions)}`, then install again"
+        )
+
+
+check_parts(Path(mujoco.__file__).parents[1])
 
 
 def path() -> Path:

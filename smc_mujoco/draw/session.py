@@ -169,16 +169,9 @@ class Session:
         return self.batches[run].logs[0][: self.sample]
 
     def screen(self) -> mujoco.MjModel:
-        """Return the mechanism with the true parameters at the start, for the screen.
-
-        Multisampling and ambient occlusion, which Studio reads from the model, are off: each would
-        take a third of a frame where a processor draws.
-        """
+        """Return the mechanism with the true parameters at the start, for the screen."""
         scenario = self.scenarios[0].resolved
-        spec = models.spec(scenario)
-        spec.visual.quality.offsamples = 0
-        spec.add_numeric(name="filament.ao.enabled", data=[0.0])
-        seen = compiled_for_runs(spec, 0)
+        seen = compiled_for_runs(models.spec(scenario), 0)
         models.put_values(seen, seen, scenario, 0)
         mujoco.mj_setConst(seen, mujoco.MjData(seen))
         return seen
@@ -192,8 +185,8 @@ class Session:
         self.begin([self.scenarios[0]] * 2)
 
     def move(self, run: int, slider: Slider, value: float) -> None:
-        """Start again with the number of a slider."""
-        self.change(lambda s: slider.changed(s, value), run)
+        """Start again with the number of a slider; while paused, repeat the runs up to now."""
+        self.change(lambda s: slider.changed(s, value), run, self.sample if self.paused else 0)
 
     def save(self, path: Path) -> Path:
         """Write a new scene file whose runs are these to the bit; refuse what it could not

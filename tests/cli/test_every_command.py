@@ -38,8 +38,8 @@ CALLS = {
     "run duffing": ["cli.run_scene.perform"],
     "run duffing --out there --no-film --seed 7 --threads 2 --export csv,mat --no-repeat "
     "--json r.json": ["cli.run_scene.perform"],
-    "view duffing": ["draw.studio.view"],
-    "view duffing --law pid --port 8123 --no-browser": ["draw.studio.view"],
+    "view duffing": ["draw.view.view"],
+    "view duffing --law pid --port 8123 --no-browser --record run.html": ["draw.view.view"],
     "compare": ["studies.compare.compare"],
     "compare duffing,van_der_pol --law pid,classical --condition noise --seeds 3 --no-tune "
     "--worst --quick --metric itae "

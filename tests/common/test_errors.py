@@ -203,6 +203,19 @@ def test_mujoco_without_its_library_is_named(tmp_path, monkeypatch):
     assert libmujoco.path() == tmp_path / "libmujoco.so.3"
 
 
+def test_parts_of_mujoco_of_two_versions_are_named_with_the_cure(tmp_path):
+    """pip leaves the parts of 4.0.0 below an older mujoco, and `pip check` is content."""
+    for part in ("mujoco-3.17.0", "mujoco_mjx-4.1.0", "mujoco_warp-3.17.0"):
+        (tmp_path / f"{part}.dist-info").mkdir()
+    libmujoco.check_parts(tmp_path)
+    (tmp_path / "mujoco_core-4.0.0.dist-info").mkdir()
+    with pytest.raises(
+        ScenarioError,
+        match=r"\(mujoco 3.17.0, mujoco-core 4.0.0\): run `pip uninstall mujoco mujoco-core`",
+    ):
+        libmujoco.check_parts(tmp_path)
+
+
 def test_a_long_message_keeps_its_start_and_its_cure():
     said = str(ScenarioError("a" * 2000 + "b" * 500))
     assert said == "a" * 997 + "..." + "b" * 500

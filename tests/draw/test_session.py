@@ -1,18 +1,14 @@
-"""What `smc.view` promises without its window: the runs on screen are those of smc.run, and a saved
+"""What `smc.view` promises without its page: the runs on screen are those of smc.run, and a saved
 session repeats.
 """
 
 import ast
 import dataclasses
-import queue
-import types
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.draw import studio
 from smc_mujoco.draw.session import Session
 from smc_mujoco.studies import scene
 
@@ -124,48 +120,6 @@ def test_a_saved_file_holds_the_name_of_a_plant_as_text_and_replaces_no_other(na
     assert path.read_text(encoding="utf-8") == text
 
 
-class Page:
-    """A stand-in for Studio's, which tells the mouse's pull, N, in some frames only."""
-
-    def __init__(self, pulls):
-        self.pulls = pulls
-        self.frame = 0
-
-    def set_model(self, model, data):
-        self.body = model.body("cart").id
-
-    def is_running(self):
-        return self.frame < 9
-
-    def sync(self, model, data):
-        self.frame += 1
-        if (pull := self.pulls.get(self.frame)) is not None:
-            data.xfrc_applied[self.body, 0] = pull
-
-
-def test_a_body_is_pushed_once_when_the_mouse_lets_go():
-    session = Session([DUFFING])
-    panel = types.SimpleNamespace(asked=queue.Queue())
-    panel.asked.put(lambda: session.save(Path("no/folder/view.py")))
-    studio.show(
-        session,
-        Page({2: 1.0, 4: 3.0, 7: 0.0}),
-        panel,
-    )
-    (push,) = session.scenarios[0].disturbance
-    assert push.body == "cart"
-    assert push.x == 3.0
-    assert push.y == 0.0
-    assert 0.0 < push.time < session.time
-    assert session.sample > 0
-
-
 def test_runs_of_other_lengths_are_refused():
     with pytest.raises(smc.ScenarioError, match="differ in control_period or duration"):
         Session([DUFFING, dataclasses.replace(DUFFING, duration=0.3)])
-
-
-def test_a_view_says_what_it_needs(monkeypatch):
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(smc.ScenarioError, match=r"4\.0\.1, which is not on the package index yet"):
-        smc.view("duffing", laws=["pid"])

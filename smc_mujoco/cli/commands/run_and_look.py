@@ -144,25 +144,31 @@ def view(
         ),
     ] = 0,
     browser: Annotated[bool, typer.Option(help="Whether to open the browser tab.")] = True,
+    record: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write an .html page that plays the runs without a server, and show nothing.",
+        ),
+    ] = None,
 ) -> None:
-    """Watch a machine under one or two laws in a browser tab, in MuJoCo Studio. Push it, change its
-    gains, and save the scene.
+    """Watch a machine under one or two laws in a browser tab. Push it, change its gains, and save
+    the scene.
 
-    The panel "Laws" changes each law and its gains, and the plant's mass, delay, noise and
-    friction; each change restarts the runs. It also shows u, s and e. Its button "save as scene"
-    writes view.py, and `smc-mujoco run view.py` repeats the runs bit for bit. The second law's
-    machine is transparent.
+    The panel changes each law and its gains, and the plant's mass, delay, noise and friction; each
+    change restarts the runs, or repeats them up to now while they are paused. Charts show x, u and
+    s. The button "save as scene" writes view.py, and `smc-mujoco run view.py` repeats the runs bit
+    for bit.
 
-    To push a body, double-click it, hold Ctrl, and drag with the right mouse button.
+    To push a part, drag it with the mouse and let go. Only this machine can open the page's
+    address, which holds a secret word. Ctrl-C ends it.
 
-    The command needs MuJoCo 4.0.1, which is not on the package index yet. Ctrl-C ends it.
+    Example: smc-mujoco view inverted_pendulum --law pid,adrc
 
-    Example: smc-mujoco view duffing --law super_twisting,pid
-
-    Example: smc-mujoco view arm.xml:shoulder+elbow --law adrc
+    Example: smc-mujoco view arm.xml:shoulder+elbow --law adrc --record run.html
     """
     with delay_signals():
-        from smc_mujoco.draw import studio
+        from smc_mujoco.draw.view import view as show_view
 
     viewed = machine
     if machine.endswith(".py"):
@@ -170,4 +176,4 @@ def view(
 
         scene = scenes.read(scenes.find(machine))
         viewed = list(scene.conditions[scene.film].values())[:2]
-    studio.view(viewed, options.laws(law), port, browser)
+    show_view(viewed, options.laws(law), port, browser, record)

@@ -10,6 +10,7 @@ import dataclasses
 import itertools
 from collections.abc import Sequence
 
+import mujoco
 import numpy as np
 from PIL import Image
 
@@ -84,15 +85,24 @@ def across(box: Array, count: int) -> Array:
     return np.array([(a, top, b, bottom) for a, b in itertools.pairwise(ends)])
 
 
+def around(
+    model: mujoco.MjModel, data: mujoco.MjData, links: Array, turn: Array
+) -> tuple[Array, Array, Array]:
+    """Return which geoms are before and behind what moves, its `links`, and which are floors,
+    (geoms,) each.
+    """
+    depths = world.boxes(model, data) @ nearness(turn)
+    carts = depths[links]
+    planes = model.geom_type == world.PLANE
+    before = (depths.min(axis=1) > carts.max()) & ~planes
+    behind = (depths.max(axis=1) < carts.min()) & ~planes
+    return before, behind, planes
+
+
 def hide_between(stages: Sequence[Stage]) -> None:
     """Hide what of each machine would be between two rails, and the floors of all but the first."""
     first = stages[0]
-    near = nearness(first.turn)
-    depths = world.boxes(first.model, first.data) @ near
-    carts = depths[first.links]
-    planes = first.model.geom_type == world.PLANE
-    before = (depths.min(axis=1) > carts.max()) & ~planes
-    behind = (depths.max(axis=1) < carts.min()) & ~planes
+    before, behind, planes = around(first.model, first.data, first.links, first.turn)
     for stage in stages:
         hidden = np.zeros(len(planes), bool)
         if stage is not first:

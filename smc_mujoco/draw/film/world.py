@@ -138,12 +138,7 @@ def set_floor(model: mujoco.MjModel, view: camera.View, points: Array, moved: Ar
     model.stat.center[:] = ends / 2
     sides = np.ptp(points, axis=0)
     model.stat.extent = extent = sides.max()
-    decades = 10.0 ** np.arange(-4, 5)
-    cells = np.outer(decades, (1.0, 2.0, 5.0)).ravel()  # m
-    logs = np.log(FLOOR_CELLS * cells / extent)
-    misfit = np.abs(logs)
-    cell = cells[misfit.argmin()]
-    model.mat_texrepeat[model.material("floor").id] = 1.0 / cell
+    model.mat_texrepeat[model.material("floor").id] = 1.0 / floor_cell(extent)
     depth = (points - place) @ -turn[:, 2]
     start = float(depth.max())
     across = turn[:, 1] * camera.pixel(size)
@@ -158,6 +153,14 @@ def set_floor(model: mujoco.MjModel, view: camera.View, points: Array, moved: Ar
     model.vis.map.fogstart = start / extent
     model.vis.map.fogend = (start + (stop - start) / HAZE_AT_TOP) / extent
     model.vis.rgba.fog[:] = HAZE
+
+
+def floor_cell(extent: float) -> float:
+    """Return the width of a cell of the floor's grid below what is so wide, m."""
+    decades = 10.0 ** np.arange(-4, 5)
+    cells = np.outer(decades, (1.0, 2.0, 5.0)).ravel()  # m
+    misfit = np.abs(np.log(FLOOR_CELLS * cells / extent))
+    return float(cells[misfit.argmin()])
 
 
 def named_turn(model: mujoco.MjModel, pose: Array, chosen: str, whose: str) -> Array:
