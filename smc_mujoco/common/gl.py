@@ -26,6 +26,7 @@ from smc_mujoco.common import process
 
 if TYPE_CHECKING:
     import mujoco
+    import numpy as np
 
 OFF_VALUES = ("disable", "disabled", "off", "false", "0")  # of MUJOCO_GL: no rendering
 DISPLAY_VALUES = ("enable", "enabled", "on", "true", "1", "glfw", "glx")  # a display is needed
@@ -208,6 +209,36 @@ def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "m
         _close_all
     )  # registered after MuJoCo's function that ends EGL, so that it runs before that one
     return rendering
+
+
+def part(rendering: "mujoco.Renderer", box: tuple[int, int, int, int]) -> "np.ndarray":
+    """Return a part of a renderer's picture, whose left, top, right and bottom are given, px,
+    without drawing the rest.
+    """
+    import mujoco
+
+    left_edge, top, right, bottom = box
+    width, height = rendering.width, rendering.height
+    views = rendering.scene.camera
+    frustums = []
+    for view in views:
+        frustums.append((view.frustum_center, view.frustum_width))
+        frustums[-1] += (view.frustum_bottom, view.frustum_top)
+        pixel = (view.frustum_top - view.frustum_bottom) / height
+        view.frustum_center += 0.5 * pixel * (left_edge + right - width)
+        view.frustum_width = 0.5 * pixel * (right - left_edge)
+        view.frustum_top -= pixel * top
+        view.frustum_bottom += pixel * (height - bottom)
+    rectangle = rendering._rect
+    rendering._rect = mujoco.MjrRect(left_edge, height - bottom, right - left_edge, bottom - top)
+    rendering._width, rendering._height = right - left_edge, bottom - top
+    try:
+        return rendering.render()
+    finally:
+        rendering._rect = rectangle
+        rendering._width, rendering._height = width, height
+        for view, frustum in zip(views, frustums, strict=True):
+            view.frustum_center, view.frustum_width, view.frustum_bottom, view.frustum_top = frustum
 
 
 def _after_fork() -> None:

@@ -16,12 +16,13 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from PIL import Image, ImageDraw, ImageFilter
+from PIL import Image, ImageDraw
 
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import quantities, style
 from smc_mujoco.draw.decimate import Envelope, windows
 from smc_mujoco.draw.film import world
+from smc_mujoco.draw.film.dilation import widened
 from smc_mujoco.draw.panels import Panel, by_channel
 from smc_mujoco.mechanisms.layout import channel_names, dof_ids
 from smc_mujoco.mechanisms.plant import EFFORT, Plant, catalogue
@@ -704,8 +705,8 @@ def paint(
     ImageDraw.Draw(mask).polygon(points, opaque)
     mask = mask.reduce(SUPERSAMPLING)
     if rim:
-        wide = mask.filter(ImageFilter.MaxFilter(2 * rim + 1))
-        image.paste(style.rgb(style.PAPER), place, wide)
+        wide = widened(np.asarray(mask), rim)
+        image.paste(style.rgb(style.PAPER), place, Image.fromarray(wide))
     if inner:
         image.paste(style.rgb(style.PAPER), place, mask)
         mask = Image.new("L", tuple(size.tolist()))

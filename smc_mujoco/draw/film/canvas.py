@@ -10,12 +10,14 @@ from collections.abc import Callable
 
 import mujoco
 import numpy as np
-from PIL import Image, ImageChops, ImageFilter
+from PIL import Image
 
 from smc_mujoco.common import gl
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film import camera, world
+from smc_mujoco.draw.film.changes import Look
+from smc_mujoco.draw.film.dilation import widened
 
 THICKNESS = 1e-4  # of a shadow, of its shape's height: normals of a flat shape would be undefined
 FLOOR_DISTANCE = 4e-4  # of the model's extent: height of shadows over the floor
@@ -35,6 +37,9 @@ class Canvas:
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, size: tuple[int, int]):
         self.data = data
+        self.size = size
+        self.look: Look | None = None  # of the last picture
+        self.picture = np.empty(0)
         light = data.light(world.SUN)
         self.sun = light.xdir.copy()
         self.extent = model.stat.extent
@@ -46,13 +51,17 @@ class Canvas:
         self.renderer = gl.renderer(model, size[1], size[0])
         self.option = mujoco.MjvOption()
         self.renderer.scene.flags[FOG] = 1
+        # the last outline, which is kept while its shapes stand still, and how it looked
+        self.outline: Image.Image | None = None
+        self.outline_look = b""
 
     def close(self) -> None:
         """Close the renderer."""
         self.renderer.close()
 
     def draw(self, add: Callable[[mujoco.MjvScene], None]) -> Array:
-        """Return the picture of `data` as it is, (height, width, 3) uint8.
+        """Return the picture of `data` as it is, (height, width, 3) uint8; drawn where it differs
+        from the last one.
 
         `add` adds shapes to the scene, such as ghosts.
         """
@@ -60,32 +69,64 @@ class Canvas:
         self.renderer.update_scene(self.data, "film", self.option)
         add(scene)
         add_shadows(scene, self.sun, self.casts, self.extent)
-        return self.renderer.render()
+        look = Look.of(scene)
+        parts = look and look.changed(self.look, self.renderer.model, self.size)
+        if parts is None:
+            self.picture = self.renderer.render()
+        else:
+            self.picture = self.picture.copy()
+            for box in parts:
+                left_edge, top, right, bottom = box
+                self.picture[top:bottom, left_edge:right] = gl.part(self.renderer, box)
+        self.picture.setflags(write=False)  # it is the next one's beginning
+        self.look = look
+        return self.picture
 
     def outlined(
         self, picture: Array, add: Callable[[mujoco.MjvScene], None], width: float
     ) -> Array:
         """Return a picture with the outline, of a width in px, of the white shapes that `add` adds
-        to a scene; read-only. An outline that would be cut is not drawn.
+        to a scene, in one width; read-only. An outline that would be cut is not drawn.
         """
         scene = self.renderer.scene
         scene.ngeom = 0
         add(scene)
         if not scene.ngeom:
             return picture
+        if (look := look_of(scene)) != self.outline_look:
+            self.outline_look = look
+            self.outline = self.outline_of(max(1, round(width)))
+        if self.outline is None:
+            return picture
+        image = Image.fromarray(picture)
+        image.paste(style.rgb(style.INK), (0, 0), self.outline)
+        return np.asarray(image)
+
+    def outline_of(self, width: int) -> Image.Image | None:
+        """Return the opacity of the outline of the scene's white shapes, of a width in px; None if
+        it would be cut.
+        """
+        scene = self.renderer.scene
         flags = scene.flags.copy()
         scene.flags[FLAT] = 1
         scene.flags[FOG] = scene.flags[SKY] = 0
-        seen = Image.fromarray(self.renderer.render()[..., 0])  # white shapes on black
+        seen = self.renderer.render()[..., 0]  # white shapes on black
         scene.flags[:] = flags
-        x0, y0, x1, y1 = seen.getbbox() or (0, 0, 0, 0)
-        if x0 == 0 or y0 == 0 or x1 == seen.width or y1 == seen.height:
-            return picture
-        thick = 2 * max(1, round(width)) + 1
-        edge = ImageChops.subtract(seen.filter(ImageFilter.MaxFilter(thick)), seen)
-        image = Image.fromarray(picture)
-        image.paste(style.rgb(style.INK), (0, 0), edge.point(lambda part: OUTLINE_OPACITY * part))
-        return np.asarray(image)
+        if not seen.any() or any(rim.any() for rim in (seen[0], seen[-1], seen[:, 0], seen[:, -1])):
+            return None
+        edge = Image.fromarray(widened(seen, width) - seen)
+        return edge.point(lambda part: OUTLINE_OPACITY * part)
+
+
+def look_of(scene: mujoco.MjvScene) -> bytes:
+    """Return what a picture of a scene's shapes depends on: their places, turns and sizes, and the
+    camera's place and directions.
+    """
+    eye = scene.camera[0]
+    parts = [eye.pos, eye.forward, eye.up]
+    for shape in scene.geoms[: scene.ngeom]:
+        parts += [shape.pos, shape.mat, shape.size]
+    return b"".join(part.tobytes() for part in parts)
 
 
 def casting(model: mujoco.MjModel, pixel: float) -> Array:

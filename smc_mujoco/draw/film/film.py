@@ -13,7 +13,9 @@ import contextlib
 import dataclasses
 import functools
 import itertools
+from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, overload
 
@@ -237,7 +239,7 @@ def film(
 
 def write(frames: Frames, path: Path) -> Path:
     """Write frames to a file, as its ending tells, and return its path."""
-    images = iter(frames)
+    images = pictures(frames, ahead=True)
     with replacing(path) as part, contextlib.closing(images), bar("film", len(frames)) as progress:
         WRITERS[path.suffix](frames, _counted(images, progress), part)
     return path
@@ -295,8 +297,10 @@ def _checked_size(size: Iterable[int]) -> tuple[int, int]:
     return int(sides[0]), int(sides[1])
 
 
-def pictures(frames: Frames) -> Generator[Array]:
-    """Yield the pictures of a film at the times of its clock, each (height, width, 3) uint8."""
+def pictures(frames: Frames, ahead: bool = False) -> Generator[Array]:
+    """Yield the pictures of a film at the times of its clock, each (height, width, 3) uint8; with
+    `ahead` while the next one is drawn.
+    """
     with rc_context({"axes.facecolor": style.PAPER}):  # whatever the caller's page
         runs = DrawnRuns.of(frames.traces, frames.labels)
     size = _checked_size(frames.size)
@@ -331,7 +335,7 @@ def pictures(frames: Frames) -> Generator[Array]:
             from smc_mujoco.draw.film import arm
 
             overlays = arm.overlays(stages)
-        yield from drawn(clock, stages, shots, overlays, sheet)
+        yield from drawn(clock, stages, shots, overlays, sheet, ahead)
         if close := clock.close:
             start = float(close.times[0])
             closing = [horizon.since(trace, start) for trace in runs.traces]
@@ -344,7 +348,7 @@ def pictures(frames: Frames) -> Generator[Array]:
                 larger = close.factor * (track.x - middle)
                 track.x = middle + larger
                 stage.track = track
-            yield from drawn(close, stages, shots, overlays, sheet)
+            yield from drawn(close, stages, shots, overlays, sheet, ahead)
 
 
 def tracks_at(
@@ -372,15 +376,34 @@ def drawn(
     shots: Callable[[Sequence[Stage], int, float], list[Array]],
     overlays: Sequence["arm.Overlay"],
     sheet: Sheet,
+    ahead: bool,
 ) -> Generator[Array]:
-    """Yield the pictures at the times of a clock."""
+    """Yield the pictures at the times of a clock; `ahead` draws the page of one, on a second core,
+    beside the machines of the next one.
+    """
+    waiting: deque[Future[Array]] = deque()
+    with ThreadPoolExecutor(1) as second_core:
+        for moment, machines in machines_at(clock, stages, shots, overlays):
+            waiting.append(second_core.submit(sheet.picture, moment, machines))
+            if len(waiting) > ahead:
+                yield waiting.popleft().result()
+        for page in waiting:
+            yield page.result()
+
+
+def machines_at(
+    clock: FilmClock,
+    stages: Sequence[Stage],
+    shots: Callable[[Sequence[Stage], int, float], list[Array]],
+    overlays: Sequence["arm.Overlay"],
+) -> Iterator[tuple[Moment, list[Array]]]:
+    """Yield what the page says at each time of a clock, and the pictures of the machines."""
     for frame, time in enumerate(clock.times.tolist()):
         machines = shots(stages, frame, time)
         for k, over in enumerate(overlays):
             machines[k] = over.over(machines[k], frame)
         states = [stage.track.states[frame] for stage in stages]
-        moment = Moment(time, float(clock.speeds[frame]), states, len(clock.times) == 1)
-        yield sheet.picture(moment, machines)
+        yield Moment(time, float(clock.speeds[frame]), states, len(clock.times) == 1), machines
 
 
 class Placement(NamedTuple):

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 from helpers.films import staged
+from PIL import Image, ImageFilter
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
+from smc_mujoco.draw.film import changes
+from smc_mujoco.draw.film.dilation import widened
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.simulation.model import compile_model
 
@@ -91,3 +94,101 @@ def test_an_outline_that_the_picture_s_edge_would_cut_is_not_drawn():
             view.arrange(np.array([0.6]), goal=np.array([0.0]))
             assert (changed(view.render(), alone).max() > 50) == drawn
             view.model.cam_pos[view.camera] -= (edge + beyond) / metre * view.turn[:, 0]
+
+
+# what is kept from one picture to the next
+
+
+def places(view, count=6):
+    """Arrange a machine that moves, whose goal stands still and then jumps."""
+    for k in range(count):
+        goal = np.full(view.puppet.shown, 0.1 if k < count - 1 else 0.4)
+        view.arrange(np.full(view.puppet.shown, 0.6 - 0.1 * k), goal=goal)
+        view.forward()
+        yield k
+
+
+@pytest.mark.parametrize("plant", ["inverted_pendulum", "van_der_pol"])
+def test_a_kept_outline_is_the_same_array_as_a_new_one(plant):
+    with stage(plant) as view, stage(plant) as other:
+        for _ in zip(places(view), places(other), strict=True):
+            picture = view.canvas.draw(lambda shown: None)
+            kept = view.canvas.outlined(picture, view.add_outline, 2.0)
+            other.canvas.draw(lambda shown: None)
+            other.canvas.outline_look = b""
+            drawn = other.canvas.outlined(picture, other.add_outline, 2.0)
+            assert np.array_equal(kept, drawn)
+            assert changed(kept, picture).max() > 50
+
+
+def test_an_outline_is_drawn_again_only_when_its_shapes_or_the_camera_move(monkeypatch):
+    counts = []
+    with stage("inverted_pendulum") as view:
+        draw = view.canvas.outline_of
+        monkeypatch.setattr(
+            view.canvas, "outline_of", lambda width: counts.append(width) or draw(width)
+        )
+        for _ in places(view):
+            view.render()
+        assert len(counts) == 2
+        view.model.cam_pos[view.camera] += 0.1
+        view.render()
+        assert len(counts) == 3
+
+
+@pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing", "cart_pole", "panda"])
+def test_a_picture_of_which_parts_are_kept_is_the_whole_one(plant):
+    drawn = []
+    with stage(plant) as view:
+        canvas = view.canvas
+        for _ in places(view):
+            before = canvas.look
+            picture = canvas.draw(lambda shown: None)
+            look = canvas.look
+            assert look is not None
+            drawn.append(look.changed(before, view.model, SIZE))
+            whole = canvas.renderer.render()
+            unlike = changed(picture, whole)
+            assert (unlike > SEEN).sum() <= 30  # samples of smooth edges
+            assert (unlike > 3 * SEEN).sum() == 0
+    assert drawn[0] is None
+    assert any(drawn)
+
+
+def test_all_of_a_picture_is_drawn_where_a_change_shows_elsewhere():
+    with stage("inverted_pendulum") as view:
+        list(places(view, 1))
+        canvas = view.canvas
+        canvas.draw(lambda shown: None)
+        before = canvas.look
+        assert before is not None
+        assert list(before.changed(before, view.model, SIZE)) == []
+        view.model.cam_pos[view.camera] += 0.01
+        list(places(view, 1))
+        canvas.draw(lambda shown: None)
+        look = canvas.look
+        assert look is not None
+        assert look.changed(before, view.model, SIZE) is None
+        view.model.geom_rgba[view.links] = 0.0
+        canvas.draw(lambda shown: None)
+        view.model.light_castshadow[:] = 1
+        canvas.draw(lambda shown: None)
+        assert canvas.look is None
+
+
+def test_boxes_are_joined_where_that_takes_less_time():
+    parts = []
+    far = 4 * changes.PART_COST
+    changes.join(parts, (0, 0, 10, 10))
+    changes.join(parts, (20, 0, 30, 10))
+    changes.join(parts, (far, 0, far + 10, 10))
+    assert parts == [(0, 0, 30, 10), (far, 0, far + 10, 10)]
+    changes.join(parts, (0, 0, far, 100))
+    assert parts == [(0, 0, far + 10, 100)]
+
+
+@pytest.mark.parametrize("reach", [1, 2, 5, 40])
+def test_shapes_are_widened_as_by_a_filter_of_ranks(reach):
+    shapes = (np.random.default_rng(0).random((37, 53)) > 0.97).astype(np.uint8) * 200
+    filtered = Image.fromarray(shapes).filter(ImageFilter.MaxFilter(2 * reach + 1))
+    assert np.array_equal(widened(shapes, reach), np.asarray(filtered))
