@@ -22,7 +22,7 @@ The names by task, those of a first script first; `help(smc.run)` tells what a n
     Surfaces, estimators, policies: surface, estimator, estimator_function, policy
     Signals and time: Signal, Jump, Fault, Clock
     Analyse: worst_case, sensitivity, Uncertainty
-    Machines: rig, rigs, identify, identify_friction
+    Machines: rig, rigs, identify, identify_friction, measured
     Papers: audit, claims
     Benchmark: problem, results
 

@@ -54,6 +54,7 @@ from smc_mujoco.robustness.worst_case import worst_case as worst_case
 from smc_mujoco.simulation.conditions import condition as condition
 from smc_mujoco.simulation.grid import grid as grid
 from smc_mujoco.simulation.grid import starts as starts
+from smc_mujoco.simulation.readings import measured as measured
 from smc_mujoco.simulation.run import run as run
 from smc_mujoco.simulation.run import stream as stream
 from smc_mujoco.simulation.scenario import Scenario as Scenario

@@ -379,9 +379,10 @@ def identify(
         Or a rig or its name, see `smc.rigs()`.
       logs: one log or several, of any controller, at 40 Hz or more: the path of a CSV or npz file,
         a data frame, columns by name, or traces. Of a trace x is what its encoder reads, with the
-        noise; in a file of `Trace.export` it is the true position. A log has t in s, and x (rad or
-        m) and u (in the unit of the machine's command) of the joint, or x_JOINT and u_JOINT of
-        each. u is held from its row to the next: of a log of fewer rows give the mean between them.
+        noise; in a file of `Trace.export` it is the true position, but of `smc.measured(trace)`. A
+        log has t in s, and x (rad or m) and u (in the unit of the machine's command) of the joint,
+        or x_JOINT and u_JOINT of each. u is held from its row to the next: of a log of fewer rows
+        give the mean between them.
         The time grows with rows and names: 4 s at 1 kHz of two joints take a minute or two.
       names: paths of the numbers: "shoulder.damping", .frictionloss, .armature, .stiffness, .gain,
         .offset, .zero, "input_delay", "hand.payload" of a body, "friction.elbow.kc", and "m" in kg,

@@ -63,6 +63,27 @@ def readings(trace: Trace, noisy: bool = True) -> Array:
     return x
 
 
+def measured(trace: Trace) -> Trace:
+    """Return a run as its encoders saw it, as a log of a machine has it:
+
+        smc.measured(trace).export("log.csv")
+
+    x is what the law of the run read: with bias, counts, noise, delay and what was lost, and on the
+    motor's side of a play or a spring the rotor. All else stays, also v, the true rate. Its scores
+    would be those of the readings.
+    """
+    s = trace.scenario
+    x = readings(trace)
+    late = []
+    for i in range(s.plant.driven):
+        sensor = s.encoder(i)
+        if sensor and (sensor.delay or sensor.skew or sensor.period or sensor.dropout):
+            late.append(i)
+    if late:
+        x[:, late] = _repeated(trace).s[:, late]
+    return dataclasses.replace(trace, x=x)
+
+
 def _repeated(trace: Trace) -> Trace:
     """Return the run of a trace with its commands, whose s is what its sensors read."""
     s = trace.scenario

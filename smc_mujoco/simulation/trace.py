@@ -344,7 +344,8 @@ class Trace:
 
         CSV: a header line with units, "t [s]", "x [rad]", ..., then a line per sample, with the
         fewest digits that identify each number (0.1, not 0.10000000000000001), and nan after a
-        failure. x and v are the true ones, not what a sensor read. Parquet: the `columns`; the
+        failure. x and v are the true ones, not what a sensor read: `smc.measured(trace)` has what
+        the encoders read. Parquet: the `columns`; the
         metadata of each column has its "unit", and that of the schema the "scenario", as JSON. MAT:
         the arrays by name, (K + 1, n), a struct `units` with the unit of each ("m, rad" if channels
         differ), and `scenario`.

@@ -37,10 +37,9 @@ UNDER = {
     "settling time": "Settling time is when the error enters its band to stay: 2 % of its initial "
     "value, or of the reference's range if that is larger.",
     "final error": "The final error is the largest absolute error of any channel in the last "
-    "fifth of a run.",
+    "part of a run: its last fifth, or whole periods of a periodic load or reference.",
     "ITAE": "ITAE is the integral of time times absolute error.",
-    "variation of u": "Variation of u is its total variation per second in the last fifth of a "
-    "run.",
+    "variation of u": "Variation of u is its total variation per second in the last part of a run.",
     "default": "Default gains are those of the law's own file.",
     "given": "Gains marked given are the authors' own choice.",
     "strong=True": "Bold: may be the best: no other law is shown to be better (a paired test at "

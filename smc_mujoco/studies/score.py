@@ -49,8 +49,9 @@ def score(
     - settling_time in s from t = 0, also if the reference steps later; rise_time in s, from 10 % to
       90 % of the way; overshoot in % of the scale, the larger of the first error and r's range;
     - in rad or m: peak (of x), rms_error (of e, from a quarter of the run on), ultimate_bound
-      (largest |e| in the last fifth) and steady_error (|mean of e| there, which an oscillation
-      leaves small); iae, ise, itae (of the whole run). The largest |e| of a run has no name: it is
+      (largest |e| in the last part: the last fifth, or whole periods of a periodic load or
+      reference) and steady_error (|mean of e| there, which an oscillation leaves small); iae, ise,
+      itae (of the whole run). The largest |e| of a run has no name: it is
       `np.abs(trace.x - trace.r).max()`;
     - of the command u, in N m or N: max_u, tv (sum of |changes of u|), tv_rate (per second) and
       energy (integral of u^2, times s);

@@ -252,6 +252,37 @@ def test_csv_holds_every_number_to_the_last_bit(name, traces, tmp_path):
         np.testing.assert_array_equal([float(row[column]) for row in rows], expected)
 
 
+@smc.law_function(gains={"kp": 20.0, "kd": 4.0})
+def reading(y, gains, memory):
+    """A PD law whose s is the position that it reads."""
+    return -gains.kp * y.e - gains.kd * y.de, y.x
+
+
+SEEN = {
+    "counts and noise": {"sensor": smc.Encoder(1024, bias=0.01), "noise": smc.Noise(2e-3)},
+    "late and lost": {"sensor": smc.Encoder(1024, delay=3e-3, dropout=0.2)},
+    "a clock of its own": {"sensor": smc.Encoder(1024, period=4e-3), "noise": smc.Noise(1e-3)},
+    "the motor's side": {
+        "sensor": smc.Encoder(4096, side="motor"),
+        "actuator": smc.Backlash(0.05),
+    },
+}
+
+
+@pytest.mark.parametrize("case", SEEN)
+def test_readings_are_what_the_law_read(case, tmp_path):
+    trace = smc.run(smc.Scenario(plant="duffing", law=reading(), duration=0.3, **SEEN[case]))
+    exported = {}
+    for seen, run in ((False, trace), (True, smc.measured(trace))):
+        with open(run.export(tmp_path / "a.csv"), newline="") as file:
+            rows = list(csv.DictReader(file))
+        exported[seen] = np.array([float(row["x [m]"]) for row in rows])
+        assert [float(row["v [m/s]"]) for row in rows] == trace.v[:, 0].tolist()
+    np.testing.assert_array_equal(exported[False], trace.x[:, 0])
+    np.testing.assert_array_equal(exported[True], trace.s[:, 0])
+    assert abs(exported[True] - trace.x[:, 0]).max() > 1e-4
+
+
 def test_every_format_has_the_units_of_each_column(tmp_path):
     """Of the cart and of its pole, of which one moves in m and the other in rad."""
     trace = smc.run(smc.Scenario(plant="cart_pole", law="hierarchical", duration=0.01))
