@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from smc_mujoco.common.files import replacing
-from smc_mujoco.common.text import joined, number
+from smc_mujoco.common.text import capital, joined, number
 from smc_mujoco.control.component import gains_text
 from smc_mujoco.problems.tracking import tracking_suites
 from smc_mujoco.problems.tracking_entry import beside_of
@@ -75,8 +75,9 @@ def page(board: TrackingBoard, picture: str) -> str:
         "",
     ]
     for problem, result in zip(suite.problems, board.problems, strict=True):
-        limit = f"at most {problem.limit:g} bounds a second"
-        lines += [f"## {problem.name}", "", f"{problem.why}: `{problem.load}`, {limit}.", ""]
+        limit = f"u may vary by {problem.limit:g} bounds a second"
+        why = capital(problem.why)
+        lines += [f"## {problem.name}", "", f"{why}. `{problem.load}`; {limit}.", ""]
         lines += [*problem_table(board, result), ""]
     return "\n".join(lines)
 
