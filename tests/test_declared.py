@@ -31,6 +31,8 @@ from smc_mujoco.common.constraints import (
     OneOf,
     OrNone,
     Range,
+    SeedOf,
+    Shown,
     Whole,
 )
 from smc_mujoco.common.errors import shown
@@ -128,6 +130,8 @@ BAD = {  # of another kind, and just beyond each end
     Called: lambda one: [None, 3, "x", ()],
 }
 BAD[Available] = BAD[OneOf]
+BAD[Shown] = BAD[Flag]
+BAD[SeedOf] = lambda one: [*NO_NUMBERS, math.nan, 2.5, -1, one.high + 1, math.inf]
 GOOD = {  # a plain value, and the ends themselves
     OrNone: lambda one: [*good(one.item), None],
     Number: good_numbers,
@@ -135,6 +139,8 @@ GOOD = {  # a plain value, and the ends themselves
     ExecutorAddress: lambda one: ["dask://host:8786", "tcp://127.0.0.1:1"],
     OneOf: lambda one: [*one.names],
     Flag: lambda one: [True, False],
+    Shown: lambda one: [True, False, print],
+    SeedOf: lambda one: [0, one.high, float(one.high // 2)],
     Each: lambda one: [*good(one.item), (good(one.item)[0],) * 2],
     Range: lambda one: [(max(1.0, one.low),) * 2, (max(one.low, beyond(one.above), -9.0), 1e300)],
     FilePath: lambda one: [Path("a"), Path("b/c")],
@@ -147,6 +153,8 @@ TOLD = {
     Whole: lambda one: f"whole {one.low} to {one.high}" + " or inf" * one.infinite,
     OneOf: lambda one: f"one of {', '.join(one.names)}",
     Flag: lambda one: "flag",
+    Shown: lambda one: "flag, or a function",
+    SeedOf: lambda one: f"whole 0 to {one.high}, or a Generator",
     Each: lambda one: f"{reported(one.item)}, or one for each channel",
     Range: lambda one: f"range of {reported(Number(above=one.above, low=one.low))}",
     FilePath: lambda one: "path",

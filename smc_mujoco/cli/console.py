@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from smc_mujoco.common.errors import ScenarioError, printable
-from smc_mujoco.common.files import with_ending, writable, write_json
+from smc_mujoco.common.files import to_json, with_ending, writable, write_json
 from smc_mujoco.common.scripts import users_traceback
 
 if TYPE_CHECKING:
@@ -51,18 +51,23 @@ def _fail(sentence: str, code: int = 2) -> None:
     raise SystemExit(code)
 
 
+STDOUT = Path("-")  # as a file: standard output
+
+
 class Terminal(Console):
     """The console of a command, which also measures its time and can write what it printed as JSON.
+    Where that goes to standard output, what it prints goes to standard error.
 
     It prints brackets as they are, not as markup.
     """
 
     def __init__(self, json: Path | None = None):
-        super().__init__(markup=False, emoji=False)
+        super().__init__(markup=False, emoji=False, stderr=json == STDOUT)
         self.start = time.perf_counter()
         self.json = json
         self.printed: list[Any] = []
-        writable(json and with_ending(json, ".json"))
+        if json != STDOUT:
+            writable(json and with_ending(json, ".json"))
 
     @property
     def seconds(self) -> float:
@@ -96,5 +101,8 @@ class Terminal(Console):
         if self.json is not None:
             from smc_mujoco.cli.tables import document
 
-            printed = self.printed
-            self.wrote(write_json(self.json, document(printed) if data is None else data))
+            written = document(self.printed) if data is None else data
+            if self.json == STDOUT:
+                print(to_json(written))
+            else:
+                self.wrote(write_json(self.json, written))

@@ -4,7 +4,7 @@ Those of arrays import numpy, and only where they are asked for, so that a comma
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -20,6 +20,8 @@ Floats = tuple[float, ...]
 Names = tuple[str, ...]
 Numbers = Mapping[str, float]  # by name
 Pair = tuple[float, float]
+# whether to show progress, or a function that is told a text and the share that is done
+ProgressTo = bool | Callable[[str, float], object]
 
 
 def __getattr__(name: str) -> Any:

@@ -19,6 +19,7 @@ from typing import Annotated, Any, ParamSpec, TypeVar
 
 import numpy as np
 
+from smc_mujoco.common.aliases import ProgressTo
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown, warned, whole
 from smc_mujoco.common.files import as_path
@@ -72,6 +73,18 @@ class Whole(Constraint):
 
 
 @keyword_dataclass
+class SeedOf(Constraint):
+    """A seed: a whole number from 0 to `high`, or a numpy Generator, from which one is drawn."""
+
+    high: int
+
+    def __call__(self, what: str, value: Any) -> int:
+        if isinstance(value, np.random.Generator):
+            return int(value.integers(self.high + 1))
+        return whole(what, value, 0, self.high)
+
+
+@keyword_dataclass
 class OneOf(Constraint):
     """One of some names."""
 
@@ -91,6 +104,13 @@ class Flag(Constraint):
         if isinstance(value, bool | np.bool_):
             return bool(value)
         raise ScenarioError(f"{what} is {shown(value)}: give True or False")
+
+
+class Shown(Flag):
+    """Whether to show progress, or a function that is called with a text and the share done."""
+
+    def __call__(self, what: str, value: Any) -> Any:
+        return value if callable(value) else super().__call__(what, value)
 
 
 @keyword_dataclass
@@ -173,12 +193,14 @@ class OrNone(Constraint):
 MAX_SEED = 2**53 - 1  # a float64 holds every whole number up to it exactly
 
 Boolean = Annotated[bool, Flag()]
+# whether to show it, or what is called with a text and the share that is done
+Progress = Annotated[ProgressTo, Shown()]
 Finite = Annotated[float, Number()]
 Natural = Annotated[float, Number(low=0.0)]
 Positive = Annotated[float, Number(above=0.0)]
 Bound = Annotated[float, Number(above=0.0, infinite=True)]  # inf: no bound
 Probability = Annotated[float, Number(low=0.0, high=1.0)]
-Seed = Annotated[int, Whole(low=0, high=MAX_SEED)]
+Seed = Annotated[int, SeedOf(high=MAX_SEED)]
 Timeout = Annotated[float, Number(above=0.0, high=86_400.0)]  # s, a day at most
 
 

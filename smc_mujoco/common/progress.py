@@ -10,6 +10,8 @@ import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
+from smc_mujoco.common.aliases import ProgressTo
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -28,7 +30,7 @@ class Bar:
         what: str = "",
         whole: float | None = None,
         counted: bool = False,
-        draw: "Callable[[Bar], None] | None" = None,
+        draw: "Callable[[Bar], object] | None" = None,
         period: float = 0.0,
         delay: float = 0.0,
     ):
@@ -111,9 +113,9 @@ def length(seconds: float) -> str:
 
 @contextlib.contextmanager
 def bar(
-    what: str, whole: float | None = None, shown: bool = True, counted: bool = False
+    what: str, whole: float | None = None, shown: ProgressTo = True, counted: bool = False
 ) -> Iterator[Bar]:
-    """Show a bar while the block lasts.
+    """Show a bar while the block lasts, or tell the function `shown` of each step.
 
     If stderr is no terminal, print a line each ten seconds instead; in a notebook the next replaces
     it, and nothing of it stays.
@@ -122,6 +124,10 @@ def bar(
     """
     if not shown:
         yield Bar()
+        return
+    if callable(shown):
+        tell = shown
+        yield Bar(what, whole, counted, lambda bar: tell(bar.what, bar.share))
         return
     from rich.console import Console
 
@@ -193,7 +199,7 @@ def summed(report: Report, done: float, whole: float) -> Callable[[float], None]
 
 
 @contextlib.contextmanager
-def counter(runs: int, steps: int, shown: bool) -> Iterator[Callable[[int], None]]:
+def counter(runs: int, steps: int, shown: ProgressTo) -> Iterator[Callable[[int], None]]:
     """Yield a function that adds simulated steps.
 
     A bar shows how many are done and how many per second.
@@ -212,6 +218,6 @@ def counter(runs: int, steps: int, shown: bool) -> Iterator[Callable[[int], None
             count,
         )
 
-    with bar("", steps, shown=shown and runs > 0) as drawn:
+    with bar("", steps, shown=shown if runs else False) as drawn:
         stepped(0)
         yield stepped

@@ -14,6 +14,7 @@ environment: viewer.launch(environment).
 """
 
 import contextlib
+import os
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import version
@@ -23,8 +24,13 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.extras import MissingPackageError, cure, extra
+from smc_mujoco.common.gl import choice
 from smc_mujoco.envs.episode import Episode, Setting, bounded
 from smc_mujoco.mechanisms.plant import Plant
+
+# dm_control would try a window first, which needs a display
+if choice()[1] in ("egl", "osmesa"):
+    os.environ.setdefault("MUJOCO_GL", choice()[1])
 
 with extra("dm", "smc_mujoco.envs.dm_control_env"):
     from dm_control.mujoco import Physics

@@ -17,7 +17,7 @@ from typing import Any
 
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Objective
 from smc_mujoco.analysis.tuning.search import tune
-from smc_mujoco.common.aliases import AnyPath, Fields
+from smc_mujoco.common.aliases import AnyPath, Fields, ProgressTo
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError, ScenarioWarning
 from smc_mujoco.control.law import Law
 from smc_mujoco.identification.rig import Rig, Values
@@ -102,7 +102,7 @@ def tuned(
     starts: Starts | None = None,
     folder: AnyPath | None = None,
     threads: int | None = None,
-    progress: bool = False,
+    progress: ProgressTo = False,
 ) -> list[Candidate]:
     """Return laws with the gains of every search, by one rule for all, see `smc.tune`.
 

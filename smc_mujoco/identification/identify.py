@@ -30,7 +30,7 @@ from smc_mujoco.answers.answer import Answer
 from smc_mujoco.answers.facts import IdentifiedNumber, IdentifyFacts
 from smc_mujoco.common import html
 from smc_mujoco.common.aliases import AnyPath, Array, Data, Fields, Numbers
-from smc_mujoco.common.constraints import Natural, Seed, Whole, constrained
+from smc_mujoco.common.constraints import Natural, Progress, Seed, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import write_json
 from smc_mujoco.common.progress import bar
@@ -362,7 +362,7 @@ def identify(
     starts: Count = 1,
     seed: Seed = 0,
     most: Count = 30,
-    progress: bool = False,
+    progress: Progress = False,
     folder: AnyPath | None = None,
 ) -> Identified:
     """Estimate a machine's parameters from logs: friction, armature, delay, masses and more.

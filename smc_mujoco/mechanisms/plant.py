@@ -11,6 +11,7 @@ import dataclasses
 import functools
 import inspect
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,7 +23,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array, Floats, Names, Numbers, Pair
 from smc_mujoco.common.constraints import Number
 from smc_mujoco.common.data import keyword_dataclass
-from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, unknown, whole
+from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, unknown, whole
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
@@ -37,6 +38,7 @@ MAX_EXCESS = 1e-3
 TINY = 1e-12  # SI units; least value of a parameter above 0 that is neither a mass nor a length
 MAX_PARAMETER = 1e15  # SI units; no parameter of a mechanism is larger
 
+OF_FILE = re.compile(r"\.(xml|urdf|mjb)\b")  # a text that names a model's file
 Values = SimpleNamespace  # parameters by name: p.m, p.l, ...
 Range = tuple[str, float, float]  # joint, least and largest position, rad or m
 
@@ -466,6 +468,10 @@ def plant(name: str, *, set: Any = None, **parameters: float) -> Plant:
     Returns:
       A Plant.
     """
+    if isinstance(name, str) and OF_FILE.search(name):
+        raise ScenarioError(
+            f"plant is {shown(name)}: a model of your own is smc.plant_from(file, [joints])"
+        )
     base = find("plant", name, catalogue())
     size = parameters.pop("n", base.n)
     n = whole(f"n of {name}", size, *base.sizes)

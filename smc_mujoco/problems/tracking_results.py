@@ -25,7 +25,7 @@ from smc_mujoco.answers.facts import EnteredFacts, ProblemStanding
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import AnyPath, Array, Names, Numbers
 from smc_mujoco.common.cache import CachedResult
-from smc_mujoco.common.constraints import constrained
+from smc_mujoco.common.constraints import Progress, constrained
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, reading, replacing, slug, write_json
@@ -66,7 +66,7 @@ def enter_tracking(
     suite: str,
     out: AnyPath = "results",
     threads: int | None = None,
-    progress: bool = False,
+    progress: Progress = False,
     executor: Workers | None = None,
 ) -> Path:
     """Search for an entry's gains in every problem of a suite. Return the file of its result.

@@ -33,7 +33,7 @@ from smc_mujoco.answers.answer import Answer
 from smc_mujoco.answers.command import again
 from smc_mujoco.answers.facts import Grid, NextStep, SensitivityFacts, Settles
 from smc_mujoco.common.aliases import Array, ArrayPair
-from smc_mujoco.common.constraints import Seed, Whole, constrained
+from smc_mujoco.common.constraints import Progress, Seed, Whole, constrained
 from smc_mujoco.common.data import attributes
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.progress import bar
@@ -241,7 +241,7 @@ def sensitivity(
     points: Annotated[int, Whole(low=8, high=2**16)] | None = None,
     seed: Seed = 0,
     threads: int | None = None,
-    progress: bool = False,
+    progress: Progress = False,
     device: Device = "cpu",
 ) -> Sensitivity:
     """Find which uncertainties explain a law's score, and where its runs fail.

@@ -22,9 +22,9 @@ from smc_mujoco.answers import answers
 from smc_mujoco.answers.answer import Answer
 from smc_mujoco.answers.command import again, instead, typed
 from smc_mujoco.answers.facts import Grid, Lead, NextStep, WorstFacts
-from smc_mujoco.common.aliases import Numbers
+from smc_mujoco.common.aliases import Numbers, ProgressTo
 from smc_mujoco.common.cache import cached
-from smc_mujoco.common.constraints import Seed, Whole, constrained
+from smc_mujoco.common.constraints import Progress, Seed, Whole, constrained
 from smc_mujoco.common.data import attributes
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import read_json, write_json
@@ -278,7 +278,7 @@ def worst_case(
     budget: Annotated[int, Whole(low=1, high=MAX_BUDGET)] | None = None,
     seed: Seed = 0,
     threads: int | None = None,
-    progress: bool = False,
+    progress: Progress = False,
     device: Device = "cpu",
 ) -> WorstCase:
     """Search for the worst run of a scenario within a class of uncertainty, and return it.
@@ -407,7 +407,7 @@ def cached_worst_case(
     within: Uncertainty | None,
     budget: int | None,
     threads: int | None = None,
-    progress: bool = False,
+    progress: ProgressTo = False,
     device: str = "cpu",
 ) -> WorstCase:
     """Return the `worst_case` of a scenario, from the file of an earlier call if there is one."""

@@ -301,8 +301,18 @@ def _of_text(value: object) -> Condition:
         raise ScenarioError(
             f"condition {shown(value)} joins {count:,} conditions: give at most {MAX_JOINED}"
         )
-    first, *further = [find("condition", part.strip(), NAMED) for part in value.split("+")]
+    first, *further = [_named(part.strip()) for part in value.split("+")]
     return sum(further, start=first)
+
+
+def _named(name: str) -> Condition:
+    """Return a condition of the suite."""
+    if name not in NAMED and (delay := OTHER_DELAY.fullmatch(name)):
+        seconds = f"{float(delay[1]) / 1e3:g}"
+        raise ScenarioError(
+            f"unknown condition {name!r}: write another delay as 'late: input_delay={seconds}'"
+        )
+    return find("condition", name, NAMED)
 
 
 def applicable(names: Iterable[str], plants: Sequence[Plant], duration: float) -> list[str]:
@@ -789,6 +799,7 @@ REAL: dict[str, Recipe] = {
     "fault": _fault,
 }
 
+OTHER_DELAY = re.compile(r"delay_([0-9.]+)ms")
 NAMED: dict[str, Condition] = {
     name: Condition(name, fields) for name, fields in (IDEAL | REAL).items()
 }

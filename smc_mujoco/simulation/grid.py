@@ -30,7 +30,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.aliases import Data, Fields, Floats
-from smc_mujoco.common.constraints import Natural, Whole, constrained
+from smc_mujoco.common.constraints import Natural, SeedOf, constrained
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import (
     MAX_ITEMS,
@@ -330,7 +330,7 @@ def case(
     condition: str | Condition = "nominal",
     duration: float = DURATION,
     gains: str = "tuned",
-    seed: Annotated[int, Whole(low=0, high=GRID_SEEDS - 1)] = 0,
+    seed: Annotated[int, SeedOf(high=GRID_SEEDS - 1)] = 0,
     starts: Starts | None = None,
     changes: Data = frozen({}),
 ) -> Scenario:

@@ -57,6 +57,8 @@ def failure_of(name: str, error: BaseException, channel: int | None = None) -> F
         text = str(error)
     except USER_EXCEPTIONS:
         text = "its text cannot be shown"
+    if isinstance(error, IndexError) and "out of bounds for axis" in text:
+        text += "; memory has as many numbers as memory= of its function says"
     return Failure(f"{name} raised {type(error).__name__} ({one_line(text)})", channel)
 
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from smc_mujoco.common import arithmetic
 from smc_mujoco.common.attended import attended
-from smc_mujoco.common.constraints import Flag, Whole, constrained
+from smc_mujoco.common.constraints import Shown, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, has_items, shown, warn_once
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import counted
@@ -39,7 +39,7 @@ from smc_mujoco.simulation.trace import Trace, from_log, warn_of_broken
 # isort: split
 from mujoco.batch import Batch, SimulationError  # by now imported by callback
 
-from smc_mujoco.common.aliases import Array
+from smc_mujoco.common.aliases import Array, ProgressTo
 
 BATCH_BYTES = 256 * 2**20  # of logs and records in one Batch
 MIN_TRIM_RUNS = 64  # after a batch of fewer runs, freed memory is not returned to the system
@@ -86,15 +86,17 @@ class PlainLoopWarning(UserWarning):
 
 
 @overload
-def run(scenarios: Scenario, threads: int | None = None, progress: bool = False) -> Trace: ...
+def run(scenarios: Scenario, threads: int | None = None, progress: ProgressTo = False) -> Trace: ...
 @overload
 def run(
-    scenarios: Iterable[Scenario | Prepared], threads: int | None = None, progress: bool = False
+    scenarios: Iterable[Scenario | Prepared],
+    threads: int | None = None,
+    progress: ProgressTo = False,
 ) -> list[Trace]: ...
 def run(
     scenarios: Scenario | Iterable[Scenario | Prepared],
     threads: int | None = None,
-    progress: bool = False,
+    progress: ProgressTo = False,
 ) -> Trace | list[Trace]:
     """Run one scenario or many.
 
@@ -104,7 +106,8 @@ def run(
     Args:
       scenarios: a Scenario, or any number of them.
       threads: how many simulations at once; None for one per available core.
-      progress: whether to show a progress bar.
+      progress: whether to show a progress bar, or a function that is called with a text and the
+        share that is done.
 
     Returns:
       The Trace, or a list of them in the order of the scenarios. A run fails if its law raises or
@@ -119,7 +122,7 @@ def run(
     the call within a second. A compiled law that never returns cannot be stopped: it keeps
     one core busy until Python ends, with exit code 130.
     """
-    shown_bar = Flag()("progress", progress)
+    shown_bar = Shown()("progress", progress)
     prepared = list(map(prepare, as_iterable(scenarios)))
     for item in prepared:
         warn_once(blind(item.scenario.plant, item.scenario.law.parts))

@@ -24,7 +24,15 @@ from smc_mujoco.answers.facts import Barred, Beware, CompareFacts, Contest, More
 from smc_mujoco.common import html
 from smc_mujoco.common.aliases import AnyPath, Fields, Names
 from smc_mujoco.common.cached import cached_property
-from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, constrained
+from smc_mujoco.common.constraints import (
+    Boolean,
+    FilePath,
+    Positive,
+    Progress,
+    SeedOf,
+    Whole,
+    constrained,
+)
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown, warn_once
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import replacing
@@ -64,7 +72,7 @@ QUICK_SEARCHES = LOOKS[0]
 # plants times conditions that have a table each; if there are more, each plant has one table
 MAX_BLOCKS = 12
 MAX_SEED = 10**6
-DrawSeed = Annotated[int, Whole(low=0, high=MAX_SEED)]
+DrawSeed = Annotated[int, SeedOf(high=MAX_SEED)]
 TIMES = "Computing time of each compiled law per sample, on this computer"
 TIME_HEADINGS = "plant", "law", "relative time", "median (s)", "99 % quantile (s)"
 TIME_NOTE = (
@@ -514,7 +522,7 @@ def compare(
     defaults: Boolean = False,
     relevant: Relevant = RELEVANT,
     threads: int | None = None,
-    progress: bool = True,
+    progress: Progress = True,
     seed: DrawSeed = 0,
     device: Device = "cpu",
     executor: Workers | None = None,

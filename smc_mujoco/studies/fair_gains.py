@@ -25,7 +25,7 @@ from smc_mujoco.analysis.tuning.effort import Search
 from smc_mujoco.analysis.tuning.objective import BUDGET, Objective, objectives
 from smc_mujoco.analysis.tuning.run_limits import RunLimit, shows_limits
 from smc_mujoco.common import fingerprint
-from smc_mujoco.common.aliases import AnyPath
+from smc_mujoco.common.aliases import AnyPath, ProgressTo
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.errors import (
     MAX_ITEMS,
@@ -171,7 +171,7 @@ class Trial(NamedTuple):
     search: Search = Search()
     gains: GainChoice = GainChoice()
     threads: int | None = None
-    progress: bool = False
+    progress: ProgressTo = False
 
     @classmethod
     def of(

@@ -23,8 +23,8 @@ import numpy as np
 
 from smc_mujoco.analysis.step_halving import halved, repeats_every_run
 from smc_mujoco.common import fingerprint
-from smc_mujoco.common.aliases import AnyPath, Data, Fields, Names
-from smc_mujoco.common.constraints import FilePath, constrained
+from smc_mujoco.common.aliases import AnyPath, Data, Fields, Names, ProgressTo
+from smc_mujoco.common.constraints import FilePath, Progress, constrained
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, printable, shown
 from smc_mujoco.common.files import reading, to_json
@@ -189,7 +189,7 @@ def study(
     out: Annotated[AnyPath, FilePath()],
     resume: bool = True,
     threads: int | None = None,
-    progress: bool = False,
+    progress: Progress = False,
     half_steps: bool = False,
     executor: Workers | None = None,
 ) -> Table:
@@ -210,7 +210,8 @@ def study(
       out: folder of the study; it may contain the parts of other studies.
       resume: whether to keep the finished runs in the folder; False removes them first.
       threads: number of simulations at a time; None for one per available core.
-      progress: whether to show a progress bar.
+      progress: whether to show a progress bar, or a function that is called with a text and the
+        share that is done.
       half_steps: whether to repeat runs at half the physics step, so that `leaderboard` names no
         winner that the step decides: all of them where constraints may act or the integrator is not
         RK4, elsewhere one seed in four.
@@ -268,7 +269,7 @@ def _compute(
     store: Store,
     plants: run_key.Hashes,
     threads: int,
-    progress: bool,
+    progress: ProgressTo,
     executor: Any,
 ) -> None:
     """Compute runs, given by key, and store their rows as they finish."""

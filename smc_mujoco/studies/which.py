@@ -15,7 +15,7 @@ from smc_mujoco.analysis.ranking import Relevant
 from smc_mujoco.analysis.relevant import RELEVANT
 from smc_mujoco.analysis.tuning.effort import Search
 from smc_mujoco.analysis.tuning.run_limits import RunLimit, limits_in
-from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Whole, constrained
+from smc_mujoco.common.constraints import Boolean, FilePath, Positive, Progress, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template
@@ -57,7 +57,7 @@ def which(
     out: Annotated[str | Path, FilePath()] = "which",
     quick: Boolean = False,
     threads: int | None = None,
-    progress: bool = False,
+    progress: Progress = False,
     defaults: Boolean = False,
     relevant: Relevant = RELEVANT,
     seed: DrawSeed = 0,

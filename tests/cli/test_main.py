@@ -3,6 +3,7 @@ for every mistake.
 """
 
 import functools
+import json
 import os
 import re
 import signal
@@ -703,3 +704,18 @@ def test_the_picture_of_an_answer_is_of_the_largest_error_after_half_of_the_run(
     assert studies._worst_time(trace) == 0.5
     trace.x = np.where(t[:, None] == t[7], -0.6, x)
     assert studies._worst_time(trace) == t[7]
+
+
+def test_json_goes_to_standard_output_and_the_rest_beside_it(capsys):
+    with pytest.raises(SystemExit):
+        main.main(["list", "metrics", "--json", "-"])
+    said = capsys.readouterr()
+    assert json.loads(said.out)
+    assert "wrote" not in said.out + said.err
+
+
+def test_run_with_a_law_leads_to_compare(capsys):
+    with pytest.raises(SystemExit) as end:
+        main.main(["run", "duffing", "--law", "pid"])
+    assert end.value.code == 2
+    assert "smc-mujoco compare duffing --law pid" in capsys.readouterr().err

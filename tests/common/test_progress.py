@@ -4,6 +4,7 @@ from unittest.mock import MagicMock, call
 
 import pytest
 
+import smc_mujoco as smc
 from smc_mujoco.common import progress
 
 pytestmark = pytest.mark.quick
@@ -124,3 +125,14 @@ def test_no_time_is_estimated_before_a_tenth_is_done(monkeypatch):
     assert str(bar) == "tuning, 9 %"
     bar.advance(1.0)
     assert str(bar) == "tuning, 10 %, 81 s left"
+
+
+def test_a_function_is_told_of_progress():
+    told = []
+    scenario = smc.Scenario(plant="duffing", law="pid", duration=0.1)
+    smc.run([scenario] * 3, progress=lambda text, share: told.append((text, share)))
+    text, share = told[-1]
+    assert "3 runs" in text
+    assert share == 1.0
+    with pytest.raises(smc.ScenarioError, match="give True or False"):
+        smc.run(scenario, progress=1.5)

@@ -4,6 +4,9 @@ control.
 
 import dataclasses
 import math
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -302,3 +305,16 @@ def test_an_agent_whose_law_fails_says_so():
     timestep = environment.step(act(timestep))
     with pytest.raises(smc.ScenarioError, match=r"broken.* ZeroDivisionError .* t = 0\.001 s"):
         act(timestep)
+
+
+@pytest.mark.slow
+def test_an_environment_is_rendered_without_a_display():
+    code = "from smc_mujoco.envs import suite; e = suite.load('duffing', 'regulate', random=0)"
+    code += "; e.reset(); print(e.physics.render(24, 32).shape)"
+    environment = dict(os.environ)
+    for name in ("DISPLAY", "MUJOCO_GL"):
+        environment.pop(name, None)
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.stdout == "(24, 32, 3)\n", done.stderr

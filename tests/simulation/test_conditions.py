@@ -405,3 +405,7 @@ def test_a_condition_may_be_written_as_everywhere_else():
     dry = smc.condition("dry", friction=smc.Coulomb(0.1), noise=smc.Noise(position=1e-3))
     assert smc.condition("dry: friction=Coulomb(0.1), noise=Noise(position=1e-3)") == dry
     assert str(smc.condition("noise+encoder")) == str(smc.condition("noise + encoder"))
+
+
+def test_another_delay_is_refused_with_its_field(refused):
+    refused(lambda: find_condition("noise + delay_7ms"), "delay_7ms", "late: input_delay=0.007")

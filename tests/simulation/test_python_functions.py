@@ -263,3 +263,14 @@ def test_a_run_under_python_does_not_depend_on_those_beside_it():
         scenarios.append(network(law=shared(), plant="duffing", seed=seed))
     plainly(scenarios)
     assert seen == sorted(seen[: len(seen) // 2]) * 2
+
+
+def test_a_number_beyond_the_memory_is_told_as_such():
+    @smc.law_function(gains={}, memory=1)
+    def beyond(y, gains, memory):
+        memory[3] = 1.0
+        return 0.0, y.e
+
+    with pytest.warns(UserWarning, match="failed by itself"):
+        trace = smc.run(smc.Scenario(plant="duffing", law=beyond, duration=0.1))
+    assert "memory has as many numbers as memory= of its function says" in trace.failure

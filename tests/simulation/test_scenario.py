@@ -428,3 +428,16 @@ def test_what_is_no_scenario_is_refused_by_run_and_stream_alike(given, refused):
 def test_a_field_that_there_is_not_suggests_the_one_that_is_meant(make, meant):
     with pytest.raises(TypeError, match=f"unexpected keyword argument .*: did you mean {meant}"):
         make()
+
+
+def test_a_generator_draws_a_seed():
+    draws = [
+        smc.Scenario(plant="duffing", law="pid", seed=np.random.default_rng(seed)).seed
+        for seed in (1, 1, 2)
+    ]
+    assert draws[0] == draws[1] != draws[2]
+    assert all(type(seed) is int for seed in draws)
+
+
+def test_a_model_s_file_is_no_name_of_a_plant(refused):
+    refused(lambda: smc.plant("arm.xml:elbow"), "arm.xml:elbow", "plant_from")

@@ -73,7 +73,7 @@ from smc_mujoco.analysis.tuning.stages import (
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import AnyPath, Array, Floats
 from smc_mujoco.common.cache import CachedResult
-from smc_mujoco.common.constraints import Boolean, FilePath, Whole, constrained
+from smc_mujoco.common.constraints import Boolean, FilePath, Progress, SeedOf, constrained
 from smc_mujoco.common.errors import (
     BrokenLawError,
     ScenarioError,
@@ -127,10 +127,10 @@ def tune(
     plant: Plant | str,
     law: Component | Template | str,
     budget: Budget = BUDGET,
-    seed: Annotated[int, Whole(low=0, high=MAX_TUNING_SEED)] = 0,
+    seed: Annotated[int, SeedOf(high=MAX_TUNING_SEED)] = 0,
     objective: Objective | str = "balanced",
     threads: int | None = None,
-    progress: bool = False,
+    progress: Progress = False,
     conditions: Sequence[Condition | str] | Condition | str | None = None,
     starts: Starts | None = None,
     chattering: float | None = None,

@@ -125,7 +125,10 @@ Joints = Annotated[
     ),
 ]
 Json = Annotated[
-    Path | None, typer.Option(metavar="FILE.json", help="Also write the result to a file.")
+    Path | None,
+    typer.Option(
+        metavar="FILE.json", help="Also write the result to a file; - is standard output."
+    ),
 ]
 Full = Annotated[
     bool,

@@ -390,6 +390,11 @@ def _with_drives(
 def _check_names(label: str, model: mujoco.MjModel, keyframe: str | None, tip: str | None) -> None:
     """Raise ScenarioError for a keyframe or a site that the model does not have."""
     if keyframe is not None:
+        if not model.nkey:
+            raise ScenarioError(
+                f"keyframe is {shown(keyframe)}: {label} has none, so leave it out, or give a pose "
+                "instead"
+            )
         keyframes = [model.key(i).name for i in range(model.nkey)]
         mjcf.pick(label, "keyframe", keyframe, keyframes)
     if tip is not None:
