@@ -56,11 +56,17 @@ class TrackingEntry:
 
     @property
     def name(self) -> str:
-        """The name in tables."""
+        """The name in tables, with the gains that were given as 0."""
+        template = self.law.template
+        left_out = []
+        for gain, declared in (template.gains if template else {}).items():
+            if self.law.gains[gain] == 0.0 != declared.default:
+                left_out.append(f"{gain}=0")
+        law = f"{self.law.name}({', '.join(left_out)})" if left_out else self.law.name
         if not self.kind:
-            return self.law.name
+            return law
         speed = ", speed" if self.on == "speed" else ""
-        return f"{self.law.name} + {self.kind}({self.share:g}{speed})"
+        return f"{law} + {self.kind}({self.share:g}{speed})"
 
     def law_on(self, problem: TrackingProblem) -> Component:
         """Return the law, with a bound on its integral where it has a gain for that."""

@@ -8,9 +8,17 @@ import pytest
 from helpers.pages import ROOT
 
 from smc_mujoco.analysis.bootstrap import median_of
+from smc_mujoco.common.files import slug
 from smc_mujoco.problems import tracking_page
 from smc_mujoco.problems.tracking import tracking_suite, tracking_suites
-from smc_mujoco.problems.tracking_results import bounds, shipped_bounds, tracking_board
+from smc_mujoco.problems.tracking_entry import tracking_entry
+from smc_mujoco.problems.tracking_results import (
+    SHIPPED,
+    bounds,
+    read_result,
+    shipped_bounds,
+    tracking_board,
+)
 from smc_mujoco.problems.tracking_search import SEARCHES, TAU, UNSEEN
 
 SUITES = pytest.mark.parametrize("suite", tracking_suites())
@@ -54,6 +62,15 @@ def test_no_law_and_an_oracle_bound_the_first_entry_of_each_problem(suite):
     for result in board.problems:
         still, oracle = limits[result.problem]
         assert oracle < result.errors[result.names[0]][0] < still / 50.0
+
+
+@SUITES
+def test_an_entry_is_named_by_its_text(suite, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    for path in (SHIPPED / suite).glob("*.json"):
+        entry = read_result(path)
+        assert entry.name == tracking_entry(entry.text).name
+        assert path.stem == slug(entry.name)
 
 
 @SUITES
