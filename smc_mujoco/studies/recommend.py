@@ -344,10 +344,10 @@ def _settled(table: Table) -> Settled:
 def _at_rest(course: RaceCourse, law: Component) -> AtRest | None:
     """Return how a law ends its runs without noise and without disturbances that vary, in the
     condition in which u swings most, and its largest overshoot there before any event; None without
-    time or a goal to rest at.
+    a goal to rest at, or without time, unless limits were asked for.
     """
-    trial, plant, _, clock = course
-    if not clock.fits(_work_of_tables(course)):
+    trial, plant, goal, clock = course
+    if not goal.limits and not clock.fits(_work_of_tables(course)):
         return None
     cases = [_quiet(_coarse(trial, plant, law, condition)) for condition in trial.conditions]
     traces = run_unjudged(cases, trial.threads)

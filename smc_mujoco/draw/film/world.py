@@ -25,6 +25,7 @@ MAX_CHANNELS = 6  # of a network: more would be hidden by the next machine
 DRAWN_GROUPS = 3  # groups of geoms that MuJoCo draws by default
 HIDDEN_GROUP = 5  # a group of geoms that MuJoCo does not draw by default
 QUALITY = {"offsamples": 4, "shadowsize": 2048, "numslices": 36, "numstacks": 10, "numquads": 1}
+SIZES = "memory", "njmax", "nconmax", "nemax", "nstack", "nuserdata"  # of a model's arrays
 AMBIENT = (0.30, 0.31, 0.33)  # light that models the form: less from everywhere,
 KEY = (0.60, 0.58, 0.55)  # more from one side,
 FILL = (0.10, 0.11, 0.14)  # and little from the other
@@ -107,7 +108,7 @@ def users_machine(machine: mujoco.MjSpec, film: mujoco.MjSpec) -> mujoco.MjSpec:
     """
     machine.option = film.option
     for name in dir(machine):
-        if name.startswith("nuser_"):
+        if name.startswith("nuser_") or name in SIZES:
             setattr(machine, name, getattr(film, name))
     for name in ("global_", "quality", "headlight", "map", "scale", "rgba"):
         settings = getattr(film.visual, name)

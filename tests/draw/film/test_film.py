@@ -482,3 +482,13 @@ def test_touch_is_where_the_stop_pushes_and_there_only(hit):
     assert touch.any()
     # the reaction is that of the step before, and a dashpot lets go before the buffers part
     assert not (pushed & ~touch & ~np.roll(touch, 1)).any()
+
+
+def test_sizes_that_a_user_s_file_gives_leave_nothing_on_the_terminal(capfd):
+    """MuJoCo itself prints a warning where they differ from the film's."""
+    sizes = '<size njmax="500" nconmax="100" nuserdata="3"/>'
+    xml = f"""<mujoco>{sizes}<worldbody><body><joint name="j"/><geom size=".1"/></body></worldbody>
+    <actuator><motor joint="j" ctrlrange="-1 1"/></actuator></mujoco>"""
+    scenario = smc.Scenario(plant=smc.plant_from(xml, ["j"], name="sized"), law="none")
+    world.compose(scenario, 0.0, SIZE, camera.turn(90.0, 0.0))
+    assert capfd.readouterr() == ("", "")
