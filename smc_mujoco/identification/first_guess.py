@@ -50,6 +50,7 @@ APART = 1.05  # the level of a friction at rest over that while sliding, at the 
 SHIFT = 0.01  # of a parameter, for the slope of forces by it
 LARGEST_ANGLE = 3.0 * math.pi  # rad: a larger one may be in degrees; chosen
 MAX_BEYOND = 0.1  # of a joint's range, by which a log may pass it, as stops are soft; chosen
+FITS = 0.5  # of the force that a motion takes: in degrees a log has a 57th of it; chosen
 TOO_SMALL = 0.1  # of the force that a motion takes: angles may be in degrees; chosen
 # cosine of the commands and the forces that a motion takes: beyond it they agree, and beyond its
 # negative one of their columns has the other sign; chosen
@@ -450,7 +451,8 @@ def doubts(rig: LogRig, data: Sequence[Data]) -> list[str]:
         shares = force_shares(rig, log)
         for i, (x, u) in enumerate(zip(rig.columns.x, rig.columns.inputs, strict=False)):
             reach = float(np.abs(record[x]).max())
-            if rig.plant.units[i] == "rad" and reach > LARGEST_ANGLE:
+            many_turns = rig.plant.units[i] == "rad" and reach > LARGEST_ANGLE
+            if many_turns and shares[i] < FITS:
                 said.append(f"{x} reaches {reach:.3g} rad: if that is in degrees, divide by 57.3")
             gained = f"{driven_names(rig.plant)[i]}.gain" in rig.quantities
             if shares[i] > TOO_LARGE and not gained and moves(record[x]):

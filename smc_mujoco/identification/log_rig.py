@@ -9,6 +9,7 @@ step has to divide it.
 
 import dataclasses
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,7 +18,7 @@ import numpy as np
 from smc_mujoco.common.aliases import Array, Data, Fields, Names, Numbers
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.data import frozen_data, keyword_dataclass
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, users_stacklevel
 from smc_mujoco.identification import records
 from smc_mujoco.identification.hidden_starts import HiddenStart, begun, hidden_starts
 from smc_mujoco.identification.paths import (
@@ -140,8 +141,28 @@ class LogRig(Rig):
                     columns[name] = log.u[:, i]
                 data.append(columns)
             else:
-                data.append(self._named(log))
+                data.append(self._unwrapped(self._named(log)))
         return self, data
+
+    def _unwrapped(self, log: Data) -> Data:
+        """Return a log whose hinges have no jumps by a turn; say of each that had."""
+        if not isinstance(log, Mapping):
+            return log
+        columns = dict(log)
+        for name, unit in zip(self.columns.x, self.plant.units, strict=True):
+            x = np.asarray(log.get(name, ()))
+            if unit != "rad" or x.ndim != 1 or x.dtype.kind not in "iuf" or len(x) < 2:
+                continue
+            jumps = records.wraps(x) if np.isfinite(x).all() else ()
+            if len(jumps):
+                columns[name] = np.unwrap(x)
+                warnings.warn(
+                    f"column {name} of {self.name} jumps by a turn at {len(jumps)} samples, first "
+                    f"at row {int(jumps[0]) + 1}: its encoder wraps, and the jumps are taken out",
+                    ScenarioWarning,
+                    stacklevel=users_stacklevel(),
+                )
+        return columns
 
     def _named(self, log: Data) -> Data:
         """Return the log of one joint with columns x and u, which may be x_JOINT and u_JOINT."""

@@ -23,6 +23,8 @@ from smc_mujoco.simulation.readings import readings
 from smc_mujoco.simulation.trace import Trace
 
 Record = dict[str, np.ndarray]  # column -> values, (K,)
+# of the largest other step, and rad, by which a jump of an encoder that wraps differs from a turn
+OF_A_STEP, WRAPS_BY = 2.0, 0.1  # chosen
 MIN_SAMPLES = 50  # of a replay; chosen
 # on each side of a sample, for the cubic that gives its velocity; chosen: 30 ms at 500 Hz
 STATE_SAMPLES = 15
@@ -144,6 +146,17 @@ def _cell(text: str) -> float:
         return float(text)
     except ValueError:
         return np.nan
+
+
+def wraps(x: Array) -> Array:
+    """Return the samples at which the reading of a hinge jumps by a turn, as that of an encoder
+    that wraps; none of them where it jumps otherwise, too.
+    """
+    steps = np.abs(np.diff(x))
+    jumps = steps > math.pi
+    allowed = OF_A_STEP * steps[~jumps].max(initial=0.0) + WRAPS_BY
+    turns = np.abs(steps[jumps] - 2.0 * math.pi) < allowed
+    return np.flatnonzero(jumps) + 1 if turns.all() else np.zeros(0, int)
 
 
 def positions(trace: Trace, columns: Columns, noisy: bool = False) -> Record:

@@ -33,7 +33,6 @@ FOLDERS = (
 )  # of the parts and signals of this package
 # Fields that older records lack -> their defaults, which are not written either
 LATER = {"fault": None, "tracks": "position"}
-LATER_OF_PARTS = ("side", "lead", "lead_rate")
 RUN_FILE = "<run_path>"  # the module of what runpy runs
 RESOLVED = tuple(
     Resolved.__annotations__
@@ -76,7 +75,9 @@ def _data(value: Any) -> Any:  # noqa: PLR0911  # a table
             values = {}
             for f in dataclasses.fields(value):
                 content = getattr(value, f.name)
-                if f.init and not (f.name in LATER_OF_PARTS and content == f.default):
+                # of words that came later only those that say something are written
+                later = f.kw_only and f.name != "on"
+                if f.init and not (later and content == f.default):
                     values[f.name] = _data(content)
             if not isinstance(value, Friction) and not values.get("on", True):
                 del values["on"]

@@ -7,7 +7,7 @@ import pytest
 from helpers.machine_logs import chain, servo_log
 
 import smc_mujoco as smc
-from smc_mujoco.identification import log_quality, servo_columns
+from smc_mujoco.identification import log_quality, records, servo_columns
 from smc_mujoco.identification.own_rig import own_rig
 
 T = np.arange(0.0, 4.0, 2e-3)
@@ -110,3 +110,49 @@ def test_a_servo_s_column_with_another_sign_or_unit_is_named(servo, turned, word
         log = log | {name: factor * log[name]}
     (sentence,) = servo_columns.doubts(rig, [log])
     assert re.search(words, sentence), sentence
+
+
+SPINNING = """<mujoco><worldbody><body><joint name="j" axis="0 0 1"/><geom type="capsule"
+fromto="0 0 0 .4 0 0" size=".02" mass="1" contype="0" conaffinity="0"/></body></worldbody>
+<actuator><motor joint="j" ctrlrange="-10 10"/></actuator></mujoco>"""
+
+
+def test_an_encoder_that_wraps_is_read_on(recwarn):
+    """A joint of two turns, from -pi to pi and from 0 to a turn, with counts and noise."""
+    arm = smc.plant_from(SPINNING, ["j"], name="arm")
+    run = smc.run(
+        smc.Scenario(
+            plant=arm,
+            law=smc.law("pid", kp=20.0, ki=0.0, kd=3.0),
+            mismatch={"j.damping": 0.3},
+            reference=smc.signals.Ramp(4.0) + smc.Sine(0.3, 5.0),
+            sensor=smc.Encoder(4096),
+            noise=smc.Noise(1e-4),
+            duration=3.0,
+            control_period=2e-3,
+        )
+    )
+    x = smc.measured(run).x[:, 0]
+    assert np.ptp(x) > 11.0
+    recwarn.clear()
+    values = []
+    for low in (None, -np.pi, 0.0):
+        column = x if low is None else (x - low) % (2.0 * np.pi) + low
+        found = smc.identify(arm, {"t": run.t, "x": column, "u": run.u[:, 0]}, ["j.damping"])
+        values.append(found.values["j.damping"])
+        assert not [note for note in found.notes if "degrees" in note]
+        assert bool(recwarn) == (low is not None)
+        if low is not None:
+            said = str(recwarn.pop(smc.errors.ScenarioWarning).message)
+            assert said.startswith("column x of arm jumps by a turn at ")
+            assert said.endswith("its encoder wraps, and the jumps are taken out")
+        recwarn.clear()
+    assert values == pytest.approx([0.3] * 3, rel=5e-3)
+
+
+def test_jumps_of_other_sizes_are_no_turns():
+    t = np.arange(500) * 0.01
+    x = np.sin(t)
+    assert list(records.wraps(np.where(t > 2.0, x - 2.0 * np.pi, x))) == [np.argmax(t > 2.0)]
+    for jump in (3.5, 5.0, 8.0, 360.0):
+        assert not len(records.wraps(np.where(t > 2.0, x - jump, x)))

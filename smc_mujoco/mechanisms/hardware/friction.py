@@ -6,6 +6,7 @@ actuator. Under RK4 the callback simulates dry friction on joints that move alon
 
 # pyright: reportIncompatibleVariableOverride=false
 # (a constant of the base class is a function or a property here)
+import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import ClassVar
@@ -93,7 +94,7 @@ class Coulomb(Friction):
     units: ClassVar[Mapping[str, str]] = {"level": "{f}"}
 
     level: Natural
-    km: Natural = 0.0
+    km: Natural = dataclasses.field(default=0.0, kw_only=True)
 
     @staticmethod
     def steady(y, p, memory):

@@ -8,6 +8,7 @@
 
 # pyright: reportIncompatibleVariableOverride=false
 # (a constant of the base class is a function or a property here)
+import dataclasses
 import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar
@@ -101,7 +102,7 @@ class PositionServo(Actuator):
     slewmax: Natural = 0.0
     euler: Boolean = False
     integral: Offset = 0.0
-    dead_band: Natural = 0.0
+    dead_band: Natural = dataclasses.field(default=0.0, kw_only=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
