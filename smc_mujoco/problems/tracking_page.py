@@ -150,9 +150,10 @@ def problem_table(board: TrackingBoard, result: ProblemBoard) -> Iterator[str]:
         )
     more = len(result.names) - len(stands)
     still, oracle = shipped_bounds(board.suite.name)[result.problem]
+    entries = "entry" if more == 1 else "entries"
     yield ""
     yield (
-        f"{more} more entries. {100 * result.told_apart:.0f} % of all pairs can be told apart. "
+        f"{more} more {entries}. {100 * result.told_apart:.0f} % of all pairs can be told apart. "
         f"u = 0: {number(still)} counts; an oracle: {number(oracle)}."
     )
 

@@ -57,6 +57,7 @@ BOUNDS = SHIPPED / "bounds.json"
 BOUNDING = 3  # instances of the bounds
 ORACLE_SPEEDS = (1.5, 4.0)  # bandwidths of the oracle times the scale of time
 FLOOR = 0.5  # counts: smaller errors count as equal, as no encoder shows them
+RIVALS = 63  # for which leads are corrected: up to 64 entries, one more changes none between others
 SAME = 1.1  # an error is not of the load where that without it is no more than so many times less
 
 
@@ -240,7 +241,7 @@ class TrackingBoard:
                 better[entry] = counted_errors(searches[0], limit)
                 worse[entry] = counted_errors(searches[-1], limit)
                 of_worse[entry] = searches[-1]
-        comparison = Comparison(worse, FLOOR, halves=better)
+        comparison = Comparison(worse, FLOOR, halves=better, rivals=RIVALS)
         medians, intervals = {}, {}
         for entry, errors in worse.items():
             medians[entry] = float(np.median(better[entry])), float(np.median(errors))

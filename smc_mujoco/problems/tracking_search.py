@@ -9,8 +9,8 @@ law's theorem. With gains of four digits it then runs on UNSEEN other instances,
 the load. The time constant of the estimator of velocities is a gain of every entry.
 
 Two rules make a search cheap, alike for all. A set runs through its instances one by one, and no
-further than until it is known to be among the worse half; and these runs end after WINDOW s of the
-problem's window, of which the unseen runs have all.
+further than until JUDGED others of its batch are known to cost less; and these runs end after
+WINDOW s of the problem's window, of which the unseen runs have all.
 
 The fast engine makes all runs.
 """

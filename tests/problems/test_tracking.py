@@ -204,6 +204,26 @@ def test_an_entry_changes_a_page_by_its_row_and_what_it_tops_alone():
     assert row in after
 
 
+def pairs_in_doubt(board):
+    """The number of pairs that cannot be told apart in the last problem."""
+    standing = board.problems[-1]
+    count = len(standing.names)
+    return round((1.0 - standing.told_apart) * count * (count - 1) / 2)
+
+
+def test_more_entries_change_no_lead_between_others():
+    a, b = [task.name for task in tracking_suite("smc-load@1").problems[:2]]
+    entries = [result("hodob", {a: (0.6, 0.6), b: (0.6, 0.6)}, seed=9)]
+    for name, level, seed in (("pid", 1.0, 1), ("adrc", 1.17, 2)):  # nearly told apart
+        levels = {a: (level, level), b: (level, level)}
+        entries.append(result(name, levels, spread=0.08, seed=seed))
+    before = pairs_in_doubt(board_of(*entries))
+    for number in range(30):
+        far = 50.0 * 1.3**number
+        entries.append(result(f"law {number}", {a: (far, far), b: (far, far)}, seed=3 + number))
+    assert pairs_in_doubt(board_of(*entries)) == before == 1
+
+
 def interrupted(*call):
     raise KeyboardInterrupt
 
