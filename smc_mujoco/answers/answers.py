@@ -790,7 +790,10 @@ def which_next(facts: WhichFacts, call: Sequence[str]) -> NextStep:
         wide = [*_without(_without(call, "--law"), "--minutes"), "--minutes", f"{MORE_MINUTES}"]
         return NextStep(shlex.join(wide), f"tries the usual ones of {size.untried} other laws, too")
     law = facts.file or f"{facts.law}({facts.gains.replace(' ', '')})"
-    return NextStep(shlex.join(["smc-mujoco", "export", law, "controller"]), "writes it as C")
+    if facts.modelled or not facts.file:
+        return NextStep(shlex.join(["smc-mujoco", "export", law, "controller.c"]), "writes it as C")
+    words = ["smc-mujoco", "export", law, "controller", "--ros2"]
+    return NextStep(shlex.join(words), "writes it for ros2_control; --plain writes a loop in C")
 
 
 def _compared(facts: WhichFacts, call: Sequence[str]) -> list[str]:

@@ -206,6 +206,7 @@ class WhichFacts:
     gains: str
     unit: str  # of u, where it is no force
     file: str  # with the gains; "" if they were given
+    modelled: bool  # whether the law reads the nominal model
     size: RaceSize
     lead: Lead | None  # of the law over its nearest rival
     over_sets: bool  # whether sets of gains name the law, and not only runs with its gains

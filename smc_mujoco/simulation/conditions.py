@@ -137,6 +137,8 @@ class Condition:
 
     name: str
     fields: Recipe
+    # the file that it was read from, if it was all of it, for commands that are printed
+    file: str = dataclasses.field(default="", compare=False, repr=False)
 
     def __post_init__(self):
         if not callable(self.fields):
@@ -383,6 +385,8 @@ def from_file(path: Path) -> list[Condition]:
             raise ScenarioError(f"line {count} of {str(path)!r}: {error}") from None
     if not conditions:
         raise ScenarioError(f"{str(path)!r} has no condition: write one on a line")
+    if len(conditions) == 1:
+        return [dataclasses.replace(conditions[0], file=str(path))]
     return conditions
 
 

@@ -397,6 +397,7 @@ class Recommendation(Answer):
             gains=gains_text(self.law.gains),
             unit=self._unit,
             file=str(self.folder / "recommended.json") if self.tuned else "",
+            modelled=self.law.requires_model,
             size=self.size,
             lead=self.lead,
             over_sets=self.over_sets,

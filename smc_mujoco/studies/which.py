@@ -173,7 +173,7 @@ def _call(
                 words += [option, ",".join(items)]
                 continue
             for item in items:
-                words += [option, str(item)]
+                words += [option, getattr(item, "file", "") or str(item)]
     if starts:
         words.append(f"--x0={','.join(f'{x:g}' for x in starts.x0 or ())}")
     if out != Path("which"):

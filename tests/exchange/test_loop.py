@@ -147,3 +147,14 @@ def _inputs(source):
 
 def test_a_law_that_reads_a_model_is_refused(tmp_path, refused):
     refused(lambda: law_to_package("computed_torque_sliding", tmp_path / "a", joints=2), "M", ".c")
+
+
+def test_the_package_names_the_joints_that_its_file_names(tmp_path):
+    xml = """<mujoco><worldbody><body><joint name="left/elbow" axis="0 1 0"/><geom size=".1"/></body>
+    </worldbody><actuator><motor joint="left/elbow" ctrlrange="-1 1"/></actuator></mujoco>"""
+    arm = smc.plant_from(xml, ["left/elbow"], name="arm")
+    for plant, names in ((arm, '["left/elbow"]'), ("duffing", "[joint1]")):
+        scenario = smc.Scenario(plant=plant, law="super_twisting")
+        folder = law_to_package(scenario, tmp_path / "a", "ros2")
+        parameters = (folder / "config" / "controllers.yaml").read_text()
+        assert f"joints: {names}\n" in parameters

@@ -4,6 +4,7 @@ import dataclasses
 import json
 import math
 import re
+import shlex
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -23,7 +24,7 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.properties import searched
 from smc_mujoco.robustness import margins
-from smc_mujoco.simulation.conditions import find_condition
+from smc_mujoco.simulation.conditions import find_condition, find_conditions
 from smc_mujoco.simulation.grid import Draws
 from smc_mujoco.studies import race, recommend
 from smc_mujoco.studies import recommendation as recommendation_module
@@ -246,6 +247,9 @@ def test_one_next_step_is_a_whole_command(raced):
     assert "--condition a+b" in together
     done = dataclasses.replace(asked, untried_laws=()).next_step.command
     assert done.startswith("smc-mujoco export ")
+    words = shlex.split(done)
+    commands = pytest.importorskip("smc_mujoco.exchange.commands")
+    commands._law_and_file(words[2:4], "--ros2" in words)  # refuses what the command cannot write
     assert sum(text.startswith("next") for text in asked.lines) == 1
     assert recommendation.next_step is None  # of a plant without a text
 
@@ -544,6 +548,22 @@ def test_an_event_after_the_runs_that_judge_gains_is_refused_before_them(refused
     fields = {"laws": ["pid", "adrc"], "minutes": 1}
     said = "condition 'late' has its fault at 2.5 s", "a duration above 3.75 s"
     refused(lambda: smc.which("duffing", late, duration=3.0, **fields), *said)
+
+
+def test_a_next_step_names_the_file_of_a_condition(tmp_path):
+    """The text of an identified machine is three lines of quotes."""
+    file = tmp_path / "found.txt"
+    file.write_text("# numbers\nidentified: input_delay=0.004\n")
+    several = tmp_path / "two.txt"
+    several.write_text("a: input_delay=0.001\nb: input_delay=0.002\n")
+    given = [*find_conditions(str(file)), *find_conditions(str(several)), "noise"]
+    words = module._call("m.xml:s", given, None, None, None, Path("which"), 3.0)
+    named = words[words.index("--condition") :]
+    texts = [str(file), "a: input_delay=0.001", "b: input_delay=0.002", "noise"]
+    expected = [word for text in texts for word in ("--condition", text)]
+    assert named == [*expected, "--minutes", "3"]
+    (alone,) = find_conditions(str(file))
+    assert alone == find_condition("identified: input_delay=0.004")
 
 
 def test_a_law_s_overshoot_is_looked_at_without_time_where_a_limit_was_asked_for(tmp_path):

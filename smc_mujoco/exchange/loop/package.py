@@ -4,6 +4,7 @@ The law, its surface, its estimator, its bound and what compensates friction are
 `smc_loop.c` gives it a start, a step and its parameters by name.
 """
 
+import json
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,6 +22,7 @@ from smc_mujoco.control.surface import Surface
 from smc_mujoco.exchange.fmu import contents
 from smc_mujoco.exchange.fmu.contents import ExportedLaw
 from smc_mujoco.exchange.fmu.export_fmu import controller_files, exported_law
+from smc_mujoco.mechanisms.layout import driven_names
 from smc_mujoco.simulation.scenario import Scenario
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -162,7 +164,7 @@ def _files(exported: ExportedLaw, package: str, kind: str, law: Any) -> dict[str
             "package.xml": PACKAGE,
             f"{package}.xml": PLUGIN,
             "src/smc_controller.cpp": controller,
-            "config/controllers.yaml": _parameters(exported, package, interface),
+            "config/controllers.yaml": _parameters(exported, package, interface, _joints(law)),
         }
     for name, text in texts.items():
         files[name] = re.sub(r"@(\w+)@", lambda match: words[match[1]], text)
@@ -174,10 +176,21 @@ def _listed(exported: ExportedLaw, names: Sequence[str]) -> str:
     return ", ".join(f'"{name}{place}"' for name in names for place in exported.places)
 
 
-def _parameters(exported: ExportedLaw, package: str, interface: str) -> str:
-    """Return the file of parameters, with the gains of the export."""
+def _joints(law: Any) -> Sequence[str]:
+    """Return the names of the joints that a scenario drives on a user's own robot; () without."""
+    if not isinstance(law, Scenario) or not law.plant.is_user_model:
+        return ()
+    return driven_names(law.plant)
+
+
+def _parameters(exported: ExportedLaw, package: str, interface: str, joints: Sequence[str]) -> str:
+    """Return the file of parameters, with the gains of the export, and the names of joints where as
+    many are known.
+    """
     count = max(1, exported.joints)
-    names = ", ".join(f"joint{i + 1}" for i in range(count))
+    if len(joints) != count:
+        joints = [f"joint{i + 1}" for i in range(count)]
+    names = ", ".join(json.dumps(joint) if "/" in joint else joint for joint in joints)
     lines = [
         "controller_manager:",
         "  ros__parameters:",
