@@ -383,10 +383,12 @@ def _check_angle(rig: LogRig, record: Record, i: int, share: float, stopped: boo
                 turned[angle] = np.radians(record[angle])
         if force_cosines(forces(rig, turned, [0.0]))[i] < AGREES:
             return
+    cure = "if it is in degrees, divide it by 57.3"
+    if not np.any(record[name] % 1.0):
+        cure = "if it counts the steps of an encoder, multiply it by 2 pi over those of a turn"
     raise ScenarioError(
         f"column {name} of {rig.name} reaches {reach:.3g}, and in rad its motion takes "
-        f"{1.0 / max(share, 1e-9):.3g} times the recorded force: if it is in degrees, divide it by "
-        "57.3"
+        f"{1.0 / max(share, 1e-9):.3g} times the recorded force: {cure}"
     )
 
 

@@ -86,6 +86,8 @@ def load_record(path: AnyPath, columns: Mapping[str, str] | None = None) -> Reco
                 data = dict(arrays)
     if "about" in data:
         return traces.load(file)
+    if data:
+        data = _in_si([*data], [*data.values()], str(path))
     return renamed(data or _csv(file), columns, str(path))
 
 
@@ -111,15 +113,22 @@ def as_columns(record: Any, columns: Mapping[str, str] | None = None) -> Any:
         return load_record(record, columns)
     if hasattr(record, "to_dict") and hasattr(record, "columns"):  # a data frame
         frame = record
-        record = {}
-        names, factors = column_units.headings(list(map(str, frame.columns)), "the data frame")
-        for k, (name, factor) in enumerate(zip(names, factors, strict=True)):
-            record[name] = np.asarray(frame.iloc[:, k] if hasattr(frame, "iloc") else frame[:, k])
-            if factor != 1.0:
-                record[name] = factor * record[name]
+        values = []
+        for k in range(len(frame.columns)):
+            values.append(np.asarray(frame.iloc[:, k] if hasattr(frame, "iloc") else frame[:, k]))
+        return renamed(_in_si(frame.columns, values, "the data frame"), columns, "the record")
     if isinstance(record, Mapping):
-        return renamed(record, columns, "the record")
+        return renamed(_in_si([*record], [*record.values()], "the log"), columns, "the record")
     return record
+
+
+def _in_si(heads: Sequence[object], values: Sequence[Any], what: str) -> Record:
+    """Return columns by their names without units, those of other known units converted."""
+    names, factors = column_units.headings(list(map(str, heads)), what)
+    columns = {}
+    for name, factor, column in zip(names, factors, values, strict=True):
+        columns[name] = column if factor == 1.0 else factor * np.asarray(column)
+    return columns
 
 
 def _csv(file: Path) -> Record:

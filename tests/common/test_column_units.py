@@ -46,3 +46,15 @@ def test_two_columns_of_one_name_and_a_foreign_unit_are_refused(tmp_path, refuse
     refused(lambda: rig.checked(log), "'u [A]'", "JOINT.gain", "--columns")
     named = records.as_columns(log, {"u": "u [A]"})
     np.testing.assert_array_equal(rig.checked(named)["u"], t)
+
+
+def test_units_of_columns_are_read_wherever_the_log_comes_from(tmp_path):
+    """Of columns by name `x (deg)` was refused as none of the units that have it."""
+    log = {"t [ms]": np.array([0.0, 2.0]), "x (deg)": np.array([0.0, 90.0]), "u": [1.0, 2.0]}
+    np.savez(tmp_path / "log.npz", **log)
+    for source in (log, tmp_path / "log.npz"):
+        read = records.as_columns(source)
+        assert list(read) == ["t", "x", "u"]
+        np.testing.assert_allclose(read["t"], [0.0, 2e-3])
+        np.testing.assert_allclose(read["x"], [0.0, math.pi / 2.0])
+        np.testing.assert_array_equal(read["u"], [1.0, 2.0])

@@ -156,3 +156,12 @@ def test_jumps_of_other_sizes_are_no_turns():
     assert list(records.wraps(np.where(t > 2.0, x - 2.0 * np.pi, x))) == [np.argmax(t > 2.0)]
     for jump in (3.5, 5.0, 8.0, 360.0):
         assert not len(records.wraps(np.where(t > 2.0, x - jump, x)))
+
+
+def test_a_column_of_counts_is_told_from_one_in_degrees(rig, refused):
+    u = 0.3 * np.gradient(X, T) + 0.2 * 9.81 * np.sin(X) - 1.3 * X
+    for column, cure in (
+        (np.round(X / COUNT), "counts the steps of an encoder"),
+        (np.degrees(X), "in degrees"),
+    ):
+        refused(lambda x=column: rig.guessed([{"t": T, "x": x, "u": u}]), "column x", cure)
