@@ -11,6 +11,7 @@ import json
 import pydoc
 import re
 import runpy
+import shlex
 import subprocess
 import tomllib
 
@@ -133,6 +134,19 @@ def test_the_tutorial_s_comparison_prints_what_the_page_shows(tmp_path, monkeypa
         marked = re.findall(r"^(\w+) .*\d\)?\*", text, re.MULTILINE)
         answers.append((marked, re.findall(r"^Use (\w+)", text, re.MULTILINE)))
     assert answers[0] == answers[1] == (["adrc"], ["adrc"])
+
+
+@pytest.mark.slow
+def test_the_commands_for_coding_agents_run_as_they_are(tmp_path):
+    page = DOCS / "coding_agents.md"
+    assert len(page.read_text().split()) <= 1000
+    (commands,) = blocks(page.read_text(), "sh")
+    commands = commands.splitlines()
+    assert len(commands) == 10
+    with beside(page, tmp_path):
+        for command in commands:
+            python("-m", *shlex.split(command.replace("-mujoco", "_mujoco", 1)), folder=tmp_path)
+    assert (tmp_path / "controller" / "main.c").is_file()
 
 
 @pytest.mark.slow

@@ -164,7 +164,7 @@ def check_command(line: str, known: dict) -> None:
     }
     unknown = []
     for option in rest:
-        if option.startswith("-") and option.partition("=")[0] not in options:
+        if option.startswith("-") and option.partition("=")[0] not in {*options, "-"}:
             unknown.append(option)
     assert unknown == [], line
     arguments = []

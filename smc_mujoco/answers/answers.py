@@ -9,6 +9,7 @@ import math
 import shlex
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import PurePath
 from typing import Any
 
 from smc_mujoco.answers.command import PROGRAM
@@ -179,7 +180,10 @@ def opens(facts: Sequence[Open]) -> list[Labelled]:
     parts = []
     for (laws, _, _), of_laws in alike.items():
         metrics = joined([fact.metric for fact in of_laws])
-        parts.append(f"{metrics}: {', '.join(laws)}{doubt(of_laws)}")
+        names = ", ".join(laws)
+        if len(laws) == 1:
+            names = f"perhaps {names}"
+        parts.append(f"{metrics}: {names}{doubt(of_laws)}")
     return [("open", "; ".join(parts))] if parts else []
 
 
@@ -414,7 +418,11 @@ def winners_lines(contests: Sequence[Contest]) -> list[str]:
         for name, *parts in itertools.zip_longest(*names_and_cells, fillvalue=""):
             texts = [part.ljust(room) for part in parts]
             lines.append(" ".join([name.ljust(head), *texts]).rstrip())
-    lines += ["The winner and its least lead, or the laws that are tied or open.", ""]
+    lines += [
+        "The winner and its least lead, or the laws that are tied or open.",
+        "All are judged together: fewer at once show smaller leads.",
+        "",
+    ]
     return lines + labelled(of_plants.items())
 
 
@@ -789,10 +797,14 @@ def which_next(facts: WhichFacts, call: Sequence[str]) -> NextStep:
     if size.untried:
         wide = [*_without(_without(call, "--law"), "--minutes"), "--minutes", f"{MORE_MINUTES}"]
         return NextStep(shlex.join(wide), f"tries the usual ones of {size.untried} other laws, too")
-    law = facts.file or f"{facts.law}({facts.gains.replace(' ', '')})"
+    gains = facts.file or facts.gains.replace(" ", "")
+    law = facts.file or f"{facts.law}({gains})"
+    for word in itertools.chain.from_iterable(part.split(",") for part in call):
+        if PurePath(word).suffix == ".py" and PurePath(word).stem == facts.law:
+            law = f"{word}({gains})"
     if facts.modelled or not facts.file:
-        return NextStep(shlex.join(["smc-mujoco", "export", law, "controller.c"]), "writes it as C")
-    words = ["smc-mujoco", "export", law, "controller", "--ros2"]
+        return NextStep(shlex.join([PROGRAM, "export", law, "controller.c"]), "writes it as C")
+    words = [PROGRAM, "export", law, "controller", "--ros2"]
     return NextStep(shlex.join(words), "writes it for ros2_control; --plain writes a loop in C")
 
 
@@ -849,9 +861,8 @@ IDENTIFY_LINES = LINES - 2  # one below is for the files
 
 
 def _fit(percent_of_log: float) -> str:
-    """Return "99.4 %", or when a twin falls."""
-    text = f"{percent_of_log:.1f}"
-    return text if text.startswith("falls") else f"{text} %"
+    """Return "99.4 %"."""
+    return f"{percent_of_log:.1f} %"
 
 
 def identify_files(condition: str, figure: str, report: str) -> str:

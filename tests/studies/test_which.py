@@ -1,5 +1,6 @@
 """Which law: what the answer says is what its tables hold, in each of its forms."""
 
+import contextlib
 import dataclasses
 import json
 import math
@@ -17,6 +18,7 @@ from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.tuning import quick_search, search
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.analysis.tuning.run_limits import RunLimit
+from smc_mujoco.answers import answers
 from smc_mujoco.answers.answers import CAUTIONS, LINES, WIDTH
 from smc_mujoco.cli import main
 from smc_mujoco.control import gain_sets
@@ -227,7 +229,7 @@ def test_each_form_has_its_first_line(raced):
     assert said.startswith("Open")
 
 
-def test_one_next_step_is_a_whole_command(raced):
+def test_one_next_step_is_a_whole_command(raced, tmp_path, monkeypatch):
     _, recommendation, _ = raced
     call = ["smc-mujoco", "which", "m.xml:slide", "--condition", "a", "--condition", "b"]
     call += ["--law", "pid,adrc", "--minutes", "1"]
@@ -246,10 +248,15 @@ def test_one_next_step_is_a_whole_command(raced):
     assert together.count("--condition") == 1
     assert "--condition a+b" in together
     done = dataclasses.replace(asked, untried_laws=()).next_step.command
-    assert done.startswith("smc-mujoco export ")
-    words = shlex.split(done)
-    commands = pytest.importorskip("smc_mujoco.exchange.commands")
-    commands._law_and_file(words[2:4], "--ros2" in words)  # refuses what the command cannot write
+    monkeypatch.chdir(tmp_path)
+    _, *words = shlex.split(done)
+    pytest.importorskip("smc_mujoco.exchange.commands")
+    with contextlib.suppress(SystemExit):
+        main.main(words)
+    assert next(tmp_path.glob("controller*")).exists()
+    own = dataclasses.replace(asked, untried_laws=(), call=[*call, "--law", "a/m.py,pid"])
+    law = dataclasses.replace(own.facts, law="m")
+    assert "'a/m.py(" in answers.which_next(law, own.call).command
     assert sum(text.startswith("next") for text in asked.lines) == 1
     assert recommendation.next_step is None  # of a plant without a text
 
@@ -413,6 +420,7 @@ def test_laws_for_which_there_is_no_time_are_named(raced, tmp_path):
     assert "2 of 3 laws" in short.lines[0]
 
 
+@pytest.mark.slow
 def test_the_minutes_hold_within_a_tenth(tmp_path, monkeypatch):
     """Where a search, a judgement and a run of the tables take as long as on a slow machine."""
     start = time.monotonic()
