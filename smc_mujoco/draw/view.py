@@ -52,7 +52,7 @@ def view(
 
     Args:
       scenario: a Scenario or two, a plant, or "arm.xml:shoulder+elbow".
-      laws: one or two; default the scenario's, or the first that suits the plant.
+      laws: one or two; default the scenario's, or the first that suits the plant, if any does.
       port: of the page on this machine; 0 takes the first free one from 8080 on. One that is in use
         gives way to the next free one.
       open_browser: whether to open the tab.
@@ -228,7 +228,7 @@ def runs_of(
     else:
         plant = as_plant(runs)
         runs = []
-        for law in named_laws or laws_of(plant)[:1]:
+        for law in named_laws or laws_of(plant)[:1] or ["none"]:
             own = law_for(plant, law)
             runs.append(Scenario(plant=plant, law=own))
     if len(runs) > 2:

@@ -67,15 +67,22 @@ class Machines:
                 "geoms, or its links <visual>"
             )
         slides = self.model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_SLIDE
-        self.mounts = arrows.mounts(
-            first, joints.tolist(), slides.tolist(), puppet.rail, self.turn[:, 2]
-        )
         self.carts = shared_picture.places([puppet, puppet], self.turn)
         self.colours = style.law_colours([scenario.law for scenario in session.scenarios])
         if len(set(self.colours)) < len(self.colours):  # one law twice
             self.colours = list(style.RUN_COLOURS[: len(self.colours)])
         self.points = np.concatenate(list(self.reached()))
         self.size = float(np.ptp(self.points, axis=0).max())
+        own = float(np.ptp(self.points[: 8 * self.links.sum()], axis=0).max())  # in one pose
+        front = self.turn[:, 2]
+        self.mounts = []
+        for mount in arrows.mounts(first, joints.tolist(), slides.tolist(), puppet.rail, front):
+            radius = min(mount.radius, arrows.BENT_SIZE * own)
+            if first.plant.has_path:  # an arm of the library, where a film writes numbers
+                radius = arrows.USER_RADIUS * own
+            self.mounts.append(
+                mount._replace(radius=radius, front=front if radius else mount.front)
+            )
         weight = GRAVITY * self.model.body_mass[self.moved].sum()  # N
         self.weight = float(f"{weight:.2g}")
         right, up, back = self.turn.T
