@@ -193,6 +193,8 @@ class LiveView:
 
     def record(self, path: Path) -> None:
         """Write a page that plays the runs from their start to their end without a server."""
+        from smc_mujoco.draw.view_door import with_fewer_pixels
+
         self.session.begin(self.session.scenarios)
         self.machines.show()
         recording = self.server.get_scene_serializer()
@@ -202,7 +204,7 @@ class LiveView:
             recording.insert_sleep(self.session.time - before)
             self.machines.show()
         with replacing(path) as part:
-            part.write_text(recording.as_html(), encoding="utf-8")
+            part.write_text(with_fewer_pixels(recording.as_html()), encoding="utf-8")
 
 
 def runs_of(

@@ -264,6 +264,11 @@ def test_a_notebook_s_cell_shows_the_page_and_goes_on(monkeypatch):
     assert [thread for thread in left if thread.is_alive() and thread.name != "pymp"] == []
 
 
+def test_a_machine_that_no_law_suits_is_shown_without_control():
+    (run,) = runs_of("acrobot", ())
+    assert run.law.name == "none"
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [

@@ -108,6 +108,13 @@ def test_the_page_and_its_socket_answer_at_the_address_alone(live):
         assert refused.value.response.status_code == 403
 
 
+def test_where_a_processor_draws_the_page_has_fewer_pixels(live):
+    with urllib.request.urlopen(live.address, timeout=20) as answer:
+        page = answer.read().decode()
+    assert int(answer.headers["Content-Length"]) == len(page.encode())
+    assert page.index("fixedDpr") < page.index("</script>")  # before viser reads the address
+
+
 def test_a_page_serves_this_machine_alone_and_the_door_is_taken_away(live):
     from websockets.asyncio import server
 
