@@ -21,6 +21,7 @@ from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw.decimate import end, finite, window
 from smc_mujoco.draw.page import Handle, Size
 from smc_mujoco.draw.panels import Panel
+from smc_mujoco.draw.quantities import span
 from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.simulation.trace import Trace
 
@@ -589,8 +590,9 @@ def _draw_ends(page: Figure | SubFigure, cell: SubplotSpec, panel: Panel, runs: 
     """Draw a close-up of the end of u in a cell, each run in its row."""
     frame = page.add_subplot(cell, frameon=False, xticks=[])
     rows = lanes.rows(frame, panel, runs.colours)
+    largest = max(map(abs, span(panel.traces, "u")))
     for ax, part, colours in rows:
-        drawing.last_samples(ax, part, colours)
+        drawing.last_samples(ax, part, colours, largest)
     _equal_ranges(frame, rows)
     frame.set_ylabel(_end_words(panel))
     rows[-1].axes.set_xlabel(f"{END_TIME}\nrows as in the key")

@@ -671,9 +671,9 @@ def phase(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
     ax.axvline(0.0, **rule)
 
 
-def last_samples(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
+def last_samples(ax: Axes, panel: Panel, colours: Sequence[str], beside: float = 0.0) -> None:
     """Draw the last samples of u of the first channel, each held until the next, of the longest
-    run.
+    run. `beside` is the largest |u| of runs in other rows, for the range of a u that is 0.
     """
     stop = end(panel.traces)
     begin = close_up_begin(panel.traces)
@@ -689,9 +689,8 @@ def last_samples(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
         if u.size:
             ends += [u.min(), u.max()]
     if ends:
-        range_of_u = span(panel.traces, "u")
-        largest = max(map(abs, range_of_u))
-        least = MIN_CLOSE_UP / 2 * largest
+        largest = max(map(abs, span(panel.traces, "u")))
+        least = MIN_CLOSE_UP / 2 * (largest or beside)
         half_range = 0.62 * np.ptp(ends)
         half = max(half_range, least) or 1.0
         middle = (min(ends) + max(ends)) / 2

@@ -311,3 +311,12 @@ def test_a_step_of_the_reference_is_no_peak_of_the_error_s_rate():
     trace = smc.run(dataclasses.replace(scenario, reference=smc.Sine(0.2, 3.0)))
     rate = trace.v - 0.6 * np.cos(3.0 * trace.t)[:, None]
     np.testing.assert_allclose(quantities.QUANTITIES["de"](trace), rate, atol=1e-3)
+
+
+def test_a_row_of_no_control_takes_the_range_of_the_others(pair):
+    relay = dataclasses.replace(pair[0], u=0.03 * np.sign(np.sin(9e3 * pair[0].t))[:, None])
+    idle = dataclasses.replace(pair[1], u=np.zeros_like(pair[1].u))
+    drawn = smc.figure([relay, idle], panels=["end"])
+    limits = [ax.get_ylim() for ax in drawn.axes[0].child_axes]
+    assert len(limits) == 2
+    assert all(high - low < 0.1 for low, high in limits)
