@@ -260,8 +260,9 @@ def test_a_notebook_s_cell_shows_the_page_and_goes_on(monkeypatch):
     assert live.thread
     assert live.thread.is_alive()
     live.close()
-    left = set(threading.enumerate()) - before
-    assert [thread for thread in left if thread.is_alive() and thread.name != "pymp"] == []
+    for thread in set(threading.enumerate()) - before:
+        thread.join(timeout=20)
+        assert not thread.is_alive()
 
 
 def test_a_machine_that_no_law_suits_is_shown_without_control():
