@@ -7,6 +7,7 @@ by more than a factor of ten.
 
 import copy
 import dataclasses
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -42,6 +43,8 @@ KEPT_PROMISE = 0.5  # of the decrease that derivatives promise: less calls for d
 DELAY_MOVES = -8e-3, -4e-3, -2e-3, -1e-3, 1e-3, 2e-3, 4e-3, 8e-3
 # of a stiffness, that are tried; chosen
 SPRING_FACTORS = 0.1, 0.2, 0.35, 0.6, 0.8, 1.25, 1.7, 3.0, 5.0, 10.0
+# s, of a spring's damping over its stiffness, that are tried with these; None: the present damping
+SPRING_DAMPINGS = None, 3e-4, 1e-3, 3e-3  # chosen
 LEAST_DELAY_MOVE = 2.5e-4  # s, at the solution; chosen
 BETTER = 3.0  # deviations of noise, by which another delay must fit better there; chosen
 MOST_DELAYS = 3  # other delays, at most, from which a search starts again; chosen
@@ -99,10 +102,16 @@ def _other_spring(replays: Replays, slopes: Slopes) -> Point | None:
     for k, name in enumerate(replays.names):
         if name not in replays.twin.springs:
             continue
+        damping = name.removesuffix("stiffness") + "damping"
+        times = SPRING_DAMPINGS if damping in replays.names else SPRING_DAMPINGS[:1]
         points = []
-        for factor in SPRING_FACTORS:
+        for factor, time in itertools.product((1.0, *SPRING_FACTORS), times):
             values = slopes.point.values.copy()
             values[k] = np.clip(factor * values[k], replays.low[k], replays.high[k])
+            if time is not None:  # an undamped resonance rings, wherever it is
+                d = replays.names.index(damping)
+                damped = time * values[k] * replays.scales[k] / replays.scales[d]
+                values[d] = np.clip(damped, replays.low[d], replays.high[d])
             points.append(Point(values, slopes.point.states))
         costs = [_left(slopes, rows) for rows in replays.residuals(points)]
         if min(costs) < least:

@@ -19,6 +19,7 @@ from smc_mujoco.identification.lack_of_fit import Lack
 from smc_mujoco.identification.log_rig import LogPart, LogRig
 from smc_mujoco.identification.paths import DELAY
 from smc_mujoco.identification.replays import Piece, Point, Replays, Slopes
+from smc_mujoco.mechanisms.hardware.beside_joint import BesideJoint
 from smc_mujoco.mechanisms.layout import driven_names
 
 SIZE = 0.01  # of the command's deviation: a force so small acts linearly; chosen
@@ -41,6 +42,11 @@ WARMTH = "of friction that changes in the course of the log, as it warms up"
 COMMAND = (
     "as the fast part of its command: what was applied between samples differs from the log, so "
     "record every command of the loop; or a spring is between motor and joint, an ElasticJoint"
+)
+SPRUNG = (
+    "as the fast part of its command: what was applied between samples differs from the log, so "
+    "record every command of the loop; or the search ended at another stiffness or play than the "
+    "machine's: start it from another"
 )
 LEFT_OUT = {
     "armature": "in proportion to its acceleration",
@@ -110,11 +116,12 @@ def lacking_forces(rig: LogRig, replays: Replays, slopes: Slopes) -> list[Lack]:
     texts = []
     pieces = list(replays.pieces)
     for i, joint in enumerate(driven_names(rig.plant)):
+        geared = any(isinstance(part, BesideJoint) for part in rig.base.drive_train.chains[i])
         shapes_by_piece = []
         for motion in _motions(rig, replays, slopes.point, i):
             shapes_by_piece.append([*shapes(motion), *left_out(motion, joint, replays.names)])
         for of_pieces in zip(*shapes_by_piece, strict=True):
-            words = of_pieces[0][0]
+            words = SPRUNG if geared and of_pieces[0][0] == COMMAND else of_pieces[0][0]
             texts.append(f"lack of fit: the model lacks a force on {joint} {words}")
             pieces += _pushed(replays.pieces, [force for _, force in of_pieces], i)
     trial = copy.copy(replays)

@@ -5,6 +5,7 @@ the start of a piece, of logs by an integration of both equations.
 import dataclasses
 import math
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -179,3 +180,37 @@ def test_a_level_at_rest_and_one_while_sliding_keep_their_slopes_whatever_the_st
     swapped = guess.with_values({"friction.coulomb": 0.6, "friction.static": 0.4})
     part = swapped.scenario("none").friction[0]
     assert (part.coulomb, part.static) == (0.4, 0.6)
+
+
+def test_another_stiffness_is_tried_with_damping_as_an_undamped_spring_rings():
+    """From 478 N m/rad and no damping, of 300 with 0.4: undamped, each stiffness leaves as much."""
+    names = ["actuator.stiffness", "actuator.damping"]
+
+    def residuals(points):
+        rows = []
+        for point in points:
+            stiffness, damping = point.values * (100.0, 0.1)
+            rings = 1.0 if damping < 0.05 else abs(stiffness / 300.0 - 1.0)
+            rows.append([np.array([0.0, 0.0, rings, 0.0])])
+        return rows
+
+    replays = SimpleNamespace(
+        names=names,
+        scales=np.array([100.0, 0.1]),
+        low=np.zeros(2),
+        high=np.full(2, np.inf),
+        twin=SimpleNamespace(springs=names[:1]),
+        residuals=residuals,
+    )
+    present = Point(np.array([4.78, 0.0]), np.zeros((1, 0)))
+    slopes = SimpleNamespace(
+        point=present,
+        residuals=residuals([present])[0],
+        freed_slopes=np.eye(4)[:, :2],
+        freed=lambda rows: rows,
+    )
+    other = gauss_newton._other_spring(replays, slopes)  # pyright: ignore[reportArgumentType]
+    assert other is not None
+    stiffness, damping = other.values * replays.scales
+    assert stiffness == pytest.approx(0.6 * 478.0)
+    assert 1e-4 * stiffness < damping < 1e-2 * stiffness
