@@ -11,6 +11,7 @@ from matplotlib.figure import Figure, SubFigure
 from smc_mujoco.analysis.bootstrap import MIN_INTERVAL_SAMPLES, Interval, median_of, share_interval
 from smc_mujoco.analysis.paired_runs import (
     GROUPS,
+    OBJECTIVE,
     SETTLED,
     SETTLES,
     RunColumns,
@@ -27,6 +28,7 @@ from smc_mujoco.analysis.paired_runs import (
 from smc_mujoco.analysis.ranking import linked
 from smc_mujoco.common.aliases import AnyPath, Array, Fields
 from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown, warn_once
+from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import number
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
@@ -55,6 +57,7 @@ def plot(
     format: str | None = None,
     fig: Figure | SubFigure | None = None,
     winners: Collection[Cell] | None = None,
+    objectives: Mapping[Cell, Interval] = frozen({}),
 ) -> Figure:
     """Draw the median of each law over the seeds, with its 95 % bootstrap interval: dots, by
     condition.
@@ -74,6 +77,8 @@ def plot(
       path, title, size, format, fig: as in `figure`.
       winners: (metric, plant, condition, law) of dots that get a ring; `compare`'s plot has those
         of its verdicts. Where none is drawn, the key says so; None: it says nothing.
+      objectives: ("objective", plant, condition, law) -> J of the laws, s^2, a panel before the
+        metrics; `compare`'s plot has it where each plant has one condition.
 
     Returns:
       The figure.
@@ -88,7 +93,7 @@ def plot(
     check_table(table)
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
-    dots = _dots(table, items_of("metrics", metrics), winners or ())
+    dots = _dots(table, items_of("metrics", metrics), winners or (), objectives)
     head = style.titled(title, f"Medians: {dots.heading}")
     with style.page(width):
         key, shared = _key(table, dots)
@@ -163,7 +168,12 @@ class Dots(NamedTuple):
         return (len(self.looks) + 1) * blocks
 
 
-def _dots(table: RunColumns, metrics: Sequence[str], winners: Collection[Cell]) -> Dots:
+def _dots(
+    table: RunColumns,
+    metrics: Sequence[str],
+    winners: Collection[Cell],
+    objectives: Mapping[Cell, Interval],
+) -> Dots:
     """Return what a page shows of a table. Raise ScenarioError for an unknown metric, or if nothing
     is to be drawn.
     """
@@ -177,7 +187,9 @@ def _dots(table: RunColumns, metrics: Sequence[str], winners: Collection[Cell]) 
         raise ScenarioError(
             "no runs or no metrics to draw: give a table with rows, and at least one metric"
         )
-    intervals = _intervals(table, metrics)
+    intervals = {**objectives, **_intervals(table, metrics)}
+    if objectives:
+        metrics = [OBJECTIVE, *metrics]
     of_plants = table.column("plant").tolist()
     of_conditions = table.column("condition").tolist()
     ran = set(zip(of_plants, of_conditions, strict=True))
@@ -285,7 +297,7 @@ def _floors(table: RunColumns, metrics: Sequence[str]) -> dict[tuple[str, str, s
     for group in groups(table, GROUPS):
         (scenario,) = scenarios(table, group)
         for name in metrics:
-            floors[name, *group.blocks[0]] = floor(scenario, name)
+            floors[name, *group.blocks[0]] = 0.0 if name == OBJECTIVE else floor(scenario, name)
     return floors
 
 
@@ -380,7 +392,7 @@ def _panel(
     if not sizes.size:
         ax.set_xticks([])
     if any(not np.isfinite(interval.median) for interval in intervals.values()):
-        late = CATALOGUE[metric].unit == "s" or CATALOGUE[metric].error
+        late = metric != OBJECTIVE and (CATALOGUE[metric].unit == "s" or CATALOGUE[metric].error)
         drawing.note(ax, "never" if late else "not arrived")
     for j in range(1, len(conditions)):
         ax.axhline(j * height - 1, color=style.RULE, lw=style.points(0.8))
@@ -424,7 +436,10 @@ def _label(metric: str, x: str, u: str) -> str:
     """Return the label of a panel with the metric's unit where positions are in x and commands in
     u, on two lines.
     """
-    heading = SETTLED if metric == SETTLES else CATALOGUE[metric].heading(x, u)
+    if metric == OBJECTIVE:
+        heading = "J (s^2)"
+    else:
+        heading = SETTLED if metric == SETTLES else CATALOGUE[metric].heading(x, u)
     words, bracket, unit = heading.partition(" (")
     folded = bracket.replace(" ", "\n")
     squared = unit.replace("^2", "²")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from smc_mujoco.analysis import paired_runs
+from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.law_time import LawTime, law_time
 from smc_mujoco.analysis.ranking import Relevant, needed_to_win
@@ -474,27 +475,51 @@ class Compared(Answer):
 
         Args:
           path, options: path, title, size, format and fig of `smc.figure`.
-          metrics: names of metrics. Default: five of those compared, or on a page narrower than 6
-            in as many as fit, three at most; first those in which a law wins, and the settled runs
-            last. A ScenarioWarning names the others.
+          metrics: names of metrics. Default: J, where each plant has one condition, and with it
+            five of those compared, or on a page narrower than 6 in as many as fit, three at most;
+            first those in which a law wins. The settled runs come last, and only where some do
+            not. A ScenarioWarning names the others.
         """
         from smc_mujoco.draw import dot_plot, page
 
         names = list(metrics)
+        objectives = {}
         if not names:
+            objectives = self._objectives
             width, _ = page.measure(options.get("size"), options.get("fig"))
             counts = list(map(len, self.conditions.values()))
             laws = max(map(len, self.candidates.values()))
-            most = dot_plot.room_for_metrics(width, laws, counts)
+            most = max(1, dot_plot.room_for_metrics(width, laws, counts) - bool(objectives))
+            compared = self._metrics
+            if not paired_runs.values(self.table, paired_runs.SETTLES).any():
+                compared = [name for name in compared if name != paired_runs.SETTLES]
             won = {cell[0] for cell in self.leaderboard.winners}
             last = paired_runs.SETTLES
-            first = sorted(self._metrics, key=lambda name: (name not in won, name == last))[:most]
-            names = [name for name in self._metrics if name in first]
-            if omitted := [name for name in self._metrics if name not in first]:
+            first = sorted(compared, key=lambda name: (name not in won, name == last))[:most]
+            names = [name for name in compared if name in first]
+            if omitted := [name for name in compared if name not in first]:
                 warn_once(
                     f"plot leaves out {joined(omitted)}: draw the rest with metrics={omitted}"
                 )
-        return dot_plot.plot(self.table, path, names, winners=self.leaderboard.winners, **options)
+        won = [*self.leaderboard.winners]
+        for metric, plant, _, law in self.leaderboard.winners:
+            won += [cell for cell in objectives if (*cell[:2], cell[3]) == (metric, plant, law)]
+        drawn: dict[str, Any] = {"winners": won, "objectives": objectives}
+        return dot_plot.plot(self.table, path, names, **drawn, **options)
+
+    @property
+    def _objectives(self) -> dict[tuple[str, str, str, str], Interval]:
+        """J by metric, plant, condition and law, where each plant has one condition."""
+        if any(len(conditions) > 1 for conditions in self.conditions.values()):
+            return {}
+        intervals = {}
+        for board in self.leaderboard:
+            if board.metric == paired_runs.OBJECTIVE:
+                plant = board.blocks[0].plant
+                (condition,) = self.conditions[plant]
+                for entry in board.entries:
+                    intervals[board.metric, plant, condition, entry.law] = entry.interval
+        return intervals
 
 
 def _sets(count: int) -> dict[str, str]:

@@ -492,3 +492,15 @@ def test_conditions_are_names_with_commas_or_one_text(refused):
         names.append(condition.name)
     assert names == ["noise", "sine", "worn", "encoder"]
     refused(lambda: options.conditions(["noise,worn: friction=Coulomb(0.05)"]))
+
+
+def test_a_plot_shows_J_first_and_leaves_out_settled_runs_where_all_settle(tmp_path):
+    compared = smc.compare(["pid", "adrc"], "duffing", "nominal", 6, out=tmp_path, progress=False)
+    page = compared.plot()
+    names = [ax.get_xlabel().partition("\n")[0] for ax in page.axes]
+    assert names[0] == "J"
+    assert "settled runs" not in names
+    (board,) = [board for board in compared.leaderboard if board.metric == "objective"]
+    medians = {entry.law: entry.interval.median for entry in board.entries}
+    drawn = {line.get_xdata()[0] for line in page.axes[0].lines if line.get_marker() != "None"}
+    assert {medians["pid"], medians["adrc"]} <= drawn
