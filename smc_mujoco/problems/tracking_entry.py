@@ -77,9 +77,9 @@ class TrackingEntry:
                 bounds[name] = problem.bound
         return dataclasses.replace(self.law, gains={**self.law.gains, **bounds})
 
-    def beside(self, problem: TrackingProblem) -> Feedforward | Signal | None:
-        """Return what is added to the command in a problem. Raise ScenarioError where there is no
-        friction that it could give.
+    def beside(self, problem: TrackingProblem, loaded: bool = True) -> Feedforward | Signal | None:
+        """Return what is added to the command in a problem; without its friction there is nothing
+        that it would give. Raise ScenarioError where a problem has no friction.
         """
         if not self.kind:
             return None
@@ -88,12 +88,11 @@ class TrackingEntry:
                 f"entry {self.text!r} gives a share of the friction, and problem {problem.name} "
                 "has none: enter the law alone"
             )
+        share = self.share if loaded else 0.0
         if self.kind == "Feedforward":
-            return Feedforward(
-                problem.friction, on=self.on, eps=problem.slow, error=self.share - 1.0
-            )
+            return Feedforward(problem.friction, on=self.on, eps=problem.slow, error=share - 1.0)
         level = max(_levels(problem))
-        return SquareWave(self.share * level, max(DITHER, 2.0 * problem.period))
+        return SquareWave(share * level, max(DITHER, 2.0 * problem.period))
 
 
 def _levels(problem: TrackingProblem) -> list[float]:

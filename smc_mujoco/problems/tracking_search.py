@@ -71,7 +71,6 @@ class GainTrials:
         self.problem = problem
         self.entry = entry
         self.law = entry.law_on(problem)
-        self.beside = entry.beside(problem)
         self.threads = threads
         scales = search_space.scales(problem.machine, problem.bound, problem.start, 1.0)
         box = search_space.box(self.law, scales)
@@ -84,7 +83,8 @@ class GainTrials:
 
     def _scenario(self, instance: int, loaded: bool) -> Scenario:
         velocity = filtered_difference(self.problem.period)
-        return self.problem.scenario(self.law, velocity, self.beside, instance, loaded)
+        beside = self.entry.beside(self.problem, loaded)
+        return self.problem.scenario(self.law, velocity, beside, instance, loaded)
 
     def group(self, instances: Sequence[tuple[int, bool]], longest: float = math.inf) -> FormGroup:
         """Return instances, with or without the load, as rows that end after the problem's window,
@@ -242,4 +242,4 @@ def scenario_of(
     own = {name: value for name, value in gains.items() if name != TAU}
     law: Component = with_gains(entry.law_on(problem), tuple(own), tuple(own.values()))
     velocity = filtered_difference(gains[TAU])
-    return problem.scenario(law, velocity, entry.beside(problem), instance, loaded)
+    return problem.scenario(law, velocity, entry.beside(problem, loaded), instance, loaded)

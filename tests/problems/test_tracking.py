@@ -60,6 +60,16 @@ def test_without_the_load_only_its_forces_differ(name):
         assert changed == {"friction" if task.friction else "disturbance"}
 
 
+@pytest.mark.parametrize("text", ["pid + Feedforward(0.7)", "pid + Dither(1)"])
+def test_without_the_friction_nothing_is_added_to_a_law(text):
+    task = problem("smc-friction@1", "rail-10")
+    alone, beside = (
+        smc.run(scenario_of(task, tracking_entry(entry), GAINS, 3, loaded=False)).u
+        for entry in ("pid", text)
+    )
+    assert np.array_equal(alone, beside)
+
+
 @pytest.mark.parametrize(
     ("suite", "name", "text"),
     [
