@@ -150,7 +150,7 @@ ROWS = {
     ),
     "comparison": Row(
         first_screen,
-        "the compiler",
+        "runs of MuJoCo, then the compiler",
         {
             "compiling": "numba.core.dispatcher:_FunctionCompiler.compile",
             "gains": f"{STUDIES}.fair_gains:Trial.candidates",
@@ -168,7 +168,7 @@ ROWS = {
     ),
     "claims": Row(functools.partial(command, "claims"), "runs of MuJoCo", cold=True),
     "demo": Row(demo, "the network, MuJoCo draws on the processor"),
-    "basin": Row(basin, "the compiler", cold=True),
+    "basin": Row(basin, "runs of MuJoCo", cold=True),
 }
 
 

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from smc_mujoco.common.aliases import Array, Data, Numbers
 from smc_mujoco.common.errors import ScenarioError
@@ -336,6 +335,8 @@ def _low_commands(rig: LogRig, record: Record, filtered: Filter, late: float) ->
     """Return the commands that reach the motors with a delay, low-passed, (M, driven). Each is held
     over a sample, so that it acts half a sample late.
     """
+    from scipy.signal import savgol_filter
+
     commands = []
     samples = cubic_samples(filtered.step)
     for name in rig.columns.inputs:
