@@ -90,7 +90,7 @@ gains: setup ## the laws' gains again, tuned by one rule (within 90 minutes on t
 gallery: setup ## the clips that README shows
 	$(BIN)/python videos/gallery.py
 
-bench: ## speed, beside bare MuJoCo and other packages
+bench: ## speed, beside bare MuJoCo and other packages, and where people wait
 	@./setup.sh requirements-bench.lock
 	$(BIN)/python benchmarks/speed.py
 	$(BIN)/python benchmarks/engine.py
@@ -98,6 +98,7 @@ bench: ## speed, beside bare MuJoCo and other packages
 	$(BIN)/python benchmarks/laws.py
 	$(BIN)/python benchmarks/study.py --quick
 	$(BIN)/python benchmarks/memory.py
+	$(BIN)/python benchmarks/waits.py film comparison list help basin
 	$(BIN)/python benchmarks/agents.py --quick
 
 size: ## tokens by room, density, the largest files and functions, beside the last release's

@@ -10,7 +10,8 @@ checkout in turn with these; --write keeps the rows in benchmarks/waits.json, fr
 its times.
 
 Times are of the processor and of all processes that a row starts, so that other work on the machine
-counts little. The fixed work is a million bare steps of a pendulum by MuJoCo, before each row.
+counts little. Parts that two cores make at once, as the charts of a film and the next picture, each
+count the time of both. The fixed work is a million bare steps of a pendulum by MuJoCo.
 """
 
 import argparse

@@ -208,6 +208,16 @@ def test_readme_s_cost_of_a_law_is_that_of_the_benchmark():
     assert [*re.findall(sentence, " ".join(README.split()))[0]] == added
 
 
+def test_readme_s_times_are_those_of_the_benchmark_of_waits():
+    waits = json.loads((ROOT / "benchmarks" / "waits.json").read_text(encoding="utf-8"))
+    first = waits["comparison"]
+    took = re.findall(r"took (\d+) s of processor time the first time, (\d+) s", README)
+    assert took == [(f"{first['seconds']:.0f}", f"{first['parts']['compiling']:.0f}")]
+    minutes = ["one minute", "two minutes", "three minutes", "four minutes"]
+    demo = minutes[int(waits["demo"]["seconds"] / 60.0)]
+    assert re.search(rf"^make demo .*: {demo}$", README, re.M)
+
+
 def results(folder: Path) -> set[str]:
     """The traces that a run of a scene writes to its folder."""
     runs = scene.read(scene.find(folder.name)).runs()
