@@ -66,11 +66,18 @@ def readings(trace: Trace, noisy: bool = True) -> Array:
 def measured(trace: Trace) -> Trace:
     """Return a run as its encoders saw it, as a log of a machine has it:
 
-        smc.measured(trace).export("log.csv")
+        scenario = smc.Scenario(plant="duffing", law="pid", sensor=smc.Encoder(1024), duration=0.5)
+        smc.measured(smc.run(scenario)).export("log.csv")
 
     x is what the law of the run read: with bias, counts, noise, delay and what was lost, and on the
     motor's side of a play or a spring the rotor. All else stays, also v, the true rate. Its scores
     would be those of the readings.
+
+    Args:
+      trace: of `run`.
+
+    Returns:
+      A Trace with another x, (K + 1, n), rad or m.
     """
     s = trace.scenario
     x = readings(trace)
