@@ -43,6 +43,8 @@ def page(board: TrackingBoard, picture: str) -> str:
         "",
         f"![Error of each entry over the least of its problem]({picture})",
         "",
+        "*In colour: entries that no other leads in some problem.*",
+        "",
         suite.about,
         "",
         "```sh",
