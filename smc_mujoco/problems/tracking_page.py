@@ -69,6 +69,8 @@ def page(board: TrackingBoard, picture: str) -> str:
         "",
         "- It ranks who entered, on these machines, under these limits.",
         "- A law whose searches differ much is seldom led, and seldom leads.",
+        "- The searches' budget was chosen on `pid` and `adrc` alone, before others entered. Laws "
+        "that need a longer search stand worse than they could.",
         *_hard_to_tell(board),
         "",
         "## By what an entry has",
