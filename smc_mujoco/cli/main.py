@@ -86,6 +86,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 f"no command {words[0]!r}: `smc-mujoco run SCENE` writes figures and a film, and "
                 "smc.figure and smc.film draw any traces in Python"
             )
+    if words and words[0] == "run" and "--law" in words:
+        with errors_as_sentences():
+            raise ScenarioError(
+                "run takes a scene, which has its laws: `smc-mujoco compare PLANT --law LAW` runs "
+                "laws on a plant"
+            )
     command.remember(words)
     app(arguments, prog_name=command.PROGRAM)
 

@@ -74,14 +74,15 @@ class Whole(Constraint):
 
 @keyword_dataclass
 class SeedOf(Constraint):
-    """A seed: a whole number from 0 to `high`, or a numpy Generator, from which one is drawn."""
+    """A whole number from `low` to `high`, or a numpy Generator, from which one is drawn."""
 
     high: int
+    low: int = 0
 
     def __call__(self, what: str, value: Any) -> int:
         if isinstance(value, np.random.Generator):
-            return int(value.integers(self.high + 1))
-        return whole(what, value, 0, self.high)
+            return int(value.integers(self.low, self.high + 1))
+        return whole(what, value, self.low, self.high)
 
 
 @keyword_dataclass

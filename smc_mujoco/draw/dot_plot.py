@@ -28,7 +28,6 @@ from smc_mujoco.analysis.paired_runs import (
 from smc_mujoco.analysis.ranking import linked
 from smc_mujoco.common.aliases import AnyPath, Array, Fields
 from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown, warn_once
-from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import number
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
@@ -57,7 +56,7 @@ def plot(
     format: str | None = None,
     fig: Figure | SubFigure | None = None,
     winners: Collection[Cell] | None = None,
-    objectives: Mapping[Cell, Interval] = frozen({}),
+    objectives: Mapping[Cell, Interval] | None = None,
 ) -> Figure:
     """Draw the median of each law over the seeds, with its 95 % bootstrap interval: dots, by
     condition.
@@ -93,7 +92,7 @@ def plot(
     check_table(table)
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
-    dots = _dots(table, items_of("metrics", metrics), winners or (), objectives)
+    dots = _dots(table, items_of("metrics", metrics), winners or (), objectives or {})
     head = style.titled(title, f"Medians: {dots.heading}")
     with style.page(width):
         key, shared = _key(table, dots)

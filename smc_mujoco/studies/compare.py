@@ -489,7 +489,9 @@ class Compared(Answer):
             width, _ = page.measure(options.get("size"), options.get("fig"))
             counts = list(map(len, self.conditions.values()))
             laws = max(map(len, self.candidates.values()))
-            most = max(1, dot_plot.room_for_metrics(width, laws, counts) - bool(objectives))
+            most = dot_plot.room_for_metrics(width, laws, counts)
+            if width < page.NARROW and objectives:
+                most = max(1, most - 1)
             compared = self._metrics
             if not paired_runs.values(self.table, paired_runs.SETTLES).any():
                 compared = [name for name in compared if name != paired_runs.SETTLES]

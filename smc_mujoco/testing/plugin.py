@@ -210,7 +210,7 @@ def pytest_runtest_makereport(
         if out := item.config.getoption("smc_out"):
             folder = item.config.invocation_params.dir / out
         film = bool(item.config.getoption("smc_film"))
-        full = item.config.getoption("verbose") > 0
+        full = item.config.get_verbosity() > 0
         text = report_of(item.nodeid, responses, folder, video=film, full=full)
         report.sections.append(("step responses", text))
     return report

@@ -718,4 +718,4 @@ def test_run_with_a_law_leads_to_compare(capsys):
     with pytest.raises(SystemExit) as end:
         main.main(["run", "duffing", "--law", "pid"])
     assert end.value.code == 2
-    assert "smc-mujoco compare duffing --law pid" in capsys.readouterr().err
+    assert "smc-mujoco compare PLANT --law LAW" in capsys.readouterr().err

@@ -273,4 +273,4 @@ def test_a_number_beyond_the_memory_is_told_as_such():
 
     with pytest.warns(UserWarning, match="failed by itself"):
         trace = smc.run(smc.Scenario(plant="duffing", law=beyond, duration=0.1))
-    assert "memory has as many numbers as memory= of its function says" in trace.failure
+    assert "memory has as many numbers as memory= of its function says" in str(trace.failure)

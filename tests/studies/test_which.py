@@ -585,4 +585,5 @@ def test_a_law_s_overshoot_is_looked_at_without_time_where_a_limit_was_asked_for
         course = RaceCourse(trial, plant, Objective(limits=limits), late)
         rest = recommend._at_rest(course, loose)
         assert (rest is not None) == looked
+    assert rest
     assert rest.overshoot > 10.0

@@ -8,7 +8,6 @@ from rich.text import Text
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.console import Terminal
-from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_signals
 
 
@@ -37,7 +36,6 @@ def run(
         ),
     ] = True,
     json: options.Json = None,
-    law: Annotated[str | None, typer.Option(hidden=True)] = None,
 ) -> None:
     """Run a scene (a prepared experiment), print its scores, and write traces, figures and a film.
 
@@ -50,10 +48,6 @@ def run(
 
     Example: smc-mujoco run duffing --no-film --out results --export csv,parquet
     """
-    if law is not None:
-        raise ScenarioError(
-            f"a scene has its laws: to run {law} on a plant, smc-mujoco compare {name} --law {law}"
-        )
     with delay_signals():
         from smc_mujoco.cli.run_scene import perform
         from smc_mujoco.simulation.trace import formats
