@@ -153,8 +153,7 @@ class LogRig(Rig):
             x = np.asarray(log.get(name, ()))
             if unit != "rad" or x.ndim != 1 or x.dtype.kind not in "iuf" or len(x) < 2:
                 continue
-            jumps = records.wraps(x) if np.isfinite(x).all() else ()
-            if len(jumps):
+            if np.isfinite(x).all() and len(jumps := records.wraps(x)):
                 columns[name] = np.unwrap(x)
                 warnings.warn(
                     f"column {name} of {self.name} jumps by a turn at {len(jumps)} samples, first "
