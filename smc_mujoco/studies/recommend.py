@@ -23,7 +23,14 @@ from smc_mujoco.analysis.step_halving import doubled, halved
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective, weighed
 from smc_mujoco.analysis.tuning.result import Tuned
-from smc_mujoco.analysis.tuning.run_limits import CALM, LIMIT_COST, overshoot, swing
+from smc_mujoco.analysis.tuning.run_limits import (
+    CALM,
+    LIMIT_COST,
+    OVERSHOOT,
+    RunLimit,
+    overshoot,
+    swing,
+)
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.progress import bar
@@ -128,7 +135,7 @@ def recommend(
     settled = _settled(table)
     rests = {name: _at_rest(course, law) for name, law in chosen.items()}
     shaky = [name for name, rest in rests.items() if rest and rest.share > CALM]
-    broken = {law: runs for law, runs in lost_runs(fixed).items() if goal.limits}
+    broken = breaking(goal.limits, fixed, rests)
     order = in_order({law: settled[law] for law in chosen}, fixed, raced, shaky, broken)
     metrics = list(question.metrics)
     least = {law: least_share(settled[law]) for law in chosen}
@@ -329,6 +336,22 @@ def _fixed(
         set_numbers[name] = np.zeros(len(DECIDING))
         fine[name] = J[name] < LIMIT_COST
     return compared(J, course.goal, halves, set_numbers, fine, relevant)
+
+
+def breaking(
+    limits: Sequence[RunLimit], fixed: Comparison | None, rests: Mapping[str, AtRest | None]
+) -> dict[str, int]:
+    """Return law -> in how many runs it breaks a limit that was asked for, by the unseen runs with
+    these gains and by those that show how it rests.
+    """
+    if not limits:
+        return {}
+    broken = lost_runs(fixed)
+    for limit in limits:
+        for law, rest in rests.items():
+            if rest and limit.what == OVERSHOOT and rest.overshoot > limit.most:
+                broken[law] = broken.get(law, 0) + 1
+    return broken
 
 
 def _settled(table: Table) -> Settled:

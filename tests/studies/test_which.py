@@ -587,3 +587,14 @@ def test_a_law_s_overshoot_is_looked_at_without_time_where_a_limit_was_asked_for
         assert (rest is not None) == looked
     assert rest
     assert rest.overshoot > 10.0
+
+
+def test_a_law_that_overshoots_more_than_was_asked_for_comes_last():
+    """Without time for unseen runs, a race named a law that overshot by 2390 %."""
+    rest = AtRest(0.0, 0.0, 0.0, "N m", "nominal", 0.0, "nominal")
+    rests = {"wild": rest._replace(overshoot=2390.0), "calm": rest, "unseen": None}
+    broken = recommend.breaking((RunLimit("overshoot", 2.0),), None, rests)
+    assert broken == {"wild": 1}
+    assert recommend.breaking((), None, rests) == {}
+    settled = {law: {"nominal": (4, 4)} for law in rests}
+    assert recommend.in_order(settled, None, None, broken=broken) == ["calm", "unseen", "wild"]
