@@ -114,11 +114,12 @@ def percent(low: float, high: float = math.nan) -> str:
 
 
 def use(fact: Use) -> str:
-    """Return "Use adrc (wc=30), unless settling time matters most: then my_law."."""
+    """Return "Use adrc (wc=30), unless settling time matters most: then my_law (k1=8)."."""
     gains = f" ({fact.gains})" if fact.gains else ""
     aims_by_law: dict[str, list[str]] = {}
-    for aim, law in fact.unless:
-        aims_by_law.setdefault(law, []).append(aim)
+    for aim, law, its_gains in fact.unless:
+        with_gains = f"{law} ({its_gains})" if its_gains else law
+        aims_by_law.setdefault(with_gains, []).append(aim)
     exceptions = []
     for law, aims in aims_by_law.items():
         exceptions.append(f"{joined(aims, 'or')} matters most: then {law}")

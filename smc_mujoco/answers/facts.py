@@ -105,7 +105,8 @@ class Use:
 
     law: str
     gains: str  # as a user writes them, "k1=41.2, k2=310"; "" for a law without gains
-    unless: tuple[tuple[str, str], ...] = ()  # (what matters most, the law then)
+    # (what matters most, the law then, its gains)
+    unless: tuple[tuple[str, str, str], ...] = ()
     rivals: Names = ()  # the laws between which it is undecided; () for a winner
     metric: str = "J"  # in which
 

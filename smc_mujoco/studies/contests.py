@@ -156,7 +156,7 @@ def _use(
     unless = []
     for fact in verdicts[1:]:
         if isinstance(fact, Lead) and fact.law != law and fact.law not in lost:
-            unless.append((fact.metric, fact.law))
+            unless.append((fact.metric, fact.law, gains.get(fact.law, "")))
     return Use(
         law=law,
         gains=gains.get(law, ""),

@@ -66,7 +66,11 @@ def test_shares_have_two_digits(low, high, text):
 
 def test_the_law_to_use_comes_with_its_gains_and_the_laws_that_lead_elsewhere():
     text = answers.use(
-        Use(law="adrc", gains="wc=30", unless=(("ITAE", "pid"), ("J", "sta"), ("energy", "pid")))
+        Use(
+            law="adrc",
+            gains="wc=30",
+            unless=(("ITAE", "pid", "kp=2"), ("J", "sta", ""), ("energy", "pid", "kp=2")),
+        )
     )
     assert text.index("adrc") < text.index("wc=30") < text.index("pid") < text.index("sta")
     assert text.count("pid") == 1
