@@ -128,10 +128,10 @@ def test_no_time_is_estimated_before_a_tenth_is_done(monkeypatch):
 
 
 def test_a_function_is_told_of_progress():
-    told = []
+    reports = []
     scenario = smc.Scenario(plant="duffing", law="pid", duration=0.1)
-    smc.run([scenario] * 3, progress=lambda text, share: told.append((text, share)))
-    text, share = told[-1]
+    smc.run([scenario] * 3, progress=lambda text, share: reports.append((text, share)))
+    text, share = reports[-1]
     assert "3 runs" in text
     assert share == 1.0
     with pytest.raises(smc.ScenarioError, match="give True or False"):

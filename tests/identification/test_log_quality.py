@@ -138,9 +138,9 @@ def test_an_encoder_that_wraps_is_read_on(recwarn):
     values = []
     for low in (None, -np.pi, 0.0):
         column = x if low is None else (x - low) % (2.0 * np.pi) + low
-        found = smc.identify(arm, {"t": run.t, "x": column, "u": run.u[:, 0]}, ["j.damping"])
-        values.append(found.values["j.damping"])
-        assert not [note for note in found.notes if "degrees" in note]
+        identified = smc.identify(arm, {"t": run.t, "x": column, "u": run.u[:, 0]}, ["j.damping"])
+        values.append(identified.values["j.damping"])
+        assert not [note for note in identified.notes if "degrees" in note]
         assert bool(recwarn) == (low is not None)
         if low is not None:
             said = str(recwarn.pop(smc.errors.ScenarioWarning).message)

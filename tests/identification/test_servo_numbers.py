@@ -65,15 +65,15 @@ def test_stiffness_and_dead_band_are_found_from_the_file_s_own_numbers():
         "elbow.frictionloss": 0.08,
         "elbow.armature": ARMATURE,
     }
-    found = smc.identify(arm, noisy(log_of(arm, 6.0)), list(true))
+    identified = smc.identify(arm, noisy(log_of(arm, 6.0)), list(true))
     for name, value in true.items():
-        off = abs(found.values[name] - value)
-        assert off <= max(2.0 * found.errors[name], 5e-3 * value), name
-    assert not found.notes
-    condition = found.condition()
+        off = abs(identified.values[name] - value)
+        assert off <= max(2.0 * identified.errors[name], 5e-3 * value), name
+    assert not identified.notes
+    condition = identified.condition()
     (servo,) = smc.Scenario(plant=arm, law="none", **condition.on(arm, 1.0)).actuator
-    assert servo.kp == pytest.approx(found.values["elbow.kp"])
-    assert found.rig.quantities["elbow.kp"].unit == "N m/rad"
+    assert servo.kp == pytest.approx(identified.values["elbow.kp"])
+    assert identified.rig.quantities["elbow.kp"].unit == "N m/rad"
 
 
 def test_a_log_that_does_not_show_the_stiffness_says_why():
@@ -84,8 +84,8 @@ def test_a_log_that_does_not_show_the_stiffness_says_why():
         3.0,
         **TRUE | {"inertia": 0.01, "weight": 0.0, "dead_band": 0.0},
     )
-    found = smc.identify(arm, noisy(slow), ["elbow.kp", "elbow.damping"])
-    (cause,) = [note for note in found.notes if "elbow.kp" in note]
+    identified = smc.identify(arm, noisy(slow), ["elbow.kp", "elbow.damping"])
+    (cause,) = [note for note in identified.notes if "elbow.kp" in note]
     assert cause.startswith(
         "the log does not show elbow.kp: its joint follows the set-point slowly"
     )

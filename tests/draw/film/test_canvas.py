@@ -113,12 +113,12 @@ def test_a_kept_outline_is_the_same_array_as_a_new_one(plant):
     with stage(plant) as view, stage(plant) as other:
         for _ in zip(places(view), places(other), strict=True):
             picture = view.canvas.draw(lambda shown: None)
-            kept = view.canvas.outlined(picture, view.add_outline, 2.0)
+            outlined = view.canvas.outlined(picture, view.add_outline, 2.0)
             other.canvas.draw(lambda shown: None)
             other.canvas.outline_look = b""
             drawn = other.canvas.outlined(picture, other.add_outline, 2.0)
-            assert np.array_equal(kept, drawn)
-            assert changed(kept, picture).max() > 50
+            assert np.array_equal(outlined, drawn)
+            assert changed(outlined, picture).max() > 50
 
 
 def test_an_outline_is_drawn_again_only_when_its_shapes_or_the_camera_move(monkeypatch):
