@@ -862,8 +862,9 @@ IDENTIFY_LINES = LINES - 2  # one below is for the files
 
 
 def _fit(percent_of_log: float) -> str:
-    """Return "99.4 %"."""
-    return f"{percent_of_log:.1f} %"
+    """Return "99.4 %", or "falls at 3.1 s" of a twin that cannot hold its loop."""
+    text = f"{percent_of_log:.1f}"
+    return text if text.startswith("falls") else f"{text} %"
 
 
 def identify_files(condition: str, figure: str, report: str) -> str:
