@@ -100,7 +100,7 @@ def enter_tracking(
     missing = [call for call in stored if stored[call] is None]
     with bar(f"sets of gains of {entry.name}", len(missing) * SETS, progress) as shown_bar:
         calls = [(problem, entry, count) for problem, count in missing]
-        for i, result in _made(calls, threads, executor, shown_bar.advance):
+        for i, result in _results_in_turn(calls, threads, executor, shown_bar.advance):
             stored[missing[i]] = files[missing[i]].keep(result._asdict())
     searched = {}
     for problem in chosen.problems:
@@ -134,7 +134,7 @@ def _write(result: dict, path: Path) -> None:
     write_json(path, result)
 
 
-def _made(
+def _results_in_turn(
     calls: Sequence[tuple[TrackingProblem, TrackingEntry, int]],
     threads: int | None,
     executor: Any,

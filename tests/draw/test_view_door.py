@@ -101,8 +101,8 @@ def test_the_page_and_its_socket_answer_at_the_address_alone(live):
     socket = live.address.replace("http", "ws").rstrip("/")
     with connect(socket, subprotocols=protocol) as own:
         assert own.recv(timeout=20)
-    others = [(outside.replace("http", "ws"), None), (socket, EVIL)]
-    for address, origin in others:
+    strangers = [(outside.replace("http", "ws"), None), (socket, EVIL)]
+    for address, origin in strangers:
         with pytest.raises(InvalidStatus) as refused:
             connect(address, subprotocols=protocol, origin=origin)
         assert refused.value.response.status_code == 403

@@ -209,8 +209,8 @@ def test_another_stiffness_is_tried_with_damping_as_an_undamped_spring_rings():
         freed_slopes=np.eye(4)[:, :2],
         freed=lambda rows: rows,
     )
-    other = gauss_newton._other_spring(replays, slopes)  # pyright: ignore[reportArgumentType]
-    assert other is not None
-    stiffness, damping = other.values * replays.scales
+    spring = gauss_newton._other_spring(replays, slopes)  # pyright: ignore[reportArgumentType]
+    assert spring is not None
+    stiffness, damping = spring.values * replays.scales
     assert stiffness == pytest.approx(0.6 * 478.0)
     assert 1e-4 * stiffness < damping < 1e-2 * stiffness

@@ -128,8 +128,8 @@ def test_sets_that_stop_early_cost_more_than_those_that_run_through(monkeypatch)
     costs, allowed = trials.judged(logs)
     best = np.argsort(full_costs)[: tracking_search.JUDGED]
     assert costs[best] == pytest.approx(full_costs[best], rel=1e-12)
-    others = np.setdiff1d(np.arange(24), best)
-    assert (costs[others] >= costs[best].max()).all()
+    beaten = np.setdiff1d(np.arange(24), best)
+    assert (costs[beaten] >= costs[best].max()).all()
     assert (costs <= full_costs * (1.0 + 1e-12)).all()
     assert allowed[best].tolist() == (worst[best, 1] <= limit).tolist()
     assert sum(run_counts) < 0.6 * 24 * len(trials.choosing.rows)
@@ -252,13 +252,13 @@ def test_a_law_of_ones_own_enters_and_the_same_command_goes_on(tmp_path, monkeyp
         "    return -gains.p * y.e - gains.d * y.de, y.e\n"
     )
     pending = []
-    made = tracking_results._made
+    in_turn = tracking_results._results_in_turn
 
     def noted(calls, *rest):
         pending.append(len(calls))
-        return made(calls, *rest)
+        return in_turn(calls, *rest)
 
-    monkeypatch.setattr(tracking_results, "_made", noted)
+    monkeypatch.setattr(tracking_results, "_results_in_turn", noted)
     searches = iter([*[tracking_results.search] * 3, interrupted])
 
     def stopped(*call):

@@ -122,9 +122,9 @@ def independent_errors(gains, count, rng, steps=20):
 
 @pytest.mark.slow
 def test_a_loop_that_shares_nothing_gives_a_printed_error_within_its_interval():
-    for found in tracking_board("smc-friction@1").entries["pid"].searches["rail-30"]:
-        errors = independent_errors(found.gains, 48, np.random.default_rng(1))
-        printed, own = median_of(np.array([found.errors])), median_of(errors[None])
+    for search in tracking_board("smc-friction@1").entries["pid"].searches["rail-30"]:
+        errors = independent_errors(search.gains, 48, np.random.default_rng(1))
+        printed, own = median_of(np.array([search.errors])), median_of(errors[None])
         assert own.low < printed.high
         assert printed.low < own.high
         assert own.median == pytest.approx(printed.median, rel=0.02)

@@ -562,9 +562,9 @@ def test_a_next_step_names_the_file_of_a_condition(tmp_path):
     """The text of an identified machine is three lines of quotes."""
     file = tmp_path / "found.txt"
     file.write_text("# numbers\nidentified: input_delay=0.004\n")
-    several = tmp_path / "two.txt"
-    several.write_text("a: input_delay=0.001\nb: input_delay=0.002\n")
-    given = [*find_conditions(str(file)), *find_conditions(str(several)), "noise"]
+    pair_of_conditions = tmp_path / "two.txt"
+    pair_of_conditions.write_text("a: input_delay=0.001\nb: input_delay=0.002\n")
+    given = [*find_conditions(str(file)), *find_conditions(str(pair_of_conditions)), "noise"]
     words = module._call("m.xml:s", given, None, None, None, Path("which"), 3.0)
     named = words[words.index("--condition") :]
     texts = [str(file), "a: input_delay=0.001", "b: input_delay=0.002", "noise"]

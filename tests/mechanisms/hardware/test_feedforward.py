@@ -193,8 +193,8 @@ def test_compensation_of_the_load_takes_a_lifting_arm_to_its_reference():
     law = smc.law("computed_torque", kp=100.0, kd=20.0)
     fields = {"plant": arm, "law": law, "model": "nominal", "friction": loss, "x0": 1.0}
     errors = []
-    for given in (None, smc.Coulomb(0.1), loss):
-        ahead = smc.Feedforward(given) if given else None
+    for compensated in (None, smc.Coulomb(0.1), loss):
+        ahead = smc.Feedforward(compensated) if compensated else None
         moved = smc.Constant(1.0) + SINE
         scenario = smc.Scenario(**fields, reference=moved, feedforward=ahead, duration=4.0)
         errors.append(rms(smc.run(scenario)))
