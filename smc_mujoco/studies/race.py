@@ -321,7 +321,7 @@ def _first_sets(
     progress.says("set of gains", float(len(ready)))
     pieces = [RaceSearch(entrant, 0) for entrant in searched(entrants)]
     start = time.monotonic()
-    for i, result in _made(course, pieces, clock.first_sets_end, shorten=True):
+    for i, result in _results(course, pieces, clock.first_sets_end, shorten=True):
         entrant = pieces[i].entrant
         entrant.results.append(result)
         spent = time.monotonic() - start
@@ -365,7 +365,7 @@ def _search_round(
 ) -> bool:
     """Make one search of each law, and return whether all ended in time; else none counts."""
     results = {}
-    for i, result in _made(course, pieces, ends):
+    for i, result in _results(course, pieces, ends):
         results[i] = result
         progress.advance(1.0)
     if len(results) < len(pieces):
@@ -492,7 +492,7 @@ def _file(course: RaceCourse, piece: RaceSearch) -> CachedResult[SearchResult]:
     return piece.entrant.file(piece.k, piece.draw, folder)
 
 
-def _made(
+def _results(
     course: RaceCourse, pieces: Sequence[RaceSearch], ends: float, shorten: bool = False
 ) -> Iterator[tuple[int, SearchResult]]:
     """Yield the number and the result of each search: those that the folder has first, then the
@@ -507,7 +507,7 @@ def _made(
             missing.append(i)
             writable(file.path)
     if course.trial.search.executor is None:
-        yield from _made_here(course, pieces, missing, ends, shorten)
+        yield from _results_here(course, pieces, missing, ends, shorten)
     elif missing:
         calls = []
         for i in missing:
@@ -519,7 +519,7 @@ def _made(
                     return
 
 
-def _made_here(
+def _results_here(
     course: RaceCourse,
     pieces: Sequence[RaceSearch],
     missing: Sequence[int],
@@ -552,7 +552,7 @@ def _again(course: RaceCourse, running: Sequence[SearchedEntrant], ends: float) 
         for k in stuck([result.best.objective for result in entrant.results]):
             if k not in entrant.again:
                 pieces.append(RaceSearch(entrant, k, 1))
-    for i, result in _made(course, pieces, ends):
+    for i, result in _results(course, pieces, ends):
         entrant, k, _ = pieces[i]
         entrant.again.add(k)
         if result.best.objective < entrant.results[k].best.objective:

@@ -65,12 +65,12 @@ def _friction(numbers: Numbers | None, memory: int, function: Callable) -> Any:
     size = _size(memory, function)
     if size and not returns_bounds(function, frozen({} if numbers is None else numbers), size):
         space = {"memory": size, "force": staticmethod(function)}
-        return _made(HeldForce, numbers, space, function)
+        return _part_class(HeldForce, numbers, space, function)
     space = {"memory": OWN + 2 * size, "own_memory": size, "function": staticmethod(function)}
     space["of_speed"] = not size and is_of_speed(
         function, frozen({} if numbers is None else numbers)
     )
-    return _made(OwnFriction, numbers, space, function)
+    return _part_class(OwnFriction, numbers, space, function)
 
 
 def actuator_function(
@@ -100,14 +100,14 @@ def actuator_function(
 
 def _drive(numbers: Numbers | None, memory: int, delay: float, function: Callable) -> Any:
     space = {"memory": _size(memory, function), "delay": delay, "force": staticmethod(function)}
-    return _made(Drive, numbers, space, function)
+    return _part_class(Drive, numbers, space, function)
 
 
 def _size(memory: int, function: Callable) -> int:
     return int(number(f"memory of {function.__name__}", memory, low=0, high=MAX_MEMORY))
 
 
-def _made(base: type[JointPart], numbers: Numbers | None, space: Fields, function: Callable) -> Any:
+def _part_class(base: type[JointPart], numbers: Numbers | None, space: Fields, function: Callable) -> Any:
     name = function.__name__
     taken = {*dir(base), *BESIDE_REST}
     fields = []
