@@ -22,17 +22,19 @@ import math
 from smc_mujoco.control.law import assumed, clipped, law_function, sgn, sliding
 from smc_mujoco.control.units import ACCELERATION, ASSUMED_B, RATE, SLOPE, Gain
 
+GAINS = {
+    "k": Gain(2.0, ACCELERATION, nonnegative=True, over="b"),
+    "c": SLOPE,
+    "l": Gain(20.0, RATE, positive=True),
+    "b": ASSUMED_B,
+}
+
 
 @law_function(
     family="disturbance-observer",
     finite_time="s",
     accuracy=1,
-    gains={
-        "k": Gain(2.0, ACCELERATION, nonnegative=True, over="b"),
-        "c": SLOPE,
-        "l": Gain(20.0, RATE, positive=True),
-        "b": ASSUMED_B,
-    },
+    gains=GAINS,
     memory=4,
 )
 def disturbance_observer(y, gains, memory):

@@ -13,19 +13,14 @@ error).
 """
 
 from smc_mujoco.control.law import assumed, clipped, law_function, sgn, sliding
+from smc_mujoco.control.laws.disturbance_observer import GAINS
 from smc_mujoco.control.laws.hodob import estimated, remember
-from smc_mujoco.control.units import ACCELERATION, ASSUMED_B, RATE, SLOPE, Gain
 
 
 @law_function(
     family="disturbance-observer",
     accuracy=1,
-    gains={
-        "k": Gain(2.0, ACCELERATION, nonnegative=True, over="b"),
-        "c": SLOPE,
-        "l": Gain(20.0, RATE, positive=True),
-        "b": ASSUMED_B,
-    },
+    gains=GAINS,
     memory=5,
     label="Sliding mode with second-order observer",
     short="DO2",

@@ -107,7 +107,9 @@ def _size(memory: int, function: Callable) -> int:
     return int(number(f"memory of {function.__name__}", memory, low=0, high=MAX_MEMORY))
 
 
-def _part_class(base: type[JointPart], numbers: Numbers | None, space: Fields, function: Callable) -> Any:
+def _part_class(
+    base: type[JointPart], numbers: Numbers | None, space: Fields, function: Callable
+) -> Any:
     name = function.__name__
     taken = {*dir(base), *BESIDE_REST}
     fields = []
