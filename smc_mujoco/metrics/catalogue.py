@@ -254,10 +254,10 @@ def ultimate_bound(trace: Trace) -> float:
     ...
 
 
-@metric("", error=True, late=True)
+@folded("", Fold("rest", "largest", part="late"), error=True)
 def rest_share(trace: Trace) -> float:
     """Ultimate bound over the scale."""
-    return CATALOGUE["ultimate_bound"].formula(trace) / scale(trace)
+    ...
 
 
 @folded("{x}", Fold("e", "range", power=0, part="late"))

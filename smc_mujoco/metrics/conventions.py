@@ -79,9 +79,11 @@ from smc_mujoco.metrics.fold import (
     LAST_PART,
     ROUNDING,
     Fold,
+    after_turn,
     first_sample,
     judges_last_part,
     late_periods,
+    slipped,
 )
 from smc_mujoco.simulation.python_functions import evaluate
 
@@ -100,8 +102,6 @@ STRAIGHT = 1e-6  # of the steps of a reference: by less they differ on a straigh
 UNIT_OF_S = "unit of s"
 REST_SHARE = 1e-3  # of the run's largest |v|
 REST_SPEED = 1e-5  # rad/s or m/s: above the creep of stuck joints, see friction.py
-# s, chosen: friction's change of sign is over by then in loops of 5 Hz and more
-AFTER_TURN = 0.15
 
 CATALOGUE: dict[str, Metric] = {}  # filled by @metric, in order of definition
 
@@ -381,14 +381,15 @@ def signal(trace: Trace, name: str) -> Array:
     """Return a signal of a group's trace that a fold names, (K + 1, n)."""
     if name == "e":
         return error(trace)
+    if name == "rest":
+        return error(trace) / scale(trace)
     if name == "turned":
         return np.where(_after_turns(trace), error(trace), 0.0)
     if name == "held":
         return _held(trace)
     if name == "slips":
-        held = _held(trace) > 0.0
-        none = np.zeros(held.shape[1])
-        return np.vstack([none, held[:-1] & ~held[1:]])
+        held = _held(trace)
+        return np.vstack([np.zeros(held.shape[1]), slipped(held[:-1], held[1:])])
     return getattr(trace, name)
 
 
@@ -415,8 +416,7 @@ def _after_turns(trace: Trace) -> Array:
         turns = moving[1:][np.diff(channel[moving]) != 0.0]
         for turn in turns:
             later = slice(turn + 1, None)
-            passed = trace.t[later] - trace.t[turn]
-            after[later, i] |= passed <= AFTER_TURN * (1 + 1e-9)
+            after[later, i] |= after_turn(trace.t[later] - trace.t[turn])
     return after
 
 

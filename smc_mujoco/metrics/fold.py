@@ -8,7 +8,7 @@ functions of a trace, in the catalogue.
 from __future__ import annotations
 
 import math
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -19,12 +19,15 @@ ROUNDING = 1e-9  # of the duration: a sample that is so little before the last p
 TRANSIENT_SHARE = 0.25  # of the run, which an "early" part leaves out
 # of the run's duration: the last part and as much before it, where a load is periodic; chosen
 TWO_PARTS = 0.85
+# s, chosen: friction's change of sign is over by then in loops of 5 Hz and more
+AFTER_TURN = 0.15
 
 
 class Fold(NamedTuple):
     """A metric as a row: what is taken of each sample, and how samples are put together."""
 
-    # a column of a trace, or one that `conventions.signal` makes of some: "e", "turned", "slips"
+    # a column of a trace, or one that `conventions.signal` makes of some: "e", "rest" (e over the
+    # scale), "turned", "slips"
     signal: str
     # of the worst channel: "largest", "range", "sum", "mean"; summed over the channels: "integral"
     # by the trapezoid rule, "held" of a signal that is held between samples
@@ -71,6 +74,20 @@ class Fold(NamedTuple):
         if self.power:
             y = np.abs(y) ** self.power
         return t[first:], y
+
+
+def slipped(before: Any, now: Any) -> Any:
+    """Return whether friction let a joint go, which it held for these times, s, before and now.
+    Arrays, or numbers.
+    """
+    return (before > 0.0) & (now == 0.0)
+
+
+def after_turn(passed: Any) -> Any:
+    """Return whether a turn of the reference, which has passed by so many seconds, still counts.
+    Arrays, or numbers.
+    """
+    return passed <= AFTER_TURN * (1 + 1e-9)
 
 
 def late_periods(duration: float, period: float) -> int:

@@ -27,16 +27,18 @@ from smc_mujoco.analysis.engine.form import (
 from smc_mujoco.common.aliases import Array, Pair
 from smc_mujoco.common.jit import always, inlined, record_in
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.metrics.conventions import AFTER_TURN, SETTLING_BAND
-from smc_mujoco.metrics.fold import Fold, first_sample
+from smc_mujoco.metrics.conventions import SETTLING_BAND
+from smc_mujoco.metrics.fold import Fold, after_turn, first_sample, slipped
 from smc_mujoco.metrics.limit_cycle import largest_of
 from smc_mujoco.simulation.cfunctions import cached
 from smc_mujoco.simulation.state import LOG
 
 log_in = record_in(LOG)
+slips_now = inlined(slipped)
+counts_after_turn = inlined(after_turn)
 COLUMN = {name: i for i, name in enumerate(LOG.names or ())}  # places in a sample
 RESTING = ("settling_time", "rest_share")  # of a reference that does not move
-MADE = "e", "turned"  # signals that are made of columns
+MADE = "e", "rest", "turned"  # signals that are made of columns
 HOLDING = "held", "slips"  # those of friction that is exact, see `Scenario.exact_friction`
 CYCLE = "chattering_amplitude", "chattering_frequency"  # of a log, which only the processor writes
 
@@ -47,6 +49,7 @@ class Samples(NamedTuple):
     n: int  # channels that it is of
     now: int
     before: int
+    shares: int = 0  # in the row: 2 % of the scale of each channel's group
 
 
 def summed_up(name: str) -> bool:
@@ -85,7 +88,7 @@ def tallying(form: Form) -> Any:
     for name, first in zip(form.metrics, layout(form).metrics, strict=True):
         if fold := _fold(name):
             n = form.n if CATALOGUE[name].shared else form.driven
-            samples = Samples(n, work_at.now, work_at.before)
+            samples = Samples(n, work_at.now, work_at.before, layout(form).row.shares)
             metrics.append(folding(fold, samples, first))
         elif name in CYCLE:
             metrics.append((always(None), always(math.nan)))
@@ -138,12 +141,14 @@ def _valuing(fold: Fold, samples: Samples, at: int) -> Any:
         return _slipping(samples)
     if fold.signal == "turned":
         return _turning(samples, at)
+    if fold.signal == "rest":
+        return _resting(samples)
     power = fold.power
     change = fold.change
     of_error = fold.signal == "e"
     column = COLUMN["x" if of_error else fold.signal]
     r = COLUMN["r"]
-    _, now, before = samples
+    now, before = samples.now, samples.before
 
     @inlined
     def value(row, work, k, i):
@@ -165,14 +170,26 @@ def _valuing(fold: Fold, samples: Samples, at: int) -> Any:
 
 def _slipping(samples: Samples) -> Any:
     """Return a function (row, work, k, i) -> 1 if friction let channel i go by sample k, else 0."""
-    _, now, before = samples
+    now, before = samples.now, samples.before
 
     @inlined
     def slips(row, work, k, i):
         was = log_in(work, before + WIDTH * i).held
-        return 1.0 if was > 0.0 and log_in(work, now + WIDTH * i).held == 0.0 else 0.0
+        return 1.0 if slips_now(was, log_in(work, now + WIDTH * i).held) else 0.0
 
     return slips
+
+
+def _resting(samples: Samples) -> Any:
+    """Return a function (row, work, k, i) -> |e| of channel i over the scale of its group."""
+    now, shares = samples.now, samples.shares
+
+    @inlined
+    def share(row, work, k, i):
+        sample = log_in(work, now + WIDTH * i)
+        return SETTLING_BAND * abs((sample.x - sample.r) / row[shares + i])
+
+    return share
 
 
 def _turning(samples: Samples, at: int) -> Any:
@@ -180,7 +197,7 @@ def _turning(samples: Samples, at: int) -> Any:
     short time before sample k, else 0. It keeps the direction, and the sample of the last turn,
     behind the numbers of the fold.
     """
-    n, now, before = samples
+    n, now, before, _ = samples
     direction = at + 2 * n
     last = direction + n
 
@@ -194,7 +211,7 @@ def _turning(samples: Samples, at: int) -> Any:
                 work[last + i] = k  # the turn's sample, counted from 1
             work[direction + i] = side
         turn = work[last + i]
-        if turn > 0.0 and (k - turn + 1.0) * row[SETTING.period] <= AFTER_TURN * (1.0 + 1e-9):
+        if turn > 0.0 and counts_after_turn((k - turn + 1.0) * row[SETTING.period]):
             return abs(sample.x - sample.r)
         return 0.0
 
@@ -327,20 +344,6 @@ def _over_samples(folds: tuple[Fold, ...], n: int) -> Any:
     return cached(scored)
 
 
-def _rest_share(form: Form, at: int) -> tuple[Any, Any]:
-    """Return the largest |e| of the last part over the scale of its channel's group."""
-    n = form.n
-    row_at, work_at = layout(form)[:2]
-
-    @inlined
-    def take(row, work, k):
-        for i in range(n if k >= row[SETTING.late] else 0):
-            now = log_in(work, work_at.now + WIDTH * i)
-            work[at] = max(work[at], abs((now.x - now.r) / row[row_at.shares + i]))
-
-    return take, inlined(lambda row, work: SETTLING_BAND * work[at])
-
-
 def _settling_time(form: Form, at: int) -> tuple[Any, Any]:
     n = form.n
     row_at, work_at = layout(form)[:2]
@@ -362,4 +365,4 @@ def _settling_time(form: Form, at: int) -> tuple[Any, Any]:
 
 
 # name -> function (form, place) -> its two functions, of metrics that are no folds
-WRITTEN_OUT: dict[str, Callable] = {"rest_share": _rest_share, "settling_time": _settling_time}
+WRITTEN_OUT: dict[str, Callable] = {"settling_time": _settling_time}
