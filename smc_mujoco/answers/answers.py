@@ -464,21 +464,22 @@ def margins_lines(facts: MarginsFacts) -> list[str]:
     """Return the most that laws tolerate: a table for each plant, and who tolerates the most."""
     about = f"The most that each law tolerates in runs of {facts.duration:g} s"
     lines = textwrap.wrap(f"{about}, or the range in which it lies", WIDTH)
-    most: dict[str, list[str]] = {}
-    starred = False
+    kinds_of: dict[str, dict[str, list[str]]] = {}  # law -> plant -> what it tolerates most of
     for plant, table in facts.grids:
         numbers, omitted = grid_lines(table)
         lines += ["", plant, *numbers]
         lines += [f"With --full: {joined(omitted)}."] if omitted else []
         for (kind, _), law in zip(table.columns, table.winners, strict=True):
-            starred |= bool(law)
             if law:
-                most.setdefault(law, []).append(f"{kind} on {plant}")
-    if starred:
+                kinds_of.setdefault(law, {}).setdefault(plant, []).append(kind)
+    if kinds_of:
         lines.append("* more than any other of these laws, by more than the search resolves")
     if facts.gains:
         lines.append(f"{facts.gains[:1].upper()}{facts.gains[1:]}")
-    pairs = [(law, f"tolerates the most {joined(kinds)}") for law, kinds in most.items()]
+    pairs = []
+    for law, by_plant in kinds_of.items():
+        most = [f"{joined(kinds)} on {plant}" for plant, kinds in by_plant.items()]
+        pairs.append((law, f"tolerates the most {'; '.join(most)}"))
     if facts.failing:
         pairs.append(("fails", f"unchanged: {', '.join(facts.failing)}"))
     pairs += [next_step(facts.next), more(More("", "", ("margin",)))]
@@ -711,7 +712,7 @@ def _evidence_of_law(facts: WhichFacts) -> list[Labelled]:
             text += f"{'; ' if text else ''}no time for {joined(facts.untried)}"
         pairs.append(("withstands", text))
     if facts.without and facts.form != "unneeded":
-        text = f"{_counts(facts.without.runs)} runs settle"
+        text = f"{_counts(facts.without)} runs settle"
         if facts.over_none and facts.over_none.low > 0.0:
             text += f"; the law's J is {percent(facts.over_none.low, facts.over_none.high)} below"
         pairs.append(("without a law", text))

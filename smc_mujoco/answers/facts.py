@@ -153,21 +153,12 @@ class SettledRuns:
 
 @frozen_data
 class Level:
-    """A level that a law withstands, and the least one tried that it does not."""
+    """A level that a law withstands."""
 
     kind: str  # a kind of margins
     value: float  # NaN where not even the unchanged run holds
-    beyond: float
     unit: str
     open: bool  # whether the search ended there
-
-
-@frozen_data
-class WithoutLaw:
-    """How many runs settle with u = 0, and J over that of the law; NaN where runs fail."""
-
-    runs: Settles
-    times: float
 
 
 @frozen_data
@@ -219,12 +210,9 @@ class WhichFacts:
     runs: SettledRuns
     conditions: Names  # asked for
     levels: tuple[Level, ...]
-    beside: str  # the condition beside which the levels are
     untried: Names  # kinds of margins without time
-    without: WithoutLaw | None
+    without: Settles | None  # how many runs settle with u = 0
     cautions: tuple[Caution, ...]
-    bounds: str  # on u, in words
-    second: str
     folder: str
 
 

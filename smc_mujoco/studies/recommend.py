@@ -21,7 +21,7 @@ from smc_mujoco.analysis.paired_runs import SETTLES, values
 from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.step_halving import doubled, halved
 from smc_mujoco.analysis.tuning import search
-from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective, weighed
+from smc_mujoco.analysis.tuning.objective import Objective, weighed
 from smc_mujoco.analysis.tuning.result import Tuned
 from smc_mujoco.analysis.tuning.run_limits import (
     CALM,
@@ -138,8 +138,7 @@ def recommend(
     broken = breaking(goal.limits, fixed, rests)
     order = in_order({law: settled[law] for law in chosen}, fixed, raced, shaky, broken)
     metrics = list(question.metrics)
-    least = {law: least_share(settled[law]) for law in chosen}
-    if min(least.values()) < 1.0 and SETTLES not in metrics:
+    if min(least_share(settled[law]) for law in chosen) < 1.0 and SETTLES not in metrics:
         metrics.append(SETTLES)
     boards = leaderboard(table, metrics, BY, defaults=True, relevant=question.relevant)
     if not boards:
@@ -155,7 +154,6 @@ def recommend(
         table=table,
         leaderboard=boards,
         laws=tuple(chosen[law] for law in order),
-        settles=least,
         race=raced,
         fixed=fixed,
         settled=settled,
@@ -431,22 +429,14 @@ def _weighed(course: RaceCourse, law: Component) -> tuple[dict[str, float], NoLa
     instances = BESIDE_NONE[:count]
     names = [condition.name for condition in goal.conditions]
     with clock.timed(2 * count * clock.unit):
-        costs, settled = weighed(plant, law, goal, instances, trial.threads)
+        costs, _ = weighed(plant, law, goal, instances, trial.threads)
         none = coerce.law(WITHOUT)
-        without_costs, settled_without = weighed(plant, none, goal, instances, trial.threads)
+        _, settled_without = weighed(plant, none, goal, instances, trial.threads)
     total = costs.sum(axis=0)
     parts = (total / total.sum()).tolist()
-    ratios = without_costs.sum(axis=1) / costs.sum(axis=1)
-    failed = np.maximum(costs, without_costs) >= FAILURE_COST
-    without = dict(zip(names, settled_without.sum(axis=0).tolist(), strict=True))
-    case = trial.case(plant, none, trial.conditions[0])
     return dict(zip(names, parts, strict=True)), NoLaw(
-        times=math.nan if failed.any() else float(np.median(ratios)),
         runs=len(instances),
-        duration=goal.duration,
-        settled=without,
-        settled_by_law=dict(zip(names, settled.sum(axis=0).tolist(), strict=True)),
-        holds=case.efforts[0] == plant.unit,
+        settled=dict(zip(names, settled_without.sum(axis=0).tolist(), strict=True)),
     )
 
 

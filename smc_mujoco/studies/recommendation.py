@@ -24,7 +24,6 @@ from smc_mujoco.answers.facts import (
     SettledRuns,
     Settles,
     WhichFacts,
-    WithoutLaw,
 )
 from smc_mujoco.common import html
 from smc_mujoco.common.cached import cached_property
@@ -51,12 +50,8 @@ Settled = dict[str, dict[str, tuple[int, int]]]  # law -> condition -> runs that
 class NoLaw(NamedTuple):
     """How a plant does without a law, u = 0, on unseen runs of all conditions."""
 
-    times: float  # its J over that of the first law, median over instances; NaN where runs fail
     runs: int  # in each condition
-    duration: float  # of a run, s
     settled: Mapping[str, int]  # condition -> the number of its runs that settle
-    settled_by_law: Mapping[str, int]  # the same under the first law
-    holds: bool  # whether u = 0 is the goal of a servo, which then holds it
 
     @property
     def needless(self) -> list[str]:
@@ -112,7 +107,6 @@ class Recommendation(Answer):
     table: Table  # the runs of the laws, each with one set of gains
     leaderboard: Boards  # of these, a board for each need
     laws: tuple[Component, ...]  # with their gains: those of the boards, best first
-    settles: Mapping[str, float]  # law -> the least share of its runs that settle in a condition
     race: Race
     # of those of `laws` that may be the best, or else the first two, and none, with these gains, by
     # J of the same unseen runs; None without time
@@ -141,11 +135,6 @@ class Recommendation(Answer):
     def law(self) -> Component:
         """The law to use, with its gains."""
         return self.laws[0]
-
-    @property
-    def second(self) -> Component | None:
-        """The second law, with its gains; None if there is no other."""
-        return self.laws[1] if len(self.laws) > 1 else None
 
     @property
     def margins(self) -> Sequence[Margin]:
@@ -253,8 +242,7 @@ class Recommendation(Answer):
         """What the law withstands, a level of each kind."""
         levels = []
         for margin in self.margins:
-            least = margin.value + margin.resolution
-            levels.append(Level(margin.kind, margin.value, least, margin.unit, margin.open))
+            levels.append(Level(margin.kind, margin.value, margin.unit, margin.open))
         return levels
 
     @property
@@ -409,16 +397,10 @@ class Recommendation(Answer):
             runs=self.runs,
             conditions=tuple(self.settled[self.law.name]),
             levels=tuple(self.withstood),
-            beside=self.tolerance.beside,
             untried=tuple(self.tolerance.untried),
             without=without
-            and WithoutLaw(
-                Settles(sum(without.settled.values()), without.runs * len(without.settled)),
-                without.times,
-            ),
+            and Settles(sum(without.settled.values()), without.runs * len(without.settled)),
             cautions=tuple(self.cautions),
-            bounds=self._bounds,
-            second=str(self.second or ""),
             folder=str(self.folder),
         )
 

@@ -219,7 +219,7 @@ def test_each_form_has_its_first_line(raced):
     laws = len(raced_laws.laws)
     assert f"{laws} of {laws + 2} laws" in said
     never = {law: {"coulomb": (0, 4)} for law in recommendation.settled}
-    form, said = first(settled=never, settles=dict.fromkeys(never, 0.0))
+    form, said = first(settled=never)
     assert form == "unsettled"
     assert "coulomb" in said
     assert name in said
@@ -276,9 +276,7 @@ def test_cautions_are_lines_with_their_numbers(raced):
     limit = SimpleNamespace(what="overshoot", most=10.0)
     kept = dataclasses.replace(rested, limits=[limit])
     assert numbers(line(kept, "overshoot"))[:2] == [19.0, 10.0]
-    rare = dataclasses.replace(
-        recommendation, settled={name: {"coulomb": (2, 4)}}, settles={name: 0.5}
-    )
+    rare = dataclasses.replace(recommendation, settled={name: {"coulomb": (2, 4)}})
     assert (2, 4) in [(caution.count, caution.run_count) for caution in rare.cautions]
     delay = recommendation.margins[0]
     tight = dataclasses.replace(delay, value=0.01, resolution=0.005)
@@ -296,7 +294,7 @@ def test_cautions_are_lines_with_their_numbers(raced):
     helped = recommendation.tolerance._replace(helped=["z"], opposed=recommendation.margins[1])
     fights = dataclasses.replace(recommendation, tolerance=helped)._of_margins[-1]
     assert (fights.kind, fights.value) == ("helped", recommendation.margins[1].value)
-    needless = NoLaw(0.9, 4, 1.0, {"coulomb": 4, "noise": 1}, {"coulomb": 4, "noise": 4}, False)
+    needless = NoLaw(4, {"coulomb": 4, "noise": 1})
     unneeded = dataclasses.replace(recommendation, no_law=needless)
     assert "coulomb" in line(unneeded, "without  ")
 
