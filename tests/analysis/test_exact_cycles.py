@@ -10,6 +10,7 @@ import math
 import numpy as np
 import pytest
 from helpers.exact_cycles import GAINS, NAMES, ExactLoop, measured, random_loop
+from helpers.runs import free_mass
 
 import smc_mujoco as smc
 
@@ -123,7 +124,7 @@ def test_ranges_hold_the_cycles_of_fresh_loops():
 def test_a_run_whose_cycle_depends_on_the_step_is_marked():
     """implicitfast moves positions ahead by half a step."""
     coarse = {"physics_step": 1e-3, "integrator": "implicitfast"}
-    free = smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0)
+    free = free_mass()
     common = {
         "plant": free,
         "law": smc.law("twisting"),

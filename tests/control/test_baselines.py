@@ -10,17 +10,13 @@ import math
 import numpy as np
 import pytest
 from helpers import plants_ab
+from helpers.runs import free_mass
 from scipy.linalg import expm, solve_continuous_are
 
 import smc_mujoco as smc
 from smc_mujoco.control import nominal_gains
 
-FREE = smc.plant(
-    "duffing",
-    alpha=0.0,
-    beta=0.0,
-    delta=0.0,
-)
+FREE = free_mass()
 
 
 def called(law, times=1, memory=None, **y):

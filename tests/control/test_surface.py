@@ -9,6 +9,7 @@ import math
 import numpy as np
 import pytest
 from helpers.plants_ab import measured
+from helpers.runs import free_mass
 from scipy.integrate import quad
 
 import smc_mujoco as smc
@@ -21,13 +22,7 @@ pytestmark = pytest.mark.quick
 SURFACES = pytest.mark.parametrize("name", laws(kind="surface"))
 # those that an acceleration of the error keeps
 SECOND = [name for name in laws(kind="surface") if name != "higher_order"]
-MASS = smc.plant(
-    "duffing",
-    M=1.0,
-    alpha=0.0,
-    beta=0.0,
-    delta=0.0,
-)
+MASS = free_mass()
 HUM = smc.Sine(amplitude=0.4, omega=3.0)
 SHAKEN = 1.2e-3 * 3.0  # bound on s from sampling: (k + D) dt for k = 2, and half as much again
 

@@ -24,6 +24,11 @@ def scenario(law="classical", **fields):
     return smc.Scenario(**{"plant": "duffing", "law": law, "duration": 0.02} | fields)
 
 
+def free_mass(mass=1.0):
+    """A block, kg, that nothing but u and d moves."""
+    return smc.plant("duffing", M=mass, delta=0.0, alpha=0.0, beta=0.0)
+
+
 def made(function, gains=None, memory=8):
     """A law of a function."""
     return smc.law_function(gains=gains, memory=memory)(function)()

@@ -20,6 +20,7 @@ import re
 import numpy as np
 import pytest
 from helpers.pages import ROOT
+from helpers.runs import free_mass
 from numba import njit
 
 import smc_mujoco as smc
@@ -33,17 +34,6 @@ SEEDS = 24
 # samples in which errors are measured: as many for every period, as their maximum grows with the
 # number
 LATE = 3000
-
-
-def mass():
-    """A block that nothing but u and d moves."""
-    return smc.plant(
-        "duffing",
-        M=1.0,
-        delta=0.0,
-        alpha=0.0,
-        beta=0.0,
-    )
 
 
 def exponents(sizes, errors):
@@ -102,7 +92,7 @@ def sliding(r, noise):
             for seed in range(SEEDS if noise else 4):
                 scenarios.append(
                     smc.Scenario(
-                        plant=mass(),
+                        plant=free_mass(),
                         law=law,
                         x0=0.02 + 0.01 * seed,
                         duration=settled + LATE * h,
@@ -186,7 +176,7 @@ def differentiation(n, noise):
             for law, velocity in shows[: n + 1]:
                 scenarios.append(
                     smc.Scenario(
-                        plant=mass(),
+                        plant=free_mass(),
                         law=law,
                         velocity=velocity,
                         x0=math.sin(seed),

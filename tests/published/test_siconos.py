@@ -14,6 +14,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers.runs import free_mass
 
 import smc_mujoco as smc
 
@@ -44,17 +45,6 @@ TWISTING = {
 }
 
 
-def mass(m=1.0):
-    """A block that nothing but u and d moves."""
-    return smc.plant(
-        "duffing",
-        M=m,
-        delta=0.0,
-        alpha=0.0,
-        beta=0.0,
-    )
-
-
 @functools.cache
 def first_example():
     """Traces: x2 under the implicit law and under the explicit one."""
@@ -73,7 +63,7 @@ def first_example():
     ):
         x2.append(
             smc.Scenario(
-                plant=mass(0.5),
+                plant=free_mass(0.5),
                 law=law,
                 model="nominal",
                 v0=-1.0,
@@ -135,7 +125,7 @@ def implicit_twisting(y, gains, memory):
 def twisting_runs():
     """Traces of Siconos' implicit twisting and of the library's explicit one, from (10, 10)."""
     common = {
-        "plant": mass(),
+        "plant": free_mass(),
         "x0": 10.0,
         "v0": 10.0,
         "control_period": 0.1,

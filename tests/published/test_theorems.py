@@ -9,6 +9,7 @@ import math
 import numpy as np
 import pytest
 from helpers.pages import ROOT
+from helpers.runs import free_mass
 
 import smc_mujoco as smc
 
@@ -18,13 +19,7 @@ L, BOUND = 1.0, 2.0  # of |d'| and of |u|, in N/s and N
 
 def run(laws, **fields):
     """Runs of laws on a block that nothing but u and d moves, c = 0 so that s is its velocity."""
-    mass = smc.plant(
-        "duffing",
-        M=1.0,
-        delta=0.0,
-        alpha=0.0,
-        beta=0.0,
-    )
+    mass = free_mass()
     common = {
         "plant": mass,
         "x0": 0.0,

@@ -4,6 +4,7 @@ import dataclasses
 import math
 
 import pytest
+from helpers.runs import free_mass
 
 import smc_mujoco as smc
 from smc_mujoco.control.law import all_laws, catalogue
@@ -19,18 +20,8 @@ def promised(found):
     return abs(found.order - found.theory) <= 0.2
 
 
-def double_integrator():
-    return smc.plant(
-        "duffing",
-        M=1.0,
-        delta=0.0,
-        alpha=0.0,
-        beta=0.0,
-    )
-
-
 def defaults(names, **options):
-    return smc.accuracy.orders(names, double_integrator(), gains="default", **SHORT | options)
+    return smc.accuracy.orders(names, free_mass(), gains="default", **SHORT | options)
 
 
 @smc.law_function(gains={"k": 4.0, "c": 2.5}, accuracy={"s": 1, "e": 1})

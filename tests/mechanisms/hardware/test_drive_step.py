@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from helpers import reference
 from helpers.reference import advance
-from helpers.runs import at_defaults
+from helpers.runs import at_defaults, free_mass
 from scipy.integrate import solve_ivp
 
 import smc_mujoco as smc
@@ -84,12 +84,7 @@ def test_the_mean_force_of_two_lags_is_exact(first, second, step):
 
 @pytest.mark.parametrize("tau", [1e-4, 1e-3, 0.01, 0.5])
 def test_a_lag_gives_a_free_mass_its_exact_velocity(tau):
-    free = smc.plant(
-        "duffing",
-        alpha=0.0,
-        beta=0.0,
-        delta=0.0,
-    )
+    free = free_mass()
     trace = smc.run(
         scenario(
             smc.Lag(tau),
@@ -304,12 +299,7 @@ def test_a_free_rotor_is_the_second_order_system_of_its_equations_with_any_step(
     a step.
     """
     motor = smc.DCMotor(inductance=20e-3)
-    free = smc.plant(
-        "duffing",
-        alpha=0.0,
-        beta=0.0,
-        delta=0.0,
-    )
+    free = free_mass()
     trace = smc.run(
         scenario(
             motor,

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 from helpers import reference
-from helpers.runs import assert_same
+from helpers.runs import assert_same, free_mass
 from numba import njit
 
 import smc_mujoco as smc
@@ -70,7 +70,7 @@ def exact_rest(x, kp, kd, numbers, inertia=1.0, seconds=4.0):
 
 def cart(**fields):
     """A run of a cart of 1 kg without a spring."""
-    plant = smc.plant("duffing", M=1.0, alpha=0.0, beta=0.0, delta=0.0)
+    plant = free_mass()
     return smc.run(
         smc.Scenario(plant=plant, **{"law": "none", "x0": 0.0, "v0": 0.0, "u_max": 99.0} | fields)
     )

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from helpers import reference
-from helpers.runs import assert_same
+from helpers.runs import assert_same, free_mass
 
 import smc_mujoco as smc
 from smc_mujoco.control.units import Gain
@@ -31,13 +31,7 @@ def sigmoid(v, p1, p2, p3):
 
 def flywheel(mass, v0, **fields):
     """A run of a cart of that mass, without a spring, from the speed v0."""
-    plant = smc.plant(
-        "duffing",
-        M=mass,
-        alpha=0.0,
-        beta=0.0,
-        delta=0.0,
-    )
+    plant = free_mass(mass)
     return smc.run(
         smc.Scenario(
             **{

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.runs import free_mass
 
 import smc_mujoco as smc
 from smc_mujoco.hardware import LuGre, Stribeck
@@ -18,7 +19,7 @@ PART = Stribeck(0.2, 0.35, 0.1, viscous=0.3, offset=0.05)
 
 def cart(**fields):
     """A run of a cart of 1 kg without a spring."""
-    plant = smc.plant("duffing", M=1.0, alpha=0.0, beta=0.0, delta=0.0)
+    plant = free_mass()
     return smc.run(smc.Scenario(plant=plant, **{"law": "none", "x0": 0.0, "v0": 0.0} | fields))
 
 
