@@ -799,16 +799,6 @@ def ramp(colour: str, count: int, lightest: float = LIGHTEST) -> list[str]:
     return [shades[i] for i in nearest]
 
 
-@functools.cache
-def letters_on(colour: str) -> str:
-    """Return the colour of letters that have more contrast with a colour, white or ink (WCAG
-    2.2).
-    """
-    on = luminance(colour) + 0.05
-    darker = on / (luminance(INK) + 0.05)
-    return INK if darker > (luminance(PAPER) + 0.05) / on else PAPER
-
-
 def luminance(colour: str) -> float:
     """Return the relative luminance of WCAG 2.2, 0 for black and 1 for white."""
     shares = np.array([0.2126, 0.7152, 0.0722])
