@@ -9,6 +9,7 @@ from smc_mujoco.mechanisms.hardware.drives import in_series
 from smc_mujoco.mechanisms.hardware.friction import DryFriction
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.hardware.rotors import Rotors, flies
+from smc_mujoco.mechanisms.hardware.tendons import of_plant
 from smc_mujoco.mechanisms.layout import moves_alone
 from smc_mujoco.simulation.signals import Push
 
@@ -35,7 +36,7 @@ def exact_parts(s: Any) -> tuple[Part, ...]:
         return ()
     if s.contact or s.mechanism != "equation":
         return ()
-    if s.integrator not in (None, "RK4") or not moves_alone(s.plant):
+    if s.integrator not in (None, "RK4") or not moves_alone(s.plant) or of_plant(s.plant):
         return ()
     if any(isinstance(d, Push) for d in s.disturbance):
         return ()
@@ -50,6 +51,8 @@ def acting(s: Any) -> tuple[tuple[Part, str], ...]:
     do, see `Scenario.acting`.
     """
     drives: list[Part] = [Rotors()] if flies(s.plant) else []
+    if tendons := of_plant(s.plant):
+        drives.append(tendons)
     defaults = s.resolved
     chains = s.drive_train.chains
     drives += in_series(chains, defaults.physics_step, defaults.integrator == "RK4")

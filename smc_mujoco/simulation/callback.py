@@ -56,6 +56,7 @@ WRONG_MUJOCO = "4.0.0"  # pyproject.toml excludes it
 MAGIC = 7263.0  # the first number of this package's userdata: chosen
 PROBE_MODEL = """<mujoco><size nuserdata="12345" nuser_actuator="1" nuser_body="1"/>
   <worldbody><body><joint name="j" frictionloss="1"/><geom size="1"/></body></worldbody>
+  <tendon><fixed><joint joint="j" coef="1"/></fixed></tendon>
   <actuator><motor joint="j"/></actuator><sensor><jointpos joint="j"/></sensor></mujoco>"""
 
 OF_MODEL = (
@@ -176,6 +177,7 @@ def callback():
             array_at(data + offset.qLDiagInv),
             array_at(data + offset.efc_frictionloss),
             array_at(data + offset.efc_aref),
+            array_at(data + offset.ten_J),
             array_at(model + offset.dof_frictionloss),
             integers(model + offset.actuator_user)[0],
             integers(model + offset.body_user)[0],

@@ -51,7 +51,7 @@ Arrays = namedtuple(
     "Arrays",
     """qpos qvel ctrl xfrc_applied qfrc_applied sensordata xipos xanchor xaxis
     actuator_force qfrc_constraint qfrc_bias qfrc_spring qfrc_passive qfrc_actuator qLDiagInv
-    efc_frictionloss efc_aref dof_frictionloss actuator_user body_user""",
+    efc_frictionloss efc_aref ten_J dof_frictionloss actuator_user body_user""",
 )
 # What the moments see of a run: the address of its record, the record, and the Arrays.
 View = namedtuple("View", ("address", "sim", "data"))

@@ -41,6 +41,7 @@ def keep_reach(reach, data):
     reach.xfrc_applied = place(data.xfrc_applied)
     reach.qfrc_applied = place(data.qfrc_applied)
     reach.actuator_force = place(data.actuator_force)
+    reach.ten_J = place(data.ten_J)
     reach.actuator_user = data.actuator_user
     reach.body_user = data.body_user
 

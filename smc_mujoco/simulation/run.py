@@ -138,6 +138,7 @@ def run(
     for trace in traces.values():
         warn_once(trace.unresolved)
         warn_once(trace.unmet)
+        warn_once(trace.unreached)
     if isinstance(scenarios, Scenario):
         return traces[0]
     return [traces[i] for i in range(len(prepared))]

@@ -15,6 +15,7 @@ from smc_mujoco.mechanisms.hardware.contact import kinds
 from smc_mujoco.mechanisms.hardware.feedforward import Feedforward
 from smc_mujoco.mechanisms.hardware.part import Friction
 from smc_mujoco.mechanisms.hardware.rotors import flies
+from smc_mujoco.mechanisms.hardware.tendons import of_plant
 from smc_mujoco.mechanisms.layout import driven_names, loaded
 from smc_mujoco.mechanisms.plant import MAX_EXCESS, Plant, check_ranges, degrees_hint
 from smc_mujoco.simulation.law_checks import check_inertia, check_law
@@ -260,6 +261,13 @@ def _check_parts(s: Any) -> None:
     for chain in dict.fromkeys(s.drive_train.chains):
         for part in chain:
             part.suits(s, chain)
+    tendons = of_plant(s.plant)
+    for i, chain in enumerate(s.drive_train.chains):
+        if tendons and i in tendons.driven and chain:
+            raise ScenarioError(
+                f"tendons drive joint {driven_names(s.plant)[i]!r} of {s.plant.name}, and "
+                f"{type(chain[0]).__name__} is another drive of it: leave actuator out"
+            )
     for part in s.friction:
         part.check(s.plant)
         if part.side == "motor":

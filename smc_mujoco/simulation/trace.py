@@ -26,7 +26,8 @@ from smc_mujoco.common.errors import (
 )
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import CHANGED, as_path, from_json, reading, replacing, to_json
-from smc_mujoco.mechanisms.layout import channel_names, column_ends
+from smc_mujoco.mechanisms.hardware.tendons import of_plant
+from smc_mujoco.mechanisms.layout import channel_names, column_ends, loaded
 from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.simulation import damping, scenario_json
 from smc_mujoco.simulation.scenario import Scenario
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     import xarray  # pyright: ignore[reportMissingImports]
 
 ARRAYS = ("t", *LOGGED)
-OPTIONAL = ("held", "damping", "compensation")
+OPTIONAL = ("held", "damping", "compensation", "tension")
 PLANT_DIVERGED = "the plant diverged"  # how the failure of such a run begins
 MAX_FAILURE = 500  # characters; chosen
 MAX_TEXT = 2**26  # characters of a scenario in a file, 64 million; chosen
@@ -79,6 +80,8 @@ class Trace:
       damping: the part of `reaction` that damping exerts, (K + 1, n), N or N m; None without any.
       compensation: what a Feedforward asked for beside the law, (K + 1, n), in the unit of u; None
         without one.
+      tension: of the tendons that drive joints, (K + 1, tendons), N, in the order of the
+        file's actuators; None where motors do.
 
     Of a free body x is its position, in the world's axes, and the rotation vector of its attitude;
     v its velocity in the world's axes, and its angular velocity in its own. u, d, force and
@@ -102,6 +105,7 @@ class Trace:
     held: Array | None = None
     damping: Array | None = None
     compensation: Array | None = None
+    tension: Array | None = None
 
     def __post_init__(self):
         for array in self.arrays().values():
@@ -113,9 +117,7 @@ class Trace:
         return self.scenario.plant.errors(self.x, self.r)
 
     def arrays(self) -> dict[str, Array]:
-        """Return the arrays by name; `held`, `damping` and `compensation` only if they are not
-        None.
-        """
+        """Return the arrays by name; those of OPTIONAL only if they are not None."""
         arrays = {}
         for name in (*ARRAYS, *OPTIONAL):
             array = getattr(self, name)
@@ -134,6 +136,13 @@ class Trace:
         from smc_mujoco.simulation.blow import unmet
 
         return unmet(self)
+
+    @property
+    def unreached(self) -> str:
+        """What of the commands the tendons could not give, in a sentence; "" if nothing."""
+        from smc_mujoco.simulation.tendon_forces import unreached
+
+        return unreached(self)
 
     @property
     def unresolved(self) -> str:
@@ -176,6 +185,8 @@ class Trace:
             rows["not resolved"] = self.unresolved
         if self.unmet:
             rows["not met"] = self.unmet
+        if self.unreached:
+            rows["not reached"] = self.unreached
         efforts = s.efforts[: s.plant.driven]
         for name, units in (("x", s.plant.units), ("u", efforts)):
             for unit in dict.fromkeys(units):
@@ -459,6 +470,9 @@ def from_log(scenario: Scenario, log: Array, failed_step: int, failure: str | No
     if damped.any():
         arrays["damping"] = damped
         arrays["reaction"] += damped
+    if tendons := of_plant(scenario.plant):
+        model = loaded(scenario.plant)
+        arrays["tension"] = tendons.shared(model, arrays["x"], arrays["applied"])[0]
     return Trace(
         **arrays,
         t=t,
@@ -531,9 +545,11 @@ def _checked_array(archive: zipfile.ZipFile, name: str, scenario: Scenario | Non
     if scenario is None:
         expected = shape == () and dtype.kind == "U" and dtype.itemsize <= 4 * MAX_TEXT
     else:
-        expected = (
-            dtype == np.dtype(float)
-            and shape == (scenario.samples + 1, scenario.plant.n)[: 1 if name == "t" else 2]
+        tendons = of_plant(scenario.plant)
+        columns = len(tendons.cables) if name == "tension" and tendons else scenario.plant.n
+        rows = scenario.samples + 1
+        expected = dtype == np.dtype(float) and shape == (
+            (rows,) if name == "t" else (rows, columns)
         )
     if not expected:
         raise ScenarioError(

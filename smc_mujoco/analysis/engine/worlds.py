@@ -16,6 +16,7 @@ from smc_mujoco.analysis.engine.group import (
 from smc_mujoco.analysis.engine.scores import holds
 from smc_mujoco.analysis.engine.world_callback import WorldRuns, calls_in_step, world_places
 from smc_mujoco.common.aliases import Array
+from smc_mujoco.mechanisms.hardware.tendons import of_plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.model import check_start, mechanism, structure
 from smc_mujoco.simulation.scenario import Resolved, Scenario
@@ -34,6 +35,7 @@ def why_not(scenario: Scenario, metrics: Sequence[str] = (), device: str = "cuda
         "it has a base that moves freely": bool(plant.pose or plant.base >= 0),
         "its law reads the nominal model, which MuJoCo computes run by run": s.model != "none"
         and bool(plant.by_mujoco or plant.unmodelled),
+        "tendons share the forces on its joints": of_plant(plant) is not None,
         "it measures joints that nothing drives": plant.measured > 0,
         "a part of it acts in MuJoCo's callback": any(kind != "act" for _, kind in s.acting),
         "it has an actuator other than lags and rate limits": not all(map(lags, s.actuator)),

@@ -25,17 +25,18 @@ from smc_mujoco.common.errors import (
     shown,
     users_stacklevel,
 )
-from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.custom.actuator_kinds import filters, gear_of, no_motor
 from smc_mujoco.mechanisms.custom.kept_actuators import (
-    ctrlrange_of,
     delay_of,
     filter_of,
     forcerange_of,
     kept,
     not_kept,
+    of_command,
+    of_motor,
 )
 from smc_mujoco.mechanisms.custom.mjcf import pick
+from smc_mujoco.mechanisms.custom.pulled import pulled_by
 from smc_mujoco.mechanisms.hardware.part import Actuator
 from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
 from smc_mujoco.mechanisms.layout import BASE, PASSIVE, PLACES, POSE, unit_wrenches
@@ -68,8 +69,9 @@ class Channel:
     Attributes:
       motor: whether to replace the joint's actuators, if it has any, by an ideal motor. It keeps
         their forcerange, a motor's ctrlrange, and the joint's actuatorfrcrange. Without it, the
-        joint needs exactly one actuator, which stays as it is. In a file without actuators, such as
-        a URDF, a joint whose force is bounded gets an ideal motor.
+        joint needs exactly one actuator, which stays as it is, or motors of tendons, over which u
+        is shared. In a file without actuators, such as a URDF, a joint whose force is bounded gets
+        an ideal motor.
       servo: what the joint's actuator has to be. True: a `<position>` or a `<pid>`, whose
         set-point u is, rad (m) from the joint's default goal, with its gains, gear, timeconst,
         forcerange and ctrlrange, and without a nominal model; or a `<dcmotor>`, whose voltage u is,
@@ -405,15 +407,7 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> Floats:
                 f"actuator {name!r} of {label} is more than a force behind a lag: "
                 "make it a <motor> without a refsite and without a delay"
             )
-    commands = model.actuator_ctrladr[drives]
-    ends = model.actuator_gainprm[drives, :1] * model.actuator_ctrlrange[commands]
-    ends[model.actuator_ctrllimited[commands] == 0] = math.inf
-    allowed = model.actuator_forcerange[drives].T[:, :, None]
-    clamped = np.clip(ends, *allowed)
-    ends[model.actuator_forcelimited[drives] == 1] = clamped[
-        model.actuator_forcelimited[drives] == 1
-    ]
-    largest = np.abs(ends).max(axis=1)
+    largest = np.array([np.abs(of_command(model, i)).max() for i in drives])
     forces = unit_wrenches(model, model.joint(joint).id, drives)
     pushes = forces[:, :3]
     together = np.linalg.norm(pushes, axis=1)
@@ -526,11 +520,9 @@ def motor_of(
         bounds.append(_together(model, actuators))
     elif not actuators:
         if not bounds or _has_actuators(model):
-            pulled = pulled_by(model, joint)
-            left_out = f", which leaves out that {joined(pulled)} pull at it" if pulled else ""
             raise ScenarioError(
-                f"no actuator of {label} drives joint {joint!r} alone: {cure}{left_out}; without a "
-                "u_max its bound is what the joint's load and travel need"
+                f"no actuator of {label} drives joint {joint!r} alone: {cure}; without a u_max its "
+                "bound is what the joint's load and travel need"
             )
     elif len(actuators) > 1:
         raise ScenarioError(f"joint {joint!r} of {label} has the actuators {names}: {cure}")
@@ -544,7 +536,7 @@ def motor_of(
             f"servo out, or {cure}"
         )
     else:
-        bounds.append(_of_actuator(model, actuators[0]))
+        bounds.append(of_motor(model, actuators[0]))
     gives = f"actuator {names!r} gives joint {joint!r} of {label}"
     limit = _limit(gives, cure, *bounds)
     parts = ()
@@ -595,26 +587,6 @@ def bound_of_kept(label: str, model: mujoco.MjModel, joint: str, part: Actuator)
     )
 
 
-def pulled_by(model: mujoco.MjModel, joint: str) -> list[str]:
-    """Return the actuators of tendons that act on a joint at the model's default pose, quoted."""
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    moments = np.zeros((model.nu, model.nv))
-    mujoco.mju_sparse2dense(
-        moments,
-        data.actuator_moment,
-        data.moment_rownnz,
-        data.moment_rowadr,
-        data.moment_colind,
-    )
-    names = []
-    for i in np.flatnonzero(moments[:, model.joint(joint).dofadr[0]]):
-        if model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_TENDON:
-            tendon = model.tendon(model.actuator_trnid[i, 0]).name
-            names.append(repr(model.actuator(i).name or tendon or f"number {i}"))
-    return names
-
-
 def _on_joint(model: mujoco.MjModel, joint_id: int) -> list[int]:
     """Return the actuators that act on this joint alone."""
     acting = []
@@ -622,6 +594,18 @@ def _on_joint(model: mujoco.MjModel, joint_id: int) -> list[int]:
         if model.actuator_trntype[i] in ONE_JOINT and model.actuator_trnid[i, 0] == joint_id:
             acting.append(i)
     return acting
+
+
+def by_tendons(model: mujoco.MjModel, channels: Pairs) -> list[str]:
+    """Return the driven joints that tendons drive: nothing drives them alone, and the user asks for
+    no other motor.
+    """
+    joints = []
+    for joint, channel in channels:
+        alone = _on_joint(model, model.joint(joint).id)
+        if not (channel.motor or channel.servo or alone) and pulled_by(model, joint):
+            joints.append(joint)
+    return joints
 
 
 def _has_actuators(model: mujoco.MjModel) -> bool:
@@ -643,18 +627,6 @@ def _limit(who: str, cure: str, *ranges: Floats) -> float:
     return min(-low, high)
 
 
-def _of_actuator(model: mujoco.MjModel, i: int) -> Pair:
-    """Return the least and the largest force of an actuator at its joint, N m or N."""
-    gain = model.actuator_gainprm[i, 0]
-    gear = gear_of(model, i)
-    low, high = sorted(float(gain * end) for end in ctrlrange_of(model, i))
-    if model.actuator_forcelimited[i]:
-        lowest, highest = model.actuator_forcerange[i]
-        low, high = (float(min(max(end, lowest), highest)) for end in (low, high))
-    low, high = sorted((float(gear * low), float(gear * high)))
-    return low, high
-
-
 def _together(model: mujoco.MjModel, actuators: Sequence[int]) -> Pair:
     """Return the least and the largest force that a joint's actuators allow together by their
     forceranges, and motors by their ctrlranges, N m or N.
@@ -667,7 +639,7 @@ def _together(model: mujoco.MjModel, actuators: Sequence[int]) -> Pair:
     for i in actuators:
         ends = -math.inf, math.inf
         if not no_motor(model, i) and not filters(model, i):
-            ends = _of_actuator(model, i)
+            ends = of_motor(model, i)
         elif model.actuator_forcelimited[i]:
             of_gear = gear_of(model, i) * model.actuator_forcerange[i]
             ends = sorted(of_gear)

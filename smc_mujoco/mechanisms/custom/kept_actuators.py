@@ -190,6 +190,21 @@ def _range_of(model: mujoco.MjModel, ctrl: int) -> Pair:
     return low, high
 
 
+def of_command(model: mujoco.MjModel, i: int) -> Pair:
+    """Return the least and the largest force of a motor before its gear."""
+    gain = model.actuator_gainprm[i, 0]
+    low, high = sorted(float(gain * end) for end in ctrlrange_of(model, i))
+    if model.actuator_forcelimited[i]:
+        lowest, highest = model.actuator_forcerange[i]
+        low, high = (float(min(max(end, lowest), highest)) for end in (low, high))
+    return low, high
+
+
+def of_motor(model: mujoco.MjModel, i: int) -> Pair:
+    """Return the least and the largest force of a motor at its joint or its tendon, N m or N."""
+    return _times(of_command(model, i), gear_of(model, i))
+
+
 def forcerange_of(model: mujoco.MjModel, i: int) -> Pair:
     """Return the least and the largest force of an actuator at its joint, N m or N, by its
     forcerange alone.

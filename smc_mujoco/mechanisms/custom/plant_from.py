@@ -53,9 +53,11 @@ from smc_mujoco.mechanisms.custom.model_constraints import (
 )
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.custom.others import OTHERS, limp, ties
+from smc_mujoco.mechanisms.custom.pulled import Pulled, may_push, name_of, pulled, pulled_by
 from smc_mujoco.mechanisms.custom.scales import free_base, rises
 from smc_mujoco.mechanisms.custom.user_model import UserFields, UserModel
 from smc_mujoco.mechanisms.hardware.position_servo import PositionServo
+from smc_mujoco.mechanisms.hardware.tendons import Tendons, of_plant
 from smc_mujoco.mechanisms.layout import loaded
 from smc_mujoco.mechanisms.plant import Plant, catalogue, check_ranges, degrees_hint
 
@@ -173,6 +175,8 @@ def plant_from(
     seen = [*joints_of(pairs), *measured]
     doubts += _doubts_of_others(source.label, spec, model, seen, others)
     doubts += _left_out_cables(source.label, model, pairs)
+    if tendons := of_plant(machine):
+        doubts += may_push(source.label, model, tendons.cables)
     for doubt in doubts:
         warnings.warn(doubt, ScenarioWarning, users_stacklevel())
     return machine
@@ -211,9 +215,10 @@ def _assumed_drives(label: str, machine: Plant, pairs: Pairs) -> Iterator[str]:
 def _left_out_cables(label: str, model: mujoco.MjModel, pairs: Pairs) -> Iterator[str]:
     """Yield a sentence on each joint whose ideal motor stands for cables that pull at it."""
     for joint, channel in pairs:
-        if channel.motor and (pulled := own.pulled_by(model, joint)):
+        if channel.motor and (pulling := pulled_by(model, joint)):
+            names = joined([repr(name_of(model, i)) for i in pulling])
             yield (
-                f"the ideal motor of joint {joint!r} of {label} leaves out that {joined(pulled)} "
+                f"the ideal motor of joint {joint!r} of {label} leaves out that {names} "
                 "pull at it: it may push, and no tension is bounded, so its runs are of another "
                 "machine"
             )
@@ -374,9 +379,22 @@ def _with_drives(
         return dataclasses.replace(build, thrusters=thrusters), reach
     motors = []
     channels = []
+    by_tendons = own.by_tendons(model, build.channels)
+    shared = Pulled()
+    tendons = None
+    if by_tendons:
+        cure = f'give "{build.with_motor(by_tendons[0])}", with an ideal motor instead'
+        shared = pulled(
+            label, model, {joint: goals[joint] for joint in by_tendons}, build.keyframe, cure
+        )
+        driven = [i for i, (joint, _) in enumerate(build.channels) if joint in by_tendons]
+        tendons = Tendons(shared.cables, tuple(driven))
     for joint, channel in build.channels:
         ideal = build.with_motor(joint)
-        own_motor = own.motor_of(label, model, joint, channel, goals[joint], ideal)
+        if joint in shared.limits:
+            own_motor = Motor(joint, shared.limits[joint], shared.actuators)
+        else:
+            own_motor = own.motor_of(label, model, joint, channel, goals[joint], ideal)
         motors.append(own_motor)
         # what the file decided is stated from now on, also in texts and records
         motor = channel.motor or not own_motor.replaced
@@ -384,7 +402,8 @@ def _with_drives(
         stated = dataclasses.replace(channel, motor=motor, servo=servo)
         channels.append((joint, stated))
     limits = tuple(motor.limit for motor in motors)
-    return dataclasses.replace(build, channels=tuple(channels), motors=tuple(motors)), limits
+    drives = {"channels": tuple(channels), "motors": tuple(motors), "tendons": tendons}
+    return dataclasses.replace(build, **drives), limits
 
 
 def _check_names(label: str, model: mujoco.MjModel, keyframe: str | None, tip: str | None) -> None:

@@ -15,6 +15,7 @@ from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs, joints_
 from smc_mujoco.mechanisms.custom.mjcf import ModelSource
 from smc_mujoco.mechanisms.custom.model_constraints import harden, touches
 from smc_mujoco.mechanisms.custom.others import edit, limp, usual_keyframe
+from smc_mujoco.mechanisms.hardware.tendons import Tendons
 from smc_mujoco.mechanisms.layout import OWN, ROTOR, START
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Field
 
@@ -42,6 +43,7 @@ class UserModel:
     tip: str = ""
     # indices of the actuators of a free joint, which then has the six channels
     thrusters: tuple[int, ...] = ()
+    tendons: Tendons | None = None  # over which the channels' forces are shared
     others: str = ""  # one of others.OTHERS, or "" if not given
     measured: Names = ()  # joints that are measured beside the channels
 

@@ -142,7 +142,7 @@ PART = np.dtype(
 # rotors and drag have.
 Reach = namedtuple(
     "Reach",
-    "qpos qvel ctrl xfrc_applied qfrc_applied actuator_force actuator_user body_user",
+    "qpos qvel ctrl xfrc_applied qfrc_applied actuator_force ten_J actuator_user body_user",
 )
 REACH = whole_numbers(Reach._fields)  # their addresses
 
@@ -157,6 +157,7 @@ def reached(at):
         pointer(at.xfrc_applied),
         pointer(at.qfrc_applied),
         pointer(at.actuator_force),
+        pointer(at.ten_J),
         at.actuator_user,
         at.body_user,
     )
