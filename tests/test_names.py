@@ -9,13 +9,15 @@ pytestmark = pytest.mark.quick
 
 WORDS = """one its some each of found made told other others these shown kept known given wanted thing
 left at every both several asked there whole"""
-FOLDERS = ["smc_mujoco", "benchmarks", "scenes", "docs/site", "videos", "examples"]
-# fields and parameters that users name by keyword
+FOLDERS = ["smc_mujoco", "tests", "benchmarks", "scenes", "docs/site", "videos", "examples"]
+# fields and parameters that users name by keyword, and the left side of a box
 PUBLIC = {
     ("smc_mujoco/draw/film/film.py", "at"),
     ("smc_mujoco/simulation/signals.py", "at"),
     ("smc_mujoco/mechanisms/custom/user_model.py", "others"),
     ("smc_mujoco/mechanisms/hardware/moments.py", "others"),
+    ("tests/helpers/boxes.py", "left"),
+    ("tests/helpers/films.py", "left"),
 }
 
 

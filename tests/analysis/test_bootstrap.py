@@ -30,10 +30,12 @@ def test_the_interval_of_a_share_covers_as_often_as_its_docstring_says(n):
         intervals.append(share_interval(k / n, n))
 
     def coverage(shares):
-        covered = np.array([(one.low <= shares) & (shares <= one.high) for one in intervals])
+        covered = np.array(
+            [(bounds.low <= shares) & (shares <= bounds.high) for bounds in intervals]
+        )
         return (binom.pmf(np.arange(n + 1)[:, None], n, shares) * covered).sum(axis=0)
 
-    ends = np.array([(one.low, one.high) for one in intervals])
+    ends = np.array([(bounds.low, bounds.high) for bounds in intervals])
     beside = np.concatenate([ends - 1e-9, ends + 1e-9]).ravel()
     assert coverage(beside[(beside > 0.0) & (beside < 1.0)]).min() == pytest.approx(0.83, abs=0.01)
     assert coverage(np.linspace(0.0005, 0.9995, 2000)).mean() == pytest.approx(0.95, abs=0.01)

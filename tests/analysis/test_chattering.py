@@ -46,14 +46,14 @@ def test_a_prediction_prints_as_a_sentence():
 
 def lagging(law, mu, **fields):
     """An integrator of s (c is small) behind two equal lags."""
-    given = {
+    settings = {
         "actuator": (smc.Lag(mu), smc.Lag(mu)),
         "control_period": 1e-4,
         "x0": 0.0,
         "v0": 1e-3,
     }
     return smc.Scenario(
-        plant=smc.plant("duffing", **INTEGRATOR), law=at_defaults(law), **(given | fields)
+        plant=smc.plant("duffing", **INTEGRATOR), law=at_defaults(law), **(settings | fields)
     )
 
 
@@ -66,11 +66,11 @@ def measured(trace, part=0.4):
     t = trace.t[first:]
     z = s - s.mean()
     up = np.flatnonzero((z[:-1] < 0) & (z[1:] >= 0))
-    at = t[up] - z[up] * (t[up + 1] - t[up]) / (z[up + 1] - z[up])
+    crossings = t[up] - z[up] * (t[up + 1] - t[up]) / (z[up + 1] - z[up])
     ranges = []
     for a, b in itertools.pairwise(up):
         ranges.append(np.ptp(s[a : b + 1]))
-    return np.median(ranges) / 2, (len(at) - 1) / (at[-1] - at[0])
+    return np.median(ranges) / 2, (len(crossings) - 1) / (crossings[-1] - crossings[0])
 
 
 # the loop
@@ -190,9 +190,9 @@ def test_the_describing_function_of_play_is_that_of_a_run_under_a_sine(gap, omeg
         actuator=smc.Backlash(gap, rotor_inertia=0.01),
     )
     loop = Loop(scenario)
-    found = fitted(scenario, omega)
+    fit = fitted(scenario, omega)
     assert loop.gap == pytest.approx(gap * 0.01 / 1.01, rel=1e-6)
-    assert found / loop.response(omega) == pytest.approx(play(abs(found), loop.gap), abs=0.01)
+    assert fit / loop.response(omega) == pytest.approx(play(abs(fit), loop.gap), abs=0.01)
 
 
 @pytest.mark.slow
@@ -247,7 +247,7 @@ def test_a_coarse_encoder_s_count_moves_s_as_in_a_run(counts):
 def test_amplitude_and_frequency_follow_formulas_runs_and_exponents_of_the_lag(name):
     """Perez-Ventura & Fridman 2017: s' = u behind 1/(mu s + 1)^2."""
     lags = (1e-3, 2e-2)
-    found = []
+    cycles_of_lags = []
     for mu in lags:
         scenario = lagging(LAWS[name], mu, duration=1.0 + 40 * mu)
         cycle = chattering(scenario)
@@ -270,10 +270,12 @@ def test_amplitude_and_frequency_follow_formulas_runs_and_exponents_of_the_lag(n
         assert cycle.power == pytest.approx(
             (cycle.amplitude * math.tau * cycle.frequency) ** 2 / 2, rel=0.05
         )
-        found.append(fine)
+        cycles_of_lags.append(fine)
     amplitudes, frequencies = (
-        np.polyfit(np.log(lags), np.log([getattr(one, of) for one in found]), 1)[0]
-        for of in ("amplitude", "frequency")
+        np.polyfit(
+            np.log(lags), np.log([getattr(predicted, quantity) for predicted in cycles_of_lags]), 1
+        )[0]
+        for quantity in ("amplitude", "frequency")
     )
     assert amplitudes == pytest.approx(1.0 if name == "classical" else 2.0, rel=0.02)
     assert frequencies == pytest.approx(-1.0, rel=0.02)
@@ -385,10 +387,14 @@ def test_each_part_that_a_prediction_leaves_out_is_said_and_no_other():
                 physics_step=2.5e-4,
                 **{field: part},
             )
-            said = " ".join(one for one in _assumptions(Loop(run)) if one not in plain)
-            others = {each for its in parts.values() for each in its} - {word}
+            said = " ".join(
+                assumption for assumption in _assumptions(Loop(run)) if assumption not in plain
+            )
+            other_words = {word_of_part for words in parts.values() for word_of_part in words} - {
+                word
+            }
             assert word in said
-            assert not [other for other in others if other in said]
+            assert not [other_word for other_word in other_words if other_word in said]
 
 
 def test_a_file_of_predictions_has_what_was_predicted_and_measured(snapshot):
@@ -411,9 +417,9 @@ def test_a_file_of_predictions_has_what_was_predicted_and_measured(snapshot):
     changes = StepChange(0.02, 0.2), StepChange(0.0, math.inf)
     measured = [(0.4, 19.0), (math.nan, math.nan)]
     said = []
-    for one in rows([run, run], [sure, possible], measured, changes):
-        said.append(json.dumps(plain(one)))
-    assert [*said, bool(sure), bool(possible), *(one.marked for one in changes)] == snapshot
+    for row in rows([run, run], [sure, possible], measured, changes):
+        said.append(json.dumps(plain(row)))
+    assert [*said, bool(sure), bool(possible), *(row.marked for row in changes)] == snapshot
 
 
 class Formula:
@@ -491,10 +497,10 @@ def test_the_cycles_of_a_closed_form_are_stable_where_its_gain_falls(law, wanted
     places = np.geomspace(1e-3, 3.0, 200_001)
     loop = Formula(law, 2.0 * turn / wanted, turn)
     signs = np.diff(np.sign([law(a) - wanted for a in places]))
-    for found, sign in zip(cycles(loop), (-1, 1), strict=True):
+    for cycle, sign in zip(cycles(loop), (-1, 1), strict=True):
         crossings = np.flatnonzero(signs * sign > 0)
-        assert [amplitude for amplitude, _ in found] == pytest.approx(places[crossings], rel=1e-4)
-        assert [omega for _, omega in found] == pytest.approx([turn] * len(crossings), rel=1e-6)
+        assert [amplitude for amplitude, _ in cycle] == pytest.approx(places[crossings], rel=1e-4)
+        assert [omega for _, omega in cycle] == pytest.approx([turn] * len(crossings), rel=1e-6)
     assert switches(loop) == (law is relay)
 
 
@@ -517,11 +523,11 @@ def test_of_the_two_cycles_behind_a_dead_zone_a_run_ends_in_the_outer_one_or_res
     # where 4 k |L| sqrt(1 - (d / a)^2) / (pi a) is 1
     assert cycle.threshold_x == pytest.approx(0.0107, rel=0.01)
     assert "x beyond threshold_x" in cycle.assumptions
-    calm, *others = smc.run(
+    calm, *swinging = smc.run(
         [dataclasses.replace(scenario, x0=q * cycle.threshold_x) for q in (0.9, 1.1, 10.0)]
     )
     assert np.ptp(calm.s[calm.t > 10.0]) == 0.0
-    for trace in others:
+    for trace in swinging:
         assert channel_cycle(trace) == pytest.approx((cycle.amplitude, cycle.frequency), rel=0.02)
     assert cycle.uncertainty < 0.05  # the law as it is, later and earlier: all of the outer cycle
 

@@ -99,13 +99,13 @@ def loops(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("drive", ["lags", "motor"])
 def test_random_loops_behind_drives_oscillate_as_the_machine_does(drive):
-    driven = (one for one in loops(1) if getattr(one[0], drive))
+    driven = (loop_and_start for loop_and_start in loops(1) if getattr(loop_and_start[0], drive))
     for loop, _, _ in itertools.islice(driven, 2):
         amplitude, frequency = loop.cycle(8.0)
         trace = smc.run(scenario(loop, duration=8.0))
         late = trace.t > 4.8
-        found = measured(trace.t[late], trace.s[late, 0])
-        assert found == pytest.approx((amplitude, frequency), rel=0.05), loop
+        cycle = measured(trace.t[late], trace.s[late, 0])
+        assert cycle == pytest.approx((amplitude, frequency), rel=0.05), loop
 
 
 @pytest.mark.slow

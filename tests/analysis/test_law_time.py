@@ -28,8 +28,10 @@ def test_the_law_is_given_what_it_measures_in_its_run():
     seen = []
     for row in law_time._measured(scenario):
         seen.append(Measurement(*row))
-    asked = np.array([called(law, y, memory)[0] for y in seen])
-    np.testing.assert_allclose(asked.clip(-seen[0].limit, seen[0].limit), u, rtol=1e-9, atol=1e-9)
+    commands = np.array([called(law, y, memory)[0] for y in seen])
+    np.testing.assert_allclose(
+        commands.clip(-seen[0].limit, seen[0].limit), u, rtol=1e-9, atol=1e-9
+    )
 
 
 def test_a_law_is_timed_in_the_first_seconds_of_a_run_whose_fault_comes_later(monkeypatch):

@@ -29,19 +29,19 @@ def growth(plant: Plant, lam: float, k1: float, control_period: float, periods: 
 
     The largest |eigenvalue| of (x, x', u_-1, .. u_-m), worst mode.
     """
-    at = linear_theory.linear(plant)
+    linear_model = linear_theory.linear(plant)
     largest = 0.0
-    for stiffness in at.modes:
-        e, gamma = linear_theory.sampled_mode(at, stiffness, control_period)
-        whole = np.zeros((2 + periods, 2 + periods))
-        whole[:2, :2] = np.eye(2) + e
+    for stiffness in linear_model.modes:
+        e, gamma = linear_theory.sampled_mode(linear_model, stiffness, control_period)
+        transition = np.zeros((2 + periods, 2 + periods))
+        transition[:2, :2] = np.eye(2) + e
         if periods:
-            whole[:2, -1] = gamma
-            whole[2, :2] = -lam * k1, -lam
-            whole[3:, 2:-1] = np.eye(periods - 1)
+            transition[:2, -1] = gamma
+            transition[2, :2] = -lam * k1, -lam
+            transition[3:, 2:-1] = np.eye(periods - 1)
         else:
-            whole -= lam * np.outer(gamma, (k1, 1.0))
-        largest = max(largest, float(np.abs(np.linalg.eigvals(whole)).max()))
+            transition -= lam * np.outer(gamma, (k1, 1.0))
+        largest = max(largest, float(np.abs(np.linalg.eigvals(transition)).max()))
     return largest
 
 
@@ -77,10 +77,10 @@ def grows(size: np.ndarray) -> bool:
 
 def test_a_single_pendulum_has_its_textbook_coefficients():
     p = smc.plant("inverted_pendulum").parameters
-    at = linear_theory.linear(smc.plant("inverted_pendulum"))
-    assert at.inertia == pytest.approx(p["m"] * p["l"] ** 2)
-    assert at.damping == pytest.approx(p["b"])
-    assert at.modes == pytest.approx([-p["m"] * p["grav"] * p["l"]])
+    linear_model = linear_theory.linear(smc.plant("inverted_pendulum"))
+    assert linear_model.inertia == pytest.approx(p["m"] * p["l"] ** 2)
+    assert linear_model.damping == pytest.approx(p["b"])
+    assert linear_model.modes == pytest.approx([-p["m"] * p["grav"] * p["l"]])
 
 
 def test_a_network_has_the_modes_of_its_path_graph():

@@ -115,8 +115,8 @@ def test_blocks_are_drawn_by_seed_and_so_the_interval_covers_where_that_of_poole
     for _ in range(300):
         # the seed decides; median 0
         values = rng.normal(size=(1, 12)) + 0.1 * rng.normal(size=(8, 12))
-        for i, found in enumerate((interval(values), interval(values.ravel()))):
-            covered[i] += found.low <= 0 <= found.high
+        for i, drawn_interval in enumerate((interval(values), interval(values.ravel()))):
+            covered[i] += drawn_interval.low <= 0 <= drawn_interval.high
     assert covered[0] > 0.92 * 300
     assert covered[1] < 0.7 * 300
 
@@ -132,10 +132,10 @@ def test_blocks_are_drawn_by_seed_and_so_the_interval_covers_where_that_of_poole
     ],
 )
 def test_the_interval_of_a_share_is_wilson_s(k, n):
-    wanted = stats.binomtest(k, n).proportion_ci(method="wilson")
-    found = share_interval(k / n, n)
-    assert found[1:3] == pytest.approx(tuple(wanted), abs=1e-12)
-    assert found.low <= found.median <= found.high
+    wilson = stats.binomtest(k, n).proportion_ci(method="wilson")
+    share = share_interval(k / n, n)
+    assert share[1:3] == pytest.approx(tuple(wilson), abs=1e-12)
+    assert share.low <= share.median <= share.high
 
 
 def test_intervals_of_medians_have_sets_of_gains_as_samples():
@@ -168,15 +168,15 @@ def test_a_law_that_fails_less_often_comes_first_whatever_its_median():
         "fails": [1.0, 1.0, 1.0, INF],
         "also": [1.0, 2.0, 3.0, INF],
     }
-    found = []
+    orders = []
     for rank in ranks(Comparison({law: 3 * values for law, values in scores.items()})):
-        found.append((rank.law, rank.place, rank.best))
-    assert found == [("never_fails", 1, True), ("fails", 2, False), ("also", 3, False)]
+        orders.append((rank.law, rank.place, rank.best))
+    assert orders == [("never_fails", 1, True), ("fails", 2, False), ("also", 3, False)]
 
 
 def test_the_least_relevant_difference_is_a_share_and_values_below_the_floor_are_equal():
-    found = exceeds([1.04, 1.02, INF, INF, 1.0], [1.0, 1.0, 1.0, INF, INF])
-    assert found.tolist() == [True, False, True, False, False]
+    leads = exceeds([1.04, 1.02, INF, INF, 1.0], [1.0, 1.0, 1.0, INF, INF])
+    assert leads.tolist() == [True, False, True, False, False]
     assert exceeds(1.04, 1.0, 0.5)
     assert not exceeds(1.04, 1.0, 0.5, relevant=0.05)
     assert not exceeds(1.04, 0.0, 1.02)
@@ -224,9 +224,9 @@ def test_the_winner_by_the_rule(given, winner, rule):
 def test_a_law_better_by_little_in_every_run_wins_although_the_medians_intervals_overlap():
     scores = {"a": blocks(1.0), "b": blocks(1.05)}
     assert interval(scores["a"]).high > interval(scores["b"]).low
-    found = Comparison(scores)
-    assert found.best.tolist() == [[True], [False]]
-    effect = found.effect(0, "a", "b")
+    comparison = Comparison(scores)
+    assert comparison.best.tolist() == [[True], [False]]
+    effect = comparison.effect(0, "a", "b")
     assert effect[:3] == pytest.approx((1 / 1.05, 1 / 1.05, 1 / 1.05))
     assert (effect.ahead, effect.samples, effect.sets) == (20, 20, False)
     unpaired = np.random.default_rng(1).permutation(scores["b"][0])
@@ -271,13 +271,13 @@ def test_a_winner_is_one_whose_intervals_of_the_ratio_end_beyond_the_least_relev
     for _ in range(60):
         cells = spreading(3, 1, 0.1, rng)
         cells[0] *= rng.choice([0.8, 0.9, 1.0])
-        found = Comparison({f"law{i}": cell for i, cell in enumerate(cells)})
-        for block, winner in enumerate(found.winners):
-            for law in found.laws:
+        comparison = Comparison({f"law{i}": cell for i, cell in enumerate(cells)})
+        for block, winner in enumerate(comparison.winners):
+            for law in comparison.laws:
                 rivals = []
-                for rival in found.laws:
+                for rival in comparison.laws:
                     if rival != law:
-                        rivals.append(found.effect(block, law, rival))
+                        rivals.append(comparison.effect(block, law, rival))
                 beyond = all(effect.high < 1 - RELEVANT for effect in rivals)
                 assert (law == winner) == beyond
                 for effect in rivals:
@@ -303,13 +303,13 @@ def test_a_winner_that_becomes_better_in_some_runs_stays_the_winner(repeated):
             step = np.exp(rng.normal(0.0, 0.05, (1, 12)))
             halves[law] = np.where(again, cells[law] * step, NAN)
             trends[law] = np.exp(rng.normal(0.05, 0.05, (1, 12)))
-        found = Comparison(
+        comparison = Comparison(
             cells,
             0.5,
             halves=halves,
             trends=trends,
         )
-        (winner,) = found.winners
+        (winner,) = comparison.winners
         if winner is None:
             continue
         less = np.where(rng.random(12) < 0.4, np.exp(-rng.exponential(1.0)), 1.0)
@@ -333,8 +333,8 @@ def test_a_winner_that_becomes_better_in_some_runs_stays_the_winner(repeated):
             )
             assert after.winners == [winner]
             b = after.p[0]
-            a = found.p[0]
-            row = found.laws.index(winner)
+            a = comparison.p[0]
+            row = comparison.laws.index(winner)
             assert np.all(b[row] <= a[row] + 1e-12)
         wins += 1
     assert wins > 25
@@ -346,10 +346,10 @@ def test_units_cancel_and_equal_laws_are_never_separated():
         cells = {}
         for law in "abc":
             cells[law] = np.exp(rng.normal(size=(2, 12)))
-        one = Comparison(cells, 0.3)
-        other = Comparison({law: 1e3 * values for law, values in cells.items()}, 300.0)
-        assert one.p == pytest.approx(other.p, abs=1e-12)
-        assert one.winners == other.winners
+        in_metres = Comparison(cells, 0.3)
+        in_millimetres = Comparison({law: 1e3 * values for law, values in cells.items()}, 300.0)
+        assert in_metres.p == pytest.approx(in_millimetres.p, abs=1e-12)
+        assert in_metres.winners == in_millimetres.winners
     same = Comparison(dict.fromkeys("abc", np.exp(rng.normal(size=(2, 12)))))
     assert {rank[1:] for rank in ranks(same)} == {(2, 2, True)}
 
@@ -370,10 +370,10 @@ def test_runs_linked_by_sets_of_gains_of_either_law_are_one_sample():
 def test_the_difference_of_a_sample_is_the_median_of_its_runs():
     b = np.array([1.1, 1.2, 9.0, 1.0, 1.3, INF, 2.0, 3.0, 1.0])
     sets = {"a": np.arange(9) // 3, "b": np.zeros(9, int)}
-    found = Comparison({"a": np.ones(9), "b": b}, sets=sets)
-    assert np.exp(found.leads[0, 0, 1, :3]) == pytest.approx([1.2, 1.3, 2.0])
-    assert np.exp(-found.leads[0, 1, 0, :3]) == pytest.approx([1.2, 1.3, 2.0])
-    assert np.isnan(found.leads[0, 0, 1, 3:]).all()
+    comparison = Comparison({"a": np.ones(9), "b": b}, sets=sets)
+    assert np.exp(comparison.leads[0, 0, 1, :3]) == pytest.approx([1.2, 1.3, 2.0])
+    assert np.exp(-comparison.leads[0, 1, 0, :3]) == pytest.approx([1.2, 1.3, 2.0])
+    assert np.isnan(comparison.leads[0, 0, 1, 3:]).all()
 
 
 def test_seeds_that_change_nothing_but_rounding_are_one_sample_of_two_laws_beside_a_third():
@@ -400,8 +400,8 @@ def test_seeds_that_change_nothing_but_rounding_are_one_sample_of_two_laws_besid
     assert block.samples == 20
     assert block.best == ("b", "c")  # one sample of two laws tells nothing
     assert block.worse == ("a",)
-    other = table_of({"a": still, "b": 2 * still}, tv_rate=np.tile(np.arange(20.0), 2))
-    assert leaderboard(other, ["itae"])[0].blocks[0].runs == 20
+    moved_table = table_of({"a": still, "b": 2 * still}, tv_rate=np.tile(np.arange(20.0), 2))
+    assert leaderboard(moved_table, ["itae"])[0].blocks[0].runs == 20
 
 
 # level laws, and leads that would have been seen
@@ -423,9 +423,9 @@ def test_laws_are_level_only_if_an_interval_of_twelve_units_says_so():
         assert Comparison(scores).level[0, 0, 1] == level
     # of shares: twelve runs that settle say nothing of 10 %, only that the same ones do
     settles = np.zeros((1, 12))
-    other = settles.copy()
-    other[0, 3] = 1.0
-    for rival, level in ((settles, True), (other, False)):
+    shifted = settles.copy()
+    shifted[0, 3] = 1.0
+    for rival, level in ((settles, True), (shifted, False)):
         assert Comparison({"a": settles, "b": rival}, shares=True).level[0, 0, 1] == level
     effect = Comparison(close).effect(0, "a", "b")
     assert 0.9 < effect.low < effect.high < 1 / 0.9
@@ -485,8 +485,8 @@ def test_the_least_visible_lead_is_seen_with_a_probability_of_eighty_percent(uni
         a, c = np.exp(law(rng, (2, units)) + centre)
         b, d = np.exp(rival(rng, (2, units)))
         lead = least_visible_lead(np.log(b / a), level, 0.03)  # of another sample of the same laws
-        found = Comparison({"a": (1 - lead) * c, "b": d})
-        seen += found.p[0, 0, 1] <= level
+        comparison = Comparison({"a": (1 - lead) * c, "b": d})
+        seen += comparison.p[0, 0, 1] <= level
     assert 0.69 <= seen / 200 <= 0.94
 
 
@@ -508,7 +508,7 @@ def test_the_least_visible_lead_is_seen_with_a_probability_of_eighty_percent(uni
 def test_a_median_that_half_the_step_moves_is_marked(factor, floor, first_order, marked):
     cells = {"a": blocks(1.0), "b": blocks(2.0)}
     halves = {"a": factor * cells["a"], "b": cells["b"]}
-    found = Comparison(
+    comparison = Comparison(
         cells,
         floor,
         halves=halves,
@@ -516,11 +516,11 @@ def test_a_median_that_half_the_step_moves_is_marked(factor, floor, first_order,
     )
     middle = float(np.median(cells["a"]))
     if marked:
-        wanted = pytest.approx((middle, factor * middle))
+        step_medians = pytest.approx((middle, factor * middle))
     else:
-        wanted = None
-    assert found.step_change(0, "a") == wanted
-    assert found.step_change(0, "b") is None
+        step_medians = None
+    assert comparison.step_change(0, "a") == step_medians
+    assert comparison.step_change(0, "b") is None
 
 
 # boards
@@ -555,7 +555,11 @@ def study(seeds: int = 20) -> MadeTable:
 
 
 def entries(boards, metric: str, plant: str) -> dict:
-    (board,) = [one for one in boards if one.metric == metric and one.group["plant"] == plant]
+    (board,) = [
+        of_metric
+        for of_metric in boards
+        if of_metric.metric == metric and of_metric.group["plant"] == plant
+    ]
     return {entry.law: entry for entry in board.entries}
 
 
@@ -602,9 +606,9 @@ def test_a_law_that_fails_wins_nothing_and_is_not_better_than_one_that_does_not(
     assert board.winner is None
     assert board.best == ("b",)
     assert [board.failures(entry) for entry in board.entries] == ["", "1 of 24 failed"]
-    (both,) = leaderboard(table_of({"a": failing, "b": 2 * failing}), ["itae"])
-    assert both.winner is None
-    assert both.best == ()
+    (board_of_both,) = leaderboard(table_of({"a": failing, "b": 2 * failing}), ["itae"])
+    assert board_of_both.winner is None
+    assert board_of_both.best == ()
     fails = np.r_[np.full(7, INF), np.full(9, 0.5)]
     assert Comparison({"fails": fails, "works": np.linspace(0.9, 1.1, 16)}).best.tolist() == [
         [False],
@@ -657,13 +661,13 @@ def test_what_cannot_be_compared_is_refused(refused):
 )
 def test_runs_that_differ_in_more_than_the_law_are_not_compared(changed, words):
     worn = smc.condition("worn", friction=smc.Coulomb(0.05))
-    given = {
+    settings = {
         "plants": "duffing",
         "conditions": worn,
         "duration": 1.0,
         "gains": "default",
     }
-    runs = smc.grid(**given, laws="classical") + smc.grid(**given | changed, laws="pid")
+    runs = smc.grid(**settings, laws="classical") + smc.grid(**settings | changed, laws="pid")
     rows = [run_key.row(scenario) for scenario in runs]
     names = "plant", "law", "condition", "seed", "scenario"
     table = MadeTable(**{name: [row[name] for row in rows] for name in names}, itae=[1.0, 2.0])
@@ -766,8 +770,8 @@ def test_laws_below_the_floor_are_not_ranked_and_a_lead_over_it_is_a_least_one(
     if factors == (0.3, 0.9):  # and in another condition neither is
         two = {law: np.vstack([scores[law], 9.0 * scores["a"]]) for law in "ab"}
         table = table_of(two, "ultimate_bound", scenario=np.tile(rows, 2))
-        (both,) = leaderboard(table, ["ultimate_bound"])
-        assert [getattr(tied, "floor", None) for tied in both.verdicts.values()] == [q, ""]
+        (board_of_both,) = leaderboard(table, ["ultimate_bound"])
+        assert [getattr(tied, "floor", None) for tied in board_of_both.verdicts.values()] == [q, ""]
     cells = {}
     for row in boards.tables[0].rows:
         cells[row[0].text] = row[1]
@@ -787,10 +791,10 @@ def test_a_median_below_the_floor_that_rises_says_that_it_may_pass_it():
     rows = np.array([run_key.row(FINE)["scenario"]] * 24)
     rises = np.array(['{"ultimate_bound": 1.0}'] * 12 + ['{"ultimate_bound": 4.0}'] * 12)
     table = table_of(scores, "ultimate_bound", scenario=rows, trends=rises)
-    (shown,) = leaderboard(table, ["ultimate_bound"]).tables
-    said = {row[0].text: row[1].below.splitlines()[-1] for row in shown.rows}
+    (tabular,) = leaderboard(table, ["ultimate_bound"]).tables
+    said = {row[0].text: row[1].below.splitlines()[-1] for row in tabular.rows}
     assert said == {"a": "floor 0.00015 m", "b": "may exceed 0.00015 m"}
-    assert "May exceed a floor: " in shown.under[-1]
+    assert "May exceed a floor: " in tabular.under[-1]
 
 
 def test_a_lead_over_the_floor_is_printed_only_where_the_test_sees_it():

@@ -22,12 +22,12 @@ SAMPLES = [
 
 def share_of_signs(differences) -> float:
     """The share of all choices of signs with a rank sum as large as that of these differences."""
-    known = np.array([d for d in differences if not np.isnan(d)])
-    ranks = rankdata(np.minimum(np.abs(known), 1e300))
+    finite = np.array([d for d in differences if not np.isnan(d)])
+    ranks = rankdata(np.minimum(np.abs(finite), 1e300))
     sums = []
     for signs in itertools.product((0.0, 1.0), repeat=len(ranks)):
         sums.append(np.dot(ranks, signs))
-    return float(np.mean(np.array(sums) >= ranks[known > 0].sum() - 1e-9))
+    return float(np.mean(np.array(sums) >= ranks[finite > 0].sum() - 1e-9))
 
 
 @pytest.mark.parametrize("differences", SAMPLES, ids=len)

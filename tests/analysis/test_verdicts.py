@@ -35,9 +35,9 @@ def test_of_twins_few_win_and_few_are_taken_for_worse(laws, spread):
     rng = np.random.default_rng(laws)
     won = lost = 0
     for _ in range(100):
-        found = Comparison(drawn(rng, [0.0] * laws, spread, blocks=2))
-        won += any(found.winners)
-        lost += found.worse[0].sum()
+        comparison = Comparison(drawn(rng, [0.0] * laws, spread, blocks=2))
+        won += any(comparison.winners)
+        lost += comparison.worse[0].sum()
     assert won <= 5
     assert lost <= 10
 
@@ -46,19 +46,19 @@ def test_a_law_that_is_better_than_fifteen_others_by_half_wins_with_twelve_sets(
     rng = np.random.default_rng(1)
     named = 0
     for _ in range(10):
-        found = Comparison(drawn(rng, [0.0, *[math.log(1.5)] * 15], 0.1, blocks=3, stuck=0.0))
-        named += found.winners.count("law00")
-        assert set(found.winners) <= {"law00", None}
+        comparison = Comparison(drawn(rng, [0.0, *[math.log(1.5)] * 15], 0.1, blocks=3, stuck=0.0))
+        named += comparison.winners.count("law00")
+        assert set(comparison.winners) <= {"law00", None}
     assert named >= 27  # of 30
 
 
 def test_six_sets_name_a_winner_of_one_block_among_any_number_of_laws():
     scores = drawn(np.random.default_rng(2), [0.0, *[1.5] * 20], 0.02)
     for sets, winner in ((6, "law00"), (5, None)):
-        found = Comparison({law: values[:, :sets] for law, values in scores.items()})
-        assert found.winners == [winner]
+        comparison = Comparison({law: values[:, :sets] for law, values in scores.items()})
+        assert comparison.winners == [winner]
         # where none wins, so few say nothing of any law
-        assert found.best.sum() == (winner is not None)
+        assert comparison.best.sum() == (winner is not None)
 
 
 def test_a_winner_is_corrected_for_all_blocks_of_its_metric_step_by_step():
@@ -66,17 +66,17 @@ def test_a_winner_is_corrected_for_all_blocks_of_its_metric_step_by_step():
     ahead = np.linspace(0.5, 0.6, 12)[None]
     late = np.where(np.arange(12) < 11, ahead, 2.5)
     even = np.where(np.arange(12) % 2, 0.9, 1.1)[None]
-    one = np.ones((1, 12))
-    assert 0.0125 < Comparison({"a": late, "b": one}).p[0, 0, 1] < 0.025
+    ones = np.ones((1, 12))
+    assert 0.0125 < Comparison({"a": late, "b": ones}).p[0, 0, 1] < 0.025
     for law, winners in (
         (late, ["a"]),
         (np.vstack([late, even]), [None, None]),
         (np.vstack([late, ahead]), ["a", "a"]),
     ):
         assert Comparison({"a": law, "b": np.ones_like(law)}).winners == winners
-    six = Comparison({"a": ahead[:, :6], "b": one[:, :6]})
+    six = Comparison({"a": ahead[:, :6], "b": ones[:, :6]})
     assert six.visible(0, "a", "b") < 0.9
-    two = [Comparison({"a": ahead[:, :6], "b": one[:, :6]}) for _ in range(2)]
+    two = [Comparison({"a": ahead[:, :6], "b": ones[:, :6]}) for _ in range(2)]
     corrected(two)
     assert two[0].visible(0, "a", "b") == 1.0  # no six units are enough beside another block
 
@@ -91,20 +91,20 @@ def test_a_law_with_few_sets_of_gains_takes_no_other_s_verdict_along():
     scores = drawn(np.random.default_rng(3), [0.0, 0.5, 2.8], 0.02)
     sets = {law: np.arange(SETS)[None] for law in scores}
     sets["law02"] = np.arange(SETS)[None] % 3
-    found = Comparison(scores, sets=sets)
-    assert found.ranked.tolist() == [[True], [True], [False]]
-    assert found.winners == ["law00"]
-    assert found.best.tolist() == [[True], [False], [False]]
-    assert found.worse.tolist() == [[False], [True], [False]]
+    comparison = Comparison(scores, sets=sets)
+    assert comparison.ranked.tolist() == [[True], [True], [False]]
+    assert comparison.winners == ["law00"]
+    assert comparison.best.tolist() == [[True], [False], [False]]
+    assert comparison.worse.tolist() == [[False], [True], [False]]
 
 
 def cells(boards) -> dict:
     """Law -> its cells."""
-    found: dict = {}
+    values_by_law: dict = {}
     for table in boards.tables:
         for name, *row in table.rows:
-            found.setdefault(name.text, []).extend(row)
-    return found
+            values_by_law.setdefault(name.text, []).extend(row)
+    return values_by_law
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -148,14 +148,14 @@ def test_beside_a_law_below_the_floor_none_above_it_is_starred():
     """Duffing's pid, 8.7e-4 m, had the star of a column with 1e-9 m in it."""
     low = np.full(SETS, 0.5)
     straddling = np.where(np.arange(SETS) < 5, 0.9, 1.4)
-    found = Comparison({"low": low, "above": straddling, "far": 9.0 * low}, 1.0)
-    assert found.winners == [None]
-    assert dict(zip(found.laws, found.best[:, 0].tolist(), strict=True)) == {
+    comparison = Comparison({"low": low, "above": straddling, "far": 9.0 * low}, 1.0)
+    assert comparison.winners == [None]
+    assert dict(zip(comparison.laws, comparison.best[:, 0].tolist(), strict=True)) == {
         "above": False,
         "far": False,
         "low": True,
     }
-    assert not found.worse[found.laws.index("above"), 0]
+    assert not comparison.worse[comparison.laws.index("above"), 0]
 
 
 LATE_METRICS = {

@@ -116,21 +116,23 @@ def parameters(command: Callable) -> dict[str, tuple[inspect.Parameter, Any]]:
     """Return how each option and argument is written -> its parameter, and what typer is told of
     it.
     """
-    found = {}
-    every = inspect.signature(command).parameters
-    for one in [one for name, one in every.items() if name != "ctx"]:
-        info = one.annotation.__metadata__[0]
-        given = []
+    option_by_name = {}
+    signature = inspect.signature(command).parameters
+    for parameter in [parameter for name, parameter in signature.items() if name != "ctx"]:
+        info = parameter.annotation.__metadata__[0]
+        declared = []
         for word in (info.default, *(info.param_decls or ())):
             if isinstance(word, str):
-                given.append(word)
-        name = one.name.replace("_", "-")
-        names = [f"--{name}", *[f"--no-{name}"] * isinstance(one.default, bool)]
-        found["/".join(given or (names if isinstance(info, OptionInfo) else [one.name]))] = (
-            one,
+                declared.append(word)
+        name = parameter.name.replace("_", "-")
+        names = [f"--{name}", *[f"--no-{name}"] * isinstance(parameter.default, bool)]
+        option_by_name[
+            "/".join(declared or (names if isinstance(info, OptionInfo) else [parameter.name]))
+        ] = (
+            parameter,
             info,
         )
-    return found
+    return option_by_name
 
 
 def value_of(one: inspect.Parameter, info: Any) -> str:
@@ -152,20 +154,20 @@ def with_values(calls: dict[str, list[str]]) -> dict[str, list[str]]:
     """Return the calls; the longest of each command also has the numbers and texts that none of
     them has, so that such an option needs no word here.
     """
-    found = dict(calls)
+    call_by_line = dict(calls)
     for name, (_, command) in COMMANDS.items():
         lines = sorted((line for line in calls if line.split()[0] == name), key=len)
         tried = set()
         for word in " ".join(lines).split():
             tried.add(word.partition("=")[0])
         more = []
-        for names, (one, info) in parameters(command).items():
-            value = value_of(one, info)
+        for names, (parameter, info) in parameters(command).items():
+            value = value_of(parameter, info)
             if value and names.startswith("-") and not tried & {*names.split("/")}:
                 more += [names, value]
         if lines and more:
-            found[" ".join([lines[-1], *more])] = found.pop(lines[-1])
-    return found
+            call_by_line[" ".join([lines[-1], *more])] = call_by_line.pop(lines[-1])
+    return call_by_line
 
 
 CALLS = with_values(CALLS)
@@ -260,12 +262,12 @@ def called(function: Callable, arguments: tuple, named: dict[str, Any]) -> dict[
     """Return the arguments of a call that are not as the function's defaults, as text."""
     signature = inspect.signature(function)
     bound = signature.bind(*arguments, **named).arguments
-    plain = {name: one.default for name, one in signature.parameters.items()}
-    given = {}
-    for name, one in bound.items():
-        if type(one) is not type(plain[name]) or one != plain[name]:
-            given[name] = reported(one)
-    return {f"{function.__name__}({name})": one for name, one in given.items()}
+    plain = {name: argument.default for name, argument in signature.parameters.items()}
+    passed = {}
+    for name, argument in bound.items():
+        if type(argument) is not type(plain[name]) or argument != plain[name]:
+            passed[name] = reported(argument)
+    return {f"{function.__name__}({name})": argument for name, argument in passed.items()}
 
 
 def reached(words: list[str], paths: list[str]) -> dict[str, str]:
@@ -320,8 +322,8 @@ def test_every_option_changes_the_argument_of_its_name_and_no_other_to_its_value
     """
     words = line.split()
     paths = CALLS[line]
-    whole = reached(words, paths)
-    assert [name for name, value in whole.items() if not value and "(" not in name] == [
+    calls = reached(words, paths)
+    assert [name for name, value in calls.items() if not value and "(" not in name] == [
         path.rpartition(".")[2] for path in paths
     ]
     for start, stop in options(words):
@@ -331,8 +333,8 @@ def test_every_option_changes_the_argument_of_its_name_and_no_other_to_its_value
         instead = REQUIRED.get((words[0], option), [])
         without = reached(words[:start] + instead + words[stop:], paths)
         changed = set()
-        for name in {*whole, *without}:
-            if whole.get(name) != without.get(name):
+        for name in {*calls, *without}:
+            if calls.get(name) != without.get(name):
                 changed.add(name)
         # of its runs
         if not changed and (option in AFTER or (words[0], option) == ("chatter", "--threads")):
@@ -344,7 +346,7 @@ def test_every_option_changes_the_argument_of_its_name_and_no_other_to_its_value
         mine = [name for name in changed if re.split(r"[()]", name)[1] in names]
         assert len(mine) == 1, (option, changed)
         assert option == "--quick" or len(changed) == 1, (option, changed)
-        value = whole.get(mine[0], "").replace("_", "-")
+        value = calls.get(mine[0], "").replace("_", "-")
         for piece in re.split(r"[,=:()]", " ".join(words[start + 1 : stop])):
             plain = piece.removesuffix(".json").replace("_", "-")
             assert plain in value or mine[0] in UNTOLD or plain == "all", (option, piece, value)
@@ -362,7 +364,7 @@ FILES = {
 
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(
-    ("line", "option"), [(line, option) for line, its in FILES.items() for option in its]
+    ("line", "option"), [(line, option) for line, options in FILES.items() for option in options]
 )
 def test_a_file_of_another_kind_is_refused_before_the_work(line, option, capsys):
     words = line.split()
@@ -382,8 +384,8 @@ def test_a_device_without_its_package_is_refused_before_the_work(line, monkeypat
     with pytest.raises(SystemExit) as end:
         main.main(line.split())
     assert end.value.code == 2
-    assert "numba_cuda" in (told := capsys.readouterr().err)
-    assert told.endswith("pip install 'smc-mujoco[gpu]'\n")
+    assert "numba_cuda" in (message := capsys.readouterr().err)
+    assert message.endswith("pip install 'smc-mujoco[gpu]'\n")
 
 
 def test_an_option_of_a_number_or_a_text_needs_no_value_here():
@@ -395,10 +397,10 @@ def test_an_option_of_a_number_or_a_text_needs_no_value_here():
     ):
         pass
 
-    found = {}
-    for names, (one, info) in parameters(command).items():
-        found[names] = value_of(one, info)
-    assert found == {"--count": "4", "--label": "word", "--mass": "m=2", "--out": ""}
+    value_by_option = {}
+    for names, (parameter, info) in parameters(command).items():
+        value_by_option[names] = value_of(parameter, info)
+    assert value_by_option == {"--count": "4", "--label": "word", "--mass": "m=2", "--out": ""}
 
 
 def test_the_calls_above_have_every_option_of_their_commands():
@@ -415,7 +417,7 @@ def test_the_calls_above_have_every_option_of_their_commands():
                     options.append({*names.split("/")})
         else:
             options = []
-        assert [one for one in options if not one & words] == [], name
+        assert [option for option in options if not option & words] == [], name
 
 
 def test_the_least_number_that_an_option_takes_is_the_least_that_its_function_takes():
@@ -423,11 +425,11 @@ def test_the_least_number_that_an_option_takes_is_the_least_that_its_function_ta
     for line, path in {(line.split()[0], paths[-1]) for line, paths in CALLS.items()}:
         module, _, name = f"smc_mujoco.{path}".rpartition(".")
         declared = of_parameters(getattr(importlib.import_module(module), name))
-        for one, info in parameters(COMMANDS[line][1]).values():
-            bound = declared.get(one.name)
+        for parameter, info in parameters(COMMANDS[line][1]).values():
+            bound = declared.get(parameter.name)
             low = getattr(getattr(bound, "item", bound), "low", None)
             if isinstance(info, OptionInfo) and info.min is not None and low is not None:
-                assert info.min == low, (line, one.name)
+                assert info.min == low, (line, parameter.name)
                 compared += 1
     assert compared > 8
 
@@ -437,8 +439,8 @@ def test_the_examples_of_a_command_have_options_that_it_takes(name):
     command = COMMANDS[name][1]
     taken = set()
     for names in parameters(command):
-        for one in names.split("/"):
-            taken.add(one)
+        for option in names.split("/"):
+            taken.add(option)
     examples = re.findall(
         r"Example: smc-mujoco (\S+)(.*?)(?: && .*| > .*)?\n", f"{command.__doc__}\n"
     )
@@ -544,6 +546,6 @@ def names_in(data: Any, depth: int = 2) -> str:
     if not depth or not isinstance(data, dict):
         return ""
     return ", ".join(
-        f"{name} ({below})" if (below := names_in(one, depth - 1)) else name
-        for name, one in data.items()
+        f"{name} ({below})" if (below := names_in(entry, depth - 1)) else name
+        for name, entry in data.items()
     )

@@ -153,8 +153,8 @@ def test_list_names_everything_there_is_or_all_of_a_kind(call):
     names = [*smc.plants(), *smc.laws(), *scenes, *smc.paper.CONDITIONS]
     names += [*smc.laws(kind="surface"), *smc.laws(kind="estimator")]
     assert [name for name in names if not re.search(rf"(?<![\w]){name}(?![\w])", out)] == []
-    asked = {"scenes": "hard_stops", "friction": "Viscous(b=0.05)", "peak": "x, not e"}
-    assert [word for word in asked if asked[word] not in call("list", word)[1]] == []
+    name_by_kind = {"scenes": "hard_stops", "friction": "Viscous(b=0.05)", "peak": "x, not e"}
+    assert [word for word in name_by_kind if name_by_kind[word] not in call("list", word)[1]] == []
     assert "…" not in out
     assert max(map(len, out.splitlines())) <= 80
 
@@ -223,17 +223,17 @@ def test_another_seed_changes_random_numbers_and_the_same_seed_nothing(call, und
 
 
 def test_threads_are_as_many_as_asked_for_and_change_no_bit(call, undrawn, scene, monkeypatch):
-    asked = []
+    thread_counts = []
 
     def noted(scenarios, threads, **options):
-        asked.append((threads, options))
+        thread_counts.append((threads, options))
         return smc.run(scenarios, threads, **options)
 
     monkeypatch.setattr(show, "run", noted)
     for threads in (1, 2):
         assert call("run", scene, "--no-film", "--out", str(threads), "--threads", threads)[0] == 0
     # the runs, then the same at half the step
-    assert asked == [(k, {"progress": True}) for k in (1, 1, 2, 2)]
+    assert thread_counts == [(k, {"progress": True}) for k in (1, 1, 2, 2)]
     np.testing.assert_array_equal(
         smc.load("1/mine/noisy-rough.npz").x, smc.load("2/mine/noisy-rough.npz").x
     )
@@ -377,12 +377,17 @@ def test_what_a_user_s_file_raises_is_shown_from_that_file_on(line, said, call, 
     ):
         code, _, err = call(*words)
         # which 3.13 places elsewhere
-        shown = []
+        tracebacks = []
         for text in err.splitlines():
             if set(text.strip()) != {"^"}:
-                shown.append(text)
+                tracebacks.append(text)
         assert code == 1
-        assert shown == [TRACEBACK, '  File "mine.py", line 1, in <module>', f"    {line}", said]
+        assert tracebacks == [
+            TRACEBACK,
+            '  File "mine.py", line 1, in <module>',
+            f"    {line}",
+            said,
+        ]
     with pytest.raises((ImportError, OSError, ValueError)) as raised:
         smc.grid(["duffing"], ["mine.py"])
     assert type(raised.value).__name__ == said.partition(":")[0]
@@ -429,13 +434,13 @@ OUTCOMES = {  # what a command raises -> its exit code and what it says
 
 @pytest.mark.parametrize("case", OUTCOMES)
 def test_a_command_ends_with_the_code_and_the_sentence_of_what_it_raises(case, capfd, monkeypatch):
-    kept = types.SimpleNamespace(
+    signals = types.SimpleNamespace(
         devnull=os.devnull,
         O_WRONLY=os.O_WRONLY,
         open=os.open,
         dup2=lambda new, _: os.close(new),
     )
-    monkeypatch.setattr(console, "os", kept)  # the test's stdout stays
+    monkeypatch.setattr(console, "os", signals)  # the test's stdout stays
     error, *expected = OUTCOMES[case]
     with pytest.raises(SystemExit) as end, console.errors_as_sentences():
         raise error
@@ -692,8 +697,8 @@ def test_a_film_of_an_answer_has_as_many_pictures_as_its_time_allows(tmp_path, m
         assert picture.size == (1280, 720)
     studies._film(recommendation, tmp_path, time.monotonic() + 600.0, terminal)
     assert said[2:] == [tmp_path / "worst.mp4"]
-    made = next(ffmpeg.read_frames(str(said[2])))
-    assert made["fps"] == studies.MAX_FPS
+    frame = next(ffmpeg.read_frames(str(said[2])))
+    assert frame["fps"] == studies.MAX_FPS
     assert {path.name for path in tmp_path.iterdir()} == {said[0].name, said[2].name}
 
 

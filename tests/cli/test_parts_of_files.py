@@ -150,8 +150,8 @@ def test_another_process_knows_a_part_of_a_file_by_the_same_key(parts):
     mine = find_condition("mine: friction=my_parts.py:stribeck(static=0.3)")
     scenario = smc.Scenario(plant="duffing", law="pid", **mine.fields)
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        there = pool.submit(_key, workers.packed(scenario)).result()
-    assert there == run_key.key(scenario)
+        key = pool.submit(_key, workers.packed(scenario)).result()
+    assert key == run_key.key(scenario)
 
 
 @pytest.mark.slow
@@ -181,8 +181,8 @@ def test_identify_finds_the_numbers_of_a_friction_of_a_file_which_compare_takes(
     words = ["identify", "arm.xml", "run.csv", "--out", "found.txt", "--condition"]
     mine = "mine: friction=my_parts.py:stribeck(static=0.5, speed=0.2)"
     shell(*words, mine, "--for", "friction.coulomb,input_delay")
-    (found,) = from_file(Path("found.txt"))
-    friction = smc.Scenario(plant=arm, law="pid", **found.fields).friction[0]
+    (condition,) = from_file(Path("found.txt"))
+    friction = smc.Scenario(plant=arm, law="pid", **condition.fields).friction[0]
     assert friction.coulomb == pytest.approx(0.3, rel=0.01)
     assert "friction=(my_parts.py:stribeck(" in Path("found.txt").read_text()
     compared = ["compare", "arm.xml:j1", "--law", PAIR, "--allow-defaults", "--seeds", "2"]
@@ -213,7 +213,7 @@ def test_a_command_that_takes_one_condition_takes_it_from_a_file(tmp_path, refus
     assert taken.scenario.friction == (smc.Coulomb(0.05),)
     file.write_text("a: x0=0.2\nb: x0=0.3\n")
     grid = smc.grid("duffing", "pid", [file, "nominal"], seeds=1, gains="default")
-    assert [one.condition for one in grid] == ["a", "b", "nominal"]
+    assert [scenario.condition for scenario in grid] == ["a", "b", "nominal"]
     words = "has 2 conditions ('a' and 'b')", "takes one"
     refused(lambda: respond("duffing", "pid", 0.2, file, {}), *words)
     refused(lambda: respond("duffing", "pid", 0.2, "lost.txt", {}), "no file of conditions at lost")

@@ -60,16 +60,16 @@ def test_compare_prints_the_medians_and_the_counts_of_its_table(printed):
         " --seeds 3 --duration 0.3 --out there --metric itae,rms_error"
     )
     rows = parquet.read_table("there/results.parquet").to_pylist()
-    failed = sum(one["failure"] is not None for one in rows)
+    failed = sum(record["failure"] is not None for record in rows)
     assert failed == 3
     page = Path("there/report.html").read_text()
     assert f"{len(rows)} runs, {failed} stopped early" in page
     of_runs = out[out.index("duffing under nominal") :]
     for law in ("classical", "pid"):
-        its = [one for one in rows if one["law"] == law]
+        rows_of_law = [record for record in rows if record["law"] == law]
         values = []
         for name in ("itae", "rms_error"):
-            values.append(sorted(one[name] for one in its)[1])
+            values.append(sorted(record[name] for record in rows_of_law)[1])
         medians = [float(word) for word in row(of_runs, law)[2:]]  # after the law and J
         assert medians == pytest.approx(values, rel=6e-3)
     assert "3 of 3" in of_runs
@@ -95,11 +95,11 @@ def test_worst_prints_what_its_file_holds(printed):
     out = printed(
         "worst duffing --law classical,pid --budget 3 --duration 0.2 --gains default --json w.json"
     )
-    for one in json.loads(Path("w.json").read_text()):
-        words = row(out, one["scenario"]["law"]["name"])
-        assert near(words[1], one["value"])
-        assert near(words[2], one["median"])
-        assert row(out, one["unit"]) == [one["unit"], one["unit"]]
+    for case in json.loads(Path("w.json").read_text()):
+        words = row(out, case["scenario"]["law"]["name"])
+        assert near(words[1], case["value"])
+        assert near(words[2], case["median"])
+        assert row(out, case["unit"]) == [case["unit"], case["unit"]]
 
 
 def test_sensitivity_prints_shares_in_per_cent_and_ranges_in_their_unit(printed):

@@ -109,12 +109,12 @@ def test_a_run_that_fails_at_half_the_step_or_only_there_does_not_is_marked():
         "c": [lost, lost],
     }
     (table,) = tables.scores("t", runs, again)
-    shown = tables.number(smc.score(fine)["tv_rate"])
+    rate = tables.number(smc.score(fine)["tv_rate"])
     for said in (
         cells(table),
         cells(*tables.answers(["tv_rate"], {"nominal": runs}, {"nominal": again})),
     ):
-        assert [f"{shown}{MARK} (..failed)" in row for row in said] == [True, True, False]
+        assert [f"{rate}{MARK} (..failed)" in row for row in said] == [True, True, False]
         assert "failed" in said[2]
 
 
@@ -135,14 +135,14 @@ def test_every_number_of_a_scene_is_compared_with_its_runs_again(monkeypatch, tm
         answers=("tv_rate",),
         answer=lambda outcome: "said",
     )
-    given = []
+    step_lists = []
     for name in ("scores", "tips"):
-        monkeypatch.setattr(tables, name, lambda title, runs, again: given.append(again) or [])
+        monkeypatch.setattr(tables, name, lambda title, runs, again: step_lists.append(again) or [])
     monkeypatch.setattr(
-        tables, "answers", lambda names, runs, again: given.append(again["wall"]) or []
+        tables, "answers", lambda names, runs, again: step_lists.append(again["wall"]) or []
     )
     monkeypatch.setattr(show, "figures", lambda *_: [])
     show.perform(scene, tmp_path, False, 1, Terminal(), (), "")
-    steps = [[trace.scenario.resolved.physics_step for trace in again["a"]] for again in given]
-    whole = runs["wall"]["a"].resolved.physics_step
-    assert steps == [[whole / 2, whole]] * 3
+    steps = [[trace.scenario.resolved.physics_step for trace in again["a"]] for again in step_lists]
+    step = runs["wall"]["a"].resolved.physics_step
+    assert steps == [[step / 2, step]] * 3

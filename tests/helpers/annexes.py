@@ -17,14 +17,14 @@ MACHINES = re.compile(r"\brigs?[( ]")  # published machines are data of an annex
 
 def _public() -> dict[str, str]:
     """Public name -> its annex."""
-    found = {}
+    names = {}
     for shelf in ("__init__", "accuracy"):
         stub = (ROOT / "smc_mujoco" / f"{shelf}.pyi").read_text(encoding="utf-8")
         for module, name in lazy.NAMES.findall(stub):
             annex = f"{module}.{name}".split(".")[1]
             if annex in annexes.ANNEXES:
-                found[name if shelf == "__init__" else f"{shelf}.{name}"] = annex
-    return found
+                names[name if shelf == "__init__" else f"{shelf}.{name}"] = annex
+    return names
 
 
 PUBLIC = _public()

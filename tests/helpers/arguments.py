@@ -27,18 +27,22 @@ def reported(value: Any) -> str:
 
 def told_items(values: list | tuple) -> str:
     """Return the first items of a list: twelve, or three scenarios."""
-    shown = values[: 3 if all(isinstance(one, Scenario) for one in values) else 12]
-    return f"[{', '.join([*map(reported, shown), *['...'] * (len(values) > len(shown))])}]"
+    values_told = values[: 3 if all(isinstance(entry, Scenario) for entry in values) else 12]
+    return (
+        f"[{', '.join([*map(reported, values_told), *['...'] * (len(values) > len(values_told))])}]"
+    )
 
 
 def told_scenario(scenario: Scenario) -> str:
     """Return plant, law and what differs from the default."""
     plain = Scenario(plant=scenario.plant, law=scenario.law)
-    given = {one.name: getattr(scenario, one.name) for one in dataclasses.fields(scenario)}
+    value_by_field = {
+        field.name: getattr(scenario, field.name) for field in dataclasses.fields(scenario)
+    }
     changed = []
-    for name, one in given.items():
-        if one != getattr(plain, name):
-            changed.append(f"{name}={reported(one)}")
+    for name, setting in value_by_field.items():
+        if setting != getattr(plain, name):
+            changed.append(f"{name}={reported(setting)}")
     return f"Scenario({', '.join([reported(scenario.plant), reported(scenario.law), *changed])})"
 
 
@@ -54,7 +58,7 @@ TEXTS: dict[Any, Callable[[Any], str]] = {
     ),
     Path: lambda path: f"Path({path.as_posix()})",
     Mapping: lambda values: (
-        "{" + ", ".join(f"{key}: {reported(one)}" for key, one in values.items()) + "}"
+        "{" + ", ".join(f"{key}: {reported(setting)}" for key, setting in values.items()) + "}"
     ),
     (list, tuple): told_items,
     (bool, int, float, str, range, NoneType, Condition, Starts, Uncertainty): repr,

@@ -54,9 +54,14 @@ def check(boxes, whole=True):
         for text, left, low, right, high in words:
             assert not (whole and "…" in text)
             assert min(left, low, size[0] - right, size[1] - high) > -TOUCH, text
-        for one, other in itertools.combinations(dict.fromkeys(words), 2):
-            apart = max(one[1] - other[3], other[1] - one[3], one[2] - other[4], other[2] - one[4])
-            assert apart > -TOUCH, (one[0], other[0])
+        for first, second in itertools.combinations(dict.fromkeys(words), 2):
+            apart = max(
+                first[1] - second[3],
+                second[1] - first[3],
+                first[2] - second[4],
+                second[2] - first[4],
+            )
+            assert apart > -TOUCH, (first[0], second[0])
 
 
 def words_of(page, monkeypatch, whole=False):

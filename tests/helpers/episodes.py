@@ -19,8 +19,8 @@ def one_of_each(turn: int) -> list[tuple[str, str]]:
     """
     tasked = {plant: tasks.tasks(plant) for plant in JOINTED}
     return [
-        (plant, known[(i + turn) % len(known)])
-        for i, (plant, known) in enumerate(tasked.items())
+        (plant, tasks_of_plant[(i + turn) % len(tasks_of_plant)])
+        for i, (plant, tasks_of_plant) in enumerate(tasked.items())
         if i % 2 == turn % 2
     ]
 

@@ -127,11 +127,11 @@ class ExactLoop:
         parts = []
         for part in (slice(first, None), slice(first, middle), slice(middle, None)):
             parts.append(measured(t[part], s[part]))
-        whole, early, late = parts
+        cycle_of_all, early, late = parts
         steady = all(abs(b / a - 1.0) < STEADY for a, b in zip(early, late, strict=True))
-        centred = abs(s[first:].max() + s[first:].min()) < 2.0 * CENTRED * whole[0]
+        centred = abs(s[first:].max() + s[first:].min()) < 2.0 * CENTRED * cycle_of_all[0]
         if steady and centred:
-            return whole
+            return cycle_of_all
         return (math.nan, math.nan)
 
 
@@ -143,11 +143,13 @@ def measured(t: np.ndarray, s: np.ndarray) -> tuple[float, float]:
     up = np.flatnonzero((z[:-1] < 0.0) & (z[1:] >= 0.0))
     if len(up) < 5 or not np.isfinite(s).all():
         return math.nan, math.nan
-    at = t[up] - z[up] * (t[up + 1] - t[up]) / (z[up + 1] - z[up])
+    crossings = t[up] - z[up] * (t[up + 1] - t[up]) / (z[up + 1] - z[up])
     ranges = []
     for a, b in itertools.pairwise(up):
         ranges.append(np.ptp(s[a : b + 1]))
-    return float(np.median(ranges)) / 2.0, float((len(at) - 1) / (at[-1] - at[0]))
+    return float(np.median(ranges)) / 2.0, float(
+        (len(crossings) - 1) / (crossings[-1] - crossings[0])
+    )
 
 
 def random_loop(rng: np.random.Generator) -> ExactLoop:
@@ -212,9 +214,9 @@ def _law(kind, g, m, h, x, v):
         m[0] -= h * g[1] * _sign(s)
         return u, s
     if kind == 3:
-        wanted = g[1] * math.sqrt(abs(x))
+        speed = g[1] * math.sqrt(abs(x))
         return (
-            -g[0] * (v + wanted * _sign(x)) / (abs(v) + wanted) if abs(v) + wanted > 0.0 else 0.0
+            -g[0] * (v + speed * _sign(x)) / (abs(v) + speed) if abs(v) + speed > 0.0 else 0.0
         ), x
     if kind == 4:
         if v * m[1] < 0.0 or v == 0.0:

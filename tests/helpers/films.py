@@ -31,24 +31,24 @@ without_charts = mock.patch.object(film, "Sheet", Blank)
 def tracks(traces, colours):
     """Return what runs do in a film without arrows, at 0 and .1 s."""
     clock = FilmClock(np.array([0.0, 0.1]), np.ones(2))
-    found = []
+    tracks_of_runs = []
     for trace, colour in zip(traces, colours, strict=False):
-        found.append(MachineTrack(trace, colour, clock, clock.times, {}))
-    return found
+        tracks_of_runs.append(MachineTrack(trace, colour, clock, clock.times, {}))
+    return tracks_of_runs
 
 
 def staged(trace, size, colour="#0072B2", chosen=None, strip=0.0):
     """Return the stage of a machine that has a picture of this size, px, to itself, but for a strip
     at its foot.
     """
-    shown = tracks([trace], [colour])
-    whole = mock.patch.object(film, "room_of", lambda size, lines: Room(0.0, 0.0, *size))
+    tracks_shown = tracks([trace], [colour])
+    undivided = mock.patch.object(film, "room_of", lambda size, lines: Room(0.0, 0.0, *size))
     words = mock.patch.object(
         film, "label_sizes", lambda names, size, room: (np.array([[room, strip]]), 1.0)
     )
-    with whole, words:
-        placed = film.placement(shown, chosen, ["one"], size)
-    return next(film.staged(shown, placed, np.zeros(1)))
+    with undivided, words:
+        placed = film.placement(tracks_shown, chosen, ["one"], size)
+    return next(film.staged(tracks_shown, placed, np.zeros(1)))
 
 
 def sheet(traces, names=None, size=(1280, 720)):

@@ -64,12 +64,12 @@ def compiled(
 
 def split(truth: Mapping[str, float], joints: Sequence[str]) -> dict[str, dict[str, float]]:
     """Return joint -> the numbers that the model has, from paths."""
-    found: dict[str, dict[str, float]] = {}
+    numbers_by_part: dict[str, dict[str, float]] = {}
     for path, value in truth.items():
         joint, _, kind = path.rpartition(".")
         if joint in joints and kind in ("damping", "frictionloss", "armature", "stiffness"):
-            found.setdefault(joint, {})[kind] = value
-    return found
+            numbers_by_part.setdefault(joint, {})[kind] = value
+    return numbers_by_part
 
 
 def log(
@@ -104,7 +104,7 @@ def log(
     offset = np.array([truth.get(f"{joint}.offset", 0.0) for joint in joints])
     m = len(joints)
     rng = np.random.default_rng(seed)
-    every = round(1.0 / rate / STEP)
+    stride = round(1.0 / rate / STEP)
     late = round(truth.get("input_delay", 0.0) / STEP)
     if x0 is not None:
         data.qpos[places] = x0
@@ -114,9 +114,9 @@ def log(
     rates = np.zeros(m)
     last: np.ndarray | None = None
     share = 1.0 - np.exp(-1.0 / rate / RATE_FILTER)
-    times, positions, given = [], [], []
+    times, positions, commanded = [], [], []
     for k in range(round(duration / STEP)):
-        if k % every == 0:
+        if k % stride == 0:
             y = data.qpos[places] + noise * rng.standard_normal(len(seen))
             y = quantum * np.floor(y / quantum + 0.5)
             if last is not None:
@@ -126,11 +126,11 @@ def log(
             command = np.asarray(kp) * (r - y[:m]) + np.asarray(kd) * (dr - rates)
             times.append(k * STEP)
             positions.append(y)
-            given.append(command)
+            commanded.append(command)
         commands.append(command)
         data.ctrl[:] = (gain * commands[k - late] if k >= late else 0.0) + offset
         mujoco.mj_step(model, data)
-    x, u = np.array(positions), np.array(given)
+    x, u = np.array(positions), np.array(commanded)
     columns = {"t": np.array(times)}
     for i, joint in enumerate(seen):
         columns["x" if len(seen) == 1 else f"x_{joint}"] = x[:, i]
@@ -146,7 +146,7 @@ def servo_log(
     model = compiled(xml, split(truth, ["j1"]), {})
     data = mujoco.MjData(model)
     rng = np.random.default_rng(seed)
-    every = round((t[1] - t[0]) / STEP)
+    stride = round((t[1] - t[0]) / STEP)
     quantum = 2.0 * np.pi / 8192.0
     data.qpos[0] = u[0]
     x = np.zeros(len(t))
@@ -154,8 +154,8 @@ def servo_log(
     for k in range(len(u)):
         y = data.qpos[0] + 2e-4 * rng.standard_normal()
         x[k] = quantum * np.floor(y / quantum + 0.5)
-        for step in range(k * every, (k + 1) * every):
-            data.ctrl[0] = u[max(step - late, 0) // every]
+        for step in range(k * stride, (k + 1) * stride):
+            data.ctrl[0] = u[max(step - late, 0) // stride]
             mujoco.mj_step(model, data)
     return {"t": t, "x": x, "u": u}
 

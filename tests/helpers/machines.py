@@ -126,4 +126,4 @@ PENDULUM = PublishedRig(
 
 def catalogue() -> Catalogue[PublishedRig]:
     """Return both, by name."""
-    return Catalogue({one.name: one for one in (AXIS, PENDULUM)})
+    return Catalogue({machine.name: machine for machine in (AXIS, PENDULUM)})

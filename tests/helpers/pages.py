@@ -19,10 +19,10 @@ def blocks(text: str, language: str) -> list[str]:
 
 def titled(page: Path) -> dict[str, str]:
     """The files that a page has its reader write: name -> text."""
-    found = re.findall(
+    titles_and_texts = re.findall(
         r"^```\w+ title=\"([^\"]+)\"\n(.*?)^```$", page.read_text(), re.MULTILINE | re.DOTALL
     )
-    return dict(found)
+    return dict(titles_and_texts)
 
 
 @contextlib.contextmanager

@@ -241,30 +241,30 @@ def _chain(
 
     Return 1 if the law raised.
     """
-    at = pointer(y)
+    y_pointer = pointer(y)
     memory = pointer(cells)
     answer = pointer(out)
     state = pointer(x)
     moved = pointer(step)
     kick = pointer(kicks)
     noise = pointer(errors)
-    kept = pointer(states)
+    states_pointer = pointer(states)
     logged = pointer(log)
     remembered = pointer(memories)
     for k in range(count):
-        at[T], row = k * h, k * n
+        y_pointer[T], row = k * h, k * n
         first = state[0] + noise[row]
         if n == 1:
-            at[V] = at[DE] = at[S] = first
+            y_pointer[V] = y_pointer[DE] = y_pointer[S] = first
         else:
-            at[R] = at[DR] * at[T]
-            at[E] = first
-            at[X] = first + at[R]
-            at[DE] = state[1] + noise[row + 1]
-            at[V] = at[DE] + at[DR]
-            at[A] = state[2] + noise[row + 2] if n == 3 else 0.0
+            y_pointer[R] = y_pointer[DR] * y_pointer[T]
+            y_pointer[E] = first
+            y_pointer[X] = first + y_pointer[R]
+            y_pointer[DE] = state[1] + noise[row + 1]
+            y_pointer[V] = y_pointer[DE] + y_pointer[DR]
+            y_pointer[A] = state[2] + noise[row + 2] if n == 3 else 0.0
         for i in range(n):
-            kept[row + i] = state[i]
+            states_pointer[row + i] = state[i]
         for i in range(size):
             remembered[k * size + i] = memory[i]
         if call(law, y, gains, cells, out) != 0:
@@ -274,7 +274,7 @@ def _chain(
         for i in range(n):
             after = kick[row + i] + moved[i * (n + 1) + n] * (f + g * u)
             for j in range(n):
-                after += moved[i * (n + 1) + j] * kept[row + j]
+                after += moved[i * (n + 1) + j] * states_pointer[row + j]
             state[i] = after
     return 0
 
@@ -284,12 +284,12 @@ def kicked(d, n, h, count):
 
     Taylor's remainder of its repeated integrals.
     """
-    whole = [d.integral(m, np.arange(count + 1) * h) for m in range(1, n + 1)]  # integral m + 1
+    moments = [d.integral(m, np.arange(count + 1) * h) for m in range(1, n + 1)]  # integral m + 1
     kicks = np.empty((count, n))
     for i in range(n):
         m = n - i
-        kicks[:, i] = whole[m - 1][1:] - sum(
-            h**j / math.factorial(j) * whole[m - j - 1][:-1] for j in range(m)
+        kicks[:, i] = moments[m - 1][1:] - sum(
+            h**j / math.factorial(j) * moments[m - j - 1][:-1] for j in range(m)
         )
     return kicks
 

@@ -33,11 +33,11 @@ def double_pendulum() -> str:
 def double_pendulum_log(folder: Path, name: str, duration: float) -> dict[str, np.ndarray]:
     """Return the first seconds of record C1-sysid-NAME, with the measured torques as commands."""
     with np.load(folder / f"double_pendulum-C1-sysid-{name}.npz") as record:
-        kept = record["time"] < duration
-        columns = {"t": record["time"][kept]}
+        within = record["time"] < duration
+        columns = {"t": record["time"][within]}
         for i, joint in enumerate(("shoulder", "elbow"), 1):
-            columns[f"x_{joint}"] = record[f"pos_meas{i}"][kept]
-            columns[f"u_{joint}"] = record[f"tau_meas{i}"][kept]
+            columns[f"x_{joint}"] = record[f"pos_meas{i}"][within]
+            columns[f"u_{joint}"] = record[f"tau_meas{i}"][within]
     return columns
 
 

@@ -51,8 +51,8 @@ class Controller:
         self.surface = scenario.surface and PythonComponent(scenario.surface, n)
         self.limits = np.array(scenario.limits)
         self.scale = math.prod(part.scale for part in scenario.actuator)
-        known = zip(scenario.plant.parameters, nominal_values(self.scenario), strict=True)
-        self.values = Values(**dict(known))
+        parameters = zip(scenario.plant.parameters, nominal_values(self.scenario), strict=True)
+        self.values = Values(**dict(parameters))
         if scenario.plant.by_mujoco:  # compiles now, not at the first call
             scenario.plant.nominal(np.zeros(n), np.zeros(n), 0, self.values)
         self.last_u = np.zeros(n)  # commands of the last sample
@@ -152,10 +152,10 @@ class Controller:
 
     def compensation(self, i: int, v: np.ndarray, motion: np.ndarray) -> float:
         """Return what a Feedforward of Coulomb and viscous friction adds to u of channel i."""
-        given = self.scenario.feedforward
-        if not isinstance(given, Feedforward):
+        feedforward = self.scenario.feedforward
+        if not isinstance(feedforward, Feedforward):
             return 0.0
-        speed = float(motion[1, i] if given.on == "reference" else v[i])
+        speed = float(motion[1, i] if feedforward.on == "reference" else v[i])
         force = 0.0
         for part in self.scenario.compensated:
             if i in part.channels(self.scenario.plant):
@@ -163,7 +163,7 @@ class Controller:
                     force += part.b * speed
                 else:
                     force += math.copysign(part.level, speed)
-        share = (1.0 + given.error) * math.tanh(abs(speed) / given.eps)
+        share = (1.0 + feedforward.error) * math.tanh(abs(speed) / feedforward.eps)
         return share * force / self.scenario.drive_train.nominal[i].gain
 
     def measurement(

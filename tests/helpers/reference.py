@@ -76,22 +76,24 @@ def by_function(
 ) -> tuple[float, float, float]:
     """Return the friction of a user's function of speed and load, and its bounds at rest."""
     y = JointState(0.0, 0.0, 0.0, v, 0.0, motor, load)
-    found = type(part).function(y, numbers, np.zeros(0))
-    if isinstance(found, tuple):
-        return found
+    force = type(part).function(y, numbers, np.zeros(0))
+    if isinstance(force, tuple):
+        return force
     rest = abs(type(part).function(y._replace(v=0.0), numbers, np.zeros(0)))
-    return math.copysign(found, v), -rest, rest
+    return math.copysign(force, v), -rest, rest
 
 
 def advance(
     effect: DriveStep, u: np.ndarray, first: np.ndarray, second: np.ndarray, v: np.ndarray
 ) -> np.ndarray:
     """Return the mean force over a step and both states at its end, (3, ...), without compiling."""
-    found = []
-    for command, one, other, speed in zip(u, first, second, v, strict=True):
-        kept = SimpleNamespace(first=one, second=other)
-        found.append((advanced.py_func(effect, kept, command, speed), kept.first, kept.second))
-    return np.array(found).T
+    next_states = []
+    for command, state, second_state, speed in zip(u, first, second, v, strict=True):
+        states = SimpleNamespace(first=state, second=second_state)
+        next_states.append(
+            (advanced.py_func(effect, states, command, speed), states.first, states.second)
+        )
+    return np.array(next_states).T
 
 
 class Motor:
@@ -257,11 +259,11 @@ class Loop:
             self.commands.append(self.commands[-1] if k else np.zeros(self.scenario.plant.n))
         if within == self.late(k):
             t = k * self.scenario.control_period + within * self.scenario.physics_step
-            at = self.channels
+            places = self.channels
             if self.scenario.model == "true":
                 self.controller.reported = self.d + self.forces[1] / self.scenario.steps
-            x = data.sensordata[at["x_sensor"]]
-            v = data.sensordata[at["v_sensor"]]
+            x = data.sensordata[places["x_sensor"]]
+            v = data.sensordata[places["v_sensor"]]
             self.commands[k], self.log["s"][k] = self.controller(k, t, x, v)
             self.log["u"][k] = self.commands[k]
             self.log["r"][k] = self.controller.r
@@ -292,7 +294,7 @@ class Loop:
                 v,
                 strict=True,
             )
-            control = np.array([rippled(self.drive_step, *each) for each in moving])
+            control = np.array([rippled(self.drive_step, *joint) for joint in moving])
         data.ctrl[self.channels["ctrl"][self.driven]] = control[self.driven]
 
     def with_fault(self, step: int) -> np.ndarray:
@@ -374,8 +376,8 @@ class Loop:
         Return their generalised forces, (n,).
         """
         xfrc = data.xfrc_applied.ravel()
-        at = self.channels
-        xfrc[at["xfrc"]] = xfrc[at["horizontal"]] = 0.0
+        places = self.channels
+        xfrc[places["xfrc"]] = xfrc[places["horizontal"]] = 0.0
         self.apply_pushes(data, t)
         joints = np.zeros(len(self.driven))  # forces on the joints themselves, in a user's model
         for signal, memory, stream in zip(
@@ -384,25 +386,25 @@ class Loop:
             if isinstance(signal, Push):
                 continue
             d = self.disturbance(signal, data, t, memory, stream)
-            matched = at["sign"] * d * self.driven  # only on joints with an actuator
+            matched = places["sign"] * d * self.driven  # only on joints with an actuator
             joints += matched
             if signal.cartesian:
-                xfrc[at["horizontal"]] += d
+                xfrc[places["horizontal"]] += d
             else:
-                xfrc[at["xfrc"]] += matched
-        d = at["sign"] * xfrc[at["xfrc"]]
+                xfrc[places["xfrc"]] += matched
+        d = places["sign"] * xfrc[places["xfrc"]]
         if self.scenario.plant.direct:
-            xfrc[at["xfrc"]] = 0.0
-            data.qfrc_applied[at["qfrc"]] = d = joints
+            xfrc[places["xfrc"]] = 0.0
+            data.qfrc_applied[places["qfrc"]] = d = joints
         if self.hinged.any():
-            anchor = data.xanchor[at["anchor"] // 3]
-            axis = data.xaxis[at["anchor"] // 3]
-            arm = data.xipos[at["hinge_body"] // 3] - anchor
+            anchor = data.xanchor[places["anchor"] // 3]
+            axis = data.xaxis[places["anchor"] // 3]
+            arm = data.xipos[places["hinge_body"] // 3] - anchor
             channel = np.arange(len(d))
-            j = at["axis"] + 1
-            k = (at["axis"] + 2) % 3
+            j = places["axis"] + 1
+            k = (places["axis"] + 2) % 3
             turn = axis[channel, j] * arm[channel, k] - axis[channel, k] * arm[channel, j]
-            d[self.hinged] += (turn * xfrc[at["horizontal"]])[self.hinged]
+            d[self.hinged] += (turn * xfrc[places["horizontal"]])[self.hinged]
         if not np.isfinite(d).all():
             raise Failure(DISTURBANCE_NOT_FINITE)
         return d
@@ -469,19 +471,19 @@ class Loop:
         """Give the joints their friction by a formula for a physics step; d are the disturbances,
         (n,).
         """
-        at = self.channels
-        for i, dof in enumerate(at["qvel"]):
+        places = self.channels
+        for i, dof in enumerate(places["qvel"]):
             if self.formulas[i] is None:
                 continue
             v = float(data.qvel[dof])
             if self.has_drive[i]:
-                motor = float(data.actuator_force[at["force"][i]])
+                motor = float(data.actuator_force[places["force"][i]])
             else:
                 motor = 0.0
             load = float(data.qfrc_spring[dof] - data.qfrc_bias[dof])
             held = float(data.qfrc_constraint[dof])
             load += held + d[i]
-            if (shaft := at["shaft"][i]) not in (-1, dof):
+            if (shaft := places["shaft"][i]) not in (-1, dof):
                 load += data.qfrc_constraint[shaft]
                 held += data.qfrc_constraint[shaft]
             load -= min(max(held, -self.level[i]), self.level[i])
@@ -497,7 +499,7 @@ class Loop:
             elif not slow:
                 self.stuck_at[i] = math.nan
             else:
-                x = float(data.qpos[at["qpos"][i]])
+                x = float(data.qpos[places["qpos"][i]])
                 if math.isnan(self.stuck_at[i]):
                     self.stuck_at[i] = x
                 away = x - self.stuck_at[i]
@@ -517,29 +519,29 @@ class Loop:
         """Give the joints their dry friction at a stage of RK4, by its formula or by its moments in
         the step; d are the disturbances, (n,).
         """
-        at = self.channels
-        for i, dof in enumerate(at["qvel"]):
+        places = self.channels
+        for i, dof in enumerate(places["qvel"]):
             v = float(data.qvel[dof])
             if self.driven[i]:
                 drive = torque(
-                    self.scenario.drive_train.torques[i], float(data.ctrl[at["ctrl"][i]]), v
+                    self.scenario.drive_train.torques[i], float(data.ctrl[places["ctrl"][i]]), v
                 )
             else:
                 drive = 0.0
             load = float(data.qfrc_spring[dof] - data.qfrc_bias[dof]) + d[i]
-            others = float(data.qfrc_passive[dof] - data.qfrc_bias[dof] + d[i])
+            other_forces = float(data.qfrc_passive[dof] - data.qfrc_bias[dof] + d[i])
             if stage == 0:
                 if self.drive_step and self.drive_step.rise_first:
-                    smooth = others + self.middle[i]
+                    smooth = other_forces + self.middle[i]
                 else:
-                    smooth = others + drive
+                    smooth = other_forces + drive
                 self.rubbing[i] = self.begin_friction(data, i, smooth, drive, load)
             moments = self.rubbing[i]
             if moments is None:
                 force = -self.while_sliding(i, v, drive, load, stage)
             else:
                 mean, rise, smooth, holding, low, high = moments
-                force = min(max(mean - holding * (others + drive - smooth), low), high)
+                force = min(max(mean - holding * (other_forces + drive - smooth), low), high)
                 force += (-rise, 0.0, 0.0, rise)[stage]
             data.qfrc_applied[dof] = force + (d[i] if self.scenario.plant.direct else 0.0)
             self.forces[1, i] += force / (6.0, 3.0, 3.0, 6.0)[stage]

@@ -62,12 +62,12 @@ def assert_loops_agree(scenarios, rounding=0.0):
     """Fail unless runs of the callback are those of the oracle, to the bit or to a
     rounding, and go well.
     """
-    for one, trace in zip(scenarios, smc.run(scenarios), strict=True):
+    for declared, trace in zip(scenarios, smc.run(scenarios), strict=True):
         assert trace.failure is None
-        other = reference.run(one)
+        expected = reference.run(declared)
         for name in ARRAYS:
             a = getattr(trace, name)
-            b = getattr(other, name)
+            b = getattr(expected, name)
             np.testing.assert_allclose(
                 a, b, rtol=rounding, atol=rounding, err_msg=f"{name} of {trace!r}"
             )

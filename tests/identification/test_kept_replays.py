@@ -48,7 +48,7 @@ def run():
 
 def test_a_stopped_search_goes_on_and_gives_the_same_bits(run, stop, tmp_path):
     arm = smc.plant_from(ONE, ["j1"])
-    whole = smc.identify(arm, run, list(TRUTH), held_out=run)
+    uninterrupted = smc.identify(arm, run, list(TRUTH), held_out=run)
     folder = tmp_path / "replays"
     stop.reset()
     smc.identify(arm, run, list(TRUTH), held_out=run, folder=folder)
@@ -65,7 +65,7 @@ def test_a_stopped_search_goes_on_and_gives_the_same_bits(run, stop, tmp_path):
     assert stop.simulated == count - 2 * (count // 3 - 1) + 1
     assert not folder.exists()
     for field in ("values", "errors", "fits", "by_pieces", "held_out", "notes", "evaluations"):
-        assert getattr(again, field) == getattr(whole, field), field
+        assert getattr(again, field) == getattr(uninterrupted, field), field
 
 
 @pytest.mark.slow
@@ -77,14 +77,14 @@ def test_what_was_simulated_of_another_log_or_machine_is_not_taken(run, stop, tm
         smc.identify(arm, run, ["j1.damping"], folder=folder)
     later = {name: values + (0.01 if name == "x" else 0.0) for name, values in run.items()}
     heavy = smc.plant_from(chain([0.4], [1.1]), ["j1"])
-    for machine, given in ((arm, later), (heavy, run)):
+    for machine, columns in ((arm, later), (heavy, run)):
         stop.reset()
-        fresh = smc.identify(machine, given, ["j1.damping"], folder=tmp_path / "fresh")
+        fresh = smc.identify(machine, columns, ["j1.damping"], folder=tmp_path / "fresh")
         count = stop.simulated
         stop.reset()
-        other = tmp_path / "other"
-        shutil.copytree(folder, other)
-        beside = smc.identify(machine, given, ["j1.damping"], folder=other)
+        copied = tmp_path / "other"
+        shutil.copytree(folder, copied)
+        beside = smc.identify(machine, columns, ["j1.damping"], folder=copied)
         assert beside.values == fresh.values
         assert stop.simulated == count
 

@@ -52,7 +52,7 @@ def test_every_entry_has_every_search_of_every_problem(suite):
         assert list(entry.searches) == names
         for searches in entry.searches.values():
             assert len(searches) == SEARCHES
-            assert all(len(found.errors) == UNSEEN for found in searches)
+            assert all(len(of_search.errors) == UNSEEN for of_search in searches)
 
 
 @SUITES

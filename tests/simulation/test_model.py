@@ -211,13 +211,13 @@ def test_runs_one_after_another_share_a_model_that_none_of_them_changes(monkeypa
 
 
 def test_a_thread_may_keep_its_model_while_another_counts_the_bytes_of_those_kept(monkeypatch):
-    first, other = (smc.Scenario(plant=name, law="pid") for name in ("duffing", "van_der_pol"))
+    first, second = (smc.Scenario(plant=name, law="pid") for name in ("duffing", "van_der_pol"))
     monkeypatch.setattr(model, "_recent", type(model._recent)())
     monkeypatch.setattr(model, "_mechanisms", weakref.WeakValueDictionary())
-    size, meanwhile = mujoco.mj_sizeModel, [other]
+    size, meanwhile = mujoco.mj_sizeModel, [second]
 
     def counted(compiled):
-        if meanwhile:  # as if the other thread ran now
+        if meanwhile:  # as if the second thread ran now
             model.mechanism(meanwhile.pop())
         return size(compiled)
 

@@ -19,9 +19,9 @@ LAW = arms.gained("computed_torque_sliding")
 
 def test_seeds_move_the_start_except_at_the_wall():
     for task in ("sway", "payload", "blow"):
-        own, other = (np.array(arms.scenario(task, LAW, seed).x0) for seed in (0, 3))
+        own, moved = (np.array(arms.scenario(task, LAW, seed).x0) for seed in (0, 3))
         assert own.tolist() == [signal.values[0] for signal in arms.scenario(task, LAW).references]
-        assert 0.0 < np.abs(other - own).max() <= arms.SPREAD
+        assert 0.0 < np.abs(moved - own).max() <= arms.SPREAD
     for task in ("wall", "behind"):
         assert arms.scenario(task, LAW, 3).x0 == arms.scenario("wall", LAW).x0
     assert arms.scenario("wall", LAW, 3).seed == 3
@@ -105,16 +105,19 @@ def test_the_hybrid_law_presses_as_hard_as_it_should_and_stays_on_the_wall():
     """With the friction of a real arm, rubbing on the wall, and noise: within 5 %, and less than 1
     mm deep.
     """
-    known, unknown = smc.run(
-        [arms.scenario("wall", arms.hybrid(friction=one), seed=5) for one in (True, False)]
+    with_friction, unknown = smc.run(
+        [
+            arms.scenario("wall", arms.hybrid(friction=friction), seed=5)
+            for friction in (True, False)
+        ]
     )
-    for trace in (known, unknown):
+    for trace in (with_friction, unknown):
         scores = smc.metrics.tip_scores(trace)
         assert abs(scores["force_error"]) < 5.0
         assert scores["touching"] == 100.0
         assert scores["depth"] < 1e-3
     assert (
-        smc.metrics.tip_scores(known)["force_ripple"]
+        smc.metrics.tip_scores(with_friction)["force_ripple"]
         < smc.metrics.tip_scores(unknown)["force_ripple"]
     )
 
@@ -150,7 +153,7 @@ def test_medians_of_the_page_are_those_of_its_runs(task, payload, column):
         rms = np.median([1e3 * smc.metrics.tip_scores(trace)["rms_error"] for trace in traces])
         rate = np.median(
             [
-                max(one["tv_rate"] for one in smc.metrics.joint_scores(trace).values())
+                max(scores["tv_rate"] for scores in smc.metrics.joint_scores(trace).values())
                 for trace in traces
             ]
         )

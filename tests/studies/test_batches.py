@@ -23,11 +23,11 @@ def mixed() -> list[smc.Scenario]:
 def test_batches_hold_every_scenario_once_and_agree_on_its_layout(monkeypatch, steps):
     monkeypatch.setattr(batches, "MAX_WORK", steps)
     scenarios = mixed()
-    found = list(batches.batches(scenarios))
+    batches_of_runs = list(batches.batches(scenarios))
     assert sorted(map(id, scenarios)) == sorted(
-        id(one.scenario) for batch in found for one in batch
+        id(trace.scenario) for batch in batches_of_runs for trace in batch
     )
-    for batch in [[one.scenario for one in batch] for batch in found]:
+    for batch in [[trace.scenario for trace in batch] for batch in batches_of_runs]:
         assert (
             len({(s.plant.name, s.resolved.integrator, s.resolved.physics_step) for s in batch})
             == 1
@@ -45,26 +45,30 @@ def test_outcomes_come_in_the_order_of_the_batch_and_do_not_depend_on_it():
     assert together == [
         batches.result_columns(trace) for s in batch for trace in batches.run_batch([s], 1)
     ]
-    assert [found["diverged_at"] for found in together] == [None, 0.011, 0.021]
+    assert [outcome["diverged_at"] for outcome in together] == [None, 0.011, 0.021]
 
 
 def test_a_batch_is_finished_while_the_next_one_runs_and_what_that_raises_is_heard():
-    made = list(batches.batches(mixed()))
+    batches_of_runs = list(batches.batches(mixed()))
     finished = []
     batches.compute(
-        made, 1, lambda batch, traces: finished.append((batch, [t.scenario for t in traces]))
+        batches_of_runs,
+        1,
+        lambda batch, traces: finished.append((batch, [t.scenario for t in traces])),
     )
-    assert [batch for batch, _ in finished] == made
-    assert [[one.scenario for one in batch] for batch in made] == [done for _, done in finished]
+    assert [batch for batch, _ in finished] == batches_of_runs
+    assert [[trace.scenario for trace in batch] for batch in batches_of_runs] == [
+        done for _, done in finished
+    ]
 
-    for doomed in (made[0], made[-1]):
+    for doomed in (batches_of_runs[0], batches_of_runs[-1]):
 
         def full(batch, traces, doomed=doomed):
             if batch is doomed:
                 raise smc.ScenarioError("no room")
 
         with pytest.raises(smc.ScenarioError, match="no room"):
-            batches.compute(made, 1, full)
+            batches.compute(batches_of_runs, 1, full)
 
 
 @pytest.mark.quick

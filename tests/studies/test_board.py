@@ -113,10 +113,10 @@ def test_the_last_table_says_how_laws_failed():
 )
 def test_the_last_table_says_where_no_run_touches(touched, said):
     law, condition = ["a", "a", "b", "b"], ["contact"] * 4
-    made = MadeTable(
+    table = MadeTable(
         law=law, condition=condition, seed=[0, 1, 0, 1], itae=[1.0, 2.0, 3.0, 4.0], touched=touched
     )
-    text = repr(leaderboard(made, ["itae"]))
+    text = repr(leaderboard(table, ["itae"]))
     if said:
         assert said in " ".join(text.split())
     else:
@@ -141,7 +141,7 @@ def test_html_and_latex_have_the_numbers_of_the_text(boards):
     escaped = r"50 \% \& $<$b$>$x\_1\textasciicircum{}\{2\}$<$/b$>$ \textbackslash{} $\lambda$ = 2"
     assert list(latex)[1].startswith(escaped)
     for row, in_latex in zip(table.rows, latex.values(), strict=True):
-        for cell, shown, tex in zip(
+        for cell, html_text, tex in zip(
             row[1:],
             html[row[0].text],
             in_latex,
@@ -149,7 +149,7 @@ def test_html_and_latex_have_the_numbers_of_the_text(boards):
         ):
             interval, *detects = cell.below.splitlines()
             assert not detects
-            assert " ".join([cell.text, interval]) in shown
+            assert " ".join([cell.text, interval]) in html_text
             for part in (cell.text, interval):
                 assert re.search(rf"(?<![\d.]){re.escape(part)}[* \n]", text), part
             for part, line in zip((cell.text, interval), tex, strict=True):
@@ -231,10 +231,10 @@ def test_only_what_no_law_beats_is_marked(boards):
     assert not any(map(any, marked(blind)))
     fact: Any = blind[0].verdict(block)
     assert fact.hidden > 0.995
-    some = made()  # the first median is known within a factor of 10, the others within 1.2
+    some_boards = made()  # the first median is known within a factor of 10, the others within 1.2
     random = np.random.default_rng(3)
-    some.columns["itae"] = np.exp(np.repeat([2.5, 0.1, 0.1], 20) * random.normal(size=60))
-    board = leaderboard(some, metrics=["itae"])[0]
+    some_boards.columns["itae"] = np.exp(np.repeat([2.5, 0.1, 0.1], 20) * random.normal(size=60))
+    board = leaderboard(some_boards, metrics=["itae"])[0]
     assert board.winner is None
     assert EVIL in board.best
     cells = {row[0].text: row[1] for row in Boards([board]).tables[0].rows}
@@ -258,9 +258,9 @@ def test_a_law_that_wins_is_marked_and_its_ratio_is_a_number(never, spread, cond
     times[2] *= np.exp(-4.0 * spread - 1.0)
     times[:2][random.random(times[:2].shape) < never] = math.inf
     table.columns["settling_time"] = times.ravel()
-    (board,) = found = leaderboard(table, metrics=["settling_time"])
+    (board,) = ranked_boards = leaderboard(table, metrics=["settling_time"])
     assert board.winner == "third"
-    assert found.tables[0].rows[0][1].strong
+    assert ranked_boards.tables[0].rows[0][1].strong
     for block in board.blocks:
         fact: Any = board.verdict(block)
         assert (fact.law, fact.metric, fact.samples) == ("third", "settling time", 20)
@@ -303,7 +303,7 @@ def test_the_key_of_a_plot_says_what_a_ring_is_or_that_no_law_of_these_metrics_w
     """A reader who had seen stars in a table took a plot without rings for a fault."""
     drawn = dot_plot.plot(made(), metrics=[metric], winners=winners)
     words = [text.get_text() for legend in drawn.legends for text in legend.get_texts()]
-    assert [one for one in words if "winner" in one] == said
+    assert [word for word in words if "winner" in word] == said
 
 
 def test_an_axis_is_logarithmic_where_a_condition_is_several_times_as_slow():
@@ -335,13 +335,13 @@ def test_a_law_has_its_label_in_latex_and_plots_and_values_below_the_floor_are_s
     (ax,) = drawn.axes
     assert [text.get_text() for text in ax.get_yticklabels()] == ["Root sliding", "PID"]
     (ax,) = dot_plot.plot(table, metrics=["ultimate_bound"]).axes
-    left, _ = ax.get_xlim()
+    least_x, _ = ax.get_xlim()
     floors = []
     for condition in ("nominal", "noise"):
         floors.append(floor(table.select(condition=condition).scenario(0), "ultimate_bound"))
     ends = [shade.get_datalim(ax.transData).x1 for shade in ax.collections]
-    assert ends == pytest.approx([max(left, floors[0]), max(left, floors[1])])
-    assert left < floors[1]
+    assert ends == pytest.approx([max(least_x, floors[0]), max(least_x, floors[1])])
+    assert least_x < floors[1]
 
 
 def test_a_title_in_latex_has_words_and_one_of_a_terminal_has_names():
@@ -396,8 +396,8 @@ def test_a_verdict_that_says_below_is_no_cell_below_a_floor():
     table.columns["itae"] = np.exp(0.3 * random.normal(size=60))
     boards = leaderboard(table, ["itae"])
     assert "leads below" in repr(boards[0])
-    (shown,) = boards.tables
-    assert UNDER["floor "] not in shown.under[-1]
+    (tabular,) = boards.tables
+    assert UNDER["floor "] not in tabular.under[-1]
 
 
 def test_the_shade_below_the_floor_begins_at_0_on_a_linear_axis():
@@ -417,8 +417,8 @@ def test_a_name_is_no_formula_in_a_plot_and_no_command_in_latex():
     table.columns["law"] = np.array([names[law] for law in table.column("law")])
     drawn = dot_plot.plot(table, metrics=["itae"])
     drawn.canvas.draw()
-    shown = [text for ax in drawn.axes for text in ax.get_yticklabels()]
-    assert not any(text.get_parse_math() for text in shown)
+    labels = [text for ax in drawn.axes for text in ax.get_yticklabels()]
+    assert not any(text.get_parse_math() for text in labels)
     latex = leaderboard(table, ["itae"], by=("plant", "condition")).to_latex()
     assert r"\$\textbackslash{}write18\{id\}\$" in latex
     assert r"a \$5\$ b" in latex
@@ -461,13 +461,13 @@ def test_each_group_has_a_table_with_its_units_and_its_sample():
 
 
 def test_a_metric_in_a_unit_without_a_floor_says_so(monkeypatch):
-    told = "no floor is known for a metric in 'W', so any difference counts"
+    sentence = "no floor is known for a metric in 'W', so any difference counts"
     (board,) = leaderboard(made(), ["itae"])
-    assert told not in board.lines
+    assert sentence not in board.lines
     entry = dataclasses.replace(CATALOGUE["itae"], unit="W")
     monkeypatch.setitem(CATALOGUE, "itae", entry)
     (board,) = leaderboard(made(), ["itae"])
-    assert board.lines[-1] == told
+    assert board.lines[-1] == sentence
 
 
 def test_latex_has_no_letter_that_an_engine_may_not_know():

@@ -79,17 +79,17 @@ def found(folder):
 
 
 def kinds(found, plant="duffing"):
-    return {law: made.source.kind for law, made in found.gains[plant].items()}
+    return {law: law_gains.source.kind for law, law_gains in found.gains[plant].items()}
 
 
 def test_every_law_has_given_shipped_or_tuned_gains_and_its_table_says_which(found):
-    wanted = {"my_law": "tuned here", "classical": "shipped", "pid": "given"}
+    kind_by_law = {"my_law": "tuned here", "classical": "shipped", "pid": "given"}
     for plant in PLANTS:
-        assert kinds(found, plant) == wanted
+        assert kinds(found, plant) == kind_by_law
     mine = [found.gains[plant]["my_law"].gains for plant in PLANTS]
     assert mine[0] != mine[1]
     gains = found.tables[-1]
-    rows = [(plant, law, kind) for plant in PLANTS for law, kind in wanted.items()]
+    rows = [(plant, law, kind) for plant in PLANTS for law, kind in kind_by_law.items()]
     assert [row[:3] for row in gains.rows] == rows
     assert "kp=20" in gains.rows[2][6]
     searches = found.gains["duffing"]["my_law"].source.search
@@ -103,9 +103,9 @@ def test_every_law_has_given_shipped_or_tuned_gains_and_its_table_says_which(fou
 def test_a_table_of_runs_has_the_periods_and_bounds_of_all_conditions(tmp_path):
     slow = smc.condition("slow", control_period=0.02, u_max=3.0)
     laws = [smc.law("pid", kp=20.0)]
-    of = {"out": tmp_path, "duration": 0.1, "progress": False}
-    made = smc.compare(laws, "duffing", [slow, "nominal"], 1, **of)
-    assert made.tables[-2].rows[0][1:4:2] == ("3.00 N or 6.00 N", "20 or 1")
+    settings = {"out": tmp_path, "duration": 0.1, "progress": False}
+    compared = smc.compare(laws, "duffing", [slow, "nominal"], 1, **settings)
+    assert compared.tables[-2].rows[0][1:4:2] == ("3.00 N or 6.00 N", "20 or 1")
 
 
 def test_a_law_of_which_a_search_was_stuck_is_named(found):
@@ -113,9 +113,9 @@ def test_a_law_of_which_a_search_was_stuck_is_named(found):
     for spread, said in ((0.9, False), (6.6, True)):
         search = dataclasses.replace(candidate.law.source.search, spread=spread)
         law = candidate.law.sourced("tuned here", search)
-        one = dataclasses.replace(found, candidates={"duffing": [candidate._replace(law=law)]})
+        renamed = dataclasses.replace(found, candidates={"duffing": [candidate._replace(law=law)]})
         words = "the final J values of its searches differ by up to 7.6 times, so where it trails, a search"
-        assert (words in str(one.remarks)) is said
+        assert (words in str(renamed.remarks)) is said
 
 
 def test_a_gain_at_the_end_of_its_box_is_named_as_tune_names_it(found, folder):
@@ -137,9 +137,9 @@ def test_runs_use_every_set_of_gains_in_turn(found):
     assert len(mine.sets) == 12
     assert used == [mine.sets[i % len(mine.sets)].gains for i in range(8)]
     shipped = found.table.select(plant="duffing", law="classical", condition="encoder")
-    known = gain_sets.tuned("duffing", "classical").sets
+    sets = gain_sets.tuned("duffing", "classical").sets
     for i in range(8):
-        assert shipped.scenario(i).law.gains["k"] == known[i]["k"]
+        assert shipped.scenario(i).law.gains["k"] == sets[i]["k"]
 
 
 def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
@@ -206,7 +206,9 @@ def test_its_page_has_every_median_and_verdict_and_needs_no_other_file(found, tm
     assert "default-src 'none'" in text
     (title,) = re.findall("<h1>(.*?)</h1>", text)
     assert title == "my_law, Classical and PID on Duffing oscillator and Inverted pendulum"
-    assert {at[:5] for at in re.findall(r' (?:src|srcset|href)="([^"]*)"', text)} == {"data:"}
+    assert {address[:5] for address in re.findall(r' (?:src|srcset|href)="([^"]*)"', text)} == {
+        "data:"
+    }
     for table in found.tables:
         for cell in (cell for row in table.rows for cell in row if isinstance(cell, Cell)):
             assert f"{html.text(cell.text)}" in text
@@ -226,9 +228,9 @@ def test_its_page_fits_a_phone_and_turns_dark(found, tmp_path):
         assert failures == []
         assert phone.evaluate("document.documentElement.scrollWidth") == 390
         widths = "all => all.map(one => [one.naturalWidth, one.getBoundingClientRect().width])"
-        ((natural, shown),) = phone.eval_on_selector_all("img", widths)
+        ((natural, shown_width),) = phone.eval_on_selector_all("img", widths)
         assert natural < 390
-        assert 0 < shown <= 358
+        assert 0 < shown_width <= 358
         notes = "all => all.map(one => one.getBoundingClientRect().right)"
         assert max(phone.eval_on_selector_all("td[colspan] div", notes)) <= 390
         assert phone.evaluate("getComputedStyle(document.body).color") == "rgb(255, 255, 255)"
@@ -277,7 +279,7 @@ def test_two_calls_write_the_same_bytes_whenever_wherever_and_with_any_threads(
         monkeypatch.setattr(time, "time", lambda days=days: now() + 86400 * days)
         short = {"duration": 0.3, "seeds": 2, "threads": threads}
         laws = [my_law, "classical"]
-        made = smc.compare(
+        compared = smc.compare(
             laws,
             "duffing",
             ["noise", "coulomb"],
@@ -287,7 +289,7 @@ def test_two_calls_write_the_same_bytes_whenever_wherever_and_with_any_threads(
             progress=False,
             **short,
         )
-        made.to_latex("tables.tex")
+        compared.to_latex("tables.tex")
         smc.which(
             "duffing",
             "noise",
@@ -312,25 +314,25 @@ def test_two_calls_write_the_same_bytes_whenever_wherever_and_with_any_threads(
 def test_another_seed_draws_other_starts_and_noise_for_the_same_gains(tmp_path):
     tables = []
     for seed in (0, 1):
-        given = {"out": tmp_path, "seed": seed, **SHORT}
-        made = smc.compare(
+        settings = {"out": tmp_path, "seed": seed, **SHORT}
+        compared = smc.compare(
             ["classical", "pid"],
             "duffing",
             "noise",
             3,
-            **given,
+            **settings,
         )
-        tables.append(made.table)
-        (holdout, *_) = made.leaderboard
+        tables.append(compared.table)
+        (holdout, *_) = compared.leaderboard
         tables.append(holdout.entries[0].interval.median)
     seeds = []
     for table in tables[::2]:
         seeds.append(table.column("seed")[:3].tolist())
     assert seeds == [[0, 1, 2], [1_000_000, 1_000_001, 1_000_002]]
     first, second = ([table.scenario(i) for i in range(3)] for table in tables[::2])
-    for one, other in zip(first, second, strict=True):
-        assert one.law == other.law
-        assert one.resolved.x0 != other.resolved.x0
+    for scenario, redrawn in zip(first, second, strict=True):
+        assert scenario.law == redrawn.law
+        assert scenario.resolved.x0 != redrawn.resolved.x0
     assert tables[1] != tables[3]  # J on other instances
 
 
@@ -338,7 +340,7 @@ def test_another_seed_draws_other_starts_and_noise_for_the_same_gains(tmp_path):
 def test_more_blocks_than_have_a_table_each_are_one_table_a_plant(most, tmp_path, monkeypatch):
     monkeypatch.setattr(compare, "MAX_BLOCKS", most)
     conditions = ["nominal", "noise", "sine", "constant"]
-    made = smc.compare(
+    compared = smc.compare(
         ["classical", "pid"],
         "duffing",
         conditions,
@@ -347,7 +349,7 @@ def test_more_blocks_than_have_a_table_each_are_one_table_a_plant(most, tmp_path
         **SHORT,
     )
     blocks = []
-    for board in made.leaderboard:
+    for board in compared.leaderboard:
         if board.metric == "itae":
             blocks.append(len(board.blocks))
     assert blocks == ([4] if most == 3 else [1] * 4)
@@ -358,7 +360,7 @@ def test_more_blocks_than_have_a_table_each_are_one_table_a_plant(most, tmp_path
 def test_a_gain_without_a_unit_is_searched_about_its_default_and_that_is_said(tmp_path):
     said = "gains lam and k1 of plain_law have no unit"
     with pytest.warns(smc.errors.ScenarioWarning, match=said):
-        made = smc.compare(
+        compared = smc.compare(
             [plain_law, "classical"],
             "duffing",
             "nominal",
@@ -366,14 +368,14 @@ def test_a_gain_without_a_unit_is_searched_about_its_default_and_that_is_said(tm
             out=tmp_path,
             **SHORT,
         )
-    assert kinds(made)["plain_law"] == "tuned here"
-    (remark,) = made.remarks
+    assert kinds(compared)["plain_law"] == "tuned here"
+    (remark,) = compared.remarks
     assert remark.startswith("plain_law on duffing: no unit is given for lam and k1, so ")
 
 
 def test_without_tuning_laws_have_their_defaults_and_no_winner_is_named_over_them(tmp_path):
     laws = [my_law, smc.law("classical")]
-    made = smc.compare(
+    compared = smc.compare(
         laws,
         "duffing",
         "nominal",
@@ -382,9 +384,9 @@ def test_without_tuning_laws_have_their_defaults_and_no_winner_is_named_over_the
         out=tmp_path,
         **SHORT,
     )
-    assert kinds(made) == {"my_law": "default", "classical": "shipped"}
-    assert made.remarks == ["my_law on duffing: default gains."]
-    assert "classical" not in [board.winner for board in made.leaderboard]
+    assert kinds(compared) == {"my_law": "default", "classical": "shipped"}
+    assert compared.remarks == ["my_law on duffing: default gains."]
+    assert "classical" not in [board.winner for board in compared.leaderboard]
 
 
 def test_laws_that_nobody_named_come_with_gains_on_a_plant_where_any_do():
@@ -454,18 +456,18 @@ def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatc
     monkeypatch.setattr(worst_case, "default_budget", lambda scenario, within: 8)
     within = smc.Uncertainty(disturbance=0.5)
     laws = [smc.law("classical", k=5.0), smc.law("pid", kp=20.0)]
-    given = {"worst": within, "out": tmp_path, **SHORT}
-    made = smc.compare(
+    settings = {"worst": within, "out": tmp_path, **SHORT}
+    compared = smc.compare(
         laws,
         "duffing",
         "nominal",
         1,
-        **given,
+        **settings,
     )
-    for case in made.worst["duffing"].values():
+    for case in compared.worst["duffing"].values():
         assert smc.score(smc.run(case.scenario))["rms_error"] == case.value >= case.median
-    (table,) = [table for table in made.tables if "worst of 16 runs" in table.title]
-    assert table.to_latex() in made.to_latex()
+    (table,) = [table for table in compared.tables if "worst of 16 runs" in table.title]
+    assert table.to_latex() in compared.to_latex()
     assert "\nPID & " in table.to_latex()
     assert table.label == table.title.replace("duffing:", "Duffing oscillator:") != table.title
     monkeypatch.setattr(worst_case, "worst_case", None)
@@ -474,9 +476,9 @@ def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatc
         "duffing",
         "nominal",
         1,
-        **given,
+        **settings,
     )
-    assert again.worst["duffing"]["pid"].scenario == made.worst["duffing"]["pid"].scenario
+    assert again.worst["duffing"]["pid"].scenario == compared.worst["duffing"]["pid"].scenario
 
 
 def test_shells_complete_the_last_name():

@@ -64,7 +64,7 @@ def test_five_laws_in_one_condition_fit_a_screen_of_80_by_24(contest):
 def test_the_numbers_of_the_screen_are_those_of_the_boards(boards, contest):
     for row, numbers in contest.grid.rows:
         for (name, _), text in zip(contest.grid.columns, numbers, strict=True):
-            (board,) = [one for one in boards if one.label == name]
+            (board,) = [candidate for candidate in boards if candidate.label == name]
             (entry,) = [entry for entry in board.entries if entry.law == row]
             assert text == size(entry.interval.median, board.metric)
     assert dict(contest.settled) == dict.fromkeys(LAWS, Settles(SEEDS, SEEDS))
@@ -74,7 +74,7 @@ def test_a_lead_on_the_screen_is_the_least_lead_of_the_board(boards, contest):
     (lead,) = [
         fact for fact in contest.verdicts if isinstance(fact, Lead) and fact.metric == "ITAE"
     ]
-    (board,) = [one for one in boards if one.metric == "itae"]
+    (board,) = [candidate for candidate in boards if candidate.metric == "itae"]
     effect = board.blocks[0].lead.effect
     assert (lead.law, lead.rival) == (LAWS[0], LAWS[1])
     assert (lead.low, lead.high) == (1.0 - effect.high, 1.0 - effect.low)
@@ -109,17 +109,17 @@ def test_a_law_with_a_run_that_does_not_arrive_is_not_to_be_used(boards):
 
 
 def test_more_than_five_plants_and_conditions_are_one_table_of_winners():
-    made = leaderboard(
+    ranked = leaderboard(
         table(("friction", "noise", "encoder"), ("duffing", "pendulum")), by=("plant", "condition")
     )
-    blocks = contests(made, OWN, ())
+    blocks = contests(ranked, OWN, ())
     assert len(blocks) == 6
     lines = answers.compare_lines(CompareFacts(contests=blocks))
     assert max(map(len, lines)) <= answers.WIDTH
-    whole = " ".join(lines)
+    text = " ".join(lines)
     for block in blocks:
         assert len(re.findall(rf"^{block.plant} {block.condition}", "\n".join(lines), re.M)) == 1
-    assert whole.count("my_law") == 6
+    assert text.count("my_law") == 6
 
 
 @pytest.mark.parametrize(
@@ -147,7 +147,7 @@ def test_every_word_of_answers_and_tables_is_explained(word):
 
 
 def test_the_share_of_the_bound_stands_beside_the_variation_of_u(boards):
-    (board,) = [one for one in boards if one.metric == "tv_rate"]
+    (board,) = [candidate for candidate in boards if candidate.metric == "tv_rate"]
     blocks = tuple(dataclasses.replace(block, bound=250.0) for block in board.blocks)
     (contest,) = contests([dataclasses.replace(board, blocks=blocks)], {}, ())
     ((_, unit),) = contest.grid.columns

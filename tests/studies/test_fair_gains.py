@@ -33,20 +33,20 @@ def trial(folder, plants=(), starts=None, gains=GainChoice(), **effort) -> Trial
 
 
 def test_laws_are_tuned_from_the_starts_of_the_packages_gains_where_these_are_compared(monkeypatch):
-    asked = []
+    searches = []
 
     def search_gains(self, plant, law, rule):
-        asked.append(rule.goal.starts)
+        searches.append(rule.goal.starts)
 
     monkeypatch.setattr(Trial, "search_gains", search_gains)
-    other = smc.starts(x0=0.5)
+    other_starts = smc.starts(x0=0.5)
     mine = law_function(gains={"k": 2.0})(lambda y, gains, memory: (-gains.k * y.e, y.e))
     laws = [catalogue()["classical"], mine]
     for plant in (DUFFING, smc.plant("duffing", M=2.0)):
-        trial(Path("gains"), [plant], other, GainChoice(defaults=True)).candidates(
+        trial(Path("gains"), [plant], other_starts, GainChoice(defaults=True)).candidates(
             {"duffing": laws}, 12
         )
-    assert asked == [Objective().starts, other, other]
+    assert searches == [Objective().starts, other_starts, other_starts]
 
 
 @pytest.mark.usefixtures("by_mujoco")
@@ -70,14 +70,14 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(tmp_pa
     heavy = dataclasses.replace(smc.plant("duffing", M=2.0), name="mine")
     for _ in range(2):
         searched = trial(tmp_path, [heavy], searches=2, budget=8)
-        (found,) = searched.candidates({"mine": [my_pd]}, 12)["mine"]
-        assert found.law.function is my_pd.function
-        assert found.law.gains == tuned[0].law.gains != my_pd.defaults
-        assert [dict(law.gains) for law in found.sets] == [
-            dict(zip(("kp", "kd"), one.gains, strict=True)) for one in tuned[0].sets
+        (candidate,) = searched.candidates({"mine": [my_pd]}, 12)["mine"]
+        assert candidate.law.function is my_pd.function
+        assert candidate.law.gains == tuned[0].law.gains != my_pd.defaults
+        assert [dict(law.gains) for law in candidate.sets] == [
+            dict(zip(("kp", "kd"), gain_set.gains, strict=True)) for gain_set in tuned[0].sets
         ]
-        assert found.law.source.kind == "tuned here"
-        assert found.remark.startswith("at most 8 sets were tried for each gain, where 64")
+        assert candidate.law.source.kind == "tuned here"
+        assert candidate.remark.startswith("at most 8 sets were tried for each gain, where 64")
     assert len(tuned) == 1
 
 
@@ -134,26 +134,26 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
     def build(n):
         return DUFFING.build(n)
 
-    asked = []
+    searches = []
 
     def cached(path, depends, *rest):
-        asked.append(str(depends))
+        searches.append(str(depends))
         return types.SimpleNamespace(before=1.0, objective=2.0, law=FAST)
 
     monkeypatch.setattr(fair_gains, "cached", cached)
     fixed = Gain(1.0, FORCE_PER_SPEED, held=True)
     held = dataclasses.replace(my_spring, gains={**my_spring.gains, "kd": fixed})
-    other = dataclasses.replace(DUFFING, build=build)
+    other_starts = dataclasses.replace(DUFFING, build=build)
     rule = trial(tmp_path).rule(DUFFING, [])
     for plant, law in (
         (DUFFING, my_spring),
         (DUFFING, my_spring),
         (DUFFING, held),
-        (other, held),
+        (other_starts, held),
     ):
         trial(tmp_path).search_gains(plant, law, rule)
-    assert asked[0] == asked[1]
-    assert len(set(asked)) == 3
+    assert searches[0] == searches[1]
+    assert len(set(searches)) == 3
 
 
 def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(tmp_path, monkeypatch):
@@ -180,47 +180,49 @@ def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(tmp_path, monke
     assert own.remark == "its defaults, better than those tried"
     assert own.law.source.kind == FAST.source.kind
     tuned.before = 3.0
-    found = trial(tmp_path).search_gains(DUFFING, default, rule)
-    assert found.law == FAST
-    assert found.remark == ""
+    searched = trial(tmp_path).search_gains(DUFFING, default, rule)
+    assert searched.law == FAST
+    assert searched.remark == ""
     for budget, where in ((8, "trails"), (100, "leads")):
-        other = trial(tmp_path).search_gains(DUFFING, default, rule._replace(budget=budget))
-        assert other.remark.endswith(f"where it {where}, its search may be why")
+        other_starts = trial(tmp_path).search_gains(DUFFING, default, rule._replace(budget=budget))
+        assert other_starts.remark.endswith(f"where it {where}, its search may be why")
     # also with another seed of the comparison run i has the gains of search i
     for first in (0, 1_000_000):
-        assert [found(first + i).gains["k1"] for i in range(3)] == [2.0, 2.5, 2.0]
+        assert [searched(first + i).gains["k1"] for i in range(3)] == [2.0, 2.5, 2.0]
 
 
 def test_quick_searches_are_under_what_is_asked_for_and_noise_where_no_gains_are_shipped():
     """A condition that has noise needs no other; where some gains are shipped, all are as these."""
     machine = dataclasses.replace(smc.plant("duffing", M=2.0), name="mine")
-    other = smc.starts(x0=0.5)
-    for given, searched in (
+    other_starts = smc.starts(x0=0.5)
+    for names, searched in (
         (("friction", "delay_10ms"), ["friction", "delay_10ms", "noise"]),
         (("noise + friction",), ["noise + friction"]),
     ):
-        asked = [find_condition(name) for name in given]
-        quick = trial(Path("gains"), [machine], other, quick=True)._replace(conditions=asked)
+        conditions = [find_condition(name) for name in names]
+        quick = trial(Path("gains"), [machine], other_starts, quick=True)._replace(
+            conditions=conditions
+        )
         rule = quick.rule(machine, [None])
-        assert [one.name for one in rule.goal.conditions] == searched
+        assert [condition.name for condition in rule.goal.conditions] == searched
         assert rule.goal.duration == pytest.approx(quick.duration * 2 / 3)
-        assert (rule.goal.starts, rule.quick, rule.budget) == (other, True, 16)
+        assert (rule.goal.starts, rule.quick, rule.budget) == (other_starts, True, 16)
     shipped = quick.known(DUFFING, [catalogue()["pid"]])
-    whole = quick.rule(DUFFING, [*shipped, None])
-    assert (whole.goal.starts, whole.quick) == (Objective().starts, False)
+    rule_of_all = quick.rule(DUFFING, [*shipped, None])
+    assert (rule_of_all.goal.starts, rule_of_all.quick) == (Objective().starts, False)
 
 
 def test_a_law_with_fewer_shipped_sets_than_searches_asked_for_is_tuned_too(monkeypatch):
     """It kept its three sets, whatever number was given."""
     laws = [catalogue()[name] for name in ("fixed_time", "pid")]
     monkeypatch.setattr(Trial, "search_gains", lambda self, plant, law, starts: law.name)
-    for asked, tuned, kept in ((None, 3, 12), (3, 3, 3), (6, "fixed_time", 6)):
-        gains = GainChoice(as_many=asked is not None)
-        effort = {} if asked is None else {"searches": asked}
+    for searches, tuned, sets in ((None, 3, 12), (3, 3, 3), (6, "fixed_time", 6)):
+        gains = GainChoice(as_many=searches is not None)
+        effort = {} if searches is None else {"searches": searches}
         compared = trial(Path("gains"), [DUFFING], gains=gains, **effort)
         few, many = compared.candidates({"duffing": laws}, 12)["duffing"]
-        assert (few if asked == 6 else len(few.sets)) == tuned
-        assert len(many.sets) == kept
+        assert (few if searches == 6 else len(few.sets)) == tuned
+        assert len(many.sets) == sets
     untuned = trial(
         Path("gains"), [DUFFING], gains=GainChoice(tune=False, as_many=True), searches=6
     )
@@ -240,10 +242,10 @@ def test_what_cannot_be_ranked_is_said_before_laws_are_tuned(monkeypatch, capsys
         ),
         (5, "5 sets of gains or runs cannot rank 2 laws in 1 condition; 6"),
     ):
-        asked = trial(
+        asked_trial = trial(
             Path("gains"), [DUFFING], gains=GainChoice(defaults=True), searches=usual
         )._replace(progress=True, conditions=[NAMED["noise"]])
-        (said, _) = asked.candidates({"duffing": [mine, mine]}, 12)["duffing"]
+        (said, _) = asked_trial.candidates({"duffing": [mine, mine]}, 12)["duffing"]
         assert said.startswith(words)
         assert said.endswith(
             "gains to search on duffing: mine and mine; searches of these laws as they are now, which gains keeps, are not repeated\n"
@@ -263,10 +265,10 @@ def test_j_on_unseen_runs_is_kept(tmp_path, monkeypatch):
 
 def test_laws_that_cannot_see_what_nothing_drives_are_named_before_the_runs(tmp_path, capsys):
     laws = [all_laws()[name] for name in ("pid", "hierarchical")]
-    for plant, told in (("cart_pole", ["pid"]), ("duffing", [])):
+    for plant, names in (("cart_pole", ["pid"]), ("duffing", [])):
         machine = smc.plant(plant)
         fields = {"draws": Draws(1), "threads": 1, "progress": True}
         trial = Trial.of([machine], "nominal", (), 1.0, tmp_path, **fields)
         trial.check({plant: laws})
         said = capsys.readouterr().err
-        assert [law.name for law in laws if law.name in said] == told
+        assert [law.name for law in laws if law.name in said] == names

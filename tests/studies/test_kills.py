@@ -121,13 +121,13 @@ main([*words.split(), str(out)])
 def test_killed_twenty_times_a_study_ends_with_the_same_table_and_does_nothing_twice(tmp_path):
     done = python("-c", LOADED + KILLER, tmp_path, fine=False)
     assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
-    assert found["same"]
-    assert len(found["ends"]) == 20
-    assert {"run", "write", "wrote", "collect"} == set(found["ends"])  # where it was killed
-    assert len(found["wrote"]) == len(set(found["wrote"]))
-    assert set(found["wrote"]) <= set(found["undisturbed"])
-    assert len(found["undisturbed"]) == 80
+    output = json.loads(done.stdout)
+    assert output["same"]
+    assert len(output["ends"]) == 20
+    assert {"run", "write", "wrote", "collect"} == set(output["ends"])  # where it was killed
+    assert len(output["wrote"]) == len(set(output["wrote"]))
+    assert set(output["wrote"]) <= set(output["undisturbed"])
+    assert len(output["undisturbed"]) == 80
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")

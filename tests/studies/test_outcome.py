@@ -199,9 +199,9 @@ def test_names_that_are_not_there_are_refused():
 @functools.cache
 def declared(path: Path) -> tuple[smc.Scene, dict[str, dict[str, smc.Trace]]]:
     """A scene, and traces that differ from label to label and from condition to condition."""
-    found = scenes.read(path)
+    scene = scenes.read(path)
     traces: dict[str, dict[str, smc.Trace]] = {}
-    for k, (condition, runs) in enumerate(found.conditions.items()):
+    for k, (condition, runs) in enumerate(scene.conditions.items()):
         traces[condition] = {}
         for i, (label, scenario) in enumerate(runs.items()):
             if i < 2 + k:
@@ -209,14 +209,14 @@ def declared(path: Path) -> tuple[smc.Scene, dict[str, dict[str, smc.Trace]]]:
             else:
                 settled = NEVER
             traces[condition][label] = made(scenario, settled, 0.5 + 2.5 * i + k)
-    return found, traces
+    return scene, traces
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_a_scene_answers_with_numbers_and_singles_out_none_of_equal_runs(path):
-    found, traces = declared(path)
-    answer = found.sentence(traces)
-    assert found.answer is not summary
+    scene, traces = declared(path)
+    answer = scene.sentence(traces)
+    assert scene.answer is not summary
     assert re.search(r"\d", answer)
     equal = {}
     for name, runs in traces.items():
@@ -224,11 +224,11 @@ def test_a_scene_answers_with_numbers_and_singles_out_none_of_equal_runs(path):
     labels = "|".join(re.escape(label) for label in Outcome(traces=traces).labels)
     alone = rf"(?:: |under |with )(?:{labels}) \("
     if all(len(runs) > 1 for runs in equal.values()):
-        assert not re.search(alone, found.sentence(equal))
+        assert not re.search(alone, scene.sentence(equal))
     # runs that failed change it
     lost: dict[str, dict[str, smc.Trace]] = {}
     for name, runs in traces.items():
         lost[name] = {}
         for label, run in runs.items():
             lost[name][label] = dataclasses.replace(run, failure="lost", diverged_at=0.1)
-    assert found.sentence(lost) != answer
+    assert scene.sentence(lost) != answer

@@ -120,7 +120,7 @@ def test_laws_have_equal_numbers_of_sets_and_a_clear_lead_ends_the_race_at_the_f
     assert raced.winner == "a"
     assert raced.first == ["a"]
     assert [*raced.dropped] == ["c"]
-    assert {name: len(one.results) for name, one in raced.entrants.items()} == {
+    assert {name: len(entrant.results) for name, entrant in raced.entrants.items()} == {
         "a": 7,
         "b": 7,
         "c": 3,
@@ -132,13 +132,13 @@ def test_laws_have_equal_numbers_of_sets_and_a_clear_lead_ends_the_race_at_the_f
 def test_a_stuck_search_is_made_once_more_and_the_better_one_is_judged(run):
     again = 0
     for seed in range(10):
-        for one in run({"a": 0.0, "b": 0.3}, seed).entrants.values():
-            again += len(one.again)
-            for k, made in enumerate(one.results):
-                tried = [trained for number, trained in one.outcome if number == k]
-                assert len(tried) == 1 + (k in one.again)
-                assert made.best.objective == min(tried)
-                assert one.values[k] == one.outcome[k, min(tried)]
+        for entrant in run({"a": 0.0, "b": 0.3}, seed).entrants.values():
+            again += len(entrant.again)
+            for k, search_result in enumerate(entrant.results):
+                tried = [trained for number, trained in entrant.outcome if number == k]
+                assert len(tried) == 1 + (k in entrant.again)
+                assert search_result.best.objective == min(tried)
+                assert entrant.values[k] == entrant.outcome[k, min(tried)]
     assert again
 
 
@@ -160,14 +160,14 @@ def test_the_clock_ends_a_race_between_two_rounds(run, now):
     raced = run({"a": 0.0, "b": 2.0}, clock=AnswerTime(110.0))
     assert raced.stopped
     assert 1 < raced.sets < module.LOOKS[0]
-    assert {len(one.results) for one in raced.entrants.values()} == {raced.sets}
+    assert {len(entrant.results) for entrant in raced.entrants.values()} == {raced.sets}
     assert raced.winner is None
     assert raced.first == raced.running == ["a", "b"]
 
 
 def test_a_race_that_stops_between_its_looks_keeps_what_the_first_look_said(run, now):
-    whole = run({"a": 0.0, "b": 0.6}, 3)
-    assert (whole.sets, whole.looked) == (12, 12)
+    uninterrupted = run({"a": 0.0, "b": 0.6}, 3)
+    assert (uninterrupted.sets, uninterrupted.looked) == (12, 12)
     ends = []
     for end in range(60, 400, 40):
         now[0] = 0.0
@@ -183,29 +183,29 @@ def test_a_race_that_stops_between_its_looks_keeps_what_the_first_look_said(run,
 def shown(monkeypatch):
     """Return the bars of races, and what each was told: the work done, the whole, and its words."""
     bars = []
-    told = []
+    counts = []
 
     class Recorded(Bar):
         def reached(self, done, whole):
             super().reached(done, whole)
-            told.append((done, whole, self.what))
+            counts.append((done, whole, self.what))
 
     def recorded(*given, **named):
         bars.append(Recorded(*given[:2]))
         return contextlib.nullcontext(bars[-1])
 
     monkeypatch.setattr(module, "bar", recorded)
-    return bars, told
+    return bars, counts
 
 
 def test_the_bar_never_shows_more_sets_than_are_to_be_made(run, shown, monkeypatch):
     """Beyond the first look, and after a law was dropped."""
-    bars, told = shown
+    bars, counts = shown
     monkeypatch.setattr(module, "WITHIN", math.inf)
     raced = run({"a": 0.0, "b": 0.0, "c": 99.0})
     assert (raced.sets, [*raced.dropped]) == (12, ["c"])
-    assert all(done <= whole for done, whole, _ in told)
-    assert told[-1][:2] == (24, 24)
+    assert all(done <= total for done, total, _ in counts)
+    assert counts[-1][:2] == (24, 24)
     assert str(bars[0]).startswith("c dropped: set of gains")
 
 
@@ -292,8 +292,8 @@ def test_laws_of_one_name_win_seldom_and_a_lead_of_three_times_is_named(run):
     """Two, three and five laws; a wrong winner of two equal laws is allowed in 5 % of races."""
     wins = [run({"a": 0.0, "b": 0.0}, seed).winner for seed in range(200)]
     assert sum(map(bool, wins)) <= 17  # 99 % of the time, of 5 %
-    for others in ("b", "bcde"):
-        leads = {"a": 0.0} | dict.fromkeys(others, 2.0)
+    for rivals in ("b", "bcde"):
+        leads = {"a": 0.0} | dict.fromkeys(rivals, 2.0)
         assert sum(run(leads, seed).winner == "a" for seed in range(20)) >= 18
     equal = [run(dict.fromkeys("abc", 0.0), seed).winner for seed in range(40)]
     assert not any(equal)

@@ -21,7 +21,7 @@ WITHIN = smc.Uncertainty(disturbance=0.5, mass=(0.8, 1.2))
 def attacked(law: str, value: float, median: float, **fields: object) -> WorstCase:
     """The worst case of a law, of made-up values."""
     scenario = dataclasses.replace(RUN, law=smc.law(law))
-    given = {
+    settings = {
         "unit": "m",
         "found_by": "bang-bang",
         "tried": 48,
@@ -29,15 +29,15 @@ def attacked(law: str, value: float, median: float, **fields: object) -> WorstCa
         "outside": "",
         "seed": 0,
     }
-    both = {"scenario": scenario, "nominal": scenario, "within": WITHIN}
-    return WorstCase(value=value, median=median, **given | both | fields)
+    scenarios = {"scenario": scenario, "nominal": scenario, "within": WITHIN}
+    return WorstCase(value=value, median=median, **settings | scenarios | fields)
 
 
 @pytest.mark.parametrize(
     "field", ["value", "median", "unit", "found_by", "tried", "metric", "outside", "seed", "sets"]
 )
 def test_a_worst_case_that_is_kept_is_the_one_that_is_read(field, tmp_path, monkeypatch):
-    found = attacked(
+    worst = attacked(
         "classical",
         0.2,
         0.05,
@@ -48,16 +48,16 @@ def test_a_worst_case_that_is_kept_is_the_one_that_is_read(field, tmp_path, monk
         tried=50,
         unit="rad",
     )
-    monkeypatch.setattr(worst_case, "worst_case", lambda *_, **__: found)
+    monkeypatch.setattr(worst_case, "worst_case", lambda *_, **__: worst)
     path = tmp_path / "worst" / "a.json"
     for _ in range(2):
         again = worst_case.cached_worst_case(path, RUN, WITHIN, 24)
-        assert getattr(again, field) == getattr(found, field)
-        assert again.scenario.plant == found.scenario.plant
+        assert getattr(again, field) == getattr(worst, field)
+        assert again.scenario.plant == worst.scenario.plant
         assert again.within == WITHIN
         monkeypatch.setattr(worst_case, "worst_case", None)  # would raise
-    (kept,) = path.parent.iterdir()
-    assert [len(part) for part in kept.stem.split("-")] == [1, 12, 12]
+    (file,) = path.parent.iterdir()
+    assert [len(part) for part in file.stem.split("-")] == [1, 12, 12]
 
 
 def test_a_default_budget_is_as_many_runs_as_take_the_time_of_that_many_steps():
@@ -76,11 +76,14 @@ def test_a_default_budget_is_as_many_runs_as_take_the_time_of_that_many_steps():
 
 def test_names_of_files():
     names = ["", "...", "A  =  B", "x" * 60, "x" * 61, "é" * 31, "a/b\\c", "_a_", "k=-1.5+2"]
-    made = [slug(name) for name in names]
-    assert made[:3] == ["run", "run", "a-b"]
-    assert made[3] == "x" * 60
-    assert [(len(one.encode()), one[-9]) for one in made[4:6]] == [(60, "-"), (59, "-")]
-    assert made[6:] == ["a_b_c", "a", "k--1.5+2"]
+    slugs = [slug(name) for name in names]
+    assert slugs[:3] == ["run", "run", "a-b"]
+    assert slugs[3] == "x" * 60
+    assert [(len(name_of_file.encode()), name_of_file[-9]) for name_of_file in slugs[4:6]] == [
+        (60, "-"),
+        (59, "-"),
+    ]
+    assert slugs[6:] == ["a_b_c", "a", "k--1.5+2"]
 
 
 def test_a_result_is_read_only_where_its_seal_fits(tmp_path):
@@ -98,28 +101,30 @@ def test_a_result_is_read_only_where_its_seal_fits(tmp_path):
     assert kept(1, "three") == "three"
     assert kept(2, "four") == "four"
     # those with other hashes are removed
-    assert [one.read_text() for one in tmp_path.iterdir()] == ["four"]
+    assert [file_left.read_text() for file_left in tmp_path.iterdir()] == ["four"]
 
 
 @pytest.mark.parametrize("task", ["sway", "payload", "wall", "behind", "blow"])
 def test_a_task_of_the_arm_has_its_part_its_seed_and_all_that_disturbs_it(task):
-    one = arms.scenario(task, smc.law("none"), seed=2, payload=0.5)
-    assert one.seed == 2
-    assert one.noise is not None
-    assert dict(one.mismatch) == {"payload": 0.5}  # the law knows nothing of it
-    assert (one.jump is not None) is (task == "payload")
-    assert bool(one.disturbance) is (task == "blow")
-    assert (bool(one.contact) and one.contact[0].kind == "wall") is (task in ("wall", "behind"))
+    scenario = arms.scenario(task, smc.law("none"), seed=2, payload=0.5)
+    assert scenario.seed == 2
+    assert scenario.noise is not None
+    assert dict(scenario.mismatch) == {"payload": 0.5}  # the law knows nothing of it
+    assert (scenario.jump is not None) is (task == "payload")
+    assert bool(scenario.disturbance) is (task == "blow")
+    assert (bool(scenario.contact) and scenario.contact[0].kind == "wall") is (
+        task in ("wall", "behind")
+    )
 
 
 def test_a_part_with_scores_by_other_code_counts_as_not_done(tmp_path, monkeypatch):
-    kept = study.Store(tmp_path)
-    kept.open(resume=True)
-    kept.add([run_key.row(RUN)])
+    store = study.Store(tmp_path)
+    store.open(resume=True)
+    store.add([run_key.row(RUN)])
     again = study.Store(tmp_path)
     again.open(resume=True)
     assert list(again.where) == [run_key.key(RUN)]
     monkeypatch.setattr(study.fingerprint, "of", lambda thing: "other")
-    other = study.Store(tmp_path)
-    other.open(resume=True)
-    assert not other.where
+    other_store = study.Store(tmp_path)
+    other_store.open(resume=True)
+    assert not other_store.where

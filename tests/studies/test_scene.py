@@ -117,8 +117,8 @@ def test_a_scene_of_each_kind_of_figure_is_drawn(name, tmp_path, monkeypatch):
 def test_a_scene_of_the_study_compares_all_laws_of_the_paper_under_the_same_conditions(name):
     for runs in scenes.read(FOLDER / f"{name}.py").conditions.values():
         assert [scenario.law.name for scenario in runs.values()] == LAWS
-        first, *others = runs.values()
-        for scenario in others:
+        first, *other_runs = runs.values()
+        for scenario in other_runs:
             assert dataclasses.replace(scenario, law=first.law) == first
 
 
@@ -404,7 +404,7 @@ def test_a_name_that_the_study_does_not_have_is_answered_with_the_nearest(names,
 def test_the_van_der_pol_scenes_are_the_study_s_conditions(scene, conditions):
     declared = scenes.read(FOLDER / f"{scene}.py").conditions
     assert declared == {
-        name: smc.paper.comparison("van_der_pol", given) for name, given in conditions.items()
+        name: smc.paper.comparison("van_der_pol", options) for name, options in conditions.items()
     }
 
 

@@ -45,8 +45,8 @@ def test_a_winner_is_named_over_rivals_at_their_defaults_only_where_it_is_asked_
     assert isinstance(fact, Barred)
     assert fact.laws == ("slow",)
     assert "textbf" not in boards.to_latex()
-    (asked,) = ranked([FAST, at_default(SLOW)], folder, defaults=True)
-    assert asked.winner == "fast"
+    (board,) = ranked([FAST, at_default(SLOW)], folder, defaults=True)
+    assert board.winner == "fast"
 
 
 def test_a_law_at_its_own_defaults_may_win_over_others(folder):
@@ -78,8 +78,8 @@ def test_equal_gains_are_one_run_and_the_table_has_the_source_of_this_study(fold
         "slow": "default",
     }
     assert table.scenario(16).law.source.kind == "default"
-    one, other = (smc.Scenario(plant="duffing", law=law) for law in (SLOW, at_default(SLOW)))
-    assert run_key.key(one) == run_key.key(other)
+    tuned, default = (smc.Scenario(plant="duffing", law=law) for law in (SLOW, at_default(SLOW)))
+    assert run_key.key(tuned) == run_key.key(default)
 
 
 def test_a_table_keeps_the_search_behind_the_gains(tmp_path):

@@ -37,15 +37,15 @@ def bytes_of(out: Path) -> bytes:
 @pytest.fixture
 def ran(monkeypatch):
     """The scenarios of all runs so far."""
-    found = []
+    scenarios = []
     honest = batches.run_batch
 
     def counted(batch, *rest):
-        found.extend(one.scenario for one in batch)
+        scenarios.extend(trace.scenario for trace in batch)
         return honest(batch, *rest)
 
     monkeypatch.setattr(batches, "run_batch", counted)
-    return found
+    return scenarios
 
 
 @pytest.fixture
@@ -67,7 +67,7 @@ def raises(y, gains, memory):
 
 
 def test_the_grid_is_every_combination_in_order():
-    made = grid(
+    scenarios = grid(
         ["duffing", "van_der_pol"],
         ["classical", "adaptive"],
         ["nominal", "noise"],
@@ -76,7 +76,7 @@ def test_the_grid_is_every_combination_in_order():
         duration=1.0,
     )
     names = []
-    for s in made:
+    for s in scenarios:
         names.append((s.plant.name, condition(s), s.law.name, s.seed))
     assert names == [
         (plant, name, law, seed)
@@ -88,20 +88,20 @@ def test_the_grid_is_every_combination_in_order():
 
 
 def test_seed_0_is_the_papers_own_scenario():
-    (made,) = grid(["pendulum_network"], ["classical"], ["noise"], 1, "study")
-    assert made == paper.scenario("pendulum_network", "classical", "noise")
+    (scenario,) = grid(["pendulum_network"], ["classical"], ["noise"], 1, "study")
+    assert scenario == paper.scenario("pendulum_network", "classical", "noise")
 
 
 def test_a_seed_has_one_start_for_all_laws_and_conditions_near_the_papers():
-    made = grid(
+    scenarios = grid(
         ["pendulum_network"], ["classical", "adaptive"], ["nominal", "coulomb"], [3, 4], "study"
     )
     starts = {}
-    for s in made:
-        starts[s.seed] = {t.resolved.x0 for t in made if t.seed == s.seed}
-    for found in starts.values():
-        assert len(found) == 1
-    nominal = np.array(made[0].plant.x0)
+    for s in scenarios:
+        starts[s.seed] = {t.resolved.x0 for t in scenarios if t.seed == s.seed}
+    for starts_of_seed in starts.values():
+        assert len(starts_of_seed) == 1
+    nominal = np.array(scenarios[0].plant.x0)
     for seed, (x0,) in starts.items():
         z = []
         for i in range(nominal.size):
@@ -112,12 +112,12 @@ def test_a_seed_has_one_start_for_all_laws_and_conditions_near_the_papers():
 
 @pytest.mark.slow
 def test_no_start_lies_beyond_a_stop():
-    made = grid(paper.PLANTS, ["none"], ["contact"], 3, "study", duration=10.0)
-    single = [s for s in made if s.plant.n == 1]
+    scenarios = grid(paper.PLANTS, ["none"], ["contact"], 3, "study", duration=10.0)
+    single = [s for s in scenarios if s.plant.n == 1]
     for s in single:
         assert 0.8 <= s.resolved.x0[0] / s.plant.x0[0] <= 1.0
-    assert len({(s.plant.name, s.resolved.x0) for s in made}) == len(paper.PLANTS) * 3
-    for scenario in made:
+    assert len({(s.plant.name, s.resolved.x0) for s in scenarios}) == len(paper.PLANTS) * 3
+    for scenario in scenarios:
         prepare(scenario)  # checks the start
 
 

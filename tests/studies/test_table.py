@@ -54,9 +54,9 @@ def test_rows_are_the_scores_of_the_runs_in_order(tmp_path):
 
 
 def test_equal_runs_are_one_row_where_the_first_stands(tmp_path):
-    one, two, *_ = small(seeds=1)
-    table = study([two, one, two, one], tmp_path)
-    assert table.column("hash").tolist() == [key(two), key(one)]
+    first, second, *_ = small(seeds=1)
+    table = study([second, first, second, first], tmp_path)
+    assert table.column("hash").tolist() == [key(second), key(first)]
 
 
 def test_a_table_is_read_back_selected_and_run_again(tmp_path):
@@ -188,14 +188,14 @@ def test_a_notebook_shows_the_first_rows_and_says_how_many_more(tmp_path):
         grid(["duffing"], ["classical", fails_late()], ["nominal"], 5, "study", duration=0.05),
         tmp_path,
     )
-    shown = table._repr_html_()
-    assert shown.count("<tr>") == 1 + MAX_ROWS + 1
-    assert "Table(10 runs: 1 plant, 2 laws, 1 condition)" in shown
-    assert "and 2 more" in shown
-    assert f">{number(table.rows()[0]['itae'])}<" in shown
+    html_text = table._repr_html_()
+    assert html_text.count("<tr>") == 1 + MAX_ROWS + 1
+    assert "Table(10 runs: 1 plant, 2 laws, 1 condition)" in html_text
+    assert "and 2 more" in html_text
+    assert f">{number(table.rows()[0]['itae'])}<" in html_text
     failure = table.rows()[5]["failure"]
     assert failure
-    assert html.escape(failure) in shown
+    assert html.escape(failure) in html_text
     none = dataclasses.replace(table, data=table.data.slice(0, 0))._repr_html_()
     assert "Table(0 runs: 0 plants, 0 laws, 0 conditions)" in none
     assert "more" not in none
@@ -206,10 +206,10 @@ def test_packages_that_speak_arrow_read_the_table_as_it_is(tmp_path):
     assert pa.table(table).equals(table.data)
     old = pa.string()
     new = pa.large_string()
-    wanted = pa.schema(
+    schema = pa.schema(
         [field.with_type(new) if field.type == old else field for field in table.data.schema]
     )
-    assert pa.RecordBatchReader.from_stream(table, wanted).schema.field("law").type == new
+    assert pa.RecordBatchReader.from_stream(table, schema).schema.field("law").type == new
     pandas = pytest.importorskip("pandas")
     for frame in (table.to_pandas(), pandas.DataFrame(table)):
         assert list(frame.columns) == table.data.column_names

@@ -66,13 +66,13 @@ def raced(tmp_path_factory):
     """A law that is tuned for a mass and two with given gains, the last of which is slow."""
     folder = tmp_path_factory.mktemp("raced")
     plant = smc.plant_from(MASS, ["slide"])
-    asked = {
+    settings = {
         "conditions": ["coulomb"],
         "laws": ["observer_free", *HOLDING],
         "out": folder,
         "seeds": 4,
     }
-    return asked, smc.which(plant, **asked, quick=True, duration=1.5), plant
+    return settings, smc.which(plant, **settings, quick=True, duration=1.5), plant
 
 
 def numbers(text):
@@ -110,11 +110,13 @@ def test_the_answer_is_the_winner_with_its_gains_and_its_lead(raced):
 
 
 def test_the_answer_fits_a_screen_and_its_counts_are_those_of_the_tables(raced):
-    asked, recommendation, _ = raced
+    settings, recommendation, _ = raced
     lines = recommendation.lines
     assert len(lines) <= LINES
     for printed in lines:  # but commands, and the paths of a folder
-        assert len(printed) <= WIDTH or printed.startswith("next") or str(asked["out"]) in printed
+        assert (
+            len(printed) <= WIDTH or printed.startswith("next") or str(settings["out"]) in printed
+        )
     own = recommendation.table.select(law=recommendation.law.name)
     times = own.column("settling_time")
     done = int((times <= 0.8 * own.column("duration")).sum())
@@ -123,10 +125,10 @@ def test_the_answer_fits_a_screen_and_its_counts_are_those_of_the_tables(raced):
     if done:
         assert said[2] == pytest.approx(times.min(), rel=1e-2)
     assert [level.kind for level in recommendation.withstood] == [*recommend.KINDS]
-    told = line(recommendation, "withstands")
+    withstands = line(recommendation, "withstands")
     for margin in recommendation.margins:
         value = 1e3 * margin.value if margin.unit == "s" else margin.value
-        assert any(number == pytest.approx(value, rel=5e-3) for number in numbers(told))
+        assert any(number == pytest.approx(value, rel=5e-3) for number in numbers(withstands))
 
 
 def test_every_caution_has_a_template_and_what_it_says():
@@ -136,8 +138,8 @@ def test_every_caution_has_a_template_and_what_it_says():
 
 
 def test_the_folder_has_the_report_and_the_gains(raced):
-    asked, recommendation, _ = raced
-    folder = Path(asked["out"])
+    settings, recommendation, _ = raced
+    folder = Path(settings["out"])
     page = (folder / "report.html").read_text()
     assert "report.html" not in page
     assert recommendation.lines[0].split()[1] in page
@@ -183,14 +185,14 @@ def test_no_law_is_the_answer_where_it_has_the_lowest_J(tmp_path):
     """A servo that holds its goal, beside a law that pushes it off."""
     bad = smc.law_function(gains={"off": 0.3})(lambda y, gains, memory: (gains.off, y.e))
     plant = smc.plant_from(SERVO, {"j": {"servo": True}})
-    found = smc.which(plant, "nominal", laws=[bad()], out=tmp_path, seeds=3, duration=1.5)
-    assert found.form == "unneeded"
-    assert found.law.name == race.WITHOUT
-    assert found.race.winner == race.WITHOUT
-    assert found.lead
-    assert found.lead.rival == bad.name
-    assert found.lines[0].startswith("No law")
-    assert numbers(found.lines[0])[1:3] == [3, 3]
+    recommended = smc.which(plant, "nominal", laws=[bad()], out=tmp_path, seeds=3, duration=1.5)
+    assert recommended.form == "unneeded"
+    assert recommended.law.name == race.WITHOUT
+    assert recommended.race.winner == race.WITHOUT
+    assert recommended.lead
+    assert recommended.lead.rival == bad.name
+    assert recommended.lines[0].startswith("No law")
+    assert numbers(recommended.lines[0])[1:3] == [3, 3]
 
 
 SERVO = """<mujoco model="servo"><worldbody><body><joint name="j" axis="0 0 1" damping=".1"/>
@@ -234,30 +236,30 @@ def test_one_next_step_is_a_whole_command(raced, tmp_path, monkeypatch):
     call = ["smc-mujoco", "which", "m.xml:slide", "--condition", "a", "--condition", "b"]
     call += ["--law", "pid,adrc", "--minutes", "1"]
     few = recommendation.race._replace(comparison=None, sets=1, seconds=90.0)
-    asked = dataclasses.replace(recommendation, call=call)
-    untried = asked.next_step.command
+    with_call = dataclasses.replace(recommendation, call=call)
+    untried = with_call.next_step.command
     assert "--law" not in untried
     assert untried.startswith("smc-mujoco which m.xml:slide --condition a --condition b --minutes ")
-    more = dataclasses.replace(asked, race=few, fixed=None).next_step.command
+    more = dataclasses.replace(with_call, race=few, fixed=None).next_step.command
     assert more.startswith(
         "smc-mujoco which m.xml:slide --condition a --condition b --law pid,adrc"
     )
     assert numbers(more)[-1] >= 9
     coupled = {recommendation.law.name: {"a": (4, 4), "b": (4, 4)}}
-    together = dataclasses.replace(asked, settled=coupled, together=(0, 4)).next_step.command
+    together = dataclasses.replace(with_call, settled=coupled, together=(0, 4)).next_step.command
     assert together.count("--condition") == 1
     assert "--condition a+b" in together
-    done = dataclasses.replace(asked, untried_laws=()).next_step.command
+    done = dataclasses.replace(with_call, untried_laws=()).next_step.command
     monkeypatch.chdir(tmp_path)
     _, *words = shlex.split(done)
     pytest.importorskip("smc_mujoco.exchange.commands")
     with contextlib.suppress(SystemExit):
         main.main(words)
     assert next(tmp_path.glob("controller*")).exists()
-    own = dataclasses.replace(asked, untried_laws=(), call=[*call, "--law", "a/m.py,pid"])
+    own = dataclasses.replace(with_call, untried_laws=(), call=[*call, "--law", "a/m.py,pid"])
     law = dataclasses.replace(own.facts, law="m")
     assert "'a/m.py(" in answers.which_next(law, own.call).command
-    assert sum(text.startswith("next") for text in asked.lines) == 1
+    assert sum(text.startswith("next") for text in with_call.lines) == 1
     assert recommendation.next_step is None  # of a plant without a text
 
 
@@ -265,17 +267,17 @@ def test_cautions_are_lines_with_their_numbers(raced):
     _, recommendation, _ = raced
     name = recommendation.law.name
     shaky = AtRest(8.4, 22.0, 0.17, "N m", "delay_10ms", 56.0, "friction")
-    told = dataclasses.replace(recommendation, rests={name: shaky})
-    assert numbers(line(told, "at rest"))[:3] == [8.4, 17.0, 22.0]
-    assert numbers(line(told, "overshoot"))[0] == 56.0
-    kinds = [caution.kind for caution in told.cautions]
+    shaking = dataclasses.replace(recommendation, rests={name: shaky})
+    assert numbers(line(shaking, "at rest"))[:3] == [8.4, 17.0, 22.0]
+    assert numbers(line(shaking, "overshoot"))[0] == 56.0
+    kinds = [caution.kind for caution in shaking.cautions]
     assert kinds[:2] == ["shakes", "overshoots"]
     calm = shaky._replace(share=0.009, overshoot=19.0)
     rested = dataclasses.replace(recommendation, rests={name: calm})
     assert not {"shakes", "overshoots"} & {caution.kind for caution in rested.cautions}
     limit = SimpleNamespace(what="overshoot", most=10.0)
-    kept = dataclasses.replace(rested, limits=[limit])
-    assert numbers(line(kept, "overshoot"))[:2] == [19.0, 10.0]
+    limited = dataclasses.replace(rested, limits=[limit])
+    assert numbers(line(limited, "overshoot"))[:2] == [19.0, 10.0]
     rare = dataclasses.replace(recommendation, settled={name: {"coulomb": (2, 4)}})
     assert (2, 4) in [(caution.count, caution.run_count) for caution in rare.cautions]
     delay = recommendation.margins[0]
@@ -362,8 +364,8 @@ def test_margins_go_before_the_film():
     for spare, tried in ((30.0, ["delay", "friction"]), (0.0, [])):
         clock = AnswerTime(time.monotonic(), spare, pace=pace)
         assert clock.work_left == 0.0
-        found, untried = recommend._margins(trial, base, clock)  # pyright: ignore[reportArgumentType]
-        assert [one.kind for one in found][:2] == tried
+        fitted, untried = recommend._margins(trial, base, clock)  # pyright: ignore[reportArgumentType]
+        assert [margin.kind for margin in fitted][:2] == tried
         assert [*tried, *untried][:2] == ["delay", "friction"]
 
 
@@ -387,18 +389,18 @@ def test_the_lead_is_over_the_nearest_rival_and_over_no_law_only_without_one():
 
 
 def test_a_race_that_is_asked_for_again_gives_the_same_answer_from_its_folder(raced, monkeypatch):
-    asked, recommendation, plant = raced
+    settings, recommendation, plant = raced
     monkeypatch.setattr(search.TuningTask, "search", None)
-    again = smc.which(plant, **asked, quick=True, duration=1.5)
+    again = smc.which(plant, **settings, quick=True, duration=1.5)
     assert str(again) == str(recommendation)
 
 
 def test_without_time_there_is_an_answer_of_the_sets_that_there_are_without_margins(
     raced, monkeypatch
 ):
-    asked, recommendation, plant = raced
+    settings, recommendation, plant = raced
     monkeypatch.setattr(search.TuningTask, "search", None)
-    short = smc.which(plant, **asked | {"seeds": 9}, minutes=1e-6, duration=1.5)
+    short = smc.which(plant, **settings | {"seeds": 9}, minutes=1e-6, duration=1.5)
     assert short.law.name in {law.name for law in recommendation.laws}
     assert short.race.sets == recommendation.race.sets
     assert short.fixed is None
@@ -410,8 +412,8 @@ def test_without_time_there_is_an_answer_of_the_sets_that_there_are_without_marg
 
 
 def test_laws_for_which_there_is_no_time_are_named(raced, tmp_path):
-    asked, _, plant = raced
-    short = smc.which(plant, **asked | {"out": tmp_path}, minutes=1e-6, duration=1.5)
+    settings, _, plant = raced
+    short = smc.which(plant, **settings | {"out": tmp_path}, minutes=1e-6, duration=1.5)
     assert short.race.stopped
     assert short.race.laws == [law.name for law in HOLDING]
     assert [*short.race.unsearched] == ["observer_free"]
@@ -424,9 +426,9 @@ def test_the_minutes_hold_within_a_tenth(tmp_path, monkeypatch):
     start = time.monotonic()
     plant = smc.plant_from(MASS, ["slide"])
     minutes = 0.1
-    found = smc.which(plant, "coulomb", laws=["pid", "adrc"], out=tmp_path, minutes=minutes)
+    recommended = smc.which(plant, "coulomb", laws=["pid", "adrc"], out=tmp_path, minutes=minutes)
     assert time.monotonic() - start < 60.0 * 1.1 * minutes + 3.0  # and the compiler's
-    assert found.race.laws
+    assert recommended.race.laws
 
 
 def test_the_laws_that_a_person_would_try_come_first():
@@ -434,8 +436,8 @@ def test_the_laws_that_a_person_would_try_come_first():
     names = [law.name for law in module._suited(plant, (), None)]
     assert names[:3] == ["pid", "super_twisting", "adrc"]
     assert {*names[: len(gain_sets.COMPARED)]} == {*gain_sets.COMPARED}
-    given = [law.name for law in module._suited(plant, (), ["twisting", "pid"])]
-    assert given == ["twisting", "pid"]
+    suited = [law.name for law in module._suited(plant, (), ["twisting", "pid"])]
+    assert suited == ["twisting", "pid"]
 
 
 def test_needs_are_limits_properties_or_scores():
@@ -451,25 +453,28 @@ def test_needs_are_limits_properties_or_scores():
 
 def test_where_u_has_two_units_a_need_or_a_metric_of_u_says_so(tmp_path):
     plant = smc.plant_from(MIXED, {"a": {}, "b": {"servo": True}})
-    given = {"laws": [smc.law("pid", kp=20.0, ki=1.0, kd=9.0)], "out": tmp_path, "seeds": 2}
-    given |= {"conditions": "nominal", "duration": 0.3}
+    arguments = {"laws": [smc.law("pid", kp=20.0, ki=1.0, kd=9.0)], "out": tmp_path, "seeds": 2}
+    arguments |= {"conditions": "nominal", "duration": 0.3}
     why = "tv_rate has no one value where u is in N and m, as in mixed: take a metric of the error"
     with pytest.raises(smc.ScenarioError, match=re.escape(why)):
-        smc.which(plant, needs=["accurate", "calm"], **given)
-    found = smc.which(plant, **given)  # the default needs that have a value
-    assert [board.metric for board in found.leaderboard][:2] == ["settling_time", "ultimate_bound"]
-    assert found.facts.unit == "N and m"
+        smc.which(plant, needs=["accurate", "calm"], **arguments)
+    recommended = smc.which(plant, **arguments)  # the default needs that have a value
+    assert [board.metric for board in recommended.leaderboard][:2] == [
+        "settling_time",
+        "ultimate_bound",
+    ]
+    assert recommended.facts.unit == "N and m"
 
 
 def test_the_page_has_the_numbers_of_the_code():
     page = (Path(__file__).parents[2] / "docs" / "which.md").read_text()
     file = Path(__file__).parents[2] / "benchmarks" / "quick_searches.json"
-    found = json.loads(file.read_text())
-    medians = [row["median"] for row in found]
-    assert 0.2 < np.median([row["time"] for row in found]) < 0.3
+    verdicts = json.loads(file.read_text())
+    medians = [row["median"] for row in verdicts]
+    assert 0.2 < np.median([row["time"] for row in verdicts]) < 0.3
     for words in (
         f"had {min(medians):.2f} to {max(medians):.2f} times the J of whole searches, the worst "
-        f"{max(row['worst'] for row in found):.2f} times",
+        f"{max(row['worst'] for row in verdicts):.2f} times",
         f"`--quick` is `--minutes {module.QUICK_MINUTES:g}`",
         f"{module.SEEDS} runs",
         f"fewer than {100 * recommendation_module.RELIABLE:g} %",
@@ -562,8 +567,8 @@ def test_a_next_step_names_the_file_of_a_condition(tmp_path):
     file.write_text("# numbers\nidentified: input_delay=0.004\n")
     pair_of_conditions = tmp_path / "two.txt"
     pair_of_conditions.write_text("a: input_delay=0.001\nb: input_delay=0.002\n")
-    given = [*find_conditions(str(file)), *find_conditions(str(pair_of_conditions)), "noise"]
-    words = module._call("m.xml:s", given, None, None, None, Path("which"), 3.0)
+    conditions = [*find_conditions(str(file)), *find_conditions(str(pair_of_conditions)), "noise"]
+    words = module._call("m.xml:s", conditions, None, None, None, Path("which"), 3.0)
     named = words[words.index("--condition") :]
     texts = [str(file), "a: input_delay=0.001", "b: input_delay=0.002", "noise"]
     expected = [word for text in texts for word in ("--condition", text)]

@@ -27,20 +27,20 @@ def test_objectives_are_those_of_each_law_on_its_own_unseen_instance():
     laws = []
     for k in (2.0, 4.0, 2.0):
         laws.append(smc.law("classical", k=k))
-    found, there = objectives("duffing", laws, BRIEF)
-    assert there.tolist() == [False] * 3  # in half a second
+    objective_by_law, objective_there = objectives("duffing", laws, BRIEF)
+    assert objective_there.tolist() == [False] * 3  # in half a second
     expected = []
     for i, law in enumerate(laws):
         expected.append(objective_of(smc.run(BRIEF.holdout("duffing", law, i))))
-    assert found == pytest.approx(expected, rel=1e-12)
-    assert found[0] != found[2]
+    assert objective_by_law == pytest.approx(expected, rel=1e-12)
+    assert objective_by_law[0] != objective_by_law[2]
     again, _ = objectives(
         "duffing",
         laws[:1],
         BRIEF,
         instances=[2],
     )
-    assert again == pytest.approx(found[2:], rel=1e-12)
+    assert again == pytest.approx(objective_by_law[2:], rel=1e-12)
 
 
 # both engines against smc.run
@@ -76,10 +76,10 @@ def uncompiled(y, gains, memory):
 
 def cases_of(plant, law, goal=SECOND):
     if isinstance(law, str):
-        given = gain_sets.law(plant, law)
+        gains = gain_sets.law(plant, law)
     else:
-        given = law
-    return goal.scenarios(plant, given, 3)
+        gains = law
+    return goal.scenarios(plant, gains, 3)
 
 
 def by_runs(cases, names, gains, goal=SECOND):
@@ -104,7 +104,7 @@ CASES = [
 ]
 # each law and plant of the equation is compiled for itself, in seconds
 BY_ENGINE = [(False, *CASES[0]), (False, *CASES[2]), (True, *CASES[1])]
-BY_ENGINE += [pytest.param(True, *one, marks=pytest.mark.slow) for one in CASES]
+BY_ENGINE += [pytest.param(True, *case, marks=pytest.mark.slow) for case in CASES]
 
 
 @pytest.mark.parametrize(("by_equation", "plant", "law", "tolerance"), BY_ENGINE)
@@ -116,8 +116,8 @@ def test_either_engine_has_the_objective_of_the_runs(by_equation, plant, law, to
         candidates.append(tuple(factor * cases[0].law.gains[name] for name in names))
     evaluate = Evaluator(SECOND, cases, names, threads=2, by_equation=by_equation, slots=2)
     assert evaluate.engine == (EQUATION if by_equation else MUJOCO)
-    found = [one.objective for one in evaluate(candidates)]
-    assert found == pytest.approx(
+    objectives_of_runs = [score.objective for score in evaluate(candidates)]
+    assert objectives_of_runs == pytest.approx(
         [by_runs(cases, names, gains) for gains in candidates], rel=tolerance
     )
 
@@ -144,14 +144,14 @@ def test_an_objective_does_not_depend_on_the_candidates_before(law, failure, by_
     options = {"threads": 1, "by_equation": by_equation}
     evaluate = Evaluator(goal, cases, names, slots=3, **options)
     together = evaluate(candidates)
-    assert [evaluate([one])[0] for one in reversed(candidates)] == together[::-1]
+    assert [evaluate([candidate])[0] for candidate in reversed(candidates)] == together[::-1]
     alone = Evaluator(goal, cases, names, slots=1, **options)
     assert alone(candidates) == together
     expected = []
     for gains in candidates:
         expected.append(by_runs(cases, names, gains, goal))
-    assert [one.objective for one in together] == pytest.approx(expected, rel=1e-9)
-    assert [one.failed for one in together] == [
+    assert [candidate.objective for candidate in together] == pytest.approx(expected, rel=1e-9)
+    assert [candidate.failed for candidate in together] == [
         failure != "" and gains[0] > 5.0 for gains in candidates
     ]
     for case in cases:
@@ -180,9 +180,9 @@ def test_a_case_that_is_more_than_its_equation_is_run_by_mujoco(
     cases = goal.scenarios(plant, smc.law(law))
     evaluate = Evaluator(goal, cases, (gain,), by_equation=True)
     assert evaluate.engine == engine
-    found = [one.objective for one in evaluate([(5.0,), (4.0,)])]
+    objectives_of_runs = [score.objective for score in evaluate([(5.0,), (4.0,)])]
     expected = [by_runs(cases, (gain,), (value,), goal) for value in (5.0, 4.0)]
-    assert found == pytest.approx(expected, rel=1e-9)
+    assert objectives_of_runs == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.filterwarnings("ignore:.*does not compile")

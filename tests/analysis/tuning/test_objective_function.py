@@ -71,6 +71,6 @@ def test_the_page_s_table_of_optimisers_is_that_of_the_benchmark():
     measured = json.loads(optimisers.MEASURED.read_text(encoding="utf-8"))
     page = Path(optimisers.__file__).parents[1] / "docs" / "recipes.md"
     assert optimisers.table(measured) in page.read_text(encoding="utf-8")
-    assert {len(found) for row in measured.values() for found in row.values()} == {6}
-    medians = np.array([[np.median(found) for found in row.values()] for row in measured.values()])
+    assert {len(costs) for row in measured.values() for costs in row.values()} == {6}
+    medians = np.array([[np.median(costs) for costs in row.values()] for row in measured.values()])
     assert (medians.max(axis=1) / medians.min(axis=1)).max() < 1.08

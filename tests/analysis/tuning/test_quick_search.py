@@ -30,29 +30,29 @@ def test_all_but_the_last_three_evaluations_take_one_step_a_period(task, monkeyp
         return evaluate(self, candidates)
 
     monkeypatch.setattr(Evaluator, "__call__", seen)
-    found = task.search(0, "", lambda count: None)
-    wide, kept, *others, decided = ran
+    search_result = task.search(0, "", lambda count: None)
+    wide, narrow, *later, decided = ran
     usual = task.size // 8
     assert wide[::2] == (1, quick_search.WIDER * usual), "the hypercube in the first run alone"
-    assert kept[::2] == (2, 3)
+    assert narrow[::2] == (2, 3)
     assert decided[0] == 2
-    coarse = set().union(*(how for _, how, _ in (wide, kept, *others)))
+    coarse = set().union(*(how for _, how, _ in (wide, narrow, *later)))
     assert {step for _, step in coarse} == {1e-3}
     assert {integrator for integrator, _ in coarse} <= {"Euler", "implicitfast"}
     assert {case.resolved.integrator for case in task.cases(0)} == {"RK4"}
     assert not coarse & decided[1]
-    assert decided[2] == quick_search.DECIDED == len(found.history)
-    whole = sum(size for runs, _, size in ran if runs == 2) + quick_search.WIDER * usual // 2
-    assert found.evaluations == whole <= task.size + quick_search.DECIDED
+    assert decided[2] == quick_search.DECIDED == len(search_result.history)
+    steps = sum(size for runs, _, size in ran if runs == 2) + quick_search.WIDER * usual // 2
+    assert search_result.evaluations == steps <= task.size + quick_search.DECIDED
 
 
 def test_its_j_is_that_of_the_runs_of_a_scenario(task):
-    found = task.search(0, "", lambda count: None)
-    law = search.with_gains(task.law, tuple(task.box), found.best.gains)
+    search_result = task.search(0, "", lambda count: None)
+    law = search.with_gains(task.law, tuple(task.box), search_result.best.gains)
     cases = task.goal.scenarios(task.plant, law, 0, 0)
     again = task.goal.evaluation(cases[0], smc.run(cases)).objective
-    assert found.best.objective == pytest.approx(again, rel=1e-9)
-    assert found.best.objective == min(one.objective for one in found.history)
+    assert search_result.best.objective == pytest.approx(again, rel=1e-9)
+    assert search_result.best.objective == min(tried.objective for tried in search_result.history)
 
 
 ARM = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/><body pos="0 0 .6">
@@ -82,7 +82,7 @@ def test_the_last_three_have_twice_the_step_of_a_scenario_under_rk4(monkeypatch)
 def test_another_draw_is_another_search_on_the_same_runs(task, tmp_path):
     first, again = (task.search(1, "", lambda count: None, draw) for draw in (0, 1))
     assert first == task.search(1, "", lambda count: None)
-    assert not {one.gains for one in first.history} & {one.gains for one in again.history}
+    assert not {tried.gains for tried in first.history} & {tried.gains for tried in again.history}
     stems = {task.file(1, tmp_path, draw).stem for draw in (0, 1)}
     assert len(stems) == 2
     assert np.isfinite(again.best.objective)
@@ -100,7 +100,7 @@ def test_a_search_whose_time_is_over_ends_with_the_best_set_so_far(last):
             raise quick_search.OutOfTime
 
     result = task.search(0, "", report)
-    whole = task.search(0, "", lambda count: None)
-    assert result.evaluations <= whole.evaluations
+    unlimited = task.search(0, "", lambda count: None)
+    assert result.evaluations <= unlimited.evaluations
     assert len(result.history) == 1
-    assert result.best.objective >= 0.5 * whole.best.objective
+    assert result.best.objective >= 0.5 * unlimited.best.objective

@@ -87,7 +87,7 @@ def test_more_searches_repeat_those_of_fewer_and_share_nothing(found, monkeypatc
     )
     assert first.searches == found.searches[:1]
     assert [3, 0] in drawn
-    gains = [{one.gains for one in made.history} for made in found.searches]
+    gains = [{tried.gains for tried in search_result.history} for search_result in found.searches]
     assert not gains[0] & gains[1]
     seeds = []
     for i in range(3):
@@ -100,17 +100,17 @@ def test_more_searches_repeat_those_of_fewer_and_share_nothing(found, monkeypatc
 def test_a_tuning_that_is_killed_goes_on_and_ends_with_the_same_bytes(
     found, killed_in, monkeypatch, tmp_path
 ):
-    made = []
+    searches = []
     real = search.TuningTask.search
 
-    def one(task, i, *rest):
-        if i == killed_in and len(made) == killed_in:
-            made.append("killed")
+    def killed(task, i, *rest):
+        if i == killed_in and len(searches) == killed_in:
+            searches.append("killed")
             raise KeyboardInterrupt
-        made.append(i)
+        searches.append(i)
         return real(task, i, *rest)
 
-    monkeypatch.setattr(search.TuningTask, "search", one)
+    monkeypatch.setattr(search.TuningTask, "search", killed)
     again = {
         "budget": 16,
         "seed": 3,
@@ -121,27 +121,28 @@ def test_a_tuning_that_is_killed_goes_on_and_ends_with_the_same_bytes(
     with pytest.raises(KeyboardInterrupt):
         tune("duffing", "observer_free", **again)
     tuned = tune("duffing", "observer_free", **again)
-    assert made == [*range(killed_in), "killed", *range(killed_in, 3)]
-    whole, resumed = (
-        one.save(tmp_path / name) for one, name in ((found, "whole.json"), (tuned, "resumed.json"))
+    assert searches == [*range(killed_in), "killed", *range(killed_in, 3)]
+    content, resumed = (
+        tuning.save(tmp_path / name)
+        for tuning, name in ((found, "whole.json"), (tuned, "resumed.json"))
     )
-    assert whole.read_bytes() == resumed.read_bytes()
+    assert content.read_bytes() == resumed.read_bytes()
     tune("duffing", "observer_free", **again)
-    assert len(made) == 4
+    assert len(searches) == 4
     assert len(list((tmp_path / "kept").iterdir())) == 3
     tune("duffing", "observer_free", **again | {"budget": 17})
-    assert made[4:] == [0, 1, 2]
+    assert searches[4:] == [0, 1, 2]
 
 
 def test_each_objective_on_record_is_that_of_the_runs_of_its_own_search(found):
     traces = []
-    for i, one in enumerate(found.searches):
+    for i, search_result in enumerate(found.searches):
         law = dataclasses.replace(
-            found.law, gains=dict(zip(found.bounds, one.best.gains, strict=True))
+            found.law, gains=dict(zip(found.bounds, search_result.best.gains, strict=True))
         )
         traces = smc.run(found.definition.scenarios(found.plant, law, found.seed, i))
         again = sum(itae(t) / abs(t.x[0, 0]) + 1e-3 * tv(t) / (6.0 * 0.5) for t in traces)
-        assert again == pytest.approx(one.best.objective, rel=1e-12)
+        assert again == pytest.approx(search_result.best.objective, rel=1e-12)
     assert [t.scenario.input_delay for t in traces] == [0.0, 0.0, 0.01, *[0.0] * 4]
     assert [t.scenario.noise.position > 0.0 for t in traces] == [False, True, *[False] * 5]
     assert [bool(t.scenario.disturbance) for t in traces] == [False] * 3 + [True] * 2 + [False] * 2
@@ -231,15 +232,15 @@ def test_coarse_runs_under_friction_leave_out_contacts_of_what_touches_nothing()
 @pytest.mark.filterwarnings("ignore:no set of gains")
 @pytest.mark.parametrize("budget", [1, 4, 32])
 def test_a_search_stops_at_its_budget_and_no_set_of_gains_is_paid_for_twice(budget):
-    (one,) = tune(
+    (search_result,) = tune(
         "duffing",
         "observer_free",
         budget=budget,
         objective=LEAN,
         searches=1,
     ).searches
-    assert 1 <= one.evaluations <= 2 * budget
-    assert len({e.gains for e in one.history}) == len(one.history)
+    assert 1 <= search_result.evaluations <= 2 * budget
+    assert len({e.gains for e in search_result.history}) == len(search_result.history)
 
 
 @pytest.mark.parametrize(
@@ -329,10 +330,10 @@ def test_a_gain_is_searched_three_decades_wide_and_further_above_if_of_more_than
         "T": 0.5,
     }
     box = search_space.box(smc.law("super_twisting"), scales)
-    its = {"k1": 6.0 / 4.0**0.5, "k2": 12.0, "c": 2.0}
+    gains = {"k1": 6.0 / 4.0**0.5, "k2": 12.0, "c": 2.0}
     for name, (low, high) in box.items():
-        assert low == pytest.approx(its[name] / 10**1.5)
-        assert high == pytest.approx(its[name] * 10 ** (2.5 if name == "k2" else 1.5))
+        assert low == pytest.approx(gains[name] / 10**1.5)
+        assert high == pytest.approx(gains[name] * 10 ** (2.5 if name == "k2" else 1.5))
     low, high = box["c"]
     assert search_space.widened(box)["c"] == pytest.approx((low / 10, 10 * high))
 
@@ -418,26 +419,26 @@ def test_every_set_that_a_search_evaluates_holds_the_theorem_unless_the_user_lif
         return costs(trials, candidates, *rest)
 
     monkeypatch.setattr(search.Trials, "_costs", seen)
-    found = tune(
+    tuning = tune(
         plant,
         law,
         24,
         objective=LEAN,
         searches=1,
     )
-    template = found.law.template
+    template = tuning.law.template
     assert template is not None
-    names = tuple(found.bounds)
-    held = dict(found.law.gains)
+    names = tuple(tuning.bounds)
+    held = dict(tuning.law.gains)
 
     def missed():
         return [
-            bool(template.unmet(held | dict(zip(names, one, strict=True)))) for one in evaluated
+            bool(template.unmet(held | dict(zip(names, gains, strict=True)))) for gains in evaluated
         ]
 
     assert len(evaluated) > 20
     assert not any(missed())
-    assert "outside its theorem" not in str(found.law.source)
+    assert "outside its theorem" not in str(tuning.law.source)
     evaluated.clear()
     tune(
         plant,
@@ -496,15 +497,18 @@ def test_a_run_that_fails_costs_more_than_any_other_and_less_the_later_it_fails(
 
 def test_a_law_that_got_more_than_its_rivals_is_not_compared(found, refused):
     rival = dataclasses.replace(found, law=smc.law("classical"))
-    assert {one.law.name for one in compare([rival, found])} == {"classical", "observer_free"}
+    assert {candidate.law.name for candidate in compare([rival, found])} == {
+        "classical",
+        "observer_free",
+    }
     for changed in (
         {"budget": 17},
         {"searches": rival.searches[:2]},
         {"definition": Objective(duration=0.5, u_max=12.0)},
         {"plant": smc.plant("duffing", M=2.0)},
     ):
-        other = dataclasses.replace(rival, **changed)
-        refused(lambda other=other: compare([found, other]))
+        unequal = dataclasses.replace(rival, **changed)
+        refused(lambda unequal=unequal: compare([found, unequal]))
 
 
 # files
@@ -582,7 +586,7 @@ def test_warns_if_and_only_if_the_laws_own_gains_are_better():
             searches=1,
         )
     assert again.objective > again.before
-    assert [Path(one.filename).name for one in caught] == ["test_search.py"]
+    assert [Path(warning.filename).name for warning in caught] == ["test_search.py"]
     # as good as its own: a warning would be an error
     tune(
         "duffing",

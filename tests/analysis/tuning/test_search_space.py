@@ -66,8 +66,8 @@ def systems(law, fixed, model, rng):
     They are powers of 4, so that roots are exact and rounding, which a switching law magnifies, is
     the same.
     """
-    found = []
-    while len(found) < 2:
+    scales = []
+    while len(scales) < 2:
         F, X, T = 4.0 ** rng.integers(-2, 3, 3)
         system = {
             "F": X / T ** max(law.relative_degree, 2) if model else F,
@@ -75,8 +75,8 @@ def systems(law, fixed, model, rng):
             "T": T,
         }
         if (fixed is None or fixed.of(system) == 1.0) and (X, T) != (1.0, 1.0):
-            found.append((system, F))
-    return found
+            scales.append((system, F))
+    return scales
 
 
 def run(law, X=1.0, T=1.0, F=1.0, model=0.0):
@@ -124,11 +124,11 @@ def given(name, rng):
 
 def converted(law, system):
     """The law with its gains in another system of units."""
-    known = {}
+    gains = {}
     for gain in law.gains:
-        known[gain] = search_space.unit(law, gain) or units.Unit()
+        gains[gain] = search_space.unit(law, gain) or units.Unit()
     return dataclasses.replace(
-        law, gains={g: v * known[g].of(system) for g, v in law.gains.items()}
+        law, gains={g: v * gains[g].of(system) for g, v in law.gains.items()}
     )
 
 
@@ -184,8 +184,10 @@ def test_a_wrong_unit_of_any_gain_would_be_seen(name):
     law = given(name, np.random.default_rng(0))
     plain = np.concatenate([np.concatenate(run(law, model=model)) for model in (0.0, 1.0)])
     for gain, value in law.gains.items():
-        other = dataclasses.replace(law, gains=dict(law.gains) | {gain: 2.0 * value})
-        changed = np.concatenate([np.concatenate(run(other, model=model)) for model in (0.0, 1.0)])
+        doubled = dataclasses.replace(law, gains=dict(law.gains) | {gain: 2.0 * value})
+        changed = np.concatenate(
+            [np.concatenate(run(doubled, model=model)) for model in (0.0, 1.0)]
+        )
         assert np.abs(changed - plain).max() > 1e-6, gain
 
 

@@ -110,13 +110,13 @@ def places(view, count=6):
 
 @pytest.mark.parametrize("plant", ["inverted_pendulum", "van_der_pol"])
 def test_a_kept_outline_is_the_same_array_as_a_new_one(plant):
-    with stage(plant) as view, stage(plant) as other:
-        for _ in zip(places(view), places(other), strict=True):
+    with stage(plant) as view, stage(plant) as second_view:
+        for _ in zip(places(view), places(second_view), strict=True):
             picture = view.canvas.draw(lambda shown: None)
             outlined = view.canvas.outlined(picture, view.add_outline, 2.0)
-            other.canvas.draw(lambda shown: None)
-            other.canvas.outline_look = b""
-            drawn = other.canvas.outlined(picture, other.add_outline, 2.0)
+            second_view.canvas.draw(lambda shown: None)
+            second_view.canvas.outline_look = b""
+            drawn = second_view.canvas.outlined(picture, second_view.add_outline, 2.0)
             assert np.array_equal(outlined, drawn)
             assert changed(outlined, picture).max() > 50
 
@@ -147,8 +147,8 @@ def test_a_picture_of_which_parts_are_kept_is_the_whole_one(plant):
             look = canvas.look
             assert look is not None
             drawn.append(look.changed(before, view.model, SIZE))
-            whole = canvas.renderer.render()
-            unlike = changed(picture, whole)
+            whole_picture = canvas.renderer.render()
+            unlike = changed(picture, whole_picture)
             assert (unlike > SEEN).sum() <= 30  # samples of smooth edges
             assert (unlike > 3 * SEEN).sum() == 0
     assert drawn[0] is None

@@ -81,8 +81,8 @@ def test_antagonists_give_the_force_of_a_motor_and_never_push():
 def test_a_least_tension_pulls_at_both_sides():
     trace = run_of(smc.plant_from(finger(low=5), ["j"], name="finger"))
     assert trace.tension[:, 0].min() == 5.0
-    given = (arms_at(trace.x[:, 0]) * trace.tension).sum(axis=1)
-    np.testing.assert_allclose(given, trace.applied[:, 0], atol=1e-8)
+    torque = (arms_at(trace.x[:, 0]) * trace.tension).sum(axis=1)
+    np.testing.assert_allclose(torque, trace.applied[:, 0], atol=1e-8)
 
 
 def test_three_tendons_over_two_joints_are_a_bounded_least_squares():
@@ -92,9 +92,9 @@ def test_three_tendons_over_two_joints_are_a_bounded_least_squares():
     assert trace.tension.min() == 0.0
     ridge = RIDGE * (ARMS**2).sum(axis=0).max()
     for k in range(0, len(trace.t), 97):
-        wanted = trace.applied[k]
+        torques = trace.applied[k]
         system = np.vstack([ARMS, np.sqrt(ridge) * np.eye(3)])
-        own = lsq_linear(system, [*wanted, 0.0, 0.0, 0.0], bounds=(0.0, 90.0), tol=1e-14)
+        own = lsq_linear(system, [*torques, 0.0, 0.0, 0.0], bounds=(0.0, 90.0), tol=1e-14)
         np.testing.assert_allclose(ARMS @ trace.tension[k], ARMS @ own.x, atol=1e-6)
         # of the tensions that give this force, the least
         assert np.linalg.norm(trace.tension[k]) <= np.linalg.norm(own.x) + 1e-4
@@ -108,14 +108,14 @@ def test_shared_forces_are_optimal_for_arms_at_random():
         arms = random.normal(size=(n, m)) * (random.random((n, m)) < 0.7)
         low = random.choice([0.0, 0.5, -1.0], size=m)
         high = low + random.exponential(5.0, size=m)
-        wanted = random.normal(size=n) * random.choice([0.1, 5.0, 100.0])
+        torques = random.normal(size=n) * random.choice([0.1, 5.0, 100.0])
         tensions = np.zeros(m)
-        share(arms, wanted, low, high, tensions, np.zeros((m + 3, m)))
+        share(arms, torques, low, high, tensions, np.zeros((m + 3, m)))
         assert np.all(tensions >= low)
         assert np.all(tensions <= high)
         ridge = RIDGE * (arms**2).sum(axis=0).max()
-        slope = arms.T @ (wanted - arms @ tensions) - ridge * tensions
-        rounding = 1e-10 * (1.0 + np.abs(wanted).max() + np.abs(tensions).max())
+        slope = arms.T @ (torques - arms @ tensions) - ridge * tensions
+        rounding = 1e-10 * (1.0 + np.abs(torques).max() + np.abs(tensions).max())
         assert np.all(slope[tensions < high] <= rounding)
         assert np.all(slope[tensions > low] >= -rounding)
 
