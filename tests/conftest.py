@@ -1,7 +1,7 @@
 """What the tests share: this package's plugin, also where it is not installed, and pytest's for
 testing plugins.
 
-    pytest --quick            # the first case of each test, in files that are marked quick
+    pytest --quick            # the first case of each test that is marked quick
     pytest -m "not slow"      # without tests of over 0.3 s whose lines faster ones run, too
 
 Compiled code is kept in the user's cache, see `common.jit.Cache`, so that all workers, child
@@ -40,7 +40,7 @@ def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginMa
     parser.addoption(
         "--quick",
         action="store_true",
-        help="only the first case of each test, in files marked quick",
+        help="only the first case of each test that is marked quick",
     )
 
 
@@ -72,23 +72,19 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(50_000, 20, 20)  # a thirtieth of the time is in the 700 objects of the default
 
 
-def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Leave out files that are not marked quick before their import, where quick tests are asked
-    for.
-    """
-    if collection_path.suffix != ".py" or not config.getoption("quick"):
+def pytest_pycollect_makeitem(collector: pytest.Collector, name: str, obj: object) -> list | None:
+    """Make no cases of a test that is not marked quick, where quick tests are asked for."""
+    if not collector.config.getoption("quick") or not name.startswith("test_"):
         return None
-    return "pytest.mark.quick" not in collection_path.read_text(encoding="utf-8") or None
+    own = any(mark.name == "quick" for mark in getattr(obj, "pytestmark", []))
+    return None if own or collector.get_closest_marker("quick") else []
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Keep the first case of each quick test that is not slow, where quick tests are asked for."""
+    """Keep the first case of each test that is not slow, where quick tests are asked for."""
     if not config.getoption("quick"):
         return
-    quick = []
-    for item in items:
-        if item.get_closest_marker("quick") and not item.get_closest_marker("slow"):
-            quick.append(item)
+    quick = [item for item in items if not item.get_closest_marker("slow")]
     first = set({item.nodeid.split("[")[0]: item for item in reversed(quick)}.values())
     config.hook.pytest_deselected(items=[item for item in items if item not in first])
     items[:] = [item for item in items if item in first]

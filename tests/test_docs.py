@@ -67,6 +67,7 @@ def known(monkeypatch, whole):
     return importlib.import_module("known")
 
 
+@pytest.mark.quick
 def test_the_contents_name_every_page_once():
     assert sorted(NAV) == sorted(path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md"))
 

@@ -56,6 +56,7 @@ PUBLIC = {
 }
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", PUBLIC)
 def test_a_function_says_what_comes_back(name):
     said = inspect.getdoc(PUBLIC[name])

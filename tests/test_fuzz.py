@@ -44,6 +44,7 @@ def test_wild_files_end_well_or_in_a_sentence(tmp_path, monkeypatch):
     assert [why for _, why in (attack.case("files", 0, i) for i in range(5)) if why] == []
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(("part", "cases"), [("calls", 60), ("commands", 8)])
 def test_calls_with_odd_arguments_end_well_or_in_a_sentence(part, cases, tmp_path, monkeypatch):
     """The first cases have what was a foreign error once: arrays as flags, lists and tables."""

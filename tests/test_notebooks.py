@@ -94,6 +94,7 @@ def code(path: Path) -> list[str]:
     return [text for kind, text in cells(path) if kind == "code"]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_is_kept_without_outputs_as_jupyter_saves_it(path):
     text = path.read_text("utf-8")

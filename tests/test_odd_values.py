@@ -66,6 +66,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", REFUSED)
 def test_it_is_refused_in_a_sentence(name):
     call, words = REFUSED[name]

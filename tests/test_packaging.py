@@ -308,6 +308,7 @@ def locked(*names: str) -> set[str]:
     }
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", LOCKS)
 def test_a_lock_pins_every_package_by_hash_and_names_no_host(name):
     text = (ROOT / name).read_text()

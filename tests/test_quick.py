@@ -7,6 +7,30 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
+NONE_QUICK = {  # files all of whose tests take longer
+    "analysis/test_engine_gpu.py",
+    "cli/test_ctrl_c.py",
+    "common/test_arithmetic.py",
+    "common/test_children.py",
+    "draw/test_view_browser.py",
+    "draw/test_words_fit.py",
+    "evidence/papers/test_quick_verdicts_of_gaber.py",
+    "evidence/rigs/test_qube_servo.py",
+    "identification/test_kept_replays.py",
+    "identification/test_numbers_of_parts.py",
+    "published/test_levant_accuracy.py",
+    "studies/test_kills.py",
+    "test_skipped.py",
+}
+
+
+@pytest.mark.quick
+def test_every_other_file_has_a_quick_test():
+    without = set()
+    for path in (ROOT / "tests").rglob("test_*.py"):
+        if "mark.quick" not in path.read_text(encoding="utf-8"):
+            without.add(path.relative_to(ROOT / "tests").as_posix())
+    assert without <= NONE_QUICK
 
 
 @pytest.mark.slow

@@ -44,6 +44,7 @@ def test_a_law_that_raises_is_told_once(ask):
     assert len(reported) == 1
 
 
+@pytest.mark.quick
 def test_a_plant_that_diverges_is_no_broken_law():
     trace = smc.run(
         smc.Scenario(

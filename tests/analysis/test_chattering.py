@@ -38,6 +38,7 @@ LAWS = {
 }
 
 
+@pytest.mark.quick
 def test_a_prediction_prints_as_a_sentence():
     cycle = Chattering(amplitude=0.5, amplitude_x=0.1, amplitude_u=2.0, frequency=40.0)
     assert str(cycle).startswith("Limit cycle predicted: 40 Hz, with amplitudes 0.5 of s, 0.1 of x")

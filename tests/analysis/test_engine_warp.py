@@ -195,6 +195,7 @@ def test_parameter_sets_of_an_identified_machine_are_worlds_of_one_model(on_card
     assert "MuJoCo made" not in str(table)
 
 
+@pytest.mark.quick
 def test_the_plant_decides_which_engine_runs_it(on_card):
     equation = smc.Scenario(plant="duffing", law="pid", duration=0.1)
     own = smc.Scenario(plant=hinge(), law="pid", duration=0.1)

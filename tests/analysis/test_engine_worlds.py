@@ -147,6 +147,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_a_world_cannot_run_is_told(what):
     fields = {"plant": PLANTS["wall"](), "law": "pid"} | REFUSED[what]

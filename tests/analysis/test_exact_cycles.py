@@ -121,6 +121,7 @@ def test_ranges_hold_the_cycles_of_fresh_loops():
     assert (np.sum(held, axis=0) >= 18).all()
 
 
+@pytest.mark.quick
 def test_a_run_whose_cycle_depends_on_the_step_is_marked():
     """implicitfast moves positions ahead by half a step."""
     coarse = {"physics_step": 1e-3, "integrator": "implicitfast"}

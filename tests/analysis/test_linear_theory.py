@@ -75,6 +75,7 @@ def grows(size: np.ndarray) -> bool:
 # what a plant is at rest
 
 
+@pytest.mark.quick
 def test_a_single_pendulum_has_its_textbook_coefficients():
     p = smc.plant("inverted_pendulum").parameters
     linear_model = linear_theory.linear(smc.plant("inverted_pendulum"))

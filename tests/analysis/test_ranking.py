@@ -82,6 +82,7 @@ MEDIANS = [
 ]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(("values", "wanted"), MEDIANS)
 def test_an_interval_by_hand(values, wanted):
     assert interval(values) == pytest.approx(wanted, nan_ok=True)

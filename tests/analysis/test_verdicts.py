@@ -52,6 +52,7 @@ def test_a_law_that_is_better_than_fifteen_others_by_half_wins_with_twelve_sets(
     assert named >= 27  # of 30
 
 
+@pytest.mark.quick
 def test_six_sets_name_a_winner_of_one_block_among_any_number_of_laws():
     scores = drawn(np.random.default_rng(2), [0.0, *[1.5] * 20], 0.02)
     for sets, winner in ((6, "law00"), (5, None)):

@@ -314,6 +314,7 @@ def options(words: list[str]) -> list[tuple[int, int]]:
     return [(k, k + (1 if flag else 2)) for k, flag in zip(starts, alone, strict=True)]
 
 
+@pytest.mark.quick
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize("line", CALLS)
 def test_every_option_changes_the_argument_of_its_name_and_no_other_to_its_value(line):

@@ -130,6 +130,7 @@ def refused(answer: tuple[int, str, str], *words: object) -> None:
 # list
 
 
+@pytest.mark.quick
 def test_names_that_are_read_from_the_source_are_those_of_the_catalogues():
     catalogues = {
         "Plants": plants(),

@@ -2,6 +2,7 @@
 
 import io
 
+import pytest
 from rich.console import Console
 
 import smc_mujoco as smc
@@ -25,6 +26,7 @@ def printed(shown) -> str:
     return console.file.getvalue()  # pyright: ignore[reportAttributeAccessIssue]
 
 
+@pytest.mark.quick
 def test_a_summary_has_commands_in_volts_and_reactions_in_newton_metres():
     lines = {}
     for line in printed(tables.trace_summary(VOLTS)).splitlines():

@@ -54,6 +54,7 @@ def press(job, times, number=signal.SIGINT):
     return sent
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("times", [1, 3])
 def test_ctrl_c_stops_the_threads_and_waits_for_them(times):
     job = Job()

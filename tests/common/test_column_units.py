@@ -12,6 +12,7 @@ from smc_mujoco.identification import records
 from smc_mujoco.identification.own_rig import own_rig
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("heading", "name", "factor"),
     [

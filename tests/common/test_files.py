@@ -56,6 +56,7 @@ def test_whatever_is_written_is_json_and_comes_back(data):
     assert same(from_json(to_json(data)), data)
 
 
+@pytest.mark.quick
 def test_numbers_that_json_lacks_are_words():
     assert to_json({"a": [math.nan, (math.inf, -math.inf)], "b": "NaN"}) == (
         '{"a": ["NaN", ["Infinity", "-Infinity"]], "b": "\'NaN"}'

@@ -182,6 +182,7 @@ BACKENDS = {
 }
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("case", BACKENDS)
 def test_the_backend_is_the_wish_or_the_first_that_loads_and_the_rest_is_said(case, monkeypatch):
     wish, libraries, platform, error, *expected = BACKENDS[case]

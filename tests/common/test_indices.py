@@ -20,6 +20,7 @@ def unpacks(y, gains, memory):
     return u, s
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("law", "allowed"),
     [

@@ -105,6 +105,7 @@ COMPILES = {
 }
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("what", COMPILES)
 def test_within_a_policy_every_model_compiles_and_the_run_goes_on(what, own, tmp_path):
     trace = run_of("none", own)

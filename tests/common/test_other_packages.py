@@ -92,6 +92,7 @@ def said(call: Callable[[], object]) -> list[str]:
 # found, and imported when asked for
 
 
+@pytest.mark.quick
 def test_an_entry_runs_like_one_of_the_library(install, tmp_path):
     install(
         "theirs",

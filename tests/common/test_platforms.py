@@ -49,6 +49,7 @@ def test_every_text_file_is_read_and_written_as_utf_8():
     assert bare == []
 
 
+@pytest.mark.quick
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="it is about systems that have it")
 def test_without_process_groups_a_late_command_dies_with_its_children(monkeypatch):
     commands = []

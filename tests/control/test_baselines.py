@@ -46,6 +46,7 @@ def free(law, **fields):
 # PID
 
 
+@pytest.mark.quick
 def test_pid_on_a_free_mass_moves_as_its_three_poles_say():
     """z = (integral of e, e, de), z' = A z, to the order of the control period."""
     kp = 10.0

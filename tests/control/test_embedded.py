@@ -71,6 +71,7 @@ def test_every_form_is_odd_bounded_and_rises(name):
 # single precision
 
 
+@pytest.mark.quick
 def test_single_precision_rounds_every_operation_to_24_bits():
     """The same operations on numpy's float32 arrays, bit by bit."""
     rng = np.random.default_rng(0)

@@ -301,6 +301,7 @@ def measured(x, v, dt, r=None, J=(16.8e-6, 16.8e-6, 29.8e-6), m=0.0319, limit=1.
     return JointMeasurement(0.0, dt, 1.0, 0, x, v, x - r, v - dr, r, dr, ddr, ddr, limits, M, h, g)
 
 
+@pytest.mark.quick
 def test_the_cascade_bounds_speed_tilt_and_the_least_thrust():
     """Level and at rest, 3 m too high and 3 m too far ahead; the period is so short that nothing
     integrates.

@@ -59,6 +59,7 @@ def tuned():
     )
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("text", "name", "gains"),
     [

@@ -33,6 +33,7 @@ def inertia(x):
     return plant.nominal.dynamics(np.array(x), np.zeros(3), Values(**plant.parameters)).M
 
 
+@pytest.mark.quick
 def test_computed_torque_sliding_reaches_its_layer_at_the_predicted_time():
     k = 5.0
     width = 0.05

@@ -84,6 +84,7 @@ def test_default_gains_end_within_five_percent_on_every_plant_with_the_model_or_
     assert max(bounds.values()) <= 0.05, bounds
 
 
+@pytest.mark.quick
 def test_none_leaves_each_plant_where_its_equation_takes_it():
     """The pendulums fall from upright, Van der Pol goes round, Duffing goes to a well beside 0, the
     chain swings.

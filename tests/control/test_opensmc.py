@@ -61,6 +61,7 @@ def controlled(controller, **more):
 # reaching laws: ours without the model, on s
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("law", "theirs"),
     [

@@ -61,6 +61,7 @@ def test_an_outer_law_leaves_no_error_under_a_constant_force(name, gains):
     assert np.abs(proportional.x[-1]).max() > 1e-2
 
 
+@pytest.mark.quick
 def test_an_observer_knows_the_acceleration_that_the_motor_can_give():
     """Where the motors saturate for long, its estimate stays bounded; told of no bound it would
     swing up.

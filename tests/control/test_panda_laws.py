@@ -9,6 +9,7 @@ import smc_mujoco as smc
 from smc_mujoco.mechanisms.plant import Values
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", ["observer_free_joint", "observer_free"])
 def test_without_gravity_compensation_gravity_over_lam_k1_remains(name):
     lam = np.array([30.0, 400.0, 20.0, 150.0, 20.0, 20.0, 3.0])

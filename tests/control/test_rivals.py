@@ -73,6 +73,7 @@ def bounded(name):
 # what holds of all
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", RIVALS)
 def test_a_constant_disturbance_leaves_no_error(name):
     run = plant_b(bounded(name), constant(2.0), duration=20.0)

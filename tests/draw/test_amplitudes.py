@@ -8,6 +8,7 @@ import smc_mujoco as smc
 from smc_mujoco.draw.amplitudes import crossover, lag
 
 
+@pytest.mark.quick
 def test_the_lag_is_what_all_drives_and_the_delay_add_up_to():
     drives = (smc.Lag(0.01), smc.Lag(0.02), smc.Backlash(0.01))
     assert lag(

@@ -94,6 +94,7 @@ def test_a_run_that_fails_at_once_is_an_x_where_it_started(tmp_path):
     assert low < min(gone.scenario.resolved.x0) <= max(gone.scenario.resolved.x0) < high
 
 
+@pytest.mark.quick
 def test_short_impacts_are_marked_beyond_the_range_of_lasting_reactions_and_told(pair):
     """Two of the first run, to both sides; the other run has none."""
     spikes = np.zeros_like(pair[0].u)

@@ -180,6 +180,7 @@ def test_controls_whose_bands_would_hide_each_other_have_a_row_each(one):
     assert len({row.get_ylim() for row in rows(page.axes[1])}) == 1
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(("size", "count"), [(0.02, 3), (1e-7, 1)])
 def test_a_close_up_of_small_switching_has_a_row_each_but_not_of_round_off(one, size, count):
     signs = np.where(np.arange(len(one.t)) % 2, 1.0, -1.0)[:, None]

@@ -388,6 +388,7 @@ def test_the_settling_band_is_two_percent_around_the_reference():
     assert (low, high) == pytest.approx((traces[0].r.min() - half, traces[0].r.max() + half))
 
 
+@pytest.mark.quick
 def test_every_joint_has_the_band_of_the_score_that_of_the_largest_error_at_the_start():
     """A joint near its goal had a narrower one, which a settled run left."""
     arm = smc.plant("double_pendulum")

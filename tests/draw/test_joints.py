@@ -64,6 +64,7 @@ def test_a_blow_and_a_payload_are_marked_and_named(trace):
     assert [event.stop for event in events] == [pytest.approx(0.021), math.inf]
 
 
+@pytest.mark.quick
 def test_panels_below_a_film_of_an_arm_tell_what_the_tip_does(trace):
     strip = charts.strip([trace])
     # joints that slide and that turn

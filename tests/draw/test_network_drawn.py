@@ -20,6 +20,7 @@ def network(n):
     return dataclasses.replace(trace, x=starts * np.exp(-rates * trace.t[:, None]), r=0.0 * trace.r)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("n", [5, 20, 60])
 def test_no_drawn_range_is_smaller_than_the_data_s(n):
     trace = network(n)

@@ -39,6 +39,7 @@ def test_both_curves_pass_minus_one_where_the_mark_is(page):
     assert mark.get_xydata().tolist() == [[-1.0, 0.0]]
 
 
+@pytest.mark.quick
 def test_s_of_the_run_fills_the_predicted_band(page):
     (s,) = page.axes[1].lines
     (band,) = page.axes[1].patches

@@ -23,6 +23,7 @@ def wide(labels: list[str], columns: int, size: float) -> float:
     return sum(max(part) for part in np.array_split(widths, columns))
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("width", [3.5, 5.0, 7.16, 12.8])
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 9, 14])
 def test_a_legend_has_the_most_columns_that_fit_on_its_page_and_no_entry_is_longer_than_its_share(

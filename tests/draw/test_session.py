@@ -57,6 +57,7 @@ def arm(tmp_path):
     return path
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("scenario", [DUFFING, HARD, NETWORK], ids=lambda s: s.plant.name)
 def test_a_session_is_the_run_of_its_scenario(scenario):
     session = Session([scenario, dataclasses.replace(scenario, seed=5)])

@@ -80,6 +80,7 @@ def test_frames_are_those_of_the_film_again_and_again(trace):
     assert repr(frames) == "Frames(5 of 320 x 180 px, 20 a second)"
 
 
+@pytest.mark.quick
 @renders
 @without_charts
 def test_mediapy_takes_the_frames_with_their_speed(trace):

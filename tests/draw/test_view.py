@@ -74,6 +74,7 @@ def watched(session):
 NOMINAL = smc.run(RUN).x[:-1]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", sorted(Session([RUN]).sliders[0]))
 def test_every_slider_changes_the_run(name):
     live = LiveView(Session([RUN]), 0)

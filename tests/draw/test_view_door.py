@@ -33,6 +33,7 @@ def inside(path, **headers):
     return view_door.inside(WORD, PORT, path, Headers({"Host": ["127.0.0.1:8080"]} | headers))
 
 
+@pytest.mark.quick
 def test_each_view_has_a_word_of_its_own_that_nobody_guesses():
     words = {view_door.secret_path() for _ in range(20)}
     assert len(words) == 20

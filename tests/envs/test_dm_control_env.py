@@ -36,6 +36,7 @@ from dm_control.utils import rewards  # noqa: E402
 # the physics are the benchmark's
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(("plant", "task"), one_of_each(1))
 def test_a_law_as_an_agent_gives_the_trace_of_its_run(plant, task):
     plant_named = smc.plant(plant)

@@ -65,6 +65,7 @@ def test_thrusts_of_a_run_as_actions_give_its_motion():
     assert reward == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.quick
 def test_episodes_begin_where_they_are_told_or_about_rest_and_end_with_a_state_that_is_lost():
     environment = FlightEnv("quadrotor", changes={"duration": 0.05})
     first, _ = environment.reset(seed=3)

@@ -342,6 +342,7 @@ def called(tmp_path, monkeypatch, capsys):
     return run
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("line", GIVEN, ids=str)
 def test_a_command_hands_on_what_it_is_given_and_prints_what_comes_back(line, called, tmp_path):
     code, notes, out, _ = called(line)

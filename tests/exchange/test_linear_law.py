@@ -36,6 +36,7 @@ def sampled(K: control.StateSpace) -> control.StateSpace:
     return K
 
 
+@pytest.mark.quick
 def test_an_array_of_gains_is_state_feedback_as_lqr_gives_it():
     A = np.array([[0.0, 1.0], [1.0, -0.2]])
     B = np.array([[0.0], [1.0]])

@@ -145,6 +145,7 @@ def _inputs(source):
     return re.findall(r'\{"(\w+)", SMC_INPUT', text)
 
 
+@pytest.mark.quick
 def test_a_law_that_reads_a_model_is_refused(tmp_path, refused):
     refused(lambda: law_to_package("computed_torque_sliding", tmp_path / "a", joints=2), "M", ".c")
 

@@ -8,6 +8,7 @@ import smc_mujoco as smc
 controllers = pytest.importorskip("opensmc.controllers")
 
 
+@pytest.mark.quick
 @pytest.mark.filterwarnings("ignore::smc_mujoco.errors.PlainLoopWarning")
 def test_their_controller_is_a_law_in_one_line():
     theirs = smc.law_from(

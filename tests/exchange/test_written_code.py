@@ -5,10 +5,13 @@ Other tests run it, in C and in FMUs.
 
 import re
 
+import pytest
+
 import smc_mujoco as smc
 from smc_mujoco.exchange.c import build
 
 
+@pytest.mark.quick
 def test_a_law_in_c_is_as_recorded(snapshot):
     """Without its docstring, the header and the version."""
     text = smc.exchange.law_to_c("super_twisting", "float")

@@ -29,6 +29,7 @@ def boards(tmp_path_factory):
     return smc.leaderboard(table, defaults=True)  # super_twisting has its default gains
 
 
+@pytest.mark.quick
 def test_every_set_is_a_condition_with_its_own_numbers():
     runs = ensemble.runs(PENDULUM, LAWS, seeds=2, duration=1.0, starts=smc.starts(0.3))
     assert len(runs) == 2 * 2 * (1 + len(PENDULUM.ensemble))

@@ -109,6 +109,7 @@ def test_a_spring_that_the_model_lacks_is_named_with_the_encoder_s_side(arm, log
     assert compliance(solved, rounded, dataclasses.replace(slopes, residuals=quiet)) == []
 
 
+@pytest.mark.quick
 def test_hidden_starts_are_put_into_the_parts_of_their_joints_within_the_play(arm):
     scenario = smc.Scenario(plant=arm, law="none", actuator=PLAY)
     starts = hidden_starts(scenario)

@@ -166,6 +166,7 @@ def test_a_closed_loop_s_transient_gives_a_quantity_within_three_errors():
         assert result.errors[name] < 0.01 * AXIS.values[name]
 
 
+@pytest.mark.quick
 def test_noise_is_read_off_a_moving_record():
     t = 1e-3 * np.arange(4000)
     rng = np.random.default_rng(5)

@@ -31,6 +31,7 @@ def lacking(size, one_sided=False):
     return lack_of_fit(slopes, [Lack("b", list(b), one_sided)]), absorbed[0]
 
 
+@pytest.mark.quick
 def test_a_lack_moves_a_number_by_what_the_number_has_absorbed():
     fit, absorbed = lacking(0.05)
     assert fit.told(np.full(1, 1e-3)) == ("b",)

@@ -29,6 +29,7 @@ def said(rig, x):
     return log_quality.doubts(rig, [{"t": T, "x": x, "u": np.sin(5.0 * T)}])
 
 
+@pytest.mark.quick
 def test_a_good_log_leaves_no_doubt_with_noise_or_counts_or_neither(rig):
     noise = 2e-4 * np.random.default_rng(0).standard_normal(len(T))
     for x in (X, X + noise, rounded(X + noise)):

@@ -22,6 +22,7 @@ def rig_of(path, names, **channel):
     return own_rig(smc.plant_from(path, joints), names)
 
 
+@pytest.mark.quick
 def test_an_mjcf_has_the_numbers_that_were_found(tmp_path):
     path = tmp_path / "arm.xml"
     path.write_text(chain([0.4, 0.3], [1.0, 0.5]))

@@ -151,6 +151,7 @@ def test_friction_that_gives_way_before_it_slides_is_told_and_in_the_errors():
     assert cured.values["j1.armature"] == pytest.approx(TRUTH["j1.armature"], rel=0.02)
 
 
+@pytest.mark.quick
 def test_commands_of_one_sample_break_a_joint_away_though_a_delay_is_between_samples(arm):
     """A mean of such a command and the one before would not. The delay is 1.5 samples."""
     level, force, period = TRUTH["j1.frictionloss"], 0.7, 2e-3

@@ -6,6 +6,7 @@ from helpers.machines import AXIS, PENDULUM
 import smc_mujoco as smc
 
 
+@pytest.mark.quick
 def test_a_pendulum_has_the_inertia_and_the_moment_of_its_rig():
     m, l = (PENDULUM.scenario("none").plant.parameters[name] for name in ("m", "l"))
     inertias = PENDULUM.quantities["inertia"].value, PENDULUM.quantities["mass_moment"].value

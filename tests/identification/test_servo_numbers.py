@@ -93,6 +93,7 @@ def test_a_log_that_does_not_show_the_stiffness_says_why():
     assert f"nearer to {math.sqrt(10.0 / inertia):.2g} rad/s" in cause
 
 
+@pytest.mark.quick
 def test_a_play_gets_a_rotor_where_the_scenario_has_none():
     arm = arm_of()
     rig = own_rig(arm, ["elbow.play"])

@@ -109,6 +109,7 @@ def test_pairs_without_friction_are_told(refused):
     refused(lambda: friction.part, "no friction in it", "gravity")
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("speed", "torque", "words"),
     [

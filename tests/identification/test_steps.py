@@ -76,6 +76,7 @@ def test_a_position_that_swings_has_its_damping_ratio():
     assert model.jnt_stiffness.ravel()[0] == pytest.approx(5.0, rel=0.01)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("log", "words"),
     [

@@ -144,6 +144,7 @@ def everything(plant, law):
     )
 
 
+@pytest.mark.quick
 def test_every_plant_of_the_study_has_its_equation_here():
     # the others: test_underactuated.py and test_rig_plants.py
     assert set(smc.paper.GAINS) == set(EQUATION)

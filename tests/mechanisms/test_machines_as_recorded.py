@@ -125,6 +125,7 @@ def weighed(array):
     )
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", recorded(__file__, PLANTS))
 def test_a_machine_says_and_shows_what_is_recorded(name, snapshot):
     machine_plant = PLANTS[name]

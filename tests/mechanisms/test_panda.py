@@ -149,6 +149,7 @@ def torques(q, v, a, payload=0.0, lp=0.04, links=LINKS):
     return published
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("payload", [0.0, 2.0])
 def test_a_thousand_states_obey_newton_and_euler(payload):
     rng = np.random.default_rng(7)

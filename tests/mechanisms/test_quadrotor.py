@@ -195,6 +195,7 @@ def speed(p, thrust):
     return (math.sqrt(p["k1"] ** 2 + 4 * p["k2"] * thrust) - p["k1"]) / (2 * p["k2"])
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     "numbers",
     [

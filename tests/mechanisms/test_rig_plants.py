@@ -148,6 +148,7 @@ def test_a_thousand_accelerations_are_those_of_the_equation(name, rough):
     assert worst < 1e-9
 
 
+@pytest.mark.quick
 @PLANTS
 def test_nominal_is_the_equation_without_dry_friction(name):
     rng = np.random.default_rng(6)

@@ -79,6 +79,7 @@ def surface(trace, law=LAW):
 # the plants
 
 
+@pytest.mark.quick
 @PLANTS
 def test_the_model_is_its_equation(name):
     rng = np.random.default_rng(0)

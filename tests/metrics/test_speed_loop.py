@@ -33,6 +33,7 @@ def ran(speed, tracks="speed", **fields):
     return smc.run(scenario)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("speed", [0.4, -3.0])
 @pytest.mark.parametrize("k", [3.0, 9.0])
 def test_the_speed_settles_when_its_error_has_fallen_to_two_percent(speed, k):

@@ -52,6 +52,7 @@ def pressed():
     )
 
 
+@pytest.mark.quick
 def test_tip_scores_are_of_the_distance_in_space(trace):
     model = arms.arm().load()
     data = mujoco.MjData(model)

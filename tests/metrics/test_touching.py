@@ -6,6 +6,7 @@ import smc_mujoco as smc
 from smc_mujoco.studies.batches import result_columns
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("contact", "touched"),
     [

@@ -17,6 +17,7 @@ def reported(y, gains, memory):
     return 1.0, y.f
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("fields", "force"),
     [

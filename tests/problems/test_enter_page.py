@@ -33,6 +33,7 @@ def test_the_page_s_law_goes_from_its_files_to_a_row_and_is_compared(tmp_path, m
     assert "soft relay" in (tmp_path / "pages" / "smc-30@1.html").read_text()
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("folder", EXAMPLES, ids=lambda path: path.name)
 def test_an_example_of_an_entry_brings_a_plant_home(folder):
     problem = smc.problem(

@@ -48,6 +48,7 @@ def small(monkeypatch):
     monkeypatch.setattr(suite, "suite", lambda name: PROBLEMS)
 
 
+@pytest.mark.quick
 def test_an_entry_has_its_gains_on_each_plant(tmp_path):
     fixed = entry.read(written(tmp_path / "one", gains="[gains.all]\nk = 2.5"))
     assert fixed.law("duffing").gains["k"] == 2.5

@@ -63,6 +63,7 @@ def traces():
     return dict(zip(boards.ROBOTS, robot_traces, strict=True))
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("version", VERSIONS)
 @ROBOTS
 def test_published_criteria_give_their_published_score(robot, version):

@@ -34,6 +34,7 @@ def rms(trace, problem):
     return float(np.sqrt(np.mean(error**2)) / problem.count)
 
 
+@pytest.mark.quick
 @SUITES
 def test_a_window_is_whole_periods_of_what_is_periodic_and_of_control(name):
     for task in tracking_suite(name).problems:

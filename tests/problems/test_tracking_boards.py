@@ -43,6 +43,7 @@ def test_readme_has_the_line_of_a_board(suite):
     assert tracking_page.readme_line(tracking_board(suite)) in lines
 
 
+@pytest.mark.quick
 @SUITES
 def test_every_entry_has_every_search_of_every_problem(suite):
     board = tracking_board(suite)

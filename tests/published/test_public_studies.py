@@ -92,6 +92,7 @@ def test_in_forty_seconds_the_cart_s_command_is_that_of_the_study_s_table():
     assert command_figures == pytest.approx((studies.LIMA_MEAN, studies.LIMA_STEPS), rel=0.01)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("scenario", "push"),
     [

@@ -51,6 +51,7 @@ def test_conditioned_super_twisting_reaches_by_its_authors_inequalities():
         assert np.abs(trace.u + trace.d)[-3000:].max() < 0.05
 
 
+@pytest.mark.quick
 def test_conditioned_super_twisting_does_not_wind_up_as_the_plain_law_does():
     laws = []
     for name in ("conditioned_super_twisting", "super_twisting"):

@@ -63,6 +63,7 @@ def test_it_is_the_boundary_between_what_is_tolerated_and_what_is_not(found):
         assert [all(map(margins.tolerates, traces)) for traces in runs] == [True, False]
 
 
+@pytest.mark.quick
 def test_a_run_tolerates_what_leaves_it_within_five_percent_of_its_start():
     held = smc.run(dataclasses.replace(BASE, disturbance=smc.Constant(1.2)))
     carried = smc.run(dataclasses.replace(BASE, disturbance=smc.Constant(1.4)))

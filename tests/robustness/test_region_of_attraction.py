@@ -111,6 +111,7 @@ def verdict(first, second, final, start=1.0, v=0.0, u=(0.0, 0.0), u_max=6.0, **e
     return maps.verdict_of(trace, np.array([-2.0, 1.0]), np.array([0.5, -4.0]), final)
 
 
+@pytest.mark.quick
 def test_an_early_verdict_needs_a_run_that_approaches_rests_or_fails():
     approaching = 0.03 * math.sqrt(0.9)
     assert [verdict(0.03, q * approaching, False) for q in (0.9999, 1.0001)] == [CONVERGES, None]

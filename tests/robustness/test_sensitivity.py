@@ -50,6 +50,7 @@ def test_indices_of_ishigami_s_function_are_its_closed_forms():
     assert axes[3].total[:3] == (0.0, 0.0, 0.0)
 
 
+@pytest.mark.quick
 def test_an_interval_is_a_point_at_the_level_0_and_grows_to_both_sides_with_the_level(monkeypatch):
     n = 64
     designs = module.designs(64, 2, 0)

@@ -83,6 +83,7 @@ def test_the_worst_scenario_replays_in_the_class_whatever_the_threads(name):
     assert np.abs(np.array(worst_scenario.resolved.x0) - 1.5).max() <= 1.5 * within.x0 * (1 + 1e-12)
 
 
+@pytest.mark.quick
 def test_the_ends_of_a_class_are_within_it():
     """A delay and a jitter are counted in steps, and friction may be both scaled and added."""
     base = scenario(friction=smc.Coulomb(0.1), physics_step=1e-3)

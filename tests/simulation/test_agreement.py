@@ -26,6 +26,7 @@ DIFFERENT = [  # each alone against one way in which the forms differ
 ]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("law", DIFFERENT)
 def test_a_law_whose_compiled_form_differs_is_called_in_python_and_told(law):
     case = scenario(made(law), duration=0.01)

@@ -87,6 +87,7 @@ fromto="0 0 0 0 0 -.8" contype="0" conaffinity="0"/></body></worldbody>
 <actuator><motor joint="j" ctrlrange="-330 330"/></actuator></mujoco>"""
 
 
+@pytest.mark.quick
 @pytest.mark.filterwarnings("ignore:.*default gains")
 @pytest.mark.parametrize(("damping", "meets"), [(200.0, False), (20.0, True)])
 def test_a_blow_that_comes_before_the_law_has_arrived_is_said_to_meet_nothing(damping, meets):

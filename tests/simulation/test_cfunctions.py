@@ -148,6 +148,7 @@ def test_laws_of_one_name_are_all_kept():
     assert [hits(law) for law in laws + laws] == [0, 0, 0, 1, 1, 1]
 
 
+@pytest.mark.quick
 def test_a_law_with_a_very_long_name_is_kept():
     law = mine()
     law.__qualname__ = "name" * 60  # with what is added, more than the 255 bytes of a file's name

@@ -86,6 +86,7 @@ def test_callback_equals_plain_loop_where_channels_differ(traces):
         assert_same(trace, reference.run(trace.scenario))
 
 
+@pytest.mark.quick
 def test_files_and_keys_hold_what_each_channel_has(traces, tmp_path):
     keys = set()
     for i, trace in enumerate(traces):

@@ -98,6 +98,7 @@ def test_a_pause_makes_all_later_samples_later_and_covers_some():
         smc.Clock(jitter=1e-3, pause=1e-2)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("delay", [0, 3, 14])
 def test_a_command_acts_from_its_own_time_on(delay):
     """The mean force of a period is the sum of the commands in it, each from its late sample plus

@@ -201,6 +201,7 @@ def test_the_obstacles_of_the_study_are_hit():
         assert np.abs(trace.reaction).max() > 0.5, trace.scenario
 
 
+@pytest.mark.quick
 def test_realistic_mechanisms_take_the_step_of_the_study_by_default():
     steps = set()
     for key, group in brief().items():

@@ -38,6 +38,7 @@ def test_one_motion_has_one_reaction_however_its_friction_is_written():
         assert np.quantile(np.abs(trace.reaction - first.reaction), 0.99) < 2e-3
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("damping", [".5", ".1 .2 .3"])
 def test_the_reaction_of_damping_is_that_of_mujoco(damping):
     trace = swing(f'damping="{damping}"', law="none", v0=1.0)

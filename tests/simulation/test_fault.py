@@ -42,6 +42,7 @@ def impulse(t, at, gain, bias, stuck, period):
     return total[np.round(t / h).astype(int)]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("gain", "bias", "stuck"),
     [(0.5, 0.0, False), (0.0, 0.0, False), (1.0, -0.7, False), (0.4, 1.1, False), (1, 0, True)],

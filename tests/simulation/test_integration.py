@@ -59,6 +59,7 @@ def of_file(level_1, level_2):
     return text.replace("{0}/>", f'{{0}} frictionloss="{level_2}"/>', 1)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("fields", "integrator", "step"),
     [

@@ -149,6 +149,7 @@ PULL = """<tendon><fixed name="t" stiffness="3" damping="1">
 SERVO = '<position tendon="t" kp="4" kv="0.5"/>'
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     "parts",
     [

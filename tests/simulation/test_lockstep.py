@@ -91,6 +91,7 @@ def noisy(plant, law, model, velocity):
     )
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("surface", smc.laws(kind="surface"))
 def test_callback_equals_plain_loop_on_every_surface(surface):
     scenario = smc.Scenario(

@@ -49,6 +49,7 @@ def cells(shown: object) -> dict[str, str]:
     return {row[0]: row[-1] for row in rows if row}
 
 
+@pytest.mark.quick
 def test_a_scenario_shows_what_it_was_given():
     assert cells(GIVEN) == {
         "plant": "inverted_pendulum (m = 0.5, l = 0.5, b = 0.02, grav = 9.81)",

@@ -38,6 +38,7 @@ def in_two_parts(t, first, second):
     return np.where(t < AT, before, x1 + relaxed(t - AT, v1, *second)[1])
 
 
+@pytest.mark.quick
 def test_dry_and_viscous_friction_of_a_sliding_block():
     frictions = smc.Coulomb(1.0), smc.Viscous(2.0)
     factors = {"friction.level": 2.5, "friction.b": 0.5}

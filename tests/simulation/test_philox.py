@@ -58,6 +58,7 @@ def test_philox_takes_the_float_arguments_that_a_row_holds():
         np.testing.assert_array_equal(np.array(floats), numpys(seed, channel, philox.PROCESS, k))
 
 
+@pytest.mark.quick
 def test_normals_are_box_muller_of_the_top_53_bits():
     for k in range(200):
         a, b, _, _ = (int(w) >> 11 for w in numpys(5, 2, philox.MEASUREMENT, k))

@@ -60,6 +60,7 @@ SCENARIOS = {
 }
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_it_gives_the_u_and_s_of_the_run_from_the_positions_and_velocities_of_the_run(name):
     trace = smc.run(dataclasses.replace(SCENARIOS[name], duration=0.05))

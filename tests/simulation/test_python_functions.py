@@ -192,6 +192,7 @@ RUNS = {
 }
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", RUNS)
 def test_what_does_not_compile_gives_the_trace_of_the_oracle(name):
     """To the bit, and told in the same words."""

@@ -327,6 +327,7 @@ def one_batch(scenarios):
     return alone
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("name", "part"),
     list(zip(itertools.cycle(["duffing", "inverted_pendulum", "pendulum_network"]), NUMBERS)),

@@ -34,6 +34,7 @@ def at(signal, t):
     return np.array(type(signal).value(float(t), signal))
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("signal", REFERENCES, ids=repr)
 def test_derivatives_are_those_of_the_value(signal):
     """Central differences of step h miss the slope by h^2/6 times a third derivative."""

@@ -32,6 +32,7 @@ ARRAYS = (*LOGGED, "r")
 NO_ROWS = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("fields", "may"),
     [

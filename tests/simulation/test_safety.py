@@ -159,6 +159,7 @@ VANDALS = [
 ]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("function", VANDALS, ids=lambda function: function.__name__)
 def test_a_helper_that_writes_beyond_the_memory_fails_the_run_and_touches_nothing_else(function):
     good = [

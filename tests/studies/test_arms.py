@@ -27,6 +27,7 @@ def test_seeds_move_the_start_except_at_the_wall():
     assert arms.scenario("wall", LAW, 3).seed == 3
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("task", "behind"),
     [

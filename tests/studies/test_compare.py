@@ -108,6 +108,7 @@ def test_a_table_of_runs_has_the_periods_and_bounds_of_all_conditions(tmp_path):
     assert compared.tables[-2].rows[0][1:4:2] == ("3.00 N or 6.00 N", "20 or 1")
 
 
+@pytest.mark.quick
 def test_a_law_of_which_a_search_was_stuck_is_named(found):
     candidate = found.candidates["duffing"][0]
     for spread, said in ((0.9, False), (6.6, True)):

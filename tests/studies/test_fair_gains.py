@@ -32,6 +32,7 @@ def trial(folder, plants=(), starts=None, gains=GainChoice(), **effort) -> Trial
     return Trial(plants, [], 1.0, folder, Draws(12, starts), Search(**effort), gains)
 
 
+@pytest.mark.quick
 def test_laws_are_tuned_from_the_starts_of_the_packages_gains_where_these_are_compared(monkeypatch):
     searches = []
 

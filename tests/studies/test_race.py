@@ -98,6 +98,7 @@ def now(monkeypatch):
     return time
 
 
+@pytest.mark.quick
 def test_a_law_that_cannot_win_any_more_is_dropped_and_two_stay():
     J = {"a": [1.0, 1.2, 1.1], "b": [2.5, 2.41, 3.0], "c": [0.9, 1.9, 2.0]}
     assert module.hopeless(J) == {"b": pytest.approx(2.41 / 1.2)}

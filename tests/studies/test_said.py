@@ -33,6 +33,7 @@ def attacked(law: str, value: float, median: float, **fields: object) -> WorstCa
     return WorstCase(value=value, median=median, **settings | scenarios | fields)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     "field", ["value", "median", "unit", "found_by", "tried", "metric", "outside", "seed", "sets"]
 )

@@ -44,6 +44,7 @@ def shortened(scenario: smc.Scenario, duration: float = 0.1) -> smc.Scenario:
 # the scenes
 
 
+@pytest.mark.quick
 def test_the_ten_scenes_of_the_study_are_there_and_are_found_by_name():
     assert set(scenes.scenes()) == {path.stem for path in FILES}
     for name in TEN:

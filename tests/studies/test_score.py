@@ -60,6 +60,7 @@ def two(law):
     return [dataclasses.replace(base, x0=x0) for x0 in (0.1, 0.3)]
 
 
+@pytest.mark.quick
 def test_times_of_runs_that_all_never_settle_have_no_range():
     text = str(smc.score(two("none"), metrics=("settling_time",)))
     assert " never\n" in text

@@ -82,6 +82,7 @@ def test_equal_gains_are_one_run_and_the_table_has_the_source_of_this_study(fold
     assert run_key.key(tuned) == run_key.key(default)
 
 
+@pytest.mark.quick
 def test_a_table_keeps_the_search_behind_the_gains(tmp_path):
     law = gain_sets.law("duffing", "classical", seed=0)
     smc.study(smc.grid("duffing", "classical", duration=0.1), tmp_path)

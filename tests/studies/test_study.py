@@ -66,6 +66,7 @@ def raises(y, gains, memory):
 # the grid
 
 
+@pytest.mark.quick
 def test_the_grid_is_every_combination_in_order():
     scenarios = grid(
         ["duffing", "van_der_pol"],

@@ -83,6 +83,7 @@ def test_a_table_is_read_back_selected_and_run_again(tmp_path):
         table.scenario(8)
 
 
+@pytest.mark.quick
 def test_what_is_no_table_is_one_sentence(tmp_path):
     with pytest.raises(smc.ScenarioError, match="no table at"):
         Table.read(tmp_path)

@@ -39,6 +39,7 @@ from smc_mujoco.studies.recommendation import AtRest, NoLaw
 FAST = smc.law("observer_free", lam=6.0, k1=2.0)
 
 
+@pytest.mark.quick
 def test_properties_choose_laws_and_laws_with_given_gains_keep_them(tmp_path):
     machine = smc.plant("duffing")
     names = {law.name for law in module._suited(machine, ["continuous", "two-gains"], None)}

@@ -107,6 +107,7 @@ def test_a_bad_law_fails_with_a_line_of_its_first_metrics(session):
     assert "steady_error" not in said
 
 
+@pytest.mark.quick
 def test_a_bad_law_fails_with_a_table_of_its_metrics_where_more_is_asked_for(session):
     said = session(BAD, "-v", failed=1)
     assert "all metrics" not in said

@@ -23,6 +23,7 @@ def objective_of(traces):
     return sum(itae(t) / np.abs(t.x[0]).sum() + 1e-3 * tv(t) / (6.0 * 0.5) for t in traces)
 
 
+@pytest.mark.quick
 def test_objectives_are_those_of_each_law_on_its_own_unseen_instance():
     laws = []
     for k in (2.0, 4.0, 2.0):

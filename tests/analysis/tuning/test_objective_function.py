@@ -30,6 +30,7 @@ def test_it_gives_the_gains_of_each_search_the_j_that_the_search_has_on_record()
     assert objective.bounds == dict(tuned.bounds)
 
 
+@pytest.mark.quick
 def test_gains_outside_the_theorem_cost_inf_and_are_not_run():
     objective = smc.design.objective("duffing", "twisting", objective=SHORT)
     assert objective([2.0, 3.0, *[1.0] * (len(objective.bounds) - 2)]) == math.inf  # r1 < r2

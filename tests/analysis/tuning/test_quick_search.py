@@ -88,6 +88,7 @@ def test_another_draw_is_another_search_on_the_same_runs(task, tmp_path):
     assert np.isfinite(again.best.objective)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("last", [0, 3, 6])
 def test_a_search_whose_time_is_over_ends_with_the_best_set_so_far(last):
     """After so many reports; before the first evaluation it has none."""

@@ -23,6 +23,7 @@ BASE = smc.Scenario(plant="duffing", law=smc.law("pid", kp=30.0, ki=0.0, kd=1.0)
 STEPS = BASE.samples + 1
 
 
+@pytest.mark.quick
 def test_overshoot_is_of_the_way_and_only_before_an_event():
     goal = 0.2
     case = dataclasses.replace(BASE, reference=smc.Constant(goal), x0=1.2)

@@ -150,6 +150,7 @@ def check_units(name, law, model, rng):
         np.testing.assert_allclose(other_u, u, rtol=0, atol=1e-6, err_msg=str(system))
 
 
+@pytest.mark.quick
 def test_every_gain_has_a_unit_and_a_law_with_gains_can_be_tuned():
     for name in LAWS:
         law = smc.law(name)

@@ -68,6 +68,7 @@ def drawn(shown, points):
     return np.asarray(image)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(("followed", "first"), [(None, 50), (0, 100)])
 def test_a_trail_is_drawn_until_now_from_a_second_before_if_followed(
     trace, monkeypatch, followed, first

@@ -47,6 +47,7 @@ def trace(request, tmp_path_factory) -> smc.Trace:
 FRONT = np.array([0.0, -1.0, 0.0])
 
 
+@pytest.mark.quick
 def test_angles_are_those_of_mujoco_s_free_camera():
     turn = camera.turn(90.0, -30.0)
     assert -turn[:, 2] == pytest.approx([0.0, 0.75**0.5, -0.5])

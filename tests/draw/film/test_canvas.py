@@ -38,6 +38,7 @@ def test_a_changed_colour_or_shape_is_drawn():
             assert (changed(unlike, grey) > 50).sum() > 50
 
 
+@pytest.mark.quick
 def test_the_ground_of_van_der_pol_has_no_law_s_colour_and_two_greys():
     model = compile_model(smc.Scenario(plant="van_der_pol", law="none"))
     light, dark = (model.mat(name).rgba[:3] for name in ("energy_in", "energy_out"))

@@ -51,6 +51,7 @@ def test_pendulums_have_tiles_of_their_own():
     assert placed(traces, ["one", "two"]).lanes is None
 
 
+@pytest.mark.quick
 def test_a_long_name_is_broken_after_underscores_before_it_makes_machines_small():
     names = ["adaptive_quaternion_sliding", "geometric"]
     sizes, read = label_sizes(names, SIZE, 140.0)

@@ -95,6 +95,7 @@ def share(picture: np.ndarray, colour: str) -> float:
     return float((strong & alike).mean())
 
 
+@pytest.mark.quick
 def test_arrows_are_to_scale_and_a_bar_shows_switching():
     (trace,) = runs("van_der_pol", "sine", LAWS[:1])
     u = np.where(np.arange(301) % 2, 6.0, -3.0)[:, None]

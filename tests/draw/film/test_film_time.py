@@ -90,6 +90,7 @@ def test_panels_show_the_time_until_all_rest_and_then_the_cursor_is_gone(page):
         assert (after[panel] == page.full[panel][..., :3]).all()
 
 
+@pytest.mark.quick
 def test_all_panels_have_the_same_ticks(page):
     first, second = (panel.axes for panel in page.moving)
     assert first.get_xticks().tolist() == second.get_xticks().tolist()

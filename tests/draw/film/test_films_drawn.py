@@ -314,6 +314,7 @@ STATES = [
 ]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("parts", "moving", "resting", "touching", "dry", "stops"), STATES, ids=range(len(STATES))
 )

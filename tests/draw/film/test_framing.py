@@ -208,6 +208,7 @@ def test_bent_arrows_are_around_their_joint_and_stay_in_the_tile(monkeypatch):
                 assert stage.project(line).min() > 0.0
 
 
+@pytest.mark.quick
 def test_five_machines_keep_room_above_their_words():
     turn = camera.turn(90.0, -12.0)
     cube = world.CORNERS

@@ -44,6 +44,7 @@ def as_kept(picture):
         return np.asarray(clip.convert("RGB"), float)
 
 
+@pytest.mark.quick
 def test_each_file_is_a_clip():
     assert {path.stem for path in gallery.FOLDER.iterdir()} == set(gallery.CLIPS)
 

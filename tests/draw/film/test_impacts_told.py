@@ -55,6 +55,7 @@ def test_a_blow_is_told_with_its_peak_from_its_start_and_fades(run):
     assert all(state.colour == style.DISTURBANCE and state.peak for state in said.values())
 
 
+@pytest.mark.quick
 def test_an_impulse_that_lasts_is_no_blow():
     timeline = states.timeline(struck(0.2), np.arange(0.1, 0.3, 1e-2))
     assert not any(state.words.startswith("blow") for state in timeline if state)

@@ -54,6 +54,7 @@ def test_a_swing_is_told_in_the_unit_of_the_panel(drawn):
     assert said == ["smooth", "±2", "±6"]
 
 
+@pytest.mark.quick
 def test_a_law_that_switches_in_few_samples_has_a_lane():
     run = made(
         smc.Scenario(

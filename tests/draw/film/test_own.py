@@ -154,6 +154,7 @@ def test_a_blow_is_an_arrow_to_its_body_that_is_to_the_scale_of_the_others():
     assert np.ptp(line[:, 0]) == pytest.approx(3.0 * longest)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(("floor", "shown"), [(0.6, 0.6), (-3.0, 0.68)])  # m; -3 is out of sight
 def test_a_foreign_machine_has_its_own_floor_or_one_close_below(floor, shown):
     trace = hung(f'<geom type="plane" size="1 1 .1" pos="0 0 {floor}"/>')

@@ -48,6 +48,7 @@ def way(plant, **fields):
     return -machine.turn(None)[:, 2], data.xaxis[machine.ids[0]]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("turned", [True, False])
 @pytest.mark.parametrize(
     ("axis", "within"),  # degrees: steps of 15, and 12 from above

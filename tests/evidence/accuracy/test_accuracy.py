@@ -35,6 +35,7 @@ def pushing_away(y, gains, memory):
     return 6.0 if y.e > 0.0 else -6.0, y.e
 
 
+@pytest.mark.quick
 def test_every_law_states_its_order_of_accuracy():
     orders = {}
     for name, law in all_laws().items():

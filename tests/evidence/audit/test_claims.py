@@ -49,6 +49,7 @@ UNIVERSALS = {"11", "18", "19", "20", "24", "50", "59"}
 # checks
 
 
+@pytest.mark.quick
 def test_a_check_holds_just_where_its_relation_does():
     for relation, below, on_limit, above in (
         ("<", 1, 0, 0),

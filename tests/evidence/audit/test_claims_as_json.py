@@ -2,6 +2,7 @@
 
 import math
 
+import pytest
 from common.test_files import strict
 
 from smc_mujoco.common.files import to_json
@@ -9,6 +10,7 @@ from smc_mujoco.evidence.audit.audit import document
 from smc_mujoco.evidence.audit.verdict import Claim
 
 
+@pytest.mark.quick
 def test_numbers_beside_a_claim_are_json():
     words = dict.fromkeys(("id", "text", "where", "measured", "holds_if", "note"), "NaN")
     beside = {"tuned": {"x": math.inf}}

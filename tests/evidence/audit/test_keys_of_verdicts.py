@@ -2,11 +2,14 @@
 
 import shutil
 
+import pytest
+
 import smc_mujoco as smc
 from smc_mujoco.common import fingerprint
 from smc_mujoco.simulation.run_key import key
 
 
+@pytest.mark.quick
 def test_a_paper_changes_the_key_of_verdicts_and_no_key_of_a_run(monkeypatch, tmp_path):
     scenario = smc.Scenario(plant="duffing", law=smc.law("classical"), duration=1.0)
     package = tmp_path / "smc_mujoco"

@@ -73,6 +73,7 @@ def winding(y, gains, memory):
     return -memory[0], y.e
 
 
+@pytest.mark.quick
 def test_mutants_reverse_the_command_drop_it_forget_or_switch():
     scenario = smc.Scenario(plant="duffing", law=winding(), duration=0.05)
     laws = [variant(winding(), name) for name in MUTANTS]

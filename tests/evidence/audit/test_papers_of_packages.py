@@ -17,6 +17,7 @@ def papers_read_again():
     paper.catalogue.cache_clear()
 
 
+@pytest.mark.quick
 @pytest.mark.usefixtures("papers_read_again")
 def test_a_paper_with_something_wrong_is_left_out_of_the_list(install, tmp_path):
     folder = install(

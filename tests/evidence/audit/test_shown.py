@@ -112,6 +112,7 @@ VERDICTS = {  # of each claim: verdict, by gains, what decides by gains, slack o
 }
 
 
+@pytest.mark.quick
 def test_an_audit_says_verdicts_what_decides_and_how_far_a_check_is_from_its_limit(claims):
     for claim in claims:
         verdict, slow, tuned, first, second, slack = VERDICTS[claim.id]

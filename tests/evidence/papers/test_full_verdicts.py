@@ -51,6 +51,7 @@ def decided(claim: Claim) -> str:
     return claim.decided(name) + (f", {name} gains" if len(claim.verdicts) > 1 else "")
 
 
+@pytest.mark.quick
 def test_the_page_shows_every_claim_of_every_paper():
     assert {name: [*known(name)] for name in shipped()} == {
         name: [*paper(name).claims] for name in shipped()

@@ -361,6 +361,7 @@ SCORED += [
 ]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("id", dict.fromkeys(id for id, *_ in SCORED))
 def test_a_verdict_follows_the_scores_to_the_threshold(id):
     verdicts = [

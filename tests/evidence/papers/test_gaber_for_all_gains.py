@@ -38,6 +38,7 @@ def closed_loop(plant, lam: float, k1: float, sign: float = 1.0, mass: float = 1
     return np.roots([1.0, force - damping, force * k1 - stiffness])
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", PLANTS)
 def test_v_rises_beside_its_line_for_every_pair(name):
     """Claim 18: on alpha = 0, V' changes sign with alpha, so it is positive on one side."""

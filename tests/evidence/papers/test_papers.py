@@ -9,6 +9,7 @@ from evidence.helpers.broken_laws import survivors
 from smc_mujoco.evidence.audit.paper import paper, shipped
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", shipped())
 def test_every_claim_says_what_where_how_and_whose(name):
     about = paper(name)

@@ -154,6 +154,7 @@ def moved(scenario: Scenario, nudge: float) -> Scenario:
     return dataclasses.replace(scenario, **start)
 
 
+@pytest.mark.quick
 def test_the_golden_has_every_claim_of_every_paper():
     claims = {}
     for name in shipped():

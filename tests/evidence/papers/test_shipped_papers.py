@@ -29,6 +29,7 @@ from tests.evidence.papers.test_quick_verdicts import runs_made_once
 PAPERS = [name for name in shipped() if name != "gaber"]
 
 
+@pytest.mark.quick
 def test_at_least_five_papers_ship_with_4_to_12_claims_each():
     assert len(PAPERS) >= 5
     for name in PAPERS:

@@ -77,6 +77,7 @@ def test_noise_of_the_encoders_does_not_make_a_link_lighter(swung):
     assert identified.values["I2"] == pytest.approx(rig.values["I2"], rel=0.05)
 
 
+@pytest.mark.quick
 def test_the_published_dry_friction_is_what_its_arctangent_reaches():
     reached = np.arctan(100.0 * 20.0)  # at 20 rad/s
     published = {

@@ -13,6 +13,7 @@ RIG = smc.rig("emps")
 PROGRAM = programs.program()
 
 
+@pytest.mark.quick
 def test_the_program_is_periodic_and_as_fast_as_recorded():
     r = np.array(PROGRAM.values)
     v = np.diff(r) / PERIOD

@@ -12,6 +12,7 @@ from smc_mujoco.analysis.tuning import search
 from smc_mujoco.identification import ensemble
 
 
+@pytest.mark.quick
 def test_a_published_machine_has_laws_and_a_start_of_its_own():
     qube = smc.rig("qube_servo")
     runs = ensemble.runs(qube, seeds=1, duration=0.1)

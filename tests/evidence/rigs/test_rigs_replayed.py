@@ -49,6 +49,7 @@ def record():
     return recorded(smc.run(moving))
 
 
+@pytest.mark.quick
 def test_every_number_has_a_source_and_its_licence():
     for name in smc.rigs():
         for quantity, number in smc.rig(name).quantities.items():

@@ -38,6 +38,7 @@ LAYER = {
 }
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("kind", LAYER)
 def test_a_law_is_within_its_layer_the_linear_law_that_was_read(kind):
     linearised_at = {

@@ -25,6 +25,7 @@ def row(machine, record, figure, variant=""):
     return match
 
 
+@pytest.mark.quick
 def test_whether_a_record_was_used_follows_from_the_rig(monkeypatch):
     held = row("qube_servo", "11", "theta rms")
     assert held.use == twin_figures.HELD_OUT

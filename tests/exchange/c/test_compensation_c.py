@@ -99,6 +99,7 @@ def own(y, p, memory):
     return p.level
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("feedforward", "more", "words"),
     [

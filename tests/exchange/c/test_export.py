@@ -194,6 +194,7 @@ def test_every_law_in_single_precision_compiles_without_a_double_in_it(folder):
     assert done.returncode == 0
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("plant", PLANTS)
 def test_fixed_point_is_the_library_s_to_the_last_bit(folder, plant):
     (folder / "q15.c").write_text(

@@ -104,6 +104,7 @@ def test_firmware_gives_what_a_run_gives_from_what_was_measured_there(tmp_path, 
     assert len(np.unique(controls, axis=0)) > 100
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("law", "said"),
     [

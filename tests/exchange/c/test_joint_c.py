@@ -300,6 +300,7 @@ def test_a_law_written_out_and_read_back_gives_its_own_trace_to_the_last_bit(tra
         assert len(np.unique(ours.u, axis=0)) > 50
 
 
+@pytest.mark.quick
 def test_gains_by_joint_and_shared_ones_are_read_back(compiled):
     law, c = compiled["with gains by joint"]
     assert dict(c.gains) == dict(law.gains)

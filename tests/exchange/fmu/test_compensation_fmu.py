@@ -25,6 +25,7 @@ WAYS = {
 }
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("way", WAYS)
 def test_u_and_compensation_have_the_bits_of_a_run(tmp_path, way):
     fields, rubs, on = WAYS[way]

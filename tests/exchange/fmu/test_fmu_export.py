@@ -216,6 +216,7 @@ def test_instances_in_one_process_do_not_share_their_memory(twisting):
     )
 
 
+@pytest.mark.quick
 def test_reset_forgets_everything(twisting):
     fmu = Importer(*twisting, law__k1=1.0)
     expected = []

@@ -168,6 +168,7 @@ def expected(trace: smc.Trace, k: float = 8.0) -> np.ndarray:
     return np.array(u)
 
 
+@pytest.mark.quick
 def test_a_foreign_fmu_keeps_its_period_and_its_state(foreign):
     law = smc.exchange.law_from_fmu(foreign, **RENAMED)
     function = law.function

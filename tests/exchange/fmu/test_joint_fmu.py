@@ -121,6 +121,7 @@ def test_an_fmu_gives_what_a_run_gives(made, folder, name):
         np.testing.assert_array_equal(u_and_s, expected)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", CASES)
 def test_its_inputs_are_those_that_the_law_reads(made, name):
     read = {

@@ -77,6 +77,7 @@ def at_goal(model, data):
         mujoco.mj_initCtrlHistory(model, data, i, times, values)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
 def test_each_joint_keeps_the_delay_of_its_actuator(integrator):
     parts = SERVO % (LATE % (0.012, 12)), MOTOR % (LATE % (0.003, 3))

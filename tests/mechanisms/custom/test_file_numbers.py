@@ -41,6 +41,7 @@ WRONG = [  # in the file, in its place, what the sentence says
 ]
 
 
+@pytest.mark.quick
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("text", [MJCF, URDF], ids=["mjcf", "urdf"])
 def test_a_file_whose_numbers_a_machine_may_have_is_read(text, tmp_path):

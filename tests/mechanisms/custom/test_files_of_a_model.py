@@ -22,6 +22,7 @@ NO_XML = {
 }
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("kind", NO_XML)
 def test_what_a_file_includes_counts_though_the_file_is_no_xml(kind, tmp_path):
     before, name, tail = NO_XML[kind]

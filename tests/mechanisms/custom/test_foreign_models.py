@@ -100,6 +100,7 @@ def ran(name):
     return traces
 
 
+@pytest.mark.quick
 @FOREIGN
 @pytest.mark.parametrize("name", ROAD)
 def test_laws_run_on_a_foreign_model_and_its_columns_are_its_joints(name):

@@ -167,6 +167,7 @@ def test_a_tumbling_body_keeps_its_angular_momentum_and_energy_and_falls_on_a_pa
     np.testing.assert_allclose(trace.x[:, :3], fallen, atol=1e-9)
 
 
+@pytest.mark.quick
 def test_rotors_that_saturate_keep_the_torques_and_give_up_thrust(drone):
     """The firmware takes the excess of the largest from all four, and then cuts at 0."""
 

@@ -51,6 +51,7 @@ FOLLOW = {
 }
 
 
+@pytest.mark.quick
 def test_laws_of_many_joints_track_on_every_joint(jaco):
     for trace in smc.run([moving(jaco, law) for law in FOLLOW]):
         error = np.abs(trace.x - trace.r).max(axis=0)

@@ -114,6 +114,7 @@ def test_the_regulator_stands_and_its_trace_comes_back(make, tilt, tmp_path):
     assert again.scenario.plant == plant
 
 
+@pytest.mark.quick
 def test_the_order_of_measured_joints_is_that_of_the_channels():
     x0 = {"slide": 0.1, "low": 0.02, "high": -0.03}
     traces = []

@@ -97,6 +97,7 @@ def posed(name, x):
     return model, data, model.joint(joint).dofadr[0]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", MACHINES)
 def test_a_locked_joint_leaves_every_pose_and_the_channel_s_load(name, seed):

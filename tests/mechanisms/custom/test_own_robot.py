@@ -45,6 +45,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.quick
 def test_a_text_says_of_a_channel_what_python_says(folder):
     said = as_plant("mine.xml:lift(motor,partner=tilt,u_max=30,x0=0.1,partner_x0=-0.2)")
     channel = smc.Channel(

@@ -51,6 +51,7 @@ def test_a_payload_is_a_point_mass_at_the_centre_of_mass_that_no_other_mass_scal
     assert "hand.payload + 0.4 kg" in runs[1].scenario.plant.change(carried)
 
 
+@pytest.mark.quick
 def test_a_law_does_not_know_of_a_payload(arm):
     base = smc.Scenario(plant=arm, model="nominal", **RUN | {"law": "classical"})
     carrying = dataclasses.replace(base, mismatch={"hand.payload": 0.4})

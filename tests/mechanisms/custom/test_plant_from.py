@@ -211,6 +211,7 @@ def test_f_and_g_are_the_accelerations_of_the_file(name):
 # laws get f and g
 
 
+@pytest.mark.quick
 def test_seven_coupled_joints_settle_as_the_error_equation_says():
     """e'' + 20 e' + 100 e = 0: critically damped, e = (1 + 10 t) e0 exp(-10 t)."""
     plant = pusher()

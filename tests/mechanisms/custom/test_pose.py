@@ -20,6 +20,7 @@ def file(tmp_path, monkeypatch):
     return "two.xml"
 
 
+@pytest.mark.quick
 def test_joints_stand_where_the_pose_says_and_the_goal_is_there(file):
     arm = smc.plant_from(file, ["j2"], pose={"j1": -1.2, "j2": 0.3}, others="held")
     assert arm.rest == (0.3,)

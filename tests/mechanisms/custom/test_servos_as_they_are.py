@@ -119,6 +119,7 @@ def test_a_servo_hangs_by_its_load_and_an_outer_integral_removes_that():
     assert late.scenario.efforts == ("rad",)
 
 
+@pytest.mark.quick
 def test_a_bound_and_a_goal_follow_from_the_file():
     arm = smc.plant_from(
         ARM, {"a": smc.Channel(servo=True), "b": smc.Channel(servo=True)}, keyframe="home"

@@ -16,6 +16,7 @@ WHEEL = """<mujoco><worldbody><body><joint name="hinge" axis="0 1 0"/>
 <actuator><motor joint="hinge" ctrlrange="-3 3"/></actuator></mujoco>"""
 
 
+@pytest.mark.quick
 @pytest.mark.filterwarnings("ignore:LuGre's bristles")  # those of the wheel, which is light
 @pytest.mark.parametrize("name", [*smc.plants(), "wheel"])
 def test_every_condition_fits_a_plant_or_is_refused(name):

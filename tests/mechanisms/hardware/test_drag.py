@@ -26,6 +26,7 @@ def trace(friction, **fields):
     return smc.run(smc.Scenario(plant=plant, friction=friction, **fields))
 
 
+@pytest.mark.quick
 def test_a_body_slows_down_as_quadratic_and_linear_drag_say():
     v0, linear, quadratic = 2.0, 1.5, 3.0
     t = trace(Drag(0.0, quadratic), v0=v0)

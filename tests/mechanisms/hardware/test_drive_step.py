@@ -53,6 +53,7 @@ def mean_risen(t, first, second):
     return np.diff(integral) / np.diff(t)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("step", [1e-3, 2.5e-4])
 @pytest.mark.parametrize(
     ("first", "second"),

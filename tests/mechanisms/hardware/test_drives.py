@@ -64,6 +64,7 @@ def sine(t):
     return 2.0 * math.sin(5.0 * t)
 
 
+@pytest.mark.quick
 def test_a_locked_rotors_torque_comes_at_once_without_inductance():
     motor = DCMotor(inductance=0.0)
     assert driven(locked(motor), lambda t: 4.0 * motor.scale, 0.01)[:, 3] == pytest.approx(

@@ -103,6 +103,7 @@ def test_a_joint_of_an_arm_bends_where_the_others_move_it():
     assert np.abs(integrated - trace.x).max() < 1e-6
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("part", "fields"),
     [

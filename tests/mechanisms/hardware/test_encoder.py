@@ -59,6 +59,7 @@ PERFECT = smc.Encoder(counts=math.inf)
 # quantisation and bias
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(
     ("plant", "turn", "counts"),
     [

@@ -265,6 +265,7 @@ EXTRAS = [
 ]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("extra", EXTRAS)
 @pytest.mark.parametrize("plant", ["inverted_pendulum", "pendulum_network"])
 def test_the_reference_loop_does_the_same_to_the_bit(plant, extra):

@@ -66,6 +66,7 @@ def test_on_the_error_it_is_what_breaks_a_joint_away_towards_the_reference(joint
     assert abs(trace.x[-1, 0]) < 0.02
 
 
+@pytest.mark.quick
 def test_a_drive_gets_the_u_that_gives_the_force(joint):
     motor = smc.DCMotor()
     feedforward = smc.Feedforward(smc.Coulomb(0.02))

@@ -70,6 +70,7 @@ def coasting(model, v0, seconds):
     return np.array(states)
 
 
+@pytest.mark.quick
 @PLANTS
 @STEPS
 def test_a_joint_stuck_by_coulomb_friction_does_not_creep(name, h, integrator):

@@ -39,6 +39,7 @@ def scenario(friction, plant="cart_pole", **fields):
     )
 
 
+@pytest.mark.quick
 @EACH
 @CARTS
 def test_a_part_alone_is_on_the_driven_joint_and_by_name_on_any(part, plant, driven, free):

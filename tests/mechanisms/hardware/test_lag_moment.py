@@ -50,6 +50,7 @@ def test_positions_behind_a_lag_are_those_of_its_continuous_force_at_the_default
     assert trace.x[:, 0] == pytest.approx(exact(scenario.plant, 0.01, trace.u[:, 0], tau), abs=1e-9)
 
 
+@pytest.mark.quick
 def test_the_mean_of_its_force_over_a_control_period_is_in_the_trace():
     tau = 5e-3
     trace = smc.run(

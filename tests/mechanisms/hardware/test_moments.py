@@ -90,6 +90,7 @@ def same(a, b):
     return np.array_equal(a.x, b.x) and np.array_equal(a.v, b.v) and np.array_equal(a.u, b.u)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", FRICTIONS)
 def test_a_friction_never_drives(name):
     trace = smc.run(

@@ -163,6 +163,7 @@ def corners(name):
     return np.stack(np.meshgrid((-0.15, 0.15), (-0.1, 0.1), (-0.08, 0.08)), -1).reshape(-1, 3), 0.0
 
 
+@pytest.mark.quick
 @EVERY
 @pytest.mark.parametrize("direction", [(0, 0, -1), (1, 0, 0), (1.0, -2.0, 0.5), (-3, 0, 4)])
 def test_a_wall_stands_where_the_body_ends_and_the_gap(name, direction):

@@ -86,6 +86,7 @@ def test_it_rests_where_exact_steps_rest(kind, kp, kd):
     assert trace.x[-1, 0] == pytest.approx(truth, rel=0.01)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("kind", [stribeck, bounded])
 def test_it_holds_at_90_percent_of_its_breakaway_and_not_above(kind):
     held, gone = (

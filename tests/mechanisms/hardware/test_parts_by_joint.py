@@ -50,6 +50,7 @@ def scenario(**fields):
     return smc.Scenario(plant=PLANT, velocity="filtered_difference", **common | fields)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("model", ["none", "nominal"])
 @pytest.mark.parametrize(("field", "pair"), EACH, ids=str)
 def test_a_joint_with_its_own_part_moves_as_if_all_joints_had_it(field, pair, model):

@@ -17,6 +17,7 @@ AXIS = """<mujoco><worldbody><body><joint name="slide" type="slide" axis="1 0 0"
 <actuator><motor joint="slide" ctrlrange="-6 6"/></actuator></mujoco>"""
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("divisor", [1, 16])
 @pytest.mark.parametrize("plant", ["duffing", "inverted_pendulum"])
 def test_a_flank_rebounds_at_less_than_one_percent_of_its_speed(plant, divisor):

@@ -60,6 +60,7 @@ def weightless(**fields):
 # a joint that slides
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("i", range(7))
 def test_friction_at_constant_speed_is_the_published_sigmoid(i):
     """At 2 mrad/s to 10 rad/s, both ways: a flywheel of 1e12 kg keeps its speed to 1e-13."""

@@ -359,6 +359,7 @@ def test_a_missed_sample_adds_no_speed_and_the_next_adds_that_of_both():
     assert loop.motors[0].state.speed == pytest.approx(speed, rel=1e-12)
 
 
+@pytest.mark.quick
 def test_a_strong_motor_without_a_generator_has_the_wanted_acceleration():
     """The plain twin of a stepper: x'' = u, a sample late."""
     ideal = Stepper(

@@ -23,6 +23,7 @@ def cart(**fields):
     return smc.run(smc.Scenario(plant=plant, **{"law": "none", "x0": 0.0, "v0": 0.0} | fields))
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("v", [-1.0, -0.07, 0.03, 0.4])
 @pytest.mark.parametrize("width", [0.0, 0.02])
 def test_its_force_is_the_formula(v, width):
