@@ -37,7 +37,7 @@ quick: ## the first case of each test that takes little: a minute, for every cha
 
 attack: ## random scenarios and files by the thousand, for releases (7 minutes)
 	@./setup.sh requirements-test.lock
-	$(BIN)/python tests/attack.py
+	SEED=$${SEED:-$$(date +%s)} $(BIN)/python -m pytest tests/attack.py -n auto -o faulthandler_timeout=600 -o faulthandler_exit_on_timeout=true
 
 mutants: ## small faults of ROOM=metrics, drawn from SEED, and which of them its tests find
 	@./setup.sh requirements-test.lock

@@ -1,45 +1,37 @@
 """The long attack on what the suite promises: any scenario and any file ends well or in one
 sentence.
 
-    make attack                                                       # all parts, with new seeds
-    python tests/attack.py files --seed 7 --cases 8000                # one part
-    python tests/attack.py files --seed 7 --start 1234 --cases 1      # one case, as it prints it
+    make attack                                       # all parts, with a new seed
+    SEED=7 python -m pytest tests/attack.py -k files  # one part, with the seed that it was told
 
 Parts: `scenarios` (wild fields, run to a trace that is sound), `batches` (several together, the
 same bits as alone), `interrupts` (Ctrl-C, after which nothing is lost), `files` (damaged ones),
 `calls` (of functions with odd arguments), `commands`.
 Found is: an exception that is not ours, a sentence that is none, a trace with a number that was not
-computed, a crash, and a case that takes longer than LIMIT. Every case is made of its part, the seed
-and its number alone. Exit code 1 where something was found.
+computed, a crash, and cases that take too long, of which pytest ends the process. Every case is
+made of its part, the seed and its number alone.
 """
 
-import argparse
-import concurrent.futures
 import contextlib
 import dataclasses
-import faulthandler
 import functools
 import json
 import math
 import os
 import random
-import re
-import select
 import signal
-import subprocess
-import sys
 import tempfile
 import time
 import warnings
 import zipfile
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from random import Random
 from typing import Any
 
 import numpy as np
 import odd_calls
+import pytest
 import wild
 
 import smc_mujoco as smc
@@ -47,11 +39,9 @@ from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.mechanisms.rotation import pose_errors
 from smc_mujoco.simulation.state import LOGGED
 
-START = 600.0  # s in which a process is ready, compiling included
-LIMIT = 60.0  # s a case may take
-SLICE = 10_000  # cases a process at most; each process compiles its laws again, for a minute
+SEED = int(os.environ.get("SEED") or 0)
+TOGETHER = 20  # cases of a test
 MOST = 400  # physics steps times channels of a run that is played
-SCRIPT = __file__  # what a child runs
 # 10 minutes on two cores
 CASES = {
     "scenarios": 40_000,
@@ -453,133 +443,19 @@ def case(part: str, seed: int, i: int) -> tuple[str, str]:
         return "found", f"{_where(error)}: {_first(error)}"
 
 
-def child(part: str, seed: int, start: int, cases: int) -> None:
-    """Run cases, each told, on the standard output that the calls do not get."""
-    faulthandler.enable()
-    out = os.fdopen(os.dup(1), "w", buffering=1)
-    os.dup2(os.open(os.devnull, os.O_RDWR), 1)
-    if part == "files":
-        world()
-    elif part in ("calls", "commands"):
-        odd_calls.world()
-    out.write("[]\n")
-    for i in range(start, start + cases):
-        out.write(f"{json.dumps([i, *case(part, seed, i)])}\n")
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory):
+    """One folder for all cases of a process, whose files the first of them writes."""
+    return tmp_path_factory.mktemp("attack")
 
 
-def slice_of(part: str, seed: int, start: int, cases: int) -> Iterator[tuple[int, str, str]]:
-    """(case, how it ended, what was found) of a slice, each process begun again after the case that
-    ended it.
-    """
-    end = start + cases
-    while start < end:
-        with (
-            tempfile.TemporaryDirectory(prefix="attack") as folder,
-            tempfile.TemporaryFile() as errors,
-        ):
-            command = [sys.executable, SCRIPT, part, "--seed", str(seed), "--start", str(start)]
-            process = subprocess.Popen(
-                [*command, "--cases", str(end - start), "--child"],
-                cwd=folder,
-                env=os.environ | {"PYTHONPATH": str(Path(smc.__file__).parents[1]), "HOME": folder},
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=errors,
-            )
-            hung = False
-            with process:
-                for line in lines(process):
-                    hung = not line
-                    if line and (ended := json.loads(line)):
-                        yield tuple(ended)
-                        start = ended[0] + 1
-                process.kill()
-            if start < end:
-                errors.seek(0)
-                reported = []
-                for text in errors.read().decode(errors="replace").splitlines():
-                    if text.strip():
-                        reported.append(text.strip())
-                why = f"the process ended with code {process.returncode}: {' | '.join(reported[-12:])}"
-                yield start, "found", f"takes longer than {LIMIT:g} s" if hung else why
-                start += 1
-
-
-def lines(process: subprocess.Popen) -> Iterator[bytes]:
-    """The lines that a process writes, and after LIMIT without one b""."""
-    held = b""
-    pipe = process.stdout
-    limit = START
-    assert pipe is not None
-    while select.select([pipe], [], [], limit)[0]:
-        limit = LIMIT
-        if not (read := os.read(pipe.fileno(), 2**16)):
-            return
-        *full_lines, held = (held + read).split(b"\n")
-        yield from full_lines
-    yield b""
-
-
-def attacked(part: str, seed: int, start: int, cases: int, jobs: int) -> int:
-    """Run a part in slices, print what was found; how many."""
-    begun = time.monotonic()
-    ends = Counter()
-    kinds = Counter()
-    size = min(SLICE, -(-cases // jobs))
-    slices = []
-    for first in range(start, start + cases, size):
-        slices.append((first, min(size, start + cases - first)))
-    with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-        for results in pool.map(lambda piece: list(slice_of(part, seed, *piece)), slices):
-            for i, end, why in results:
-                ends[end] += 1
-                if why:
-                    kind = re.sub(r"\(.*\)|0x\w+|\d+\.?\d*", "", why)[:90]
-                    kinds[kind] += 1
-                    if kinds[kind] <= 3:
-                        again = f"python tests/attack.py {part} --seed {seed} --start {i} --cases 1"
-                        print(f"  {why}\n    {again}", flush=True)
-    reported = ", ".join(f"{count} {end}" for end, count in sorted(ends.items()))
-    seconds = time.monotonic() - begun
-    print(
-        f"{part}: seed {seed}, {sum(ends.values())} cases from {start}, {seconds:.0f} s: {reported}",
-        flush=True,
-    )
-    return ends["found"]
-
-
-def main() -> int:
-    """The command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__.split("\n", maxsplit=1)[0] if __doc__ else None
-    )
-    parser.add_argument("part", nargs="?", choices=[*PARTS, "all"], default="all")
-    parser.add_argument("--seed", type=int, help="default: a new one")
-    parser.add_argument("--start", type=int, default=0, help="the first case")
-    parser.add_argument("--cases", type=int, help="how many of each part")
-    parser.add_argument("--jobs", type=int, default=2, help="processes at once")
-    parser.add_argument("--child", action="store_true", help=argparse.SUPPRESS)
-    options = parser.parse_args()
-    if options.seed is None:
-        seed = random.SystemRandom().randrange(10**6)
-    else:
-        seed = options.seed
-    if options.child:
-        child(options.part, seed, options.start, options.cases)
-        return 0
-    if options.part == "all":
-        parts = list(PARTS)
-    else:
-        parts = [options.part]
-    print(f"seed {seed}; a case may take {LIMIT:g} s", flush=True)
-    return int(
-        sum(
-            attacked(part, seed, options.start, options.cases or CASES[part], options.jobs)
-            for part in parts
-        )
-        > 0
-    )
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+@pytest.mark.parametrize(
+    ("part", "start"),
+    [(part, start) for part in PARTS for start in range(0, CASES[part], TOGETHER)],
+)
+def test_nothing_is_found(part, start, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("HOME", str(folder))
+    for i in range(start, start + TOGETHER):
+        _, why = case(part, SEED, i)
+        assert not why, f"case {i} of {part}, seed {SEED}: {why}"

@@ -2,7 +2,6 @@
 thousand.
 """
 
-import re
 import signal
 from random import Random
 
@@ -70,44 +69,6 @@ def test_arrays_and_others_where_a_list_a_table_or_a_flag_belongs_are_refused():
 
 
 # what the attack finds
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("part", "broken", "words"),
-    [
-        ("scenarios", "raise ZeroDivisionError('wild')", "ZeroDivisionError in .*: wild"),
-        ("files", "__import__('os').abort()", "the process ended with code -6"),
-        ("files", "__import__('time').sleep(60.0)", "takes longer than 1 s"),
-    ],
-)
-def test_the_attack_finds_exceptions_crashes_and_hangs(part, broken, words, tmp_path, monkeypatch):
-    """A child whose second case is broken: it is found, and the cases behind it run."""
-    script = tmp_path / "broken.py"
-    path = []
-    for place in (attack.HERE, attack.HERE.parent):
-        path.append(str(place))
-    script.write_text(f"""
-import sys
-sys.path[:0] = {path!r}
-import attack
-def broken(random):
-    if calls.append(1) or len(calls) == 2 - start:
-        {broken}
-    return "ran"
-start, calls = int(sys.argv[sys.argv.index("--start") + 1]), []
-attack.world, attack.PARTS[{part!r}] = int, broken
-sys.exit(attack.main())
-""")
-    monkeypatch.setattr(attack, "SCRIPT", str(script))
-    monkeypatch.setattr(attack, "LIMIT", 1.0)
-    (first, fine, _), (second, outcome, why), *rest = attack.slice_of(part, 0, 0, 4)
-    assert first == 0
-    assert fine == "ran"
-    assert second == 1
-    assert outcome == "found"
-    assert re.search(words, why)
-    assert [i for i, _, _ in rest] == [2, 3]
 
 
 def test_a_case_is_the_same_again():
