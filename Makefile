@@ -12,7 +12,7 @@ WITH_GPU = $(BIN)/python -c "import numba_cuda, mujoco_warp" 2>/dev/null || \
 	$(BIN)/python -m pip install --quiet -e ".[gpu]" || \
 	echo "smc-mujoco: could not install the extra gpu" >&2
 
-.PHONY: help demo promised test slow quick attack mutants check docs lowest without entered tagged build gains gallery bench size gpu cardless newer lock setup sanitized
+.PHONY: help demo promised test slow quick attack mutants check docs lowest without entered tagged build gains gallery bench size gpu cardless newer lock setup sanitized snippets
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -50,7 +50,9 @@ check: ## lint, format, types, and names that say what they hold
 	$(BIN)/python -m pytest -q tests/test_names.py
 	@# without this variable pyright asks the package index for a newer version of itself
 	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright --pythonpath $(BIN)/python
-	@# what a user's type checkers say of README's and the tutorial's scripts
+
+snippets: ## what a user's type checkers say of README's and the tutorial's scripts; for releases, and daily
+	@./setup.sh requirements-test.lock
 	$(BIN)/python tests/snippets.py .cache/snippets
 	$(BIN)/mypy --follow-imports silent .cache/snippets
 	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright --pythonpath $(BIN)/python --project .cache/snippets

@@ -30,7 +30,7 @@ def test_every_other_file_has_a_quick_test():
     for path in (ROOT / "tests").rglob("test_*.py"):
         if "mark.quick" not in path.read_text(encoding="utf-8"):
             without.add(path.relative_to(ROOT / "tests").as_posix())
-    assert without <= NONE_QUICK
+    assert without <= NONE_QUICK, "mark a test of each that takes little: @pytest.mark.quick"
 
 
 @pytest.mark.slow

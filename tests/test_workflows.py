@@ -108,7 +108,7 @@ def test_what_only_slow_tests_hold_runs_once_a_day_and_so_does_the_rest_without_
     commands = set()
     for job in jobs(daily).values():
         commands.add(job["steps"][-1]["run"])
-    targets = "slow", "without", "cardless", "lowest", "sanitized"
+    targets = "slow", "without", "cardless", "lowest", "sanitized", "snippets"
     assert commands == {f"make {target}" for target in targets}
     rooms = sorted(ANNEXES)
     assert jobs(daily)["without"]["strategy"]["matrix"]["annex"] == [*rooms, " ".join(rooms)]

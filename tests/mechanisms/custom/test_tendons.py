@@ -163,6 +163,7 @@ def test_a_motor_that_may_push_its_tendon_is_told():
     assert run_of(plant).tension.min() == 0.0
 
 
+@pytest.mark.quick
 def test_no_other_drive_stands_on_a_joint_of_tendons():
     plant = smc.plant_from(finger(), ["j"], name="finger")
     with pytest.raises(smc.ScenarioError, match=r"tendons drive joint 'j'.*Lag.*leave actuator"):
