@@ -51,6 +51,7 @@ BLOW = {
     "friction": smc.Coulomb(0.05),
     "disturbance": smc.signals.Impulse(2.0, time=0.6, width=0.01),
 }
+TWO = "observer_free", "adaptive"  # whose machines are larger than those of four
 W = 2.0  # rad/s, of a figure of eight
 EIGHT = {
     "reference": [
@@ -61,12 +62,13 @@ EIGHT = {
     ],
     "x0": (0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
     "v0": (0.6 * W, 0.6 * W, 0.0, 0.0, 0.0, 0.0),
-    "disturbance": smc.signals.Wind(x=5.0, time=1.5, width=1.0),
+    "disturbance": smc.signals.Wind(x=6.0, time=1.5, width=1.0),
 }
 ARM = """
 <mujoco model="arm">
   <default><geom type="capsule" size="0.03" contype="0" conaffinity="0"/></default>
   <worldbody>
+    <geom name="stand" type="cylinder" size="0.05" fromto="0 0 0 0 0 0.55" rgba="0.3 0.33 0.36 1"/>
     <body name="upper" pos="0 0 0.6">
       <joint name="shoulder" axis="0 1 0" damping="0.2"/>
       <geom fromto="0 0 0 0.4 0 0" mass="1"/>
@@ -91,9 +93,9 @@ STRANGER = {
 }
 CLIPS = {  # name of the clip's file -> what it shows
     "inverted_pendulum": Clip("inverted_pendulum", "Inverted pendulum", 1.5),
-    "van_der_pol": Clip("van_der_pol", "Van der Pol, noise", 2.0, "noise"),
-    "duffing": Clip("duffing", "Duffing", 3.0),
-    "pendulum_network": Clip("pendulum_network", "Coupled pendulums", 2.0),
+    "van_der_pol": Clip("van_der_pol", "Van der Pol, noise", 2.0, "noise", laws_shown=TWO),
+    "duffing": Clip("duffing", "Duffing", 3.0, laws_shown=TWO),
+    "pendulum_network": Clip("pendulum_network", "Coupled pendulums", 2.0, laws_shown=TWO),
     "hard_stops": Clip(
         "inverted_pendulum",
         "Blow, rubber stops, friction",
@@ -118,7 +120,7 @@ CLIPS = {  # name of the clip's file -> what it shows
         "A drone in a gust",
         3.2,
         changes=EIGHT,
-        laws=("geometric", "quaternion_sliding"),
+        laws=("geometric", "adaptive_quaternion_sliding"),
     ),
 }
 

@@ -393,7 +393,8 @@ def chattering(
         sizes = number(cycle.amplitude), number(amplitude) + mark
         rates = number(cycle.frequency), number(frequency) + mark
         share = cycle.coupling if plant.driven > 1 else cycle.third_harmonic
-        rows.append((law, *sizes, *rates, _share(cycle.uncertainty), _share(share)))
+        off = "irregular" if cycle.uncertainty > 1.0 else _share(cycle.uncertainty)
+        rows.append((law, *sizes, *rates, off, _share(share)))
     notes = [NOTE] if any(change.marked for change in changes) else []
     return Tabular(headings=heads, rows=rows, title=f"chattering of {plant.name}", notes=notes)
 

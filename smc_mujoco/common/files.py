@@ -5,6 +5,7 @@ and infinity.
 import contextlib
 import csv
 import errno
+import glob
 import hashlib
 import json
 import math
@@ -12,6 +13,7 @@ import os
 import re
 import stat
 import tempfile
+import time
 import uuid
 import zipfile
 from collections.abc import Iterator, Mapping
@@ -27,6 +29,7 @@ MAX_SIZE = 2 * 10**9  # bytes of a file that is read: chosen
 MAX_UNPACKED = 500_000_000  # bytes of an archive
 MAX_RATIO = 20  # of them per byte packed
 MAX_MEMBERS = 10_000  # files of an archive
+ABANDONED = 24 * 3600  # s since anything was written to a file that is not whole
 # numbers that JSON lacks
 NON_FINITE = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}
 
@@ -300,6 +303,14 @@ def replacing(path: Path) -> Iterator[Path]:
             part.replace(path)
         finally:
             part.unlink(missing_ok=True)
+
+
+def clear_abandoned(path: Path) -> None:
+    """Delete the parts of a file that processes have left which were killed a day ago or before."""
+    for part in path.parent.glob(f".{glob.escape(path.stem)}.{32 * '?'}{path.suffix}"):
+        with contextlib.suppress(OSError):
+            if time.time() - part.stat().st_mtime > ABANDONED:
+                part.unlink()
 
 
 def own(path: Path) -> bool:

@@ -1,6 +1,5 @@
 """Figures: x, u and s of several runs over time with their phase portrait."""
 
-import math
 import operator
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -648,7 +647,7 @@ def _key(shown: Sequence[Panel], events: Sequence[style.Event]) -> list[Handle]:
         else:
             handles.append(pages.entry(label, lw=thin))
     if events:
-        kinds = dict.fromkeys("blow" if math.isfinite(e.stop) else "change" for e in events)
+        kinds = dict.fromkeys(event.kind for event in events)
         label = f"dots: {' or '.join(kinds)}"
         handles.append(pages.entry(label, style.INK, lw=thin, ls=drawing.DOTS))
     return handles

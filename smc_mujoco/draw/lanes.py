@@ -99,7 +99,7 @@ def below_film(
         if panel.quantity == "largest":
             cut_peak(row.axes, row.panel)
         if laned:
-            tell_swing(row.axes, row.panel.traces[0], row.colours[0], panel.scale[0])
+            drawn += tell_swing(row.axes, row.panel.traces[0], row.colours[0], panel.scale[0])
     if panel.quantity == "x":
         drawn += mark_settled(ax, panel.traces, colours, settled)
     return drawn_rows, drawn
@@ -194,10 +194,12 @@ def apart(times: Sequence[float], least: float) -> list[float]:
     return places
 
 
-def tell_swing(lane: Axes, trace: Trace, colour: str, factor: float) -> None:
+def tell_swing(lane: Axes, trace: Trace, colour: str, factor: float) -> list[Artist]:
     """Write beside a row how far u swings at the end of the time shown, in the unit of its numbers,
-    which are `factor` times as large, with a bar; "smooth" if it does not swing.
+    which are `factor` times as large, with a bar; "smooth" if it does not swing. Return the words
+    and the bar.
     """
+    drawn: list[Artist] = []
     low, high = lane.get_ylim()
     for swings in lane.collections:
         swings.set_alpha(LANE_BAND)
@@ -214,13 +216,14 @@ def tell_swing(lane: Axes, trace: Trace, colour: str, factor: float) -> None:
         places = lane.transLimits.transform([(0.0, least), (0.0, most)])
         ends = places[:, 1]
         look: Fields = {"color": colour, "lw": style.points(3), "clip_on": False}
-        lane.plot([1.012, 1.012], ends, transform=lane.transAxes, **look)
+        drawn += lane.plot([1.012, 1.012], ends, transform=lane.transAxes, **look)
     else:
         words = "smooth"
     size = style.points(style.RC["font.size"])
     place: Fields = {"xytext": (LANE_GAP * size, 0.0), "textcoords": "offset points"}
     look: Fields = {"va": "center", "fontsize": size, "color": style.INK}
-    lane.annotate(words, (1.0, 0.5), xycoords="axes fraction", **place, **look)
+    drawn.append(lane.annotate(words, (1.0, 0.5), xycoords="axes fraction", **place, **look))
+    return drawn
 
 
 def crowded(panel: Panel, allowed: int = MAX_BANDS) -> bool:

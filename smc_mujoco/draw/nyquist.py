@@ -27,7 +27,7 @@ from smc_mujoco.simulation.trace import Trace
 
 ROW_HEIGHT = 3.4  # inches
 SPAN_FACTOR = 40.0  # from the crossing to the ends of L's frequencies and of N's amplitudes
-PLANE_EDGE = 2.5  # of the complex plane
+NEAR = 0.5  # of the complex plane, around -1
 SHOWN_PERIODS = 6  # of s
 WIDE = 1.6  # points on a full page, of the curves in the plane
 DASHES = (0, (4, 2))  # of 1/N
@@ -95,12 +95,9 @@ def nyquist(
 
 
 def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour: str) -> None:
-    """Draw L over frequency and 1/N over amplitude, and mark where they cross."""
-    ax.set(xlabel="real part", ylabel="imaginary part", aspect="equal")
-    ax.set(xlim=(-PLANE_EDGE, 0.2 * PLANE_EDGE), ylim=(-0.6 * PLANE_EDGE, 0.6 * PLANE_EDGE))
-    rule = {"color": style.RULE, "lw": style.points(0.8)}
-    ax.axhline(0.0, **rule)
-    ax.axvline(0.0, **rule)
+    """Draw L over frequency and 1/N over amplitude near -1, and mark where they cross."""
+    ax.set(xlabel="real part", ylabel="imaginary part", xlim=(-1.0 - NEAR, -1.0 + NEAR))
+    ax.axhline(0.0, color=style.RULE, lw=style.points(0.8))
     loop = Loop(scenario, channel)
     omega = math.tau * cycle.frequency
     unit = -cycle.response
@@ -118,6 +115,10 @@ def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour:
         gain = loop.gain(a, omega)
         inverses.append(1.0 / (gain or math.nan))
     inverse = np.array(inverses) / unit
+    near = np.concatenate([response, inverse])
+    near = near[np.abs(near.real + 1.0) <= NEAR]
+    largest = 1.2 * float(np.abs(near.imag).max(initial=0.0))
+    ax.set_ylim(-largest or -NEAR, largest or NEAR)
     wide = style.points(WIDE)
     ax.plot(response.real, response.imag, color=style.INK, lw=wide, label=RESPONSE)
     ax.plot(inverse.real, inverse.imag, color=colour, lw=wide, ls=DASHES, label=INVERSE)
@@ -152,6 +153,8 @@ def last_periods(ax: Axes, trace: Trace, cycle: Chattering, channel: int, colour
         low, high = ax.get_ylim()
         ax.set_ylim(low, high + 0.18 * (high - low))
         words = f"band: ±{style.short(amplitude)} {unit}, predicted"
+        if cycle.uncertainty > 1.0:
+            words += "; irregular"
         if cycle.threshold_x:
             unstable = cycle.threshold_x * amplitude / cycle.amplitude_x
             for level in (mean - unstable, mean + unstable):

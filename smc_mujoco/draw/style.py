@@ -32,7 +32,7 @@ from smc_mujoco.metrics.conventions import ChannelGroup, group_trace, groups
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation.conditions import CONDITION_FIELDS
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import Fault, Jump, Push
+from smc_mujoco.simulation.signals import Fault, Jump, Push, Wind
 from smc_mujoco.simulation.trace import Trace
 
 INK = "#1F2429"
@@ -343,6 +343,13 @@ def law_name(law: Component | str) -> str:
     return (template and template.label) or (in_words(name) if name in all_laws() else name)
 
 
+def run_name(trace: Trace) -> str:
+    """Return the label of a run's law; where servos hold the joints without one, "Servo alone"."""
+    law = trace.scenario.law
+    held = any(group.is_set_point for group in groups(trace.scenario))
+    return "Servo alone" if held and law.name == "none" else law_name(law)
+
+
 def label(name: str) -> str:
     """Return the label of the library's law, surface or estimator of this name; other words
     unchanged.
@@ -392,7 +399,7 @@ def labels(traces: Sequence[Trace], own_labels: Sequence[str] | None) -> list[st
         for label in own_labels:
             texts.append(label if isinstance(label, str) else shown(label))
         return texts
-    names = [law_name(trace.scenario.law) for trace in traces]
+    names = list(map(run_name, traces))
     label_texts = []
     for trace, name in zip(traces, names, strict=True):
         words = differences(trace, traces)
@@ -416,11 +423,11 @@ def differences(trace: Trace, others: Sequence[Trace]) -> str:
     Where the condition differs, its name replaces the fields that are equal in all its runs.
     """
     scenario = trace.scenario
-    law = law_name(scenario.law)
+    law = run_name(trace)
     alike = []
     same = []
     for run in others:
-        if law_name(run.scenario.law) == law:
+        if run_name(run) == law:
             alike.append(run)
             if run.scenario.condition == scenario.condition:
                 same.append(run)
@@ -531,16 +538,17 @@ def ending(trace: Trace) -> str:
 
 
 class Event(NamedTuple):
-    """A change of a plant, for good, or a blow, from `time` to `stop`, s, in words."""
+    """A change of a plant, for good, a blow or a gust, from `time` to `stop`, s, in words."""
 
     time: float
     stop: float
     words: str
+    kind: str = "change"
 
 
 def events(traces: Sequence[Trace], names: Sequence[str]) -> list[Event]:
-    """Return the changes of plants, and the blows on bodies, such as "mass × 2" and "blow of 400
-    N", in the order of their times.
+    """Return the changes of plants, the blows on bodies and the gusts, such as "mass × 2", "blow of
+    400 N" and "gust of 5 m/s", in the order of their times.
 
     The labels of the runs precede what only some of them have, where these do not say so.
     """
@@ -556,7 +564,12 @@ def events(traces: Sequence[Trace], names: Sequence[str]) -> list[Event]:
             force = math.hypot(push.x, push.y, push.z)
             size = short(force)
             end = push.time + push.width
-            happened.add(Event(push.time, end, f"blow of {size} N"))
+            happened.add(Event(push.time, end, f"blow of {size} N", "blow"))
+        for wind in trace.scenario.disturbance:
+            if isinstance(wind, Wind) and wind.width:
+                speed = short(math.hypot(wind.x, wind.y, wind.z))
+                end = wind.time + wind.width
+                happened.add(Event(wind.time, end, f"gust of {speed} m/s", "gust"))
         for event in happened:
             who_at.setdefault(event, []).append(name)
     told_events = []

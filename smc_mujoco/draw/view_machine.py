@@ -299,10 +299,13 @@ class MachineNodes:
         draw_arrows(self.push_arrows, self.pushes())
 
     def controls(self) -> list[Line]:
-        """Return the lines of the arrows of u, as a film has them; of what flies none."""
+        """Return the lines of the arrows of u, as a film has them; of what flies, and of a network,
+        none.
+        """
         session = self.machines.session
         log = session.log(self.run)
-        if not len(log) or session.scenarios[self.run].plant.pose:
+        plant = session.scenarios[self.run].plant
+        if not len(log) or plant.pose or arrows.is_network(plant):
             return []
         applied = np.nan_to_num(log[-1]["applied"])
         self.largest = max(self.largest, float(np.abs(applied).max(initial=0.0)))

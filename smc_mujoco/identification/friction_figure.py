@@ -13,6 +13,7 @@ from smc_mujoco.common.aliases import AnyPath, Array, Numbers
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.identification import first_guess, records
+from smc_mujoco.identification.inverse_dynamics import COMPARED_PERIOD
 from smc_mujoco.identification.log_rig import LogRig
 from smc_mujoco.identification.paths import DELAY, steady_force
 from smc_mujoco.identification.records import Record
@@ -26,6 +27,8 @@ ROW_HEIGHT = 2.5  # inches, height of a joint's panels
 LOG_WIDTH = 2.4  # points, of a log, beside which dashes over it are seen in grey, too; chosen
 DASHES = (0, (3, 2))
 SPEEDS = 200  # of the friction's curve, on each side of 0
+REACH = 0.1  # s around the start and each turn of a joint, over which forces below 5 Hz are smeared
+SHOWN_SHARE = 0.98  # of the points, which are on the scale: single ones would set it; chosen
 
 
 def friction_figure(
@@ -47,7 +50,7 @@ def friction_figure(
     colour = style.spread(1)[0]
     handles = [
         Line2D([], [], color=style.INK, lw=LOG_WIDTH, label="log"),
-        Line2D([], [], color=colour, ls=DASHES, label="found"),
+        Line2D([], [], color=colour, ls=DASHES, label="found, replayed from the commands"),
         Line2D([], [], color=colour, lw=6.0, alpha=0.25, label="± 2 standard errors"),
     ]
     joints = channel_names(rig.plant)
@@ -61,13 +64,14 @@ def friction_figure(
             position_axes, residual_axes, friction_axes = axes[i]
             position_axes.plot(t, measured[name], color=style.INK, lw=LOG_WIDTH)
             position_axes.plot(t, predicted[name], color=colour, lw=1.2, ls=DASHES)
-            position_axes.set_title(f"log in an open loop, fit {fit[name]:.1f} %")
+            position_axes.set_title(f"fit {fit[name]:.1f} %")
             position_axes.set_ylabel(style.folded(f"{joint} ({unit})"))
             speed = records.rate(measured[name], records.step_of(t))
             residual_axes.axhline(0.0, color=style.RULE, lw=0.8)
             residual = measured[name] - predicted[name]
             factor, short = style.prefixed(float(np.abs(residual).max()), unit)
             residual_axes.plot(speed, factor * residual, ".", ms=1.5, color=colour)
+            fit_to(residual_axes, factor * residual, np.zeros(1))
             residual_axes.set_title(f"residual ({short})")
             _friction(friction_axes, rig, covariance, i, forces, colour)
         speed_label = f"speed ({rig.plant.units[-1]}/s)"
@@ -86,13 +90,28 @@ def _friction(
     ax.plot(speeds[:, i], points[:, i], ".", ms=1.5, color=style.INK, alpha=0.3)
     reach = float(np.abs(speeds[:, i]).max()) or 1.0
     side = np.linspace(1e-3 * reach, reach, SPEEDS)
+    curves = []
     for v in (-side[::-1], side):
         curve = friction(rig, rig.values, i, v)
         error = 2.0 * curve_error(rig, covariance, i, v)
         ax.plot(v, curve, color=colour, lw=1.2)
         ax.fill_between(v, curve - error, curve + error, color=colour, alpha=0.25, lw=0.0)
+        curves += [curve - error, curve + error]
+    fit_to(ax, points[:, i], np.concatenate(curves))
     effort = rig.plant.efforts[i].replace(" ", "·")
     ax.set_title(f"friction ({effort})")
+
+
+def fit_to(ax: Axes, points: Array, curves: Array) -> None:
+    """Fit the vertical range to curves, (K,), and to most of the points, (M,)."""
+    share = 0.5 * (1.0 - SHOWN_SHARE)
+    seen = points[np.isfinite(points)]
+    ends = np.quantile(seen, (share, 1.0 - share)) if len(seen) else curves
+    low = min(float(curves.min()), *ends.tolist())
+    high = max(float(curves.max()), *ends.tolist())
+    margin = 0.1 * (high - low)
+    if margin > 0.0:
+        ax.set_ylim(low - margin, high + margin)
 
 
 def friction(rig: LogRig, values: Numbers, i: int, v: Array) -> Array:
@@ -131,7 +150,7 @@ def curve_error(rig: LogRig, covariance: Array, i: int, v: Array) -> Array:
 
 def measured_friction(rig: LogRig, record: Record) -> tuple[Array, Array]:
     """Return speeds, and the forces of a log less those of inertia, gravity and springs, (M, n)
-    each, below 5 Hz: what is left is friction.
+    each, below 5 Hz: what is left is friction. NaN where a joint turns, or starts.
     """
     rubbing = {}
     for name in rig.plant.parameters:
@@ -155,6 +174,11 @@ def measured_friction(rig: LogRig, record: Record) -> tuple[Array, Array]:
         points[:, i] += friction_of_model(frictionless.plant, i, v[:, i])
     for i, motor in enumerate(_motors(rig)):
         points[:, i] += motor.force_of(u[:, i], x[:, i] - rig.zeros[i], v[:, i])
+    reach = round(REACH / COMPARED_PERIOD)
+    for i in range(v.shape[1]):
+        turns = np.flatnonzero(np.diff(np.sign(v[:, i])))
+        for turn in (0, *turns.tolist()):
+            points[max(turn + 1 - reach, 0) : turn + 1 + reach, i] = np.nan
     return v, points
 
 

@@ -116,6 +116,11 @@ class ChannelGroup:
     driven: bool  # whether they have actuators
     channels: tuple[int, ...]  # their indices, ascending
 
+    @property
+    def is_set_point(self) -> bool:
+        """Whether their u is what a servo holds, and no force or voltage."""
+        return self.effort.removesuffix("/s") == self.unit.removesuffix("/s")
+
 
 def groups(machine: Plant | Scenario) -> tuple[ChannelGroup, ...]:
     """Return the groups of a plant, or of a scenario's plant, driven groups first.

@@ -15,6 +15,7 @@ from smc_mujoco.common.text import capital, joined, number
 from smc_mujoco.control.component import gains_text
 from smc_mujoco.problems.tracking import tracking_suites
 from smc_mujoco.problems.tracking_entry import beside_of
+from smc_mujoco.problems.tracking_picture import draw, shown
 from smc_mujoco.problems.tracking_results import (
     FLOOR,
     ProblemBoard,
@@ -43,7 +44,7 @@ def page(board: TrackingBoard, picture: str) -> str:
         "",
         f"![Error of each entry over the least of its problem]({picture})",
         "",
-        "*In colour: entries that no other leads in some problem.*",
+        f"*In colour: entries that no other leads in some problem.{_left_out(board)}*",
         "",
         suite.about,
         "",
@@ -84,6 +85,12 @@ def page(board: TrackingBoard, picture: str) -> str:
         lines += [f"## {problem.name}", "", f"{why}. `{problem.load}`; {limit}.", ""]
         lines += [*problem_table(board, result), ""]
     return "\n".join(lines)
+
+
+def _left_out(board: TrackingBoard) -> str:
+    """Return how many entries the picture leaves out, in words; "" if none."""
+    count = len(board.entries) - len(shown(board))
+    return f" {count} more have larger errors." if count else ""
 
 
 def _hard_to_tell(board: TrackingBoard) -> Iterator[str]:
@@ -138,8 +145,8 @@ def page_name(board: TrackingBoard) -> str:
 
 def problem_table(board: TrackingBoard, result: ProblemBoard) -> Iterator[str]:
     """Yield the table of a problem: the first entries, and those that no other leads."""
-    yield "| entry | error, counts | other | without | u varies | gains |"
-    yield "|---|---|---|---|---|---|"
+    yield "| entry, its gains | error, counts | other | without | u varies |"
+    yield "|---|---|---|---|---|"
     stands = [*result.names[:FIRST]]
     stands += [name for name in result.leaders if name not in stands]
     for name in stands:
@@ -148,9 +155,10 @@ def problem_table(board: TrackingBoard, result: ProblemBoard) -> Iterator[str]:
         same = "" if result.of_load(name) else " ="
         low, high = result.intervals[name]
         yield (
-            f"| `{name}` | {number(worse)}{star} ({number(low)} to {number(high)}) "
+            f"| `{name}`<br><small>{gains_text(result.gains[name])}</small> "
+            f"| {number(worse)}{star} ({number(low)} to {number(high)}) "
             f"| {number(better)} | {number(result.without[name])}{same} "
-            f"| {number(result.rates[name])} | `{gains_text(result.gains[name])}` |"
+            f"| {number(result.rates[name])} |"
         )
     more = len(result.names) - len(stands)
     still, oracle = shipped_bounds(board.suite.name)[result.problem]
@@ -174,25 +182,24 @@ def tags_of(entry: TrackingResult) -> dict[str, str]:
 
 
 def tag_table(board: TrackingBoard) -> Iterator[str]:
-    """Yield the table of tags: how many entries have each, and how often one of them is not led."""
+    """Yield the table of tags: how many entries have each, in how many problems one of them is not
+    led, and the median of their errors.
+    """
     values: dict[tuple[str, str], set[str]] = {}
     for name, entry in board.entries.items():
         for pair in tags_of(entry).items():
             values.setdefault(pair, set()).add(name)
-    yield "| tag | | entries | one of them not led | median error over the least |"
-    yield "|---|---|---|---|---|"
+    yield f"| with | entries | not led, of {len(board.problems)} | error over the least |"
+    yield "|---|---|---|---|"
     ratios = relative_errors(board)
     for (tag, value), names in sorted(values.items()):
         problems = sum(bool(names & {*result.leaders}) for result in board.problems)
         typical = np.median([np.median(ratios[name]) for name in names])
-        problem_count = f"in {problems} of {len(board.problems)} problems"
-        yield f"| {tag} | {value} | {len(names)} | {problem_count} | {number(float(typical))} |"
+        yield f"| {tag}: {value} | {len(names)} | {problems} | {number(float(typical))} |"
 
 
 def write(board: TrackingBoard, path: Path) -> Path:
     """Write the page and its picture beside it. Return the page."""
-    from smc_mujoco.problems.tracking_picture import draw
-
     picture = path.with_suffix(".svg")
     draw(board, picture)
     with replacing(path) as file:

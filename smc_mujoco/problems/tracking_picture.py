@@ -8,7 +8,10 @@ from smc_mujoco.common.files import replacing
 from smc_mujoco.draw import style
 from smc_mujoco.problems.tracking_results import TrackingBoard, relative_errors
 
-ROWS = 20  # entries, those with the least mean
+ROWS = 15  # entries at most: those that stand first in some problem, and those with the least mean
+WIDTH = 5.0  # inches: letters of 8 points can be read on a phone, too
+ROW_HEIGHT = 0.29  # inches
+OVER = 0.43  # rows, from an entry's dots to the middle of its words
 LARGEST = 100.0  # an error over the least; larger ones, and those of failed runs, count as this one
 
 
@@ -22,33 +25,48 @@ def means(board: TrackingBoard) -> dict[str, float]:
     return dict(sorted(typical.items(), key=lambda pair: pair[1]))
 
 
+def shown(board: TrackingBoard) -> list[str]:
+    """Return the entries in the picture, those with the least mean first."""
+    typical = means(board)
+    leading = {entry for result in board.problems for entry in result.leaders}
+    in_order = sorted(typical, key=lambda entry: entry not in leading)
+    return sorted(in_order[:ROWS], key=lambda entry: typical[entry])
+
+
 def draw(board: TrackingBoard, path: Path) -> None:
     """Draw the picture as SVG: in colour the entries that no other leads in some problem."""
     errors = relative_errors(board)
     typical = means(board)
-    rows = list(typical)[:ROWS][::-1]
-    leading = {entry for result in board.problems for entry in result.leaders}
-    with style.page():
+    rows = shown(board)
+    count = len(board.problems)
+    with style.page(WIDTH):
         import matplotlib.pyplot as plt
 
-        figure, ax = plt.subplots(figsize=(style.FULL_WIDTH, 0.34 * len(rows) + 1.2))
+        figure, ax = plt.subplots(figsize=(WIDTH, ROW_HEIGHT * len(rows) + 0.6))
         for row, entry in enumerate(rows):
-            colour = style.MUTED
-            if entry in leading:
-                colour = style.law_colour(board.entries[entry].law)
+            led = sum(entry in result.leaders for result in board.problems)
+            words, colour, weight = entry, style.MUTED, "normal"
+            if led:
+                words = f"{entry}: led by no other in {led} of {count}"
+                colour, weight = style.law_colour(board.entries[entry].law), "bold"
             dots = np.minimum(errors[entry], LARGEST)
-            ax.plot(dots, [row] * len(dots), "o", ms=4.5, alpha=0.45, color=colour, mew=0)
-            ax.plot([typical[entry]], [row], "D", ms=8, color=colour, mew=0)
+            size = style.points(6)
+            look = {"color": colour, "mew": 0, "clip_on": False}
+            ax.plot(dots, [row] * len(dots), "o", ms=size, alpha=0.5, **look)
+            ax.plot([typical[entry]], [row], "D", ms=1.6 * size, **look)
+            ax.text(1.0, row - OVER, words, color=colour, weight=weight, va="center")
         ax.set_xscale("log")
-        ax.set_xlim(0.9, 1.2 * LARGEST)
+        ax.set_xlim(0.95, 1.05 * LARGEST)
+        ax.set_ylim(len(rows) - 0.6, -2 * OVER)
         ticks = [1, 2, 5, 10, 20, 50, 100]
         ax.set_xticks(ticks, [*map(str, ticks[:-1]), "≥ 100"])
         ax.minorticks_off()
-        ax.set_yticks(range(len(rows)), rows)
+        ax.set_yticks([])
+        ax.spines["left"].set_visible(False)
         ax.set_xlabel("error over the least of its problem: a dot a problem, a diamond their mean")
         ax.grid(axis="x", color=style.GRID)
         ax.set_axisbelow(True)
-        figure.tight_layout()
+        figure.tight_layout(pad=0.4)
         with replacing(path) as file:
             figure.savefig(file, format="svg", metadata={"Date": None})
         plt.close(figure)

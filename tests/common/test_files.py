@@ -6,6 +6,8 @@ import contextlib
 import dataclasses
 import json
 import math
+import os
+import uuid
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +23,15 @@ from smc_mujoco.analysis.tuning import result
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common import files
 from smc_mujoco.common.cache import cached
-from smc_mujoco.common.files import from_json, plain, reading, replacing, to_json, writable
+from smc_mujoco.common.files import (
+    clear_abandoned,
+    from_json,
+    plain,
+    reading,
+    replacing,
+    to_json,
+    writable,
+)
 from smc_mujoco.robustness.region_of_attraction import Basin
 from smc_mujoco.robustness.region_of_attraction import load_basin as load_map
 from smc_mujoco.simulation import scenario_json
@@ -233,3 +243,17 @@ def test_what_cannot_be_written_or_found_is_one_sentence(tmp_path):
         raise OSError(5, "torn")
     with pytest.raises(smc.ScenarioError, match=r"written \(full\): make room"), files.no_room(28):
         raise OSError(28, "full")
+
+
+def test_parts_that_a_killed_process_left_are_deleted_a_day_later(tmp_path):
+    """Those that are still written stay, and files of other names."""
+    times = {"old": 0.0, "new": None}
+    for name, written in times.items():
+        for stem in ("a", "b"):
+            part = tmp_path / f".{stem}.{uuid.uuid4().hex}.mp4"
+            part.write_text(name)
+            if written is not None:
+                os.utime(part, (written, written))
+    clear_abandoned(tmp_path / "a.mp4")
+    left_parts = sorted(path.name[1] + path.read_text() for path in tmp_path.iterdir())
+    assert left_parts == ["anew", "bnew", "bold"]

@@ -435,10 +435,13 @@ def test_the_friction_panel_has_the_file_s_friction_where_none_is_searched():
 def check_friction_of_servo(rig, log):
     """Assert that the points of the panel are 0.4 v + 0.3 sign v where the joint slides."""
     v, forces = measured_friction(rig, rig.checked(log))
-    slides = np.abs(v[:, 0]) > 0.8
-    slides[:10] = False  # 0.1 s, in which the joint is brought to speed and the filter rings
+    slides = (np.abs(v[:, 0]) > 0.8) & np.isfinite(forces[:, 0])
+    assert slides.sum() > 50
     expected = 0.4 * v[slides, 0] + 0.3 * np.sign(v[slides, 0])
     np.testing.assert_allclose(forces[slides, 0], expected, atol=0.06)
+    turns = np.flatnonzero(np.diff(np.sign(v[:, 0])))
+    assert len(turns)
+    assert np.isnan(forces[turns, 0]).all()  # smoothed, they would go through 0
 
 
 def pid_log(imax, first):

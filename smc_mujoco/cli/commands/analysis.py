@@ -446,7 +446,8 @@ def chatter(
 
     If a law switches and the actuator lags, the loop oscillates without end. Amplitude and
     frequency are those at which N L = 1: N is the law's describing function, L the response of the
-    linearised mechanism. The column "±" is how far the prediction may be off. A star marks a run
+    linearised mechanism. The column "±" is how far the prediction may be off, and "irregular" where
+    that is more than 100 %, as the cycle may lock to the control's samples. A star marks a run
     that changes by more than 5 % if its start changes by a relative 1e-9, or at half the physics
     step (2.5 % without RK4). The column "third harmonic" is that over the first. With several
     driven channels, "coupling" is how far this channel's command moves another channel, over how

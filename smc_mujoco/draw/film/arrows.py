@@ -4,10 +4,10 @@ the others friction and contact alone. The constant weight of a slide counts as 
 An arrow is the mean over the time of a frame. A bar behind the control's is its range, which shows
 how far a control swings that switches faster than the film. With a drive, arrow and bar show its
 force, and a pale arrow the command. Arrows lie along a pendulum's arc, beyond the bob; or along the
-rail, above the cart in the picture. At a hinge of a user's model, whose links may have any shape,
-they bend around its axis. A free body has one arrow, of the disturbance's force; a body of a user's
-model that is pushed has one that ends before it. All are drawn over the picture, so that no link
-hides them.
+rail, above the cart in the picture, or before it where carts share one. At a hinge of a user's
+model, whose links may have any shape, they bend around its axis. A free body has one arrow, of the
+disturbance's force; a body of a user's model that is pushed has one that ends before it. A network
+has none, nor has a set-point. All are drawn over the picture, so that no link hides them.
 """
 
 import dataclasses
@@ -46,9 +46,9 @@ SLIDE_THICKNESS = 0.035  # m
 MAX_RAIL_SHARE = 0.008  # of the rail, of an arrow's thickness
 USER_LENGTH = 0.25  # at slides of a user's model, of its extent
 USER_THICKNESS = 0.012
-USER_RADIUS = 0.15  # of a bent arrow at a hinge of a user's model, of its extent
-BENT_SIZE = 0.2  # largest radius of a bent arrow, of the size of what moves
-MAX_BENT_SHARE = 0.12  # the same, of the picture's height
+USER_RADIUS = 0.2  # of a bent arrow at a hinge of a user's model, of its extent
+BENT_SIZE = 0.25  # largest radius of a bent arrow, of the size of what moves
+MAX_BENT_SHARE = 0.2  # the same, of the picture's height
 RIM = 2.0  # px, of paper around an arrow that lies over a link, of a film of full size
 MIN_PIXELS = 9.0  # px, of a film of full size: shorter arrows are not drawn
 MIN_SHAFT = 8.0  # px, of a film of full size; of an arrow that is long enough
@@ -64,13 +64,12 @@ EDGE_SHARE = 0.3  # widest edge of a hollow arrow, of its shaft
 HEAD, LESS_HEAD = 0.7, 0.5  # longest head, of its arrow, and of one with a break mark or a bar
 SUPERSAMPLING = 3  # pixels of a flat arrow for each of the picture, in both directions
 CHAIN_FACTOR = 1.6  # arrows of several pendulums are longer: they are seen from the side
-NETWORK_LENGTH = 0.72  # of the way between the outer pivots of a network, of its one arrow
 MIN_LENGTH = 0.05  # of the longest: shorter arrows are not drawn
 MAX_THICKNESS = 0.25  # of the shaft of a short arrow, of its length
 MIN_LEVER = 1e-6  # m: a body centred on its hinge has no arc for an arrow
-FLIGHT_LENGTH = 1.3  # at a free body, in radii of its largest part
-FLIGHT_THICKNESS = 0.07
-FLIGHT_DISTANCE = 0.9  # of the longest arrow, from the middle of a free body to the arrow over it
+FLIGHT_LENGTH = 3.0  # at a free body, in radii of its largest part
+FLIGHT_THICKNESS = 0.14
+FLIGHT_DISTANCE = 0.4  # of the longest arrow, from the middle of a free body to the arrow over it
 BLOW_DISTANCE = 1.1  # of an arrow, from the foot of that of a blow to the middle of its body
 MAX_BLOW = 3.0  # of the longest arrow: a stronger blow's is no longer
 COMMAND_OPACITY = 0.45  # of a command's arrow beside that of the drive's force
@@ -126,8 +125,7 @@ class Mount(NamedTuple):
     unit: float  # longest arrow at a slide, m; at a hinge, a factor on HINGE_LENGTH
     thick: float  # at a slide, m
     front: Array | None  # to the camera, (3,), for a slide that carries something
-    gap: float = RAIL_DISTANCE  # thicknesses from what slides to its nearest arrow
-    beyond: bool = False  # on the other side of a hinge than the body, in a network
+    ahead: bool = False  # at a slide, in line with what slides, from the side to which it points
     radius: float = 0.0  # of bent arrows, m; 0 for straight ones
 
 
@@ -153,12 +151,8 @@ def mounts(
         hinge = slide._replace(unit=1.0, radius=USER_RADIUS * extent)
     else:
         thick = min(SLIDE_THICKNESS, MAX_RAIL_SHARE * rail)
-        slide = Mount(0, SLIDE_LENGTH * rail, thick, front, beyond=is_network(plant))
+        slide = Mount(0, SLIDE_LENGTH * rail, thick, front)
         turning = CHAIN_FACTOR if plant.n > 1 else 1.0
-        if is_network(plant):
-            pivots = model.body_pos[model.jnt_bodyid[list(joints)]]
-            way = float(np.linalg.norm(np.ptp(pivots, axis=0)))
-            turning = NETWORK_LENGTH * way / (HINGE_LENGTH * plant.parameters["l"])
         usual = catalogue().get(plant.name)
         if plant.n == 1 and "l" in plant.parameters and usual:  # as large on any rod
             turning = usual.parameters["l"] / plant.parameters["l"]
@@ -217,7 +211,7 @@ class Scale(NamedTuple):
     """The largest values that arrows show, in the units of u and of a force, and those of the
     longest arrows: `longest` of forces, one in a picture, and `full` of the control.
 
-    They are of the runs that lasted, and of a network of its mean. Short peaks, such as that of an
+    They are of the runs that lasted. Short peaks, such as that of an
     estimator at the start, do not set the longest arrow, nor do blows, which are far larger than
     what drives the machine.
     """
@@ -232,11 +226,7 @@ class Scale(NamedTuple):
 
 
 def _of_one_unit(traces: Sequence[Trace]) -> dict[ChannelGroup, Sequence[Trace]]:
-    """Return the traces of each group of channels, or of each channel where units of u differ;
-    of a network, its means.
-    """
-    if is_network(traces[0].scenario.plant):
-        traces = list(map(mean_trace, traces))
+    """Return the traces of each group of channels, or of each channel where units of u differ."""
     traces_by_group = {}
     for group, parts in style.split(traces).items():
         if group.effort or traces[0].scenario.plant.pose:
@@ -267,7 +257,7 @@ def scales(traces: Sequence[Trace]) -> dict[ChannelGroup, Scale]:
         if not group.driven and traces[0].scenario.plant.base >= 0:
             reaction = 0.0  # the floor's, which bears the machine
         brief.append(reaction)
-        if not group.driven:
+        if not group.driven or group.is_set_point:
             scale_by_group[group] = Scale(0.0, 0.0, reaction)
             continue
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
@@ -323,15 +313,20 @@ def rgba(colour: str, opacity: float = 1.0) -> tuple[float, ...]:
 
 
 def key(traces: Sequence[Trace], scales: Mapping[ChannelGroup, Scale]) -> list[str]:
-    """Return what the longest arrow of a picture is, such as "→ u 6 N", and how much of a network
-    is shown.
+    """Return what the longest arrow of a picture is, such as "→ u 6 N"; or how much of a network
+    is shown, which has no arrows.
 
-    Arms have no arrows but those with their numbers beside them.
+    Arms have none but those with their numbers beside them.
     """
     plant = traces[0].scenario.plant
     if plant.tip:
         return []
     words = []
+    if is_network(plant):
+        count = max(trace.scenario.plant.n for trace in traces)
+        if count > world.MAX_CHANNELS:
+            words.append(f"{world.MAX_CHANNELS} of {count} pendulums")
+        return words
     drive = any(scale.drive for scale in scales.values())
     names = {"control": "drive" if drive else "u", "disturbance": "d", "reaction": "reaction"}
     for kind, name in names.items():
@@ -340,12 +335,8 @@ def key(traces: Sequence[Trace], scales: Mapping[ChannelGroup, Scale]) -> list[s
             if size := getattr(scale, kind):
                 sizes.append(f"{style.short(size)} {scale.units[kind != 'control']}")
         if sizes:
-            mean = "mean " if is_network(plant) else ""
-            words.append(f"→ {mean}{name} {', '.join(sizes)}")
+            words.append(f"→ {name} {', '.join(sizes)}")
             break
-    count = max(trace.scenario.plant.n for trace in traces)
-    if count > world.MAX_CHANNELS and is_network(plant):
-        words.append(f"{world.MAX_CHANNELS} of {count} pendulums")
     return words
 
 
@@ -397,23 +388,16 @@ def frames(
 ) -> list[Drawn]:
     """Return the arrows of a machine in each frame between `edges`, s, for what acts on its
     channels, of these scales. Blows are shown for `holds`, s, after their end.
-
-    The pendulums of a network have one arrow, of the mean of each force.
     """
     acting = loads(trace, edges)
     plant = trace.scenario.plant
-    if is_network(plant) and sizes:
-        acting = {name: mean_of(force) for name, force in acting.items()}
-        numbered_sizes = [(len(sizes) // 2, sizes[0])]
-    else:
-        numbered_sizes = list(enumerate(sizes))
     drawn_frames = []
     for k, time in enumerate(edges[1:].tolist()):
         drawn = []
         if plant.pose and sizes:
             drawn = flying(acting, k, sizes[0])
         else:
-            for i, size in numbered_sizes:
+            for i, size in enumerate(sizes):
                 for arrow in arrows(acting, k, i, size, colour):
                     drawn.append((i, arrow))
             for body, peak in blows(trace, edges[k] - holds[k], time) if sizes else ():
@@ -445,24 +429,6 @@ def is_network(plant: Plant) -> bool:
     return len(kinds) == 1
 
 
-def mean_trace(trace: Trace) -> Trace:
-    """Return a trace of a network on whose every channel the mean of each force acts."""
-    means = {}
-    for name in ("applied", "d", "force", "reaction"):
-        mean = getattr(trace, name).mean(axis=1, keepdims=True)
-        means[name] = np.repeat(mean, trace.x.shape[1], 1)
-    return dataclasses.replace(trace, **means)
-
-
-def mean_of(acting: Envelope) -> Envelope:
-    """Return what acts on the mean channel, for each of them."""
-    parts = []
-    for part in acting[1:]:
-        mean = part.mean(axis=1, keepdims=True)
-        parts.append(np.repeat(mean, part.shape[1], 1))
-    return Envelope(acting.t, *parts)
-
-
 def blows(trace: Trace, start: float, stop: float) -> list[tuple[str, Array]]:
     """Return the bodies that blows hit between two times, s, with the peak of each, (3,) N."""
     forces = []
@@ -487,6 +453,23 @@ def straight(
     return data.xpos[body] + over + along - 0.5 * force
 
 
+def bent(
+    anchor: Array, axis: Array, mount: Mount, arrow: Arrow, along: Array
+) -> tuple[Array, float] | None:
+    """Return as `path` the line of an arrow around a hinge; `along`, (m, 1), is where its points
+    are, of the longest.
+    """
+    front = mount.front + np.array([0.0, 0.0, BENT_RAISE])
+    right = np.cross(axis, front)
+    if not right.any():
+        return None
+    right /= np.linalg.norm(right)
+    sideways = np.cross(right, axis)
+    out = np.cos(MAX_SWEEP * along) * sideways + np.sin(MAX_SWEEP * along) * right
+    radius = mount.radius * (1.0 + BENT_DISTANCE * arrow.layer)
+    return anchor + radius * out, arrow.size * BENT_WIDTH * mount.radius
+
+
 def path(
     model: mujoco.MjModel, data: mujoco.MjData, mount: Mount, arrow: Arrow
 ) -> tuple[Array, float] | None:
@@ -502,19 +485,12 @@ def path(
     low, high = np.clip((arrow.low, arrow.high), -1.0, 1.0)
     along = np.linspace(low, high, 40)[:, None]  # of the longest
     if mount.radius:
-        front = mount.front + np.array([0.0, 0.0, BENT_RAISE])
-        right = np.cross(axis, front)
-        if not right.any():
-            return None
-        right /= np.linalg.norm(right)
-        sideways = np.cross(right, axis)
-        out = np.cos(MAX_SWEEP * along) * sideways + np.sin(MAX_SWEEP * along) * right
-        radius = mount.radius * (1.0 + BENT_DISTANCE * arrow.layer)
-        return anchor + radius * out, arrow.size * BENT_WIDTH * mount.radius
+        return bent(anchor, axis, mount, arrow, along)
     body = arrow_geom(model, owner)
     if body < 0:
         return None
     place = data.geom_xpos[body]
+    sides = 0.0
     if model.jnt_type[mount.joint] == mujoco.mjtJoint.mjJNT_HINGE:
         radius = model.geom_rbound[body]
         arm = np.cross(axis, np.cross(place - anchor, axis))  # a link may be beside its hinge
@@ -525,11 +501,6 @@ def path(
         out = arm / length
         width = RADIUS_SHARE * radius + LENGTH_SHARE * mount.unit * min(length, LONG_PENDULUM)
         start = radius + ARC_DISTANCE * width
-        if mount.beyond:
-            down = -1.0 if out[2] > 0.0 else 1.0
-            out = np.array([0.0, 0.0, down])
-            place = anchor
-            axis = -axis
         way = np.cross(axis, out)
     else:
         reach = mount.unit
@@ -540,12 +511,17 @@ def path(
             across = np.cross(mount.front, way)
             if np.linalg.norm(across) >= 0.1:  # else it slides to the camera
                 out = across / np.linalg.norm(across) * (1.0 if across[2] >= 0.0 else -1.0)
-        turned = out @ data.geom_xmat[body].reshape(3, 3)
+        frame = data.geom_xmat[body].reshape(3, 3)
         box = model.geom_aabb[body]
-        half = box[3:] @ np.abs(turned)
-        start = box[:3] @ turned + half + mount.gap * width
+        turned = out @ frame
+        start = box[:3] @ turned
+        if mount.ahead:
+            half = box[3:] @ np.abs(way @ frame)
+            sides = half * np.linspace(np.sign(low or high), np.sign(high or low), 40)[:, None]
+        else:
+            start += box[3:] @ np.abs(turned) + RAIL_DISTANCE * width
     start += LAYER_DISTANCE * width * arrow.layer
-    return place + start * out + reach * along * way, arrow.size * width
+    return place + start * out + (reach * along + sides) * way, arrow.size * width
 
 
 def outline(

@@ -26,7 +26,7 @@ from PIL import Image
 from smc_mujoco.common import errors, extras, gl
 from smc_mujoco.common.aliases import AnyPath, Array, Pair
 from smc_mujoco.common.errors import ScenarioError, items_of, number
-from smc_mujoco.common.files import replacing, with_ending
+from smc_mujoco.common.files import clear_abandoned, replacing, with_ending
 from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.draw import horizon, style
 from smc_mujoco.draw.decimate import end
@@ -240,6 +240,7 @@ def film(
 def write(frames: Frames, path: Path) -> Path:
     """Write frames to a file, as its ending tells, and return its path."""
     images = pictures(frames, ahead=True)
+    clear_abandoned(path)
     with replacing(path) as part, contextlib.closing(images), bar("film", len(frames)) as progress:
         WRITERS[path.suffix](frames, _counted(images, progress), part)
     return path
@@ -463,7 +464,7 @@ def placement(
         if camera.magnification(shared[2], points_of_lanes) > camera.magnification(view, points):
             tiles, labels, view = shared
             points = points_of_lanes
-            puppets = list(map(shared_picture.on_roof, puppets))
+            puppets = list(map(shared_picture.in_line, puppets))
         else:
             lanes = None
     scale = size[0] / FULL_SIZE[0]

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
@@ -14,7 +13,7 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import panels, quantities, style
 from smc_mujoco.simulation.trace import Trace
 
-FUTURE_LINE, PAST_LINE = 0.8, 1.5  # points, width of a path before and after it is flown
+PATH = 1.5  # points, width of a path
 
 
 def plane(traces: Sequence[Trace]) -> Array:
@@ -42,11 +41,9 @@ class Flight(NamedTuple):
     places: Array
 
 
-def draw_map(
-    ax: Axes, panel: panels.Panel, colours: Sequence[str]
-) -> tuple[list[Artist], list[Flight]]:
+def draw_map(ax: Axes, panel: panels.Panel, colours: Sequence[str]) -> list[Flight]:
     """Draw the paths of free bodies and of their references in `plane`, to one scale, with a title
-    that has the unit, and return the artists of the traces, and what moves.
+    that has the unit, and return what moves.
     """
     axes = plane(panel.traces)
     letters = np.array(["x", "y", "z"])
@@ -64,21 +61,18 @@ def draw_map(
     around = np.array([-half, half])
     ends = np.transpose((low + high) / 2 + around)
     ax.set(xlim=ends[0], ylim=ends[1])
-    artists: list[Artist] = []
     flights = []
     looks = style.looks(panel.traces)
     rows = zip(panel.traces, colours, looks, strict=True)
     for trace, colour, look in reversed(list(rows)):
         places = factor * trace.x[:, axes].T
-        width = style.points(FUTURE_LINE)
-        artists += ax.plot(*places, color=colour, lw=width, **look)
         thin = {"color": style.INK, "lw": style.points(0.8), "ls": panels.DASHES, "animated": True}
         if not np.ptp(trace.r[:, axes], axis=0).any():  # it stands still
             thin |= {"marker": "+", "ms": style.points(9)}
         (goal,) = ax.plot(*(factor * trace.r[:, axes].T), **thin)
-        wide = {"color": colour, "lw": style.points(PAST_LINE), "animated": True, **look}
+        wide = {"color": colour, "lw": style.points(PATH), "animated": True, **look}
         (past,) = ax.plot([], [], **wide)
         dot = panels.dot(ax, colour)
         flight = Flight(past, goal, dot, trace.t, places)
         flights.append(flight)
-    return artists, flights
+    return flights

@@ -20,6 +20,7 @@ from smc_mujoco.draw.film.puppet import Puppet
 from smc_mujoco.draw.film.stage import OUTLINE, Stage
 
 PITCH = 0.8  # of the carts' depth with their pointers, from rail to rail; chosen
+THIN = 0.75  # of arrows elsewhere, those between rails; chosen
 
 
 def places(puppets: Sequence[Puppet], turn: Array) -> Array | None:
@@ -36,9 +37,11 @@ def places(puppets: Sequence[Puppet], turn: Array) -> Array | None:
     return np.arange(len(puppets))[:, None] * PITCH * depth * near
 
 
-def on_roof(puppet: Puppet) -> Puppet:
-    """Return a machine whose arrows lie on the roof of its cart: over it is the cart behind."""
-    mounts = [mount._replace(front=None, gap=0.0) for mount in puppet.mounts]
+def in_line(puppet: Puppet) -> Puppet:
+    """Return a machine whose arrows lie before its cart: over it is the cart behind."""
+    mounts = [
+        mount._replace(front=None, ahead=True, thick=THIN * mount.thick) for mount in puppet.mounts
+    ]
     return dataclasses.replace(puppet, mounts=mounts)
 
 

@@ -1,9 +1,9 @@
 """The page of a film: a figure of its runs, with room for the pictures of the machines.
 
 Its title, labels and panels are the artists of figures (page.py, panels.py). They are drawn twice,
-with whole and with faint curves. A frame has the whole ones up to the clock and the faint ones
-after it, and costs a copy. Only what moves is drawn in each frame: the clock, what is said of a
-machine, the cursor, and the dots where the runs are.
+with and without curves. A frame has the curves up to the clock, and costs a copy. Only what moves
+is drawn in each frame: the clock, what is said of a machine, the cursor, and the dots where the
+runs are.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,6 @@ from matplotlib import rc_context
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
@@ -48,8 +47,6 @@ LEAST_TITLE = 0.75  # of the size of letters, of a long title, and of long label
 TIME_TICKS = 5  # at most
 STATE_PLACE = 0.3  # letters, of what is said of a machine, from the corner of its tile
 STATE_HEIGHT = 1.5  # letters, from the top of a tile to below what is said there
-FUTURE_LINE = 0.4  # opacity of what is still to come
-FUTURE_BAND = 0.12
 EVENT_TIME = 0.6  # s of the film over which words on what has ended fade; chosen
 PACE = "4× slower"  # at its widest
 APART = 0.5  # letters, more than which the key ends before the room for the pace; chosen
@@ -224,10 +221,11 @@ class Sheet:
             corners = tiles[:, :2] + STATE_PLACE * self.letters
             look = {"va": "top", "weight": "bold", "path_effects": [rim]}
             self.says = [self.write(*corner, **look) for corner in corners.tolist()]
-            future, self.moving, self.flights = self.draw_panels()
+            curves, self.moving, self.flights = self.draw_panels()
         self.full = self.raster()
-        fade(future)
-        self.faint = self.raster()
+        for artist in curves:
+            artist.set_visible(False)
+        self.empty = self.raster()
         self.frames = [self.box(moving_line.axes) for moving_line in self.moving]
 
     def raster(self) -> Array:
@@ -316,7 +314,7 @@ class Sheet:
         top = (1.0 - CHARTS_SHARE) * self.size[1] + 1.15 * LINE_PITCH * high
         foot = 1.15 * LINE_PITCH * high
         room = wide - label_width - EDGE * high
-        future: list[Artist] = []
+        curves: list[Artist] = []
         moving = []
         flights = []
         for k, panel in enumerate(panels):
@@ -324,7 +322,7 @@ class Sheet:
             sides = (room / self.size[0], 1.0 - (top + foot) / self.size[1])
             ax = self.page.add_axes((*corner, *sides))
             if panel.quantity == "path":
-                drawn, flights = flight.draw_map(ax, panel, self.runs.colours)
+                flights = flight.draw_map(ax, panel, self.runs.colours)
                 ax.tick_params(length=0)
             else:
                 words = joint_shortened(panel.label, room, high)
@@ -335,8 +333,8 @@ class Sheet:
                     ax, panel, runs.colours, runs.names, runs.marks, settled
                 )
                 moving += list(map(set_moving, rows))
-            future += drawn
-        return future, moving, flights
+                curves += drawn
+        return curves, moving, flights
 
     def set_time(self, ax: Axes) -> None:
         """Set the time axis of axes: all have the same ticks, whatever their width."""
@@ -365,16 +363,16 @@ class Sheet:
         """
         time = moment.time - self.start
         pixels = np.asarray(self.canvas.buffer_rgba())
-        pixels[:] = self.faint
+        pixels[:] = self.empty
         room = round(0.3 * self.letters)
         for moving_line, (left_edge, top, right, bottom) in zip(
             self.moving, self.frames, strict=True
         ):
-            share = min(1.0, time / moving_line.axes.get_xlim()[1])
-            past = np.s_[
-                top - room : bottom + room,
-                left_edge - room : left_edge + round(share * (right - left_edge)),
-            ]
+            share = time / moving_line.axes.get_xlim()[1]
+            now = left_edge + round(share * (right - left_edge))
+            if share > 1.0 - 1e-9:  # what is beside the curves is of their end
+                now = self.size[0] if right > self.size[0] / 2 else self.size[0] // 2
+            past = np.s_[top - room : bottom + room, left_edge - room : now]
             pixels[past] = self.full[past]
         for (left_edge, top, right, bottom), machine in zip(self.tiles, machines, strict=True):
             pixels[top:bottom, left_edge:right, :3] = machine
@@ -462,12 +460,3 @@ def pace_words(speed: float) -> str:
     if abs(speed - 1.0) <= 1e-9:
         return ""
     return f"{1.0 / speed:.3g}× slower" if speed < 1.0 else f"{speed:.3g}× faster"
-
-
-def fade(artists: Sequence[Artist]) -> None:
-    """Make curves and bands faint, as what is still to come is."""
-    for artist in artists:
-        if isinstance(artist, PolyCollection):
-            artist.set_alpha(FUTURE_BAND)
-        else:
-            artist.set_alpha(FUTURE_LINE * (artist.get_alpha() or 1.0))

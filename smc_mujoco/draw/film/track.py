@@ -35,7 +35,8 @@ class Motion(NamedTuple):
 
 
 class MachineTrack:
-    """A trace at the frames of a film's clock; an arm has no arrows but those of its tip.
+    """A trace at the frames of a film's clock; an arm has no arrows but those of its tip, and a
+    network none.
 
     `missed`, (frames, 3) m, is the way from a machine whose place is measured to where its
     reference wants it; (frames, 0) of others. `framing` are its arrows at the times `grid`, s, of
@@ -59,7 +60,8 @@ class MachineTrack:
         n = world.first_channels(trace.scenario).plant.n
         self.motion = motion(trace, np.union1d(grid, times))
         sizes = []
-        if scales and not trace.scenario.plant.tip:
+        plant = trace.scenario.plant
+        if scales and not plant.tip and not arrows.is_network(plant):
             sizes = arrows.scales_by_channel(scales)[:n]
         self.drawn = arrows.frames(trace, edges, self.holds, sizes, colour)
         self.framing = arrows.frames(trace, grid, np.zeros(len(grid)), sizes, colour)

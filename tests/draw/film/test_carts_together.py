@@ -173,7 +173,8 @@ def test_dots_lead_from_a_machine_that_is_followed_to_where_it_should_be(off):
     assert len(np.unique(y)) < 0.6 * np.ptp(y)  # with gaps
 
 
-def test_arrows_of_carts_on_one_picture_begin_on_the_roof_of_their_own():
+@pytest.mark.parametrize("push", [1.0, -1.0])
+def test_arrows_of_carts_on_one_picture_begin_at_the_side_to_which_they_point(push):
     """Over a cart, where they are elsewhere, stands the cart behind it."""
     runs = []
     for law in ("classical", "adaptive"):
@@ -182,11 +183,13 @@ def test_arrows_of_carts_on_one_picture_begin_on_the_roof_of_their_own():
         model, data = puppet.model, puppet.data[0]
         data.qpos[:] = puppet.start
         world.forward(model, data)
-        arrow_path = arrows.path(
-            model, data, puppet.mounts[0], arrows.Arrow(0.0, 1.0, arrows.WHITE)
-        )
+        arrow = arrows.Arrow(0.0, push, arrows.WHITE)
+        arrow_path = arrows.path(model, data, puppet.mounts[0], arrow)
         assert arrow_path
         cart = arrows.arrow_geom(model, model.jnt_bodyid[puppet.ids[0]])
         box = world.boxes(model, data)[cart]
-        assert arrow_path[0][0, :2] == pytest.approx(box[:, :2].mean(axis=0), abs=1e-6)
-        assert arrow_path[0][0, 2] == pytest.approx(box[:, 2].max(), abs=1e-6)
+        side = box[:, 0].max() if push > 0.0 else box[:, 0].min()
+        line = arrow_path[0]
+        assert line[0, 0] == pytest.approx(side, abs=1e-6)
+        assert (line[-1, 0] - side) * push > 0.0
+        assert line[:, 1:] == pytest.approx(np.tile(box[:, 1:].mean(axis=0), (40, 1)), abs=1e-6)

@@ -431,19 +431,45 @@ def test_a_cut_arrow_is_broken_and_says_its_number():
         (4.1, 20, 2.0, "2 N·m"),
     ],
 )
-def test_a_brief_peak_of_the_mean_does_not_set_the_longest_arrow(peak, samples, longest, words):
-    """One of three pendulums is driven with 6 N m, of which the arrow is the mean; brief is up to
-    2 % of its 1001 samples.
-    """
-    (trace,) = smc.run(
-        [smc.Scenario(plant=smc.plant("pendulum_network", n=3), law="none", duration=1.0)]
-    )
-    force = np.zeros((1001, 3))
-    force[:, 1] = 3.0 * np.where(np.arange(1001) < samples, -peak, 2.0)
+def test_a_brief_peak_does_not_set_the_longest_arrow(peak, samples, longest, words):
+    """Brief is up to 2 % of the 1001 samples."""
+    (trace,) = smc.run([smc.Scenario(plant="inverted_pendulum", law="none", duration=1.0)])
+    force = np.where(np.arange(1001) < samples, -peak, 2.0)[:, None]
     arrow_scales = scales([dataclasses.replace(trace, applied=force, d=force)])
     scale = arrow_scales[driven([trace])]
     assert scale.longest == scale.full == pytest.approx(longest)
-    assert key([trace], arrow_scales) == [f"→ mean u {words}"]
+    assert key([trace], arrow_scales) == [f"→ u {words}"]
+
+
+def test_a_network_has_no_arrows():
+    """One of the mean over the picture of five pendulums is seen as a force on one of them."""
+    trace = smc.run(smc.Scenario(plant="pendulum_network", law="classical", duration=0.1))
+    arrow_scales = scales([trace])
+    clock = film.FilmClock(np.array([0.0, 0.1]), np.ones(2))
+    track = MachineTrack(trace, "#000000", clock, clock.times, arrow_scales)
+    assert not any(drawn.arrows for drawn in track.drawn)
+    assert key([trace], arrow_scales) == []
+
+
+def test_a_set_point_is_no_arrow_and_without_a_law_the_servo_is_named(tmp_path):
+    """An arc of 0.4 rad read as a torque; and the servo, which holds the joint, as no control."""
+    model = """<mujoco><worldbody><body><joint name="j" axis="0 1 0"/>
+      <geom type="capsule" size=".03" fromto="0 0 0 .4 0 0"/></body></worldbody>
+      <actuator>{}</actuator></mujoco>"""
+    names = []
+    control = []
+    for actuator in ('<motor joint="j"/>', '<position joint="j" kp="60" kv="4"/>'):
+        path = tmp_path / f"{len(names)}.xml"
+        path.write_text(model.format(actuator))
+        channel = smc.Channel(u_max=3.0, servo=actuator.startswith("<position"))
+        plant = smc.plant_from(path, channels={"j": channel})
+        run = smc.run(smc.Scenario(plant=plant, law="none", x0=0.3, duration=0.1))
+        run = dataclasses.replace(run, applied=np.full_like(run.u, 0.4))
+        (scale,) = scales([run]).values()
+        control.append(scale.control)
+        names += style.labels([run], None)
+    assert control == [0.4, 0.0]
+    assert names == ["No control", "Servo alone"]
 
 
 def test_each_joint_of_a_double_pendulum_has_its_own_arrow():

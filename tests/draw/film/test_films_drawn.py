@@ -222,7 +222,7 @@ def test_panels_are_uncovered_up_to_the_clock_with_a_dot_where_each_run_is():
     lost = dataclasses.replace(lost, x=0.5 * lost.x, u=0.3 * lost.u)
     page = sheet([machine("duffing", **parts), lost], ["one", "other"])
     runs = page.runs
-    full, faint = page.full[..., :3], page.faint[..., :3]
+    full, empty = page.full[..., :3], page.empty[..., :3]
     dots_seen = []
     for time in (0.3, 0.8):
         image = picture(page, time)
@@ -231,7 +231,7 @@ def test_panels_are_uncovered_up_to_the_clock_with_a_dot_where_each_run_is():
             past = np.s_[top:bottom, left_edge : now - 14]
             future = np.s_[top:bottom, now + 14 : right]
             assert (image[past] == full[past]).all()
-            assert (image[future] == faint[future]).all()
+            assert (image[future] == empty[future]).all()
             column = image[: bottom + 20, now].astype(int)
             column[: top - 20] = 255
             for colour, (_, t, y) in zip(runs.colours, reversed(panel.dots), strict=True):

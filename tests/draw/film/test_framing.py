@@ -204,7 +204,9 @@ def test_bent_arrows_are_around_their_joint_and_stay_in_the_tile(monkeypatch):
                 line, _ = arrow_path
                 anchor = stage.project(stage.data.xanchor[[mount.joint]])
                 radius = np.linalg.norm(stage.project(line) - anchor, axis=1)
-                assert radius.max() == pytest.approx(0.12 * stage.size[1], rel=0.15)
+                assert radius.max() == pytest.approx(
+                    arrows.MAX_BENT_SHARE * stage.size[1], rel=0.15
+                )
                 assert stage.project(line).min() > 0.0
 
 

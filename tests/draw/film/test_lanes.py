@@ -30,7 +30,7 @@ def swinging(law, amplitude):
 def drawn(monkeypatch):
     said = []
     plain = lanes.tell_swing
-    monkeypatch.setattr(lanes, "tell_swing", lambda *row: (plain(*row), said.append(row)))
+    monkeypatch.setattr(lanes, "tell_swing", lambda *row: (said.append(row), plain(*row))[1])
     traces = []
     for law, amplitude in zip(LAWS, (0.0, 2.0, 6.0), strict=True):
         traces.append(swinging(law, amplitude))
