@@ -45,6 +45,7 @@ class Run:
     held: None = None
     damping: None = None
     compensation: None = None
+    tension: None = None
     diverged_at: float | None = None
     failure: str | None = None
     plant_diverged = Trace.plant_diverged
