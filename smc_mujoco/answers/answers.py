@@ -644,7 +644,7 @@ def which_lines(facts: WhichFacts, step: NextStep | None) -> list[str]:
 
 
 def _first_line(facts: WhichFacts) -> Labelled:
-    """Return what to do, in one of five forms."""
+    """Return what to do, in one of six forms."""
     size = facts.size
     part = f" ({size.raced} of {size.named} laws tried)" if size.raced < size.named else ""
     if facts.form == "untried":
@@ -658,6 +658,8 @@ def _first_line(facts: WhichFacts) -> Labelled:
     if facts.form == "unsettled":
         where = joined([c.where for c in facts.cautions if c.kind == "unsettled"])
         return "No law", f"settles under {where}; the nearest is {facts.law}{part}"
+    if facts.form == "unkept":
+        return "No law", f"keeps {joined(facts.limits)} so far; the nearest is {facts.law}{part}"
     if facts.form == "undecided":
         words = _sets(facts)
         if len(facts.undecided) > 1:
@@ -690,7 +692,7 @@ def _evidence_of_law(facts: WhichFacts) -> list[Labelled]:
         return []
     size = facts.size
     pairs = []
-    if facts.gains and facts.form in ("undecided", "unsettled"):
+    if facts.gains and facts.form in ("undecided", "unsettled", "unkept"):
         pairs.append((facts.law, _gains(facts)))
     if facts.form == "law" and facts.lead:
         how = "with these gains"

@@ -193,7 +193,7 @@ class Caution:
 class WhichFacts:
     """The answer to which law suits a plant."""
 
-    form: str  # "law", "undecided", "unneeded", "unsettled" or "untried"
+    form: str  # "law", "undecided", "unneeded", "unsettled", "unkept" or "untried"
     law: str
     gains: str
     unit: str  # of u, where it is no force
@@ -209,6 +209,7 @@ class WhichFacts:
     minutes_needed: float  # for the missing sets; NaN where that is not known
     runs: SettledRuns
     conditions: Names  # asked for
+    limits: Names  # asked for
     levels: tuple[Level, ...]
     untried: Names  # kinds of margins without time
     without: Settles | None  # how many runs settle with u = 0

@@ -45,6 +45,7 @@ DELAY_MOVES = -8e-3, -4e-3, -2e-3, -1e-3, 1e-3, 2e-3, 4e-3, 8e-3
 SPRING_FACTORS = 0.1, 0.2, 0.35, 0.6, 0.8, 1.25, 1.7, 3.0, 5.0, 10.0
 # s, of a spring's damping over its stiffness, that are tried with these; None: the present damping
 SPRING_DAMPINGS = None, 3e-4, 1e-3, 3e-3  # chosen
+FLANK_STEPS = 4  # of the states at the starts, from a flank of a play; chosen
 LEAST_DELAY_MOVE = 2.5e-4  # s, at the solution; chosen
 BETTER = 3.0  # deviations of noise, by which another delay must fit better there; chosen
 MOST_DELAYS = 3  # other delays, at most, from which a search starts again; chosen
@@ -74,7 +75,11 @@ def search(
     if starts == 1:
         best = refine(replays, first, most, tolerance)
         for _ in range(MOST_DELAYS):
-            point = _other_spring(replays, best) or _other_delay(replays, best, SMALL_CHANGE)
+            point = (
+                _other_spring(replays, best)
+                or _other_flanks(replays, best)
+                or _other_delay(replays, best, SMALL_CHANGE)
+            )
             if point is None:
                 break
             tried = refine(replays, replays.slopes(point), most, tolerance)
@@ -118,6 +123,35 @@ def _other_spring(replays: Replays, slopes: Slopes) -> Point | None:
             least = min(costs)
             best = points[costs.index(least)]
     return None if best is slopes.point else best
+
+
+def _other_flanks(replays: Replays, slopes: Slopes) -> Point | None:
+    """Return the point with the rotor of each play where it fits each piece best at the start: as
+    it is, or near either flank; None if that is the present one. The cost has a valley for each.
+    """
+    if not replays.plays.any():
+        return None
+    starts = Replays(
+        replays.rig(slopes.point),
+        [],
+        replays.data,
+        replays.closed,
+        replays.report,
+        replays.whole,
+        replays.kept,
+    )
+    states = slopes.point.states.copy()
+    costs = [cost([r]) for r in slopes.residuals]
+    for side in (-1.0, 1.0):
+        begun = starts.at_flanks(starts.start, side)
+        reached = refine(starts, starts.slopes(begun), FLANK_STEPS, SMALL_CHANGE)
+        for k, r in enumerate(reached.residuals):
+            if cost([r]) < costs[k]:
+                costs[k] = cost([r])
+                states[k] = reached.point.states[k]
+    if sum(costs) >= (1.0 - LAST_CHANGE) * slopes.cost:
+        return None
+    return Point(slopes.point.values, states)
 
 
 def _left(slopes: Slopes, rows: list[Array]) -> float:

@@ -30,6 +30,7 @@ from smc_mujoco.identification.paths import (
 )
 from smc_mujoco.identification.records import Record
 from smc_mujoco.identification.rig import RecordPart, Rig, Source, Values
+from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.current_motor import CurrentMotor
 from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
 from smc_mujoco.mechanisms.layout import channel_names, driven_names
@@ -250,6 +251,20 @@ class LogRig(Rig):
     def hidden(self) -> list[HiddenStart]:
         """What no log has at the start of a piece."""
         return hidden_starts(self.base)
+
+    @property
+    def half_plays(self) -> list[float]:
+        """Half of the play in which each hidden number stands, rad or m; 0 for what is in none."""
+        halves = []
+        actuators = self.numbers_of(Values(**self.values)).get("actuator", ())
+        for start in self.hidden:
+            joint = driven_names(self.plant)[start.channel]
+            gap = 0.0
+            for part in actuators if start.field == "lead" else ():
+                if isinstance(part, Backlash) and joint in part.joint_names(self.plant):
+                    gap = part.gap
+            halves.append(0.5 * gap)
+        return halves
 
     def hidden_spreads(self, record: Record, period: float) -> list[float]:
         """Return how far each hidden number varies in a log."""

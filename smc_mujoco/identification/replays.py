@@ -277,6 +277,27 @@ class Replays:
             states[k, -n:] = -self._part(k).state[-n:] / piece.scales[-n:]
         return Point(point.values, states)
 
+    @property
+    def plays(self) -> Array:
+        """Half of the play of each free state that is where a rotor stands in one, (s,); 0 for
+        others.
+        """
+        halves = np.zeros(len(self.free))
+        if len(self.free) == len(self.twin.hidden) + 2 * len(self.twin.columns.x):
+            halves[: len(self.twin.hidden)] = self.twin.half_plays
+        return halves
+
+    def at_flanks(self, point: Point, side: float) -> Point:
+        """Return the point with the rotor of each play on a flank of it at the start of each
+        piece: that of side -1 or 1.
+        """
+        states = point.states.copy()
+        for j in np.flatnonzero(self.plays):
+            for k, piece in enumerate(self.pieces):
+                flank = side * self.plays[j]
+                states[k, j] = (flank - self._part(k).state[j]) / piece.scales[j]
+        return Point(point.values, states)
+
     def residuals(self, points: Sequence[Point]) -> list[list[Array]]:
         """Return the residuals of each piece, (N,), at each point. All replays are one batch."""
         if not self.limit:

@@ -301,6 +301,11 @@ class Rig:
         """What no record has at the start of a piece; nothing of a published machine."""
         return ()
 
+    @property
+    def half_plays(self) -> Sequence[float]:
+        """Half of the play in which each of these stands, rad or m; 0 for what is in none."""
+        return ()
+
     def hidden_spreads(self, record: Record, period: float) -> list[float]:
         """Return how far each hidden number varies in a record."""
         del record, period

@@ -29,7 +29,7 @@ from smc_mujoco.simulation.signals import Impulse
 # All chosen.
 REACH = 1.5  # energy of a blow over what can be taken from it
 WIDTH = 5e-3  # s, of a blow
-PASSED = 0.2  # of the way from the goal to a stop, by which a joint may go into it
+PASSED = 0.05  # of the way from the goal to a stop, by which a joint may go into it
 NEAR, FAR = (
     1 / 3,
     1.5,

@@ -12,7 +12,7 @@ from smc_mujoco.analysis.paired_runs import SETTLES, values
 from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST
 from smc_mujoco.analysis.tuning.result import Tuned
-from smc_mujoco.analysis.tuning.run_limits import CALM, OVERSHOOT, RunLimit
+from smc_mujoco.analysis.tuning.run_limits import CALM, LIMIT_COST, OVERSHOOT, RunLimit
 from smc_mujoco.answers import answers
 from smc_mujoco.answers.answer import Answer
 from smc_mujoco.answers.facts import (
@@ -150,11 +150,14 @@ class Recommendation(Answer):
 
     @property
     def form(self) -> str:
-        """The kind of answer: "untried", "unneeded", "unsettled", "undecided" or "law"."""
+        """The kind of answer: "untried", "unneeded", "unsettled", "unkept", "undecided" or "law"."""
         if not self.race.laws:
             return "untried"
         if not any(done for done, _ in self.settled[self.law.name].values()):
             return "unsettled"
+        of_law = self.race.entrants[self.law.name].values if self.limits else []
+        if of_law and min(of_law) >= LIMIT_COST:  # and those of the other laws, which come after it
+            return "unkept"
         if self.law.name == WITHOUT:
             return "unneeded"
         alone = len(self.race.laws) == 1 and WITHOUT in self.race.dropped
@@ -396,6 +399,7 @@ class Recommendation(Answer):
             minutes_needed=self.minutes_needed,
             runs=self.runs,
             conditions=tuple(self.settled[self.law.name]),
+            limits=tuple(map(str, self.limits)),
             levels=tuple(self.withstood),
             untried=tuple(self.tolerance.untried),
             without=without

@@ -109,15 +109,15 @@ mass=".006" contype="0" conaffinity="0"/></body></worldbody>
 
 
 @pytest.mark.filterwarnings("ignore:.*default gains")
-def test_a_light_joint_is_stopped_within_a_quarter_of_its_way():
-    """A finger went through a stop 0.1 rad from its goal by up to 0.14 rad."""
+def test_a_light_joint_is_stopped_within_a_tenth_of_its_way():
+    """A finger went through a stop 0.1 rad from its goal by up to 0.14 rad, later by 0.011."""
     plant = smc.plant_from(FINGER, ["j"])
-    for law in ("pid", "super_twisting"):
+    for law in ("pid", "adrc"):
         (scenario,) = smc.grid(plant, smc.law(law), "contact", duration=2.0)
         trace = smc.run(scenario)
         low, high = scenario.contact[0].limits["j"]
         near = min(-low, high)
         into = max((trace.x - high).max(), (low - trace.x).max())
-        assert 0.0 < into < 0.25 * near
+        assert 0.0 < into < 0.1 * near
         assert scenario.resolved.physics_step <= 0.25 * scenario.contact[0].depth
         assert trace.failure is None

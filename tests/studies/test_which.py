@@ -226,6 +226,14 @@ def test_each_form_has_its_first_line(raced):
     assert form == "unsettled"
     assert "coulomb" in said
     assert name in said
+    broken = SimpleNamespace(values=[3e6, 2e6])
+    lost = raced_laws._replace(entrants={**raced_laws.entrants, name: broken}, comparison=None)
+    limits = (RunLimit("overshoot", 2.0),)
+    form, said = first(race=lost, limits=limits)
+    assert form == "unkept"
+    assert "overshoot < 2 % so far" in said
+    assert name in said
+    assert first(race=lost)[0] != "unkept"
     none = {race.WITHOUT: raced_laws.entrants[name]}
     form, said = first(race=raced_laws._replace(entrants=none, unsearched=["pid"]))
     assert form == "untried"
