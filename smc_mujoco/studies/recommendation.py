@@ -150,7 +150,7 @@ class Recommendation(Answer):
 
     @property
     def form(self) -> str:
-        """The kind of answer: "untried", "unneeded", "unsettled", "unkept", "undecided" or "law"."""
+        """The form of the answer, as `WhichFacts` has it."""
         if not self.race.laws:
             return "untried"
         if not any(done for done, _ in self.settled[self.law.name].values()):

@@ -226,7 +226,7 @@ def test_each_form_has_its_first_line(raced):
     assert form == "unsettled"
     assert "coulomb" in said
     assert name in said
-    broken = SimpleNamespace(values=[3e6, 2e6])
+    broken = SimpleNamespace(values=[3e6, 2e6], count=2, searched=True)
     lost = raced_laws._replace(entrants={**raced_laws.entrants, name: broken}, comparison=None)
     limits = (RunLimit("overshoot", 2.0),)
     form, said = first(race=lost, limits=limits)
