@@ -601,6 +601,7 @@ MORE_MINUTES = 30  # of a next step, where the time that is needed is not known
 # kind of a caution -> its label, and what to know and do
 CAUTIONS = {
     "unsettled": ("beware", "{count} of {of} runs settle under {where}"),
+    "never": ("beware", "no law settles under {where}"),
     "leans": ("beware", "u stays at its bound under {where}: more force, or an easier goal"),
     "together": ("beware", "{where}: {count} of {of} runs settle; if yours has all, ask for that"),
     "lower": ("beware", "{where} has the lower J, and settles too seldom"),
@@ -656,8 +657,8 @@ def _first_line(facts: WhichFacts) -> Labelled:
         below = f", and J is {_below(facts.lead)}" if facts.lead else ""
         return "No law", f"needed: u = 0 settles {_counts(facts.runs.runs)} runs{below}{part}"
     if facts.form == "unsettled":
-        where = joined([c.where for c in facts.cautions if c.kind == "unsettled"])
-        return "No law", f"settles under {where}; the nearest is {facts.law}{part}"
+        never = joined(facts.never)
+        return "No law", f"settles under {never}; the nearest is {facts.law}{part}"
     if facts.form == "unkept":
         return "No law", f"keeps {joined(facts.limits)} so far; the nearest is {facts.law}{part}"
     if facts.form == "undecided":
@@ -694,7 +695,7 @@ def _evidence_of_law(facts: WhichFacts) -> list[Labelled]:
     pairs = []
     if facts.gains and facts.form in ("undecided", "unsettled", "unkept"):
         pairs.append((facts.law, _gains(facts)))
-    if facts.form == "law" and facts.lead:
+    if facts.form in ("law", "unsettled") and facts.lead:
         how = "with these gains"
         if facts.over_sets and size.searched:
             how = f"after {size.sets} searches of each"

@@ -194,6 +194,7 @@ class WhichFacts:
     """The answer to which law suits a plant."""
 
     form: str  # "law", "undecided", "unneeded", "unsettled", "unkept" or "untried"
+    never: Names  # conditions in which no law settles
     law: str
     gains: str
     unit: str  # of u, where it is no force

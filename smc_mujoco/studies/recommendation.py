@@ -153,16 +153,18 @@ class Recommendation(Answer):
         """The form of the answer, as `WhichFacts` has it."""
         if not self.race.laws:
             return "untried"
-        if not any(done for done, _ in self.settled[self.law.name].values()):
+        if len(self.never_settled) == len(self.settled[self.law.name]):
             return "unsettled"
         of_law = self.race.entrants[self.law.name].values if self.limits else []
         if of_law and min(of_law) >= LIMIT_COST:  # and those of the other laws, which come after it
             return "unkept"
         if self.law.name == WITHOUT:
-            return "unneeded"
+            return "unsettled" if self.never_settled else "unneeded"
         alone = len(self.race.laws) == 1 and WITHOUT in self.race.dropped
         decided = alone or (self.lead and {*self.race.first} <= {*self.rivals, self.law.name})
-        return "law" if decided and not self.race.unsearched else "undecided"
+        if not decided or self.race.unsearched:
+            return "undecided"
+        return "unsettled" if self.never_settled else "law"
 
     @property
     def lead(self) -> Lead | None:
@@ -232,6 +234,15 @@ class Recommendation(Answer):
         return SettledRuns(Settles(done, total), first, last, together)
 
     @property
+    def never_settled(self) -> list[str]:
+        """The conditions in which no law settles in any run."""
+        never = []
+        for name in self.settled[self.law.name]:
+            if not any(of_law[name][0] for of_law in self.settled.values()):
+                never.append(name)
+        return never
+
+    @property
     def unsettled_in(self) -> dict[str, Settles]:
         """Condition -> how many runs of the law settle, where it does not do so reliably."""
         unsettled = {}
@@ -257,10 +268,14 @@ class Recommendation(Answer):
     def _of_runs(self) -> list[Caution]:
         """What the runs of the law warn of."""
         cautions = []
+        never = self.never_settled
         for name, runs in self.unsettled_in.items():
-            cautions.append(
-                Caution(kind="unsettled", where=name, count=runs.count, run_count=runs.total)
-            )
+            if name not in never:
+                cautions.append(
+                    Caution(kind="unsettled", where=name, count=runs.count, run_count=runs.total)
+                )
+        if never and self.form != "unsettled":  # whose first line says so
+            cautions.append(Caution(kind="never", where=joined(never)))
         if self.pictured and self.unsettled_in and leans(self.worst_trace):
             cautions.append(Caution(kind="leans", where=str(self.worst_run.condition)))
         if self.together and self.together[0] < RELIABLE * self.together[1]:
@@ -384,6 +399,7 @@ class Recommendation(Answer):
         without = self.no_law
         return WhichFacts(
             form=self.form,
+            never=tuple(self.never_settled),
             law=self.law.name,
             gains=gains_text(self.law.gains),
             unit=self._unit,

@@ -234,6 +234,17 @@ def test_each_form_has_its_first_line(raced):
     assert "overshoot < 2 % so far" in said
     assert name in said
     assert first(race=lost)[0] != "unkept"
+    partly = {law: {"coulomb": (4, 4), "noise": (0, 4)} for law in recommendation.settled}
+    form, said = first(settled=partly)
+    assert form == "unsettled"
+    assert "noise" in said
+    assert "coulomb" not in said
+    open_race = dataclasses.replace(recommendation, settled=partly, race=few, fixed=None)
+    assert open_race.form == "undecided"
+    (never,) = [caution for caution in open_race.cautions if caution.kind == "never"]
+    assert never.where == "noise"
+    partly[name] = {"coulomb": (4, 4), "noise": (1, 4)}
+    assert first(settled=partly)[0] == "law"
     none = {race.WITHOUT: raced_laws.entrants[name]}
     form, said = first(race=raced_laws._replace(entrants=none, unsearched=["pid"]))
     assert form == "untried"
