@@ -134,9 +134,10 @@ def test_killed_twenty_times_a_study_ends_with_the_same_table_and_does_nothing_t
 def test_on_a_full_disk_a_study_stops_with_one_sentence_and_later_goes_on(tmp_path):
     done = python("-c", LOADED + FULL, tmp_path, fine=False)
     assert done.returncode == 2, done.stderr
-    assert done.stderr.startswith("smc-mujoco: cannot write")
-    assert done.stderr.rstrip().endswith("choose another folder or make room")
-    assert len(done.stderr.splitlines()) == 1
+    # progress of a slow machine may stand before it
+    (sentence,) = (line for line in done.stderr.splitlines() if "simulations" not in line)
+    assert sentence.startswith("smc-mujoco: cannot write")
+    assert sentence.endswith("choose another folder or make room")
     files = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()}
     names = sorted(path.name for path in files if path.suffix != ".parquet")
     # two finished parts, no noise key yet, and nothing half done
