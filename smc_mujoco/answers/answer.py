@@ -107,6 +107,14 @@ class Answer(Tables):
 
 
 def _preformatted(lines: Sequence[str]) -> str:
-    """Return lines as HTML, in their columns."""
-    text = "\n".join(lines)
-    return f'<pre style="overflow-x:auto">{html.text(text)}</pre>'
+    """Return lines as HTML, in their columns: those of the first part, which may be a table, in
+    letters that let them fit a phone, where those of the others are broken.
+    """
+    table, *parts = "\n".join(lines).split("\n\n")
+    columns = max(map(len, table.split("\n")))
+    style = f"overflow-x:auto;--columns:{columns}"
+    blocks = [f'<pre style="{style}">{html.text(table)}</pre>']
+    if parts:
+        text = "\n\n".join(parts)
+        blocks.append(f'<pre style="overflow-x:auto">{html.text(text)}</pre>')
+    return "".join(blocks)

@@ -15,8 +15,8 @@ from websockets.asyncio import server
 
 SECRET_BYTES = 16
 THIS_MACHINE = "127.0.0.1"
-# Where a processor draws, each pixel takes a microsecond of it. So the picture has fewer along each
-# side: chosen, as edges are still clean.
+# Where a processor draws, each pixel takes a microsecond of it, and smooth edges as much again. So
+# the picture has fewer along each side, chosen, and its edges are not smoothed.
 FEWER_PIXELS = """<head><script>{
   const gl = document.createElement("canvas").getContext("webgl2");
   const names = gl?.getExtension("WEBGL_debug_renderer_info");
@@ -25,6 +25,10 @@ FEWER_PIXELS = """<head><script>{
     const address = new URL(location);
     address.searchParams.set("fixedDpr", "0.75");
     history.replaceState(null, "", address);
+    const context = HTMLCanvasElement.prototype.getContext;
+    HTMLCanvasElement.prototype.getContext = function (kind, options) {
+      return context.call(this, kind, {...options, antialias: false});
+    };
   }
 }</script>"""
 REFUSED = "Forbidden: open the address that smc.view prints.\n"

@@ -36,7 +36,9 @@ GRAVITY = 9.81  # m/s^2, for the force of a push: the weight of what moves, a si
 # intensity of each light, and the direction from which it comes
 LIGHTS = {"key": (2.0, (-0.35, -0.55, 0.80)), "fill": (0.8, (0.45, -0.80, 0.35))}
 AMBIENT = 1.8
+TENDON = 2.0  # px, width of a tendon
 FLOOR_LINES = 10  # of the floor's grid, to each side; viser's own takes ten times as long to draw
+PULLEY = -2  # in data.wrap_obj, where a branch of a tendon ends
 Pushed = Callable[[str, Array], None]  # a body, with a force in the axes of the world, (3,) N
 
 
@@ -120,6 +122,7 @@ class Machines:
         self.data.qpos[:] = self.session.state(run)[0]
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_tendon(self.model, self.data)
 
     def light(self) -> None:
         """Light the scene as a film does, over a floor with its grid."""
@@ -143,7 +146,7 @@ class Machines:
             "/floor",
             np.concatenate([along_x, along_x[..., [1, 0, 2]]]) + middle,
             style.rgb(style.GRID),
-            thickness=1.5,
+            thickness=2.0,
             thickness_units="screen",
         )
 
@@ -219,6 +222,13 @@ class MachineNodes:
         )
         self.control_arrows = self.add_arrows("u", self.rgb)
         self.push_arrows = self.add_arrows("push", style.rgb(style.DISTURBANCE))
+        self.tendons = None
+        if len(lines := tendon_lines(machines.model, machines.data)):
+            colours = np.broadcast_to(style.rgb(style.INK), lines.shape)
+            look = {"thickness": TENDON, "thickness_units": "screen"}
+            self.tendons = machines.scene.add_line_segments(
+                f"/{run}/tendons", lines, colours, **look
+            )
         self.largest = 0.0  # |u| so far, which the longest arrow shows
 
     def add_bodies(self) -> None:
@@ -295,6 +305,9 @@ class MachineNodes:
         for body, frame in self.bodies.items():
             frame.position = self.machines.data.xpos[body]
             frame.wxyz = self.machines.data.xquat[body]
+        if self.tendons is not None:
+            lines = tendon_lines(self.machines.model, self.machines.data)
+            self.tendons.points = lines.astype(np.float32)
         draw_arrows(self.control_arrows, self.controls())
         draw_arrows(self.push_arrows, self.pushes())
 
@@ -331,6 +344,21 @@ class MachineNodes:
     def line(self, mount: arrows.Mount, arrow: arrows.Arrow) -> Line | None:
         """Return the line of an arrow, and its width, m."""
         return arrows.path(self.machines.model, self.machines.data, mount, arrow)
+
+
+def tendon_lines(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
+    """Return the pieces of tendons through space, (pieces, 2, 3) m, between the sites and pulleys
+    that they pass and the shapes around which they lie.
+    """
+    pieces = [np.zeros((0, 2, 3))]
+    sides = data.wrap_xpos.reshape(-1, 3)
+    passed = data.wrap_obj.ravel()
+    for tendon in range(model.ntendon):
+        first = data.ten_wrapadr[tendon]
+        for k in range(first, first + data.ten_wrapnum[tendon] - 1):
+            if passed[k] != PULLEY and passed[k + 1] != PULLEY:
+                pieces.append(sides[None, k : k + 2])
+    return np.concatenate(pieces)
 
 
 def draw_arrows(handle: MeshHandle, lines: Sequence[Line]) -> None:

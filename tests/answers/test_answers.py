@@ -146,6 +146,16 @@ def test_a_result_prints_its_answer_and_holds_its_evidence(tmp_path):
     assert "<h1>a wins</h1>" in page
 
 
+def test_on_a_phone_a_page_s_first_part_keeps_its_columns(tmp_path, monkeypatch):
+    """Its letters fit its widest line; what follows is broken, and nothing is lost."""
+    lines = ["law   J", "adrc  0.2", "", "Use adrc, as it leads.", "", "gains  " + 40 * "k=1 "]
+    monkeypatch.setattr(Sample, "lines", lines)
+    page = Sample().to_html(tmp_path / "report.html").read_text()
+    parts = re.findall(r"<pre style=.([^>]*).>(.*?)</pre>", page, re.DOTALL)
+    assert "\n\n".join(text for _, text in parts) == "\n".join(lines)
+    assert ["--columns:9" in style for style, _ in parts] == [True, False]
+
+
 @pytest.mark.parametrize("word", sorted(glossary()))
 def test_an_explanation_fits_ten_lines_of_a_screen(word):
     lines = explain(word).splitlines()

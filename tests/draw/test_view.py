@@ -293,3 +293,39 @@ def test_a_machine_without_a_shape_is_refused():
     plant = smc.plant_from(text, ["j"], name="bare")
     with pytest.raises(smc.ScenarioError, match="nothing that moves on bare has a shape"):
         smc.view(smc.Scenario(plant=plant, law=smc.law("pid"), duration=0.1))
+
+
+ROPE = """<mujoco><worldbody>
+  <geom name="drum" type="cylinder" size=".05 .1" pos="0 0 .5" euler="90 0 0" contype="0"/>
+  <site name="a" pos="-.2 0 .3"/><site name="top" pos="0 0 .8"/>
+  <body name="bar" pos="0 0 .2"><joint name="j" axis="0 1 0"/><site name="b" pos=".2 0 0"/>
+    <geom size=".02" fromto="0 0 0 .3 0 0" type="capsule" contype="0"/></body></worldbody>
+  <tendon><spatial><site site="a"/><geom geom="drum" sidesite="top"/><site site="b"/></spatial>
+    <spatial><site site="a"/><site site="top"/><pulley divisor="2"/><site site="b"/>
+      <site site="top"/></spatial></tendon>
+  <actuator><motor joint="j" ctrlrange="-1 1"/></actuator></mujoco>"""
+
+
+def test_tendons_are_lines_from_site_to_site_that_move(tmp_path):
+    """One that lies around a drum touches it; from pulley to pulley there is none."""
+    path = tmp_path / "rope.xml"
+    path.write_text(ROPE)
+    plant = smc.plant_from(path, ["j"])
+    live = LiveView(Session([smc.Scenario(plant=plant, law="none", x0=0.3)]), 0)
+    try:
+        (run,) = live.machines.runs
+        assert run.tendons is not None
+        before = np.array(run.tendons.points)
+        site = np.array([0.2 * np.cos(0.3), 0.0, 0.2 - 0.2 * np.sin(0.3)])
+        a, top, drum = np.array([[-0.2, 0.0, 0.3], [0.0, 0.0, 0.8], [0.0, 0.0, 0.5]])
+        first, around, last, left_side, right_side = before
+        assert first[0] == pytest.approx(a, abs=1e-6)
+        assert last[1] == pytest.approx(site, abs=1e-6)
+        assert np.linalg.norm(around - drum, axis=1) == pytest.approx(0.05, abs=1e-3)
+        assert left_side == pytest.approx(np.array([a, top]), abs=1e-6)
+        assert right_side == pytest.approx(np.array([site, top]), abs=1e-6)
+        live.session.advance(0.2)
+        live.machines.show()
+        assert np.abs(run.tendons.points - before).max() > 0.01
+    finally:
+        live.close()
