@@ -991,6 +991,15 @@ def test_a_run_has_arrived_within_ten_percent_of_its_start_or_five_sigma(ending,
     assert m.arrived(run(t, np.where(t < 5.0, 1.5, ending), noise=noise)) is there
 
 
+@pytest.mark.parametrize(("noise", "apart"), [(1e-3, 5e-3), (1e-2, 1e-2)])
+def test_a_sensor_tells_apart_its_noise_or_half_a_count(noise, apart):
+    sensed = smc.Scenario(
+        plant="duffing", law="none", sensor=smc.Encoder(counts=100), noise=smc.Noise(noise)
+    )
+    (driven,) = groups(sensed)
+    assert conventions.resolution(sensed, driven) == pytest.approx(apart)
+
+
 @pytest.mark.parametrize("plant", ["inverted_pendulum", "van_der_pol", "cart_pole", "quadrotor"])
 def test_without_a_law_no_plant_that_falls_or_swings_has_arrived(plant):
     assert not m.arrived(smc.run(smc.Scenario(plant=plant, law="none", duration=3.0)))
