@@ -655,7 +655,9 @@ def _first_line(facts: WhichFacts) -> Labelled:
         return "Open", f"No law was tried to the end{needs}"
     if facts.form == "unneeded":
         below = f", and J is {_below(facts.lead)}" if facts.lead else ""
-        return "No law", f"needed: u = 0 settles {_counts(facts.runs.runs)} runs{below}{part}"
+        settled = facts.runs.runs
+        words = "needed: u = 0" if settled.count == settled.total else "is better than u = 0, which"
+        return "No law", f"{words} settles {_counts(settled)} runs{below}{part}"
     if facts.form == "unsettled":
         never = joined(facts.never)
         return "No law", f"settles under {never}; the nearest is {facts.law}{part}"

@@ -20,6 +20,7 @@ from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.analysis.tuning.run_limits import RunLimit
 from smc_mujoco.answers import answers
 from smc_mujoco.answers.answers import CAUTIONS, LINES, WIDTH
+from smc_mujoco.answers.facts import SettledRuns, Settles
 from smc_mujoco.cli import main
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
@@ -193,6 +194,10 @@ def test_no_law_is_the_answer_where_it_has_the_lowest_J(tmp_path):
     assert recommended.lead
     assert recommended.lead.rival == bad.name
     assert recommended.lines[0].startswith("No law")
+    runs = SettledRuns(Settles(1, 2), 0.2, 0.2)
+    half = dataclasses.replace(recommended.facts, runs=runs)
+    assert "needed" not in answers.which_lines(half, None)[0]
+    assert "is better than u = 0, which settles 1 of 2 runs" in answers.which_lines(half, None)[0]
     assert numbers(recommended.lines[0])[1:3] == [3, 3]
 
 
