@@ -108,7 +108,6 @@ def test_a_table_of_runs_has_the_periods_and_bounds_of_all_conditions(tmp_path):
     assert compared.tables[-2].rows[0][1:4:2] == ("3.00 N or 6.00 N", "20 or 1")
 
 
-@pytest.mark.quick
 def test_a_law_of_which_a_search_was_stuck_is_named(found):
     candidate = found.candidates["duffing"][0]
     for spread, said in ((0.9, False), (6.6, True)):
@@ -482,6 +481,7 @@ def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatc
     assert again.worst["duffing"]["pid"].scenario == compared.worst["duffing"]["pid"].scenario
 
 
+@pytest.mark.quick
 def test_shells_complete_the_last_name():
     assert options.PLANTS("duffing,inverted_pendulum_") == ["duffing,inverted_pendulum_network"]
     assert options.CONDITIONS("friction,noise+enc") == ["friction,noise+encoder"]
