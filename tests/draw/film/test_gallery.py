@@ -51,9 +51,11 @@ def test_each_file_is_a_clip():
 
 @pytest.mark.skipif(bool(gl.missing()), reason="no OpenGL")
 @pytest.mark.parametrize("name", CLIPS)
-def test_a_clip_is_what_the_code_would_make(name):
+def test_a_clip_is_what_the_code_would_make(name, monkeypatch):
     frames = gallery.CLIPS[name].frames()
     full_clock = frames.clock
+    played = type(full_clock).played  # numbers are held in the time of the whole film
+    monkeypatch.setattr(type(full_clock), "played", lambda clock, t: played(full_clock, t))
     with Image.open(gallery.FOLDER / f"{name}.webp") as clip:
         assert clip.n_frames == len(frames)
         assert clip.size == frames.size
