@@ -5,9 +5,9 @@ of ten. So further starts are drawn evenly in their logarithms, and no step chan
 by more than a factor of ten.
 """
 
-import copy
 import dataclasses
 import itertools
+import operator
 from collections.abc import Sequence
 
 import numpy as np
@@ -21,10 +21,9 @@ from smc_mujoco.identification.standard_errors import jackknife
 START_DECADES = 2.0  # by which a quantity of a further start may differ from the rig's own; chosen
 CANDIDATES = 8  # further starts that are drawn for each one that is refined; chosen
 DAMPINGS = 0.0, 1e-2, 1.0, 1e3  # of steps that are tried in turn, relative to the curvature; chosen
-# of its linear move by which a piece's starting state is moved in trials; chosen. 0 keeps a state
-# that dry friction holds, which any move might spoil
-SHARES = 0.0, 0.3, 1.0
-TRIALS = len(SHARES) + 1  # points that a step tries with each damping
+# of its linear move by which the starting state of a piece is moved that misses its promise;
+# chosen. 0 keeps a state that dry friction holds, which any move might spoil
+SHARES = 0.0, 0.3
 # scales of a state at the start, by which it may differ from the measured one; chosen
 MAX_STATE = 100.0
 # scales of velocity by which starts differ from which a piece's own is fitted; chosen
@@ -38,6 +37,7 @@ NEGLIGIBLE_VALUE = 1e-4  # of its scale: below it such a quantity may become 0; 
 # steps follow, and with extrapolated replays, which cost six times as much; chosen
 COST_TOLERANCE, SMALL_CHANGE, LAST_CHANGE = 1e-5, 0.01, 0.1
 KEPT_PROMISE = 0.5  # of the decrease that derivatives promise: less calls for damping; chosen
+TRUE_PROMISE = 0.9  # of that decrease: derivatives that keep it serve a further step; chosen
 # s, by which other delays differ that are tried; chosen: with a command that jumps at each sample
 # derivatives by the delay hold for about a sample
 DELAY_MOVES = -8e-3, -4e-3, -2e-3, -1e-3, 1e-3, 2e-3, 4e-3, 8e-3
@@ -71,9 +71,9 @@ def search(
     `most`: largest number of steps from the best start. `tolerance`: as of `refine`.
     """
     if (delayed := _other_delay(replays, first, LAST_CHANGE)) is not None:
-        first = replays.slopes(delayed)
+        first = replays.slopes(delayed, central=False)
     if starts == 1:
-        best = refine(replays, first, most, tolerance)
+        best = refine(replays, first, most, tolerance, rough=True)
         for _ in range(MOST_DELAYS):
             point = (
                 _other_spring(replays, best)
@@ -82,20 +82,22 @@ def search(
             )
             if point is None:
                 break
-            tried = refine(replays, replays.slopes(point), most, tolerance)
+            slopes = replays.slopes(point, central=False)
+            tried = refine(replays, slopes, most, tolerance, rough=True)
             if tried.cost >= best.cost:
                 break
             best = tried
         return best
-    reached = [refine(replays, first, min(most, ROUGH_STEPS), tolerance)]
+    steps = min(most, ROUGH_STEPS)
+    reached = [refine(replays, first, steps, tolerance, rough=True)]
     if reached[-1].fit < GOOD_FIT:
         for point in _random(replays, starts - 1, seed):
-            slopes = replays.slopes(point)
-            reached.append(refine(replays, slopes, min(most, ROUGH_STEPS), tolerance))
+            slopes = replays.slopes(point, central=False)
+            reached.append(refine(replays, slopes, steps, tolerance, rough=True))
             if reached[-1].fit > GOOD_FIT:
                 break
     best = min(reached, key=lambda slopes: slopes.cost)
-    return refine(replays, best, most, tolerance)
+    return refine(replays, best, most, tolerance, rough=True)
 
 
 def _other_spring(replays: Replays, slopes: Slopes) -> Point | None:
@@ -163,10 +165,15 @@ def _left(slopes: Slopes, rows: list[Array]) -> float:
 
 
 def _other_delay(
-    replays: Replays, slopes: Slopes, share: float, moves: Sequence[float] | Array = DELAY_MOVES
+    replays: Replays,
+    slopes: Slopes,
+    share: float,
+    moves: Sequence[float] | Array = DELAY_MOVES,
+    by_steps: Sequence[Array] | None = None,
 ) -> Point | None:
     """Return the point with the delay that leaves least of what no number can cause, by the slopes;
-    None if no other leaves less by that share of it. `moves`: between delays, s.
+    None if no other leaves less by that share of it. `moves`: between delays, s. `by_steps`: what
+    steps of 0 would change in the residuals of each piece; None for nothing.
     """
     if DELAY not in replays.names:
         return None
@@ -180,7 +187,10 @@ def _other_delay(
                 values[k] + move / replays.scales[k], replays.low[k], replays.high[k]
             )
             points.append(Point(values, best.states))
-        lefts = [_left(slopes, rows) for rows in replays.residuals(points)]
+        lefts = []
+        for rows in replays.residuals(points):
+            without = rows if by_steps is None else list(map(operator.add, rows, by_steps))
+            lefts.append(_left(slopes, without))
         if min(lefts) >= least:
             return None if best is slopes.point else best
         least = min(lefts)
@@ -234,19 +244,19 @@ def extrapolated(replays: Replays, slopes: Slopes, most: int = 0) -> tuple[Slope
         ends = replays.slopes(ends.point)  # longer steps err by too much
     share = BETTER**2 / sum(map(len, ends.residuals))
     fine = LEAST_DELAY_MOVE * np.array([-2.0, -1.0, 1.0, 2.0])
-    delayed = _other_delay(replays, ends, share, fine) if most else None
-    if delayed is not None:  # then derivatives by the delay do not hold over such a move
-        (rows,) = replays.residuals([delayed])
-        ends = dataclasses.replace(ends, point=delayed, residuals=rows)
     replays.limit = False
-    if most:
-        (full,) = replays.residuals([ends.point])
-        ends, _, by_quarter = _without_steps(replays, ends, full)
-        moved = np.maximum(moved, LEFT_BY_STEPS * _moves(slopes, by_quarter))
-    if delayed is not None:
+    if not most:
+        return _solved(replays, ends), moved
+    (full,) = replays.residuals([ends.point])
+    by_steps = list(map(operator.sub, ends.residuals, full))  # hardly depends on the delay
+    delayed = _other_delay(replays, ends, share, fine, by_steps)
+    if delayed is not None:  # then derivatives by the delay do not hold over such a move
+        (full,) = replays.residuals([delayed])
+        ends = dataclasses.replace(ends, point=delayed)
         k = replays.names.index(DELAY)
         moved[k] = max(moved[k], LEAST_DELAY_MOVE / replays.scales[k])
-    return _solved(replays, ends), moved
+    ends, _, by_quarter = _without_steps(replays, ends, full)
+    return _solved(replays, ends), np.maximum(moved, LEFT_BY_STEPS * _moves(slopes, by_quarter))
 
 
 def _settled(replays: Replays, slopes: Slopes, most: int) -> Slopes:
@@ -321,12 +331,17 @@ def not_worse(replays: Replays, reached: Slopes) -> Slopes:
 
 
 def refine(
-    replays: Replays, slopes: Slopes, most: int, tolerance: float = COST_TOLERANCE
+    replays: Replays,
+    slopes: Slopes,
+    most: int,
+    tolerance: float = COST_TOLERANCE,
+    rough: bool = False,
 ) -> Slopes:
     """Return the slopes at the least squares near others, after at most `most` steps that lower the
     cost, until one lowers it by less than the share `tolerance`.
 
-    Derivatives of the last steps, which change little, are those of the step before.
+    Derivatives of the last steps, which change little, are those of the step before. If `rough`,
+    derivatives are differences to one side, and serve while they keep their promise.
     """
     for _ in range(most):
         after = _best_step(replays, slopes)
@@ -334,7 +349,10 @@ def refine(
         if not gain > 0.0:
             break
         change = gain / slopes.cost
-        slopes = after if change < SMALL_CHANGE else replays.slopes(after.point)
+        serves = change < SMALL_CHANGE or (
+            rough and gain > TRUE_PROMISE * _promise(replays, slopes)
+        )
+        slopes = after if serves else replays.slopes(after.point, central=not rough)
         if change < tolerance:
             break
     return slopes
@@ -347,7 +365,7 @@ def fit_starts(replays: Replays, most: int) -> Slopes:
     A joint that dry friction holds at a start has no slope there. So a piece that does not fit well
     is also fitted from other velocities, and keeps the best.
     """
-    reached = refine(replays, replays.slopes(replays.start), most, SMALL_CHANGE)
+    reached = _own_starts(replays, replays.start, most)
     residuals = list(reached.residuals)
     allowed = (1.0 - GOOD_PIECE / 100.0) ** 2 * reached.columns * reached.records
     samples = sum(map(len, residuals))
@@ -355,13 +373,12 @@ def fit_starts(replays: Replays, most: int) -> Slopes:
     for k, r in enumerate(residuals):
         if len(replays.free) and cost([r]) > allowed * len(r) / samples:
             hard.append(k)
-    trial = copy.copy(replays)
-    trial.pieces = [replays.pieces[k] for k in hard]
+    trial = replays.only(hard)
     states = reached.point.states.copy()
     for velocity in KICKS if hard else ():
         kicked = trial.start
         kicked.states[:, -len(replays.twin.columns.x) :] += velocity
-        kicked_fit = refine(trial, trial.slopes(kicked), most, SMALL_CHANGE)
+        kicked_fit = _own_starts(trial, kicked, most)
         for i, k in enumerate(hard):
             if cost([kicked_fit.residuals[i]]) < cost([residuals[k]]):
                 residuals[k] = kicked_fit.residuals[i]
@@ -370,52 +387,94 @@ def fit_starts(replays: Replays, most: int) -> Slopes:
     return dataclasses.replace(reached, point=point, residuals=residuals)
 
 
+def _own_starts(replays: Replays, point: Point, most: int) -> Slopes:
+    """Return the slopes at a point without quantities, with the residuals and the states that at
+    most `most` steps of each piece reach, until one lowers its cost by less than SMALL_CHANGE.
+    """
+    first = slopes = replays.slopes(point, central=False)
+    residuals = list(first.residuals)
+    states = point.states.copy()
+    falling = list(range(len(residuals)))
+    for _ in range(most):
+        after = _best_step(replays.only(falling), slopes)
+        still = []
+        for i, k in enumerate(falling):
+            before, reached = cost([residuals[k]]), cost([after.residuals[i]])
+            if reached < before:
+                residuals[k] = after.residuals[i]
+                states[k] = after.point.states[i]
+            if reached < (1.0 - SMALL_CHANGE) * before:
+                still.append(k)
+        falling = still
+        if not falling:
+            break
+        slopes = replays.only(falling).slopes(Point(point.values, states[falling]), central=False)
+    return dataclasses.replace(first, point=Point(point.values, states), residuals=residuals)
+
+
 def _best_step(replays: Replays, slopes: Slopes) -> Slopes:
     """Return what a damped step reaches, with the derivatives before it: the first of several that
     keeps its promise, or the best.
-
-    Each piece chooses the best move of its own states.
     """
     reached = []
     for damping in DAMPINGS if len(slopes.point.values) else DAMPINGS[:1]:
-        values = _moved(replays, slopes, damping)
-        reached.append(_chosen(replays, slopes, _variants(replays, slopes, values)))
-        step = values - slopes.point.values
-        promised = cost([slopes.freed_residuals + slopes.freed_slopes @ step])
-        if slopes.cost - reached[-1].cost > KEPT_PROMISE * (slopes.cost - promised):
+        reached.append(_chosen(replays, slopes, _moved(replays, slopes, damping)))
+        promise = _promise(replays, slopes, damping)
+        if slopes.cost - reached[-1].cost > KEPT_PROMISE * promise:
             break
     return min(reached, key=lambda slopes: slopes.cost)
 
 
-def _chosen(replays: Replays, slopes: Slopes, points: list[Point]) -> Slopes:
-    """Return slopes at the best of points for each piece, with the derivatives of others."""
-    tried = replays.residuals(points)
-    residuals = []
-    states = []
-    for k in range(len(replays.pieces)):
-        best = min(range(len(points)), key=lambda i: cost([tried[i][k]]))
-        residuals.append(tried[best][k])
-        states.append(points[best].states[k])
-    point = Point(points[0].values, np.array(states))
-    return dataclasses.replace(slopes, point=point, residuals=residuals)
+def _promise(replays: Replays, slopes: Slopes, damping: float = 0.0) -> float:
+    """Return by how much a damped step lowers the cost, by the derivatives."""
+    step = _moved(replays, slopes, damping) - slopes.point.values
+    return slopes.cost - cost([slopes.freed_residuals + slopes.freed_slopes @ step])
+
+
+def _chosen(replays: Replays, slopes: Slopes, values: Array) -> Slopes:
+    """Return slopes at quantities, with the derivatives of others. Each piece has its linear move
+    of its own states, or if that misses its promise, the best of several.
+    """
+    full, *others = _variants(replays, slopes, values)
+    (residuals,) = replays.residuals([full])
+    states = full.states.copy()
+    step = values - slopes.point.values
+    missed = []
+    for k, (r, J, S) in enumerate(
+        zip(slopes.residuals, slopes.by_values, slopes.by_states, strict=True)
+    ):
+        before, promised = (
+            cost([r]),
+            cost([r + J @ step + S @ (states[k] - slopes.point.states[k])]),
+        )
+        allowed = before - KEPT_PROMISE * (before - promised)
+        if cost([residuals[k]]) > max(allowed, (1.0 + SMALL_CHANGE) * promised):
+            missed.append(k)
+    if missed and others:
+        points = [Point(values, point.states[missed]) for point in others]
+        for point, tried in zip(points, replays.only(missed).residuals(points), strict=True):
+            for i, k in enumerate(missed):
+                if cost([tried[i]]) < cost([residuals[k]]):
+                    residuals[k] = tried[i]
+                    states[k] = point.states[i]
+    return dataclasses.replace(slopes, point=Point(values, states), residuals=residuals)
 
 
 def _variants(replays: Replays, slopes: Slopes, values: Array) -> list[Point]:
     """Return points with the same quantities, and states at the starts that a piece may choose
-    from.
+    from: the linear move first.
 
     Dry friction makes a kink in the cost at velocity 0, which no step crosses from another
     velocity. So rest is tried.
     """
     moves = slopes.moves(values - slopes.point.values)
-    moved = []
-    for share in SHARES:
+    variants = []
+    for share in (1.0, *SHARES):
         states = np.clip(slopes.point.states + share * moves, -MAX_STATE, MAX_STATE)
-        moved.append(Point(values, states))
+        variants.append(Point(values, states))
     if not len(replays.free):
-        return moved[-1:]
-    moved.append(replays.at_rest(moved[-1]))
-    return moved
+        return variants[:1]
+    return [*variants, replays.at_rest(variants[0])]
 
 
 def _moved(replays: Replays, slopes: Slopes, damping: float) -> Array:

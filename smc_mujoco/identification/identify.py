@@ -49,7 +49,7 @@ from smc_mujoco.identification.paths import DELAY, named_once
 from smc_mujoco.identification.published_rig import rig as find_rig
 from smc_mujoco.identification.published_rig import rigs
 from smc_mujoco.identification.records import Record
-from smc_mujoco.identification.replays import Point, Replays, Slopes
+from smc_mujoco.identification.replays import Point, Replays, Slopes, cost
 from smc_mujoco.identification.rig import Fall, Rig, Source
 from smc_mujoco.identification.standard_errors import (
     BLOCKS,
@@ -446,6 +446,7 @@ def identify(
         deviation = between(slopes, [piece.record for piece in replays.pieces]) * replays.scales
         scatter = dict(zip(names, deviation.tolist(), strict=True))
     by_pieces = [] if replays.whole else fits_by_pieces(replays, slopes)
+    predictions = fitted.predictions(data, states=states, **steps)
     checked = None if held_out is None else check(fitted, held_out, columns, batches)
     if batches is not None:
         batches.remove()
@@ -455,9 +456,9 @@ def identify(
         values=values,
         errors=errors,
         correlations=correlations,
-        fits=tuple(fitted.fits(data, states=states, **steps)),
+        fits=tuple(fitted.fits_of(predictions)),
         fits_before=tuple(fits_before),
-        predictions=tuple(fitted.predictions(data, states=states, **steps)),
+        predictions=tuple(predictions),
         evaluations=replays.evaluations,
         independent=independent(lacking.slopes),
         by_pieces=tuple(by_pieces),
@@ -473,7 +474,7 @@ def _expected_sets(twin: Rig, names: Sequence[str], most: int) -> int:
     """Return about how many parameter sets a search will simulate."""
     slopes = 2 * (len(names) + 2 * len(twin.columns.x)) + 1
     searches = 1 if twin.controller is None else 2
-    return searches * min(most, USUAL_STEPS) * (slopes + gauss_newton.TRIALS)
+    return searches * min(most, USUAL_STEPS) * slopes
 
 
 def check(
@@ -664,6 +665,8 @@ def _solved(
     steps, (p,).
     """
     pieces = Replays(twin, names, data, False, report, kept=batches)
+    if twin.controller is None and not pieces.whole:
+        pieces.steps = twin.long_steps(pieces.pieces[0].part)  # pyright: ignore[reportArgumentType]
     first = pieces.slopes(pieces.start)
     if doubts and first.fit < 0.0:
         raise ScenarioError(doubts[0])
@@ -671,14 +674,17 @@ def _solved(
     extrapolates = twin.controller is None and not corrected
     tolerance = gauss_newton.SMALL_CHANGE if extrapolates else gauss_newton.COST_TOLERANCE
     reached = gauss_newton.search(pieces, first, starts, seed, most, tolerance)
-    reached = pieces.in_order(reached)
+    point = pieces.in_order(reached.point)
+    pieces.steps = {}
     if twin.controller is None:
+        reached = pieces.slopes(point)
         if not corrected:
+            reached = gauss_newton.refine(pieces, reached, most)
             return pieces, *gauss_newton.extrapolated(pieces, reached, most)
         slopes, moved = gauss_newton.accurate(pieces, reached)
         return pieces, gauss_newton.not_worse(pieces, slopes), moved
     closed = Replays(twin, names, data, True, report, kept=batches)
-    points = [closed.start, Point(reached.point.values, closed.start.states)]
+    points = [closed.start, Point(point.values, closed.start.states)]
     if len(closed.free):  # a record may begin at rest with a jump of the command
         points += list(map(closed.at_rest, points))
     begin = closed.slopes(gauss_newton.better(closed, *points))
@@ -705,13 +711,14 @@ def _starting_states(
     of_records = [piece.record for piece in replays.pieces]
     firsts = list(map(of_records.index, range(len(data))))
     none = np.zeros(0)
-    candidates = [repeats.start, Point(none, point.states[firsts])]
-    for candidate in tuple(candidates):
-        moves = repeats.slopes(candidate).moves(none)
-        candidates.append(Point(none, candidate.states + moves))
-    costs = repeats.costs(candidates)
-    best = costs.argmin(axis=0)
+    starts = [repeats.start, Point(none, point.states[firsts])]
+    costs, moved = [], []
+    for start in starts:
+        slopes = repeats.slopes(start, central=False)
+        costs.append([cost([rows]) for rows in slopes.residuals])
+        moved.append(Point(none, start.states + slopes.moves(none)))
+    best = np.array([*costs, *repeats.costs(moved)]).argmin(axis=0)
     states = []
     for i in range(len(data)):
-        states.append(repeats.state(candidates[best[i]], i))
+        states.append(repeats.state([*starts, *moved][best[i]], i))
     return states

@@ -18,6 +18,7 @@ from smc_mujoco.common.aliases import Array
 from smc_mujoco.identification.lack_of_fit import Lack
 from smc_mujoco.identification.log_rig import LogPart, LogRig
 from smc_mujoco.identification.paths import DELAY
+from smc_mujoco.identification.records import Record
 from smc_mujoco.identification.replays import Piece, Point, Replays, Slopes
 from smc_mujoco.mechanisms.hardware.beside_joint import BesideJoint
 from smc_mujoco.mechanisms.layout import driven_names
@@ -115,10 +116,11 @@ def lacking_forces(rig: LogRig, replays: Replays, slopes: Slopes) -> list[Lack]:
     """
     texts = []
     pieces = list(replays.pieces)
+    (predicted,) = replays.predicted([slopes.point])
     for i, joint in enumerate(driven_names(rig.plant)):
         geared = any(isinstance(part, BesideJoint) for part in rig.base.drive_train.chains[i])
         shapes_by_piece = []
-        for motion in _motions(rig, replays, slopes.point, i):
+        for motion in _motions(rig, replays, predicted, i):
             shapes_by_piece.append([*shapes(motion), *left_out(motion, joint, replays.names)])
         for of_pieces in zip(*shapes_by_piece, strict=True):
             words = SPRUNG if geared and of_pieces[0][0] == COMMAND else of_pieces[0][0]
@@ -127,6 +129,8 @@ def lacking_forces(rig: LogRig, replays: Replays, slopes: Slopes) -> list[Lack]:
     trial = copy.copy(replays)
     trial.pieces = pieces
     trial.corrections = None
+    longer = rig.long_steps(pieces[0].part)  # pyright: ignore[reportArgumentType]
+    trial.steps = replays.steps | longer
     states = np.tile(slopes.point.states, (len(texts) + 1, 1))
     (rows,) = trial.residuals([Point(slopes.point.values, states)])
     count = len(replays.pieces)
@@ -139,10 +143,11 @@ def lacking_forces(rig: LogRig, replays: Replays, slopes: Slopes) -> list[Lack]:
     return lacks
 
 
-def _motions(rig: LogRig, replays: Replays, point: Point, i: int) -> list[JointMotion]:
+def _motions(
+    rig: LogRig, replays: Replays, predicted: Sequence[Record], i: int
+) -> list[JointMotion]:
     """Return the motion of joint i in each piece, as it is predicted."""
     late = rig.values.get(DELAY, rig.base.input_delay)
-    (predicted,) = replays.predicted([point])
     x, v, a = [], [], []
     for piece, columns in zip(replays.pieces, predicted, strict=True):
         period = _period(piece)

@@ -30,11 +30,13 @@ from smc_mujoco.identification.paths import (
 )
 from smc_mujoco.identification.records import Record
 from smc_mujoco.identification.rig import RecordPart, Rig, Source, Values
+from smc_mujoco.mechanisms.custom.poles import constraint_rate
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.current_motor import CurrentMotor
 from smc_mujoco.mechanisms.hardware.elastic_joint import ElasticJoint
 from smc_mujoco.mechanisms.layout import channel_names, driven_names
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation import integration
 from smc_mujoco.simulation.readings import as_recorded, rotors_read
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Fault
@@ -221,6 +223,20 @@ class LogRig(Rig):
         u = (1.0 - share) * part.u[first : first + count]
         u = u + share * part.u[first - 1 : first - 1 + count]
         return self.of_motors("gain", 1.0) * u + self.of_motors("offset", 0.0)
+
+    def long_steps(self, part: RecordPart) -> Fields:
+        """Return the control period as the physics step of trials, if dry friction alone asks for
+        shorter ones: it changes its direction a little late then.
+        """
+        plain = self.repeated(part)
+        step = plain.control_period
+        if plain.exact_friction or plain.actuator or plain.contact:
+            return {}
+        resolves_poles = step * integration.fastest_pole(plain) <= integration.MAX_POLE
+        resolves_stops = step * constraint_rate(self.plant) <= integration.MAX_CONSTRAINT_RATE
+        if plain.resolved.integrator != "RK4" or not (resolves_poles and resolves_stops):
+            return {}
+        return {"physics_step": step}
 
     def finer(self, part: RecordPart, times: int) -> RecordPart:
         """Return a part with that many times as many commands, if a delay may be between them: it

@@ -15,6 +15,7 @@ correction hardly depends on the quantities. So a search keeps that of one point
 other points with longer steps.
 """
 
+import copy
 import dataclasses
 import itertools
 import math
@@ -232,16 +233,21 @@ class Replays:
             values[name] = min(max(value, quantity.least), quantity.most)
         return values
 
-    def in_order(self, slopes: Slopes) -> Slopes:
-        """Return slopes at the point whose quantities are in the order in which they are reported;
-        it has the same residuals.
+    def in_order(self, point: Point) -> Point:
+        """Return the point whose quantities are in the order in which they are reported; it has the
+        same residuals.
         """
-        values = self.values(slopes.point)
-        ordered = self.twin.in_order(values)
-        if ordered == values:
-            return slopes
+        ordered = self.twin.in_order(self.values(point))
         scaled = np.array([ordered[name] for name in self.names]) / self.scales
-        return self.slopes(Point(scaled, slopes.point.states))
+        return Point(scaled, point.states)
+
+    def only(self, indices: Sequence[int]) -> "Replays":
+        """Return the replays of some of the pieces alone."""
+        some = copy.copy(self)
+        some.pieces = [self.pieces[k] for k in indices]
+        if self.corrections is not None:
+            some.corrections = [self.corrections[k] for k in indices]
+        return some
 
     def rig(self, point: Point) -> Rig:
         """Return the rig at a point."""

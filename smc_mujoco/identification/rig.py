@@ -325,6 +325,11 @@ class Rig:
         """Return values as they are reported: those of which one is the larger are in order."""
         return dict(values)
 
+    def long_steps(self, part: RecordPart) -> Fields:
+        """Return the physics step with which replays of a part are tried; none for its own."""
+        del part
+        return {}
+
     def finer(self, part: RecordPart, times: int) -> RecordPart:
         """Return a part with that many times as many commands, where a delay needs them."""
         return part
@@ -362,8 +367,14 @@ class Rig:
         **changes: Any,
     ) -> list[dict[str, float]]:
         """Return `fit` of several records, simulated in one batch; see `predictions`."""
+        return self.fits_of(self.predictions(many, states, **changes))
+
+    def fits_of(
+        self, predictions: Sequence[tuple[Record, Record, Array]]
+    ) -> list[dict[str, float]]:
+        """Return the fit of each record whose `predictions` are given."""
         fits = []
-        for predicted, measured, t in self.predictions(many, states, **changes):
+        for predicted, measured, t in predictions:
             fit = percentages(predicted, measured)
             if self.columns.u in fit:
                 fit["u"] = fit.pop(self.columns.u)
