@@ -459,10 +459,13 @@ class Replays:
         ranges: central ones, or in half the time those to one side.
         """
         p = len(self.names)
-        ahead = self._moved(point, DIFFERENCE_STEP)
+        steps = np.full(p, DIFFERENCE_STEP)
         behind = []
         if central:
-            behind = self._moved(point, -DIFFERENCE_STEP)
+            behind = self._moved(point, -steps, -DIFFERENCE_STEP)
+        else:
+            steps[point.values + steps > self.high] *= -1.0
+        ahead = self._moved(point, steps, DIFFERENCE_STEP)
         residuals, *rows = self.residuals([point, *ahead, *behind])
         count = len(ahead)
         rows_behind = rows[count:]
@@ -486,11 +489,13 @@ class Replays:
         columns = len(self.pieces[0].measured)
         return Slopes(point, residuals, by_values, by_states, columns, len(self.data))
 
-    def _moved(self, point: Point, step: float) -> list[Point]:
-        """Return the point with each value, then each free state moved by a step."""
+    def _moved(self, point: Point, steps: Array, step: float) -> list[Point]:
+        """Return the point with each value moved by its own of the steps, then each free state by
+        the step.
+        """
         moved = []
-        for e in np.eye(len(self.names)):
-            values = np.clip(point.values + step * e, self.low, self.high)
+        for row in np.diag(steps):
+            values = np.clip(point.values + row, self.low, self.high)
             moved.append(Point(values, point.states))
         for e in np.eye(len(self.free)):
             moved.append(Point(point.values, point.states + step * e))

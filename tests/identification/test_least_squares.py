@@ -225,9 +225,10 @@ def block(k, rows):
     ],
     ids=["inside", "lowest", "highest"],
 )
-def test_slopes_are_derivatives_also_at_the_ends_of_ranges(values):
+@pytest.mark.parametrize("central", [True, False])
+def test_slopes_are_derivatives_also_at_the_ends_of_ranges(values, central):
     curve = Curve(spread=100.0 * SPREAD)
-    slopes = curve.slopes(Point(np.array(values), np.zeros((3, 1))))
+    slopes = curve.slopes(Point(np.array(values), np.zeros((3, 1))), central)
     for k, part in enumerate(curve.parts):
         exact = block(k, part) / 100.0
         np.testing.assert_allclose(
