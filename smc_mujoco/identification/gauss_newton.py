@@ -435,7 +435,7 @@ def _chosen(replays: Replays, slopes: Slopes, values: Array) -> Slopes:
     """Return slopes at quantities, with the derivatives of others. Each piece has its linear move
     of its own states, or if that misses its promise, the best of several.
     """
-    full, *others = _variants(replays, slopes, values)
+    full, *alternatives = _variants(replays, slopes, values)
     (residuals,) = replays.residuals([full])
     states = full.states.copy()
     step = values - slopes.point.values
@@ -450,8 +450,8 @@ def _chosen(replays: Replays, slopes: Slopes, values: Array) -> Slopes:
         allowed = before - KEPT_PROMISE * (before - promised)
         if cost([residuals[k]]) > max(allowed, (1.0 + SMALL_CHANGE) * promised):
             missed.append(k)
-    if missed and others:
-        points = [Point(values, point.states[missed]) for point in others]
+    if missed and alternatives:
+        points = [Point(values, point.states[missed]) for point in alternatives]
         for point, tried in zip(points, replays.only(missed).residuals(points), strict=True):
             for i, k in enumerate(missed):
                 if cost([tried[i]]) < cost([residuals[k]]):

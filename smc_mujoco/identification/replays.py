@@ -243,11 +243,11 @@ class Replays:
 
     def only(self, indices: Sequence[int]) -> "Replays":
         """Return the replays of some of the pieces alone."""
-        some = copy.copy(self)
-        some.pieces = [self.pieces[k] for k in indices]
+        subset = copy.copy(self)
+        subset.pieces = [self.pieces[k] for k in indices]
         if self.corrections is not None:
-            some.corrections = [self.corrections[k] for k in indices]
-        return some
+            subset.corrections = [self.corrections[k] for k in indices]
+        return subset
 
     def rig(self, point: Point) -> Rig:
         """Return the rig at a point."""

@@ -66,7 +66,11 @@ class Curve(Replays):
         self.report = lambda count: None
         columns = SimpleNamespace(state=(), x=("y",))
         self.twin = SimpleNamespace(
-            dynamics=None, springs=(), columns=columns, finer=lambda part, times: part
+            dynamics=None,
+            springs=(),
+            hidden=(),
+            columns=columns,
+            finer=lambda part, times: part,
         )
         self.replayed = []
         self.lag = 0.0
@@ -89,9 +93,9 @@ class Curve(Replays):
         return None
 
     def only(self, indices):
-        some = super().only(indices)
-        some.parts = [self.parts[k] for k in indices]
-        return some
+        subset = super().only(indices)
+        subset.parts = [self.parts[k] for k in indices]
+        return subset
 
     def _replayed(self, rigs, points, fields):
         """Return the formula, with an error of `lag` times the physics step."""
