@@ -30,6 +30,12 @@ from smc_mujoco.problems.tracking_search import SEARCHES, SETS, UNSEEN
 TAGS = Path(__file__).parent / "boards_tags.toml"
 FIRST = 5  # entries of a problem's table; those that no other leads are named besides
 ENOUGH = 1 / 3  # of the pairs of a problem: if fewer can be told apart, the page says so
+BESIDE = {
+    "friction": (
+        "- **`+ Feedforward(1)`** is told the true friction; 0.7 and 1.3 are 30 % off. "
+        "`+ Dither(1)` is a square wave as high as the friction.",
+    )
+}
 TITLES = {"load": "Leaderboard: an unknown load", "friction": "Leaderboard: dry friction"}
 
 
@@ -65,6 +71,8 @@ def page(board: TrackingBoard, picture: str) -> str:
         f"- **`without`** has the error of the same gains without the {load}; `=`: it is no less, "
         f"so it is not of the {load}.",
         "- **`never`**: u varies more than the limit, or a run failed.",
+        "- **An oracle** knows state, friction and load, without noise and delay.",
+        *BESIDE.get(load, ()),
         "",
         "## Limits",
         "",
@@ -119,10 +127,10 @@ def summary(board: TrackingBoard) -> str:
     """Return the first line: who stands where."""
     first, led = first_entries(board)
     names = joined(f"`{name}`" for name in first)
-    stands = "stands" if len(first) == 1 else "stand"
+    verb = "is" if len(first) == 1 else "are"
     return (
-        f"**{names} {stands} first, or level with the first, in {led} of {len(board.problems)} "
-        f"problems, of {len(board.entries)} entries** (`{board.suite.name}`, {_date(board)})."
+        f"**Of {len(board.entries)} entries {names} {verb} led by no other in {led} of "
+        f"{len(board.problems)} problems** (`{board.suite.name}`, {_date(board)})."
     )
 
 
