@@ -48,6 +48,7 @@ LINES = 24  # of a screen
 MAX_CONTESTS = 5  # that have a block each; more have one table of winners
 MAX_NAMED = 8  # conditions that a verdict names; chosen
 MAX_REFUTED = 8  # claims that an answer names; chosen
+MAX_SUMMED = 2  # conditions that a block names as those of J; chosen
 GAP = "  "  # between columns
 HEADING = 12  # characters of a line of a heading; chosen
 NAMES = 24  # characters of a plant and a condition beside winners; chosen
@@ -371,6 +372,10 @@ def contest_lines(contest: Contest) -> list[str]:
         notes.insert(0, "* best of these laws (95 % sure).")
     if contest.settled:
         notes.append(settled(contest.settled))
+    if contest.summed:
+        count = len(contest.summed)
+        judged = f"{count} tuning conditions" if count > MAX_SUMMED else joined(contest.summed)
+        notes.append(f"J is over {judged}, the rest under {contest.condition}.")
     if omitted:
         notes.append(f"In the report: {joined(omitted)}.")
     lines = [*textwrap.wrap(heading, WIDTH), *table, *textwrap.wrap(" ".join(notes), WIDTH)]

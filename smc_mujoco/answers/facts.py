@@ -238,6 +238,7 @@ class Contest:
     condition: str
     sample: Sample
     grid: Grid
+    summed: Names  # the conditions that J sums; () without J
     settled: tuple[tuple[str, Settles], ...]  # by law
     use: Use | None  # None if no law is to be preferred
     verdicts: tuple[Verdict, ...]

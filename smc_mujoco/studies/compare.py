@@ -184,7 +184,11 @@ class Compared(Answer):
             (needed, more_runs, "makes enough runs for a winner"),
             (barred, {"--allow-defaults": ""}, "lets a law win over default gains"),
             (undecided, _sets(2 * max(SEARCHES, seeds)), "shows smaller leads"),
-            (self._together, {"--condition": self._together}, "tries them all at once"),
+            (
+                self._together,
+                {"--condition": self._together},
+                "tries what a machine has, all at once",
+            ),
             (not self.worst, {"--worst": ""}, "searches the worst case of each law"),
         ]
         for applies, options, purpose in steps:

@@ -72,6 +72,7 @@ def _contest(columns: Sequence[Column], gains: Mapping[str, str], own: Names) ->
             rows=tuple(rows),
             winners=tuple(block.winner or "" for _, block in with_numbers),
         ),
+        summed=columns[0][0].summed,
         settled=_settled(columns),
         use=_use(columns, verdicts, gains),
         verdicts=tuple(verdicts),

@@ -70,6 +70,17 @@ def test_the_numbers_of_the_screen_are_those_of_the_boards(boards, contest):
     assert dict(contest.settled) == dict.fromkeys(LAWS, Settles(SEEDS, SEEDS))
 
 
+def test_the_screen_says_what_J_is_over_beside_its_condition(contest):
+    assert contest.summed == ()
+    conditions = ("nominal", "noise", "sine")
+    for summed, words in (
+        (conditions, "3 tuning conditions"),
+        (conditions[:2], "nominal and noise"),
+    ):
+        lines = " ".join(answers.contest_lines(dataclasses.replace(contest, summed=summed)))
+        assert f"J is over {words}, the rest under {contest.condition}." in lines
+
+
 def test_a_lead_on_the_screen_is_the_least_lead_of_the_board(boards, contest):
     (lead,) = [
         fact for fact in contest.verdicts if isinstance(fact, Lead) and fact.metric == "ITAE"

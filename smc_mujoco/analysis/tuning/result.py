@@ -102,7 +102,10 @@ class Tuned(Answer):
             command = instead("compare", {"--law": rivals}, ("--condition", "--x0"))
             step = NextStep(command, "compares it with rivals, with these gains")
         else:
-            step = NextStep(again({"--out": f"{name}.json"}), "keeps the gains in a file")
+            step = NextStep(
+                again({"--out": f"{name}.json"}),
+                "searches once more, and keeps the gains in a file",
+            )
         if self.spread > FAR_APART:
             step = NextStep(again({"--budget": f"{4 * self.budget}"}), "searches longer")
         return answers.tune_lines(
