@@ -341,6 +341,8 @@ def parse(text: str) -> Condition:
         values = read_fields(fields)
     except SyntaxError:
         cure = 'write it as "worn gear: friction=Coulomb(0.05), x0=0.3"'
+        if with_unit := re.search(r"\b\d[\d.]*(?![eE][-+]?\d)[a-zA-Z]+", fields):
+            cure = f"numbers stand without a unit, in SI, and {with_unit[0]!r} has one"
         raise ScenarioError(f"condition {shown(text)} cannot be read: {cure}") from None
     return condition(name.strip(), **values)
 

@@ -130,6 +130,8 @@ def test_a_text_that_is_none_is_one_sentence(refused):
         "a" * 10**5 + ": x=" + "(" * 10**4,
     ):
         refused(lambda text=text: find_condition(text))
+    refused(lambda: find_condition("worn: input_delay=10ms"), "'10ms'", "without a unit")
+    refused(lambda: find_condition("worn: x0=1e3 2"), "friction=Coulomb(0.05)")
 
 
 def test_a_condition_of_your_own_needs_its_own_option(refused):
