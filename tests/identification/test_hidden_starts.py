@@ -234,7 +234,9 @@ def test_a_rotor_that_starts_on_the_wrong_flank_of_its_play_is_tried_on_the_othe
     ends = []
     for side in (-1.0, 1.0):
         begun_there = replays.at_flanks(replays.start, side)
-        assert replays.state(begun_there, 0)[0] == pytest.approx(side * 0.5 * PLAY.gap)
+        state = replays.state(begun_there, 0)
+        assert state is not None
+        assert state[0] == pytest.approx(side * 0.5 * PLAY.gap)
         ends.append(gauss_newton.refine(replays, replays.slopes(begun_there), 4, 0.01))
     right, wrong = sorted(ends, key=lambda slopes: slopes.cost)
     assert wrong.cost > 5.0 * right.cost
