@@ -71,6 +71,7 @@ def page(board: TrackingBoard, picture: str) -> str:
         f"- **`without`** has the error of the same gains without the {load}; `=`: it is no less, "
         f"so it is not of the {load}.",
         "- **`never`**: u varies more than the limit, or a run failed.",
+        "- **Told**: given a1, a2 and b of the plant, e'' = a1 e + a2 e' + b u.",
         "- **An oracle** knows state, friction and load, without noise and delay.",
         *BESIDE.get(load, ()),
         "",
@@ -183,7 +184,8 @@ def tags_of(entry: TrackingResult) -> dict[str, str]:
     about = tomllib.loads(TAGS.read_text(encoding="utf-8"))
     tags = {}
     for tag, groups in about.items():
-        tags[tag] = next((value for value in groups if entry.law in groups[value]), "other")
+        rest = "nothing" if tag == "told" else "other"
+        tags[tag] = next((value for value in groups if entry.law in groups[value]), rest)
     kinds = {"": "nothing", "Dither": "a square wave", "Feedforward": "the friction"}
     tags["beside it"] = kinds[beside_of(entry.text)[0]]
     return tags

@@ -75,9 +75,14 @@ def test_an_entry_is_named_by_its_text(suite, monkeypatch):
 
 
 @SUITES
-def test_an_entry_has_a_tag_of_each_kind(suite):
+def test_an_entry_has_a_tag_of_each_kind(suite, monkeypatch):
+    monkeypatch.chdir(ROOT)
     for entry in tracking_board(suite).entries.values():
-        assert "other" not in tracking_page.tags_of(entry).values(), entry.law
+        tags = tracking_page.tags_of(entry)
+        assert "other" not in tags.values(), entry.law
+        template = tracking_entry(entry.text).law.template
+        is_told = any(gain.plant for gain in (template.gains if template else {}).values())
+        assert is_told == (tags["told"] != "nothing"), entry.law
 
 
 @pytest.mark.slow
