@@ -322,11 +322,13 @@ ROBOT = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/><body pos="0 0 .
 def test_unseen_runs_under_rk4_have_twice_the_step_and_one_in_four_their_own():
     robot = smc.plant_from(ROBOT, ["j"], name="robot")
     law = smc.law("pid", kp=20.0, ki=20.0, kd=2.0)
-    goal = Objective(conditions=("friction", "contact", "delay_10ms"), duration=1.0)
+    goal = Objective(conditions=("friction", "delay_10ms"), duration=1.0)
     trial = types.SimpleNamespace(draws=Draws(2), threads=1)
     steps = {case.resolved.physics_step for case in goal.holdout(robot, law, 0)}
     assert {case.resolved.integrator for case in goal.holdout(robot, law, 0)} == {"RK4"}
-    assert max(steps) < goal.control_period  # so they may be doubled
+    assert (
+        max(steps) < goal.control_period
+    )  # so they may be doubled, as those of light stops may not
     fast, own = module.unseen(trial, robot, [law] * 2, goal, [0, 1])
     J, _ = objectives(robot, [law] * 2, goal, [0, 1], 1)
     assert own[0] == J[0]
