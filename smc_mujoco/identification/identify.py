@@ -431,9 +431,7 @@ def identify(
             twin, names, data, doubts, starts, seed, most, corrected, report, batches
         )
         lacking = lack_of_fit(slopes, twin.lacks(replays, slopes))
-        shares = np.array([twin.unsure.get(name, 0.0) for name in names])
         by_model = np.hypot(by_steps, lacking.moved)
-        by_model = np.hypot(by_model, shares * slopes.point.values)
         errors, correlations = statistics(replays, slopes, by_model)
     values = twin.in_order(replays.values(slopes.point))
     fitted = twin.with_values(values, "identified from records")

@@ -46,9 +46,6 @@ from smc_mujoco.simulation.trace import Trace
 MAX_PERIOD = 1e-3  # s, of a replay's commands; chosen: a mixed command then errs by 0.5 us^2 u/J
 SLOWEST = 40.0  # Hz: a log of fewer samples a second misses too much of the commands; chosen
 STILL = 3.0  # deviations of the noise, or steps of the sensor: less is no motion; chosen
-# of a play that only the joint shows, beside a delay that is found too: how far it may be off. In
-# two own logs it came out 5 and 8 % too small
-IMPACTS = 0.1
 RUN_STEP = 2.5e-4  # s, longest physics step of runs with a delay, which it divides
 RELATIVE = (
     "with a gain free, forces and inertias are relative to the model's mass: if the model is too "
@@ -384,18 +381,18 @@ class LogRig(Rig):
         return rotors_read(self.base)
 
     @property
-    def unsure(self) -> dict[str, float]:
+    def plays_by_impacts(self) -> list[str]:
         """The plays that an encoder on the joint shows by their impacts alone, whose moments a
-        delay moves too, and the share of each by which it may be off beyond its scatter.
+        delay moves too, where that is found beside them.
         """
-        shares = {}
+        names = []
         for name, place in self.places.items() if DELAY in self.quantities else ():
             part = parts_of(self.base, place.field)[place.part]
-            if isinstance(part, Backlash) and place.name == "gap":
-                channels = part.channels(self.plant)
-                if not {*channels} <= {*self.rotors_read}:
-                    shares[name] = IMPACTS
-        return shares
+            if not isinstance(part, Backlash) or place.name != "gap":
+                continue
+            if not {*part.channels(self.plant)} <= {*self.rotors_read}:
+                names.append(name)
+        return names
 
     @property
     def units(self) -> dict[str, str]:
@@ -409,11 +406,11 @@ class LogRig(Rig):
         cautions = []
         if any(name.endswith(".gain") for name in self.quantities):
             cautions.append(RELATIVE)
-        for name, share in self.unsure.items():
+        for name in self.plays_by_impacts:
             cautions.append(
                 f"{name} is seen from the joint alone, by the moments of its impacts, which "
-                f"{DELAY} moves too: beside it a play may be {100.0 * share:.0f} % too small, "
-                "which its error has; give the delay, or an encoder on the motor's side"
+                f"{DELAY} moves too: a play may come out too small by more than its error; give "
+                "the delay, or an encoder on the motor's side"
             )
         if absent := self.not_in_runs:
             cautions.append(

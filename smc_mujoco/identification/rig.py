@@ -306,11 +306,6 @@ class Rig:
         """Half of the play in which each of these stands, rad or m; 0 for what is in none."""
         return ()
 
-    @property
-    def unsure(self) -> Mapping[str, float]:
-        """The quantities that may be off beyond their scatter, and by what share of them."""
-        return {}
-
     def hidden_spreads(self, record: Record, period: float) -> list[float]:
         """Return how far each hidden number varies in a record."""
         del record, period
