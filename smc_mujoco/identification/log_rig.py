@@ -409,8 +409,8 @@ class LogRig(Rig):
         for name in self.plays_by_impacts:
             cautions.append(
                 f"{name} is seen from the joint alone, by the moments of its impacts, which "
-                f"{DELAY} moves too: a play may come out too small by more than its error; give "
-                "the delay, or an encoder on the motor's side"
+                f"{DELAY} moves too: both may be off by more than their errors; give the delay, or "
+                "an encoder on the motor's side"
             )
         if absent := self.not_in_runs:
             cautions.append(

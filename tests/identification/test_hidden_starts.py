@@ -279,7 +279,7 @@ def test_a_play_seen_from_the_joint_is_found_where_the_delay_is_given_and_else_d
     identified = smc.identify(base, log, list(true))
     for name, value in true.items():
         off = abs(identified.values[name] - value)
-        if given or name != "j1.play":
+        if given or name not in ("j1.play", "input_delay"):  # of which the doubt is
             assert off <= max(2.0 * identified.errors[name], 0.02 * value), name
     doubted = any(note.startswith("j1.play is seen") for note in identified.notes)
     assert doubted != given
