@@ -597,7 +597,7 @@ def pushes(traces: Sequence[Trace]) -> list[Push]:
     body_pushes = []
     for trace in traces:
         plant = trace.scenario.plant
-        if plant.tip or (plant.is_user_model and not plant.pose):
+        if plant.tip or plant.has_user_joints:
             for push in trace.scenario.disturbance:
                 if isinstance(push, Push):
                     body_pushes.append(push)

@@ -267,6 +267,11 @@ class Plant:
         return hasattr(type(self.build), "argument")  # no value is made
 
     @property
+    def has_user_joints(self) -> bool:
+        """Whether its channels are joints of a user's model, not the pose of its body."""
+        return self.is_user_model and not self.pose
+
+    @property
     def has_path(self) -> bool:
         """Whether films show its path: an arm's tip, or a free body's."""
         return bool(self.tip or self.pose)

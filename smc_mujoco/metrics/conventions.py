@@ -481,7 +481,7 @@ def leans(trace: Trace) -> bool:
     one of its bounds for more than LEANS of the last part, or the base falls.
     """
     plant = trace.scenario.plant
-    if not plant.is_user_model or plant.pose:
+    if not plant.has_user_joints:
         return False
     limits = np.array(trace.scenario.limits)
     u = trace.u[last_part(trace)]

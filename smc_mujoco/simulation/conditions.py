@@ -696,7 +696,7 @@ def _fitted(usual: Actuator, fit: Callable[[JointSize], Actuator]) -> Recipe:
     """
 
     def fields(plant: Plant, duration: float) -> Data:
-        if not plant.is_user_model or plant.pose:
+        if not plant.has_user_joints:
             return {"actuator": usual}
         parts = list(map(fit, _joint_sizes(plant)))
         if len(set(parts)) == 1:
@@ -748,7 +748,7 @@ def _encoder(plant: Plant, duration: float) -> Data:
     has on 0.3 rad, or more.
     """
     way = BESIDE
-    if plant.is_user_model and not plant.pose:
+    if plant.has_user_joints:
         way = min(BESIDE, *(joint.travel for joint in _joint_sizes(plant)))
     return {"sensor": Encoder(counts=math.ceil(4096 * BESIDE / way))}
 

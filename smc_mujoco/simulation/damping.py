@@ -53,7 +53,7 @@ def of_file(plant: Plant) -> Array:
     0 for other plants, and for the channels of a free body.
     """
     coefficients = np.zeros((3, plant.n))
-    if not plant.is_user_model or plant.pose:
+    if not plant.has_user_joints:
         return coefficients
     model = loaded(plant)
     for i, name in enumerate(channel_names(plant)):

@@ -137,4 +137,4 @@ def _limits(plant: Plant) -> list[float]:
 def _unbounded(plant: Plant) -> bool:
     """Return whether nothing bounds the force on some joint of a user's model."""
     bounded = plant.limits and math.inf not in plant.limits
-    return plant.is_user_model and not plant.pose and not bounded
+    return plant.has_user_joints and not bounded

@@ -187,7 +187,7 @@ def _at_goal(scenario: Scenario) -> bool:
     where.
     """
     plant = scenario.plant
-    joints = plant.is_user_model and not plant.pose
+    joints = plant.has_user_joints
     return joints and scenario.x0 is None and plant.x0 == plant.origin
 
 

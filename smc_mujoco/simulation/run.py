@@ -575,7 +575,7 @@ class ScenarioBatch:
         data = self.batch.get_data(i, self.scratch)
         if any(data.warning[kind].number for kind in FULL_WARNINGS):
             return 0, LOST_CONTACTS
-        if plant.is_user_model and not plant.pose:
+        if plant.has_user_joints:
             from smc_mujoco.mechanisms.custom import scales
 
             if scales.tips_over(self.model, data):

@@ -508,7 +508,7 @@ def helped_joints(base: Scenario) -> list[int]:
     run to the goal.
     """
     plant = base.plant
-    if not plant.is_user_model or plant.pose:
+    if not plant.has_user_joints:
         return []
     apart = np.subtract(base.resolved.x0, plant.origin)[: plant.driven]
     helps = at_goal(plant).load * np.sign(apart)

@@ -172,7 +172,7 @@ def rises(plant: Plant, x: Floats) -> bool:
 
 def falls(plant: Plant) -> str:
     """Return a sentence if the base of a user's plant falls while its joints are held, or ""."""
-    if plant.pose or not plant.is_user_model or at_goal(plant).strayed <= 1.0:
+    if not plant.has_user_joints or at_goal(plant).strayed <= 1.0:
         return ""
     return (
         f"the base of {plant.name} falls or drives off while its joints are held, by more than its "
@@ -220,7 +220,7 @@ def usual_start(plant: Plant) -> Floats:
     """Return where runs of a plant begin if nobody says so, (n,): beside the goal of a user's
     model that would start at it.
     """
-    if plant.is_user_model and not plant.pose and plant.x0 == plant.origin:
+    if plant.has_user_joints and plant.x0 == plant.origin:
         return beside_goal(plant)
     return plant.x0
 
