@@ -11,7 +11,8 @@ from smc_mujoco.draw.nyquist import nyquist
 
 
 @pytest.fixture(scope="module")
-def page():
+def drawn():
+    """The page, and the cycles that it shows."""
     fields = {
         "plant": "duffing",
         "actuator": smc.Lag(0.01),
@@ -24,9 +25,13 @@ def page():
     cycles = []
     for scenario in scenarios:
         cycles.append(predict(scenario, ranges=False))
-    return nyquist(
-        scenarios, 0, cycles, smc.run(scenarios), [StepChange(0.06, 0.0), StepChange(0.04, 0.05)]
-    )
+    changes = [StepChange(0.06, 0.0), StepChange(0.04, 0.05)]
+    return nyquist(scenarios, 0, cycles, smc.run(scenarios), changes), cycles
+
+
+@pytest.fixture(scope="module")
+def page(drawn):
+    return drawn[0]
 
 
 def test_both_curves_pass_minus_one_where_the_mark_is(page):
@@ -37,6 +42,17 @@ def test_both_curves_pass_minus_one_where_the_mark_is(page):
         assert np.hypot(*(lines[name] - [-1.0, 0.0]).T).min() < 0.1
     (mark,) = [line for line in page.axes[0].lines if line.get_marker() == "o"]
     assert mark.get_xydata().tolist() == [[-1.0, 0.0]]
+
+
+@pytest.mark.quick
+def test_the_legend_names_the_frequency_and_the_curves_as_they_are_drawn(drawn):
+    page, (cycle, _) = drawn
+    legend = page.legends[0]
+    words = [text.get_text() for text in legend.get_texts()]
+    assert f"{cycle.frequency:.3g} Hz" in words[0]
+    styles_by_name = {line.get_label(): line.get_linestyle() for line in page.axes[0].lines}
+    for name, handle in zip(words[2:4], legend.legend_handles[2:4], strict=True):
+        assert handle.get_linestyle() == styles_by_name[name]
 
 
 @pytest.mark.quick
