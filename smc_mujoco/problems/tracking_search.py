@@ -77,7 +77,7 @@ class GainTrials:
         self.names = tuple(box)
         taus = [share * problem.period for share in TAUS]
         self.box = np.log([*box.values(), taus])  # (gains, 2)
-        self.bounds = np.log([*search_space.widened(box).values(), taus])
+        self.bounds = np.log([*search_space.widened(self.law, box).values(), taus])
         runs = [(instance, True) for instance in range(CHOOSING)]
         self.choosing = self.group([*runs, (CHOOSING, False)], WINDOW)
 

@@ -490,7 +490,7 @@ def task_of(
         goal=goal,
         scales=scales,
         box=box,
-        searched=search_space.widened(box),
+        searched=search_space.widened(first.law, box),
         budget=budget,
         seed=seed,
         threads=threads,

@@ -8,7 +8,8 @@ The plant has four scales, from which each gain's scale follows:
     T = sqrt(M X / u_max)   s, time in which the actuator moves the plant from rest by X / 2
 
 A gain with the unit F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5,
-and a search may leave this box by a decade. As F = M X / T^2, its unit has 2 a - c powers of a rate
+and a search may leave this box by a decade; by two for the weights of a regulator, N^2/m^2, of
+which its slopes are roots. As F = M X / T^2, its unit has 2 a - c powers of a rate
 1 / T. A force or a stiffness has two, and each beyond two, or beyond those of F^a if a > 1, raises
 the upper end by a decade. So ki of a PID, N/(m s), reaches the l wc^2 / b that is the integral of a
 PD with an observer. Forces have this box too, such as lambda of -lambda tanh(s), as the actuator
@@ -248,7 +249,12 @@ def force_limits(law: Component, gains: Numbers, u_max: float) -> dict[str, floa
     return limits
 
 
-def widened(bounds: Box) -> dict[str, Pair]:
-    """Return bounds a decade wider on either side."""
-    factor = 10**WIDENING
-    return {name: (low / factor, high * factor) for name, (low, high) in bounds.items()}
+def widened(law: Component, bounds: Box) -> dict[str, Pair]:
+    """Return bounds a decade wider on either side; of a weight of squares, two decades."""
+    wider = {}
+    for name, (low, high) in bounds.items():
+        gain_unit = _gain(law, name).unit
+        squares = isinstance(gain_unit, Unit) and gain_unit.force == 2
+        factor = 10 ** (WIDENING * (2 if squares else 1))
+        wider[name] = (low / factor, high * factor)
+    return wider

@@ -329,13 +329,19 @@ def test_a_gain_is_searched_three_decades_wide_and_further_above_if_of_more_than
         "M": 1.0,
         "T": 0.5,
     }
-    box = search_space.box(smc.law("super_twisting"), scales)
+    law = smc.law("super_twisting")
+    box = search_space.box(law, scales)
     gains = {"k1": 6.0 / 4.0**0.5, "k2": 12.0, "c": 2.0}
     for name, (low, high) in box.items():
         assert low == pytest.approx(gains[name] / 10**1.5)
         assert high == pytest.approx(gains[name] * 10 ** (2.5 if name == "k2" else 1.5))
     low, high = box["c"]
-    assert search_space.widened(box)["c"] == pytest.approx((low / 10, 10 * high))
+    assert search_space.widened(law, box)["c"] == pytest.approx((low / 10, 10 * high))
+    regulator = smc.law("lqr")
+    squares = search_space.box(regulator, scales)
+    low, high = squares["q1"]  # N^2/m^2: the root is a slope
+    wide = search_space.widened(regulator, squares)["q1"]
+    assert wide == pytest.approx((low / 100, 100 * high))
 
 
 def test_a_gain_over_another_is_searched_as_far_as_a_force():
