@@ -86,6 +86,33 @@ def test_a_run_tolerates_nothing_if_its_pole_has_fallen_though_the_cart_is_home(
     assert not margins.tolerates(dataclasses.replace(trace, x=fallen))
 
 
+@pytest.mark.quick
+def test_a_column_holds_what_its_heading_says():
+    margin = margins.Margin(
+        plant="duffing",
+        law="pid",
+        kind="delay",
+        value=0.031,
+        unit="s",
+        resolution=0.002,
+        searched=0.5,
+        theory=0.043,
+        sets=12,
+        low=0.011,
+        high=0.037,
+    )
+    (table,) = (table.about() for table in margins.Margins([margin]).tables)
+    assert dict(zip(table["columns"], table["rows"][0], strict=True)) == {
+        "plant": "duffing",
+        "law": "pid",
+        "margin": 0.031,
+        "to within": 0.002,
+        "all sets": "0.0110 to 0.0370",
+        "theory": 0.043,
+        "unit": "s",
+    }
+
+
 # the search
 
 SEARCHED = [  # whether a level is tolerated, of 1, 2 and 4 first, and the margin
