@@ -77,6 +77,14 @@ def test_a_scenario_has_what_its_instance_drew_and_the_rules_bounds():
     }
 
 
+def test_a_problem_with_an_adversary_has_the_rules_of_the_adversary():
+    worst = problems.rules(1)["worst"]
+    attacked = problems.problem("duffing/worst_forces@1")
+    assert attacked.budget == worst["budget"]
+    assert attacked.visible == worst["visible"] != problems.rules(1)["visible"]
+    assert problems.problem("duffing/noise@1").budget == 1
+
+
 @pytest.mark.parametrize(
     ("condition", "fields"),
     [

@@ -109,3 +109,5 @@ def test_with_tolerances_only_their_metrics_count(step_response, tmp_path):
     golden.compare(tmp_path / "a.json", "one", r, {"itae": 1e-9})
     with pytest.raises(AssertionError, match="max_u"):
         golden.compare(tmp_path / "a.json", "one", r, {})
+    with pytest.raises(smc.ScenarioError, match="tolerance of itae"):
+        golden.compare(tmp_path / "a.json", "one", r, {"itae": -1.0})
