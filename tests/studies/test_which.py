@@ -580,6 +580,21 @@ def test_the_worst_run_is_of_the_condition_in_which_the_law_settles_least_and_th
     assert recommend._worst_run(Columns(), "b") == 4
 
 
+@pytest.mark.quick
+@pytest.mark.parametrize("fields", [{"minutes": 10}, {"quick": True}])
+def test_the_answer_must_be_there_within_the_minutes_that_were_asked_for(monkeypatch, fields):
+    class Begun(Exception):
+        pass
+
+    def begun(trial, machine, question, goal, clock):
+        raise Begun(clock.ends + clock.spare - time.monotonic())
+
+    monkeypatch.setattr(module, "recommend", begun)
+    with pytest.raises(Begun) as raised:
+        smc.which("duffing", "noise", laws=["pid", "adrc"], **fields)
+    assert 480.0 < raised.value.args[0] < 600.0
+
+
 def test_an_event_after_the_runs_that_judge_gains_is_refused_before_them(refused):
     late = smc.condition("late", fault=smc.Fault(2.5))
     fields = {"laws": ["pid", "adrc"], "minutes": 1}
