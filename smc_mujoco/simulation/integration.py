@@ -140,6 +140,8 @@ def default_steps(s: Any) -> int:
     shortest = min(map(longest_step, s.machines))
     longest = max(shortest, s.control_period / MAX_DEFAULT_STEPS)
     minimum = math.ceil(s.control_period / longest - 1e-9)
+    if any(math.isfinite(part.longest_step) for part in s.contact):
+        minimum += minimum % 2  # so that a search can double the step
     if s.actuator or s.exact_friction:
         for steps in range(minimum, 4 * minimum + 1):
             if _divides_delays(s, steps):

@@ -73,9 +73,14 @@ def _forces(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
 
 
 @functools.lru_cache(maxsize=32)
-def at_goal(plant: Plant) -> AtGoal:
-    """Return what moves a plant's joints about their default goal."""
-    model, data = _at(plant, plant.rest or plant.origin)
+def at_goal(plant: Plant, share: float = 0.0) -> AtGoal:
+    """Return what moves a plant's joints about their default goal, or a share of the way from it to
+    where runs begin.
+    """
+    goal = np.array(plant.rest or plant.origin)
+    start = np.array(usual_start(plant)) if share else goal
+    pose = goal + share * (start - goal)
+    model, data = _at(plant, tuple(pose.tolist()))
     dofs = dof_ids(model)[: plant.driven]
     M = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, M)
