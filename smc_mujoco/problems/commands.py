@@ -8,7 +8,7 @@ import typer
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.console import Terminal
-from smc_mujoco.common.errors import printable
+from smc_mujoco.common.errors import find, printable
 from smc_mujoco.common.interrupts import delay_signals
 
 if TYPE_CHECKING:
@@ -79,7 +79,9 @@ def enter(
     Example: smc-mujoco enter entries/soft_relay --site
     """
     with delay_signals():
+        from smc_mujoco.problems.suite import suites
         from smc_mujoco.problems.tracking import tracking_suites
+    find("suite", suite, dict.fromkeys((*tracking_suites(), *suites())))
     if suite in tracking_suites():
         _enter_tracking(folder, suite, results, threads, executor)
         return

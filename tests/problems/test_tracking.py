@@ -11,7 +11,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.problems import tracking_page, tracking_results, tracking_search
+from smc_mujoco.problems import commands, tracking_page, tracking_results, tracking_search
 from smc_mujoco.problems.tracking import TrackingProblem, tracking_suite, tracking_suites
 from smc_mujoco.problems.tracking_entry import tracking_entry
 from smc_mujoco.problems.tracking_results import TrackingBoard, enter_tracking, read_result
@@ -148,6 +148,14 @@ def test_what_is_no_entry_is_refused_before_anything_is_searched(text, about, tm
     with pytest.raises(ScenarioError, match=about):
         enter_tracking(text, "smc-load@1", tmp_path)
     assert not list(tmp_path.rglob("*.json"))
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"), [("smc-fricton@1", "smc-friction@1"), ("x", "smc-load@1, ")]
+)
+def test_a_mistyped_suite_is_told_those_of_both_kinds(typed, meant):
+    with pytest.raises(ScenarioError, match=meant):
+        commands.enter("pid", suite=typed)
 
 
 def result(name, levels, spread=0.02, seed=0, rate=5.0):
