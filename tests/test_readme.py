@@ -171,6 +171,8 @@ def check_command(line: str, known: dict) -> None:
     for argument in rest:
         if not argument.startswith("-"):
             arguments.append(argument)
+        if argument.startswith("examples/"):
+            assert (ROOT / argument.partition(":")[0]).exists(), line
     of_template = set()
     for path in (ROOT / "examples").glob("*/*/scenes/*.py"):
         of_template.add(path.stem)
@@ -194,6 +196,17 @@ def test_the_first_screen_is_what_its_command_prints(tmp_path):
     lines = [line.rstrip() for line in done.stdout.splitlines()]
     assert block.splitlines() == lines[: len(block.splitlines())]
     assert (tmp_path / "compared" / "report.html").exists()
+
+
+@pytest.mark.slow
+def test_the_numbers_of_a_log_are_what_the_command_prints(tmp_path):
+    page = (ROOT / "docs" / "identify.md").read_text()
+    (line,) = [line for line in commands(README) if line.startswith("smc-mujoco identify ")]
+    assert line in commands(page)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    done = python("-m", "smc_mujoco", *shlex.split(line)[1:], folder=tmp_path, COLUMNS="80")
+    (block,) = blocks(page, "text")
+    assert block.splitlines() == [line.rstrip() for line in done.stdout.splitlines()]
 
 
 def test_readme_s_cost_of_a_law_is_that_of_the_benchmark():

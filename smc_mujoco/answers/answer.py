@@ -2,11 +2,14 @@
 explained.
 """
 
+import dataclasses
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from smc_mujoco.answers.answers import screen_lines
 from smc_mujoco.answers.explain import explain
+from smc_mujoco.answers.facts import Screen
 from smc_mujoco.common import html
 from smc_mujoco.common.aliases import AnyPath, Names
 from smc_mujoco.common.files import replacing
@@ -32,18 +35,18 @@ class Answer(Tables):
     """Base of results with three layers.
 
     `print` and a notebook show `lines`; `full` prints `tables`; `to_html` writes all of it. A
-    subclass has `lines` and `tables`, and `title` and `pictures` for its page.
+    subclass has `screen` and `tables`, and `title` and `pictures` for its page.
     """
 
     @property
-    def lines(self) -> Sequence[str]:
-        """The answer, at most 80 characters wide, from the templates of `answers.answers`."""
+    def screen(self) -> Screen:
+        """The facts of the answer."""
         raise NotImplementedError
 
     @property
-    def page_lines(self) -> Sequence[str]:
-        """The answer on its page, which does not point at itself."""
-        return self.lines
+    def lines(self) -> list[str]:
+        """The answer, at most 80 characters wide."""
+        return screen_lines(self.screen)
 
     @property
     def title(self) -> str:
@@ -94,7 +97,8 @@ class Answer(Tables):
         Raises:
           ScenarioError: a file that cannot be written.
         """
-        parts = [_preformatted(self.page_lines), *self.pictures]
+        screen = dataclasses.replace(self.screen, report="")  # the page does not point at itself
+        parts = [_preformatted(screen_lines(screen)), *self.pictures]
         for table in self.tables:
             parts.append(table._repr_html_())
         if self.words:

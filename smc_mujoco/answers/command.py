@@ -8,14 +8,30 @@ from contextvars import ContextVar
 PROGRAM = "smc-mujoco"
 ARGUMENTS = {"condition": "conditions", "law": "laws"}  # an option -> its argument in Python
 _typed: ContextVar[tuple[str, ...]] = ContextVar("typed", default=())
+_doubted: ContextVar[str] = ContextVar("doubted", default="")
 
 
 def remember(words: Sequence[str]) -> None:
     """Remember the words of a command line, without the program's name."""
     _typed.set(tuple(words))
+    _doubted.set("")
 
 
-def again(options: Mapping[str, str], without: Sequence[str] = ()) -> str:
+def doubt(sentence: str) -> None:
+    """Remember the first doubt about a value of the command that is running."""
+    if not _doubted.get():
+        _doubted.set(sentence)
+
+
+def doubted() -> str:
+    """Return a doubt about a value of the command that is running; "" without one, or a command."""
+    return _doubted.get() if _typed.get() else ""
+
+
+Options = Mapping[str, str | None]  # option -> value; "" of a flag, None for one to leave out
+
+
+def again(options: Options, without: Sequence[str] = ()) -> str:
     """Return the command that is running, with these options in place of its own, such as
     {"--seeds": "24"}, and `without` some flags; where Python runs, the arguments that differ.
     """
@@ -38,7 +54,7 @@ def typed(option: str) -> str:
     return next((word.partition("=")[2] for word in words if word.startswith(f"{option}=")), "")
 
 
-def instead(command: str, options: Mapping[str, str], shared: Sequence[str] = ()) -> str:
+def instead(command: str, options: Options, shared: Sequence[str] = ()) -> str:
     """Return another command with the arguments, and the `shared` options, of the one that is
     running, and further options; where Python runs, its name.
     """
@@ -52,17 +68,19 @@ def instead(command: str, options: Mapping[str, str], shared: Sequence[str] = ()
                 words.append(word)
             elif words_typed[i - 1] in shared:
                 words += words_typed[i - 1 : i + 1]
+        elif "=" in word and word.partition("=")[0] in shared:
+            words.append(word)
     return shlex.join([PROGRAM, *words, *_flat(options)])
 
 
-def _written(value: str) -> str:
+def _written(value: str | None) -> str:
     """Return a value as Python writes it."""
-    if value in ("", "False"):
-        return value or "True"
+    if value in ("", "False", None):
+        return "True" if value == "" else str(value)
     return value if value.isdigit() else repr(value)
 
 
-def _others(options: Mapping[str, str]) -> list[str]:
+def _others(options: Options) -> list[str]:
     """Return the words of the running command without these options and their values."""
     words = []
     skip = False
@@ -76,6 +94,10 @@ def _others(options: Mapping[str, str]) -> list[str]:
     return words
 
 
-def _flat(options: Mapping[str, str]) -> list[str]:
+def _flat(options: Options) -> list[str]:
     """Return the options and their values as words."""
-    return [part for pair in options.items() for part in pair if part]
+    words = []
+    for option, value in options.items():
+        if value is not None:
+            words += filter(None, (option, value))
+    return words

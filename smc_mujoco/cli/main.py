@@ -22,8 +22,9 @@ from smc_mujoco.cli.commands import (
     studies,
 )
 from smc_mujoco.cli.console import errors_as_sentences
+from smc_mujoco.cli.help_pages import GroupedCommand, with_all
 from smc_mujoco.common import annexes
-from smc_mujoco.common.errors import ScenarioError, printable
+from smc_mujoco.common.errors import ScenarioError, UnitWarning, printable
 from smc_mujoco.common.gl import choose_gl
 from smc_mujoco.common.version import __version__
 
@@ -60,7 +61,8 @@ for annex in sorted(filter(annexes.installed, annexes.ANNEXES)):
 for group, commands in GROUPS.items():
     for function in commands:
         name = function.__name__.strip("_").replace("_", "-")  # list_ -> list, export_c -> export-c
-        app.command(name, rich_help_panel=group)(errors_as_sentences()(function))
+        command_of = app.command(name, cls=GroupedCommand, rich_help_panel=group)
+        command_of(errors_as_sentences()(function))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -93,15 +95,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 "laws on a plant"
             )
     command.remember(words)
-    app(arguments, prog_name=command.PROGRAM)
+    app(with_all(words), prog_name=command.PROGRAM)
 
 
 def _showing_once() -> Callable[..., None]:
     """Return a showwarning that prints each sentence once, also if parts of a command repeat it."""
     sentences: set[str] = set()
 
-    def show(message: Warning | str, *_: object, **__: object) -> None:
+    def show(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
         if (sentence := printable(str(message))) not in sentences:
+            if issubclass(category, UnitWarning):
+                command.doubt(sentence)
             sentences.add(sentence)
             print(f"smc-mujoco: {sentence}", file=sys.stderr)
 

@@ -46,6 +46,10 @@ class ScenarioWarning(UserWarning):
     """
 
 
+class UnitWarning(ScenarioWarning):
+    """A value that may be in another unit, such as degrees."""
+
+
 def printable(text: str) -> str:
     """Return the text with escapes for characters that a terminal would act on, such as a newline
     in a file's name.
@@ -267,10 +271,13 @@ warned: ContextVar[set[str]] = ContextVar("warned")
 
 
 def warn_once(sentence: str, kind: type[Warning] = ScenarioWarning) -> None:
-    """Warn of a doubt, if any, that a call of the user's may raise many times."""
+    """Warn of a doubt, if any, that a call of the user's may raise many times; also if only its
+    numbers differ, as those of starts that were drawn around a doubtful one.
+    """
     before = warned.get(set())
-    if sentence and sentence not in before:
-        before.add(sentence)
+    words = re.sub(r"\d[\d.e-]*", "#", sentence)
+    if sentence and words not in before:
+        before.add(words)
         warnings.warn(sentence, kind, users_stacklevel())
 
 

@@ -145,7 +145,7 @@ class Tabular:
 
         texts = [Text(self.headings[i])]
         for row in self.rows:
-            cell = _cell(row[i])
+            cell = as_cell(row[i])
             name = Text(folded(cell.text, width), cell.colour)
             if cell.below:
                 name.append(f"\n{cell.below}", "dim")
@@ -159,7 +159,7 @@ class Tabular:
         """
         from rich.text import Text
 
-        cells = [_cell(row[i]) for row in self.rows]
+        cells = [as_cell(row[i]) for row in self.rows]
         if narrow:
             cells = [cell._replace(below=_narrow(cell.below)) for cell in cells]
         pad = " " if any(cell.strong for cell in cells) else ""  # below the stars
@@ -216,7 +216,7 @@ class Tabular:
         columns = []
         for i in range(len(self.headings)):
             letters = marks if i >= self.name_columns else {}
-            cells = [_cell(row[i]) for row in self.rows]
+            cells = [as_cell(row[i]) for row in self.rows]
             widest = max((_tex_width(cell, letters) for cell in cells), default=0.0)
             head = self._heading(i, math.ceil(widest / TEX_CHARACTER)).splitlines()
             widths.append(max([widest, *(TEX_CHARACTER * len(line) for line in head)]))
@@ -251,7 +251,7 @@ class Tabular:
         marks: dict[str, str] = {}
         for row in self.rows:
             for value in row[self.name_columns :]:
-                for line in _below(_cell(value)):
+                for line in _below(as_cell(value)):
                     if " " in line:
                         again, letter = divmod(len(marks), 26)
                         marks.setdefault(line, chr(ord("a") + letter) * (1 + again))
@@ -337,7 +337,8 @@ def folded(name: str, width: int) -> str:
     return "\n".join(lines)
 
 
-def _cell(cell: Cell | str) -> Cell:
+def as_cell(cell: Cell | str) -> Cell:
+    """Return a cell that may be a text alone."""
     return cell if isinstance(cell, Cell) else Cell(cell)
 
 
@@ -346,7 +347,7 @@ def _value(cell: Cell | str) -> object:
     if isinstance(cell, Cell) and (cell.below or cell.alarm or cell.strong):
         parts = {"text": _value(cell.text), "below": cell.below, "alarm": cell.alarm}
         return parts | {"strong": cell.strong}
-    text = _cell(cell).text
+    text = as_cell(cell).text
     try:
         return float(text)
     except ValueError:
@@ -392,7 +393,7 @@ def _parts(widths: Sequence[int], width: int, names: int) -> list[list[int]]:
 
 def _html(cell: Cell | str) -> str:
     """Return a cell as HTML, with the lines below in smaller letters."""
-    cell = _cell(cell)
+    cell = as_cell(cell)
     text = html.strong(cell.text) if cell.strong else html.text(cell.text)
     if below := "<br>".join(map(html.text, _below(cell))):
         return html.Html(f'{text}<br><small style="white-space:nowrap">{below}</small>')

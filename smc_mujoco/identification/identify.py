@@ -25,9 +25,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from smc_mujoco.answers import answers
 from smc_mujoco.answers.answer import Answer
-from smc_mujoco.answers.facts import IdentifiedNumber, IdentifyFacts
+from smc_mujoco.answers.facts import Fact, Screen
 from smc_mujoco.common import html
 from smc_mujoco.common.aliases import AnyPath, Array, Data, Fields, Numbers
 from smc_mujoco.common.constraints import Natural, Progress, Seed, Whole, constrained
@@ -76,6 +75,7 @@ FLOOR = 0.05  # of a value, by which drawn sets differ at least; chosen: frictio
 USUAL_STEPS = 6  # of a search; chosen: only the progress that is shown depends on it
 AHEAD = 1.1  # times what is done: the work that is shown, if a search takes longer
 PIECE_STEPS = 12  # of the search for the starts of pieces of a log that was not used; chosen
+HEADINGS = "number", "value", "±", "unit", "start", "scatter between logs"
 Log = Source | AnyPath  # also a data frame
 Count = Annotated[int, Whole(low=1, high=1000)]
 SLOW = (
@@ -218,34 +218,28 @@ class Identified(Answer):
         return f"identified({self.rig.name!r}, {', '.join(values)})"
 
     @property
-    def lines(self) -> list[str]:
+    def screen(self) -> Screen:
         """The answer: numbers with errors and units, the fit, and what to doubt."""
-        numbers = []
+        rows = []
         for name, value in self.values.items():
-            numbers.append(self._number(name, value))
-        held_out = None
+            rows.append((name, *self._number(name, value)))
+        fits = {"fit": _fit(self.by_pieces or self.fits), "pieces": bool(self.by_pieces)}
         if self.held_out:
-            held_out = _worst([self.held_out.by_pieces or self.held_out.fit])
-        return answers.identify_lines(
-            IdentifyFacts(
-                numbers=tuple(numbers),
-                fit=_worst(self.by_pieces or self.fits),
-                by_pieces=bool(self.by_pieces),
-                held_out=held_out,
-                doubts=tuple(self.notes),
-            )
+            fits["held_out"] = _fit([self.held_out.by_pieces or self.held_out.fit])
+        return Screen(
+            tables=[Tabular(headings=HEADINGS[:4], rows=rows)],
+            notes=[Fact("fits", **fits)],
+            facts=[Fact("doubt", text=note) for note in self.notes],
         )
 
-    def _number(self, name: str, value: float) -> IdentifiedNumber:
-        """Return a number as text; a short time is in ms."""
+    def _number(self, name: str, value: float) -> tuple[str, str, str]:
+        """Return a number, its error and their unit as text; a short time is in ms."""
         unit = self.rig.quantities[name].unit
         scale = 1.0
         if unit == "s" and abs(self.values[name]) < SHORT_TIME:
             unit, scale = "ms", 1e3
         error = scale * self.errors[name]
-        return IdentifiedNumber(
-            name, number_text.to_error(scale * value, error), f"{error:.2g}", unit
-        )
+        return number_text.to_error(scale * value, error), f"{error:.2g}", unit
 
     @property
     def title(self) -> str:
@@ -268,10 +262,9 @@ class Identified(Answer):
         """The numbers, the fits of all logs, and correlations."""
         numbers = []
         for name, value in self.values.items():
-            number = self._number(name, value)
-            before = self._number(name, self.before.values[name])
+            before, *_ = self._number(name, self.before.values[name])
             scatter = f"{self.scatter[name]:.2g}" if self.scatter else ""
-            numbers.append([name, number.value, number.error, number.unit, before.value, scatter])
+            numbers.append([name, *self._number(name, value), before, scatter])
         heads = [f"log {i}" for i in range(1, len(self.fits) + 1)]
         whole_fits, piece_fits = list(self.fits), list(self.by_pieces or [{}] * len(self.fits))
         if self.held_out:
@@ -286,9 +279,8 @@ class Identified(Answer):
         rows = []
         for name, row in zip(self.values, self.correlations.tolist(), strict=True):
             rows.append([name, *(f"{value:.2f}" for value in row)])
-        heads_of_numbers = ("number", "value", "±", "unit", "start", "scatter between logs")
         return [
-            Tabular(headings=heads_of_numbers, rows=numbers, title=self.title, notes=self.notes),
+            Tabular(headings=HEADINGS, rows=numbers, title=self.title, notes=self.notes),
             Tabular(
                 headings=("log", "column", "fit, %", "in pieces of 1 s, %"),
                 rows=fits,
@@ -494,6 +486,12 @@ def check(
 def _worst(fits: Sequence[Numbers]) -> float:
     """Return the worst fit of any column of any log."""
     return min(min(fit.values()) for fit in fits)
+
+
+def _fit(fits: Sequence[Numbers]) -> str:
+    """Return the worst fit as text: "99.4 %", or when a twin falls."""
+    fit = _worst(fits)
+    return str(fit) if isinstance(fit, Fall) else f"{fit:.1f} %"
 
 
 def fits_by_pieces(replays: Replays, slopes: Slopes) -> list[dict[str, float]]:

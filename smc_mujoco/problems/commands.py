@@ -115,7 +115,7 @@ def _enter_tracking(
     text: str, suite: str, results: Path, threads: int | None, executor: str | None
 ) -> None:
     """Search for an entry's gains in a suite of tracking problems, and print where it stands."""
-    from smc_mujoco.answers.answers import entered_lines
+    from smc_mujoco.answers.answers import screen_lines
     from smc_mujoco.problems import tracking_page, tracking_results
 
     terminal = Terminal()
@@ -123,8 +123,9 @@ def _enter_tracking(
     board = tracking_results.tracking_board(suite, results)
     entry = tracking_results.read_result(target).name
     page = tracking_page.write(board, target.parent / "board.md")
-    for line in entered_lines(board.standing(entry, str(page))):
+    for line in screen_lines(board.standing(entry)):
         terminal.note(line)
+    terminal.wrote(page)
 
 
 def _places(found: "Results", entry: str) -> Iterator[str]:

@@ -21,7 +21,7 @@ import numpy as np
 from smc_mujoco.analysis.bootstrap import median_of
 from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.tuning import search_space
-from smc_mujoco.answers.facts import EnteredFacts, ProblemStanding
+from smc_mujoco.answers.facts import Fact, Screen, Settles
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.aliases import AnyPath, Array, Names, Numbers
 from smc_mujoco.common.cache import CachedResult
@@ -30,6 +30,7 @@ from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, reading, replacing, slug, write_json
 from smc_mujoco.common.progress import bar
+from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import number
 from smc_mujoco.common.version import versions
 from smc_mujoco.control.law import law
@@ -269,27 +270,21 @@ class TrackingBoard:
         """The boards of all problems."""
         return [self.problem(problem.name) for problem in self.suite.problems]
 
-    def standing(self, entry: str, page: str) -> EnteredFacts:
-        """Return where an entry stands, and the file of the board."""
-        standings = []
+    def standing(self, entry: str) -> Screen:
+        """Return where an entry stands."""
+        rows = []
         for board in self.problems:
             first = board.names[0]
-            standings.append(
-                ProblemStanding(
-                    problem=board.problem,
-                    place=1 + board.names.index(entry),
-                    level=entry in board.leaders,
-                    error=number(board.errors[entry][1]),
-                    first=first,
-                    least=number(board.errors[first][1]),
-                )
-            )
-        return EnteredFacts(
-            entry=entry,
-            suite=self.suite.name,
-            entries=len(self.entries),
-            standings=tuple(standings),
-            page=page,
+            place = Cell(f"{1 + board.names.index(entry)}", strong=entry in board.leaders)
+            error, least = (number(board.errors[name][1]) for name in (entry, first))
+            rows.append((board.problem, place, error, first, least))
+        headings = "problem", "place", "error", "first", "its error"
+        level = Settles(sum(entry in board.leaders for board in self.problems), len(rows))
+        about = {"entry": entry, "suite": self.suite.name, "level": level}
+        return Screen(
+            heading=Fact("entered", **about, others=len(self.entries) - 1),
+            tables=[Tabular(headings=headings, rows=rows)],
+            notes=[Fact("leaders")],
         )
 
     def shares(self) -> dict[str, float]:

@@ -36,17 +36,16 @@ from smc_mujoco.analysis import linear_theory as theory
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns, worth_compiling
 from smc_mujoco.analysis.tuning import search_space
-from smc_mujoco.answers import answers
 from smc_mujoco.answers.answer import Answer
 from smc_mujoco.answers.command import again, instead
-from smc_mujoco.answers.facts import Grid, MarginsFacts, NextStep
+from smc_mujoco.answers.facts import Fact, NextStep, Screen
 from smc_mujoco.common.aliases import AnyPath
 from smc_mujoco.common.constraints import Boolean, Called, constrained
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.common.tabular import Cell, Tabular
-from smc_mujoco.common.text import number
+from smc_mujoco.common.text import capital, number
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component, Template
@@ -432,11 +431,29 @@ class Margins(Answer, list[Margin]):
     coarse: bool = False
 
     @property
-    def lines(self) -> list[str]:
-        """The answer on one screen."""
-        grids = []
+    def screen(self) -> Screen:
+        """The answer: a table for each plant, and the law that tolerates the most of each kind."""
+        tables = []
+        places_of: dict[str, list[Fact]] = {}
+        kinds = dict.fromkeys(margin.kind for margin in self)
         for plant in dict.fromkeys(margin.plant for margin in self):
-            grids.append((plant, self._grid([margin for margin in self if margin.plant == plant])))
+            cells: dict[str, list[Cell | str]] = {}
+            headings = [""]
+            won: dict[str, list[str]] = {}
+            for kind in kinds:
+                place = plant, kind
+                of_kind = [margin for margin in self if (margin.plant, margin.kind) == place]
+                unit = "of nominal" if kind == "mass" else of_kind[0].unit.replace("1", "share")
+                headings.append(f"{kind} ({unit})")
+                most = _most(of_kind)
+                won.setdefault(most, []).append(kind)
+                for margin in of_kind:
+                    cell = Cell(margin.over_sets or margin.text, strong=margin.law == most)
+                    cells.setdefault(margin.law, [margin.law]).append(cell)
+            tables.append(Tabular(headings=headings, rows=list(cells.values()), title=plant))
+            won.pop("", None)
+            for law, of_law in won.items():
+                places_of.setdefault(law, []).append(Fact("on plant", kinds=of_law, plant=plant))
         failing = dict.fromkeys(margin.law for margin in self if math.isnan(margin.value))
         step = NextStep(
             instead("worst", {}, ("--law", "--gains", "--condition")),
@@ -444,33 +461,21 @@ class Margins(Answer, list[Margin]):
         )
         if self.coarse:
             step = NextStep(again({}, without=("--quick",)), "finds them more exactly")
-        return answers.margins_lines(
-            MarginsFacts(
-                duration=self.duration,
-                gains=self.gains,
-                grids=tuple(grids),
-                failing=tuple(failing),
-                next=step,
-            )
+        notes = [Fact("most")] if places_of else []
+        if self.gains:
+            notes.append(Fact("sentence", label="", text=f"{capital(self.gains)}."))
+        facts = [Fact("tolerates", law=law, places=places) for law, places in places_of.items()]
+        if failing:
+            facts.append(Fact("fails", laws=list(failing)))
+        ranges = any(margin.over_sets for margin in self)
+        return Screen(
+            heading=Fact("tolerated", duration=self.duration, ranges=ranges),
+            tables=tables,
+            notes=notes,
+            facts=facts,
+            next=step,
+            word="margin",
         )
-
-    @staticmethod
-    def _grid(margins: Sequence[Margin]) -> Grid:
-        """Return the margins on one plant, and of each kind the law that tolerates the most."""
-        kinds: dict[str, dict[str, Margin]] = {}
-        for margin in margins:
-            kinds.setdefault(margin.kind, {})[margin.law] = margin
-        columns = []
-        winners = []
-        for kind, by_law in kinds.items():
-            unit = next(iter(by_law.values())).unit
-            columns.append((kind, "of nominal" if kind == "mass" else unit.replace("1", "share")))
-            winners.append(_most(list(by_law.values())))
-        rows = []
-        for law in dict.fromkeys(margin.law for margin in margins):
-            cells = [by_law[law].over_sets or by_law[law].text for by_law in kinds.values()]
-            rows.append((law, tuple(cells)))
-        return Grid(columns=tuple(columns), rows=tuple(rows), winners=tuple(winners))
 
     @property
     def tables(self) -> list[Tabular]:

@@ -28,10 +28,9 @@ import numpy as np
 from smc_mujoco.analysis.bootstrap import Interval, share_interval
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns, worth_compiling
-from smc_mujoco.answers import answers
 from smc_mujoco.answers.answer import Answer
 from smc_mujoco.answers.command import again
-from smc_mujoco.answers.facts import Grid, NextStep, SensitivityFacts, Settles
+from smc_mujoco.answers.facts import Fact, NextStep, Screen, Settles, Span
 from smc_mujoco.common.aliases import Array, ArrayPair
 from smc_mujoco.common.constraints import Progress, Seed, Whole, constrained
 from smc_mujoco.common.data import attributes
@@ -93,29 +92,34 @@ class Sensitivity(Answer, SobolResult):
     runs: int  # number of all runs
 
     @property
-    def lines(self) -> list[str]:
-        """The answer on one screen."""
+    def screen(self) -> Screen:
+        """The answer: what explains the score, where runs fail, and what to narrow first."""
         low, high = np.quantile(self.values, [0.05, 0.95])
         rows = []
         for axis in self.axes:
-            rows.append((in_words(axis.name), (_percent(axis.total).text, _trend(axis))))
-        columns = ("explains, with others", "%"), ("more of it is", "")
+            rows.append((in_words(axis.name), _percent(axis.total).text, _trend(axis)))
+        headings = "", "explains, with others (%)", "more of it is"
         half = self.improvement
         first = self.leading
         finer = NextStep(again({"--points": f"{2 * len(self.values)}"}), "narrows the intervals")
-        return answers.sensitivity_lines(
-            SensitivityFacts(
-                about=f"{self.scenario.law.name} on {self.scenario.plant.name}",
-                metric=self.label,
-                first=in_words(first.name) if first else "",
-                share=(first.total.low, first.total.high) if first else (math.nan, math.nan),
-                grid=Grid(columns=columns, rows=tuple(rows), winners=("", "")),
-                spread=(self.text(low), self.text(high)),
-                failed=Settles(int(self.failed.sum()), len(self.failed)),
-                narrow=_words(self.space, [half.half]) if half else "",
-                medians=(self.text(half.before), self.text(half.median)) if half else ("", ""),
-                next=finer,
-            )
+        metric, runs = self.label, len(self.failed)
+        facts = [
+            Fact("spread", metric=metric, low=self.text(low), high=self.text(high), runs=runs),
+            Fact("fail", runs=Settles(int(self.failed.sum()), runs)),
+        ]
+        if half:
+            medians = {"median": self.text(half.median), "before": self.text(half.before)}
+            facts.append(Fact("narrow", half=_words(self.space, [half.half]), **medians))
+        about = {"law": self.scenario.law.name, "plant": self.scenario.plant.name}
+        if first:
+            share = Span(first.total.low, first.total.high)
+            about |= {"axis": in_words(first.name), "share": share}
+        return Screen(
+            heading=Fact("explains", **about, metric=metric),
+            tables=[Tabular(headings=headings, rows=rows)],
+            facts=facts,
+            next=finer,
+            word="sensitivity",
         )
 
     @property

@@ -18,10 +18,9 @@ import numpy as np
 
 from smc_mujoco.analysis.engine import Device
 from smc_mujoco.analysis.engine.scored_runs import ScoredRuns, worth_compiling
-from smc_mujoco.answers import answers
 from smc_mujoco.answers.answer import Answer
 from smc_mujoco.answers.command import again, instead, typed
-from smc_mujoco.answers.facts import Grid, Lead, NextStep, WorstFacts
+from smc_mujoco.answers.facts import Fact, Lead, NextStep, Screen
 from smc_mujoco.common.aliases import Numbers, ProgressTo
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.constraints import Progress, Seed, Whole, constrained
@@ -175,36 +174,40 @@ class WorstCases(Answer, list[WorstCase]):
         super().__init__(sorted(cases, key=lambda case: (case.value, case.median)))
 
     @property
-    def lines(self) -> list[str]:
-        """The answer on one screen."""
+    def screen(self) -> Screen:
+        """The answer: the worst run of each law, and by how much the first leads."""
         first = self[0]
         label = CATALOGUE[first.metric].label
         rows = []
         for case in self:
-            rows.append((case.nominal.law.name, (case.shown(case.value), case.shown(case.median))))
-        lead = None
+            rows.append((case.nominal.law.name, case.shown(case.value), case.shown(case.median)))
+        facts: list[Fact | Lead] = []
         if len(self) > 1 and math.isfinite(first.value) and self[1].value > first.value:
             share = 1.0 - first.value / self[1].value
             names = first.nominal.law.name, self[1].nominal.law.name
-            lead = Lead(
-                law=names[0], rival=names[1], metric=f"worst {label}", low=share, high=share
-            )
-        columns = ("worst found", first.unit), ("median", first.unit)
-        outside = [(case.nominal.law.name, case.outside) for case in self if case.outside]
+            metric = f"worst {label}"
+            facts.append(Lead(law=names[0], rival=names[1], metric=metric, low=share, high=share))
+        headings = "", f"worst found ({first.unit})", f"median ({first.unit})"
+        for case in self:
+            if case.outside:
+                facts.append(Fact("sentence", label=case.nominal.law.name, text=case.outside))
         step = NextStep(again({"--figure": "worst"}), "draws the worst runs")
         if typed("--figure"):
             command = instead("margins", {}, ("--law", "--gains", "--condition"))
             step = NextStep(command, "finds how much of each alone is tolerated")
-        return answers.worst_lines(
-            WorstFacts(
-                about=f"{first.nominal.plant.name}, {label}",
+        return Screen(
+            heading=Fact(
+                "attacked",
+                plant=first.nominal.plant.name,
+                metric=label,
                 runs=first.tried,
                 bounds=first.class_words,
-                grid=Grid(columns=columns, rows=tuple(rows), winners=("", "")),
-                lead=lead,
-                outside=tuple(outside),
-                next=step,
-            )
+            ),
+            tables=[Tabular(headings=headings, rows=rows)],
+            notes=[Fact("may be worse")],
+            facts=facts,
+            next=step,
+            word="worst",
         )
 
     @property

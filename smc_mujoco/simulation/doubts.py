@@ -35,7 +35,7 @@ LONG_TIME = 1.0  # s; chosen: an input delay or a control period that is as long
 LARGE_FACTORS = 15.0, 1000.0  # chosen: a mismatch between them may be in percent
 
 
-def _doubtful_units(s: Any) -> Iterator[str]:
+def _times_and_factors(s: Any) -> Iterator[str]:
     """Yield a sentence about each number that may be in ms or percent."""
     for what in ("input_delay", "control_period"):
         if (seconds := getattr(s, what)) >= LONG_TIME:
@@ -129,7 +129,7 @@ def _degrees(s: Any) -> Iterator[str]:
         for unit, value in zip(s.plant.units, values, strict=False):
             if unit == "rad" and MAX_ANGLE < abs(value) <= MAX_DEGREES:
                 fact = f"{what} is {value:g} rad, {abs(value) / math.tau:.1f} turns"
-                yield f"{fact}: if it is {value:g} degrees, give math.radians({value:g})"
+                yield f"{fact}: if it is {value:g} degrees, give {math.radians(value):.4g}"
 
 
 def _far_starts(s: Any) -> Iterator[str]:
@@ -184,17 +184,19 @@ def _weak_motors(s: Any) -> Iterator[str]:
                 )
 
 
-def of_values(s: Any) -> Iterator[str]:
-    """Yield a sentence about each value that may be in another unit, or that makes a run other than
-    it seems.
-    """
-    yield from _stiff_bristles(s)
-    yield from _broken_period(s)
-    yield from _doubtful_units(s)
-    yield from _unreachable_goals(s)
-    yield from _positions_for_speeds(s)
+def of_units(s: Any) -> Iterator[str]:
+    """Yield a sentence about each value that may be in another unit."""
+    yield from _times_and_factors(s)
     yield from _degrees(s)
     yield from _far_starts(s)
+
+
+def of_values(s: Any) -> Iterator[str]:
+    """Yield a sentence about each value that makes a run other than it seems."""
+    yield from _stiff_bristles(s)
+    yield from _broken_period(s)
+    yield from _unreachable_goals(s)
+    yield from _positions_for_speeds(s)
     yield from _holding_friction(s)
     yield from _weak_motors(s)
 

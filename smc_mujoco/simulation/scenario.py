@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.constraints import Number, OneOf, Seed, of_fields, suggesting
-from smc_mujoco.common.errors import find, shown, warn_once
+from smc_mujoco.common.errors import UnitWarning, find, shown, warn_once
 from smc_mujoco.control import nominal_gains
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator, estimator
@@ -233,7 +233,10 @@ class Scenario:
         self._convert()
         scenario_checks.check(self.resolved)
         scenario_checks.check_start(self.resolved)
-        warn_once(next(doubts.of_values(self.resolved), ""))
+        if slip := next(doubts.of_units(self.resolved), ""):
+            warn_once(slip, UnitWarning)
+        else:
+            warn_once(next(doubts.of_values(self.resolved), ""))
         if self.u_max is None:
             warn_once(doubts.of_assumed_bound(self.resolved))
 

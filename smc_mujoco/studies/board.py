@@ -3,19 +3,23 @@
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
 
 from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.paired_runs import OBJECTIVE, SETTLES, without_floor
-from smc_mujoco.analysis.ranking import Effect, Rank, needed_to_rank, needed_to_win
+from smc_mujoco.analysis.ranking import Rank, needed_to_rank, needed_to_win
 from smc_mujoco.answers import answers
-from smc_mujoco.answers.facts import Barred, Lead, NotRanked, Open, Sample, Tied, Verdict
+from smc_mujoco.answers.facts import Barred, Lead, NotRanked, Open, Sample, Tied, Trails, Verdict
 from smc_mujoco.common.aliases import Names, Numbers, Pair
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.control.source import Source
 from smc_mujoco.metrics.catalogue import CATALOGUE
 
 LABELS = {SETTLES: answers.SHARE, OBJECTIVE: answers.ON_PLANT}
+
+
+def label_of(metric: str) -> str:
+    """Return a metric in words, such as "final error"."""
+    return LABELS.get(metric) or CATALOGUE[metric].label
 
 
 @keyword_dataclass
@@ -29,51 +33,6 @@ class BoardEntry:
     failed: int  # number of its runs that failed, or have no value, such as those that never settle
     runs: int  # number of its runs, equal ones counted once
     sources: tuple[Source, ...] = ()  # of its gains
-
-
-class LeastLead(NamedTuple):
-    """The law in front in a block, the rival over which its lead is least (by the upper end of the
-    interval), and how they compare.
-    """
-
-    law: str
-    rival: str
-    effect: Effect
-    floor: str = ""  # in words, if the law is below it and the rival is not, else ""
-    unit: str = "runs"  # what values are of
-    lacking: str = ""  # how many runs of the rival have no value, such as "5 of 24"
-
-    def fact(self, metric: str, medians: Numbers) -> Lead:
-        """Return the lead as a fact of an answer, with the medians by law."""
-        effect = self.effect
-        interval = {"low": 1.0 - effect.high, "high": 1.0 - effect.low, "ratio": effect.value}
-        if self.lacking:
-            interval = {}
-        elif self.floor:
-            interval = {"low": 1.0 - effect.high}
-        median = medians[self.law], medians[self.rival]
-        return Lead(
-            law=self.law,
-            rival=self.rival,
-            metric=metric,
-            gaps=self.lacking,
-            floor=self.floor,
-            ahead=effect.ahead,
-            samples=effect.samples,
-            unit="sets of gains" if effect.sets else self.unit,
-            medians_differ=median[0] > median[1],
-            **interval,
-        )
-
-
-class Behind(NamedTuple):
-    """A law that others are better than: the laws that are, and its value over that of the law in
-    front, the middle of the ratio in paired runs, NaN if it is not known.
-    """
-
-    leader: str
-    ahead: Names
-    times: float
 
 
 @keyword_dataclass
@@ -92,8 +51,8 @@ class Block:
     away: Names  # laws with runs that failed or have not arrived, which do not win
     ahead: str | None  # the law that is better than every other, laws with default gains included
     # None for one law, for "settles", or if the law in front has runs without a value
-    lead: LeastLead | None
-    behind: Mapping[str, Behind]  # those of `worse`
+    lead: Lead | None
+    behind: Mapping[str, Trails]  # those of `worse`
     seeds: int  # in which every law ran
     # distinct runs in these seeds; in the others every law repeats the result of an earlier one
     runs: int
@@ -194,7 +153,7 @@ class Board:
     @property
     def label(self) -> str:
         """The metric in words, such as "final error"."""
-        return LABELS.get(self.metric) or CATALOGUE[self.metric].label
+        return label_of(self.metric)
 
     @property
     def verdicts(self) -> dict[str, Verdict | None]:
@@ -208,7 +167,7 @@ class Board:
         if len(laws) < 2:
             return None
         if block.winner and block.lead and block.lead.law == block.winner:
-            return block.lead.fact(metric, block.medians)
+            return block.lead
         if block.winner:
             return Lead(law=block.winner, rival="", metric=metric)
         if block.barred:

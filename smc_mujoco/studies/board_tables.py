@@ -9,7 +9,7 @@ from smc_mujoco.analysis.ranking import BEST_ERROR, RIVALS
 from smc_mujoco.analysis.step_halving import UNTRIED
 from smc_mujoco.answers import answers
 from smc_mujoco.answers.answer import Answer
-from smc_mujoco.answers.facts import Beware, CompareFacts
+from smc_mujoco.answers.facts import Fact, Screen
 from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import capital, counted, joined
@@ -56,6 +56,7 @@ UNDER = {
 }
 
 
+NO_BOARDS = "no boards: no metric applies"
 # what boards and comparisons explain on their pages
 WORDS = (
     *("star", "may be the best", "lead", "tied", "open", "not ranked", "floor", "interval"),
@@ -85,9 +86,9 @@ class Boards(Answer, list[Board]):
         return [*self.commands, *self.failures, *self.untouched]
 
     @property
-    def bewares(self) -> tuple[Beware, ...]:
+    def bewares(self) -> list[Fact]:
         """The same as facts of an answer."""
-        return tuple(Beware("beware", sentence) for sentence in self.remarks)
+        return [Fact("beware", text=sentence) for sentence in self.remarks]
 
     @property
     def winners(self) -> list[tuple[str, str, str, str]]:
@@ -113,12 +114,13 @@ class Boards(Answer, list[Board]):
         return sorted(standing, key=lambda law: (standing[law], law))
 
     @property
-    def lines(self) -> list[str]:
-        """The answer on one screen."""
+    def screen(self) -> Screen:
+        """The answer: a block for each plant and condition."""
         compared = contests(self, {}, ())
+        facts = self.bewares
         if not compared:
-            return ["no boards: no metric applies", *self.absent]
-        return answers.compare_lines(CompareFacts(contests=compared, bewares=self.bewares))
+            facts = [Fact("sentence", label=NO_BOARDS, text=text) for text in self.absent or [""]]
+        return Screen(contests=compared, facts=facts)
 
     @property
     def words(self) -> Names:
@@ -136,7 +138,7 @@ class Boards(Answer, list[Board]):
         for board in self:
             groups.setdefault(board.about, []).append(board)
         if not groups:
-            return [Tabular(headings=["no boards: no metric applies"], rows=[], notes=self.absent)]
+            return [Tabular(headings=[NO_BOARDS], rows=[], notes=self.absent)]
         tabulars = [_table(boards, self.labels, self.plants) for boards in groups.values()]
         words = str([(table.headings, table.rows) for table in tabulars])
         last = tabulars[-1]

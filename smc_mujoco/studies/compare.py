@@ -18,10 +18,9 @@ from smc_mujoco.analysis.ranking import Relevant, needed_to_win
 from smc_mujoco.analysis.relevant import RELEVANT
 from smc_mujoco.analysis.tuning.effort import Search
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Budget, Searches
-from smc_mujoco.answers import answers
 from smc_mujoco.answers.answer import Answer
 from smc_mujoco.answers.command import again
-from smc_mujoco.answers.facts import Barred, Beware, CompareFacts, Contest, More, NextStep, Open
+from smc_mujoco.answers.facts import Barred, Contest, Fact, NextStep, Open, Screen
 from smc_mujoco.common import html
 from smc_mujoco.common.aliases import AnyPath, Fields, Names
 from smc_mujoco.common.cached import cached_property
@@ -102,8 +101,6 @@ TOGETHER = {"friction": "friction", "encoder": "sensor", "delay_10ms": "input_de
 MOST_TOGETHER = 3  # conditions that were tried one by one; of more not all are of one machine
 RIVALS = ("pid", "adrc", "super_twisting")  # to add to a single law
 REPORT = "report.html"
-CONTENTS = "intervals, gains, figure"
-EXPLAINED = ("lead",)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -127,32 +124,27 @@ class Compared(Answer):
     report: str = ""  # the page that was written; "" for none
 
     @property
-    def lines(self) -> list[str]:
-        """The answer on one screen."""
-        return self._lines(More(self.report, CONTENTS if self.report else "", EXPLAINED))
-
-    @property
-    def page_lines(self) -> list[str]:
-        """The answer on its page."""
-        return self._lines(None)
-
-    def _lines(self, more: More | None) -> list[str]:
+    def screen(self) -> Screen:
+        """The answer: a block for each plant and condition, and what to know and do."""
         if not self._contests:
-            return self.leaderboard.lines
-        bewares = *self._defaults, *self.leaderboard.bewares
-        return answers.compare_lines(
-            CompareFacts(contests=self._contests, bewares=bewares, next=self._next, more=more)
+            return self.leaderboard.screen
+        return Screen(
+            contests=self._contests,
+            facts=[*self._defaults, *self.leaderboard.bewares],
+            next=self._next,
+            report=self.report,
+            word="lead",
         )
 
     @property
-    def _defaults(self) -> list[Beware]:
+    def _defaults(self) -> list[Fact]:
         """The laws that ran with the gains of their own files."""
         laws = {}
         for candidates in self.candidates.values():
             for law, *_ in candidates:
                 if law.source.kind == source.DEFAULT and law.gains:
                     laws[law.name] = None
-        return [Beware("gains", f"the defaults of {joined(laws)}, not searched")] if laws else []
+        return [Fact("defaults", laws=list(laws))] if laws else []
 
     @cached_property
     def _contests(self) -> tuple[Contest, ...]:

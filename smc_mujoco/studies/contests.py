@@ -6,21 +6,21 @@ from collections.abc import Mapping, Sequence
 from smc_mujoco.analysis.paired_runs import OBJECTIVE, SETTLES
 from smc_mujoco.answers.facts import (
     Contest,
-    Grid,
     Lead,
     NotRanked,
     Open,
     Settles,
     Tied,
-    Trails,
     Use,
     Verdict,
 )
 from smc_mujoco.common.aliases import Names
+from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.studies.board import Block, Board
 from smc_mujoco.studies.board_numbers import in_order, size, unit_of
 
 RATE = "tv_rate"  # the metric that is also given as a share of the bound on u
+MANY_BOUNDS = 10.0  # of a share that is no longer said in percent; chosen
 Column = tuple[Board, Block]  # a metric, in one condition
 Gains = Mapping[str, Mapping[str, str]]  # plant -> law -> its best gains as text
 
@@ -60,23 +60,25 @@ def _contest(columns: Sequence[Column], gains: Mapping[str, str], own: Names) ->
             verdicts.append(fact)
         not_ranked += board.not_ranked
     with_numbers = [column for column in columns if column[0].metric != SETTLES]
+    headings = [""]
+    for board, _ in with_numbers:
+        unit = _unit(board)
+        headings.append(f"{board.label} ({unit})" if unit else board.label)
     rows = []
     for law in in_order([board for board, _ in columns]):
-        rows.append((law, tuple(_number(board, block, law) for board, block in with_numbers)))
+        rows.append((law, *(_number(board, block, law) for board, block in with_numbers)))
     return Contest(
         plant=last.plant,
         condition=last.condition,
         sample=last.sample,
-        grid=Grid(
-            columns=tuple((board.label, _unit(board)) for board, _ in with_numbers),
-            rows=tuple(rows),
-            winners=tuple(block.winner or "" for _, block in with_numbers),
-        ),
+        table=Tabular(headings=headings, rows=rows),
         summed=columns[0][0].summed,
         settled=_settled(columns),
         use=_use(columns, verdicts, gains),
         verdicts=tuple(verdicts),
-        trails=tuple(_trails(*with_numbers[0], own)) if with_numbers else (),
+        trails=tuple(fact for fact in with_numbers[0][1].behind.values() if fact.law in own)
+        if with_numbers
+        else (),
         not_ranked=tuple(not_ranked),
     )
 
@@ -91,17 +93,24 @@ def _has_share(board: Board) -> bool:
     return board.metric == RATE and not any(math.isnan(block.bound) for block in board.blocks)
 
 
-def _number(board: Board, block: Block, law: str) -> str:
+def _number(board: Board, block: Block, law: str) -> Cell:
     """Return the median of a law in a block; of one below its floor, the floor."""
     if law not in block.medians:
-        return ""
+        return Cell("")
     median = block.medians[law]
-    if law in block.below and block.floor:
-        return f"<{block.floor.split()[0]}"
     text = size(median, board.metric)
-    if _has_share(board) and math.isfinite(median):
-        return f"{text} ({float(f'{100.0 * median / block.bound:.2g}'):g} %)"
-    return text
+    if law in block.below and block.floor:
+        text = f"<{block.floor.split()[0]}"
+    elif _has_share(board) and math.isfinite(median):
+        text += f" ({_share(median / block.bound)})"
+    return Cell(text, strong=law == block.winner)
+
+
+def _share(share: float) -> str:
+    """Return a share of the bound on u a second: "150 %", of many bounds "270 x"."""
+    if share >= MANY_BOUNDS:
+        return f"{float(f'{share:.2g}'):g} x"
+    return f"{float(f'{100.0 * share:.2g}'):g} %"
 
 
 def _settled(columns: Sequence[Column]) -> tuple[tuple[str, Settles], ...]:
@@ -113,23 +122,6 @@ def _settled(columns: Sequence[Column]) -> tuple[tuple[str, Settles], ...]:
                 facts.append((law, Settles(round((1.0 - share) * block.runs), block.runs)))
             return tuple(facts)
     return ()
-
-
-def _trails(board: Board, block: Block, own: Names) -> list[Trails]:
-    """Return how far own laws are behind the law in front of a block."""
-    facts = []
-    for law, behind in block.behind.items():
-        if law in own:
-            facts.append(
-                Trails(
-                    law=law,
-                    leader=behind.leader,
-                    metric=board.label,
-                    times=behind.times,
-                    ahead=behind.ahead,
-                )
-            )
-    return facts
 
 
 def _use(

@@ -30,13 +30,14 @@ from smc_mujoco.analysis.paired_runs import (
 from smc_mujoco.analysis.ranking import Comparison, corrected, linked, ranks
 from smc_mujoco.analysis.relevant import RELEVANT
 from smc_mujoco.analysis.step_halving import first_order, repeats_every_run
+from smc_mujoco.answers.facts import Lead, Trails
 from smc_mujoco.common.aliases import Array, Names
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.common.text import joined
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.board import Behind, Block, Board, BoardEntry, LeastLead
+from smc_mujoco.studies.board import Block, Board, BoardEntry, label_of
 from smc_mujoco.studies.board_tables import Boards
 
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
@@ -214,14 +215,15 @@ def objective_boards(
         sets = {}
         for law, numbers in holdout[plant].sets.items():
             sets[law] = np.atleast_2d(numbers)
-        seeds = int(comparison.seeds[0])
+        about = (plant, "unseen runs"), int(comparison.seeds[0]), comparison, 0
+        block = _block(*about, untuned, "", OBJECTIVE)
         boards.append(
             Board(
                 group={"plant": plant},
                 metric=OBJECTIVE,
                 unit=UNITS[OBJECTIVE],
                 entries=_entries(comparison, sets, sources[plant]),
-                blocks=(_block((plant, "unseen runs"), seeds, comparison, 0, untuned, "", OF_J),),
+                blocks=(block,),
                 family=_family(compared.values()),
                 relevant=relevant,
                 by_step=False,
@@ -271,7 +273,8 @@ def _board(
     for block_number, k in enumerate(scores.blocks):
         of_blocks.append(ran[k])
         floor = paired_runs.floor_words(ran[k], metric)
-        block = _block(group.blocks[k], group.seeds[k], comparison, block_number, untuned, floor)
+        about = group.blocks[k], group.seeds[k], comparison, block_number
+        block = _block(*about, untuned, floor, metric)
         blocks.append(dataclasses.replace(block, bound=_bound(ran[k])))
     repeated = not np.isnan(comparison.halves).all()
     return Board(
@@ -339,11 +342,9 @@ def _block(
     at: int,
     untuned: Names,
     floor: str,
-    unit: str = "runs",
+    metric: str,
 ) -> Block:
-    """Return block `at` of a comparison, with its plant and condition, the number of seeds, and
-    what values are of.
-    """
+    """Return block `at` of a comparison, with its plant and condition, and the number of seeds."""
     laws = np.array(comparison.laws)
     sets = comparison.sets[:, at]
     by_step = {}
@@ -386,8 +387,8 @@ def _block(
         away=tuple(laws[away].tolist()),
         worse=tuple(laws[comparison.worse[:, at]].tolist()),
         ahead=winner,
-        lead=_lead(comparison, at, ranked, floor, unit),
-        behind=_behind(comparison, at, order),
+        lead=_lead(comparison, at, ranked, floor, metric),
+        behind=_behind(comparison, at, order, label_of(metric)),
         level=bool(comparison.level[at][np.ix_(best, best)].all()),
         resolves=resolves,
         charged=charged,
@@ -403,10 +404,10 @@ def _block(
 
 
 def _lead(
-    comparison: Comparison, at: int, order: Sequence[str], floor: str, unit: str
-) -> LeastLead | None:
-    """Return the least lead of the law in front of a block, which comes first in `order`, over its
-    rivals.
+    comparison: Comparison, at: int, order: Sequence[str], floor: str, metric: str
+) -> Lead | None:
+    """Return the least lead of the law in front of a block, which comes first in `order`, over the
+    rival over which it is least by the upper end of the interval.
     """
     if len(order) < 2 or comparison.shares:
         return None
@@ -421,13 +422,30 @@ def _lead(
     effect = effects[rival]
     if lacking[a] or not effect.samples or comparison.pairs_below_floor[at, a, b]:
         return None
-    lost = ""
+    low, high = 1.0 - effect.high, 1.0 - effect.low
+    interval = {"low": low, "high": high, "ratio": effect.value}
+    gaps = ""
     if lacking[b]:
-        lost = f"{lacking[b]} of {comparison.seeds[at]}"
-    return LeastLead(first, rival, effect, floor if effect.below else "", unit, lost)
+        interval = {}
+        gaps = f"{lacking[b]} of {comparison.seeds[at]}"
+    elif effect.below and floor:
+        interval = {"low": low}
+    unit = OF_J if metric == OBJECTIVE else "runs"
+    return Lead(
+        law=first,
+        rival=rival,
+        metric=label_of(metric),
+        gaps=gaps,
+        floor=floor if effect.below else "",
+        ahead=effect.ahead,
+        samples=effect.samples,
+        unit="sets of gains" if effect.sets else unit,
+        medians_differ=bool(comparison.centres[a, at] > comparison.centres[b, at]),
+        **interval,
+    )
 
 
-def _behind(comparison: Comparison, at: int, order: Sequence[str]) -> dict[str, Behind]:
+def _behind(comparison: Comparison, at: int, order: Sequence[str], label: str) -> dict[str, Trails]:
     """Return the laws of a block that others are better than; the law in front is first in
     `order`.
     """
@@ -443,7 +461,8 @@ def _behind(comparison: Comparison, at: int, order: Sequence[str]) -> dict[str, 
             effect = comparison.effect(at, ahead[0], law)
             if not effect.below and effect.value > 0.0:
                 times = 1.0 / effect.value
-        behind[law] = Behind(ahead[0], ahead, times if math.isfinite(times) else math.nan)
+        times = times if math.isfinite(times) else math.nan
+        behind[law] = Trails(law=law, leader=ahead[0], metric=label, times=times, ahead=ahead)
     return behind
 
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -13,18 +14,9 @@ from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST
 from smc_mujoco.analysis.tuning.result import Tuned
 from smc_mujoco.analysis.tuning.run_limits import CALM, LIMIT_COST, OVERSHOOT, RunLimit
-from smc_mujoco.answers import answers
 from smc_mujoco.answers.answer import Answer
-from smc_mujoco.answers.facts import (
-    Caution,
-    Lead,
-    Level,
-    NextStep,
-    RaceSize,
-    SettledRuns,
-    Settles,
-    WhichFacts,
-)
+from smc_mujoco.answers.command import PROGRAM, again, instead, typed
+from smc_mujoco.answers.facts import Fact, Lead, Level, NextStep, Screen, Settles, Span
 from smc_mujoco.common import html
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.tabular import Cell, Tabular
@@ -44,6 +36,10 @@ from smc_mujoco.studies.table import Table
 RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
 FAR_OVER = 20.0  # %, an overshoot beyond which the answer says so; chosen
 NO_ROOM = 1.5  # times the delay of a condition: a margin within that leaves no room; chosen
+MOST_NAMED = 5  # laws that the first line names
+MORE_MINUTES = 30  # of a next step, where the time that is needed is not known
+LATER = 1.2  # times an estimate: a time that it is likely to keep
+NOWHERE = Span(math.nan, math.nan)
 Settled = dict[str, dict[str, tuple[int, int]]]  # law -> condition -> runs that settle, and all
 
 
@@ -129,7 +125,6 @@ class Recommendation(Answer):
     judged: Mapping[str, bool]  # the conditions that J is of, and whether each was asked for
     folder: Path  # where the files are
     pictured: bool = True  # whether there is time to run `worst_run` again, for the report
-    call: Sequence[str] = ()  # the words of this call as a command; () where they are not known
 
     @property
     def law(self) -> Component:
@@ -150,7 +145,9 @@ class Recommendation(Answer):
 
     @property
     def form(self) -> str:
-        """The form of the answer, as `WhichFacts` has it."""
+        """The form of the answer: "law", "undecided", "unneeded", "unsettled", "unkept" or
+        "untried".
+        """
         if not self.race.laws:
             return "untried"
         if len(self.never_settled) == len(self.settled[self.law.name]):
@@ -179,21 +176,10 @@ class Recommendation(Answer):
     @property
     def rivals(self) -> list[str]:
         """The laws that `lead` is over."""
-        comparison = self.race.comparison if self.over_sets else self.fixed
+        over_sets = self.race.winner == self.law.name  # and not only runs with the gains printed
+        comparison = self.race.comparison if over_sets else self.fixed
         laws = comparison.laws if comparison else ()
         return [law for law in laws if law != self.law.name]
-
-    @property
-    def over_sets(self) -> bool:
-        """Whether sets of gains name the law, and not only runs with the gains printed."""
-        return self.race.winner == self.law.name
-
-    @property
-    def over_none(self) -> Lead | None:
-        """By how much J of the law is below that without a law, with the gains printed."""
-        if self.law.name == WITHOUT or not self.fixed or self.law.name not in self.fixed.laws:
-            return None
-        return _lead(self.fixed, self.law.name, WITHOUT)
 
     @property
     def undecided(self) -> list[str]:
@@ -211,27 +197,29 @@ class Recommendation(Answer):
         return 0 if math.isinf(sets) else math.ceil(sets)
 
     @property
-    def minutes_needed(self) -> float:
-        """About how many minutes the missing sets take here; NaN where that is not known."""
+    def minutes_needed(self) -> int | None:
+        """How many minutes the missing sets are likely to take here; None where that is not
+        known.
+        """
         missing = self.sets_needed - self.race.sets
         if missing <= 0 or not self.race.seconds:
-            return math.nan
-        return missing * self.race.seconds / 60.0
+            return None
+        return max(1, math.ceil(LATER * missing * self.race.seconds / 60.0))
 
     @property
-    def runs(self) -> SettledRuns:
-        """In how many of its runs the law settles, and when, s."""
-        done = total = 0
-        for count, of_condition in self.settled[self.law.name].values():
-            done += count
-            total += of_condition
+    def runs(self) -> Settles:
+        """In how many of its runs the law settles."""
+        counts = self.settled[self.law.name].values()
+        return Settles(sum(done for done, _ in counts), sum(total for _, total in counts))
+
+    @property
+    def settling_times(self) -> Span:
+        """From when to when the law settles in its runs, s; NaN where it never does."""
         own = self.table.column("law") == self.law.name
         settling = values(self.table, "settling_time")[own]
         settling = settling[values(self.table, SETTLES)[own] == 0.0]
         times = settling[np.isfinite(settling)]
-        first, last = (float(times.min()), float(times.max())) if len(times) else (math.nan,) * 2
-        together = Settles(*self.together) if self.together else None
-        return SettledRuns(Settles(done, total), first, last, together)
+        return Span(float(times.min()), float(times.max())) if len(times) else NOWHERE
 
     @property
     def never_settled(self) -> list[str]:
@@ -252,39 +240,113 @@ class Recommendation(Answer):
         return unsettled
 
     @property
-    def withstood(self) -> list[Level]:
-        """What the law withstands, a level of each kind."""
-        levels = []
-        for margin in self.margins:
-            levels.append(Level(margin.kind, margin.value, margin.unit, margin.open))
-        return levels
+    def screen(self) -> Screen:
+        """What the answer states."""
+        return Screen(
+            facts=[self._first_line, *self._of_law, *self.cautions],
+            next=self.next_step,
+            report=f"{self.folder}/report.html",
+            word="J",
+        )
 
     @property
-    def cautions(self) -> list[Caution]:
+    def _first_line(self) -> Fact:
+        """What to do."""
+        race = self.race
+        named = len(race.laws) + len(race.unsearched) + len(self.left_out)
+        tried = {"raced": len(race.laws) if len(race.laws) < named else None, "named": named}
+        form = self.form
+        if form == "unneeded":
+            kind = form if self.runs.count == self.runs.total else "unbeaten"
+            return Fact(kind, runs=self.runs, lead=self.lead, **tried)
+        if form == "undecided":
+            laws = self.undecided
+            many = len(laws) > MOST_NAMED
+            return Fact(
+                form,
+                **{"shorter" if race.shorter else "sets": race.sets},
+                needed=self.sets_needed if self.sets_needed > race.sets else None,
+                minutes=self.minutes_needed,
+                close=not self.sets_needed,
+                laws=laws if len(laws) > 1 and not many else (),
+                many=len(laws) if many else None,
+                law=self.law.name,
+                **tried,
+            )
+        if form == "law":
+            return self._gains(form)
+        never, limits = self.never_settled, list(map(str, self.limits))
+        about = {"law": self.law.name, "never": never, "limits": limits}
+        return Fact(form, minutes=self.minutes_needed, **about, **tried)
+
+    def _gains(self, kind: str) -> Fact:
+        """Return the gains of the law, and the file that has them."""
+        gains = gains_text(self.law.gains)
+        return Fact(kind, law=self.law.name, gains=gains, unit=self.unit, file=self._file)
+
+    @property
+    def _file(self) -> str:
+        """The file with the gains; "" if they were given."""
+        return str(self.folder / "recommended.json") if self.tuned else ""
+
+    @property
+    def _of_law(self) -> list[Fact]:
+        """What the runs say of the law."""
+        form = self.form
+        if form == "untried":
+            return []
+        facts = []
+        if self.law.gains and form in ("undecided", "unsettled", "unkept"):
+            facts.append(self._gains("gains"))
+        if form in ("law", "unsettled") and self.lead:
+            searched = any(entrant.count > 1 for entrant in self.race.entrants.values())
+            over_sets = searched and self.race.winner == self.law.name
+            laws = 1 + len([law for law in self.rivals if law != WITHOUT])
+            searches = self.race.sets if over_sets else None
+            facts.append(Fact("best", laws=laws, lead=self.lead, searches=searches))
+        together = self.together and Settles(*self.together)
+        times = self.settling_times
+        facts.append(Fact("settles", runs=self.runs, times=times, together=together))
+        margins = [margin for margin in self.margins if not math.isnan(margin.value)]
+        levels = [Level(margin.kind, margin.value, margin.unit, margin.open) for margin in margins]
+        if levels or self.tolerance.untried:
+            facts.append(Fact("withstands", levels=levels, untried=self.tolerance.untried))
+        if (none := self.no_law) and form != "unneeded":
+            done = Settles(sum(none.settled.values()), none.runs * len(none.settled))
+            over = NOWHERE
+            if self.law.name != WITHOUT and self.fixed and self.law.name in self.fixed.laws:
+                over = _lead(self.fixed, self.law.name, WITHOUT).share
+            facts.append(Fact("without", runs=done, below=over if over.low > 0.0 else None))
+        return facts
+
+    @property
+    def cautions(self) -> list[Fact]:
         """What to know before the law is used."""
         return [*self._of_runs, *self._of_rest, *self._of_margins, *self._of_race]
 
     @property
-    def _of_runs(self) -> list[Caution]:
+    def _of_runs(self) -> list[Fact]:
         """What the runs of the law warn of."""
         cautions = []
         never = self.never_settled
         for name, runs in self.unsettled_in.items():
             if name not in never:
-                cautions.append(
-                    Caution(kind="unsettled", where=name, count=runs.count, run_count=runs.total)
-                )
+                cautions.append(Fact("rare", where=name, runs=runs))
         if never and self.form != "unsettled":  # whose first line says so
-            cautions.append(Caution(kind="never", where=joined(never)))
+            cautions.append(Fact("never", where=never))
         if self.pictured and self.unsettled_in and leans(self.worst_trace):
-            cautions.append(Caution(kind="leans", where=str(self.worst_run.condition)))
-        if self.together and self.together[0] < RELIABLE * self.together[1]:
-            done, runs = self.together
+            cautions.append(Fact("leans", where=str(self.worst_run.condition)))
+        if self.apart:
             names = "+".join(map(str, self.settled[self.law.name]))
-            cautions.append(Caution(kind="together", where=names, count=done, run_count=runs))
+            cautions.append(Fact("together", where=names, runs=Settles(*self.together or (0, 0))))
         if ahead := self._lower_J:
-            cautions.append(Caution(kind="lower", where=ahead))
+            cautions.append(Fact("unreliable", law=ahead))
         return cautions
+
+    @property
+    def apart(self) -> bool:
+        """Whether the law settles too seldom under all conditions at once."""
+        return self.together is not None and self.together[0] < RELIABLE * self.together[1]
 
     @property
     def _lower_J(self) -> str:
@@ -296,34 +358,24 @@ class Recommendation(Answer):
         return ""
 
     @property
-    def _of_rest(self) -> list[Caution]:
+    def _of_rest(self) -> list[Fact]:
         """What the law does at rest, and beyond its goal."""
         rest = self.rests.get(self.law.name)
         if not rest:
             return []
         cautions = []
         if rest.shakes:
-            cautions.append(
-                Caution(
-                    kind="shakes",
-                    where=rest.condition,
-                    value=rest.size,
-                    unit=rest.unit,
-                    share=rest.share,
-                    frequency=rest.frequency,
-                )
-            )
+            swing = {"size": rest.size, "unit": rest.unit, "share": rest.share}
+            where = {"frequency": rest.frequency, "where": rest.condition}
+            cautions.append(Fact("shakes", **swing, **where))
         limit = min((limit.most for limit in self.limits if limit.what == OVERSHOOT), default=None)
         if rest.overshoot > (limit or FAR_OVER):
-            cautions.append(
-                Caution(
-                    kind="overshoots", where=rest.overshoots_in, value=rest.overshoot, most=limit
-                )
-            )
+            where = {"percent": rest.overshoot, "where": rest.overshoots_in}
+            cautions.append(Fact("overshoots", **where, limit=limit))
         return cautions
 
     @property
-    def _of_margins(self) -> list[Caution]:
+    def _of_margins(self) -> list[Fact]:
         """Where the law has no room."""
         cautions = []
         delay = max(
@@ -332,36 +384,33 @@ class Recommendation(Answer):
         )
         for margin in self.margins:
             if math.isnan(margin.value):
-                cautions.append(Caution(kind="no margin"))
+                cautions.append(Fact("no margin"))
                 break
             beyond = margin.value + margin.resolution
             if margin.kind == "delay" and delay and not margin.open and beyond <= NO_ROOM * delay:
-                cautions.append(Caution(kind="no room", value=delay, most=beyond))
+                cautions.append(Fact("no room", delay=delay, fails=beyond))
         if self.tolerance.helped and any(margin.kind == "friction" for margin in self.margins):
             opposed = self.tolerance.opposed
-            value = opposed.value if opposed else math.nan
-            unit = opposed.unit if opposed else ""
-            names = joined(self.tolerance.helped)
-            cautions.append(Caution(kind="helped", where=names, value=value, unit=unit))
+            values = {"value": opposed.value, "unit": opposed.unit} if opposed else {}
+            cautions.append(Fact("helped", joints=self.tolerance.helped, **values))
         return cautions
 
     @property
-    def _of_race(self) -> list[Caution]:
+    def _of_race(self) -> list[Fact]:
         """What the race leaves open."""
         cautions = []
         lost = lost_runs(self.fixed).get(self.law.name, 0)
         if self.limits and lost and self.fixed:
-            where = joined([*map(str, self.limits)])
-            run_count = len(self.fixed.cells[0, 0])
-            cautions.append(Caution(kind="limit", where=where, count=lost, run_count=run_count))
+            runs = Settles(lost, len(self.fixed.cells[0, 0]))
+            cautions.append(Fact("limit", limits=list(map(str, self.limits)), runs=runs))
         if self.tuned and self.tuned.at_bound:
-            cautions.append(Caution(kind="at bound", where=joined(self.tuned.at_bound)))
+            cautions.append(Fact("at end", gains=list(self.tuned.at_bound)))
         if self.no_law and self.no_law.needless and self.form != "unneeded":
-            cautions.append(Caution(kind="needless", where=joined(self.no_law.needless)))
+            cautions.append(Fact("needless", where=self.no_law.needless))
         if self.race.unsearched and self.form != "untried":
-            cautions.append(Caution(kind="unsearched", where=joined(self.race.unsearched)))
+            cautions.append(Fact("no time", laws=self.race.unsearched))
         for name, why in self.left_out.items():
-            cautions.append(Caution(kind="left out", where=name, reason=why))
+            cautions.append(Fact("left out", law=name, reason=why))
         return cautions
 
     @cached_property
@@ -374,73 +423,38 @@ class Recommendation(Answer):
         return list(map(self.table.scenario, rows.values()))
 
     @property
-    def size(self) -> RaceSize:
-        """How large the race was."""
-        raced = self.race
-        return RaceSize(
-            raced=len(raced.laws),
-            named=len(raced.laws) + len(raced.unsearched) + len(self.left_out),
-            sets=raced.sets,
-            searched=any(entrant.count > 1 for entrant in raced.entrants.values()),
-            shorter=raced.shorter,
-            untried=len(self.untried_laws),
-        )
+    def next_step(self) -> NextStep:
+        """The one thing to do next: more sets of gains, the conditions all at once, the laws that
+        were not tried, or the law's code.
+        """
+        minutes = str(self.minutes_needed or MORE_MINUTES)
+        if self.form in ("undecided", "untried") or self.race.unsearched or self.left_out:
+            if self.sets_needed:
+                command = again({"--minutes": minutes}, ("--quick",))
+                return NextStep(command, "goes on from the sets that there are")
+            laws = ",".join(self.undecided[:MOST_NAMED])
+            command = instead("compare", {"--law": laws}, ("--condition", "--x0"))
+            return NextStep(command, "shows where the laws differ")
+        if self.apart:
+            combined = again({"--condition": "+".join(self.settled[self.law.name])})
+            return NextStep(combined, "searches gains for all conditions at once")
+        if self.untried_laws:
+            wide = again({"--law": None, "--minutes": str(MORE_MINUTES)}, ("--quick",))
+            count = len(self.untried_laws)
+            return NextStep(wide, f"tries the usual ones of {count} other laws, too")
+        gains = self._file or gains_text(self.law.gains).replace(" ", "")
+        law = self._file or f"{self.law.name}({gains})"
+        for word in typed("--law").split(","):
+            if Path(word).suffix == ".py" and Path(word).stem == self.law.name:
+                law = f"{word}({gains})"
+        if self.law.requires_model or not self._file:
+            command = shlex.join([PROGRAM, "export", law, "controller.c"])
+            return NextStep(command, "writes it as C")
+        command = shlex.join([PROGRAM, "export", law, "controller", "--ros2"])
+        return NextStep(command, "writes it for ros2_control; --plain writes a loop in C")
 
     @property
-    def next_step(self) -> NextStep | None:
-        """The one thing to do next, as a whole command; None where the call is not known."""
-        if not self.call:
-            return None
-        return answers.which_next(self.facts, tuple(self.call))
-
-    @cached_property
-    def facts(self) -> WhichFacts:
-        """What the answer states, as data."""
-        without = self.no_law
-        return WhichFacts(
-            form=self.form,
-            never=tuple(self.never_settled),
-            law=self.law.name,
-            gains=gains_text(self.law.gains),
-            unit=self._unit,
-            file=str(self.folder / "recommended.json") if self.tuned else "",
-            modelled=self.law.requires_model,
-            size=self.size,
-            lead=self.lead,
-            over_sets=self.over_sets,
-            rivals=len([law for law in self.rivals if law != WITHOUT]),
-            over_none=self.over_none,
-            undecided=tuple(self.undecided),
-            sets_needed=self.sets_needed,
-            minutes_needed=self.minutes_needed,
-            runs=self.runs,
-            conditions=tuple(self.settled[self.law.name]),
-            limits=tuple(map(str, self.limits)),
-            levels=tuple(self.withstood),
-            untried=tuple(self.tolerance.untried),
-            without=without
-            and Settles(sum(without.settled.values()), without.runs * len(without.settled)),
-            cautions=tuple(self.cautions),
-            folder=str(self.folder),
-        )
-
-    @property
-    def lines(self) -> list[str]:
-        """The answer, from the templates of `answers`."""
-        return answers.which_lines(self.facts, self.next_step)
-
-    @property
-    def page_lines(self) -> list[str]:
-        """The answer on its page."""
-        return answers.which_lines(dataclasses.replace(self.facts, folder=""), self.next_step)
-
-    @property
-    def _bounds(self) -> str:
-        """The bounds on u in words, such as "20 N m at shoulder"."""
-        return bounds_in_words(self.worst_run)
-
-    @property
-    def _unit(self) -> str:
+    def unit(self) -> str:
         """The units of u, where it is no force; else ""."""
         scenario = self.worst_run
         if scenario.force_command:
@@ -560,7 +574,8 @@ class Recommendation(Answer):
         for kind in self.tolerance.untried:
             rows.append((kind, "no time", "", "", self.tolerance.beside))
         headings = "margin", "withstood", "not", "unit", "beside"
-        title = f"What {self.law.name} withstands, each alone; |u| at most {self._bounds}"
+        bounds = bounds_in_words(self.worst_run)
+        title = f"What {self.law.name} withstands, each alone; |u| at most {bounds}"
         return Tabular(headings=headings, rows=rows, title=title, name_columns=1)
 
     @property

@@ -4,7 +4,6 @@ A need is a metric to show, such as "fast"; a limit that searches keep, such as 
 property that each law must have, such as "continuous". See `race` and `recommend`.
 """
 
-import dataclasses
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -145,42 +144,8 @@ def which(
     question = Question(chosen, shown_metrics, relevant, untried)
     goal = trial.asked_goal(machine, limits)
     recommendation = recommend(trial, machine, question, goal, AnswerTime.within(began, minutes))
-    call = _call(plant, conditions, laws, needs, starts, trial.folder, minutes)
-    recommendation = dataclasses.replace(recommendation, call=call)
     recommendation.save()
     return recommendation
-
-
-def _call(
-    plant: object,
-    conditions: object,
-    laws: object,
-    needs: object,
-    starts: Starts | None,
-    out: Path,
-    minutes: float | None,
-) -> list[str]:
-    """Return the words of a call as a command, for a next step; [] if a plant or starts have no
-    text.
-    """
-    if not isinstance(plant, str) or (starts and (starts.x0 is None or starts.by)):
-        return []
-    words = ["smc-mujoco", "which", plant]
-    for option, values in (("--condition", conditions), ("--law", laws), ("--need", needs)):
-        if values is not None:
-            items = [values] if isinstance(values, str) else listed(option, values)
-            if all(isinstance(item, str) for item in items) and option != "--condition":
-                words += [option, ",".join(items)]
-                continue
-            for item in items:
-                words += [option, getattr(item, "file", "") or str(item)]
-    if starts:
-        words.append(f"--x0={','.join(f'{x:g}' for x in starts.x0 or ())}")
-    if out != Path("which"):
-        words += ["--out", str(out)]
-    if minutes:
-        words += ["--minutes", f"{minutes:g}"]
-    return words
 
 
 def _read_needs(

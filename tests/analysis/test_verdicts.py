@@ -142,7 +142,7 @@ def test_the_ratio_of_a_winner_is_its_least_lead_and_not_that_over_the_noisiest_
     (block,) = board.blocks
     assert block.lead
     assert (block.winner, block.lead.rival) == ("first", "near")
-    assert 0.83 < block.lead.effect.low < block.lead.effect.high < 0.87
+    assert 0.13 < block.lead.low < block.lead.high < 0.17
 
 
 def test_beside_a_law_below_the_floor_none_above_it_is_starred():

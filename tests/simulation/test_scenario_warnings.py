@@ -53,7 +53,7 @@ def test_angles_of_several_turns_may_be_degrees():
     for fields in DEGREES:
         with pytest.warns(
             smc.errors.ScenarioWarning,
-            match=r"rad, \d+\.\d turns: if it is \S+ degrees, give math.radians\(",
+            match=r"rad, \d+\.\d turns: if it is \S+ degrees, give -?\d",
         ) as caught:
             smc.Scenario(
                 plant="inverted_pendulum",

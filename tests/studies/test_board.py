@@ -5,6 +5,7 @@ law wins is said.
 import dataclasses
 import math
 import re
+from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
@@ -23,7 +24,8 @@ from smc_mujoco.common.tabular import TEX, plain
 from smc_mujoco.common.text import number
 from smc_mujoco.draw import dot_plot
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.studies.board import Board, LeastLead
+from smc_mujoco.studies import leaderboard as module
+from smc_mujoco.studies.board import Board
 from smc_mujoco.studies.board_numbers import size, sizes, spread
 from smc_mujoco.studies.board_tables import UNDER, Boards
 from smc_mujoco.studies.leaderboard import leaderboard
@@ -537,21 +539,21 @@ def test_few_sets_are_no_reason_where_every_run_settles(boards):
     assert fact.needed == 6  # of one block
 
 
-LEADS = {  # a least lead -> the fields of its fact
+LEADS = {  # how a law compares with its runner-up -> the fields of its lead
     "ratio": (
-        LeastLead("a", "b", Effect(0.85, 0.8, 0.9, 5, 8, True)),
+        Effect(0.85, 0.8, 0.9, 5, 8, True),
         {"low": 0.1, "high": 0.2, "ratio": 0.85, "ahead": 5, "unit": "sets of gains"},
     ),
     "runs": (
-        LeastLead("a", "b", Effect(0.992, 0.99, 0.993, 0, 8, False)),
+        Effect(0.992, 0.99, 0.993, 0, 8, False),
         {"low": 0.007, "high": 0.01, "ahead": 0, "unit": "runs"},
     ),
     "floor": (
-        LeastLead("a", "b", Effect(0.4, 0.0, 0.4, 8, 8, True, below=True), floor="1 m"),
+        Effect(0.4, 0.0, 0.4, 8, 8, True, below=True),
         {"low": 0.6, "high": math.nan, "floor": "1 m"},
     ),
     "no value": (
-        LeastLead("a", "b", Effect(0.0, 0.0, 0.0, 8, 8, True, below=True), "1 m", "runs", "8 of 8"),
+        Effect(0.0, 0.0, 0.0, 8, 8, True, below=True),
         {"low": math.nan, "gaps": "8 of 8"},
     ),
 }
@@ -560,9 +562,19 @@ LEADS = {  # a least lead -> the fields of its fact
 @pytest.mark.parametrize("case", LEADS)
 @pytest.mark.parametrize("medians", [(1.0, 2.0), (2.0, 1.0)])
 def test_a_lead_has_its_interval_as_shares_and_says_where_medians_differ(case, medians):
-    lead, fields = LEADS[case]
-    fact = lead.fact("J", dict(zip("ab", medians, strict=True)))
-    assert (fact.law, fact.rival, fact.metric, fact.samples) == ("a", "b", "J", 8)
+    effect, fields = LEADS[case]
+    comparison: Any = SimpleNamespace(
+        laws=["a", "b"],
+        shares=False,
+        effect=lambda at, law, rival: effect,
+        without_value=np.array([[0], [8 * (case == "no value")]]),
+        pairs_below_floor=np.zeros((1, 2, 2), bool),
+        centres=np.array([medians]).T,
+        seeds=[8],
+    )
+    fact = module._lead(comparison, 0, ["a", "b"], "1 m", "itae")
+    assert fact
+    assert (fact.law, fact.rival, fact.metric, fact.samples) == ("a", "b", "ITAE", 8)
     assert fact.medians_differ == (medians[0] > medians[1])
     for name, value in fields.items():
         expected = value if isinstance(value, str) else pytest.approx(value, nan_ok=True)

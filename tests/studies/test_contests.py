@@ -10,9 +10,9 @@ from helpers.tables import MadeTable
 
 from smc_mujoco.answers import answers
 from smc_mujoco.answers.explain import explain
-from smc_mujoco.answers.facts import CompareFacts, Lead, More, NextStep, Settles, Trails
+from smc_mujoco.answers.facts import Lead, NextStep, Screen, Settles, Trails
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.studies.board_numbers import size
+from smc_mujoco.studies.board_numbers import size, unit_of
 from smc_mujoco.studies.contests import contests
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard
 
@@ -55,18 +55,21 @@ def contest(boards):
 def test_five_laws_in_one_condition_fit_a_screen_of_80_by_24(contest):
     command = f"smc-mujoco compare inverted_pendulum --law {','.join(LAWS)} --seeds 24"
     step = NextStep(f"{command} --condition friction+encoder+delay_10ms", "tries all at once")
-    more = More("compared/report.html", "intervals, gains, figure", ("lead",))
-    lines = answers.compare_lines(CompareFacts(contests=(contest,), next=step, more=more))
+    report = "compared/report.html"
+    lines = answers.screen_lines(Screen(contests=[contest], next=step, report=report, word="lead"))
     assert len(lines) <= answers.LINES
     assert max(map(len, lines)) <= answers.WIDTH
 
 
 def test_the_numbers_of_the_screen_are_those_of_the_boards(boards, contest):
-    for row, numbers in contest.grid.rows:
-        for (name, _), text in zip(contest.grid.columns, numbers, strict=True):
+    for law, *cells in contest.table.rows:
+        for heading, cell in zip(contest.table.headings[1:], cells, strict=True):
+            name, _, unit = heading.partition(" (")
             (board,) = [candidate for candidate in boards if candidate.label == name]
-            (entry,) = [entry for entry in board.entries if entry.law == row]
-            assert text == size(entry.interval.median, board.metric)
+            (entry,) = [entry for entry in board.entries if entry.law == law]
+            assert cell.text == size(entry.interval.median, board.metric)
+            assert unit.removesuffix(")") == unit_of(board).replace("^2", "²")
+            assert cell.strong == (board.winner == law)
     assert dict(contest.settled) == dict.fromkeys(LAWS, Settles(SEEDS, SEEDS))
 
 
@@ -86,16 +89,16 @@ def test_a_lead_on_the_screen_is_the_least_lead_of_the_board(boards, contest):
         fact for fact in contest.verdicts if isinstance(fact, Lead) and fact.metric == "ITAE"
     ]
     (board,) = [candidate for candidate in boards if candidate.metric == "itae"]
-    effect = board.blocks[0].lead.effect
+    assert lead == board.blocks[0].lead
     assert (lead.law, lead.rival) == (LAWS[0], LAWS[1])
-    assert (lead.low, lead.high) == (1.0 - effect.high, 1.0 - effect.low)
     lines = "\n".join(answers.contest_lines(contest))
     assert f"{100 * lead.low:.2g} to {100 * lead.high:.2g} % below {lead.rival}" in lines
 
 
 def test_the_law_to_use_is_the_first_metrics_and_others_are_named_where_they_win(contest):
     assert contest.use is not None
-    assert contest.use.law == contest.grid.winners[0] == LAWS[-1]
+    assert contest.use.law == LAWS[-1]
+    assert [row[0] for row in contest.table.rows if row[1].strong] == [LAWS[-1]]
     assert [law for _, law, _ in contest.use.unless] == [LAWS[0]]
     assert contest.use.gains in answers.use(contest.use)
 
@@ -103,8 +106,8 @@ def test_the_law_to_use_is_the_first_metrics_and_others_are_named_where_they_win
 def test_an_own_law_that_loses_has_its_ratio(contest):
     (fact,) = [fact for fact in contest.trails if fact.law == "pid"]
     assert isinstance(fact, Trails)
-    times = dict(contest.grid.rows)
-    ratio = float(times["pid"][0]) / float(times[fact.leader][0])
+    times = {law: float(first.text) for law, first, *_ in contest.table.rows}
+    ratio = times["pid"] / times[fact.leader]
     assert fact.times == pytest.approx(ratio, rel=0.05)
     assert fact.ahead[0] == fact.leader == LAWS[-1]
 
@@ -115,7 +118,6 @@ def test_a_law_with_a_run_that_does_not_arrive_is_not_to_be_used(boards):
     (block,) = last.blocks
     lost = dataclasses.replace(block, away=(LAWS[-1],))
     (contest,) = contests([*first, dataclasses.replace(last, blocks=(lost,))], OWN, ())
-    assert contest.grid.winners[0] == LAWS[-1]
     assert contest.use is None
 
 
@@ -125,7 +127,7 @@ def test_more_than_five_plants_and_conditions_are_one_table_of_winners():
     )
     blocks = contests(ranked, OWN, ())
     assert len(blocks) == 6
-    lines = answers.compare_lines(CompareFacts(contests=blocks))
+    lines = answers.screen_lines(Screen(contests=blocks))
     assert max(map(len, lines)) <= answers.WIDTH
     text = " ".join(lines)
     for block in blocks:
@@ -161,9 +163,8 @@ def test_the_share_of_the_bound_stands_beside_the_variation_of_u(boards):
     (board,) = [candidate for candidate in boards if candidate.metric == "tv_rate"]
     blocks = tuple(dataclasses.replace(block, bound=250.0) for block in board.blocks)
     (contest,) = contests([dataclasses.replace(board, blocks=blocks)], {}, ())
-    ((_, unit),) = contest.grid.columns
-    assert "of bound" in unit
-    for law, (text,) in contest.grid.rows:
-        (number,) = re.findall(r"\(([\d.]+) %\)", text)
+    assert "of bound" in contest.table.headings[1]
+    for law, cell in contest.table.rows:
+        (number,) = re.findall(r"\(([\d.]+) %\)", cell.text)
         share = float(number)
         assert math.isclose(share, 100 * blocks[0].medians[law] / 250.0, rel_tol=0.06)

@@ -7,6 +7,7 @@ import math
 import re
 import shlex
 import time
+from contextvars import ContextVar
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,16 +19,17 @@ from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.tuning import quick_search, search
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.analysis.tuning.run_limits import RunLimit
-from smc_mujoco.answers import answers
-from smc_mujoco.answers.answers import CAUTIONS, LINES, WIDTH
-from smc_mujoco.answers.facts import SettledRuns, Settles
+from smc_mujoco.answers import command
+from smc_mujoco.answers.answers import LINES, WIDTH
+from smc_mujoco.answers.facts import Settles
+from smc_mujoco.answers.templates import TEXTS
 from smc_mujoco.cli import main
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.properties import searched
 from smc_mujoco.robustness import margins
-from smc_mujoco.simulation.conditions import find_condition, find_conditions
+from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.simulation.grid import Draws
 from smc_mujoco.studies import race, recommend
 from smc_mujoco.studies import recommendation as recommendation_module
@@ -96,7 +98,8 @@ def line(recommendation, label):
 def test_the_answer_is_the_winner_with_its_gains_and_its_lead(raced):
     _, recommendation, _ = raced
     law = recommendation.law
-    compared = recommendation.race.comparison if recommendation.over_sets else recommendation.fixed
+    over_sets = recommendation.race.winner == law.name
+    compared = recommendation.race.comparison if over_sets else recommendation.fixed
     assert compared.winners == [law.name]
     assert recommendation.form == "law"
     assert recommendation.lines[0].split()[:2] == ["Use", law.name]
@@ -126,17 +129,19 @@ def test_the_answer_fits_a_screen_and_its_counts_are_those_of_the_tables(raced):
     assert said[:2] == [done, len(own)]
     if done:
         assert said[2] == pytest.approx(times.min(), rel=1e-2)
-    assert [level.kind for level in recommendation.withstood] == [*recommend.KINDS]
+    assert [margin.kind for margin in recommendation.margins] == [*recommend.KINDS]
     withstands = line(recommendation, "withstands")
     for margin in recommendation.margins:
         value = 1e3 * margin.value if margin.unit == "s" else margin.value
         assert any(number == pytest.approx(value, rel=5e-3) for number in numbers(withstands))
 
 
-def test_every_caution_has_a_template_and_what_it_says():
-    """A field that no template prints would be lost."""
-    kinds = set(re.findall(r'kind="([a-z ]+)"', Path(recommendation_module.__file__).read_text()))
-    assert kinds | {"breaks"} == CAUTIONS.keys()
+def test_every_fact_has_a_template_and_every_template_a_fact():
+    code = "".join(path.read_text() for path in Path(smc.__file__).parent.rglob("*.py"))
+    kinds = set(re.findall(r'Fact\(\s*"([A-Za-z ]+)"', code))
+    assert kinds <= TEXTS.keys()
+    forms = {"law", "untried", "unneeded", "unbeaten", "unsettled", "unkept", "undecided", "gains"}
+    assert TEXTS.keys() == kinds | forms
 
 
 def test_the_folder_has_the_report_and_the_gains(raced):
@@ -194,10 +199,9 @@ def test_no_law_is_the_answer_where_it_has_the_lowest_J(tmp_path):
     assert recommended.lead
     assert recommended.lead.rival == bad.name
     assert recommended.lines[0].startswith("No law")
-    runs = SettledRuns(Settles(1, 2), 0.2, 0.2)
-    half = dataclasses.replace(recommended.facts, runs=runs)
-    assert "needed" not in answers.which_lines(half, None)[0]
-    assert "is better than u = 0, which settles 1 of 2 runs" in answers.which_lines(half, None)[0]
+    half = dataclasses.replace(recommended, settled={race.WITHOUT: {"nominal": (1, 2)}})
+    assert "needed" not in half.lines[0]
+    assert "is better than u = 0, which settles 1 of 2 runs" in half.lines[0]
     assert numbers(recommended.lines[0])[1:3] == [3, 3]
 
 
@@ -246,8 +250,8 @@ def test_each_form_has_its_first_line(raced):
     assert "coulomb" not in said
     open_race = dataclasses.replace(recommendation, settled=partly, race=few, fixed=None)
     assert open_race.form == "undecided"
-    (never,) = [caution for caution in open_race.cautions if caution.kind == "never"]
-    assert never.where == "noise"
+    (never,) = [fact for fact in open_race.cautions if fact.kind == "never"]
+    assert never.values["where"] == ["noise"]
     partly[name] = {"coulomb": (4, 4), "noise": (1, 4)}
     assert first(settled=partly)[0] == "law"
     none = {race.WITHOUT: raced_laws.entrants[name]}
@@ -258,34 +262,37 @@ def test_each_form_has_its_first_line(raced):
 
 def test_one_next_step_is_a_whole_command(raced, tmp_path, monkeypatch):
     _, recommendation, _ = raced
-    call = ["smc-mujoco", "which", "m.xml:slide", "--condition", "a", "--condition", "b"]
-    call += ["--law", "pid,adrc", "--minutes", "1"]
+    call = ["which", "m.xml:slide", "--condition", "a", "--condition", "b"]
+    call += ["--law", "pid,adrc", "--quick", "--minutes", "1"]
+    monkeypatch.setattr(command, "_typed", ContextVar("typed", default=tuple(call)))
     few = recommendation.race._replace(comparison=None, sets=1, seconds=90.0)
-    with_call = dataclasses.replace(recommendation, call=call)
-    untried = with_call.next_step.command
+    untried = recommendation.next_step.command
     assert "--law" not in untried
     assert untried.startswith("smc-mujoco which m.xml:slide --condition a --condition b --minutes ")
-    more = dataclasses.replace(with_call, race=few, fixed=None).next_step.command
+    more = dataclasses.replace(recommendation, race=few, fixed=None).next_step.command
     assert more.startswith(
         "smc-mujoco which m.xml:slide --condition a --condition b --law pid,adrc"
     )
     assert numbers(more)[-1] >= 9
     coupled = {recommendation.law.name: {"a": (4, 4), "b": (4, 4)}}
-    together = dataclasses.replace(with_call, settled=coupled, together=(0, 4)).next_step.command
+    apart = dataclasses.replace(recommendation, settled=coupled, together=(0, 4))
+    together = apart.next_step.command
     assert together.count("--condition") == 1
     assert "--condition a+b" in together
-    done = dataclasses.replace(with_call, untried_laws=()).next_step.command
+    assert sum(text.startswith("next") for text in recommendation.lines) == 1
+    tried = dataclasses.replace(recommendation, untried_laws=())
+    done = tried.next_step.command
     monkeypatch.chdir(tmp_path)
     _, *words = shlex.split(done)
     pytest.importorskip("smc_mujoco.exchange.commands")
     with contextlib.suppress(SystemExit):
         main.main(words)
     assert next(tmp_path.glob("controller*")).exists()
-    own = dataclasses.replace(with_call, untried_laws=(), call=[*call, "--law", "a/m.py,pid"])
-    law = dataclasses.replace(own.facts, law="m")
-    assert "'a/m.py(" in answers.which_next(law, own.call).command
-    assert sum(text.startswith("next") for text in with_call.lines) == 1
-    assert recommendation.next_step is None  # of a plant without a text
+    own = f"a/{recommendation.law.name}.py"
+    command.remember(["which", "m.xml:slide", "--law", f"{own},pid"])
+    assert f"'{own}(" in tried.next_step.command
+    command.remember([])
+    assert "minutes=30" in recommendation.next_step.command  # in Python
 
 
 def test_cautions_are_lines_with_their_numbers(raced):
@@ -295,16 +302,16 @@ def test_cautions_are_lines_with_their_numbers(raced):
     shaking = dataclasses.replace(recommendation, rests={name: shaky})
     assert numbers(line(shaking, "at rest"))[:3] == [8.4, 17.0, 22.0]
     assert numbers(line(shaking, "overshoot"))[0] == 56.0
-    kinds = [caution.kind for caution in shaking.cautions]
+    kinds = [fact.kind for fact in shaking.cautions]
     assert kinds[:2] == ["shakes", "overshoots"]
     calm = shaky._replace(share=0.009, overshoot=19.0)
     rested = dataclasses.replace(recommendation, rests={name: calm})
-    assert not {"shakes", "overshoots"} & {caution.kind for caution in rested.cautions}
+    assert not {"shakes", "overshoots"} & {fact.kind for fact in rested.cautions}
     limit = SimpleNamespace(what="overshoot", most=10.0)
     limited = dataclasses.replace(rested, limits=[limit])
     assert numbers(line(limited, "overshoot"))[:2] == [19.0, 10.0]
     rare = dataclasses.replace(recommendation, settled={name: {"coulomb": (2, 4)}})
-    assert (2, 4) in [(caution.count, caution.run_count) for caution in rare.cautions]
+    assert Settles(2, 4) in [fact.values.get("runs") for fact in rare.cautions]
     delay = recommendation.margins[0]
     tight = dataclasses.replace(delay, value=0.01, resolution=0.005)
     late = dataclasses.replace(recommendation.worst_run, input_delay=0.01)
@@ -317,10 +324,10 @@ def test_cautions_are_lines_with_their_numbers(raced):
         ),
     )
     (room,) = near._of_margins
-    assert (room.kind, room.value, room.most) == ("no room", 0.01, 0.015)
+    assert (room.kind, room.values) == ("no room", {"delay": 0.01, "fails": 0.015})
     helped = recommendation.tolerance._replace(helped=["z"], opposed=recommendation.margins[1])
     fights = dataclasses.replace(recommendation, tolerance=helped)._of_margins[-1]
-    assert (fights.kind, fights.value) == ("helped", recommendation.margins[1].value)
+    assert (fights.kind, fights.values["value"]) == ("helped", recommendation.margins[1].value)
     needless = NoLaw(4, {"coulomb": 4, "noise": 1})
     unneeded = dataclasses.replace(recommendation, no_law=needless)
     assert "coulomb" in line(unneeded, "without  ")
@@ -489,7 +496,7 @@ def test_where_u_has_two_units_a_need_or_a_metric_of_u_says_so(tmp_path):
         "settling_time",
         "ultimate_bound",
     ]
-    assert recommended.facts.unit == "N and m"
+    assert recommended.unit == "N and m"
 
 
 def test_the_page_has_the_numbers_of_the_code():
@@ -600,22 +607,6 @@ def test_an_event_after_the_runs_that_judge_gains_is_refused_before_them(refused
     fields = {"laws": ["pid", "adrc"], "minutes": 1}
     said = "condition 'late' has its fault at 2.5 s", "a duration above 3.75 s"
     refused(lambda: smc.which("duffing", late, duration=3.0, **fields), *said)
-
-
-def test_a_next_step_names_the_file_of_a_condition(tmp_path):
-    """The text of an identified machine is three lines of quotes."""
-    file = tmp_path / "found.txt"
-    file.write_text("# numbers\nidentified: input_delay=0.004\n")
-    pair_of_conditions = tmp_path / "two.txt"
-    pair_of_conditions.write_text("a: input_delay=0.001\nb: input_delay=0.002\n")
-    conditions = [*find_conditions(str(file)), *find_conditions(str(pair_of_conditions)), "noise"]
-    words = module._call("m.xml:s", conditions, None, None, None, Path("which"), 3.0)
-    named = words[words.index("--condition") :]
-    texts = [str(file), "a: input_delay=0.001", "b: input_delay=0.002", "noise"]
-    expected = [word for text in texts for word in ("--condition", text)]
-    assert named == [*expected, "--minutes", "3"]
-    (alone,) = find_conditions(str(file))
-    assert alone == find_condition("identified: input_delay=0.004")
 
 
 def test_a_law_s_overshoot_is_looked_at_without_time_where_a_limit_was_asked_for(tmp_path):

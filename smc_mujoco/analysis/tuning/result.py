@@ -8,10 +8,9 @@ from typing import Any
 
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, restore
-from smc_mujoco.answers import answers
 from smc_mujoco.answers.answer import Answer
 from smc_mujoco.answers.command import again, instead, typed
-from smc_mujoco.answers.facts import NextStep, TuneFacts
+from smc_mujoco.answers.facts import Fact, NextStep, Screen
 from smc_mujoco.common.aliases import AnyPath, Data, Fields
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError
@@ -93,8 +92,8 @@ class Tuned(Answer):
         )
 
     @property
-    def lines(self) -> list[str]:
-        """The answer on one screen."""
+    def screen(self) -> Screen:
+        """The answer: the gains, and how much better they are than the law's own."""
         name = self.law.name
         file = typed("--out")
         if file:
@@ -108,19 +107,20 @@ class Tuned(Answer):
             )
         if self.spread > FAR_APART:
             step = NextStep(again({"--budget": f"{4 * self.budget}"}), "searches longer")
-        return answers.tune_lines(
-            TuneFacts(
-                law=name,
-                plant=self.plant.name,
-                gains=", ".join(f"{gain}={value:.4g}" for gain, value in self.gains.items()),
-                objective=self.objective,
-                before=self.before,
-                searches=len(self.searches),
-                spread=self.search.apart,
-                at_bound=tuple(self.at_bound.items()),
-                next=step,
-            )
-        )
+        gains = ", ".join(f"{gain}={value:.4g}" for gain, value in self.gains.items())
+        lower = 1.0 - self.objective / self.before if self.before > 0.0 else 0.0
+        own = {}
+        if math.isfinite(self.before):
+            own = {"lower": lower} if lower > 0.0 else {"before": self.before}
+        facts = [
+            Fact("sentence", label="gains", text=gains),
+            Fact("J", objective=self.objective, **own),
+            Fact("searches", count=len(self.searches), spread=self.search.apart),
+        ]
+        for gain, end in self.at_bound.items():
+            facts.append(Fact("at bound", gain=gain, end=end))
+        heading = Fact("law on plant", law=name, plant=self.plant.name)
+        return Screen(heading=heading, facts=facts, next=step, word="J")
 
     @property
     def tables(self) -> list[Tabular]:

@@ -108,9 +108,12 @@ def list_(
 
 
 def _print_names(terminal: Terminal, names_by_kind: Sequence[tuple[str, Sequence[str]]]) -> None:
-    from smc_mujoco.answers import answers
+    from smc_mujoco.answers.answers import labelled
+    from smc_mujoco.answers.facts import Fact
+    from smc_mujoco.answers.templates import said
 
-    terminal.note("\n".join(answers.names_lines(names_by_kind)))
+    facts = [Fact("names", label=kind, names=names) for kind, names in names_by_kind]
+    terminal.note("\n".join(labelled(map(said, [*facts, Fact("listed")]))))
 
 
 def _about(metric: "Metric") -> str:

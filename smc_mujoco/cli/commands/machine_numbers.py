@@ -173,7 +173,8 @@ def identify(
     if machine is None or not files:
         raise ScenarioError("identify needs a machine and its logs, or --pairs FILE")
     with delay_signals():
-        from smc_mujoco.answers.answers import identify_files
+        from smc_mujoco.answers.facts import Fact
+        from smc_mujoco.answers.templates import said
         from smc_mujoco.identification import identify as identification
 
     identified = identification.identify(
@@ -192,12 +193,12 @@ def identify(
     terminal.answer(identified, full)
     picture = identified.figure(figure or FIGURE)[0]
     report = identified.to_html(picture.with_suffix("") / "report.html")
-    condition = ""
+    saved = None
     if out is None and identified.is_condition:
         out = FOUND
     if out is not None:
-        condition = str(identified.save(out))
-    terminal.note(identify_files(condition, str(picture), str(report)))
+        saved = identified.save(out)
+    terminal.note(said(Fact("files", condition=saved, figure=picture, report=report))[1])
     terminal.finish(identified.about())
 
 

@@ -35,7 +35,7 @@ def conditions_by_default(default: str) -> Any:
     """Return the option --condition of a command that has these conditions by default."""
     return typer.Option(
         "--condition",
-        metavar="NAME|TEXT|FILE",
+        metavar="CONDITION",
         autocompletion=CONDITIONS,
         help="Conditions from `smc-mujoco list`, separated by commas, each tried alone; "
         "noise+encoder is one that has both. "
@@ -82,7 +82,7 @@ Condition = Annotated[
     str,
     typer.Option(
         "--condition",
-        metavar="NAME|TEXT|FILE",
+        metavar="CONDITION",
         autocompletion=CONDITIONS,
         help='The condition of all runs: encoder, noise+encoder, "worn gear: '
         'friction=Coulomb(0.05)" or a file with one.',
@@ -233,13 +233,13 @@ X0 = Annotated[
     str | None,
     typer.Option(
         "--x0",
-        metavar="FLOAT[,FLOAT...]",
+        metavar="X[,X...]",
         help=f"{POSITIONS} Each run starts within 20 % of these.",
     ),
 ]
 X0Exactly = Annotated[
     str | None,
-    typer.Option("--x0", metavar="FLOAT[,FLOAT...]", help=f"{POSITIONS} All runs start at these."),
+    typer.Option("--x0", metavar="X[,X...]", help=f"{POSITIONS} All runs start at these."),
 ]
 
 

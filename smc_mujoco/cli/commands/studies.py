@@ -207,7 +207,7 @@ Condition = Annotated[
     ),
 ]
 Seeds = Annotated[
-    int, typer.Option(min=1, help="Runs of each law on each plant in each condition.")
+    int, typer.Option(min=1, metavar="N", help="Runs of each law on each plant in each condition.")
 ]
 Tune = Annotated[
     bool,
@@ -220,8 +220,8 @@ Searches = Annotated[
     int | None,
     typer.Option(
         min=1,
-        help="Number of searches that tune a law; default 12. With --rig, laws are tuned only "
-        "if you give this.",
+        metavar="N",
+        help="Searches that tune a law; default 12. With --rig, laws are tuned only with this.",
     ),
 ]
 Worst = Annotated[
@@ -254,7 +254,11 @@ Latex = Annotated[
 ]
 Rig = Annotated[
     str | None,
-    typer.Option(help="A rig from `smc-mujoco rig`, instead of plants and conditions."),
+    typer.Option(
+        help="A real machine whose parameters were identified, from `smc-mujoco rig`: its "
+        "parameter sets replace plants and conditions, and a line says for each metric whether one "
+        "law wins on every set."
+    ),
 ]
 
 
@@ -300,22 +304,16 @@ def compare(
     executor: options.Executor = None,
     full: options.Full = False,
 ) -> None:
-    """Compare control laws on plants in conditions. Tune laws where needed, run every law, and
-    report which law is best and how certain the answer is.
+    """Compare control laws on plants in conditions, and say which is best and how sure that is.
 
-    Gains that you give in brackets are used as they are. Otherwise a law of the package uses the
-    gains that are shipped for the plant. If there are none, or if the law is from your own file,
-    it is tuned by one rule, the same for all laws. This takes seconds to minutes for each
-    law and plant. The default values in your file are used only with --no-tune, with --gains other
-    than tuned, or if the law cannot be tuned.
+    Gains in brackets are used as they are. Otherwise a law of the package uses the gains that are
+    shipped for the plant. If there are none, or if the law is from your own file, it is tuned by
+    one rule, the same for all laws, in seconds to minutes for each law and plant. The default
+    values in your file are used only with --no-tune, with --gains other than tuned, or if the law
+    cannot be tuned.
 
-    A stopped command resumes when you start it again. Without --law, the usual laws that suit the
-    plant are compared: common sliding-mode laws, pid, adrc, pd_observer, lqi, mpc and
-    loop_shaping. --law all compares every general-purpose law.
-
-    A rig is a real machine whose parameters were identified. With --rig, its parameter sets replace
-    plants and conditions. Laws use the gains that are shipped for the rig; with --searches, they
-    are tuned on the parameter sets. For each metric, a line says whether one law wins on every set.
+    Without --law, the usual laws that suit the plant are compared: common sliding-mode laws, pid,
+    adrc, pd_observer, lqi, mpc and loop_shaping; with --law all, every general-purpose law.
 
     Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition
     friction,encoder

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from smc_mujoco.answers import answers
 from smc_mujoco.answers.command import instead
-from smc_mujoco.answers.facts import ClaimsFacts, NextStep, Settles
+from smc_mujoco.answers.facts import Fact, NextStep, Screen, Settles
 from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.text import capital
 from smc_mujoco.evidence.audit import verdict as verdicts
@@ -23,6 +23,7 @@ from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Claim, measure
 # questions have their own.
 COLOURS = dict(zip(verdicts.VERDICTS, ("blue", "yellow", "red", "dim", "dim", "dim"), strict=True))
 COLOURS |= dict.fromkeys(verdicts.ANSWERS.values(), "cyan")
+MAX_NAMED = 8  # claims whose checks the next step shows; chosen
 CHECKED = {True: Text("✓", COLOURS[SUPPORTED]), False: Text("✗", COLOURS[REFUTED])}
 BARE = {"box": None, "padding": (0, 2, 0, 0), "pad_edge": False, "show_header": False}
 MARKS = {verdict: Text(mark, style=COLOURS[verdict]) for verdict, mark in verdicts.MARKS.items()}
@@ -33,7 +34,7 @@ def print_claims(claims: Sequence[Claim], terminal: Terminal, named: bool, full:
     that were `named`, each in full. The two end with the totals of the paper's own sentences.
     """
     if not named and not full:
-        terminal.note("\n".join(answers.claims_lines(facts_of(claims))))
+        terminal.note("\n".join(answers.screen_lines(screen_of(claims))))
         return
     if named:
         for claim in claims:
@@ -45,27 +46,27 @@ def print_claims(claims: Sequence[Claim], terminal: Terminal, named: bool, full:
         terminal.print(Text(verdicts.over_gains(claims)), highlight=False)
 
 
-def facts_of(claims: Sequence[Claim]) -> ClaimsFacts:
+def screen_of(claims: Sequence[Claim]) -> Screen:
     """Return what an audit says on one screen."""
-    counts = []
+    facts = []
     for whose, words in verdicts.WHOSE_WORDS.items():
         of_whose = Counter(claim.verdict for claim in claims if claim.whose == whose)
         texts = [f"{verdicts.MARKS[kind]} {count} {kind}" for kind, count in of_whose.items()]
         if texts:
-            counts.append((words, tuple(texts)))
+            facts.append(Fact("names", label=words, names=texts))
     of_paper = [claim for claim in claims if claim.whose == verdicts.PAPER]
     supported = [claim for claim in of_paper if claim.verdict == SUPPORTED]
-    refuted = [(claim.id, claim.text) for claim in of_paper if claim.verdict == REFUTED]
+    if supported:
+        holds = Settles(sum(claim.for_every_set for claim in supported), len(supported))
+        facts.append(Fact("every gain", holds=holds))
+    refuted = [claim for claim in of_paper if claim.verdict == REFUTED]
     step = None
     if refuted:
-        ids = " ".join(name for name, _ in refuted[: answers.MAX_REFUTED])
+        ids = " ".join(claim.id for claim in refuted[:MAX_NAMED])
         step = NextStep(instead(f"claims {ids}", {}, ("--paper",)), "shows their checks")
-    return ClaimsFacts(
-        counts=tuple(counts),
-        supported=Settles(sum(claim.for_every_set for claim in supported), len(supported)),
-        refuted=tuple(refuted),
-        next=step,
-    )
+    for claim in refuted:
+        facts.append(Fact("sentence", label=f"refuted {claim.id}", text=claim.text))
+    return Screen(facts=facts, next=step)
 
 
 def _claims_overview(claims: Sequence[Claim]) -> Table:

@@ -1,0 +1,256 @@
+"""The words of answers: a template for each kind of fact.
+
+A field is filled with a value of its name: `{law}`, with a format of `as_text` behind a colon, as
+in `{runs:run}`. A part in square brackets is left out if one of its values is not known; of
+`[a|b]` it is the first part whose values all are.
+"""
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from smc_mujoco.answers.command import PROGRAM
+from smc_mujoco.answers.facts import Fact, Lead, Level, Settles, Span
+from smc_mujoco.common.text import counted, joined, number
+
+FIELD = re.compile(r"\{(\w+):?([^}]*)\}")
+OPTIONAL = re.compile(r"\[([^\]]*)\]")
+OVER = "over 99"  # percent, of larger shares
+LARGEST = 0.995  # a share that is printed: of the leads that might not show; chosen
+PART = "[ ({raced} of {named} laws tried)]"
+GAINS = "{gains}[ for u in {unit}][   {file}]"
+BEYOND = "a value beyond may do better"
+LEVELS = {"disturbance": "force"}  # a kind of margin, as `which` says it
+# a kind of fact -> the label of its line, and the text
+TEXTS = {
+    # of several commands
+    "beware": ("beware", "{text}"),
+    "doubt": ("doubt", "{text}"),
+    "further": ("further", "{count:line} in the report and by --full"),
+    "names": ("{label}", "{names:,}"),
+    "sentence": ("{label}", "{text}"),
+    "star": ("", "* best of these laws (95 % sure)."),
+    "lower": ("", "Lower is better."),
+    # compare
+    "sample": (
+        "",
+        "{seeds:run} a law[ ({distinct} distinct)], [gains of {sets} searches|gains of at least "
+        "{least} searches|one set of gains][{single} (some laws: one set)]",
+    ),
+    "summed": (
+        "",
+        "J is over [{count} tuning conditions|{conditions}], the rest under {condition}.",
+    ),
+    "omitted": ("", "In the report: {names}."),
+    "defaults": ("gains", "the defaults of {laws}, not searched"),
+    # which: its first line, in seven forms
+    "law": ("Use {law}", GAINS),
+    "untried": (
+        "Open",
+        "No law was tried to the end[: this machine needs {minutes:minute} for one law]",
+    ),
+    "unneeded": ("No law", f"needed: u = 0 settles {{runs}} runs[, and J is {{lead}}]{PART}"),
+    "unbeaten": (
+        "No law",
+        f"is better than u = 0, which settles {{runs}} runs[, and J is {{lead}}]{PART}",
+    ),
+    "unsettled": ("No law", f"settles under {{never}}; the nearest is {{law}}{PART}"),
+    "unkept": ("No law", f"keeps {{limits}} so far; the nearest is {{law}}{PART}"),
+    "undecided": (
+        "Undecided",
+        "[{raced} of {named} laws|each law] got [{shorter:shorter set}|{sets:set}][; deciding "
+        "takes {needed}][ ({minutes:minute} more)][{close}, too close for more to tell];[ open "
+        "between {laws};| open between {many:law};] for now {law}",
+    ),
+    # which: the law
+    "gains": ("{law}", GAINS),
+    "best": (
+        "best of {laws:law}",
+        "J {lead}, [after {searches} searches of each|with these gains] (95 %)",
+    ),
+    "settles": (
+        "settles",
+        "{runs} runs[, in {times} s][; all conditions at once {together}]",
+    ),
+    "withstands": (
+        "withstands",
+        "[{levels:,}; no time for {untried}|{levels:,}|no time for {untried}]",
+    ),
+    "without": ("without a law", "{runs} runs settle[; the law's J is {below:%} below]"),
+    # which: what to know before use
+    "rare": ("beware", "{runs} runs settle under {where}"),
+    "never": ("beware", "no law settles under {where}"),
+    "leans": ("beware", "u stays at its bound under {where}: more force, or an easier goal"),
+    "together": ("beware", "{where}: {runs} runs settle; if yours has all, ask for that"),
+    "unreliable": ("beware", "{law} has the lower J, and settles too seldom"),
+    "shakes": (
+        "at rest",
+        "u swings by {size:.3g} {unit} ({share:%} of its bound) at {frequency:.3g} Hz under "
+        "{where}: --need calm",
+    ),
+    "overshoots": (
+        "overshoot",
+        "{percent:.3g} % under {where}[, above the limit of {limit:g} %|: --need 'overshoot<10']",
+    ),
+    "limit": ("limit", "{runs} runs break {limits}, or fail"),
+    "no room": ("no room", "tuned at a delay of {delay:ms}, it fails at {fails:ms}"),
+    "no margin": ("margins", "none: the error does not end below 5 % of its start"),
+    "helped": (
+        "friction",
+        "a load helps {joints}; from the other side it withstands [{value} {unit}|none]",
+    ),
+    "at end": ("gains", f"{{gains}} at an end of its search: {BEYOND}"),
+    "needless": ("without", "all runs settle with u = 0 under {where}: no law is needed there"),
+    "no time": ("no time", "for {laws}"),
+    "left out": ("left out", "{law}: {reason}"),
+    # tune
+    "law on plant": ("", "{law} on {plant}"),
+    "J": (
+        "J",
+        "{objective} s², [{lower:%} below the law's own gains|{before} s² with the law's own "
+        "gains|the law's own gains fail]",
+    ),
+    "searches": ("searches", "{count}[ ended within {spread}]"),
+    "at bound": ("at bound", f"{{gain}}, at the {{end}} end: {BEYOND}"),
+    # margins
+    "tolerated": (
+        "",
+        "The most that each law tolerates in runs of {duration:g} s[{ranges}; a range is over its "
+        "sets of gains]",
+    ),
+    "tolerates": ("{law}", "tolerates the most {places:;}"),
+    "on plant": ("", "{kinds} on {plant}"),
+    "most": ("", "* more than any other of these laws, by more than the search resolves."),
+    "fails": ("fails", "unchanged: {laws:,}"),
+    # worst
+    "attacked": (
+        "",
+        "{plant}, {metric}, worst of {runs:run} a law, half of them drawn at random; bounds: "
+        "{bounds}",
+    ),
+    "may be worse": ("", "Lower is better. A worse case may exist."),
+    # sensitivity
+    "explains": (
+        "",
+        "{law} on {plant}: [{axis} explains {share:%} of the variance of {metric}|open which axis "
+        "explains most of the {metric}]",
+    ),
+    "spread": ("{metric}", "{low} to {high} in 90 % of {runs:run}"),
+    "fail": ("fail", "{runs} runs"),
+    "narrow": ("narrow", "{half} first: the median is then {median}, not {before}"),
+    # identify
+    "fits": (
+        "",
+        "fits {fit}[, held out {held_out}] ([{pieces}pieces of 1 s|whole logs], worst column)",
+    ),
+    "files": (
+        "",
+        "[{condition} (--condition {condition})     ]{figure}     report {report}",
+    ),
+    # claims
+    "every gain": (
+        "every gain",
+        "{holds} supported sentences hold under every set of gains that was run",
+    ),
+    # enter
+    "entered": (
+        "",
+        "{entry} in {suite}: not led by any of {others} others in {level} problems",
+    ),
+    "leaders": ("", "* no other entry leads. Errors are in counts; lower is better."),
+    # list
+    "listed": ("more", f"{PROGRAM} list laws has a line about each, list NAME a page"),
+}
+BELOW = "[below {rival}'s, which fails or breaks a limit in {gaps} runs|{share:%} below {rival}]"
+LEVEL = "{kind} [x {open}{factor}|{open}{time:ms}|{open}{value} {unit}]"
+
+
+def said(fact: Fact) -> tuple[str, str]:
+    """Return the label of a fact's line, and its text."""
+    label, template = TEXTS[fact.kind]
+    return filled(label, fact.values), filled(template, fact.values)
+
+
+def filled(template: str, values: Mapping[str, Any]) -> str:
+    """Return a template with its values."""
+
+    def known(part: str) -> bool:
+        return all(_is_known(values.get(name)) for name, _ in FIELD.findall(part))
+
+    def chosen(match: re.Match[str]) -> str:
+        return next(filter(known, match[1].split("|")), "")
+
+    def written(match: re.Match[str]) -> str:
+        return as_text(values[match[1]], match[2])
+
+    return FIELD.sub(written, OPTIONAL.sub(chosen, template))
+
+
+def _is_known(value: Any) -> bool:
+    if isinstance(value, float):
+        return not math.isnan(value)
+    if isinstance(value, Span):
+        return not math.isnan(value.low)
+    return value is not None and value is not False and value not in ("", (), [])
+
+
+def as_text(value: Any, form: str = "") -> str:
+    """Return a value as text.
+
+    The form is "%" of shares, "ms" of a time in s, "," or ";" between the parts of a sequence, a
+    noun of a count, or Python's own of a number. A flag has no text.
+    """
+    if type(value) in WRITERS:
+        return WRITERS[type(value)](value)
+    if isinstance(value, Span):
+        ends = dict.fromkeys(map(number, value))
+        return percent(*value) if form == "%" else " to ".join(ends)
+    if isinstance(value, float):
+        return _number(value, form)
+    if isinstance(value, int):
+        return counted(value, form) if form else str(value)
+    if isinstance(value, Path):
+        return str(value)
+    parts = list(map(as_text, value))
+    return f"{form} ".join(parts) if form else joined(parts)
+
+
+def _number(value: float, form: str) -> str:
+    if form == "%":
+        return percent(value, value)
+    if form == "ms":
+        return f"{1e3 * value:.4g} ms"
+    return format(value, form) if form else number(value)
+
+
+def percent(low: float, high: float = math.nan) -> str:
+    """Return shares as text: "21 to 25 %", "21 %", "at least 21 %", "over 99 %"."""
+    least, most = (f"{100 * share:.2g}" if abs(share) < LARGEST else OVER for share in (low, high))
+    if math.isnan(high):
+        return f"{OVER} %" if least == OVER else f"at least {least} %"
+    return f"{least} %" if least == most else f"{least} to {most} %"
+
+
+def _lead(lead: Lead) -> str:
+    """Return by how much J is below a rival's."""
+    return filled(BELOW, {**vars(lead), "share": lead.share})
+
+
+def _level(level: Level) -> str:
+    """Return a level that is withstood, such as "mass x 1.6"."""
+    kind = LEVELS.get(level.kind, level.kind)
+    open_ = "≥ " if level.open else True
+    in_unit = {"1": "factor", "s": "time"}.get(level.unit, "value")
+    return filled(LEVEL, {"kind": kind, "open": open_, in_unit: level.value, "unit": level.unit})
+
+
+WRITERS: dict[type, Callable[[Any], str]] = {
+    str: str,
+    bool: lambda flag: "",
+    Fact: lambda fact: said(fact)[1],
+    Settles: lambda runs: f"{runs.count} of {runs.total}",
+    Lead: _lead,
+    Level: _level,
+}

@@ -1,0 +1,45 @@
+"""Help of commands: options in groups, and those that few users need only by --help-all."""
+
+from collections.abc import Sequence
+from contextvars import ContextVar
+from typing import Any
+
+from typer.core import TyperCommand, TyperOption
+
+ALL = "--help-all"
+ASKED, GAINS, OUTPUT, RARE = "What is asked", "Runs and gains", "Output", "Rarely used"
+# option -> its group; the others are of what is asked
+GROUPS: dict[str, str] = {}
+GROUPS |= dict.fromkeys(("--seeds", "--searches", "--quick", "--minutes", "--gains"), GAINS)
+GROUPS |= dict.fromkeys(("--out", "--figure", "--full", "--json", "--help"), OUTPUT)
+GROUPS |= dict.fromkeys(("--tune", "--worst", "--latex", "--rig", "--film", "--falling"), RARE)
+GROUPS |= dict.fromkeys(("--seed", "--relevant", "--allow-defaults"), RARE)
+GROUPS |= dict.fromkeys(("--threads", "--device", "--executor"), RARE)
+MANY = 16  # options, with which a command's help has groups; chosen
+_wants_all: ContextVar[bool] = ContextVar("wants_all", default=False)
+
+
+class GroupedCommand(TyperCommand):
+    """A command whose help has groups of options, if these are many."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return the options and arguments, each option with its group."""
+        params = super().get_params(ctx)
+        options = [param for param in params if isinstance(param, TyperOption)]
+        if len(options) >= MANY:
+            self.epilog = f"{ALL} has further options: {_names(options)}."
+            for option in options:
+                option.rich_help_panel = GROUPS.get(option.opts[0], ASKED)
+                option.hidden = option.rich_help_panel == RARE and not _wants_all.get()
+        return params
+
+
+def _names(options: Sequence[TyperOption]) -> str:
+    """Return the names of the options that few need."""
+    return ", ".join(option.opts[0] for option in options if GROUPS.get(option.opts[0]) == RARE)
+
+
+def with_all(words: Sequence[str]) -> Sequence[str]:
+    """Return the words of a command line with --help for --help-all, which then shows all."""
+    _wants_all.set(ALL in words)
+    return ["--help" if word == ALL else word for word in words]
