@@ -201,6 +201,7 @@ OPTIONAL = (
     "distributed",
     "gymnasium",
     "viser",
+    "fast_simplification",
 )
 ABSENT = f"import sys; sys.modules |= dict.fromkeys({OPTIONAL})\n"
 
@@ -261,7 +262,7 @@ MISSING = {
         "gymnasium",
         "pip install 'smc-mujoco[rl]'",
     ],
-    "smc.view('duffing')": ["smc.view", "viser", "pip install 'smc-mujoco[view]'"],
+    "smc.view('duffing')": ["smc.view", "fast_simplification", "pip install 'smc-mujoco[view]'"],
     "smc.film(t, 'a.mp4')": ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[film]'"],
 }
 

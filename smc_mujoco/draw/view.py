@@ -68,9 +68,14 @@ def view(
         moves has a shape.
     """
     with extras.extra("view", "smc.view"):
+        import fast_simplification  # noqa: F401
         import viser  # noqa: F401
+    from smc_mujoco.draw.view_machine import not_shown
+
     path = None if record is None else with_ending(record, ".html")
     watched = LiveView(Session(runs_of(scenario, laws)), port)
+    if words := not_shown(watched.machines.model):
+        print(words)
     if path is not None:
         watched.record(path)
     elif html.in_notebook():
@@ -193,7 +198,7 @@ class LiveView:
 
     def record(self, path: Path) -> None:
         """Write a page that plays the runs from their start to their end without a server."""
-        from smc_mujoco.draw.view_door import with_fewer_pixels
+        from smc_mujoco.draw.view_door import with_less_work
 
         self.session.begin(self.session.scenarios)
         self.machines.show()
@@ -204,7 +209,7 @@ class LiveView:
             recording.insert_sleep(self.session.time - before)
             self.machines.show()
         with replacing(path) as part:
-            part.write_text(with_fewer_pixels(recording.as_html()), encoding="utf-8")
+            part.write_text(with_less_work(recording.as_html()), encoding="utf-8")
 
 
 def runs_of(

@@ -3,34 +3,20 @@
 The address holds a secret word. Any page that is open in a browser can send requests to this
 machine. So each request must begin with the secret word, name this machine as its host, and come
 from no page of another origin. Others get 403 before viser reads them. A browser that draws without
-a graphics card gets a page with fewer pixels.
+a graphics card has less to draw.
 """
 
 import contextlib
 import secrets
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from websockets.asyncio import server
 
 SECRET_BYTES = 16
 THIS_MACHINE = "127.0.0.1"
-# Where a processor draws, each pixel takes a microsecond of it, and smooth edges as much again. So
-# the picture has fewer along each side, chosen, and its edges are not smoothed.
-FEWER_PIXELS = """<head><script>{
-  const gl = document.createElement("canvas").getContext("webgl2");
-  const names = gl?.getExtension("WEBGL_debug_renderer_info");
-  const renderer = names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
-  if (/swiftshader|llvmpipe|basic render/i.test(renderer)) {
-    const address = new URL(location);
-    address.searchParams.set("fixedDpr", "0.75");
-    history.replaceState(null, "", address);
-    const context = HTMLCanvasElement.prototype.getContext;
-    HTMLCanvasElement.prototype.getContext = function (kind, options) {
-      return context.call(this, kind, {...options, antialias: false});
-    };
-  }
-}</script>"""
+LESS_WORK = Path(__file__).with_name("view_less_work.js").read_text(encoding="utf-8")
 REFUSED = "Forbidden: open the address that smc.view prints.\n"
 
 
@@ -56,7 +42,7 @@ def door(secret: str) -> Iterator[None]:
             if answer is not None and answer.headers.get("Content-Type", "").startswith(
                 "text/html"
             ):
-                answer.body = with_fewer_pixels(answer.body.decode()).encode()
+                answer.body = with_less_work(answer.body.decode()).encode()
                 del answer.headers["Content-Length"]
                 answer.headers["Content-Length"] = str(len(answer.body))
             return answer
@@ -70,9 +56,9 @@ def door(secret: str) -> Iterator[None]:
         server.serve = serve
 
 
-def with_fewer_pixels(page: str) -> str:
-    """Return a page of viser that has fewer pixels where a processor draws it."""
-    return page.replace("<head>", FEWER_PIXELS, 1)
+def with_less_work(page: str) -> str:
+    """Return a page of viser that is less work where a processor draws it."""
+    return page.replace("<head>", f"<head><script>{LESS_WORK}</script>", 1)
 
 
 def inside(secret: str, port: int, path: str, headers: Any) -> str | None:

@@ -14,7 +14,7 @@ from smc_mujoco.draw.film import arrows, camera, shared_picture, world
 from smc_mujoco.draw.film.puppet import Puppet, moved_bodies
 from smc_mujoco.draw.film.stage import DEFAULT_RGBA, LAW_SHARE
 from smc_mujoco.draw.session import Session
-from smc_mujoco.draw.view_shapes import arrow_mesh, body_meshes, joined
+from smc_mujoco.draw.view_shapes import arrow_mesh, body_meshes, geom_meshes, joined
 from smc_mujoco.mechanisms.layout import joint_ids
 from smc_mujoco.simulation.signals import Push
 
@@ -96,6 +96,7 @@ class Machines:
         middle = 0.5 * (across.min() + across.max())
         self.over = self.turn @ np.array([middle, high, np.mean(self.points @ back)])
         self.light()
+        self.meshes = geom_meshes(self.model)
         self.runs = [MachineNodes(self, run, colour) for run, colour in enumerate(self.colours)]
         self.stand(beside=True)
         self.show()
@@ -242,7 +243,9 @@ class MachineNodes:
             frame = self.machines.scene.add_frame(node, show_axes=False, **place)
             if model.body_weldid[body]:
                 self.bodies[body] = frame
-            for k, (rgba, mesh) in enumerate(body_meshes(model, body, painted)):
+            for k, (rgba, mesh) in enumerate(
+                body_meshes(model, body, self.machines.meshes, painted)
+            ):
                 handle = self.machines.scene.add_mesh_simple(
                     f"{node}/{k}", mesh.vertices, mesh.faces, color=np.array(rgba[:3])
                 )
@@ -264,6 +267,8 @@ class MachineNodes:
         stated = (material >= 0) & (model.geom_rgba == DEFAULT_RGBA).all(axis=1)
         paint = model.geom_rgba.copy()
         paint[stated] = model.mat_rgba[material[stated]]
+        for geom in np.flatnonzero(material >= 0).tolist():
+            paint[geom, :3] *= texture_colour(model, material[geom])
         rgb = np.array(self.rgb) / 255
         paint[self.between, 3] = 0.0
         if self.machines.session.scenarios[0].plant.on_stage:
@@ -344,6 +349,35 @@ class MachineNodes:
     def line(self, mount: arrows.Mount, arrow: arrows.Arrow) -> Line | None:
         """Return the line of an arrow, and its width, m."""
         return arrows.path(self.machines.model, self.machines.data, mount, arrow)
+
+
+def texture_colour(model: mujoco.MjModel, material: int) -> Array:
+    """Return the mean of a material's texture, red, green and blue, 0 .. 1; 1 where it has none."""
+    texture = model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB]
+    if texture < 0:
+        return np.ones(3)
+    channels = model.tex_nchannel[texture]
+    size = model.tex_height[texture] * model.tex_width[texture] * channels
+    first = model.tex_adr[texture]
+    texels = model.tex_data[first : first + size].reshape(-1, channels)
+    return np.resize(texels.mean(axis=0), 3) / 255  # a grey one has one channel
+
+
+def not_shown(model: mujoco.MjModel) -> str:
+    """Return a sentence on what a model has and the page does not show; "" if it shows all."""
+    drawn = (model.geom_group < world.DRAWN_GROUPS) & (model.geom_type != world.PLANE)
+    materials = model.geom_matid[drawn & (model.geom_matid >= 0)]
+    textured = (model.mat_texid[materials] >= 0).any()
+    names = []
+    for name, has in (("skins", model.nskin), ("flexible bodies", model.nflex)):
+        if has:
+            names.append(name)
+    words = []
+    if names:
+        words.append(f"Not shown: {' and '.join(names)}.")
+    if textured:
+        words.append("Textures are shown as their mean colour.")
+    return " ".join(words)
 
 
 def tendon_lines(model: mujoco.MjModel, data: mujoco.MjData) -> Array:

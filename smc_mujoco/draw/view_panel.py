@@ -14,7 +14,7 @@ from smc_mujoco.common import html
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw import style
 from smc_mujoco.draw.session import Session, laws_of
-from smc_mujoco.draw.view_machine import Machines
+from smc_mujoco.draw.view_machine import Machines, not_shown
 from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.metrics.conventions import groups
 
@@ -46,6 +46,8 @@ class ViewPanel:
         self.rebuild = rebuild
         self.sliders: list[dict[str, GuiSliderHandle]] = []
         self.status = gui.add_html("")
+        if words := not_shown(machines.model):
+            gui.add_html(said(words))
         self.buttons()
         names = channel_names(session.scenarios[0].plant)
         self.channel = 2 if session.scenarios[0].plant.pose else 0  # of what flies, its height
@@ -179,8 +181,12 @@ class ViewPanel:
         words = f"{self.session.time:.1f} s"
         if self.session.paused:
             words += ", paused"
-        text = f"<b>{words}</b> {html.text(self.session.message)}"
-        self.status.content = f'<div style="padding: 0 1em; font-size: 14px">{text}</div>'
+        self.status.content = said(f"<b>{words}</b> {html.text(self.session.message)}")
+
+
+def said(text: str) -> str:
+    """Return words of the panel as HTML."""
+    return f'<div style="padding: 0 1em; font-size: 14px">{text}</div>'
 
 
 def held(signal: Array) -> Array:

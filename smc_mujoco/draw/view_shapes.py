@@ -1,7 +1,7 @@
 """The shapes of a MuJoCo model, and arrows, as triangles for the page of `smc.view`.
 
 A browser shades an edge as round where triangles share its corners. So a sharp edge has each of its
-corners twice.
+corners twice. Meshes of many triangles have fewer here.
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,11 +13,17 @@ import numpy as np
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw.film import arrows, world
 
-SIDES = 32  # of what is round; chosen
+SIDES = 24  # of what is round; chosen
+MOST_TRIANGLES = 30_000  # of the meshes of a model; a processor draws 1000 in about half a ms
+FEWEST_TRIANGLES = 200  # of a mesh that has more than its share of those
+FIELD_LINES = 100  # of a height field, along each side
+CELLS = 200  # in its size: what lies in one becomes a point; gaps between its parts would stay
+SHARP = np.radians(30.0)  # at an edge of such a mesh, from which on it is sharp; chosen
 ARROW_SIDES = 12
 TURNS = np.linspace(-0.5 * np.pi, 0.5 * np.pi, SIDES // 2 + 1)  # from pole to pole
 Rgba = tuple[float, ...]  # 0 .. 1
 Geom = mujoco.mjtGeom
+MESHES = Geom.mjGEOM_MESH, Geom.mjGEOM_SDF
 
 
 class Mesh(NamedTuple):
@@ -27,23 +33,47 @@ class Mesh(NamedTuple):
     faces: Array
 
 
-def body_meshes(model: mujoco.MjModel, body: int, paint: Array) -> Iterator[tuple[Rgba, Mesh]]:
+def geom_meshes(model: mujoco.MjModel) -> list[Mesh | None]:
+    """Return the shape of each geom in its body's frame; None for those that are not drawn."""
+    drawn = model.geom_group < world.DRAWN_GROUPS
+    assets = model.geom_dataid[drawn & np.isin(model.geom_type, MESHES)]
+    triangles = model.mesh_facenum[assets].sum()
+    share = min(1.0, MOST_TRIANGLES / max(1, triangles))
+    own = {mesh: own_mesh(model, mesh, share) for mesh in set(assets.tolist())}
+    meshes = []
+    for geom in range(model.ngeom):
+        kind = Geom(model.geom_type[geom])
+        dataid = int(model.geom_dataid[geom])
+        if not drawn[geom]:
+            mesh = None
+        elif kind in MESHES:
+            mesh = own[dataid]
+        elif kind == Geom.mjGEOM_HFIELD:
+            mesh = height_field(model, dataid)
+        else:
+            mesh = solid(model, geom)
+        if mesh is not None:
+            turn = np.zeros(9)
+            mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
+            mesh = Mesh(mesh.vertices @ turn.reshape(3, 3).T + model.geom_pos[geom], mesh.faces)
+        meshes.append(mesh)
+    return meshes
+
+
+def body_meshes(
+    model: mujoco.MjModel, body: int, meshes: Sequence[Mesh | None], paint: Array
+) -> Iterator[tuple[Rgba, Mesh]]:
     """Yield the drawn shapes of a body in its own frame, one for each colour of `paint`, (geoms,
     4).
     """
     first = model.body_geomadr[body]
     parts = {}
     for geom in range(first, first + model.body_geomnum[body]):
-        mesh = geom_mesh(model, geom)
         rgba = tuple(paint[geom].tolist())
-        if mesh is None or model.geom_group[geom] >= world.DRAWN_GROUPS or not rgba[3]:
-            continue
-        turn = np.zeros(9)
-        mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-        vertices = mesh.vertices @ turn.reshape(3, 3).T + model.geom_pos[geom]
-        parts.setdefault(rgba, []).append(Mesh(vertices, mesh.faces))
-    for rgba, meshes in parts.items():
-        yield rgba, joined(meshes)
+        if meshes[geom] is not None and rgba[3]:
+            parts.setdefault(rgba, []).append(meshes[geom])
+    for rgba, same_colour in parts.items():
+        yield rgba, joined(same_colour)
 
 
 def joined(meshes: Sequence[Mesh]) -> Mesh:
@@ -53,12 +83,10 @@ def joined(meshes: Sequence[Mesh]) -> Mesh:
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
 
-def geom_mesh(model: mujoco.MjModel, geom: int) -> Mesh | None:
-    """Return a geom's shape in its own frame; None for planes, height fields and the like."""
+def solid(model: mujoco.MjModel, geom: int) -> Mesh | None:
+    """Return a geom's shape in its own frame; None for planes and flexes."""
     radius, half, _ = size = model.geom_size[geom]
     kind = Geom(model.geom_type[geom])
-    if kind == Geom.mjGEOM_MESH:
-        return own_mesh(model, model.geom_dataid[geom])
     if kind == Geom.mjGEOM_BOX:
         return box(size)
     if kind == Geom.mjGEOM_CYLINDER:
@@ -76,13 +104,52 @@ def geom_mesh(model: mujoco.MjModel, geom: int) -> Mesh | None:
     return None
 
 
-def own_mesh(model: mujoco.MjModel, mesh: int) -> Mesh:
-    """Return a mesh of a model, with the edges that MuJoCo draws sharp."""
+def own_mesh(model: mujoco.MjModel, mesh: int, share: float) -> Mesh:
+    """Return a mesh of a model with this share of its triangles, and with its sharp edges: all that
+    MuJoCo draws sharp where the share is 1.
+    """
     first, start = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
-    faces = slice(start, start + model.mesh_facenum[mesh])
-    corners = np.stack([model.mesh_face[faces], model.mesh_facenormal[faces]], axis=-1)
+    vertices = model.mesh_vert[first : first + model.mesh_vertnum[mesh]]
+    face = slice(start, start + model.mesh_facenum[mesh])
+    faces, normals = model.mesh_face[face], model.mesh_facenormal[face]
+    most = max(FEWEST_TRIANGLES, round(share * len(faces)))
+    if len(faces) > most:
+        return simplified(vertices, faces, most)
+    corners = np.stack([faces, normals], axis=-1)
     unique, places = np.unique(corners.reshape(-1, 2), axis=0, return_inverse=True)
-    return Mesh(model.mesh_vert[first + unique[:, 0]], places.reshape(-1, 3))
+    return Mesh(vertices[unique[:, 0]], places.reshape(-1, 3))
+
+
+def simplified(vertices: Array, faces: Array, most: int) -> Mesh:
+    """Return a mesh with fewer triangles of much the same shape, nearly `most` of them."""
+    import trimesh
+
+    size = np.ptp(vertices, axis=0).max()
+    cells = np.round(CELLS / size * vertices)
+    _, first, cell = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+    mesh = trimesh.Trimesh(vertices[first], cell.reshape(-1)[faces])
+    mesh.update_faces(mesh.unique_faces() & mesh.nondegenerate_faces())
+    if len(mesh.faces) > most:
+        mesh = mesh.simplify_quadric_decimation(face_count=most)
+    smooth = trimesh.graph.smooth_shade(mesh, SHARP)
+    return Mesh(np.asarray(smooth.vertices), np.asarray(smooth.faces))
+
+
+def height_field(model: mujoco.MjModel, field: int) -> Mesh:
+    """Return the surface of a height field."""
+    x, y, top, _ = model.hfield_size[field]
+    rows, columns = model.hfield_nrow[field], model.hfield_ncol[field]
+    first = model.hfield_adr[field]
+    heights = top * model.hfield_data[first : first + rows * columns].reshape(rows, columns)
+    drawn_rows, drawn_columns = (
+        np.linspace(0, lines - 1, min(lines, FIELD_LINES)).astype(int) for lines in (rows, columns)
+    )
+    heights = heights[np.ix_(drawn_rows, drawn_columns)]
+    across, along = np.meshgrid(
+        x * (2.0 * drawn_columns / (columns - 1) - 1.0), y * (2.0 * drawn_rows / (rows - 1) - 1.0)
+    )
+    places = np.column_stack([across.ravel(), along.ravel(), heights.ravel()])
+    return Mesh(places, net(np.arange(heights.size).reshape(heights.shape)))
 
 
 def box(size: Array) -> Mesh:
@@ -112,10 +179,15 @@ def tube(middles: Array, radii: Array, normal: Array, across: Array, sides: int)
     around = np.cos(turns) * normal + np.sin(turns) * across[:, None]
     rings = middles[:, None] + radii[:, None, None] * around
     corners = np.arange(len(rings) * sides).reshape(-1, sides)
-    near, far = corners[:-1], corners[1:]
-    beside, far_beside = np.roll(near, -1, axis=1), np.roll(far, -1, axis=1)
+    return Mesh(rings.reshape(-1, 3), net(np.column_stack([corners, corners[:, 0]])))
+
+
+def net(corners: Array) -> Array:
+    """Return the faces, (m, 3), of a net whose knots are these corners, (rows, columns)."""
+    near, beside = corners[:-1, :-1], corners[:-1, 1:]
+    far, far_beside = corners[1:, :-1], corners[1:, 1:]
     halves = [np.stack([near, beside, far], axis=-1), np.stack([beside, far_beside, far], axis=-1)]
-    return Mesh(rings.reshape(-1, 3), np.concatenate(halves).reshape(-1, 3))
+    return np.concatenate(halves).reshape(-1, 3)
 
 
 def arrow_mesh(line: Array, width: float) -> Mesh:

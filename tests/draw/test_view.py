@@ -16,7 +16,7 @@ import zstandard
 
 import smc_mujoco as smc
 from smc_mujoco.common import html
-from smc_mujoco.draw import style, view_panel, view_shapes
+from smc_mujoco.draw import style, view_machine, view_panel, view_shapes
 from smc_mujoco.draw.session import Session
 from smc_mujoco.draw.view import LiveView, runs_of
 
@@ -71,18 +71,32 @@ def watched(session):
     return session.log(0)["x"].copy()
 
 
-NOMINAL = smc.run(RUN).x[:-1]
+ARM = """<mujoco><worldbody><body><joint name="shoulder" axis="0 1 0"/>
+  <geom type="capsule" fromto="0 0 0 .3 0 0" size=".03" contype="0"/>
+  <body pos=".3 0 0"><joint name="elbow" axis="0 1 0"/>
+  <geom type="capsule" fromto="0 0 0 .2 0 0" size=".02" contype="0"/></body></body></worldbody>
+  <actuator><motor joint="shoulder" ctrllimited="true" ctrlrange="-30 30"/>
+  <motor joint="elbow" ctrllimited="true" ctrlrange="-15 15"/></actuator></mujoco>"""
+WATCHED = [
+    RUN,
+    smc.Scenario(
+        plant=smc.plant_from(ARM, ["shoulder", "elbow"], name="arm"), law="adrc", duration=0.3
+    ),
+    smc.Scenario(plant="quadrotor", law=smc.law("cascaded_pid"), duration=0.3),
+]
+SLIDERS = [(run, name) for run in WATCHED for name in sorted(Session([run]).sliders[0])]
 
 
 @pytest.mark.quick
-@pytest.mark.parametrize("name", sorted(Session([RUN]).sliders[0]))
-def test_every_slider_changes_the_run(name):
-    live = LiveView(Session([RUN]), 0)
+@pytest.mark.parametrize(("run", "name"), SLIDERS)
+def test_every_slider_changes_the_run(run, name):
+    live = LiveView(Session([run]), 0)
     try:
+        nominal = watched(live.session)
         slider = live.session.sliders[0][name]
         move(live, 0, name, slider.low if slider.value > slider.low else slider.high)
         assert not live.session.message
-        assert not np.array_equal(watched(live.session), NOMINAL)
+        assert not np.array_equal(watched(live.session), nominal)
     finally:
         live.close()
 
@@ -214,7 +228,8 @@ def test_shapes_are_as_large_as_mujoco_s_and_where_they_are():
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     paint = np.linspace(0.1, 0.9, model.ngeom)[:, None] * np.ones(4)
-    parts = list(view_shapes.body_meshes(model, 1, paint))
+    meshes = view_shapes.geom_meshes(model)
+    parts = list(view_shapes.body_meshes(model, 1, meshes, paint))
     assert len(parts) == model.ngeom  # a colour each
     for geom, (_, mesh) in enumerate(parts):
         local = (mesh.vertices - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
@@ -222,7 +237,76 @@ def test_shapes_are_as_large_as_mujoco_s_and_where_they_are():
         low, high = centre - half, centre + half
         assert local.min(axis=0) == pytest.approx(low, abs=0.02 * half.max())
         assert local.max(axis=0) == pytest.approx(high, abs=0.02 * half.max())
-        assert volume(mesh) == pytest.approx(VOLUMES[geom], rel=0.02)
+        chords = 0.5 * (2.0 * PI / view_shapes.SIDES) ** 2  # lie within a ball's two arcs
+        assert volume(mesh) == pytest.approx(VOLUMES[geom], rel=chords)
+
+
+def test_a_mesh_of_many_triangles_has_fewer_and_much_the_same_shape():
+    trimesh = pytest.importorskip("trimesh")
+    ball, box = trimesh.creation.icosphere(7), trimesh.creation.box()
+    for _ in range(6):
+        box = box.subdivide()
+    spec = mujoco.MjSpec()
+    for name, mesh in (("ball", ball), ("box", box)):
+        spec.add_mesh(name=name, uservert=mesh.vertices.ravel(), userface=mesh.faces.ravel())
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name)
+    model = spec.compile()
+    assert model.nmeshface > 10 * view_shapes.MOST_TRIANGLES
+    ball, box = view_shapes.geom_meshes(model)
+    assert ball
+    assert box
+    assert len(ball.faces) + len(box.faces) < 1.1 * view_shapes.MOST_TRIANGLES
+    assert volume(ball) == pytest.approx(4.0 / 3.0 * PI, rel=0.01)
+    assert volume(box) == pytest.approx(1.0, rel=0.01)
+    assert box.vertices.min() == pytest.approx(-0.5, abs=0.005)
+    a, b, c = box.vertices[box.faces].swapaxes(0, 1)
+    flat = np.cross(b - a, c - a)
+    corners = np.zeros_like(box.vertices)
+    for corner in box.faces.T:
+        np.add.at(corners, corner, flat)
+    shades = np.abs(corners).max(axis=1) / (np.linalg.norm(corners, axis=1) + 1e-12)
+    assert np.median(shades) > 0.99  # its edges are not shaded round
+
+
+FIELD = """<mujoco><asset><hfield name="hill" nrow="3" ncol="301" size="3 1 .5 .1"/>
+  <texture name="rows" type="2d" builtin="flat" rgb1=".2 .4 .6" width="8" height="8"/>
+  <material name="rows" texture="rows" rgba="1 1 .5 1"/></asset>
+  <worldbody><geom type="hfield" hfield="hill" pos="0 0 2"/>
+  <body><joint name="j" axis="0 1 0"/><geom name="bar" material="rows" size=".1" contype="0"/>
+  </body></worldbody>
+  <actuator><motor joint="j" ctrllimited="true" ctrlrange="-9 9"/></actuator></mujoco>"""
+
+
+def test_a_height_field_is_as_large_as_mujoco_s():
+    model = mujoco.MjModel.from_xml_string(FIELD)
+    model.hfield_data[:] = np.linspace(0.0, 1.0, 301)[None].repeat(3, axis=0).ravel()
+    field, _ = view_shapes.geom_meshes(model)
+    assert field
+    assert field.vertices.min(axis=0) == pytest.approx([-3.0, -1.0, 2.0])
+    assert field.vertices.max(axis=0) == pytest.approx([3.0, 1.0, 2.5])
+    assert field.vertices[:, 2] == pytest.approx(2.25 + field.vertices[:, 0] / 12.0)
+    assert len(field.faces) == 2 * 2 * (view_shapes.FIELD_LINES - 1)
+
+
+def test_a_texture_is_its_mean_colour_and_the_page_says_so():
+    plant = smc.plant_from(FIELD, ["j"], name="textured")
+    live = LiveView(Session([smc.Scenario(plant=plant, law="none", duration=0.1)]), 0)
+    try:
+        bar = live.machines.model.geom("bar").id
+        (machine,) = live.machines.runs
+        assert machine.painted()[bar] == pytest.approx([0.2, 0.4, 0.3, 1.0], abs=0.01)
+        assert view_machine.not_shown(live.machines.model).startswith("Textures are shown as")
+    finally:
+        live.close()
+
+
+def test_what_the_page_does_not_show_is_said(live):
+    skin = """<mujoco><deformable><skin vertex="0 0 0 1 0 0 0 1 0" face="0 1 2">
+      <bone body="b" bindpos="0 0 0" bindquat="1 0 0 0" vertid="0 1 2" vertweight="1 1 1"/></skin>
+      </deformable><worldbody><body name="b"><geom size=".1"/></body></worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(skin)
+    assert view_machine.not_shown(model) == "Not shown: skins."
+    assert not view_machine.not_shown(live.machines.model)
 
 
 @pytest.mark.parametrize("bend", [0.0, 2.0])

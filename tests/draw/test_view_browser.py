@@ -5,6 +5,7 @@ It needs Chromium, playwright.
 
 import io
 import re
+import runpy
 import shutil
 import signal
 import subprocess
@@ -13,6 +14,9 @@ import sys
 import numpy as np
 import pytest
 from PIL import Image
+
+import smc_mujoco as smc
+from smc_mujoco.draw.view_panel import MAX_SAMPLES
 
 pytestmark = pytest.mark.slow
 pytest.importorskip("viser")
@@ -36,6 +40,7 @@ ARM = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/>
 <motor joint="elbow" ctrllimited="true" ctrlrange="-15 15"/></actuator></mujoco>"""
 # the last values of the charts' curves
 ENDS = "Object.values(window.__viserTestpoints.uplots).map(({chart}) => chart.data[1].at(-1))"
+POSITION = "Object.values(window.__viserTestpoints.uplots)[0].chart.data.slice(0, 2).map(side => [...side])"
 TIMES = "Object.values(window.__viserTestpoints.uplots).map(({chart}) => chart.data[0].at(-1))"
 
 
@@ -67,7 +72,10 @@ def dark_share(page):
     "words",
     ["inverted_pendulum --law pid,adrc", "arm.xml:shoulder+elbow --law pid", "quadrotor"],
 )
-def test_a_browser_shows_the_machine_and_a_slider_changes_the_run(words, browser, tmp_path):
+def test_a_browser_shows_the_machine_and_a_slider_changes_the_run(
+    words, browser, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "arm.xml").write_text(ARM)
     command = [sys.executable, "-m", "smc_mujoco", "view", *words.split(), "--no-browser"]
     with subprocess.Popen(
@@ -94,6 +102,7 @@ def test_a_browser_shows_the_machine_and_a_slider_changes_the_run(words, browser
                 f"before => {ENDS}.every((end, i) => end !== before[i])", arg=before
             )
             changed = float(number.input_value())
+            times, positions = page.evaluate(POSITION)
             page.get_by_role("button", name="save as scene").click()
             page.get_by_text("saved as view.py").wait_for()
             page.close()
@@ -104,7 +113,10 @@ def test_a_browser_shows_the_machine_and_a_slider_changes_the_run(words, browser
     assert "Traceback" not in said
     assert machine > 5e-4
     assert changed == pytest.approx(2.0 * gain, rel=0.02)
-    assert (tmp_path / "view.py").exists()
+    saved = next(iter(runpy.run_path(str(tmp_path / "view.py"))["RESTORED"].values()))
+    repeated = smc.run(saved).x[:, 2 if saved.plant.pose else 0]
+    stride = max(1, round(times[-1] / saved.control_period) // MAX_SAMPLES)
+    assert np.array_equal(repeated[::stride][: len(positions)], positions)
 
 
 @without_browser

@@ -109,7 +109,7 @@ def test_the_page_and_its_socket_answer_at_the_address_alone(live):
         assert refused.value.response.status_code == 403
 
 
-def test_where_a_processor_draws_the_page_has_fewer_pixels(live):
+def test_where_a_processor_draws_the_page_is_less_work(live):
     with urllib.request.urlopen(live.address, timeout=20) as answer:
         page = answer.read().decode()
     assert int(answer.headers["Content-Length"]) == len(page.encode())
