@@ -129,6 +129,7 @@ def groups(machine: Plant | Scenario) -> tuple[ChannelGroup, ...]:
     """
     plant = machine if isinstance(machine, Plant) else machine.plant
     rate = "/s" if getattr(machine, "tracks", "") == "speed" else ""
+    every_effort = machine.efforts
     members: dict[tuple[bool, str], list[int]] = {}
     for i, unit in enumerate(plant.units):
         members.setdefault((i < plant.driven, unit), []).append(i)
@@ -138,7 +139,7 @@ def groups(machine: Plant | Scenario) -> tuple[ChannelGroup, ...]:
         name = "driven" if driven else "free"
         if kinds.count(driven) > 1:
             name += f" {unit}"
-        efforts = {machine.efforts[i] for i in channels}
+        efforts = {every_effort[i] for i in channels}
         effort = efforts.pop() if len(efforts) == 1 else ""
         channel_groups.append(
             ChannelGroup(

@@ -151,6 +151,8 @@ def _far_starts(s: Any) -> Iterator[str]:
 
 def _holding_friction(s: Any) -> Iterator[str]:
     """Yield a sentence about each dry friction that no command can overcome."""
+    if not s.friction:  # names of joints take a model
+        return
     forces = dict(zip(driven_names(s.plant), s.drive_train.forces, strict=True))
     for part in s.friction:
         values = [getattr(part, name, None) for name in LEVELS]

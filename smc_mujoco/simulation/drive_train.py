@@ -52,14 +52,13 @@ class DriveTrain:
         """Whether u is a force."""
         return not any(part.unit for part in self.actuator)
 
-    @property
+    @cached_property
     def efforts(self) -> tuple[str, ...]:
         """Unit of u in each channel, (n,): that of the joint's force, "V", or that of its
         acceleration or of its position.
         """
         efforts = list(self.plant.efforts)
-        for i, motor in enumerate(self.motors):
-            unit_of_x = self.plant.units[i]
+        for i, (motor, unit_of_x) in enumerate(zip(self.motors, self.plant.units, strict=False)):
             efforts[i] = motor.unit.format(x=unit_of_x) or efforts[i]
         return tuple(efforts)
 

@@ -635,13 +635,14 @@ def _drives(s: Resolved) -> list[dict[str, Any]]:
             summed |= {*part.channels(s.plant)}
     limits = [*s.limits, *[0.0] * s.plant.free]
     leads = reference_leads(s)
+    train = s.drive_train
+    torques, scales = train.torques, train.scales
     rows = []
-    for i, nominal in enumerate(s.drive_train.nominal):
+    for i, nominal in enumerate(train.nominal):
         row = {"limit": limits[i], "scale": 1.0, "sums_force": i in summed}
         if i < s.plant.driven:
-            torque = s.drive_train.torques[i]._asdict()
-            row |= {"scale": s.drive_train.scales[i], "torque": torque}
-            row["accelerates"] = s.drive_train.motors[i].accelerates
+            row |= {"scale": scales[i], "torque": torques[i]._asdict()}
+            row["accelerates"] = train.motors[i].accelerates
             row["lead"] = leads[i]
         rows.append(row | nominal._asdict())
     return rows

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.mechanisms.plant import plant
+from smc_mujoco.mechanisms.plant import Plant, plant
 from smc_mujoco.metrics import catalogue as m
 from smc_mujoco.metrics import conventions, fold, limit_cycle
 from smc_mujoco.metrics.conventions import group_trace, groups, scale, turns
@@ -1033,3 +1033,18 @@ def test_positions_of_a_pose_are_those_whose_distance_is_its_error():
         part = group_trace(trace, group)
         columns = [i for i in group.channels if i in trace.scenario.scored_channels]
         np.testing.assert_allclose(part.x - part.r, trace.e[:, columns], atol=1e-12)
+
+
+@pytest.mark.quick
+def test_a_large_network_is_grouped_with_as_few_looks_at_its_units_as_a_small_one(monkeypatch):
+    looks = []
+    units = Plant.units.fget
+
+    def counted(network):
+        looks.append(network.n)
+        return units(network)
+
+    scenarios = [smc.Scenario(plant=plant("pendulum_network", n=n), law="pid") for n in (2, 6)]
+    monkeypatch.setattr(Plant, "units", property(counted))
+    assert [len(groups(scenario)) for scenario in scenarios] == [1, 1]
+    assert looks.count(6) == looks.count(2)
