@@ -264,7 +264,7 @@ def _settled(replays: Replays, slopes: Slopes, most: int) -> Slopes:
     little.
     """
     for _ in range(most):
-        after = _best_step(replays, slopes)
+        after = _best_step(replays, slopes, rough=True)
         enough = after.cost >= (1.0 - LAST_CHANGE) * slopes.cost
         slopes = min(after, slopes, key=lambda slopes: slopes.cost)
         if enough:
@@ -341,10 +341,11 @@ def refine(
     cost, until one lowers it by less than the share `tolerance`.
 
     Derivatives of the last steps, which change little, are those of the step before. If `rough`,
-    derivatives are differences to one side, and serve while they keep their promise.
+    derivatives are differences to one side, and serve while they keep their promise; else all
+    pieces try other starts in the first step.
     """
-    for _ in range(most):
-        after = _best_step(replays, slopes)
+    for i in range(most):
+        after = _best_step(replays, slopes, rough or i > 0)
         gain = slopes.cost - after.cost
         if not gain > 0.0:
             break
@@ -396,7 +397,7 @@ def _own_starts(replays: Replays, point: Point, most: int) -> Slopes:
     states = point.states.copy()
     falling = list(range(len(residuals)))
     for _ in range(most):
-        after = _best_step(replays.only(falling), slopes)
+        after = _best_step(replays.only(falling), slopes, rough=True)
         still = []
         for i, k in enumerate(falling):
             before, reached = cost([residuals[k]]), cost([after.residuals[i]])
@@ -412,13 +413,13 @@ def _own_starts(replays: Replays, point: Point, most: int) -> Slopes:
     return dataclasses.replace(first, point=Point(point.values, states), residuals=residuals)
 
 
-def _best_step(replays: Replays, slopes: Slopes) -> Slopes:
+def _best_step(replays: Replays, slopes: Slopes, rough: bool) -> Slopes:
     """Return what a damped step reaches, with the derivatives before it: the first of several that
-    keeps its promise, or the best.
+    keeps its promise, or the best. `rough` as of `_chosen`.
     """
     reached = []
     for damping in DAMPINGS if len(slopes.point.values) else DAMPINGS[:1]:
-        reached.append(_chosen(replays, slopes, _moved(replays, slopes, damping)))
+        reached.append(_chosen(replays, slopes, _moved(replays, slopes, damping), rough))
         promise = _promise(replays, slopes, damping)
         if slopes.cost - reached[-1].cost > KEPT_PROMISE * promise:
             break
@@ -431,9 +432,9 @@ def _promise(replays: Replays, slopes: Slopes, damping: float = 0.0) -> float:
     return slopes.cost - cost([slopes.freed_residuals + slopes.freed_slopes @ step])
 
 
-def _chosen(replays: Replays, slopes: Slopes, values: Array) -> Slopes:
-    """Return slopes at quantities, with the derivatives of others. Each piece has its linear move
-    of its own states, or if that misses its promise, the best of several.
+def _chosen(replays: Replays, slopes: Slopes, values: Array, rough: bool) -> Slopes:
+    """Return slopes at quantities, with the derivatives of others. Each piece has the best of
+    several moves of its own states; if `rough`, the linear one where that keeps its promise.
     """
     full, *alternatives = _variants(replays, slopes, values)
     (residuals,) = replays.residuals([full])
@@ -448,7 +449,7 @@ def _chosen(replays: Replays, slopes: Slopes, values: Array) -> Slopes:
             cost([r + J @ step + S @ (states[k] - slopes.point.states[k])]),
         )
         allowed = before - KEPT_PROMISE * (before - promised)
-        if cost([residuals[k]]) > max(allowed, (1.0 + SMALL_CHANGE) * promised):
+        if not rough or cost([residuals[k]]) > max(allowed, (1.0 + SMALL_CHANGE) * promised):
             missed.append(k)
     if missed and alternatives:
         points = [Point(values, point.states[missed]) for point in alternatives]

@@ -302,15 +302,32 @@ def test_a_search_reaches_least_squares_and_tries_no_rival_of_a_good_start():
     np.testing.assert_array_equal(none.point.values, curve.start.values)
 
 
-def test_only_pieces_that_miss_what_their_slopes_promise_try_other_starts():
+@pytest.mark.parametrize(("rough", "pieces_tried"), [(True, 1), (False, 3)])
+def test_in_a_rough_step_only_pieces_that_miss_their_promise_try_other_starts(rough, pieces_tried):
     curve = Jumpy((1.0, 3.0), stuck=True)
     slopes = curve.slopes(curve.start)
     curve.tried.clear()
     values = gauss_newton._moved(curve, slopes, 0.0)
-    after = gauss_newton._chosen(curve, slopes, values)
+    after = gauss_newton._chosen(curve, slopes, values, rough)
     pieces = [len(point.states) for point in curve.tried]
-    assert pieces == [3] + [1] * (len(gauss_newton.SHARES) + 1)
+    assert pieces == [3] + [pieces_tried] * (len(gauss_newton.SHARES) + 1)
     assert after.point.states[1] == 0.0
+
+
+def test_a_refinement_tries_other_starts_of_every_piece_in_its_first_step_alone(monkeypatch):
+    steps = []
+    best_step = gauss_newton._best_step
+
+    def recorded(replays, slopes, rough):
+        steps.append(rough)
+        return best_step(replays, slopes, rough)
+
+    monkeypatch.setattr(gauss_newton, "_best_step", recorded)
+    curve = Curve(noise=0.002, start=(5.0, 1.0))
+    slopes = curve.slopes(curve.start)
+    gauss_newton.refine(curve, slopes, 2)
+    gauss_newton.refine(curve, slopes, 2, rough=True)
+    assert steps == [False, True, True, True]
 
 
 @pytest.mark.parametrize("late", [1.0, 5.0, 12.0])
