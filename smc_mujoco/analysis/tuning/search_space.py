@@ -48,7 +48,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from smc_mujoco.common.aliases import Numbers, Pair
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.errors import ScenarioError, warn_once
+from smc_mujoco.common.text import number
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component, unit_cure
 from smc_mujoco.control.units import FORCE, Gain, Unit
@@ -154,7 +155,15 @@ def scales(
     if plant.is_user_model and per_u is not None:
         # a bound far beyond what the joint needs is no scale
         need = max(at_start.needs(plant))
-        u_max = min(u_max, at_start.MOST * need / per_u)
+        if u_max * per_u > at_start.MOST * need:
+            times = number(u_max * per_u / need)
+            warn_once(
+                f"{plant.name} may give {u_max * per_u:g}, {times} times what it needs to move and "
+                f"to hold ({need:g}), and friction and other conditions are sized by it: if the "
+                "number of its file is a placeholder, give the motor's, as elbow(u_max=9) or "
+                "smc.Channel(u_max=9)"
+            )
+            u_max = at_start.MOST * need / per_u
         g = min(at_start.mobility(plant, u_max * per_u, X))
     else:
         zeros = np.zeros(plant.n)

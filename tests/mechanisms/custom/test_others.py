@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.tuning import search
+from smc_mujoco.analysis.tuning import search, search_space
 from smc_mujoco.analysis.tuning.evaluator import Evaluator
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common.errors import ScenarioWarning
@@ -645,3 +645,19 @@ def test_an_assumed_bound_holds_a_joint_wherever_its_limits_let_it_be(length):
     assert scales.needs(machine)[0] == pytest.approx(2.0 * weight, rel=0.06)
     law = smc.law("pid", kp=5.0, kd=0.02, ki=0.0)
     assert abs(smc.run(smc.Scenario(plant=machine, law=law, x0=0.3, duration=2.0)).x[-1, 0]) < 0.01
+
+
+@pytest.mark.quick
+def test_a_bound_far_beyond_what_a_joint_needs_is_no_scale_and_is_told():
+    """A URDF of a desk arm gave 1000 N m where 2.1 are needed, and no law settled under its
+    friction.
+    """
+    text = """<mujoco><worldbody><body><joint name="j" axis="0 1 0"/><geom type="capsule" mass="1"
+     fromto="0 0 0 0 0 -.4" size=".03"/></body></worldbody>
+     <actuator><motor joint="j" ctrlrange="-{0} {0}"/></actuator></mujoco>"""
+    robot = smc.plant_from(text.format(6000), ["j"])
+    need = scales.needs(robot)[0]
+    with pytest.warns(ScenarioWarning, match=rf"{6000 / need:.0f} times .* elbow\(u_max=9\)"):
+        assert search_space.scales(robot, 6000.0, 0.3)["F"] == 100.0 * need
+    moderate = smc.plant_from(text.format(60), ["j"])
+    assert search_space.scales(moderate, 60.0, 0.3)["F"] == 60.0
