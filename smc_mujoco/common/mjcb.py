@@ -26,6 +26,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common import libmujoco
+from smc_mujoco.common.process import return_freed_memory
 
 CALLBACKS = (
     "control",
@@ -36,6 +37,9 @@ CALLBACKS = (
     "act_dyn",
     "act_gain",
     "act_bias",
+)
+LARGE = (
+    10_000_000  # bytes of a model, chosen: those of meshes, whose compiling takes many times that
 )
 
 _lock = threading.RLock()  # held while callbacks are replaced
@@ -115,7 +119,10 @@ def compiled(
     if any(map(_python, _callbacks().values())):
         without = installed(None)
     with without:
-        return build(spec) if build else spec.compile()
+        model = build(spec) if build else spec.compile()
+    if mujoco.mj_sizeModel(model) > LARGE:
+        return_freed_memory()
+    return model
 
 
 def _callbacks() -> dict[str, Any]:

@@ -24,6 +24,7 @@ from smc_mujoco.common import arithmetic
 from smc_mujoco.common.attended import attended
 from smc_mujoco.common.constraints import Shown, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, has_items, shown, warn_once
+from smc_mujoco.common.process import return_freed_memory
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import counted
 from smc_mujoco.mechanisms.plant import field_array
@@ -210,15 +211,6 @@ def memory_for(prepared: Sequence[Prepared]) -> Iterator[None]:
             "the traces kept so far: give a shorter duration, a longer control period or fewer "
             "channels, or take traces from smc.stream"
         ) from None
-
-
-def return_freed_memory() -> None:
-    """Return freed memory to the system, if the C library is glibc.
-
-    Without it, a run leaves 45 to 100 kB allocated.
-    """
-    if sys.platform == "linux" and hasattr(ctypes.CDLL(None), "malloc_trim"):
-        ctypes.CDLL(None).malloc_trim(0)
 
 
 @functools.cache

@@ -33,6 +33,7 @@ from smc_mujoco.analysis.tuning.run_limits import (
 )
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.process import return_freed_memory
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import source
@@ -46,11 +47,7 @@ from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.doubts import constant_goal
 from smc_mujoco.simulation.force_bounds import default_u_max
 from smc_mujoco.simulation.prepare import prepare
-from smc_mujoco.simulation.run import (
-    lower_mmap_threshold,
-    return_freed_memory,
-    run_unjudged,
-)
+from smc_mujoco.simulation.run import lower_mmap_threshold, run_unjudged
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, Noise
 from smc_mujoco.studies.answer_time import FEWEST_SEEDS, SHOWN, AnswerTime
