@@ -222,12 +222,13 @@ class Identified(Answer):
         """The answer: numbers with errors and units, the fit, and what to doubt."""
         rows = []
         for name, value in self.values.items():
-            rows.append((name, *self._number(name, value)))
+            number, error, unit = self._number(name, value)
+            rows.append((name, number, f"± {error}", unit))
         fits = {"fit": _fit(self.by_pieces or self.fits), "pieces": bool(self.by_pieces)}
         if self.held_out:
             fits["held_out"] = _fit([self.held_out.by_pieces or self.held_out.fit])
         return Screen(
-            tables=[Tabular(headings=HEADINGS[:4], rows=rows)],
+            tables=[Tabular(headings=("",) * 4, rows=rows)],
             notes=[Fact("fits", **fits)],
             facts=[Fact("doubt", text=note) for note in self.notes],
         )

@@ -52,6 +52,12 @@ def contest(boards):
     return contest
 
 
+def column(contest, name):
+    """Return the cells of a metric, in the order of LAWS."""
+    (i,) = [i for i, head in enumerate(contest.table.headings) if head.split(" (")[0] == name]
+    return [row[i] for row in sorted(contest.table.rows, key=lambda row: LAWS.index(row[0]))]
+
+
 def test_five_laws_in_one_condition_fit_a_screen_of_80_by_24(contest):
     command = f"smc-mujoco compare inverted_pendulum --law {','.join(LAWS)} --seeds 24"
     step = NextStep(f"{command} --condition friction+encoder+delay_10ms", "tries all at once")
@@ -71,6 +77,11 @@ def test_the_numbers_of_the_screen_are_those_of_the_boards(boards, contest):
             assert unit.removesuffix(")") == unit_of(board).replace("^2", "²")
             assert cell.strong == (board.winner == law)
     assert dict(contest.settled) == dict.fromkeys(LAWS, Settles(SEEDS, SEEDS))
+    (board,) = [candidate for candidate in boards if candidate.metric == "settles"]
+    unsettled = {law: i / SEEDS for i, law in enumerate(LAWS)}  # shares
+    block = dataclasses.replace(board.blocks[0], medians=unsettled)
+    (apart,) = contests([boards[-1], dataclasses.replace(board, blocks=(block,))], OWN, ())
+    assert dict(apart.settled) == {law: Settles(SEEDS - i, SEEDS) for i, law in enumerate(LAWS)}
 
 
 def test_the_screen_says_what_J_is_over_beside_its_condition(contest):
@@ -91,6 +102,9 @@ def test_a_lead_on_the_screen_is_the_least_lead_of_the_board(boards, contest):
     (board,) = [candidate for candidate in boards if candidate.metric == "itae"]
     assert lead == board.blocks[0].lead
     assert (lead.law, lead.rival) == (LAWS[0], LAWS[1])
+    assert lead.low < 1.0 - 1.0 / 1.3 < lead.high < 1.0 - 1.0 / 1.4  # and not over another rival
+    medians = {law: cell.text for law, cell in zip(LAWS, column(contest, "ITAE"), strict=True)}
+    assert float(medians[LAWS[1]]) == pytest.approx(0.13, rel=0.05)
     lines = "\n".join(answers.contest_lines(contest))
     assert f"{100 * lead.low:.2g} to {100 * lead.high:.2g} % below {lead.rival}" in lines
 
