@@ -58,7 +58,7 @@ def page(board: TrackingBoard, picture: str) -> str:
         f"smc-mujoco enter my_law.py --suite {suite.name}",
         "```",
         "",
-        "searches for your law alone, and writes this page with its row.",
+        "It searches for your law alone, and writes this page with its row.",
         "",
         "## How to read it",
         "",
@@ -68,8 +68,7 @@ def page(board: TrackingBoard, picture: str) -> str:
         f"{UNSEEN} unseen runs, with its 95 % interval. Below {FLOOR:g} counts all are equal.",
         "- **An entry leads another** if it is better in every pairing of their searches, by a "
         "paired test (`smc-mujoco explain lead`). A star: no other entry leads it.",
-        f"- **`without`** has the error of the same gains without the {load}; `=`: it is no less, "
-        f"so it is not of the {load}.",
+        f"- **`without`**: the error of the same gains without the {load}; `=`: it is no less.",
         "- **`never`**: u varies more than the limit, or a run failed.",
         "- **Told**: given a1, a2 and b of the plant, e'' = a1 e + a2 e' + b u.",
         "- **An oracle** knows state, friction and load, without noise and delay.",

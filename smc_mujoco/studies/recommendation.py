@@ -519,7 +519,7 @@ class Recommendation(Answer):
                 ahead = f"{effect.ahead} of {effect.samples}"
                 wins = "yes" if comparison.winners[0] else "no"
                 rows.append((about, first, rival, ratio, ahead, p, wins))
-        headings = "units", "law", "rival", "J over the rival's", "ahead", "p", "wins"
+        headings = "sets of gains", "law", "rival", "J over the rival's", "ahead", "p", "wins"
         return Tabular(headings=headings, rows=rows, title="Verdicts on J", name_columns=3)
 
     @property

@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 from helpers.tables import MadeTable
 
+from smc_mujoco.analysis.tuning import result
 from smc_mujoco.answers import answers
 from smc_mujoco.answers.explain import explain
 from smc_mujoco.answers.facts import Lead, NextStep, Screen, Settles, Trails
+from smc_mujoco.answers.templates import TEXTS
 from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.robustness import sensitivity, worst_case
+from smc_mujoco.studies import compare
 from smc_mujoco.studies.board_numbers import size, unit_of
 from smc_mujoco.studies.contests import contests
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard
@@ -20,6 +24,12 @@ pytestmark = pytest.mark.quick
 
 LAWS = ("observer_based_finite_time", "super_twisting", "adrc", "pid", "my_law")
 SEEDS = 12
+HEADINGS = worst_case.HEADINGS, sensitivity.HEADINGS, result.HEADINGS, compare.GAINS
+HEADINGS += (
+    compare.RUNS,
+    compare.TIME_HEADINGS,
+    ("margin", "to within", "all sets", "theory", "unit"),
+)
 OWN = {plant: dict.fromkeys(LAWS, "wc=29.9, w=31.7, b=8.53") for plant in ("duffing", "pendulum")}
 
 
@@ -155,6 +165,9 @@ def test_more_than_five_plants_and_conditions_are_one_table_of_winners():
         *(CATALOGUE[name].label for name in METRICS if name in CATALOGUE),
         *("J", "settled", "settled runs", "floor", "star", "best", "lead", "below"),
         *("tied", "open", "not ranked", "no winner", "beware", "gains", "margin", "worst"),
+        *{re.sub(r"\{.*?\}", "", label).strip() for label, _ in TEXTS.values()} - {""},
+        *{heading.partition(" (")[0] for table in HEADINGS for heading in table}
+        - {"from", "to", ""},
         *("shipped", "tuned here", "given", "default", "interval", "searches", "evaluations"),
         *("J spread", "relative time", "arrived", "to within", "theory", "all sets", "found by"),
         *(

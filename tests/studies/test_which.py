@@ -21,6 +21,7 @@ from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.analysis.tuning.run_limits import RunLimit
 from smc_mujoco.answers import command
 from smc_mujoco.answers.answers import LINES, WIDTH
+from smc_mujoco.answers.explain import explain
 from smc_mujoco.answers.facts import Settles
 from smc_mujoco.answers.templates import TEXTS
 from smc_mujoco.cli import main
@@ -183,6 +184,8 @@ def test_the_evidence_has_the_numbers_of_the_race_and_of_the_runs(raced):
         if not margin.open:
             beyond = margin.value + margin.resolution
             assert float(row[2]) == pytest.approx(beyond, rel=5e-3)
+    for heading in [heading for table in recommendation.tables for heading in table.headings]:
+        explain(heading.split(" (")[0])
     noise = by_title["Assumed"].rows[-1]
     assert noise[0].startswith("noise (added")
     assert numbers(noise[3])[:2] == [0.01, 0.05]
