@@ -80,7 +80,7 @@ def test_worst_runs_and_medians_are_not_exchanged_and_the_first_law_leads():
 
 
 def test_tuned_gains_are_compared_with_the_law_s_own():
-    made: Any = SimpleNamespace(
+    tuning: Any = SimpleNamespace(
         law=SimpleNamespace(name="pid"),
         plant=SimpleNamespace(name="duffing"),
         gains={"kp": 2.0, "kd": 3.0},
@@ -92,21 +92,21 @@ def test_tuned_gains_are_compared_with_the_law_s_own():
         at_bound={"kd": "upper"},
         budget=8,
     )
-    says = facts(Tuned.screen.fget(made))  # pyright: ignore[reportOptionalCall]
+    says = facts(Tuned.screen.fget(tuning))  # pyright: ignore[reportOptionalCall]
     assert says["gains"] == "kp=2, kd=3"
     assert says["J"].startswith("0.300 s²")
     assert "25 % below" in says["J"]
     assert says["searches"] == "3 ended within 4 %"
     assert ("kd" in says["at bound"], "upper" in says["at bound"]) == (True, True)
-    made.before = 0.2
-    assert "0.200 s² with the law's own gains" in facts(Tuned.screen.fget(made))["J"]  # pyright: ignore[reportOptionalCall]
-    made.before = math.inf
-    assert "own gains fail" in facts(Tuned.screen.fget(made))["J"]  # pyright: ignore[reportOptionalCall]
+    tuning.before = 0.2
+    assert "0.200 s² with the law's own gains" in facts(Tuned.screen.fget(tuning))["J"]  # pyright: ignore[reportOptionalCall]
+    tuning.before = math.inf
+    assert "own gains fail" in facts(Tuned.screen.fget(tuning))["J"]  # pyright: ignore[reportOptionalCall]
 
 
 def test_a_sensitivity_says_its_spread_its_failures_and_what_to_narrow():
     half = SimpleNamespace(half=("mass", 0.7, 1.0), before=0.4, median=0.1)
-    made: Any = SimpleNamespace(
+    analysis: Any = SimpleNamespace(
         values=np.linspace(0.0, 1.0, 101),
         failed=np.arange(101) < 7,
         axes=[],
@@ -119,7 +119,7 @@ def test_a_sensitivity_says_its_spread_its_failures_and_what_to_narrow():
     )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("smc_mujoco.robustness.sensitivity._words", lambda space, cuts: cuts[0][0])
-        screen = Sensitivity.screen.fget(made)  # pyright: ignore[reportOptionalCall]
+        screen = Sensitivity.screen.fget(analysis)  # pyright: ignore[reportOptionalCall]
     says = facts(screen)
     assert says["rms error"] == "0.05 m to 0.95 m in 90 % of 101 runs"
     assert says["fail"] == "7 of 101 runs"
@@ -160,8 +160,8 @@ def test_values_have_their_texts(value, form, text):
 
 
 def test_what_is_not_known_is_left_out():
-    known = {"runs": Settles(1, 2), "times": Span(math.nan, math.nan), "together": None}
-    assert said(Fact("settles", **known)) == ("settles", "1 of 2 runs")
+    unsettled = {"runs": Settles(1, 2), "times": Span(math.nan, math.nan), "together": None}
+    assert said(Fact("settles", **unsettled)) == ("settles", "1 of 2 runs")
     lead = Lead(law="a", rival="b", metric="J", low=0.2, high=0.35)
     best = {"laws": 3, "lead": lead}
     assert said(Fact("best", **best)) == (
