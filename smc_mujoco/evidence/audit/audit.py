@@ -87,8 +87,8 @@ def audit(
       quick: whether to measure less, as each claim says: coarser grids, shorter runs.
       threads: simulations at once; None for one per available core.
       table: a study's table, whose runs are not made again.
-      report: called with how many claims are done and how many there are; each counts once per set
-        of gains.
+      report: called with how much is done and how much there is: each claim counts once for each
+        of its plants and each set of gains.
 
     Returns:
       An `Audit`: its `claims` with their verdicts, and `save(path)`.
@@ -112,13 +112,16 @@ def audit(
     evidence: dict[str, dict[str, Evidence]] = defaultdict(dict)
     used: dict[str, dict[str, dict[str, Used]]] = defaultdict(dict)
     late_last = sorted(entries, key=lambda entry: entry.late)
-    for k, name in enumerate(names):
+    needed = len(names) * sum(map(_plants, entries))
+    done = 0
+    for name in names:
         runs = ClaimRuns(audited, name, quick, {}, threads, rows, shared)
-        for done, entry in enumerate(late_last, 1 + k * len(entries)):
+        for entry in late_last:
             its_runs = runs.of(entry)
             evidence[entry.id][name] = measure(entry, its_runs)
             used[entry.id][name] = its_runs.used
-            report(done, len(entries) * len(names))
+            done += _plants(entry)
+            report(done, needed)
     verdicts = Claims()
     for entry in entries:
         claim = judged(entry, evidence[entry.id])
@@ -127,6 +130,11 @@ def audit(
             claim = dataclasses.replace(claim, measured=said)
         verdicts.append(claim)
     return Audit(audited, verdicts, quick, dict(used), table is None)
+
+
+def _plants(entry: ClaimEntry) -> int:
+    """Return how many plants a claim is about, at least 1."""
+    return max(1, len(entry.plants))
 
 
 def claims(

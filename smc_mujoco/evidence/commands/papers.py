@@ -98,7 +98,7 @@ def claims(
         return
     sets = None if gains is None else options.names(gains)
     writable(evidence and with_ending(evidence, ".json"))
-    with bar("claims", counted=True) as drawn:
+    with bar("claims") as drawn:
         done = audit(about, ids or None, sets, quick, threads, report=drawn.reached)
     if evidence:
         evidence = done.save(evidence)

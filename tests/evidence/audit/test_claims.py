@@ -252,15 +252,20 @@ def test_late_claims_come_last_and_every_one_is_reported(only):
     order = []
     reported = []
     late = dataclasses.replace(
-        entry("1"), late=True, evidence=lambda runs: order.append("1") or [YES]
+        entry("1"), late=True, plants=(), evidence=lambda runs: order.append("1") or [YES]
     )
-    only(late, dataclasses.replace(entry("2"), evidence=lambda runs: order.append("2") or [YES]))
+    of_two = dataclasses.replace(
+        entry("2"),
+        plants=("duffing", "van_der_pol"),
+        evidence=lambda runs: order.append("2") or [YES],
+    )
+    only(late, of_two)
     report = audit.audit(
         gains=["study", "tuned"], report=lambda done, whole: reported.append((done, whole))
     )
     assert [claim.id for claim in report.claims] == ["1", "2"]
     assert order == ["2", "1", "2", "1"]
-    assert reported == [(done, 4) for done in range(1, 5)]
+    assert reported == [(done, 6) for done in (2, 3, 5, 6)]
 
 
 # runs
