@@ -134,9 +134,11 @@ def _in_si(heads: Sequence[object], values: Sequence[Any], what: str) -> Record:
 def _csv(file: Path) -> Record:
     """Return the columns of a CSV file. A cell that is empty, or not a number, is NaN."""
     rows = [row for _, row in csv_rows(file)]
-    if len(rows) < 2:
+    numbers = bool(rows) and not np.isnan(list(map(_cell, rows[0]))).any()
+    if len(rows) < 2 or numbers:
+        lines = "numbers in its first line" if numbers else f"{len(rows)} lines"
         raise ScenarioError(
-            f"{file} has {len(rows)} lines: give a first line with the columns' names, and samples"
+            f"{file} has {lines}: give a first line with the columns' names, and samples"
         )
     heads, factors = column_units.headings(rows[0], str(file))
     values = []
@@ -152,7 +154,7 @@ def _csv(file: Path) -> Record:
 
 def _cell(text: str) -> float:
     try:
-        return float(text)
+        return math.nan if "_" in text else float(text)  # Python takes 1_0 for 10
     except ValueError:
         return np.nan
 

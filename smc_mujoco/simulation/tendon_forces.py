@@ -38,7 +38,7 @@ def unreached(trace: Any) -> str:
         if names:
             causes.append(f"{joined(names)} can be {words}")
     return (
-        f"the tendons of {s.plant.name} lack force in {100.0 * samples.mean():.2g} % of the "
+        f"the tendons of {s.plant.name} lack force in {100.0 * samples.mean():.0f} % of the "
         f"samples under {s.law.name}: {sizes[k, worst]:.3g} {s.plant.efforts[i]} of the "
         f"{abs(trace.applied[k, i]):.3g} that joint {channel_names(s.plant)[i]!r} is to get at "
         f"{trace.t[k]:.3g} s, as {' and '.join(causes)}"

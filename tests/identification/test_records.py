@@ -213,3 +213,18 @@ def test_what_to_doubt_is_said_from_each_bound_on(quiet, loud, note):
     calm = found(**quiet).notes
     assert not [sentence for sentence in calm if sentence.startswith(note)]
     assert [sentence for sentence in found(**loud).notes if sentence.startswith(note)]
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("0.0,0.1,1\n0.1,0.2,2\n", "has numbers in its first line: give a first line with"),
+        ("t,x,u\n0.0,0.1,1_0\n0.1,0.2,2\n", "column u of .* is nan at sample 0"),
+    ],
+)
+def test_a_log_without_a_heading_and_what_python_alone_takes_for_a_number(tmp_path, text, words):
+    file = tmp_path / "log.csv"
+    file.write_text(text)
+    with pytest.raises(smc.ScenarioError, match=words):
+        smc.identify(smc.plant("duffing"), file, ["alpha"])

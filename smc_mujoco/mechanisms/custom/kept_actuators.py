@@ -124,10 +124,15 @@ def kept(model: mujoco.MjModel, i: int, goal: float, step: float) -> Actuator:
     if model.actuator_gaintype[i] == OF_DCMOTOR:
         return _dcmotor(model, i, gear)
     _, stiffness, damping = model.actuator_biasprm[i, :3].tolist()
+    low, high = forcerange_of(model, i)
+    joint = model.actuator_trnid[i, 0]
+    if model.jnt_actfrclimited[joint]:
+        lowest, highest = model.jnt_actfrcrange[joint].tolist()
+        low, high = max(low, lowest), min(high, highest)
     servo = PositionServo(
         kp=-gear * gear * stiffness,
         kv=-gear * gear * damping,
-        forcerange=forcerange_of(model, i),
+        forcerange=(low, high),
         ctrlrange=_times(ctrlrange_of(model, i), 1.0 / gear),
         goal=goal,
         step=step,

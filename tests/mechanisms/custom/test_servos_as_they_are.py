@@ -142,6 +142,16 @@ def test_a_bound_and_a_goal_follow_from_the_file():
     assert arm.argument == "FILE.xml:a(servo)+b(servo)@home"
 
 
+@pytest.mark.quick
+def test_what_a_joint_bears_bounds_its_servo_and_what_is_sized_by_it():
+    """Friction was sized by kp times the set-point's bound, 12 N m where the joint takes 10."""
+    limited = HOBBY.replace("<joint ", '<joint actuatorfrcrange="-3 2" ')
+    arm = servo(limited % '<position joint="j" kp="900" kv="9" forcerange="-50 50"/>')
+    (scenario,) = smc.grid(arm, smc.law("pid"), "coulomb")
+    assert scenario.actuator[0].forcerange == (-3.0, 2.0)
+    assert scenario.friction[0].level == pytest.approx(2.0 / 60.0)
+
+
 FREE = '<position joint="j" kp="17.8"/>'
 REFUSED = {
     "a motor": ('<motor joint="j"/>', {}, ["is a motor", "servo=True is for", "leave servo out"]),

@@ -2,6 +2,7 @@
 least squares.
 """
 
+import re
 import warnings
 
 import numpy as np
@@ -137,6 +138,7 @@ def test_a_run_beyond_what_tendons_give_is_told_once(tmp_path):
     pushes = trace.applied[:, 0] * arms_at(trace.x[:, 0])[:, 0] < 0.0
     assert pushes.any()
     assert np.all(tensions(trace)[pushes] == 0.0)
+    assert re.search(r"in \d+ % of", trace.unreached)  # 1e+02 % was printed
     back = smc.load(trace.save(tmp_path / "single.npz"))
     np.testing.assert_array_equal(tensions(back), tensions(trace))
     weak = smc.plant_from(THREE.replace("0 90", "0 9"), ["j1", "j2"], name="weak")
