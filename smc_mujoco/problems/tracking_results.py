@@ -279,8 +279,9 @@ class TrackingBoard:
             error, least = (number(board.errors[name][1]) for name in (entry, first))
             rows.append((board.problem, place, error, first, least))
         headings = "problem", "place", "error", "first", "its error"
-        level = Settles(sum(entry in board.leaders for board in self.problems), len(rows))
-        about = {"entry": entry, "suite": self.suite.name, "level": level}
+        count = sum(entry in board.leaders for board in self.problems)
+        level = Settles(count, len(rows)) if count else None
+        about = {"entry": entry, "suite": self.suite.name, "level": level, "problems": len(rows)}
         return Screen(
             heading=Fact("entered", **about, others=len(self.entries) - 1),
             tables=[Tabular(headings=headings, rows=rows)],
