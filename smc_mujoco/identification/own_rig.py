@@ -10,6 +10,7 @@ from pathlib import Path
 from smc_mujoco.common.aliases import AnyPath, Array, Data, Fields, Numbers
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.text import joined
 from smc_mujoco.identification import first_guess, log_quality, model_file, servo_columns
 from smc_mujoco.identification.compliance import compliance
 from smc_mujoco.identification.lack_of_fit import Lack
@@ -99,6 +100,11 @@ class OwnRig(LogRig):
 def own_rig(given: Plant | Scenario, names: Sequence[str]) -> OwnRig:
     """Return the rig of a plant or a scenario whose quantities are the named paths."""
     base = given if isinstance(given, Scenario) else Scenario.recorded(plant=given, law="none")
+    if unused := [name for name in base.mismatch if name not in names]:
+        raise ScenarioError(
+            f"identify has the numbers of the model's file, and no mismatch of {joined(unused)}: "
+            "name them among the numbers to find, or write them into the file"
+        )
     base = with_plays(base, names)
     paths = resolved(base, names)
     ends = column_ends(base.plant)

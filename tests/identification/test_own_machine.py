@@ -536,6 +536,9 @@ def test_an_unknown_path_lists_what_there_is(arm, run):
     two_loads = smc.Scenario(plant=arm, law="none", disturbance=loads)
     with pytest.raises(smc.ScenarioError, match="is a number of 2 parts"):
         smc.identify(two_loads, run, ["disturbance.amplitude"])
+    changed = smc.Scenario(plant=arm, law="none", mismatch={"j1.damping": 0.2})
+    with pytest.raises(smc.ScenarioError, match=r"no mismatch of j1\.damping: name them"):
+        smc.identify(changed, run, ["input_delay"])  # it was left out without a word
 
 
 def test_what_has_no_slope_or_the_slope_of_another_is_named(arm, run):
