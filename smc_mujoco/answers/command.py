@@ -33,11 +33,12 @@ Options = Mapping[str, str | None]  # option -> value; "" of a flag, None for on
 
 def again(options: Options, without: Sequence[str] = ()) -> str:
     """Return the command that is running, with these options in place of its own, such as
-    {"--seeds": "24"}, and `without` some flags; where Python runs, the arguments that differ.
+    {"--seeds": "24"}, and `without` some flags, which these replace; where Python runs, the
+    arguments that differ.
     """
     if not _typed.get():
         arguments = []
-        for option, value in {**dict.fromkeys(without, "False"), **options}.items():
+        for option, value in (options or dict.fromkeys(without, "False")).items():
             name = option.removeprefix("--").replace("-", "_")
             arguments.append(f"{ARGUMENTS.get(name, name)}={_written(value)}")
         return f"the same call with {', '.join(arguments)}"

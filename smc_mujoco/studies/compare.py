@@ -75,24 +75,15 @@ MAX_SEED = 10**6
 DrawSeed = Annotated[int, SeedOf(high=MAX_SEED)]
 TIMES = "Computing time of each compiled law per sample, on this computer"
 TIME_HEADINGS = "plant", "law", "relative time", "median (s)", "99 % quantile (s)"
-TIME_NOTE = (
-    "Compare laws by relative time: a law's median time divided by that of pid, which is timed "
-    "again for each law, alternating with it, both with the same samples of the sensors. The "
-    "medians in seconds were taken at different times, so a busy computer distorts how they "
-    "compare."
-)
 RUNS = "plant", "|u| at most", "starts", "control period (ms)", "duration (s)"
 SI = "Values in conditions are in N or N m, m or rad, and s."
 COUNTS = "Counts of encoders are per revolution or per metre."
 MOST_STARTS = 3  # channels whose starts have room in a table
 GAINS = "plant", "law", "gains", "searches", "evaluations", "J spread", "best set"
 BEST_SET = (
-    "Each search ends with one set of gains. 'evaluations' counts the sets that all searches of a "
-    f"law tried, by default at most {BUDGET} for each gain and search. 'J spread' is how far the "
-    "largest J at which a search ended lies above the smallest, in % of it; beyond 100 % it is "
-    "given as a factor. The best set is that with the smallest J. Run i uses set i, and after the "
-    "last set the first comes again. Tables show medians over all sets, and traces are of the "
-    "first. `smc-mujoco list LAW`, or list FILE.py, has the units of a law's gains."
+    "The best set has the smallest J. A search tries by default at most "
+    f"{BUDGET} sets for each gain. Tables show medians over all sets, and traces are of the first. "
+    "`smc-mujoco list LAW`, or list FILE.py, has the units of a law's gains."
 )
 
 
@@ -280,8 +271,7 @@ class Compared(Answer):
                 of_law = [number(value, 2) for value in (time.ratio, time.median, time.high)]
                 times.append((plant, law, *of_law))
         if times:
-            about = {"headings": TIME_HEADINGS, "title": TIMES, "notes": [TIME_NOTE]}
-            tables.append(Tabular(rows=times, name_columns=2, **about))
+            tables.append(Tabular(headings=TIME_HEADINGS, rows=times, title=TIMES, name_columns=2))
         return [*tables, self._table_of_runs, self._table_of_gains]
 
     @property

@@ -22,7 +22,7 @@ from typer.models import OptionInfo
 
 import smc_mujoco as smc
 from smc_mujoco.analysis import engine
-from smc_mujoco.cli import main
+from smc_mujoco.cli import help_pages, main
 from smc_mujoco.common import gl
 from smc_mujoco.common.constraints import of_parameters
 from smc_mujoco.identification import published_rig as rig
@@ -458,6 +458,27 @@ def test_the_help_of_a_command_is_cut_nowhere(name, monkeypatch, capsys):
     with pytest.raises(SystemExit):
         main.main([name, "--help"])
     assert "…" not in capsys.readouterr().out
+
+
+def test_rare_options_are_shown_by_help_all_alone_and_every_group_has_options_that_there_are(
+    capsys,
+):
+    pages = []
+    for option in ("--help", "--help-all"):
+        with pytest.raises(SystemExit):
+            main.main(["compare", option])
+        pages.append(capsys.readouterr().out)
+    brief, all_options = (text.rpartition("╭")[0] for text in pages)  # without what is below
+    assert ("--law" in brief, "--executor" in brief, "--executor" in all_options) == (
+        True,
+        False,
+        True,
+    )
+    taken = set()
+    for _, command in COMMANDS.values():
+        for names in parameters(command):
+            taken |= {*names.split("/")}
+    assert help_pages.GROUPS.keys() - taken == {"--help"}
 
 
 def test_every_command_that_prints_tables_takes_json():
