@@ -213,7 +213,7 @@ KEPT = {  # what keeps its pieces in a folder -> its call, and what it gives in 
     ),
     "tune": lambda folder: (
         smc.tune(
-            "duffing", "pid", budget=1, objective=Objective(duration=0.2), searches=4, folder=folder
+            "duffing", "pid", budget=1, objective=Objective(duration=0.2), searches=4, out=folder
         ).sets
     ),
 }

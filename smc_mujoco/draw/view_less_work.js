@@ -1,7 +1,8 @@
 // Less work for a browser whose processor draws: it takes a microsecond for each pixel, and as much
 // again for smooth edges. So the picture has fewer pixels along each side, chosen, and its edges are
-// not smoothed. Light is computed at corners in place of pixels, without the reflections that our
-// matt machines do not have; and nothing is drawn behind the scene, where viser may have a picture.
+// not smoothed. It does not wait for the page around it, which saves copies of it. Light is computed
+// at corners in place of pixels, without the reflections that our matt machines do not have; and
+// nothing is drawn behind the scene, where viser may have a picture.
 {
   const gl = document.createElement("canvas").getContext("webgl2");
   const names = gl?.getExtension("WEBGL_debug_renderer_info");
@@ -12,7 +13,7 @@
     history.replaceState(null, "", address);
     const context = HTMLCanvasElement.prototype.getContext;
     HTMLCanvasElement.prototype.getContext = function (kind, options) {
-      return context.call(this, kind, {...options, antialias: false});
+      return context.call(this, kind, {...options, antialias: false, desynchronized: true});
     };
     // three.js's own light, tones (ACES) and sRGB, for its material "standard"
     const declared = `

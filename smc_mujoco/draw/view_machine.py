@@ -121,9 +121,7 @@ class Machines:
     def pose(self, run: int) -> None:
         """Put the machine where a run is."""
         self.data.qpos[:] = self.session.state(run)[0]
-        mujoco.mj_kinematics(self.model, self.data)
-        mujoco.mj_comPos(self.model, self.data)
-        mujoco.mj_tendon(self.model, self.data)
+        world.forward(self.model, self.data)
 
     def light(self) -> None:
         """Light the scene as a film does, over a floor with its grid."""
@@ -387,7 +385,7 @@ def tendon_lines(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     pieces = [np.zeros((0, 2, 3))]
     sides = data.wrap_xpos.reshape(-1, 3)
     passed = data.wrap_obj.ravel()
-    for tendon in range(model.ntendon):
+    for tendon in np.flatnonzero(model.tendon_group < world.DRAWN_GROUPS).tolist():
         first = data.ten_wrapadr[tendon]
         for k in range(first, first + data.ten_wrapnum[tendon] - 1):
             if passed[k] != PULLEY and passed[k + 1] != PULLEY:

@@ -100,14 +100,14 @@ def tuned(
     searches: int = SEARCHES,
     budget: int = BUDGET,
     starts: Starts | None = None,
-    folder: AnyPath | None = None,
+    out: AnyPath | None = None,
     threads: int | None = None,
     progress: ProgressTo = False,
 ) -> list[Candidate]:
     """Return laws with the gains of every search, by one rule for all, see `smc.tune`.
 
     A law that has no gains to search keeps its own, and its remark says why. `laws` and `starts`
-    are as in `runs`; `folder` keeps each search.
+    are as in `runs`; `out` is a folder that keeps each search.
     """
     goal = objective(rig, starts)
     plant = _machines(rig)["set 1"]["plant"]
@@ -122,7 +122,7 @@ def tuned(
                     budget,
                     objective=goal,
                     searches=searches,
-                    folder=folder,
+                    out=out,
                     threads=threads,
                     progress=progress,
                 )
@@ -158,7 +158,7 @@ def compare(
             laws,
             searches,
             starts=starts,
-            folder=out / "searches",
+            out=out / "searches",
             threads=threads,
             progress=True,
         )

@@ -387,7 +387,7 @@ class Trial(NamedTuple):
                     self.threads,
                     self.progress,
                     searches=self.search.searches,
-                    folder=folder / "searches",
+                    out=folder / "searches",
                     device=self.search.device,
                     executor=self.search.executor,
                     quick=rule.quick,

@@ -80,8 +80,8 @@ def test_the_workers_of_any_executor_find_the_same_table(tmp_path, monkeypatch):
 def test_searches_on_workers_find_the_same_gains_and_their_folder_makes_none_twice(tmp_path):
     goal = Objective(**SHORT)
     with Elsewhere(2) as pool:
-        two = tune("duffing", "pid", 2, 0, goal, searches=2, folder=tmp_path, executor=pool)
-        three = tune("duffing", "pid", 2, 0, goal, searches=3, folder=tmp_path, executor=pool)
+        two = tune("duffing", "pid", 2, 0, goal, searches=2, out=tmp_path, executor=pool)
+        three = tune("duffing", "pid", 2, 0, goal, searches=3, out=tmp_path, executor=pool)
     assert pool.calls == 3
     assert three.searches == tune("duffing", "pid", 2, 0, goal, searches=3).searches
     assert three.searches[:2] == two.searches

@@ -135,7 +135,7 @@ def tune(
     starts: Starts | None = None,
     chattering: float | None = None,
     searches: Searches = SEARCHES,
-    folder: Annotated[AnyPath, FilePath()] | None = None,
+    out: Annotated[AnyPath, FilePath()] | None = None,
     outside_theorem: bool = False,
     device: Device = "cpu",
     executor: Workers | None = None,
@@ -162,7 +162,8 @@ def tune(
       threads, progress: as in `run`.
       conditions, starts, chattering: in place of the objective's, see `Objective`.
       searches: their number. They share nothing: `Tuned.sets` has the best gains of each.
-      folder: keeps each search as soon as it ends. After a kill, the same call resumes there.
+      out: a folder that keeps each search as soon as it ends. After a kill, the same call resumes
+        there.
       outside_theorem: whether gains may miss the conditions of the law's theorem.
       device: on which the fast engine runs candidates, "cpu" or "cuda".
       executor: where the searches are made side by side, one on each worker, as in `study`; the
@@ -208,7 +209,7 @@ def tune(
     failure = failure_of_law(task)
     words = f"tuning {task.law.name} for {task.plant.name}: evaluation"
     with bar(words, searches * task.size, shown=progress, counted=True) as progress_bar:
-        files = [] if folder is None else [task.file(i, folder) for i in range(searches)]
+        files = [] if out is None else [task.file(i, out) for i in range(searches)]
         results = {}
         missing = []
         for i in range(searches):

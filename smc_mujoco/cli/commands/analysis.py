@@ -111,7 +111,6 @@ def tune(
     terminal = Terminal(json)
     start = options.starts(x0)
     tested = options.conditions(condition) or None
-    folder = out and out.with_name(f"{out.stem}-searches")
     tuned = search.tune(
         plant,
         law,
@@ -123,7 +122,7 @@ def tune(
         tested,
         start,
         searches=searches,
-        folder=folder,
+        out=out and out.with_name(f"{out.stem}-searches"),
         device=device,
         needs=needs,
     )

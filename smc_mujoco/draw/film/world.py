@@ -22,7 +22,7 @@ from smc_mujoco.simulation.scenario import Scenario
 
 # Numbers of presentation here are chosen.
 MAX_CHANNELS = 6  # of a network: more would be hidden by the next machine
-DRAWN_GROUPS = 3  # groups of geoms that MuJoCo draws by default
+DRAWN_GROUPS = 3  # groups of geoms and tendons that MuJoCo draws by default
 HIDDEN_GROUP = 5  # a group of geoms that MuJoCo does not draw by default
 QUALITY = {"offsamples": 4, "shadowsize": 2048, "numslices": 36, "numstacks": 10, "numquads": 1}
 SIZES = "memory", "njmax", "nconmax", "nemax", "nstack", "nuserdata"  # of a model's arrays
@@ -183,7 +183,7 @@ def forward(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Compute where everything is at data.qpos."""
     mujoco.mj_kinematics(model, data)
     mujoco.mj_camlight(model, data)
-    if (model.tendon_group < 3).any():  # those that MuJoCo draws by default
+    if (model.tendon_group < DRAWN_GROUPS).any():
         mujoco.mj_comPos(model, data)
         mujoco.mj_tendon(model, data)
 

@@ -116,7 +116,7 @@ def test_a_tuning_that_is_killed_goes_on_and_ends_with_the_same_bytes(
         "seed": 3,
         "objective": SHORT,
         "searches": 3,
-        "folder": tmp_path / "kept",
+        "out": tmp_path / "kept",
     }
     with pytest.raises(KeyboardInterrupt):
         tune("duffing", "observer_free", **again)
