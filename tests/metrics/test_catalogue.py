@@ -1038,7 +1038,7 @@ def test_positions_of_a_pose_are_those_whose_distance_is_its_error():
 @pytest.mark.quick
 def test_a_large_network_is_grouped_with_as_few_looks_at_its_units_as_a_small_one(monkeypatch):
     looks = []
-    units = Plant.units.fget
+    units = Plant.units.__get__
 
     def counted(network):
         looks.append(network.n)

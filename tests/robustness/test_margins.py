@@ -4,6 +4,7 @@ one.
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -101,7 +102,8 @@ def test_a_column_holds_what_its_heading_says():
         low=0.011,
         high=0.037,
     )
-    (table,) = (table.about() for table in margins.Margins([margin]).tables)
+    (printed,) = margins.Margins([margin]).tables
+    table: Any = printed.about()
     assert dict(zip(table["columns"], table["rows"][0], strict=True)) == {
         "plant": "duffing",
         "law": "pid",
