@@ -169,7 +169,7 @@ ROWS = {
     ),
     "claims": Row(functools.partial(command, "claims"), "runs of MuJoCo", cold=True),
     "demo": Row(demo, "the network, MuJoCo draws on the processor"),
-    "basin": Row(basin, "runs of MuJoCo", cold=True),
+    "basin": Row(basin, "the compiler, then runs of MuJoCo", cold=True),
 }
 
 
