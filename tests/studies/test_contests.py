@@ -165,9 +165,11 @@ def test_more_than_five_plants_and_conditions_are_one_table_of_winners():
         *(CATALOGUE[name].label for name in METRICS if name in CATALOGUE),
         *("J", "settled", "settled runs", "floor", "star", "best", "lead", "below"),
         *("tied", "open", "not ranked", "no winner", "beware", "gains", "margin", "worst"),
-        *{re.sub(r"\{.*?\}", "", label).strip() for label, _ in TEXTS.values()} - {""},
-        *{heading.partition(" (")[0] for table in HEADINGS for heading in table}
-        - {"from", "to", ""},
+        *sorted({re.sub(r"\{.*?\}", "", label).strip() for label, _ in TEXTS.values()} - {""}),
+        *sorted(
+            {heading.partition(" (")[0] for table in HEADINGS for heading in table}
+            - {"from", "to", ""}
+        ),
         *("shipped", "tuned here", "given", "default", "interval", "searches", "evaluations"),
         *("J spread", "relative time", "arrived", "to within", "theory", "all sets", "found by"),
         *(
