@@ -164,7 +164,7 @@ class Compared(Answer):
         undecided = any(contest.use and contest.use.rivals for contest in self._contests)
         steps = [
             (not facts, {"--law": ",".join(laws | dict.fromkeys(RIVALS))}, "adds rivals"),
-            (needed, more_runs, "makes enough runs for a winner"),
+            (needed, more_runs, "makes enough runs to decide what is open"),
             (barred, {"--allow-defaults": ""}, "lets a law win over default gains"),
             (undecided, _sets(2 * max(SEARCHES, seeds)), "shows smaller leads"),
             (

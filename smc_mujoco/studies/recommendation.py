@@ -345,8 +345,12 @@ class Recommendation(Answer):
 
     @property
     def apart(self) -> bool:
-        """Whether the law settles too seldom under all conditions at once."""
-        return self.together is not None and self.together[0] < RELIABLE * self.together[1]
+        """Whether the law settles too seldom under all conditions at once, though no condition
+        alone keeps all laws from it.
+        """
+        if self.together is None or self.never_settled:
+            return False
+        return self.together[0] < RELIABLE * self.together[1]
 
     @property
     def _lower_J(self) -> str:
