@@ -1,5 +1,6 @@
 """smc-mujoco identify and excitation: a machine's parameters from its logs, and what to record."""
 
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
@@ -173,7 +174,9 @@ def identify(
     if machine is None or not files:
         raise ScenarioError("identify needs a machine and its logs, or --pairs FILE")
     with delay_signals():
-        from smc_mujoco.answers.facts import Fact
+        from smc_mujoco.answers import answers
+        from smc_mujoco.answers.command import PROGRAM
+        from smc_mujoco.answers.facts import Fact, NextStep
         from smc_mujoco.answers.templates import said
         from smc_mujoco.identification import identify as identification
 
@@ -199,6 +202,11 @@ def identify(
     if out is not None:
         saved = identified.save(out)
     terminal.note(said(Fact("files", condition=saved, figure=picture, report=report))[1])
+    if saved is not None and saved.suffix == FOUND.suffix:
+        words = [PROGRAM, "which", identified.rig.plant.argument, "--condition", f"{saved}"]
+        step = NextStep(shlex.join([*words, "--quick"]), "finds a law for this machine")
+        for line in answers.labelled([answers.next_step(step)]):
+            terminal.note(line)
     terminal.finish(identified.about())
 
 
