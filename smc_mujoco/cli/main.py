@@ -95,7 +95,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 "laws on a plant"
             )
     command.remember(words)
-    app(with_all(words), prog_name=command.PROGRAM)
+    try:
+        app(with_all(words), prog_name=command.PROGRAM)
+    finally:
+        command.remember(())  # what follows is Python's
 
 
 def _showing_once() -> Callable[..., None]:

@@ -1110,7 +1110,8 @@ def test_an_mjspec_keeps_all_its_digits_and_is_taken_as_it_is_now(meshed):
 # kept
 
 
-def test_a_trace_loads_back_and_knows_its_file(arm, tmp_path):
+def test_a_trace_loads_back_and_knows_its_file(arm, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     trace = smc.run(
         smc.Scenario(
             plant=arm({"elbow": smc.Channel(motor=True)}, name="mine"), law="none", duration=0.1
