@@ -203,7 +203,8 @@ def identify(
         saved = identified.save(out)
     terminal.note(said(Fact("files", condition=saved, figure=picture, report=report))[1])
     if saved is not None and saved.suffix == FOUND.suffix:
-        words = [PROGRAM, "which", identified.rig.plant.argument, "--condition", f"{saved}"]
+        rig: Any = identified.rig  # the user's own machine
+        words = [PROGRAM, "which", rig.plant.argument, "--condition", f"{saved}"]
         step = NextStep(shlex.join([*words, "--quick"]), "finds a law for this machine")
         for line in answers.labelled([answers.next_step(step)]):
             terminal.note(line)
