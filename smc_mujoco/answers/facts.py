@@ -1,4 +1,4 @@
-"""Facts that an answer states: frozen records, filled where they are computed."""
+"""Facts that an answer states: records, filled where they are computed."""
 
 import math
 from collections.abc import Sequence

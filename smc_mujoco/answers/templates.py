@@ -157,8 +157,8 @@ TEXTS = {
     # enter
     "entered": (
         "",
-        "{entry} in {suite}: [not led by any of {others} others in {level} problems|led in each "
-        "of {problems} problems by some of {others} others]",
+        "{entry} in {suite}: [not led by any of {others:other} in {level} problems|led in each of "
+        "{problems} problems by some of {others:other}]",
     ),
     "leaders": ("", "* no other entry leads. Errors are in counts; lower is better."),
     # list

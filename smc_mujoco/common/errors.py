@@ -275,7 +275,7 @@ def warn_once(sentence: str, kind: type[Warning] = ScenarioWarning) -> None:
     numbers differ, as those of starts that were drawn around a doubtful one.
     """
     before = warned.get(set())
-    words = re.sub(r"\d[\d.e-]*", "#", sentence)
+    words = re.sub(r"(?<![\w.])-?\d[\d.]*(e[-+]?\d+)?(?!\w)", "#", sentence)  # not the 2 of j2
     if sentence and words not in before:
         before.add(words)
         warnings.warn(sentence, kind, users_stacklevel())

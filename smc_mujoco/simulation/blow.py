@@ -116,10 +116,10 @@ def _stopped(plant: Plant, rubs: float) -> list[Stopped]:
     shares = [0.0]
     if plant.is_user_model and not at_goal(plant).strayed:
         shares = np.linspace(0.0, 1.0, POSES).tolist()
-    gained, momenta = _momenta(plant, rubs, near, 0.0)
-    for share in shares[1:]:
-        _, from_there = _momenta(plant, rubs, near, share)
-        momenta = np.maximum(momenta, from_there)
+    bounds = np.array(Scenario.recorded(plant=plant, law="none").drive_train.forces)
+    of_poses = [_momenta(plant, rubs, bounds, near, share) for share in shares]
+    gained, _ = of_poses[0]  # at the goal
+    momenta = np.max([momentum for _, momentum in of_poses], axis=0)
     names = channel_names(plant)
     candidates = []
     for j in range(plant.driven):
@@ -137,7 +137,9 @@ def _stopped(plant: Plant, rubs: float) -> list[Stopped]:
     return candidates
 
 
-def _momenta(plant: Plant, rubs: float, near: Array, share: float) -> tuple[Array, Array]:
+def _momenta(
+    plant: Plant, rubs: float, bounds: Array, near: Array, share: float
+) -> tuple[Array, Array]:
     """Return the speed of each driven joint for a unit of momentum on all, (driven,), and the
     momentum that takes it to its stop, from a share of the way from the goal to the start.
     """
@@ -149,7 +151,6 @@ def _momenta(plant: Plant, rubs: float, near: Array, share: float) -> tuple[Arra
     inverse = np.linalg.inv(met.M)[dofs]
     gained = inverse @ _blown(plant, goal + way)
     moved = np.where(gained > 0.0, gained, np.inf)
-    bounds = np.array(Scenario.recorded(plant=plant, law="none").drive_train.forces)
     resisted = bounds * (1.0 + rubs) + np.abs(at_rest.load) + at_rest.dry
     # of what moves at once, and of the joint where servos or PDs hold the others
     mass = np.maximum(1.0 / moved, met.M[dofs, dofs])

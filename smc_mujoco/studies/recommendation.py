@@ -164,6 +164,11 @@ class Recommendation(Answer):
         return "unsettled" if self.never_settled else "law"
 
     @property
+    def over_sets(self) -> bool:
+        """Whether sets of gains name the law, and not only runs with the gains printed."""
+        return self.race.winner == self.law.name
+
+    @property
     def lead(self) -> Lead | None:
         """By how much J of the law is below that of the rival over which its lead is least: over
         sets of gains if these name it, else with these gains; None if neither does.
@@ -176,8 +181,7 @@ class Recommendation(Answer):
     @property
     def rivals(self) -> list[str]:
         """The laws that `lead` is over."""
-        over_sets = self.race.winner == self.law.name  # and not only runs with the gains printed
-        comparison = self.race.comparison if over_sets else self.fixed
+        comparison = self.race.comparison if self.over_sets else self.fixed
         laws = comparison.laws if comparison else ()
         return [law for law in laws if law != self.law.name]
 
@@ -300,9 +304,8 @@ class Recommendation(Answer):
             facts.append(self._gains("gains"))
         if form in ("law", "unsettled") and self.lead:
             searched = any(entrant.count > 1 for entrant in self.race.entrants.values())
-            over_sets = searched and self.race.winner == self.law.name
             laws = 1 + len([law for law in self.rivals if law != WITHOUT])
-            searches = self.race.sets if over_sets else None
+            searches = self.race.sets if searched and self.over_sets else None
             facts.append(Fact("best", laws=laws, lead=self.lead, searches=searches))
         together = self.together and Settles(*self.together)
         times = self.settling_times

@@ -4,6 +4,7 @@ else.
 
 import math
 import sys
+import warnings
 
 import numpy as np
 import pytest
@@ -220,3 +221,20 @@ def test_a_long_message_keeps_its_start_and_its_cure():
     said = str(ScenarioError("a" * 2000 + "b" * 500))
     assert said == "a" * 997 + "..." + "b" * 500
     assert len(str(ScenarioError("a" * 1500))) == 1500
+
+
+def test_a_doubt_is_told_once_whatever_its_numbers_but_of_each_joint():
+    token = errors.warned.set(set())
+    sentences = [
+        "x0 of j1 is 30 rad: give 0.5236",
+        "x0 of j1 is -3.15e-2 rad: give 0.55",
+        "x0 of j2 is 30 rad: give 0.5236",
+    ]
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            for sentence in sentences:
+                errors.warn_once(sentence)
+    finally:
+        errors.warned.reset(token)
+    assert [str(warning.message) for warning in caught] == [sentences[0], sentences[2]]

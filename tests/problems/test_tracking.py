@@ -192,7 +192,7 @@ def test_an_entry_leads_only_if_it_is_better_in_every_pairing_of_the_searches():
     assert boards[0].errors["pid"] == pytest.approx((1.0, 9.0), rel=0.05)
     assert board_of(lucky, steady).shares() == {"pid": 1.0, "adrc": 0.5}
     heading = screen_lines(board_of(lucky, steady).standing("pid"))[0]
-    assert heading.endswith("not led by any of 1 others in 2 of 2 problems")
+    assert heading.endswith("not led by any of 1 other in 2 of 2 problems")
     worse = result("hodob", {a: (50.0, 51.0), b: (50.0, 51.0)}, seed=3)
     heading = screen_lines(board_of(lucky, steady, worse).standing("hodob"))[0]
     assert heading.endswith("led in each of 2 problems by some of 2 others")

@@ -8,15 +8,15 @@ The plant has four scales, from which each gain's scale follows:
     T = sqrt(M X / u_max)   s, time in which the actuator moves the plant from rest by X / 2
 
 A gain with the unit F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5,
-and a search may leave this box by a decade; by two for the weights of a regulator, N^2/m^2, of
-which its slopes are roots. As F = M X / T^2, its unit has 2 a - c powers of a rate
-1 / T. A force or a stiffness has two, and each beyond two, or beyond those of F^a if a > 1, raises
-the upper end by a decade. So ki of a PID, N/(m s), reaches the l wc^2 / b that is the integral of a
-PD with an observer. Forces have this box too, such as lambda of -lambda tanh(s), as the actuator
-clips the command of every law alike. A law with 1 / tau in place of k has the same search. A law
-may divide a gain by another one, such as k by b in the force k / b, where b is an estimate of g.
-Then k / b is searched as far as a force, for the b of each candidate. The law declares this with
-`Gain(2.0, ACCELERATION, over="b")`.
+and a search may leave this box by a decade, or by a decades if a > 1: the slopes of a regulator are
+roots of its weights in N^2/m^2. As F = M X / T^2, its unit has 2 a - c powers of a rate 1 / T. A
+force or a stiffness has two, and each beyond two, or beyond those of F^a if a > 1, raises the upper
+end by a decade. So ki of a PID, N/(m s), reaches the l wc^2 / b that is the integral of a PD with
+an observer. Forces have this box too, such as lambda of -lambda tanh(s), as the actuator clips the
+command of every law alike. A law with 1 / tau in place of k has the same search. A law may divide a
+gain by another one, such as k by b in the force k / b, where b is an estimate of g. Then k / b is
+searched as far as a force, for the b of each candidate. The law declares this with `Gain(2.0,
+ACCELERATION, over="b")`.
 
 Where u is a voltage or an acceleration, F is its bound and g is x'' per unit of u. X is the largest
 |x0| of all joints, also of free ones, in m and in rad alike.
@@ -259,11 +259,11 @@ def force_limits(law: Component, gains: Numbers, u_max: float) -> dict[str, floa
 
 
 def widened(law: Component, bounds: Box) -> dict[str, Pair]:
-    """Return bounds a decade wider on either side; of a weight of squares, two decades."""
+    """Return bounds a decade wider on either side, and a times as many of a gain in F^a, a > 1."""
     wider = {}
     for name, (low, high) in bounds.items():
         gain_unit = _gain(law, name).unit
-        squares = isinstance(gain_unit, Unit) and gain_unit.force == 2
-        factor = 10 ** (WIDENING * (2 if squares else 1))
+        powers = gain_unit.force if isinstance(gain_unit, Unit) else 1.0
+        factor = 10 ** (WIDENING * max(1.0, powers))
         wider[name] = (low / factor, high * factor)
     return wider
