@@ -126,6 +126,7 @@ def picture(draw: Callable[[Path, str | None], object], about: str) -> Html:
     sources = []
     with scratch() as folder, warnings.catch_warnings():
         warnings.filterwarnings("ignore", "size=.* makes the figure")  # a phone's page scrolls
+        warnings.filterwarnings("ignore", "plot leaves out")  # tables have the rest
         for size in ("ieee-column", None):
             draw(folder / "picture.svg", size)
             data = base64.b64encode((folder / "picture.svg").read_bytes()).decode()

@@ -382,14 +382,12 @@ class Compared(Answer):
 
     @property
     def pictures(self) -> list[html.Html]:
-        """The figure of `plot` with every metric compared; none without a metric."""
+        """The figure of `plot`; none without a metric."""
         if not self._metrics:
             return []
         about = "Medians with their intervals by condition, as in the tables"
         return [
-            html.picture(
-                lambda file, size: self.plot(file, self._metrics, size=size, format="svg"), about
-            )
+            html.picture(lambda file, size: self.plot(file, size=size, format="svg"), about),
         ]
 
     def to_pandas(self) -> "pandas.DataFrame":
