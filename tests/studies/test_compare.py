@@ -216,6 +216,18 @@ def test_its_page_has_every_median_and_verdict_and_needs_no_other_file(found, tm
             assert html.text(note) in text
 
 
+def test_the_figure_of_its_page_is_that_of_plot_with_j_first(found, monkeypatch):
+    metrics_drawn = []
+
+    def plot(self, path, *metrics, **options):
+        metrics_drawn.append(metrics)
+        path.write_text("<svg/>")
+
+    monkeypatch.setattr(type(found), "plot", plot)
+    assert len(found.pictures) == 1
+    assert metrics_drawn == [(), ()]  # of a phone's width, and of a page's
+
+
 @pytest.mark.slow
 def test_its_page_fits_a_phone_and_turns_dark(found, tmp_path):
     file = found.to_html(tmp_path / "page.html")
