@@ -16,8 +16,8 @@ from smc_mujoco.analysis.tuning import objective, quick_search, search, search_s
 from smc_mujoco.common import constraints
 from smc_mujoco.envs import tasks
 from smc_mujoco.metrics import catalogue, conventions, fold, limit_cycle, tip
+from smc_mujoco.robustness import level_search, margin_kinds, uncertainty
 from smc_mujoco.robustness import region_of_attraction as region
-from smc_mujoco.robustness import uncertainty
 from smc_mujoco.robustness import worst_case_search as attack
 from smc_mujoco.simulation import (
     conditions,
@@ -74,15 +74,15 @@ def under(condition: str) -> dict:
 
 SAID = {
     margins: [
-        f"at most {percent(margins.TOLERATED_ERROR)} of its scale",
-        f"up to {WORDS[max(len(kind.levels) for kind in margins.MARGIN_KINDS.values())]} levels",
-        f"an {part(1 / uncertainty.JITTER_SHARES)} of one (jitter) or {percent(margins.FINE)} "
+        f"at most {percent(margin_kinds.TOLERATED_ERROR)} of its scale",
+        f"up to {WORDS[max(len(kind.levels) for kind in margin_kinds.MARGIN_KINDS.values())]} levels",
+        f"an {part(1 / uncertainty.JITTER_SHARES)} of one (jitter) or {percent(level_search.FINE)} "
         "(others)",
     ],
     margins.margins: [
         f"runs of {margins.QUICK_DURATION:g} s and search to within "
-        f"{margins.QUANTA[margins.COARSE]} control periods",
-        f"control periods or {percent(margins.COARSE)}, for a first look",
+        f"{level_search.QUANTA[level_search.COARSE]} control periods",
+        f"control periods or {percent(level_search.COARSE)}, for a first look",
     ],
     region: [
         f"|e| <= {percent(conventions.SETTLING_BAND)} of X and |v| <= "

@@ -41,7 +41,7 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
 from smc_mujoco.metrics.catalogue import CATALOGUE, metric_of
 from smc_mujoco.metrics.conventions import Metric, by_group
-from smc_mujoco.robustness.margins import REST_SHARE, TOLERATED_ERROR
+from smc_mujoco.robustness.margin_kinds import REST_SHARE, TOLERATED_ERROR
 from smc_mujoco.robustness.sobol import (
     CHANCE,
     Axis,

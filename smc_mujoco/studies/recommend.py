@@ -41,7 +41,8 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.custom.scales import at_goal
 from smc_mujoco.mechanisms.layout import driven_names
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.robustness.margins import COARSE, Margin, margins_of
+from smc_mujoco.robustness.level_search import COARSE
+from smc_mujoco.robustness.margins import Margin, margins_of
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.doubts import constant_goal

@@ -11,8 +11,8 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.robustness import margins
-from smc_mujoco.robustness.margins import COARSE, FINE
+from smc_mujoco.robustness import margin_kinds, margins
+from smc_mujoco.robustness.level_search import COARSE, FINE
 from smc_mujoco.simulation import gaber_study
 
 BASE = gaber_study.scenario("duffing", "observer_free", duration=4.0)
@@ -26,7 +26,7 @@ def found():
 
 
 def kind_of(put):
-    return margins.MarginKind(
+    return margin_kinds.MarginKind(
         label="push",
         unit="{u}",
         levels=(1.0, 2.0, 4.0),
@@ -55,13 +55,13 @@ def test_it_is_the_boundary_between_what_is_tolerated_and_what_is_not(found):
     closed = [margin for margin in found if not margin.open]
     assert len(closed) > 5
     for margin in closed:
-        kind = margins.MARGIN_KINDS[margin.kind]
+        kind = margin_kinds.MARGIN_KINDS[margin.kind]
         levels = margin.value, margin.value + margin.resolution
         assert margin.resolution > 0.0
         runs = []
         for level in levels:
             runs.append(smc.run(kind.scenarios(bases[margin.law], level)))
-        assert [all(map(margins.tolerates, traces)) for traces in runs] == [True, False]
+        assert [all(map(margin_kinds.tolerates, traces)) for traces in runs] == [True, False]
 
 
 @pytest.mark.quick
@@ -69,7 +69,7 @@ def test_a_run_tolerates_what_leaves_it_within_five_percent_of_its_start():
     held = smc.run(dataclasses.replace(BASE, disturbance=smc.Constant(1.2)))
     carried = smc.run(dataclasses.replace(BASE, disturbance=smc.Constant(1.4)))
     assert abs(held.x[-1, 0]) < 0.05 * 1.5 < abs(carried.x[-1, 0])
-    assert (margins.tolerates(held), margins.tolerates(carried)) == (True, False)
+    assert (margin_kinds.tolerates(held), margin_kinds.tolerates(carried)) == (True, False)
 
 
 def test_a_run_tolerates_nothing_if_its_pole_has_fallen_though_the_cart_is_home():
@@ -82,9 +82,9 @@ def test_a_run_tolerates_nothing_if_its_pole_has_fallen_though_the_cart_is_home(
         )
     )
     fallen = trace.x.copy()
-    assert margins.tolerates(trace)
+    assert margin_kinds.tolerates(trace)
     fallen[:, 1] = np.linspace(0.0, 3.0, len(fallen))
-    assert not margins.tolerates(dataclasses.replace(trace, x=fallen))
+    assert not margin_kinds.tolerates(dataclasses.replace(trace, x=fallen))
 
 
 @pytest.mark.quick
@@ -138,7 +138,7 @@ SEARCHED = [  # whether a level is tolerated, of 1, 2 and 4 first, and the margi
 )
 def test_a_margin(tolerated, value, words, monkeypatch):
     monkeypatch.setitem(
-        margins.MARGIN_KINDS, "push", kind_of(lambda base, level: pushed(tolerated(level)))
+        margin_kinds.MARGIN_KINDS, "push", kind_of(lambda base, level: pushed(tolerated(level)))
     )
     (margin,) = margins.margins_of([pushed(True)], ["push"])
     assert (margin.value, margin.searched) == (value, 4.0), words
@@ -152,7 +152,7 @@ def test_the_range_over_sets_is_that_of_their_own_margins(monkeypatch):
     def put(base, level):
         return dataclasses.replace(pushed(level <= base.law.gains["lam"]), law=base.law)
 
-    monkeypatch.setitem(margins.MARGIN_KINDS, "push", kind_of(put))
+    monkeypatch.setitem(margin_kinds.MARGIN_KINDS, "push", kind_of(put))
     first, *variants = (dataclasses.replace(pushed(True), law=law) for law in laws)
 
     def found(siblings):
@@ -186,7 +186,7 @@ def test_other_sets_are_the_shipped_ones_of_a_law_that_was_named():
 def test_both_signs_of_a_disturbance_are_tolerated(monkeypatch):
     onesided = kind_of(lambda base, level: pushed(level > -1.5))
     monkeypatch.setitem(
-        margins.MARGIN_KINDS, "onesided", dataclasses.replace(onesided, signed=True)
+        margin_kinds.MARGIN_KINDS, "onesided", dataclasses.replace(onesided, signed=True)
     )
     (margin,) = margins.margins_of([pushed(True)], ["onesided"])
     assert margin.value == pytest.approx(1.5, rel=FINE)
@@ -196,7 +196,7 @@ def test_both_signs_of_a_disturbance_are_tolerated(monkeypatch):
     runs = smc.run(
         [dataclasses.replace(wound, disturbance=smc.Constant(sign * 4.5)) for sign in (1.0, -1.0)]
     )
-    assert [margins.tolerates(run) for run in runs] == [True, False]
+    assert [margin_kinds.tolerates(run) for run in runs] == [True, False]
     assert margin.value < 4.5
 
 
@@ -229,7 +229,7 @@ def test_a_delay_may_be_tolerated_beyond_where_rest_turns_unstable_in_a_small_os
     x = abs(smc.run(ringing).x[:, 0])
     # neither grows nor decays
     assert x[-1000:].max() == pytest.approx(x[-3000:-2000].max(), rel=1e-3)
-    assert 0.01 < x[-1000:].max() / 0.5 <= margins.TOLERATED_ERROR
+    assert 0.01 < x[-1000:].max() / 0.5 <= margin_kinds.TOLERATED_ERROR
 
 
 def test_dry_friction_up_to_theory_is_tolerated(found):
@@ -254,12 +254,12 @@ def test_linear_theory_is_only_for_the_loop_that_it_describes():
     ):
         undescribed.append(dataclasses.replace(base, **fields))
     for kind in ("delay", "disturbance", "friction"):
-        expected = margins.MARGIN_KINDS[kind].expected
+        expected = margin_kinds.MARGIN_KINDS[kind].expected
         assert None not in map(expected, (base, noisy))
         assert {*map(expected, undescribed)} == {None}
     estimated = dataclasses.replace(base, velocity="filtered_difference")  # changes nothing at rest
-    assert margins.MARGIN_KINDS["delay"].expected(estimated) is None
-    assert margins.MARGIN_KINDS["disturbance"].expected(estimated) is not None
+    assert margin_kinds.MARGIN_KINDS["delay"].expected(estimated) is None
+    assert margin_kinds.MARGIN_KINDS["disturbance"].expected(estimated) is not None
 
 
 POLES = """
@@ -291,22 +291,22 @@ def test_theory_knows_the_weakest_motor(poles):
     base = smc.Scenario(plant=poles(), law=strong, x0=(1.0, 1.0))
     # rad: there it gives its 15 N m, of which gravity takes m g l sin(x) and ever more
     angle = 15.0 / (30.0 * 5.0 / 0.01)
-    expected = margins.MARGIN_KINDS["disturbance"].expected(base)
+    expected = margin_kinds.MARGIN_KINDS["disturbance"].expected(base)
     assert expected == pytest.approx(15.0 - 9.81 * math.sin(angle), rel=1e-3)
 
 
-@pytest.mark.parametrize("kind", margins.MARGIN_KINDS)
+@pytest.mark.parametrize("kind", margin_kinds.MARGIN_KINDS)
 def test_a_level_of_each_kind_changes_the_run(kind):
     """A margin of what is never put into the run would be the largest level."""
     base = dataclasses.replace(BASE, duration=1.0)
-    level = margins.MARGIN_KINDS[kind].levels[-1]
-    plain, *changed = smc.run([base, *margins.MARGIN_KINDS[kind].scenarios(base, level)])
+    level = margin_kinds.MARGIN_KINDS[kind].levels[-1]
+    plain, *changed = smc.run([base, *margin_kinds.MARGIN_KINDS[kind].scenarios(base, level)])
     for trace in changed:
         assert np.abs(trace.x - plain.x).max() > 1e-5  # half a step changes 1e-10
 
 
 def test_the_mass_ratio_is_of_the_nominal_mass_under_whichever_name():
-    heavier = margins.MARGIN_KINDS["mass"].put
+    heavier = margin_kinds.MARGIN_KINDS["mass"].put
     for name in ("mass", "M"):
         named = dataclasses.replace(BASE, mismatch={name: 1.5, "alpha": 2.0})
         assert heavier(named, 2.0).mismatch == {name: 2.0, "alpha": 2.0}
@@ -328,9 +328,9 @@ def test_levels_take_the_place_of_a_conditions_own_or_come_on_top():
     added = {"disturbance": smc.Constant(1.0), "friction": smc.Coulomb(1.0)}
     under = dataclasses.replace(BASE, physics_step=1.25e-4, **own, **added)
     put = {}
-    for name, kind in margins.MARGIN_KINDS.items():
+    for name, kind in margin_kinds.MARGIN_KINDS.items():
         put[name] = kind.put(under, 0.5)
-    kinds = margins.MARGIN_KINDS
+    kinds = margin_kinds.MARGIN_KINDS
     replaced = "delay", "mass", "noise", "jitter", "missed"
     begins = [kinds[name].search(under, COARSE).low for name in (*replaced, "friction")]
     # what the scenario itself has, the run that is tried first; friction comes on top
@@ -349,7 +349,7 @@ def test_levels_take_the_place_of_a_conditions_own_or_come_on_top():
 def test_levels_of_time_are_multiples_of_the_shortest_that_a_run_can_have():
     """Of a delay one control period, of jitter an eighth of one; others may have any level."""
     for kind, least in {"delay": BASE.control_period, "jitter": 0.125}.items():
-        search = margins.MARGIN_KINDS[kind].search(BASE, FINE)
+        search = margin_kinds.MARGIN_KINDS[kind].search(BASE, FINE)
         assert search.rounded(0.6 * least) == search.rounded(1.4 * least) == least
         assert search.rounded(1.6 * least) == 2.0 * least
         assert np.allclose(
@@ -391,11 +391,11 @@ def test_levels_of_force_are_shares_of_the_bound_of_ones_own_machine(size):
 
 def test_a_blow_comes_at_half_time_in_shares_of_the_momentum_that_u_stops_in_its_time():
     """F T = sqrt(M X F), here with the pendulum's m l^2 about its hinge."""
-    kind = margins.MARGIN_KINDS["blow"]
+    kind = margin_kinds.MARGIN_KINDS["blow"]
     (level, *_) = kind.search(BASE, COARSE).levels
     inertia = 1.0 / abs(BASE.plant.nominal(np.zeros(1), np.zeros(1), 0, BASE.plant.values({}))[1])
     full_impulse = np.sqrt(inertia * abs(BASE.resolved.x0[0]) * BASE.limits[0])
-    assert level == pytest.approx(margins.BLOWS[0] * full_impulse)
+    assert level == pytest.approx(margin_kinds.BLOWS[0] * full_impulse)
     blows = [run.disturbance[-1] for run in kind.scenarios(BASE, level)]
     width = 5e-3  # s, as the help of `margins` and the answer of `which` say
     assert [(blow.impulse, blow.time, blow.width) for blow in blows] == [

@@ -29,7 +29,7 @@ from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.properties import searched
-from smc_mujoco.robustness import margins
+from smc_mujoco.robustness import level_search, margins
 from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.simulation.grid import Draws
 from smc_mujoco.studies import race, recommend
@@ -382,7 +382,7 @@ def test_from_the_other_side_gravity_pushes_away_and_less_friction_is_tolerated(
     trial = SimpleNamespace(progress=False, threads=1)
     clock = AnswerTime()
     opposed = recommend._opposed(trial, base, [0], clock)  # pyright: ignore[reportArgumentType]
-    (helped,) = margins.margins_of([base], ["friction"], margins.COARSE)
+    (helped,) = margins.margins_of([base], ["friction"], level_search.COARSE)
     assert opposed is not None
     assert 15.0 < opposed.value < 40.0 - 2.0 * 9.81 < helped.value
     assert recommend._opposed(trial, base, [], clock) is None  # pyright: ignore[reportArgumentType]

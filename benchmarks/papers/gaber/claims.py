@@ -33,7 +33,8 @@ from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import HIGH_FREQUENCY, settling_time
-from smc_mujoco.robustness.margins import DELAYS, TOLERATED_ERROR, LevelSearch, find_boundaries
+from smc_mujoco.robustness.level_search import LevelSearch, find_boundaries
+from smc_mujoco.robustness.margin_kinds import DELAYS, TOLERATED_ERROR
 from smc_mujoco.simulation.gaber_study import CONTROL_PERIOD, LAWS, U_MAX
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Noise

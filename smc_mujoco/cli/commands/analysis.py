@@ -187,7 +187,7 @@ def margins(
         from smc_mujoco.control import gain_sets
         from smc_mujoco.draw.page import files
         from smc_mujoco.mechanisms.named import as_plant
-        from smc_mujoco.robustness.margins import KINDS
+        from smc_mujoco.robustness.margin_kinds import KINDS
         from smc_mujoco.robustness.margins import margins as search
         from smc_mujoco.simulation.conditions import PLANTS
 

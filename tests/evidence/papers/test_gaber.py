@@ -21,7 +21,7 @@ from smc_mujoco.evidence.audit.variants import variant, with_gains
 from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED, Beside, Check, verdict
 from smc_mujoco.evidence.papers.gaber import lyapunov
 from smc_mujoco.metrics.catalogue import metrics
-from smc_mujoco.robustness.margins import TOLERATED_ERROR
+from smc_mujoco.robustness.margin_kinds import TOLERATED_ERROR
 from smc_mujoco.simulation.gaber_study import LAWS
 from smc_mujoco.simulation.run_key import description
 from smc_mujoco.simulation.scenario import Scenario

@@ -18,7 +18,7 @@ from smc_mujoco.hardware import PositionServo, RateLimit
 from smc_mujoco.mechanisms.custom.plant_from import restored
 from smc_mujoco.mechanisms.named import from_text
 from smc_mujoco.metrics.tip import knows_contacts
-from smc_mujoco.robustness.margins import MARGIN_KINDS
+from smc_mujoco.robustness.margin_kinds import MARGIN_KINDS
 from smc_mujoco.simulation import scenario_json
 from smc_mujoco.simulation.conditions import applicable
 
