@@ -101,7 +101,7 @@ def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:
 
 def default_u_max(plant: Plant) -> float:
     """Return the bound on |u| where none is given, N or N m: the limit of the plant's strongest
-    motor, else 6, or what a user's joint needs.
+    motor, by its file and by what its channel suggests; else 6, or what a user's joint needs.
     """
     return max(_limits(plant), default=U_MAX)
 
@@ -120,17 +120,22 @@ def bounds_in_words(s: Any, unit: str = "") -> str:
 
 
 def _limits(plant: Plant) -> list[float]:
-    """Return the limits of the plant's motors; where a user's model has none, what a joint
-    needs.
+    """Return the limits of the plant's motors, or the lesser bounds that their channels suggest;
+    where a user's model has neither, what a joint needs.
     """
-    if not _unbounded(plant):
-        return [limit for limit in plant.limits if limit < math.inf]
     from smc_mujoco.mechanisms.custom.scales import needs
 
-    limits = plant.limits or (math.inf,) * plant.driven
+    suggested = plant.suggested.get("u_max", (None,) * plant.driven)
+    unbounded = _unbounded(plant)
     bounds = []
-    for need, limit in zip(needs(plant), limits, strict=True):
-        bounds.append(need if limit == math.inf else limit)
+    for i, limit in enumerate(plant.limits or (math.inf,) * plant.driven):
+        bound = math.inf
+        if suggested[i] is not None and not any(part.unit for part in drives_of_file(plant, i)):
+            bound = suggested[i]
+        if min(limit, bound) < math.inf:
+            bounds.append(min(limit, bound))
+        elif unbounded:
+            bounds.append(needs(plant)[i])
     return bounds
 
 

@@ -194,7 +194,7 @@ class Tuned(Answer):
     def at_bound(self) -> dict[str, str]:
         """Gain -> "lower" or "upper", if it is within 2 % of a bound of the search."""
         limits = search_space.force_limits(
-            self.law, self.law.gains, self.definition.u_max or math.inf
+            self.law, self.law.gains, self.definition.u_max or self.scales["F"]
         )
         tight = 1.0 - search_space.ROUNDING_TOLERANCE
         full = {}

@@ -95,7 +95,7 @@ from smc_mujoco.metrics.conventions import leans
 from smc_mujoco.simulation import coerce, run_key
 from smc_mujoco.simulation.codes import code_hashes
 from smc_mujoco.simulation.conditions import Condition
-from smc_mujoco.simulation.force_bounds import default_u_max
+from smc_mujoco.simulation.force_bounds import suggested_u_max
 from smc_mujoco.simulation.grid import Starts
 from smc_mujoco.simulation.integration import stepped_by_mujoco
 from smc_mujoco.simulation.model import with_values
@@ -383,7 +383,7 @@ class TuningTask(NamedTuple):
 
     def _trials(self, cheap: Evaluator, accurate: Evaluator, report: Report) -> Trials:
         def limit(gains: dict[str, float]) -> dict[str, float]:
-            return search_space.force_limits(self.law, gains, self.goal.u_max or np.inf)
+            return search_space.force_limits(self.law, gains, self.goal.u_max or self.scales["F"])
 
         return Trials(cheap, accurate, tuple(self.box), limit, report, self.holds)
 
@@ -475,8 +475,11 @@ def task_of(
             f"the conditions of a tuning have commands in {two_units}: tune for each drive alone"
         )
     _refuse_mixed_commands(first)
-    bound = goal.u_max or (default_u_max(first.plant) if first.force_command else min(first.limits))
-    goal = dataclasses.replace(goal, u_max=bound)
+    own = suggested_u_max(first.plant)
+    largest = float(np.max(own)) if first.force_command else min(first.limits)
+    bound = goal.u_max or largest
+    if not isinstance(own, tuple):  # where bounds differ, each joint keeps its own
+        goal = dataclasses.replace(goal, u_max=bound)
     reach = goal.starts.largest(dataclasses.replace(first, x0=None))
     if first.accelerates:
         per_u = None

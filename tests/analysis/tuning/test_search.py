@@ -311,6 +311,39 @@ def test_a_law_is_searched_about_the_bound_on_its_command():
         )
 
 
+TWO_JOINTS = """<mujoco><compiler inertiafromgeom="true"/><worldbody><body>
+<joint name="upper" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -.4" size=".03" mass="2"/>
+<body pos="0 0 -.4"><joint name="fore" axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 0 0 -.2" size=".02" mass=".2"/></body></body></worldbody>
+<actuator>{motors}</actuator></mujoco>"""
+
+
+def test_a_search_has_the_bounds_that_a_run_has_without_it():
+    """A bound that a channel gives, below that of the file or in its place; and what each joint
+    needs, where nothing gives one.
+    """
+    motors = '<motor joint="upper" ctrlrange="-{0} {0}"/><motor joint="fore" ctrlrange="-{0} {0}"/>'
+    of_file = TWO_JOINTS.format(motors=motors.format(1000))
+    unbounded = TWO_JOINTS.format(motors="")
+    four, two = smc.Channel(u_max=4.0), smc.Channel(motor=True, u_max=2.0)
+    ideal = smc.Channel(motor=True)
+    for text, channels, largest in (
+        (of_file, {"upper": four}, 4.0),
+        (of_file, {"upper": four, "fore": smc.Channel(u_max=2.0)}, 4.0),
+        (unbounded, {"upper": smc.Channel(motor=True, u_max=4.0), "fore": two}, 4.0),
+        (unbounded, {"upper": ideal, "fore": ideal}, None),
+    ):
+        plant = smc.plant_from(text, channels, name="two joints")
+        usual = smc.Scenario(plant=plant, law="pid").limits
+        goal = Objective(conditions=("nominal", "sine"))
+        task = search.task_of(plant, smc.law("pid"), goal, 8, 0, 1)
+        assert len(set(usual)) == len(channels)
+        assert task.scales["F"] == max(usual) == (largest or max(usual))
+        for case in task.cases(0):
+            assert case.limits == usual
+        assert task.cases(0)[1].disturbance[0].amplitude <= max(usual)
+
+
 def test_a_gain_given_as_0_stays_0():
     scales = {
         "X": 2.0,
