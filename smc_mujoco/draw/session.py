@@ -20,7 +20,7 @@ from smc_mujoco.common.aliases import Array, Fields
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.gain_sets import law as law_with_gains
-from smc_mujoco.control.law import Law, laws
+from smc_mujoco.control.law import Law, all_laws, laws, suits
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import Plant, compiled_for_runs
 from smc_mujoco.simulation import callback, state
@@ -223,8 +223,12 @@ def sliders(s: Scenario) -> dict[str, Slider]:
 
 
 def laws_of(plant: Plant) -> list[str]:
-    """List the laws for a plant, without `none`."""
-    return [name for name in laws(plant) if name != "none"]
+    """List the laws for a plant, without `none`; for an arm those of many joints come first."""
+    names = laws(plant)
+    if plant.n > 1 and not (plant.pose or plant.free or plant.unmodelled):
+        of_many = laws(kind="joint")
+        names = [*(name for name in of_many if suits(all_laws()[name], plant)), *names]
+    return [name for name in names if name != "none"]
 
 
 def law_for(plant: Plant, law: Law | Template | str) -> Law | Template | str:
@@ -262,7 +266,7 @@ def condition_sliders(s: Scenario) -> Mapping[str, Slider]:
     its own.
     """
     step = s.resolved.physics_step
-    bound = float(np.min(s.resolved.u_max))
+    bound = min(s.drive_train.forces)
     sliders: dict[str, Slider] = {
         "mass, factor": Slider(
             s.mismatch.get("mass", 1.0),

@@ -17,12 +17,18 @@ from smc_mujoco.draw.session import Session, laws_of
 from smc_mujoco.draw.view_machine import Machines, not_shown
 from smc_mujoco.mechanisms.layout import channel_names
 from smc_mujoco.metrics.conventions import groups
+from smc_mujoco.simulation.doubts import constant_goal
 
 SAVED_AS = Path("view.py")
 STEPS = 500  # of a slider
 MAX_SAMPLES = 200  # of a curve
 CHARTS = {"x": "position x", "u": "control u", "s": "sliding variable s"}
 CHART_HEIGHT = 105  # px
+AXES = tuple(  # along t and up: px from a number to the next at least, and px for the numbers
+    uplot.Axis(space=space, size=size, ticks=uplot.Axis_Ticks(show=False))
+    for space, size in ((50.0, 24.0), (18.0, 50.0))
+)
+PREFIXES = ((1e-5, 1e6, "µ"), (0.01, 1e3, "m"))  # of units: for what is below, and times what
 LINE = 2.0  # px
 DASHES = ((), (8.0, 4.0))  # of the first run's lines and the second's, px
 Ask = Callable[[Hashable, Callable[[], object]], None]
@@ -50,7 +56,9 @@ class ViewPanel:
             gui.add_html(said(words))
         self.buttons()
         names = channel_names(session.scenarios[0].plant)
-        self.channel = 2 if session.scenarios[0].plant.pose else 0  # of what flies, its height
+        run = session.scenarios[0].resolved
+        way = np.abs(np.subtract(run.x0, constant_goal(run) or run.plant.origin))
+        self.channel = int(way[: len(names)].argmax())  # has the longest way
         if len(names) > 1:
             channel_choice = gui.add_dropdown("charts of", names, initial_value=names[self.channel])
             channel_choice.on_update(
@@ -133,16 +141,14 @@ class ViewPanel:
         self.rebuild()
 
     def chart(self, names: tuple[str, ...], name: str) -> None:
-        """Show the signals of another channel."""
+        """Show the signals of another channel, from the next curves on."""
         self.channel = names.index(name)
-        for signal, chart in self.charts.items():
-            chart.title = self.title(signal)
 
-    def title(self, signal: str) -> str:
+    def title(self, signal: str, prefix: str = "") -> str:
         """Return the title of a chart, with its unit."""
         for group in groups(self.session.scenarios[0]):
             if self.channel in group.channels:
-                return f"{CHARTS[signal]} ({style.units(group)[signal]})"
+                return f"{CHARTS[signal]} ({prefix}{style.units(group)[signal]})"
         return CHARTS[signal]
 
     def add_chart(self, signal: str) -> GuiUplotHandle:
@@ -159,6 +165,7 @@ class ViewPanel:
             tuple(series),
             title=self.title(signal),
             scales={"x": uplot.Scale(time=False)},
+            axes=AXES,
             legend=uplot.Legend(show=False),
             height=CHART_HEIGHT,
             padding=(8, 24, 0, 0),
@@ -174,7 +181,13 @@ class ViewPanel:
         if len(logs[0]) < 2:
             return
         t = np.linspace(0.0, self.session.time, len(logs[0]))
-        chart.data = (t, *(held(log[signal]) for log in logs))
+        curves = [held(log[signal]) for log in logs]
+        peak = np.max(np.abs(curves))
+        small = ((times, prefix) for most, times, prefix in PREFIXES if 0.0 < peak < most)
+        times, prefix = next(small, (1.0, ""))
+        chart.data = (t, *(times * curve for curve in curves))
+        if chart.title != (title := self.title(signal, prefix)):
+            chart.title = title
 
     def say(self) -> None:
         """Say what the time is, and what could not be done."""

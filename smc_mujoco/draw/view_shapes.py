@@ -13,14 +13,14 @@ import numpy as np
 from smc_mujoco.common.aliases import Array
 from smc_mujoco.draw.film import arrows, world
 
-SIDES = 24  # of what is round; chosen
-MOST_TRIANGLES = 30_000  # of the meshes of a model; a processor draws 1000 in about half a ms
+MOST_TRIANGLES = 10_000  # of the meshes of a model; a processor draws 1000 in about a ms
 FEWEST_TRIANGLES = 200  # of a mesh that has more than its share of those
+SIDES = 24, 16, 12  # of what is round: the first with which a model has not too many triangles
+MOST_ROUND = 5000  # of what is round; chosen
 FIELD_LINES = 100  # of a height field, along each side
 CELLS = 200  # in its size: what lies in one becomes a point; gaps between its parts would stay
 SHARP = np.radians(30.0)  # at an edge of such a mesh, from which on it is sharp; chosen
 ARROW_SIDES = 12
-TURNS = np.linspace(-0.5 * np.pi, 0.5 * np.pi, SIDES // 2 + 1)  # from pole to pole
 Rgba = tuple[float, ...]  # 0 .. 1
 Geom = mujoco.mjtGeom
 MESHES = Geom.mjGEOM_MESH, Geom.mjGEOM_SDF
@@ -40,6 +40,11 @@ def geom_meshes(model: mujoco.MjModel) -> list[Mesh | None]:
     triangles = model.mesh_facenum[assets].sum()
     share = min(1.0, MOST_TRIANGLES / max(1, triangles))
     own = {mesh: own_mesh(model, mesh, share) for mesh in set(assets.tolist())}
+    solids = {}
+    for sides in SIDES:
+        solids = {geom: solid(model, geom, sides) for geom in np.flatnonzero(drawn).tolist()}
+        if sum(len(mesh.faces) for mesh in solids.values() if mesh is not None) <= MOST_ROUND:
+            break
     meshes = []
     for geom in range(model.ngeom):
         kind = Geom(model.geom_type[geom])
@@ -51,7 +56,7 @@ def geom_meshes(model: mujoco.MjModel) -> list[Mesh | None]:
         elif kind == Geom.mjGEOM_HFIELD:
             mesh = height_field(model, dataid)
         else:
-            mesh = solid(model, geom)
+            mesh = solids[geom]
         if mesh is not None:
             turn = np.zeros(9)
             mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
@@ -83,24 +88,25 @@ def joined(meshes: Sequence[Mesh]) -> Mesh:
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
 
-def solid(model: mujoco.MjModel, geom: int) -> Mesh | None:
-    """Return a geom's shape in its own frame; None for planes and flexes."""
+def solid(model: mujoco.MjModel, geom: int, sides: int) -> Mesh | None:
+    """Return a geom's shape in its own frame; None for planes, flexes and what has a mesh."""
     radius, half, _ = size = model.geom_size[geom]
     kind = Geom(model.geom_type[geom])
     if kind == Geom.mjGEOM_BOX:
         return box(size)
     if kind == Geom.mjGEOM_CYLINDER:
         edges = np.array([-half, -half, -half, half, half, half])
-        return revolved(radius * np.array([0.0, 1.0, 1.0, 1.0, 1.0, 0.0]), edges)
+        return revolved(radius * np.array([0.0, 1.0, 1.0, 1.0, 1.0, 0.0]), edges, sides)
+    turns = np.linspace(-0.5 * np.pi, 0.5 * np.pi, sides // 2 + 1)  # from pole to pole
     if kind in (Geom.mjGEOM_SPHERE, Geom.mjGEOM_ELLIPSOID):
-        ball = revolved(np.cos(TURNS), np.sin(TURNS))
+        ball = revolved(np.cos(turns), np.sin(turns), sides)
         return ball._replace(
             vertices=ball.vertices * (radius if kind == Geom.mjGEOM_SPHERE else size)
         )
     if kind == Geom.mjGEOM_CAPSULE:
-        turns = np.insert(TURNS, SIDES // 4, 0.0)  # the equator twice, at the ends of its rod
-        ends = half * np.where(np.arange(len(turns)) > SIDES // 4, 1.0, -1.0)
-        return revolved(radius * np.cos(turns), radius * np.sin(turns) + ends)
+        turns = np.insert(turns, sides // 4, 0.0)  # the equator twice, at the ends of its rod
+        ends = half * np.where(np.arange(len(turns)) > sides // 4, 1.0, -1.0)
+        return revolved(radius * np.cos(turns), radius * np.sin(turns) + ends, sides)
     return None
 
 
@@ -164,11 +170,11 @@ def box(size: Array) -> Mesh:
     return cube._replace(vertices=cube.vertices * size)
 
 
-def revolved(radii: Array, heights: Array) -> Mesh:
+def revolved(radii: Array, heights: Array, sides: int) -> Mesh:
     """Return a solid of revolution about z from rings of these radii at these heights, (k,) m."""
     middles = heights[:, None] * (0.0, 0.0, 1.0)
     x, y, _ = np.eye(3)
-    return tube(middles, radii, x, np.broadcast_to(y, middles.shape), SIDES)
+    return tube(middles, radii, x, np.broadcast_to(y, middles.shape), sides)
 
 
 def tube(middles: Array, radii: Array, normal: Array, across: Array, sides: int) -> Mesh:
@@ -179,7 +185,11 @@ def tube(middles: Array, radii: Array, normal: Array, across: Array, sides: int)
     around = np.cos(turns) * normal + np.sin(turns) * across[:, None]
     rings = middles[:, None] + radii[:, None, None] * around
     corners = np.arange(len(rings) * sides).reshape(-1, sides)
-    return Mesh(rings.reshape(-1, 3), net(np.column_stack([corners, corners[:, 0]])))
+    vertices = rings.reshape(-1, 3)
+    faces = net(np.column_stack([corners, corners[:, 0]]))
+    a, b, c = vertices[faces].swapaxes(0, 1)
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return Mesh(vertices, faces[areas > 1e-9 * areas.max()])  # at its poles, half are points
 
 
 def net(corners: Array) -> Array:

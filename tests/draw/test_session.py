@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.draw.session import Session
+from smc_mujoco.draw.session import Session, laws_of
 from smc_mujoco.studies import scene
 
 DUFFING = smc.Scenario(plant="duffing", law=smc.law("observer_free", lam=6.0, k1=3.0), duration=0.4)
@@ -124,3 +124,12 @@ def test_a_saved_file_holds_the_name_of_a_plant_as_text_and_replaces_no_other(na
 def test_runs_of_other_lengths_are_refused():
     with pytest.raises(smc.ScenarioError, match="differ in control_period or duration"):
         Session([DUFFING, dataclasses.replace(DUFFING, duration=0.3)])
+
+
+def test_an_arm_begins_with_a_law_of_many_joints_and_sliders_that_no_warning_meets(recwarn):
+    plant = smc.plant("panda")
+    run = smc.Scenario(plant=plant, law=laws_of(plant)[0], duration=0.1)
+    session = Session([run])
+    assert run.law.name in smc.laws(kind="joint")
+    assert session.sliders[0]["friction, N or N m"].high == 0.5 * min(run.limits)
+    assert not recwarn.list

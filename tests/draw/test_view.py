@@ -223,6 +223,20 @@ def test_a_chart_has_the_run_up_to_now_and_a_failed_one_its_last_value(live):
     assert view_panel.held(np.array([1.0, 2.0, np.nan, np.nan])).tolist() == [1.0, 2.0, 2.0, 2.0]
 
 
+def test_a_chart_of_small_numbers_has_a_smaller_unit_and_is_of_the_longest_way():
+    plant = smc.plant("double_pendulum")
+    run = smc.Scenario(plant=plant, law="none", x0=[0.0, 2e-3], duration=0.05)
+    live = LiveView(Session([run]), 0)
+    try:
+        live.session.advance_to(run.samples)
+        live.panel.curve(0)
+        chart = live.panel.charts["x"]
+        assert chart.title == "position x (mrad)"
+        assert chart.data[1][0] == pytest.approx(2.0)  # of the second joint
+    finally:
+        live.close()
+
+
 def test_shapes_are_as_large_as_mujoco_s_and_where_they_are():
     model = mujoco.MjModel.from_xml_string(SHAPES)
     data = mujoco.MjData(model)
@@ -237,8 +251,20 @@ def test_shapes_are_as_large_as_mujoco_s_and_where_they_are():
         low, high = centre - half, centre + half
         assert local.min(axis=0) == pytest.approx(low, abs=0.02 * half.max())
         assert local.max(axis=0) == pytest.approx(high, abs=0.02 * half.max())
-        chords = 0.5 * (2.0 * PI / view_shapes.SIDES) ** 2  # lie within a ball's two arcs
+        chords = 0.5 * (2.0 * PI / view_shapes.SIDES[0]) ** 2  # lie within a ball's two arcs
         assert volume(mesh) == pytest.approx(VOLUMES[geom], rel=chords)
+
+
+def test_many_round_shapes_have_fewer_triangles_each_and_no_flat_ones():
+    spec = mujoco.MjSpec()
+    for _ in range(15):
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[0.1, 0.4, 0.0])
+    capsule, *_ = view_shapes.geom_meshes(spec.compile())
+    assert capsule
+    assert 15 * len(capsule.faces) < view_shapes.MOST_ROUND
+    a, b, c = capsule.vertices[capsule.faces].swapaxes(0, 1)
+    assert np.linalg.norm(np.cross(b - a, c - a), axis=1).min() > 1e-6
+    assert volume(capsule) == pytest.approx(VOLUMES[2], rel=0.05)
 
 
 def test_a_mesh_of_many_triangles_has_fewer_and_much_the_same_shape():
