@@ -227,10 +227,14 @@ class Identified(Answer):
         fits = {"fit": _fit(self.by_pieces or self.fits), "pieces": bool(self.by_pieces)}
         if self.held_out:
             fits["held_out"] = _fit([self.held_out.by_pieces or self.held_out.fit])
+        doubts = []
+        for note in self.notes:
+            if not note.startswith(self.lacks[1:]):  # the largest is told; numbers move by all
+                doubts.append(Fact("doubt", text=note))
         return Screen(
             tables=[Tabular(headings=("",) * 4, rows=rows)],
             notes=[Fact("fits", **fits)],
-            facts=[Fact("doubt", text=note) for note in self.notes],
+            facts=doubts,
         )
 
     def _number(self, name: str, value: float) -> tuple[str, str, str]:

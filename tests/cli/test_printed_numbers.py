@@ -76,7 +76,7 @@ def test_compare_prints_the_medians_and_the_counts_of_its_table(printed):
 
 
 def test_margins_are_printed_in_their_unit(printed):
-    line = "margins duffing --law pid --kind delay,mass --quick --json m.json"
+    line = "margins duffing --law pid --kind mass --quick --json m.json"
     margins = json.loads(Path("m.json").read_text()) if printed(line) else []
     for out, full in ((printed(line), False), (printed(f"{line} --full"), True)):
         for margin in margins:

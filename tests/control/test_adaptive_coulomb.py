@@ -33,7 +33,7 @@ def followed(friction, M=1.0, duration=60.0, **gains):
     return np.array(errors), np.array(levels)
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.6, 1.8])
+@pytest.mark.parametrize("friction", [0.0, pytest.param(0.6, marks=pytest.mark.slow), 1.8])
 def test_the_level_goes_to_the_friction_and_the_error_goes(friction):
     errors, levels = followed(friction)
     late = slice(-int(2 * math.pi / OMEGA / H), None)

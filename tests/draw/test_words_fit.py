@@ -60,7 +60,7 @@ def runs(name):
 
 SCENES = []
 for name in sorted(path.stem for path in (ROOT / "scenes").glob("*.py")):
-    quick = name in ("chattering", "duffing")
+    quick = name == "chattering"
     SCENES.append(name if quick else pytest.param(name, marks=pytest.mark.slow))
 
 

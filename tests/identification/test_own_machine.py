@@ -519,7 +519,8 @@ def test_a_log_of_one_joint_asks_which_of_several_it_is(run, tmp_path):
 
 def test_a_command_in_milliamperes_is_doubted_unless_its_gain_is_asked_for(arm, run):
     """Of a motor of 0.1 N m/A."""
-    in_mA = run | {"u": run["u"] * 1e4}
+    in_mA = {name: values[:900] for name, values in run.items()}
+    in_mA["u"] = in_mA["u"] * 1e4
     with pytest.raises(smc.ScenarioError, match="if it is not in N m but in mA"):
         smc.identify(arm, in_mA, ["j1.damping"])
     identified = smc.identify(arm, in_mA, ["j1.gain", *TRUTH], most=1)
@@ -624,7 +625,7 @@ def test_a_chirp_is_recommended_and_a_staircase_is_last_because_it_rests(arm, tm
 
 
 def test_expected_errors_follow_the_encoder_and_the_noise_which_are_said(arm):
-    fields = {"u_max": 5.0, "duration": 2.0, "rate": 250.0}
+    fields = {"u_max": 5.0, "duration": 1.0, "rate": 250.0}
     coarse = smc.design.excitation(arm, ["j1.damping"], noise=0.0, counts=1024, **fields)
     fine = smc.design.excitation(arm, ["j1.damping"], noise=0.0, counts=2**17, **fields)
     noisy = smc.design.excitation(arm, ["j1.damping"], noise=1e-3, counts=2**17, **fields)
@@ -753,18 +754,17 @@ def test_the_command_takes_joints_from_a_log_and_writes_a_figure_and_a_condition
     rows = np.column_stack([run["t"], run["x"], run["u"]])[:700]
     np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header="t,x_j1,u_j1", comments="")
     files = [str(tmp_path / name) for name in ("arm.xml", "run.csv")]
-    options = ["--for", "j1.damping,j1.frictionloss,input_delay", "--held-out", files[1]]
+    options = ["--for", "j1.damping,input_delay", "--held-out", files[1]]
     done = CliRunner().invoke(app, ["identify", *files, *options])
     assert done.exit_code == 0, done.output
     rows = re.findall(r"^(\S+) +(\S+) +± (\S+) +(.+)$", done.output, re.MULTILINE)
     assert [(name, unit) for name, _, _, unit in rows] == [
         ("j1.damping", "N m s/rad"),
-        ("j1.frictionloss", "N m"),
         ("input_delay", "ms"),
     ]
     (condition,) = from_file(tmp_path / "found.txt")
     late = condition.on(smc.plant_from(ONE, ["j1"]), 1.0)["input_delay"]
-    assert float(rows[2][1]) == pytest.approx(1e3 * late, abs=0.13)  # whole steps of 0.25 ms
+    assert float(rows[1][1]) == pytest.approx(1e3 * late, abs=0.13)  # whole steps of 0.25 ms
     assert re.search(r"fits (\S+) %, held out (\S+) %", done.output)
     assert max(map(len, done.output.splitlines())) <= 80
     assert len(done.output.splitlines()) <= 24
@@ -834,9 +834,9 @@ def test_the_start_knows_where_other_joints_are_held():
     true = {"j2.damping": 0.2, "j2.armature": 0.01}
     push = smc.Sine(1.0, 4.0) + smc.Sine(0.5, 11.0)
     run = smc.Scenario(plant=arm, mismatch=true, law="none", feedforward=push, duration=4.0)
-    identified = smc.identify(arm, smc.run(run), list(true), most=1)
+    guess = first_guess(*own_rig(arm, list(true)).reading([smc.run(run)]))
     for name, value in true.items():
-        assert identified.before.values[name] == pytest.approx(value, rel=0.15), name
+        assert guess.values[name] == pytest.approx(value, rel=0.15), name
 
 
 @pytest.mark.slow

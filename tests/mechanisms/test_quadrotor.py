@@ -100,7 +100,7 @@ def newton_euler(duration, period, p, wind):
     )
 
 
-@pytest.mark.parametrize("name", ["crazyflie", "crazyflow"])
+@pytest.mark.parametrize("name", ["crazyflie", pytest.param("crazyflow", marks=pytest.mark.slow)])
 def test_two_seconds_of_a_flip_in_wind_are_those_of_an_integration_without_mujoco(name):
     plant = smc.plant(
         "quadrotor",

@@ -1,5 +1,6 @@
 """The boards that are shipped: their pages, README's lines, and the results behind them."""
 
+import functools
 import math
 import re
 
@@ -22,12 +23,13 @@ from smc_mujoco.problems.tracking_results import (
 from smc_mujoco.problems.tracking_search import SEARCHES, TAU, UNSEEN
 
 SUITES = pytest.mark.parametrize("suite", tracking_suites())
+BOARD = functools.cache(tracking_board)
 WORDS = 300  # that a reader of a page has to read, but for its tables
 
 
 @SUITES
 def test_a_page_is_what_the_shipped_results_say(suite):
-    board = tracking_board(suite)
+    board = BOARD(suite)
     path = ROOT / "docs" / tracking_page.page_name(board)
     text = tracking_page.page(board, path.with_suffix(".svg").name)
     assert path.read_text(encoding="utf-8") == text, "python -m smc_mujoco.problems.tracking_page"
@@ -40,13 +42,13 @@ def test_a_page_is_what_the_shipped_results_say(suite):
 @SUITES
 def test_readme_has_the_line_of_a_board(suite):
     lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
-    assert tracking_page.readme_line(tracking_board(suite)) in lines
+    assert tracking_page.readme_line(BOARD(suite)) in lines
 
 
 @pytest.mark.quick
 @SUITES
 def test_every_entry_has_every_search_of_every_problem(suite):
-    board = tracking_board(suite)
+    board = BOARD(suite)
     names = [problem.name for problem in board.suite.problems]
     assert len(board.entries) >= 3
     for entry in board.entries.values():
@@ -58,7 +60,7 @@ def test_every_entry_has_every_search_of_every_problem(suite):
 
 @SUITES
 def test_no_law_and_an_oracle_bound_the_first_entry_of_each_problem(suite):
-    board = tracking_board(suite)
+    board = BOARD(suite)
     limits = shipped_bounds(suite)
     for result in board.problems:
         still, oracle = limits[result.problem]
@@ -77,7 +79,7 @@ def test_an_entry_is_named_by_its_text(suite, monkeypatch):
 @SUITES
 def test_an_entry_has_a_tag_of_each_kind(suite, monkeypatch):
     monkeypatch.chdir(ROOT)
-    for entry in tracking_board(suite).entries.values():
+    for entry in BOARD(suite).entries.values():
         tags = tracking_page.tags_of(entry)
         assert "other" not in tags.values(), entry.law
         template = tracking_entry(entry.text).law.template

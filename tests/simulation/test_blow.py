@@ -58,7 +58,7 @@ def machine(name):
     return smc.plant_from(MACHINE.format(name="m", **ARM | parts), joints, others=what_others_do)
 
 
-@pytest.mark.parametrize("more", ["", " + friction"])
+@pytest.mark.parametrize("more", ["", pytest.param(" + friction", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", [*BUILT, "duffing", "double_pendulum", "inverted_pendulum"])
 def test_a_blow_reaches_the_stops_whatever_u_does(name, more):
     plant = machine(name)

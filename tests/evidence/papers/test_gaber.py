@@ -506,7 +506,7 @@ def test_the_plain_series_is_tanh_near_zero_and_leaves_it_far_off():
     ("slowed", "expected"),
     [
         (0.0, SUPPORTED),
-        (0.15, REFUTED),
+        pytest.param(0.15, REFUTED, marks=pytest.mark.slow),
     ],
 )
 def test_exponential_convergence_has_one_rate_at_all_distances(slowed, expected):

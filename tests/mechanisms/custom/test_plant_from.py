@@ -609,8 +609,8 @@ def test_dry_friction_of_the_file_holds_what_weighs_less(kind, fields):
 @pytest.mark.parametrize(
     ("kind", "solref"),
     [
-        ("default masks", ".02 1.5"),
-        ("default masks", "-100 -50"),
+        pytest.param("default masks", ".02 1.5", marks=pytest.mark.slow),
+        pytest.param("default masks", "-100 -50", marks=pytest.mark.slow),
         ("default masks", ""),
         ("arm", ".02 1.5"),
         ("tendon", ".05 1"),

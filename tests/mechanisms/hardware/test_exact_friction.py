@@ -238,7 +238,7 @@ def test_a_step_of_constant_forces_has_the_mean_and_first_moment_of_its_friction
     forces = np.empty(parts)
     for j in range(parts):  # friction stops the joint within a part if it can
         stops = -smooth - v / (mobility * h / parts)
-        forces[j] = np.clip(stops, -level, level)
+        forces[j] = min(max(stops, -level), level)
         v += (smooth + forces[j]) * mobility * h / parts
     moment = np.mean(forces * (1.0 - (np.arange(parts) + 0.5) / parts))
     levels = -np.copysign(level, v0), -np.copysign(level, smooth)

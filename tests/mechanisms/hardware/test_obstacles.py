@@ -136,7 +136,7 @@ def left_share(gap):
 
 
 @EVERY
-@pytest.mark.parametrize("restitution", [0.3, 0.7])
+@pytest.mark.parametrize("restitution", [0.3, pytest.param(0.7, marks=pytest.mark.slow)])
 def test_a_blow_parts_with_the_share_of_speed_that_was_asked(name, restitution):
     plant, body, joint = machine(name)
     channel = list(MACHINES[name][1]).index(joint)
