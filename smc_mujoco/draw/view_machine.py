@@ -79,7 +79,7 @@ class Machines:
         front = self.turn[:, 2]
         self.mounts = []
         for mount in arrows.mounts(first, joints.tolist(), slides.tolist(), puppet.rail, front):
-            radius = min(mount.radius, arrows.BENT_SIZE * own)
+            radius = min(mount.radius, arrows.BENT_SIZE * own / len(joints) ** 0.5)
             if first.plant.has_path:  # an arm of the library, where a film writes numbers
                 radius = arrows.USER_RADIUS * own
             self.mounts.append(
