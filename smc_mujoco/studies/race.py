@@ -318,6 +318,9 @@ def _first_sets(
     ready = [entrant for entrant in entrants if not entrant.searched]
     progress.says("runs without a law, and with given gains: set of gains")
     _judge(course, ready, 1)
+    if ready and math.isfinite(clock.ends):  # once more, as the first runs compiled
+        _judge(course, ready[:1], 2)
+        del ready[0].J[1:]
     progress.says("set of gains", float(len(ready)))
     pieces = [RaceSearch(entrant, 0) for entrant in searched(entrants)]
     start = time.monotonic()

@@ -481,11 +481,16 @@ def task_of(
     if not isinstance(own, tuple):  # where bounds differ, each joint keeps its own
         goal = dataclasses.replace(goal, u_max=bound)
     reach = goal.starts.largest(dataclasses.replace(first, x0=None))
-    if first.accelerates:
-        per_u = None
-    else:
-        per_u = first.drive_train.nominal[0].gain
-    scales = search_space.scales(first.plant, bound, reach, per_u)
+    felt, per_u = bound, None
+    if not first.accelerates:
+        drives = first.drive_train
+        per_u = drives.nominal[0].gain
+        if not first.force_command:  # a servo gives no more than its file lets it
+            pairs = zip(drives.forces, drives.motors, strict=True)
+            felt = min(bound, *(force / motor.nominal.gain for force, motor in pairs))
+    scales = search_space.scales(
+        first.plant, felt, reach, per_u, max(map(_dead_time, (first, *further)))
+    )
     box = search_space.box(first.law, scales)
     low, high = np.log10(list(box.values())).T
     task = TuningTask(
@@ -510,6 +515,12 @@ def task_of(
         f"no gains of {law.name} in its search range meet the conditions of its theorem: "
         "change its gains that are held, or give outside_theorem=True"
     )
+
+
+def _dead_time(case: Scenario) -> float:
+    """Return the time from a reading of the position to the force that follows, s."""
+    late = max((encoder.delay for encoder in case.sensors), default=0.0)
+    return case.control_period + case.input_delay + late
 
 
 def _refuse_mixed_commands(case: Scenario) -> None:

@@ -5,7 +5,7 @@ The plant has four scales, from which each gain's scale follows:
     X = max |x0|        position, rad or m
     F = u_max           force, N m or N
     M = 1 / g(0)        inertia, kg m^2 or kg; of the driven joints, where others are free
-    T = sqrt(M X / u_max)   s, time in which the actuator moves the plant from rest by X / 2
+    T = sqrt(M X / F)       s, time in which the actuator moves the plant from rest by X / 2
 
 A gain with the unit F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5,
 and a search may leave this box by a decade, or by a decades if a > 1: the slopes of a regulator are
@@ -18,8 +18,10 @@ gain by another one, such as k by b in the force k / b, where b is an estimate o
 searched as far as a force, for the b of each candidate. The law declares this with `Gain(2.0,
 ACCELERATION, over="b")`.
 
-Where u is a voltage or an acceleration, F is its bound and g is x'' per unit of u. X is the largest
-|x0| of all joints, also of free ones, in m and in rad alike.
+Where u is a voltage or an acceleration, F is its bound and g is x'' per unit of u; of the set-point
+of a servo, F ends where its force does. No loop uses a force that moves the plant by X / 2 before
+u answers to it: of a stronger actuator F is the one for which T is the longest delay of u in the
+conditions. X is the largest |x0| of all joints, also of free ones, in m and in rad alike.
 
 A user's model has no such g in general. There X is the largest distance from the goal, g is that of
 MuJoCo at the start (see `mechanisms.custom.scales`), and F at most 100 times what the joint needs.
@@ -122,7 +124,11 @@ def _scales_of(gain: Gain, scales: Numbers) -> Numbers:
 
 
 def scales(
-    plant: Plant, u_max: float, reach: float | None = None, per_u: float | None = 1.0
+    plant: Plant,
+    u_max: float,
+    reach: float | None = None,
+    per_u: float | None = 1.0,
+    late: float = 0.0,
 ) -> dict[str, float]:
     """Return the plant's X, F, M and T in SI units.
 
@@ -133,6 +139,7 @@ def scales(
       u_max: bound on u.
       reach: X, rad or m; by default max |x0| of the plant.
       per_u: force per unit of u, N m/V or N/V; None: u is an acceleration.
+      late: the least T, s: how late u answers to a position.
     """
     if plant.pose and plant.by_mujoco:
         start = np.array(plant.x0)
@@ -179,7 +186,7 @@ def scales(
             f"{plant.name} has g(0) = {g:g}: tuning needs a joint that u moves; choose another "
             "plant"
         )
-    return _scales(g, u_max, X)
+    return _scales(g, min(u_max, X / (g * late**2)) if late else u_max, X)
 
 
 def _scales(g: float, u_max: float, X: float) -> dict[str, float]:

@@ -344,6 +344,32 @@ def test_a_search_has_the_bounds_that_a_run_has_without_it():
         assert task.cases(0)[1].disturbance[0].amplitude <= max(usual)
 
 
+def test_no_force_is_a_scale_that_a_servo_does_not_give_or_that_is_over_before_u_answers():
+    """A set-point moves a servo with kp = 500 until its force is 3 N m; 10 N m move a light joint
+    by X / 2 long before a command that is 10 ms late.
+    """
+    servo = '<position joint="fore" kp="500" kv="5" forcerange="-3 3" ctrlrange="-3 3"/>'
+    motor = '<motor joint="fore" ctrlrange="-10 10"/>'
+    goal = Objective(conditions=("nominal", "delay_10ms"))
+    scales = {}
+    for motors in (servo, motor):
+        plant = smc.plant_from(
+            TWO_JOINTS.format(motors=motors),
+            {"fore": smc.Channel(servo=motors == servo)},
+            name="fore arm",
+            others="locked",
+        )
+        task = search.task_of(plant, smc.law("pid"), goal, 8, 0, 1)
+        assert task.goal.u_max == max(smc.Scenario(plant=plant, law="pid").limits)
+        scales[motors] = task.scales
+    assert scales[servo]["F"] == pytest.approx(3.0 / 500.0)
+    late = 0.010 + 0.001
+    F, X, M, T = (scales[motor][name] for name in "FXMT")
+    assert pytest.approx(late) == T
+    assert pytest.approx(M * X / late**2) == F
+    assert F < 10.0
+
+
 def test_a_gain_given_as_0_stays_0():
     scales = {
         "X": 2.0,
