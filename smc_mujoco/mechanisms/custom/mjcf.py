@@ -59,6 +59,7 @@ MAX_KEPT = 16  # models that are kept as they were read; chosen
 Stamp = dict[str, tuple[int, int]]  # file -> time of its last change, ns, and size
 
 _stamps: dict[str, Stamp] = {}  # of a hash, when it was taken
+_latest: Stamp = {}  # of every file that was hashed, when it was last
 _known: dict[str, Path] = {}  # hash of a file that this process has read -> where it was
 _lock = threading.Lock()  # held while MuJoCo writes XML with more digits
 process.free_after_fork(_lock)
@@ -167,8 +168,6 @@ class ModelSource:
                 file_numbers.check_urdf(self.label, from_urdf.text)
                 spec = from_urdf.spec()
             else:
-                # whose cache takes a mesh that is written again in the same second for the old one
-                mujoco.mj_clearCache(mujoco.mj_getCache())
                 spec = mujoco.MjSpec.from_file(self.path)
         except ScenarioError:
             raise
@@ -264,8 +263,18 @@ def _of_file(path: Path) -> ModelSource:
     """Return the source of a file as it is now."""
     sha256, stamp = digest(path)
     _known[sha256] = path
-    _stamps[sha256] = stamp
+    _note(sha256, stamp)
     return ModelSource(str(path), sha256)
+
+
+def _note(sha256: str, stamp: Stamp) -> None:
+    """Take note of when the files of a hash were read. MuJoCo's cache, which takes a mesh that is
+    written again in the same second for the old one, is cleared if one has changed since.
+    """
+    _stamps[sha256] = stamp
+    if not stamp.items() <= _latest.items():
+        mujoco.mj_clearCache(mujoco.mj_getCache())
+        _latest.update(stamp)
 
 
 def source_of_record(name: str, sha256: str) -> ModelSource:
@@ -473,7 +482,7 @@ def _unchanged(source: ModelSource) -> bool:
     sha256, stamp = digest(Path(source.path))
     if sha256 != source.sha256:
         return False
-    _stamps[sha256] = stamp
+    _note(sha256, stamp)
     return True
 
 
