@@ -103,7 +103,8 @@ class Answer(Tables):
             parts.append(table._repr_html_())
         if self.words:
             rows = [explain(word).split("\n", 1) for word in self.words]
-            parts.append(html.table(("word", "meaning"), rows, max_rows=len(rows)))
+            words = Tabular(headings=("word", "meaning"), rows=rows, name_columns=2)
+            parts.append(words._repr_html_())
         page = html.page(self.title, parts)
         with replacing(Path(path)) as file:
             file.write_text(page, encoding="utf-8")

@@ -27,6 +27,21 @@ def glossary() -> dict[str, str]:
     return entries
 
 
+def meaning(word: str) -> str:
+    """Return the first two sentences of what a word means."""
+    paragraph, *_ = _paragraphs(glossary()[word])
+    return " ".join(re.split(r"(?<=\.)\s(?=[A-Z`])", paragraph)[:2]).replace("`", "")
+
+
+def _paragraphs(body: str) -> list[str]:
+    """Return the paragraphs of an entry as text, each on one line."""
+    paragraphs = []
+    for paragraph in body.split("\n\n"):
+        text = LINK.sub(r"\1", LAST_LINKS.sub(".", paragraph)).replace("$", "")
+        paragraphs.append(" ".join(text.split()))
+    return paragraphs
+
+
 def explain(word: str) -> str:
     """Return what a word means, in lines of at most 80 characters.
 
@@ -40,9 +55,8 @@ def explain(word: str) -> str:
     body = find("word", entry, entries)
     pages = dict.fromkeys(address for _, address in LINK.findall(body))
     lines = [entry]
-    for paragraph in body.split("\n\n"):
-        text = LINK.sub(r"\1", LAST_LINKS.sub(".", paragraph)).replace("$", "")
-        lines += textwrap.wrap(" ".join(text.split()), WIDTH, break_on_hyphens=False)
+    for paragraph in _paragraphs(body):
+        lines += textwrap.wrap(paragraph, WIDTH, break_on_hyphens=False)
     if pages:
         places = [page if "/" in page else f"docs/{page}" for page in pages]
         lines += textwrap.wrap(f"See {', '.join(places)}.", WIDTH, break_on_hyphens=False)

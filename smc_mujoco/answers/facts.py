@@ -1,7 +1,8 @@
 """Facts that an answer states: records, filled where they are computed."""
 
+import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from smc_mujoco.common.aliases import Names
@@ -132,6 +133,17 @@ class NotRanked:
 
 
 Verdict = Lead | Tied | Open | Barred
+
+
+def renamed(fact: Verdict, name: Callable[[str], str]) -> Verdict:
+    """Return a verdict with other names of its laws."""
+    changes: dict[str, Any] = {}
+    for field, value in vars(fact).items():
+        if field in ("law", "rival") and value:
+            changes[field] = name(value)
+        elif field == "laws":
+            changes[field] = tuple(map(name, value))
+    return dataclasses.replace(fact, **changes)
 
 
 @keyword_dataclass

@@ -43,7 +43,59 @@ TEXTS = {
         "",
         "J is over [{count} tuning conditions|{conditions}], the rest under {condition}.",
     ),
-    "omitted": ("", "In the report: {names}."),
+    "contest": ("", "{plant} under {condition}: {sample}"),
+    "contests": ("", "{count} plants and conditions: {sample}"),
+    "winners": (
+        "",
+        "The winner and its least lead, or the laws that are tied or open. All are judged "
+        "together: fewer at once show smaller leads.",
+    ),
+    "of plant": ("", "[{advice} ]{label}: {text}"),
+    "least": ("", "{law}[ {low:%}]"),
+    "use": (
+        "",
+        "[Undecided by {metric} between {rivals}. For now|Use] {law}[ ({gains})][, unless "
+        "{unless:; or}].",
+    ),
+    "unless": ("", "{aims} matters most: then {law}[ ({gains})]"),
+    "of law": ("", "{law} {runs}"),
+    "settled runs": (
+        "",
+        "[All {all} runs settled|No run of {none} settled|Settled runs: {short:,}][{others}, all "
+        "of the others].",
+    ),
+    "size": (
+        "",
+        "{metric}[ (which {rival} lacks in {gaps} runs)| {share:%}][{medians_differ} (not its "
+        "median)]",
+    ),
+    "lead": (
+        "{law}",
+        "[{settled}more settled runs than any rival|{metrics} below {rival}|{metrics} below every "
+        "rival]",
+    ),
+    "trails": (
+        "{law}",
+        "[{metric} {times} times {leader}'s; behind {behind}|{metric} {times} times {leader}'s|"
+        "behind {behind}]",
+    ),
+    "evidence": (
+        "",
+        "{label}: {text}[; ratio {ratio}, {ends}][; below the floor of {floor}][; ahead in {ahead} "
+        "of {samples} {unit}][; {charged:%} is taken off the lead]",
+    ),
+    "tied": ("tied", "{metrics}: {laws:,}"),
+    "open": (
+        "open",
+        "{metrics}: [{perhaps}perhaps ]{laws:,}[ (deciding takes {needed} {unit})|{none} (no lead "
+        "would show)| (leads below {hidden:%} might not show)]",
+    ),
+    "barred": (
+        "no winner",
+        "{metrics}: [{defaults}no law may win over the default gains of {laws}|every law has runs "
+        "that fail, do not arrive or lack it]",
+    ),
+    "not ranked": ("not ranked", "{laws}: {samples} {unit}, of {needed} that it takes"),
     "defaults": ("gains", "the defaults of {laws}, not searched"),
     # which: its first line, in seven forms
     "law": ("Use {law}", GAINS),

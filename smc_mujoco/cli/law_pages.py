@@ -11,8 +11,9 @@ from rich.console import Console
 from rich.padding import Padding
 from rich.text import Text
 
-from smc_mujoco.cli.tables import Listing, catalogue, listed
+from smc_mujoco.cli.tables import listed
 from smc_mujoco.common.errors import unknown
+from smc_mujoco.common.tabular import of_fields
 from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import catalogue as estimators
@@ -91,11 +92,10 @@ def _values(values: Mapping[str, float]) -> str:
 
 def _print_rows(rows: Mapping[str, str], console: Console) -> None:
     """Print the rows of a page that have words."""
-    lines = [(label, words) for label, words in rows.items() if words]
-    console.print(Listing(headings=("", ""), rows=lines, style="dim", space=1))
+    console.print(of_fields("", {label: words for label, words in rows.items() if words}))
 
 
-def lists() -> dict[str, list[tuple[str, str]]]:
+def lists() -> dict[str, dict[str, str]]:
     """Return heading -> name and formula of each law, surface and estimator, as the first line of
     its docstring.
     """
@@ -113,11 +113,8 @@ def print_suitable(needs: Sequence[str], plant: str | None, console: Console) ->
         title += f" that {' and '.join(PROPERTIES[need].words for need in needs)}"
     if plant is not None:
         title += f" for {plant}"
-    suitable_laws = []
-    for row in lists()["Laws"]:
-        if row[0] in names:
-            suitable_laws.append(row)
-    console.print(catalogue(title, suitable_laws))
+    about = lists()["Laws"]
+    console.print(of_fields(title, {name: about[name] for name in about if name in names}))
 
 
 def print_page(template: Template, console: Console, package: str, text: str) -> None:

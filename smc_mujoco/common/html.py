@@ -1,4 +1,4 @@
-"""Tables, pictures and films as HTML for notebooks, in the colour of the page, and whole pages.
+"""Texts, pictures and films as HTML for notebooks, in the colour of the page, and whole pages.
 
 All text but `Html` is escaped.
 """
@@ -6,13 +6,11 @@ All text but `Html` is escaped.
 import base64
 import html
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from smc_mujoco.common.files import scratch
 
-MAX_ROWS = 12  # lines of a table: chosen, so that a cell's output stays short
-_CELL = "padding:2px 10px;vertical-align:top;text-align:"
 PHONE = 600  # px, chosen: narrower windows show a picture for a phone
 # Tables scroll within the page, and what is said below them stays in sight. Pictures are drawn on
 # white: on a dark page they are inverted, with their hues kept.
@@ -47,62 +45,6 @@ def text(value: object) -> Html:
 def strong(value: object) -> Html:
     """Return a value in bold letters."""
     return Html(f"<b>{text(value)}</b>")
-
-
-def table(
-    headings: Sequence[object],
-    rows: Sequence[Sequence[object]],
-    caption: object = "",
-    note: object = "",
-    numbers: range = range(0),
-    max_rows: int = MAX_ROWS,
-) -> Html:
-    """Return a table: caption above, note below, the columns `numbers` aligned to the right."""
-    width = 1
-    if headings or rows:
-        width = len(headings or rows[0])
-    sides = []
-    for i in range(width):
-        if i in numbers:
-            sides.append("right")
-        else:
-            sides.append("left")
-    parts = [
-        '<table style="border-collapse:collapse;font-variant-numeric:tabular-nums;color:inherit">'
-    ]
-    if caption:
-        style = "caption-side:top;text-align:left;color:inherit;padding:2px 10px"
-        parts.append(f'<caption style="{style}">{strong(caption)}</caption>')
-    if headings:
-        cells = _cells(
-            "th", headings, sides, "font-weight:normal;border-bottom:1px solid currentColor;"
-        )
-        parts.append(f"<thead><tr>{cells}</tr></thead>")
-    lines = []
-    for row in rows[:max_rows]:
-        lines.append(f"<tr>{_cells('td', row, sides, '')}</tr>")
-    wide = f'<tr><td colspan="{width}" style="{_CELL}left;opacity:0.75">'
-    if len(rows) > max_rows:
-        lines.append(f"{wide}and {len(rows) - max_rows} more</td></tr>")
-    if note:
-        lines.append(f"{wide}<div>{text(note)}</div></td></tr>")
-    return Html("".join([*parts, f"<tbody>{''.join(lines)}</tbody></table>"]))
-
-
-def _cells(tag: str, values: Sequence[object], sides: Sequence[str], style: str) -> str:
-    """Return the cells of a row; `sides` are their alignments."""
-    cells = []
-    for value, side in zip(values, sides, strict=True):
-        cells.append(f'<{tag} style="{style}{_CELL}{side}">{text(value)}</{tag}>')
-    return "".join(cells)
-
-
-def fields(values: Mapping[str, object], caption: str) -> Html:
-    """Return a table of names with their values."""
-    rows = []
-    for name, value in values.items():
-        rows.append((Html(f"<i>{text(name)}</i>"), value))
-    return table((), rows, caption, max_rows=99)
 
 
 def embedded(content: bytes, kind: str, width: float | None = None) -> Html:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
 PLAIN_WIDTH = 80  # characters of a line of plain text
-NAME_WIDTH = 20  # characters of a name before it is broken
+NAME_WIDTH = 20  # characters of a name, where space is short
 HEADING_WIDTH = 8  # characters of a heading at least
 NARROW_WIDTH = 12  # of a name, and of a line below a number, where space is short
 # In LaTeX: widths of a character, of one in a line below, and of the narrowest words, em
@@ -34,7 +34,11 @@ TEX_CHARACTER = 0.5
 TEX_SMALL = 0.43
 TEX_WIDTH = 22
 NEAR_POWERS = 2  # of ten, between the ends of an interval; beyond, its lower end is a bound
-MAX_HTML_ROWS = 40
+MAX_HTML_ROWS = 99
+HTML_TABLE = "border-collapse:collapse;font-variant-numeric:tabular-nums;color:inherit"
+HTML_TITLE = "caption-side:top;text-align:left;color:inherit;padding:2px 10px"
+HTML_CELL = "padding:2px 10px;vertical-align:top;text-align:"
+GAP = 2  # spaces between columns
 NEEDS = r"needs booktabs; \footnotesize\setlength{\tabcolsep}{2pt} before it makes it narrower"
 NO_BREAK = "\N{NO-BREAK SPACE}"
 # A character -> as LaTeX writes it, with any engine.
@@ -87,7 +91,6 @@ class Tabular:
     def __rich_console__(
         self, console: "Console", options: "ConsoleOptions"
     ) -> "Iterator[RenderableType]":
-        from rich import box
         from rich.table import Table
         from rich.text import Text
 
@@ -95,103 +98,111 @@ class Tabular:
         if self.title:
             yield Text(self.title, "bold")
         for part in _parts(list(map(_widest, columns)), options.max_width, self.name_columns):
-            bodies = []
-            for i in part:
-                bodies.append(columns[i][1:])
-            tall = any("\n" in cell.plain for cell in itertools.chain.from_iterable(bodies))
+            shown = [columns[i] for i in part]
             table = Table(
-                box=box.HORIZONTALS if tall else box.SIMPLE_HEAD,  # rules between tall rows
-                show_lines=tall,
-                padding=0,
+                box=None,
+                padding=(0, GAP, 0, 0),
                 pad_edge=False,
-                show_edge=False,
+                header_style="",
+                show_header=any(self.headings),
             )
-            lines = max(columns[i][0].plain.count("\n") for i in part)
-            for i in part:
-                head = columns[i][0]
-                above = Text("\n" * (lines - head.plain.count("\n")))
-                side = "left" if i < self.name_columns else "right"
-                table.add_column(above.append_text(head), justify=side, overflow="fold")
-            for row in zip(*bodies, strict=True):
+            heights = [column[0].plain.count("\n") for column in shown]
+            unitless = not any(" (" in self.headings[i] for i in part)
+            for i, column, height in zip(part, shown, heights, strict=True):
+                head = Text("\n" * (max(heights) - height)).append_text(column[0])
+                if unitless:
+                    head.right_crop(1)
+                table.add_column(head, justify="left" if i < self.name_columns else "right")
+            rows = list(zip(*(column[1:] for column in shown), strict=True))
+            tall = any(map(_below, itertools.chain.from_iterable(self.rows)))
+            for k, row in enumerate(rows):
                 table.add_row(*row)
+                if tall and k < len(rows) - 1:
+                    table.add_row()
             yield table
+        if self.rows and self.notes:
+            yield Text("")
         for note in self.notes:
             yield Text(note)
 
     def _columns(self, width: int) -> "list[list[Text]]":
-        """Return the columns of names, then those of numbers. Where space is short the widest
-        numbers are narrow; where it is for names alone, the first of these.
+        """Return the columns of names, then those of numbers, each a heading and cells. Where space
+        is short, names and then the widest numbers are narrow.
         """
-        names = list(map(self._names, range(self.name_columns)))
-        for i in range(self.name_columns):
-            if sum(map(_widest, names)) + self.name_columns - 1 > width:
-                names[i] = self._names(i, NARROW_WIDTH)
-        numbers = range(self.name_columns, len(self.headings))
+        count = self.name_columns
+        numbers = range(count, len(self.headings))
         columns = list(map(self._column, numbers))
+        last = range(count - (not numbers), count)  # the last names may take what others leave
+        room = width - (GAP + NAME_WIDTH) * len(last)
+        names: list[list[Text]] = []
+        for limit in range(width, NARROW_WIDTH, -1):
+            names = [self._column(i, name=limit) for i in range(count - len(last))]
+            if _total([*names, *columns] if limit > NAME_WIDTH else names) <= room:
+                break
+        rest = max(width - GAP - _total(names), NARROW_WIDTH)
+        names += [self._column(i, name=rest) for i in last]
         narrow = [self._column(i, narrow=True) for i in numbers]
-        while sum(map(_widest, [*names, *columns])) + len(self.headings) - 1 > width:
-            savings = []
-            for wide, narrower in zip(columns, narrow, strict=True):
-                savings.append(_widest(wide) - _widest(narrower))
+        while _total([*names, *columns]) > width:
+            savings = [
+                _widest(wide) - _widest(thin) for wide, thin in zip(columns, narrow, strict=True)
+            ]
             if max(savings, default=0) <= 0:
                 break
             widest = savings.index(max(savings))
             columns[widest] = narrow[widest]
         return [*names, *columns]
 
-    def _names(self, i: int, width: int = NAME_WIDTH) -> "list[Text]":
-        """Return the heading and the cells of a column of names, broken beyond a width."""
-        from rich.text import Text
-
-        texts = [Text(self.headings[i])]
-        for row in self.rows:
-            cell = as_cell(row[i])
-            name = Text(folded(cell.text, width), cell.colour)
-            if cell.below:
-                name.append(f"\n{cell.below}", "dim")
-            texts.append(name)
-        return texts
-
-    def _column(self, i: int, narrow: bool = False) -> "list[Text]":
-        """Return the heading and the cells of a column of numbers.
+    def _column(self, i: int, narrow: bool = False, name: int = 0) -> "list[Text]":
+        """Return the heading and the cells of a column, those of a name broken beyond its width.
 
         If `narrow`, the lines below its numbers are broken, an interval after its dash.
         """
         from rich.text import Text
 
         cells = [as_cell(row[i]) for row in self.rows]
-        if narrow:
-            cells = [cell._replace(below=_narrow(cell.below)) for cell in cells]
         pad = " " if any(cell.strong for cell in cells) else ""  # below the stars
         texts = []
         for cell in cells:
-            text = Text(cell.text + pad, cell.colour)
+            text = folded(cell.text, name) if name else cell.text
+            shown = Text(text + pad, cell.colour)
             if cell.strong:
-                text = Text(f"{cell.text}*", f"bold {cell.colour}".strip())
-            for lines, style in ((cell.below, "dim not bold"), (cell.alarm, "red not bold")):
+                shown = Text(f"{text}*", f"bold {cell.colour}".strip())
+            below = folded(cell.below, name) if name else cell.below
+            below = _narrow(cell.below) if narrow else below
+            for lines, style in ((below, "dim not bold"), (cell.alarm, "red not bold")):
                 for line in lines.splitlines():
-                    text.append(f"\n{line}{pad}", style)
-            texts.append(text)
-        return [Text(self._heading(i, max(map(_width, texts), default=0))), *texts]
+                    shown.append(f"\n{line}{pad}", style)
+            texts.append(shown)
+        lines = self._heading(i, max(map(_width, texts), default=0))
+        return [Text("\n".join(line and f"{line}{pad}" for line in lines)), *texts]
 
-    def _heading(self, i: int, width: int) -> str:
-        """Return a heading on lines as wide as the cells of its column; a unit stays whole."""
-        unbroken = re.sub(r"\(.*\)", lambda unit: unit[0].replace(" ", NO_BREAK), self.headings[i])
-        return _wrapped(unbroken, max(HEADING_WIDTH, width))
+    def _heading(self, i: int, width: int) -> list[str]:
+        """Return a heading on lines as wide as the cells of its column, and its unit, or ""."""
+        name, _, unit = self.headings[i].partition(" (")
+        words = textwrap.wrap(name, max(HEADING_WIDTH, width), break_long_words=False)
+        return [*words, unit.removesuffix(")").replace("^2", "²")]
 
     def _repr_html_(self) -> str:
-        lines = [list(map(_html, row)) for row in self.rows]
-        note = html.Html("<br>".join(map(html.text, self.notes)))
-        numbers = range(self.name_columns, len(self.headings))
         heads = [heading.replace("^2", "²") for heading in self.headings]
-        return html.table(
-            heads,
-            lines,
-            self.title,
-            note,
-            numbers,
-            max_rows=MAX_HTML_ROWS,
-        )
+        rule = "font-weight:normal;border-bottom:1px solid currentColor;"
+        lines = [self._html_row("th", heads, rule)] if any(heads) else []
+        lines += [self._html_row("td", row) for row in self.rows[:MAX_HTML_ROWS]]
+        more = len(self.rows) - MAX_HTML_ROWS
+        notes = [f"and {more} more"] if more > 0 else []
+        for note in [*notes, *self.notes]:
+            side = f'colspan="{len(self.headings)}" style="{HTML_CELL}left;opacity:0.75"'
+            lines.append(f"<tr><td {side}><div>{html.text(note)}</div></td></tr>")
+        caption = f'<caption style="{HTML_TITLE}">{html.strong(self.title)}</caption>'
+        parts = [f'<table style="{HTML_TABLE}">', caption if self.title else "", *lines]
+        return "".join([*parts, "</table>"])
+
+    def _html_row(self, tag: str, cells: Sequence[Cell | str], style: str = "") -> str:
+        """Return a row of HTML."""
+        texts = []
+        for i, cell in enumerate(cells):
+            side = "left" if i < self.name_columns else "right"
+            texts.append(f'<{tag} style="{style}{HTML_CELL}{side}">{_html(cell)}</{tag}>')
+        return f"<tr>{''.join(texts)}</tr>"
 
     def about(self) -> dict[str, object]:
         """Return the table as JSON data, with a list for each row; a number is a number."""
@@ -218,7 +229,8 @@ class Tabular:
             letters = marks if i >= self.name_columns else {}
             cells = [as_cell(row[i]) for row in self.rows]
             widest = max((_tex_width(cell, letters) for cell in cells), default=0.0)
-            head = self._heading(i, math.ceil(widest / TEX_CHARACTER)).splitlines()
+            *head, unit = self._heading(i, math.ceil(widest / TEX_CHARACTER))
+            head += [f"({unit})"] if unit else []
             widths.append(max([widest, *(TEX_CHARACTER * len(line) for line in head)]))
             heads.append([*map(tex, head)][::-1])
             columns.append([_tex_cell(cell, letters) for cell in cells])
@@ -329,12 +341,17 @@ def folded(name: str, width: int) -> str:
     """Return a name that is longer than a width on several lines, broken at spaces and after
     underscores.
     """
-    if len(name) <= width:
-        return name
     lines = []
-    for line in textwrap.wrap(name.replace("_", "_ "), width):
-        lines.append(line.replace("_ ", "_"))
+    for line in name.splitlines():
+        broken = textwrap.fill(line.replace("_", "_ "), width).replace("_ ", "_")
+        lines.append(line if len(line) <= width else broken)
     return "\n".join(lines)
+
+
+def of_fields(title: str, values: Mapping[str, object]) -> Tabular:
+    """Return a table of names with their values."""
+    rows = [(Cell(name, colour="cyan"), str(value)) for name, value in values.items()]
+    return Tabular(headings=("", ""), rows=rows, title=title, name_columns=2)
 
 
 def as_cell(cell: Cell | str) -> Cell:
@@ -354,16 +371,11 @@ def _value(cell: Cell | str) -> object:
         return text
 
 
-def _wrapped(text: str, width: int) -> str:
-    """Return a text on lines of a width, broken only at spaces that may break."""
-    return "\n".join(textwrap.wrap(text, width, break_long_words=False)).replace(NO_BREAK, " ")
-
-
 def _narrow(text: str) -> str:
     """Return a text on narrow lines; a number stays with its unit."""
-    lines = re.sub(r"(\d) ", rf"\1{NO_BREAK}", text.replace("–", "–\n")).splitlines()
-    narrow = [_wrapped(line, NARROW_WIDTH) for line in lines]
-    return "\n".join(narrow)
+    parts = re.sub(r"(\d) ", rf"\1{NO_BREAK}", text.replace("–", "–\n")).splitlines()
+    lines = [textwrap.fill(part, NARROW_WIDTH, break_long_words=False) for part in parts]
+    return "\n".join(lines).replace(NO_BREAK, " ")
 
 
 def _width(text: "Text") -> int:
@@ -375,19 +387,22 @@ def _widest(column: "Sequence[Text]") -> int:
     return max(map(_width, column))
 
 
+def _total(columns: "Sequence[Sequence[Text]]") -> int:
+    """Return the width of columns beside each other."""
+    return sum(map(_widest, columns)) + GAP * (len(columns) - 1)
+
+
 def _parts(widths: Sequence[int], width: int, names: int) -> list[list[int]]:
     """Return the columns of each part of a table that fits into a width; each part begins with the
     names.
     """
-    name_columns = list(range(names))
-    parts = [name_columns]
-    for i, column_width in enumerate(widths[names:], names):
-        last = parts[-1]
-        taken = sum(widths[k] for k in last) + len(last)
-        if len(last) > names and taken + column_width > width:
-            last = name_columns
-            parts.append(name_columns)
-        parts[-1] = [*last, i]
+    parts = [list(range(names))]
+    for i in range(names, len(widths)):
+        wider = [*parts[-1], i]
+        if len(wider) > names + 1 and sum(widths[k] + GAP for k in wider) - GAP > width:
+            wider = [*range(names), i]
+            parts.append(wider)
+        parts[-1] = wider
     return parts
 
 
@@ -400,8 +415,9 @@ def _html(cell: Cell | str) -> str:
     return text
 
 
-def _below(cell: Cell) -> list[str]:
+def _below(cell: Cell | str) -> list[str]:
     """Return the lines below a cell's text."""
+    cell = as_cell(cell)
     return [*cell.below.splitlines(), *cell.alarm.splitlines()]
 
 

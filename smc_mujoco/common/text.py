@@ -47,16 +47,11 @@ def _with_exponent(value: float, digits: int) -> str:
 
 
 def span(low: str, high: str) -> str:
-    """Return the range of a median in words, as `ends`; "" where both ends are the same text, such
-    as "never", and the median says it.
+    """Return the range of a median: "1.1–1.3"; "1.1 to never" where some never reach it; "1.1 or
+    more" where some have no value; "" where both ends are the same text, and the median says it.
     """
-    return "" if low == high else ends(low, high)
-
-
-def ends(low: str, high: str) -> str:
-    """Return "1.1–1.3"; "1.1 to never" where some never reach it; "1.1 or more" where some have
-    no value.
-    """
+    if low == high:
+        return ""
     if high == "never":
         return f"{low} to {high}"
     return f"{low} or more" if high[:1].isalpha() else f"{low}–{high}"

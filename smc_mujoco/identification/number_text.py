@@ -8,6 +8,7 @@ from pathlib import Path
 
 from smc_mujoco.common.aliases import Numbers
 from smc_mujoco.common.files import replacing
+from smc_mujoco.common.tabular import Tabular
 from smc_mujoco.simulation.conditions import Condition
 
 
@@ -24,17 +25,10 @@ def to_error(value: float, error: float) -> str:
 
 def table(values: Numbers, errors: Numbers, units: Mapping[str, str]) -> list[str]:
     """Return lines with each number, its value, standard error and unit."""
-    rows = [("number", "value", "±", "unit")]
+    rows = []
     for name, value in values.items():
         rows.append((name, to_error(value, errors[name]), f"{errors[name]:.2g}", units[name]))
-    widths = []
-    for column in zip(*rows, strict=True):
-        widths.append(max(map(len, column)))
-    lines = []
-    for name, value, error, unit in rows:
-        line = f"{name:<{widths[0]}}  {value:>{widths[1]}}  {error:>{widths[2]}}  {unit}"
-        lines.append(line.rstrip())
-    return lines
+    return str(Tabular(headings=("number", "value", "±", "unit"), rows=rows)).splitlines()
 
 
 def save_condition(file: Path, text: str, condition: Condition) -> Path:

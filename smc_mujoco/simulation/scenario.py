@@ -292,7 +292,7 @@ class Scenario:
         """Return plant, law, duration and the fields that differ from their defaults, in SI
         units.
         """
-        from smc_mujoco.common import html
+        from smc_mujoco.common.tabular import of_fields
 
         texts = []
         for name, value in self.plant.parameters.items():
@@ -305,7 +305,7 @@ class Scenario:
         }
         for name, value in {"duration": self.duration, **self.given}.items():
             rows[name.replace("_", " ")] = shown(value)
-        return html.fields(rows, "Scenario")
+        return of_fields("Scenario", rows)._repr_html_()
 
     @property
     def given(self) -> dict[str, Any]:

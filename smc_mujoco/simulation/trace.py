@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.lib import format as npy
 
-from smc_mujoco.common import html
 from smc_mujoco.common.aliases import AnyPath, Array, Fields, Names
 from smc_mujoco.common.errors import (
     ScenarioError,
@@ -26,6 +25,7 @@ from smc_mujoco.common.errors import (
 )
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import CHANGED, as_path, from_json, reading, replacing, to_json
+from smc_mujoco.common.tabular import of_fields
 from smc_mujoco.mechanisms.hardware.tendons import of_plant
 from smc_mujoco.mechanisms.layout import channel_names, column_ends, loaded
 from smc_mujoco.mechanisms.plant import EFFORT
@@ -195,7 +195,7 @@ class Trace:
                 finite = values[np.isfinite(values)]
                 samples = finite.tolist() or [math.nan]
                 rows[f"{name} ({unit})"] = f"{min(samples):.3g} to {max(samples):.3g}"
-        return html.fields(rows, "Trace")
+        return of_fields("Trace", rows)._repr_html_()
 
     def save(self, path: AnyPath) -> Path:
         """Write a .npz file that `smc.load` reads back.

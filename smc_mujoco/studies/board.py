@@ -11,6 +11,7 @@ from smc_mujoco.answers import answers
 from smc_mujoco.answers.facts import Barred, Lead, NotRanked, Open, Sample, Tied, Trails, Verdict
 from smc_mujoco.common.aliases import Names, Numbers, Pair
 from smc_mujoco.common.data import keyword_dataclass
+from smc_mujoco.common.text import joined
 from smc_mujoco.control.source import Source
 from smc_mujoco.metrics.catalogue import CATALOGUE
 
@@ -223,9 +224,15 @@ class Board:
 
     @property
     def lines(self) -> list[str]:
-        """The verdicts as lines of evidence."""
-        lines = answers.verdicts(self.verdicts)
-        lines += [": ".join(pair) for pair in answers.not_ranked(self.not_ranked)]
+        """The verdicts as lines of evidence, each with the conditions in which it holds."""
+        conditions_of: dict[str, list[str]] = {}
+        for condition, fact in self.verdicts.items():
+            if fact:
+                conditions_of.setdefault(answers.evidence(fact), []).append(condition)
+        lines = []
+        for text, conditions in conditions_of.items():
+            lines.append(f"{text} under {joined(conditions)}" if len(self.blocks) > 1 else text)
+        lines += [": ".join(pair) for pair in answers.verdict_lines(self.not_ranked)]
         return [*lines, *filter(None, [without_floor(self.metric)])]
 
     def failures(self, entry: BoardEntry) -> str:

@@ -4,10 +4,9 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
-from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.paired_runs import OBJECTIVE, SETTLED, SETTLES
 from smc_mujoco.common.aliases import Pair
-from smc_mujoco.common.text import LEAST_PRINTED, ends, in_one_notation, number
+from smc_mujoco.common.text import in_one_notation, number
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.metrics.conventions import Metric
 from smc_mujoco.studies.board import Board
@@ -43,17 +42,6 @@ def sizes(values: Sequence[float], metric: str) -> list[str]:
         is_word = metric == SETTLES or not math.isfinite(value)
         texts.append(size(value, metric) if is_word else text)
     return texts
-
-
-def spread(interval: Interval, low: str, high: str) -> str:
-    """Return the ends of an interval, from their texts; "" if they are not known, both infinite, or
-    both below 1e-9, which the median says.
-    """
-    if math.isnan(interval.low) or math.isinf(interval.low):
-        return ""
-    if 0.0 < interval.high < LEAST_PRINTED:
-        return ""
-    return ends(low, high)
 
 
 def heading(board: Board) -> str:

@@ -2,60 +2,36 @@
 
 import dataclasses
 import itertools
+import re
 from collections.abc import Callable, Mapping, Sequence
 
-from smc_mujoco.analysis.bootstrap import LEVEL, MIN_INTERVAL_SAMPLES
-from smc_mujoco.analysis.ranking import BEST_ERROR, RIVALS
 from smc_mujoco.analysis.step_halving import UNTRIED
 from smc_mujoco.answers import answers
 from smc_mujoco.answers.answer import Answer
-from smc_mujoco.answers.facts import Fact, Screen
+from smc_mujoco.answers.explain import meaning
+from smc_mujoco.answers.facts import Fact, Screen, renamed
+from smc_mujoco.answers.templates import said
 from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.tabular import Cell, Tabular
-from smc_mujoco.common.text import capital, counted, joined
+from smc_mujoco.common.text import capital, joined, span
 from smc_mujoco.control.source import kinds
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.studies.board import Block, Board, BoardEntry, sources
-from smc_mujoco.studies.board_numbers import heading, in_order, sizes, spread
+from smc_mujoco.studies.board import Board, BoardEntry, sources
+from smc_mujoco.studies.board_numbers import heading, in_order, sizes
 from smc_mujoco.studies.contests import contests
 
-FEW = (
-    f"With fewer than {MIN_INTERVAL_SAMPLES} samples an interval is their range, with a coverage "
-    f"below {100 * LEVEL:g} %."
-)
-# A word in headings and cells -> what LaTeX prints about it below the last table.
-UNDER = {
-    "": f"Below each median is its {100 * LEVEL:g} % interval.",
-    "J (": "Tuning minimises J, summed over conditions: ITAE divided by the initial error, "
-    "plus 0.001 s^3 times the variation of u divided by u_max and by the duration. J in tables is "
-    "from separate runs, which tuning has not seen.",
-    "shipped": "Shipped gains come with smc_mujoco.",
-    "tuned here": "Gains tuned here were found by searches with smc_mujoco.",
-    "settled runs": "Settled runs are given as a share, not as a median. A run counts as settled "
-    "if it settles before its last fifth.",
-    "settling time": "Settling time is when the error enters its band to stay: 2 % of its initial "
-    "value, or of the reference's range if that is larger.",
-    "final error": "The final error is the largest absolute error of any channel in the last "
-    "part of a run: its last fifth, or whole periods of a periodic load or reference.",
-    "ITAE": "ITAE is the integral of time times absolute error.",
-    "variation of u": "Variation of u is its total variation per second in the last part of a run.",
-    "default": "Default gains are those of the law's own file.",
-    "given": "Gains marked given are the authors' own choice.",
-    "strong=True": "Bold: may be the best: no other law is shown to be better (a paired test at "
-    f"{100 * BEST_ERROR:g} %, corrected for multiple comparisons: for {RIVALS} rivals even if "
-    "there are fewer, for all if there are more). A law "
-    "without bold is not always shown to be worse. A law wins if it is shown to be better than "
-    "every other.",
-    "floor ": "Floor: the median is below this floor (of noise, resolution, or a small share of "
-    "the start or of u_max). Values below it count as equal; where one is bold, no value above the "
-    "floor is.",
-    "may exceed ": "May exceed a floor: the median is below it, but need not stay there.",
-    "at half": "At half the step: the median of the runs that were repeated with half the physics "
-    "step, before and after.",
+# a word that print explains below the last table -> where a table has it
+IN_PRINT = {
+    "interval": "",
+    "J": r"'J \(",
+    **{name: name for name in ("settled runs", "settling time", "final error", "ITAE")},
+    "variation of u": "variation of u",
+    "shipped": "shipped|tuned here|given|default",
+    "may be the best": "strong=True",
+    "floor": "floor |may exceed ",
+    "some runs": "at half",
 }
-
-
 NO_BOARDS = "no boards: no metric applies"
 # what boards and comparisons explain on their pages
 WORDS = (
@@ -139,49 +115,46 @@ class Boards(Answer, list[Board]):
             groups.setdefault(board.about, []).append(board)
         if not groups:
             return [Tabular(headings=[NO_BOARDS], rows=[], notes=self.absent)]
-        tabulars = [_table(boards, self.labels, self.plants) for boards in groups.values()]
-        words = str([(table.headings, table.rows) for table in tabulars])
-        last = tabulars[-1]
-        notes = [*last.notes, *self.remarks]
+        tables = list(map(self._table, groups.values()))
+        words = str([(table.headings, table.rows) for table in tables])
+        notes = [*tables[-1].notes, *self.remarks]
         if any(board.by_step for board in self):
             notes.append(f"{capital(UNTRIED)}.")
-        under = *last.under, _key(self, words)
-        return [*tabulars[:-1], dataclasses.replace(last, notes=notes, under=under)]
+        explained = [word for word, mark in IN_PRINT.items() if re.search(mark, words)]
+        key = " ".join(f"{capital(word)}: {meaning(word)}" for word in explained)
+        last = dataclasses.replace(tables[-1], notes=notes, under=[*tables[-1].under, key])
+        return [*tables[:-1], last]
 
+    def _name(self, law: str) -> str:
+        """Return what LaTeX calls a law."""
+        return self.labels.get(law) or style.law_name(law)
 
-def _table(
-    boards: Sequence[Board], labels: Mapping[str, str], plants: Mapping[str, Plant]
-) -> Tabular:
-    """Return the table of one group of runs, with `Boards.labels` and `Boards.plants`."""
-    sources_of = sources(boards)
-    cells: dict[str, list[Cell | str]] = {}
-    for i, board in enumerate(boards):
-        for entry in board.entries:
-            cells.setdefault(entry.law, [""] * len(boards))[i] = _cell(board, entry)
-    rows = []
-    for law in in_order(boards):
-        name_cell = Cell(law, kinds(sources_of[law]), colour=style.law_colour(law))
-        label = labels.get(law) or style.law_name(law)
-        rows.append([name_cell._replace(label=label), *cells[law]])
-    largest = max(boards, key=lambda board: len(board.blocks))
-    plant = largest.group["plant"]
-    under = []
-    if "strong=True" in str(rows):
-        facts = [board.verdict(block) for board in boards for block in board.blocks[:1]]
-        decided = [
-            fact for fact, board in zip(facts, boards, strict=True) if fact and _is_one(board)
-        ]
-        under = [
-            answers.printed_verdicts(decided, lambda law: labels.get(law) or style.law_name(law))
-        ]
-    return Tabular(
-        headings=["law", *map(heading, boards)],
-        rows=rows,
-        title=_title(largest, plant),
-        label=_title(largest, style.plant_name(plants.get(plant, plant)), style.condition_name),
-        notes=list(itertools.chain.from_iterable(board.lines for board in boards)),
-        under=under,
-    )
+    def _table(self, boards: Sequence[Board]) -> Tabular:
+        """Return the medians of one group of runs, with the verdicts below in print."""
+        sources_of = sources(boards)
+        cells: dict[str, list[Cell | str]] = {}
+        for i, board in enumerate(boards):
+            for entry in board.entries:
+                cells.setdefault(entry.law, [""] * len(boards))[i] = _cell(board, entry)
+        rows = []
+        for law in in_order(boards):
+            colour = style.law_colour(law)
+            name = Cell(law, kinds(sources_of[law]), colour=colour, label=self._name(law))
+            rows.append([name, *cells[law]])
+        largest = max(boards, key=lambda board: len(board.blocks))
+        plant = largest.group["plant"]
+        facts = [board.verdict(board.blocks[0]) for board in boards if _is_one(board)]
+        in_print = [renamed(fact, self._name) for fact in facts if fact]
+        return Tabular(
+            headings=["law", *map(heading, boards)],
+            rows=rows,
+            title=_title(largest, plant),
+            label=_title(
+                largest, style.plant_name(self.plants.get(plant, plant)), style.condition_name
+            ),
+            notes=list(itertools.chain.from_iterable(board.lines for board in boards)),
+            under=[f"{capital(': '.join(pair))}." for pair in answers.verdict_lines(in_print)],
+        )
 
 
 def _is_one(board: Board) -> bool:
@@ -198,21 +171,8 @@ def _title(board: Board, plant: str, named: Callable[[str], str] = str) -> str:
         about += f", {named(board.blocks[0].condition)}"
     if board.summed:
         about += f" under {joined(map(named, board.summed))}"
-    samples = dict.fromkeys(map(_sample, board.blocks))
+    samples = dict.fromkeys(said(answers.sample(block.sample))[1] for block in board.blocks)
     return f"{about}: {'; '.join(samples)}"
-
-
-def _sample(block: Block) -> str:
-    """Return the size of a sample, such as "20 seeds, 1 distinct run, 3 sets of gains"."""
-    sample = block.sample
-    parts = [counted(sample.seeds, "seed")]
-    if sample.runs < sample.seeds:
-        parts.append(counted(sample.runs, "distinct run"))
-    if sample.sets > 1:
-        least = "at least " if sample.more else ""
-        alone = " (one for some laws)" if sample.single else ""
-        parts.append(f"{least}{sample.sets} sets of gains{alone}")
-    return ", ".join(parts)
 
 
 def _cell(board: Board, entry: BoardEntry) -> Cell:
@@ -224,7 +184,7 @@ def _cell(board: Board, entry: BoardEntry) -> Cell:
             changes.append(block.by_step[entry.law])
     numbers = [interval.median, interval.low, interval.high, *itertools.chain(*changes[:1])]
     median, low, high, *step = sizes(numbers, board.metric)
-    below = [spread(interval, low, high), _floor(board, entry.law)]
+    below = [span(low, high), _floor(board, entry.law)]
     alarms = [board.failures(entry)]
     if step:
         before, after = step
@@ -245,12 +205,3 @@ def _floor(board: Board, law: str) -> str:
         if block.floor and law in block.rising:
             return f"may exceed {block.floor}{where}"
     return ""
-
-
-def _key(boards: Sequence[Board], words: str) -> str:
-    """Return what LaTeX prints about the words of tables."""
-    sentences = [text for word, text in UNDER.items() if word in words]
-    entries = itertools.chain.from_iterable(board.entries for board in boards)
-    if any(entry.interval.n < MIN_INTERVAL_SAMPLES for entry in entries):
-        sentences.insert(1, FEW)
-    return " ".join(sentences)

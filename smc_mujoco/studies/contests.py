@@ -17,7 +17,7 @@ from smc_mujoco.answers.facts import (
 from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.studies.board import Block, Board
-from smc_mujoco.studies.board_numbers import in_order, size, unit_of
+from smc_mujoco.studies.board_numbers import heading, in_order, size
 
 RATE = "tv_rate"  # the metric that is also given as a share of the bound on u
 MANY_BOUNDS = 10.0  # of a share that is no longer said in percent; chosen
@@ -60,10 +60,6 @@ def _contest(columns: Sequence[Column], gains: Mapping[str, str], own: Names) ->
             verdicts.append(fact)
         not_ranked += board.not_ranked
     with_numbers = [column for column in columns if column[0].metric != SETTLES]
-    headings = [""]
-    for board, _ in with_numbers:
-        unit = _unit(board)
-        headings.append(f"{board.label} ({unit})" if unit else board.label)
     rows = []
     for law in in_order([board for board, _ in columns]):
         rows.append((law, *(_number(board, block, law) for board, block in with_numbers)))
@@ -71,7 +67,7 @@ def _contest(columns: Sequence[Column], gains: Mapping[str, str], own: Names) ->
         plant=last.plant,
         condition=last.condition,
         sample=last.sample,
-        table=Tabular(headings=headings, rows=rows),
+        table=Tabular(headings=["", *(_heading(board) for board, _ in with_numbers)], rows=rows),
         summed=columns[0][0].summed,
         settled=_settled(columns),
         use=_use(columns, verdicts, gains),
@@ -83,10 +79,10 @@ def _contest(columns: Sequence[Column], gains: Mapping[str, str], own: Names) ->
     )
 
 
-def _unit(board: Board) -> str:
-    """Return the unit below a heading."""
-    unit = unit_of(board).replace("^2", "²")
-    return f"{unit} (of bound)" if _has_share(board) else unit
+def _heading(board: Board) -> str:
+    """Return the heading of a board; beside a variation of u stands its share."""
+    text = heading(board)
+    return f"{text.removesuffix(')')} (of bound))" if _has_share(board) else text
 
 
 def _has_share(board: Board) -> bool:

@@ -7,11 +7,10 @@ the plants and conditions of the table, over initial states and noise, and over 
 the laws ran.
 """
 
-import dataclasses
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,7 +24,6 @@ from smc_mujoco.analysis.paired_runs import (
     UNITS,
     RunColumns,
     RunGroup,
-    Scores,
 )
 from smc_mujoco.analysis.ranking import Comparison, corrected, linked, ranks
 from smc_mujoco.analysis.relevant import RELEVANT
@@ -102,35 +100,63 @@ def leaderboard(
     boards.failures = paired_runs.failures(table)
     boards.untouched = paired_runs.untouched(table)
     boards.labels = paired_runs.labels(table)
-    boards.plants = plants = {}
-    ranked = []
+    groups = []
     for group in paired_runs.groups(table, by):
         sources = paired_runs.sources(table, group.rows[group.rows >= 0])
-        ran = paired_runs.scenarios(table, group)
-        for scenario in filter(None, ran):
-            plants[scenario.plant.name] = scenario.plant
-        ranked.append(RankedGroup(group, ran, sources))
-    boards.commands = _commands(ranked)
-    by_metric = {}
+        groups.append(SourcedGroup(group, paired_runs.scenarios(table, group), sources))
+    boards.plants = {run.plant.name: run.plant for group in groups for run in group.runs}
+    boards.commands = _commands(groups)
+    by_metric = []
     for metric in dict.fromkeys(metrics):
-        by_metric[metric] = _boards_of(table, metric, ranked, defaults, relevant)
-    for i in range(len(ranked)):
-        for boards_of_metric in by_metric.values():
-            if i in boards_of_metric:
-                boards.append(boards_of_metric[i])
-    boards.absent = _absent(metrics, ranked)
+        by_row = paired_runs.by_row(table, metric)
+        contests = {}
+        for i, group in enumerate(groups):
+            if contest := _contest(group, by_row, metric, relevant):
+                contests[i] = contest
+        by_metric.append(dict(zip(contests, _boards([*contests.values()], defaults), strict=True)))
+    for i in range(len(groups)):
+        boards += [of_metric[i] for of_metric in by_metric if i in of_metric]
+    boards.absent = _absent(metrics, groups)
     return boards
 
 
-def _absent(metrics: Sequence[str], ranked: Sequence["RankedGroup"]) -> list[str]:
+class SourcedGroup(NamedTuple):
+    """A group whose laws are compared, with the sources of their gains."""
+
+    group: RunGroup
+    ran: Sequence[Scenario | None]  # a scenario of each block
+    sources: Sources
+
+    @property
+    def runs(self) -> list[Scenario]:
+        """The scenarios that are known."""
+        return list(filter(None, self.ran))
+
+
+class MetricContest(NamedTuple):
+    """The laws of a group, compared in a metric."""
+
+    group: Mapping[str, str]  # what the runs have in common
+    metric: str
+    comparison: Comparison
+    blocks: Sequence[tuple[str, str]]  # plant and condition
+    seeds: Sequence[int]  # of each block
+    ran: Sequence[Scenario | None]  # a scenario of each block
+    sets: Mapping[str, Array]  # law -> the number of the set of gains of each run
+    sources: Sources
+    unit: str
+    x: str = ""  # the unit of positions
+    summed: Names = ()  # conditions whose runs a number sums
+
+
+def _absent(metrics: Sequence[str], groups: Sequence[SourcedGroup]) -> list[str]:
     """Return why metrics have no single value in the runs of groups, or are not compared there."""
     reasons = []
     unjudged: dict[tuple[str, str], list[str]] = {}  # plant and condition -> metrics
     for metric in metrics:
-        for group in ranked:
-            scenario = next(filter(None, group.ran), None)
-            if scenario and metric in CATALOGUE:
-                reasons.append(CATALOGUE[metric].refusal(scenario))
+        for group in groups:
+            if group.runs and metric in CATALOGUE:
+                reasons.append(CATALOGUE[metric].refusal(group.runs[0]))
             for block, ran in zip(group.group.blocks, group.ran, strict=True):
                 if not paired_runs.is_judged(ran, metric):
                     unjudged.setdefault(block, []).append(metric)
@@ -143,52 +169,51 @@ def _absent(metrics: Sequence[str], ranked: Sequence["RankedGroup"]) -> list[str
     return list(dict.fromkeys(filter(None, reasons)))
 
 
-class RankedGroup(NamedTuple):
-    """A group whose laws are compared."""
-
-    group: RunGroup
-    ran: Sequence[Scenario | None]  # a scenario of each block
-    sources: Sources
-
-
-def _commands(ranked: Sequence[RankedGroup]) -> list[str]:
+def _commands(groups: Sequence[SourcedGroup]) -> list[str]:
     """Return what the commands of the drives mean, and that default gains are for a force."""
     words: list[str] = []
-    for ranked_group in ranked:
-        for scenario in filter(None, ranked_group.ran):
+    for group in groups:
+        for scenario in group.runs:
             words += scenario.drive_train.words
-        if words and any(map(_is_default, itertools.chain(*ranked_group.sources.values()))):
+        if words and any(map(_is_default, itertools.chain(*group.sources.values()))):
             words.append("Default gains are for a force: tune them for this u first.")
     return [*dict.fromkeys(words)]
 
 
-def _boards_of(
-    table: RunColumns,
-    metric: str,
-    ranked: Sequence[RankedGroup],
-    defaults: bool,
-    relevant: float,
-) -> dict[int, Board]:
-    """Return the board of a metric for each group, by its number, to which the metric applies.
-    Winners are corrected for all of them.
-    """
-    by_row = paired_runs.by_row(table, metric)
-    scores = []
-    compared = {}
-    for i, ranked_group in enumerate(ranked):
-        judged = [paired_runs.is_judged(scenario, metric) for scenario in ranked_group.ran]
-        of_group = ranked_group.group.scores(by_row, judged)
-        scores.append(of_group)
-        if of_group.blocks:
-            compared[i] = _compared(of_group, ranked_group.ran, metric, relevant)
-    corrected([*compared.values()])
-    family = _family(compared.values())
-    boards = {}
-    for i, comparison in compared.items():
-        group, ran, sources = ranked[i]
-        untuned = _untuned(sources, defaults)
-        boards[i] = _board(group, scores[i], ran, metric, comparison, untuned, sources, family)
-    return boards
+def _contest(
+    group: SourcedGroup, by_row: paired_runs.ByRow, metric: str, relevant: float
+) -> MetricContest | None:
+    """Compare the laws of a group in a metric; None where it does not apply."""
+    judged = [paired_runs.is_judged(scenario, metric) for scenario in group.ran]
+    scores = group.group.scores(by_row, judged)
+    if not scores.blocks:
+        return None
+    ran = [group.ran[k] for k in scores.blocks]
+    comparison = Comparison(
+        scores.values,
+        [paired_runs.floor(scenario, metric) for scenario in ran],
+        shares=metric == SETTLES,
+        outcomes=scores.outcomes,
+        sets=scores.sets,
+        relevant=relevant,
+        halves=scores.halves,
+        trends=scores.trends,
+        arrived=scores.arrived,
+        first_order=[scenario is not None and first_order(scenario) for scenario in ran],
+        powers=list(map(paired_runs.trend_power, ran)),
+    )
+    return MetricContest(
+        group=group.group.name,
+        metric=metric,
+        comparison=comparison,
+        blocks=[group.group.blocks[k] for k in scores.blocks],
+        seeds=[group.group.seeds[k] for k in scores.blocks],
+        ran=ran,
+        sets=scores.sets,
+        sources=group.sources,
+        unit=_unit(metric, ran),
+        x=paired_runs.unit_of_x(group.group.name["plant"], group.ran),
+    )
 
 
 def objective_boards(
@@ -198,9 +223,9 @@ def objective_boards(
 
     `sources` is by plant. Others as in `leaderboard`.
     """
-    compared = {}
+    contests = []
     for plant, runs in holdout.items():
-        compared[plant] = Comparison(
+        comparison = Comparison(
             runs.values,
             EPS * runs.least,
             sets=runs.sets,
@@ -208,86 +233,49 @@ def objective_boards(
             halves=runs.halves,
             arrived=runs.arrived,
         )
-    corrected([*compared.values()])
-    boards = []
-    for plant, comparison in compared.items():
-        untuned = _untuned(sources[plant], defaults)
-        sets = {}
-        for law, numbers in holdout[plant].sets.items():
-            sets[law] = np.atleast_2d(numbers)
-        about = (plant, "unseen runs"), int(comparison.seeds[0]), comparison, 0
-        block = _block(*about, untuned, "", OBJECTIVE)
-        boards.append(
-            Board(
-                group={"plant": plant},
-                metric=OBJECTIVE,
-                unit=UNITS[OBJECTIVE],
-                entries=_entries(comparison, sets, sources[plant]),
-                blocks=(block,),
-                family=_family(compared.values()),
-                relevant=relevant,
-                by_step=False,
-                summed=holdout[plant].conditions,
-            )
+        contest = MetricContest(
+            group={"plant": plant},
+            metric=OBJECTIVE,
+            comparison=comparison,
+            blocks=[(plant, "unseen runs")],
+            seeds=[int(comparison.seeds[0])],
+            ran=[None],
+            sets={law: np.atleast_2d(numbers) for law, numbers in runs.sets.items()},
+            sources=sources[plant],
+            unit=UNITS[OBJECTIVE],
+            summed=runs.conditions,
         )
+        contests.append(contest)
+    return _boards(contests, defaults)
+
+
+def _boards(contests: Sequence[MetricContest], defaults: bool) -> list[Board]:
+    """Return the boards of contests in a metric, whose winners are corrected for all of them."""
+    comparisons = [contest.comparison for contest in contests]
+    corrected(comparisons)
+    family = sum(len(compared.floors) for compared in comparisons if len(compared.laws) > 1) or 1
+    boards = []
+    for contest in contests:
+        repeated = not np.isnan(contest.comparison.halves).all()
+        blocks = [_block(contest, at, defaults) for at in range(len(contest.blocks))]
+        board = Board(
+            group=contest.group,
+            metric=contest.metric,
+            unit=contest.unit,
+            entries=_entries(contest.comparison, contest.sets, contest.sources),
+            blocks=tuple(blocks),
+            family=family,
+            relevant=contest.comparison.relevant,
+            by_step=not repeated and any(map(repeats_every_run, filter(None, contest.ran))),
+            x=contest.x,
+            summed=contest.summed,
+        )
+        boards.append(board)
     return boards
-
-
-def _family(comparisons: Iterable[Comparison]) -> int:
-    """Return the number of blocks for which winners are corrected."""
-    count = 0
-    for comparison in comparisons:
-        if len(comparison.laws) > 1:
-            count += len(comparison.floors)
-    return count or 1
-
-
-def _untuned(sources: Sources, defaults: bool) -> Names:
-    """Return the laws with default gains, over which no winner is named; none if `defaults`."""
-    if defaults:
-        return ()
-    untuned = []
-    for law, of_law in sources.items():
-        if any(map(_is_default, of_law)):
-            untuned.append(law)
-    return tuple(untuned)
 
 
 def _is_default(source: Source) -> bool:
     return source.kind == DEFAULT
-
-
-def _board(
-    group: RunGroup,
-    scores: Scores,
-    ran: Sequence[Scenario | None],
-    metric: str,
-    comparison: Comparison,
-    untuned: Names,
-    sources: Sources,
-    family: int,
-) -> Board:
-    """Return the board of a comparison, whose winners are corrected for `family` blocks."""
-    blocks = []
-    of_blocks = []
-    for block_number, k in enumerate(scores.blocks):
-        of_blocks.append(ran[k])
-        floor = paired_runs.floor_words(ran[k], metric)
-        about = group.blocks[k], group.seeds[k], comparison, block_number
-        block = _block(*about, untuned, floor, metric)
-        blocks.append(dataclasses.replace(block, bound=_bound(ran[k])))
-    repeated = not np.isnan(comparison.halves).all()
-    return Board(
-        group=group.name,
-        metric=metric,
-        unit=_unit(metric, of_blocks),
-        entries=_entries(comparison, scores.sets, sources),
-        blocks=tuple(blocks),
-        family=family,
-        relevant=comparison.relevant,
-        by_step=not repeated and any(map(repeats_every_run, filter(None, ran))),
-        x=paired_runs.unit_of_x(group.name["plant"], ran),
-    )
 
 
 def _bound(scenario: Scenario | None) -> float:
@@ -308,98 +296,61 @@ def _unit(metric: str, ran: Sequence[Scenario | None]) -> str:
     return UNITS[metric].replace("({u})", bracketed).replace("{u}", effort)
 
 
-def _compared(
-    scores: Scores, ran: Sequence[Scenario | None], metric: str, relevant: float
-) -> Comparison:
-    """Compare the scores of laws in a metric; `ran` has a scenario of each block of the group."""
-    floors = []
-    of_first_order = []
-    powers = []
-    for k in scores.blocks:
-        scenario = ran[k]
-        powers.append(paired_runs.trend_power(scenario))
-        floors.append(paired_runs.floor(scenario, metric))
-        of_first_order.append(scenario is not None and first_order(scenario))
-    return Comparison(
-        scores.values,
-        floors,
-        shares=metric == SETTLES,
-        outcomes=scores.outcomes,
-        sets=scores.sets,
-        relevant=relevant,
-        halves=scores.halves,
-        trends=scores.trends,
-        arrived=scores.arrived,
-        first_order=of_first_order,
-        powers=powers,
-    )
-
-
-def _block(
-    name: tuple[str, str],
-    seeds: int,
-    comparison: Comparison,
-    at: int,
-    untuned: Names,
-    floor: str,
-    metric: str,
-) -> Block:
-    """Return block `at` of a comparison, with its plant and condition, and the number of seeds."""
+def _block(contest: MetricContest, at: int, defaults: bool) -> Block:
+    """Return a block of a contest; `defaults`: whether a law may win over default gains."""
+    comparison, scenario = contest.comparison, contest.ran[at]
     laws = np.array(comparison.laws)
-    sets = comparison.sets[:, at]
-    by_step = {}
-    for law in comparison.laws:
-        change = comparison.step_change(at, law)
-        if change:
-            by_step[law] = change
-    centres = comparison.centres[:, at].tolist()
-    medians = dict(zip(comparison.laws, centres, strict=True))
-    without = comparison.without_value[:, at].tolist()
-    lacking = dict(zip(comparison.laws, without, strict=True))
-    best = comparison.best[:, at]
-    below = comparison.below[:, at]
-    low = comparison.centres[:, at] <= comparison.floors[at]
-    units = comparison.units[:, at]
-    away = comparison.away[:, at].any(axis=1)
+
+    def named(chosen: Array) -> Names:
+        return tuple(laws[chosen].tolist())
+
+    def by_law(values: Array) -> dict[str, Any]:
+        return dict(zip(comparison.laws, values.tolist(), strict=True))
+
+    medians = by_law(comparison.centres[:, at])
+    lacking = by_law(comparison.without_value[:, at])
+    best, below = comparison.best[:, at], comparison.below[:, at]
     few = ~comparison.ranked[:, at]
-    sets_of_few = dict(zip(laws[few].tolist(), units[few].tolist(), strict=True))
-    runs = int(comparison.seeds[at])
+    sets = comparison.sets[:, at]
     winner = comparison.winners[at]
     # by failed runs, then by median
     order = sorted(comparison.laws, key=lambda law: (law != winner, lacking[law], medians[law]))
-    unbeaten = []
-    ranked = []
-    for law in order:
-        if law in laws[best]:
-            unbeaten.append(law)
-        if law not in laws[few]:
-            ranked.append(law)
+    ranked = [law for law in order if law not in named(few)]
+    unbeaten = [law for law in order if law in named(best)]
     resolves, charged = _resolves(comparison, at, unbeaten)
+    changes = {law: comparison.step_change(at, law) for law in comparison.laws}
+    floor = paired_runs.floor_words(scenario, contest.metric)
+    runs = int(comparison.seeds[at])
+    untuned = []
+    if not defaults:
+        untuned = [law for law, of_law in contest.sources.items() if any(map(_is_default, of_law))]
+    plant, condition = contest.blocks[at]
     return Block(
-        plant=name[0],
-        condition=name[1],
+        plant=plant,
+        condition=condition,
         medians=medians,
         lacking=lacking,
-        best=tuple(laws[best].tolist()),
-        below=tuple(laws[below].tolist()),
-        rising=tuple(laws[low & ~below].tolist()),
+        best=named(best),
+        below=named(below),
+        rising=named((comparison.centres[:, at] <= comparison.floors[at]) & ~below),
         floor=floor,
-        away=tuple(laws[away].tolist()),
-        worse=tuple(laws[comparison.worse[:, at]].tolist()),
+        away=named(comparison.away[:, at].any(axis=1)),
+        worse=named(comparison.worse[:, at]),
         ahead=winner,
-        lead=_lead(comparison, at, ranked, floor, metric),
-        behind=_behind(comparison, at, order, label_of(metric)),
+        lead=_lead(comparison, at, ranked, floor, contest.metric),
+        behind=_behind(comparison, at, order, label_of(contest.metric)),
         level=bool(comparison.level[at][np.ix_(best, best)].all()),
         resolves=resolves,
         charged=charged,
-        by_step=by_step,
-        seeds=seeds,
+        by_step={law: change for law, change in changes.items() if change},
+        seeds=contest.seeds[at],
         runs=runs,
         samples=int(comparison.samples[at].max()) if len(laws) > 1 else runs,
         sets=min(sets[sets > 1].tolist(), default=1),
-        few=sets_of_few,
+        few=dict(zip(named(few), comparison.units[few, at].tolist(), strict=True)),
         single_set=bool((sets == 1).any()),
-        untuned=untuned,
+        untuned=tuple(untuned),
+        bound=_bound(scenario),
     )
 
 

@@ -31,7 +31,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from smc_mujoco.common import html
 from smc_mujoco.common.aliases import AnyPath, Fields
 from smc_mujoco.common.errors import (
     ScenarioError,
@@ -77,6 +76,7 @@ RESULT_COLUMNS = {
 RESULT_COLUMNS |= {"arrived": "bool", "touched": "bool"}
 RESULT_COLUMNS |= {"versions": "string", "scenario": "string"}
 PREVIEW = ("plant", "law", "source", "condition", "seed")
+FIRST_METRIC = len(PREVIEW)
 PREVIEW += ("settling_time", "ultimate_bound", "itae", "tv_rate", "failure")
 MAX_ROWS = 8  # of the preview in a notebook
 CASE = ("plant", "law", "condition")  # whose runs `print` sums up in a row
@@ -135,13 +135,11 @@ def write(path: Path, schema: "pa.Schema", groups: "Iterable[pa.Table]") -> None
         writer.add_key_value_metadata({DIGEST: digest.hexdigest()})
 
 
-def _text(value: object) -> object:
+def _text(value: object) -> str:
     """Return a value as a cell shows it."""
-    if value is None:
-        return ""
     if isinstance(value, float):
         return number(value)
-    return value
+    return "" if value is None else str(value)
 
 
 def _median(metric: str, values: np.ndarray) -> Cell:
@@ -280,11 +278,11 @@ class Table:
         for row in self.data.select(names).slice(0, MAX_ROWS).to_pylist():
             cells.append(list(map(_text, row.values())))
         rest = len(self) - len(cells)
-        if rest:
-            note = f"and {rest} more: Table.rows, Table.column"
-        else:
-            note = ""
-        return html.table(names, cells, repr(self), note, range(4, 9))
+        notes = [f"and {rest} more: Table.rows, Table.column"] if rest else []
+        table = Tabular(
+            headings=names, rows=cells, title=repr(self), notes=notes, name_columns=FIRST_METRIC
+        )
+        return table._repr_html_()
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
         """Return the rows as a stream of Arrow's C interface, as polars reads it."""

@@ -1,5 +1,6 @@
 """What a line says is what its fact holds, and words of answers are explained."""
 
+import dataclasses
 import math
 import re
 import shlex
@@ -11,6 +12,7 @@ from smc_mujoco.answers import answer, answers
 from smc_mujoco.answers.answer import Answer
 from smc_mujoco.answers.explain import explain, glossary
 from smc_mujoco.answers.facts import Fact, Lead, Open, Screen, Settles, Tied, Trails, Use
+from smc_mujoco.answers.templates import percent, said
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.tabular import Cell, Tabular
@@ -20,12 +22,13 @@ pytestmark = pytest.mark.quick
 
 def test_a_lead_names_law_rival_metric_and_both_ends():
     lines = dict(
-        answers.leads(
+        answers.verdict_lines(
             [
                 Lead(law="adrc", rival="pid", metric="J", low=0.213, high=0.254),
                 Lead(law="adrc", rival="pid", metric="ITAE", low=0.11, high=0.18),
                 Lead(law="adrc", rival="sta", metric="energy", low=0.5),
                 Lead(law="mine", rival="pid", metric="settling time", low=0.2, high=0.34),
+                Lead(law="mine", rival="", metric=answers.SHARE),
             ]
         )
     )
@@ -33,21 +36,19 @@ def test_a_lead_names_law_rival_metric_and_both_ends():
         "J 21 to 25 % and ITAE 11 to 18 % below pid; energy at least 50 % below sta"
     )
     assert re.findall(r"\d+", lines["mine"]) == ["20", "34"]
+    assert lines["mine"].endswith("; more settled runs than any rival")
 
 
 def test_a_line_of_evidence_has_the_ratio_with_its_interval_and_the_samples():
     fact = Lead(
         law="a", rival="b", metric="J", low=0.211, high=0.255, ratio=0.767, ahead=11, samples=12
     )
-    text = answers.verdict(fact)
+    text = answers.evidence(fact)
     assert "ratio 0.767, 0.745 to 0.789" in text
     assert "11 of 12 runs" in text
-
-
-def test_more_settled_runs_are_no_value_below_a_rival_s():
-    fact = Lead(law="a", rival="", metric=answers.SHARE)
-    ((law, text),) = answers.leads([fact])
-    assert (law, "more" in text, "below" in text) == ("a", True, False)
+    charged = Open(metric="J", laws=("a", "b"), hidden=0.3, charged=0.2)
+    assert "20 % is taken off" in answers.evidence(charged)
+    assert "taken off" not in answers.evidence(dataclasses.replace(charged, charged=0.0))
 
 
 @pytest.mark.parametrize(
@@ -61,49 +62,55 @@ def test_more_settled_runs_are_no_value_below_a_rival_s():
     ],
 )
 def test_shares_have_two_digits(low, high, text):
-    assert answers.percent(low, high) == text
+    assert percent(low, high) == text
+
+
+def text(fact):
+    return said(fact)[1]
 
 
 def test_the_law_to_use_comes_with_its_gains_and_the_laws_that_lead_elsewhere():
-    text = answers.use(
-        Use(
-            law="adrc",
-            gains="wc=30",
-            unless=(("ITAE", "pid", "kp=2"), ("J", "sta", ""), ("energy", "pid", "kp=2")),
-        )
-    )
-    assert text.index("adrc") < text.index("wc=30") < text.index("pid") < text.index("sta")
-    assert text.count("pid") == 1
-    assert "(" not in answers.use(Use(law="none", gains=""))
+    unless = ("ITAE", "pid", "kp=2"), ("J", "sta", ""), ("energy", "pid", "kp=2")
+    words = text(answers.use(Use(law="adrc", gains="wc=30", unless=unless)))
+    assert words.index("adrc") < words.index("wc=30") < words.index("pid") < words.index("sta")
+    assert words.count("pid") == 1
+    assert "(" not in text(answers.use(Use(law="none", gains="")))
+    assert text(answers.use(Use(law="a", gains="", rivals=("a", "b")))).startswith("Undecided")
 
 
 def test_settled_runs_are_counted_by_law():
-    all_but_one = [("a", Settles(12, 12)), ("b", Settles(7, 12))]
-    assert "b 7 of 12" in answers.settled(all_but_one)
-    assert "a " not in answers.settled(all_but_one)
-    assert "24" in answers.settled([("a", Settles(12, 12)), ("b", Settles(12, 12))])
-    assert "No run of 12" in answers.settled([("a", Settles(0, 12))])
+    all_but_one = text(answers.settled([("a", Settles(12, 12)), ("b", Settles(7, 12))]))
+    assert all_but_one == "Settled runs: b 7 of 12, all of the others."
+    every = [("a", Settles(12, 12)), ("b", Settles(12, 12))]
+    assert text(answers.settled(every)) == "All 24 runs settled."
+    assert text(answers.settled([("a", Settles(0, 12))])) == "No run of 12 settled."
 
 
 def test_a_law_that_loses_has_its_ratio_and_who_is_ahead():
-    label, text = answers.trails(
-        Trails(law="mine", leader="adrc", metric="J", times=1.783, ahead=("adrc", "pid"))
-    )
-    assert label == "mine"
-    assert "1.78 times adrc's" in text
-    assert "pid" in text
+    behind = {"law": "mine", "leader": "adrc", "metric": "J"}
+    both = Trails(**behind, times=1.783, ahead=("adrc", "pid"))
+    assert answers.verdict_lines([both]) == [("mine", "J 1.78 times adrc's; behind adrc and pid")]
+    alone = Trails(**behind, times=1.783, ahead=("adrc",))
+    assert answers.verdict_lines([alone]) == [("mine", "J 1.78 times adrc's")]
+    unknown = Trails(**behind, times=math.nan, ahead=("adrc",))
+    assert answers.verdict_lines([unknown]) == [("mine", "behind adrc")]
 
 
 def test_what_is_tied_and_what_is_open_stand_on_lines_of_their_own():
-    assert answers.ties([Tied(metric="J", laws=("a", "b"), floor="0.1 mrad")]) == ["J: a, b"]
-    seen, few = answers.opens(
-        [
-            Open(metric="J", laws=("a", "b"), hidden=0.12),
-            Open(metric="ITAE", laws=("a", "b"), needed=8, unit="sets"),
-        ]
-    )
-    assert ("12 %" in seen, "8 sets" in few) == (True, True)
-    assert answers.ties([]) == answers.opens([]) == []
+    facts = [
+        Open(metric="J", laws=("a", "b"), hidden=0.12),
+        Open(metric="energy", laws=("a", "b"), hidden=0.3),
+        Open(metric="ITAE", laws=("a", "b"), needed=8, unit="sets"),
+        Tied(metric="J", laws=("a", "b"), floor="0.1 mrad"),
+    ]
+    assert answers.verdict_lines(facts) == [
+        ("tied", "J: a, b"),
+        (
+            "open",
+            "J and energy: a, b (leads below 30 % might not show); "
+            "ITAE: a, b (deciding takes 8 sets)",
+        ),
+    ]
 
 
 def test_a_line_is_at_most_80_wide_and_a_command_can_be_pasted():

@@ -11,9 +11,8 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.result import Tuned
 from smc_mujoco.answers import answers, command
-from smc_mujoco.answers.facts import Fact, Lead, NextStep, Open, Screen, Settles, Span
+from smc_mujoco.answers.facts import Fact, Lead, NextStep, Screen, Settles, Span
 from smc_mujoco.answers.templates import as_text, said
-from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.robustness.margins import Margin, Margins
 from smc_mujoco.robustness.sensitivity import Sensitivity
 from smc_mujoco.robustness.worst_case import WorstCase, WorstCases
@@ -127,20 +126,6 @@ def test_a_sensitivity_says_its_spread_its_failures_and_what_to_narrow():
     assert "mass explains 30 to 60 % of the variance" in said(screen.heading)[1]
 
 
-def test_what_holds_at_worst_is_the_least_lead():
-    numbers = {"law": "a", "rival": "b", "metric": "J", "high": 0.5}
-    leads = {name: Lead(low=low, **numbers) for name, low in (("calm", 0.4), ("wind", 0.1))}
-    assert answers.verdicts(leads)[-1].startswith("at worst a wins: J 10 to 50 % below b")
-
-
-def test_of_several_metrics_the_largest_lead_that_might_not_show_is_said():
-    few = [
-        Open(metric=name, laws=("a", "b"), hidden=hidden)
-        for name, hidden in (("J", 0.1), ("ITAE", 0.3))
-    ]
-    assert answers.opens(few) == ["J and ITAE: a, b (leads below 30 % might not show)"]
-
-
 @pytest.mark.parametrize(
     ("value", "form", "text"),
     [
@@ -178,17 +163,6 @@ def test_facts_without_room_on_a_screen_are_counted_and_commands_stay():
     count = sum(line.startswith("doubt") for line in lines)
     assert f"{30 - count} lines" in next(line for line in lines if line.startswith("further"))
     assert lines[-2].split() == ["next", "smc-mujoco", "list"]
-
-
-def test_a_table_has_units_below_its_headings_and_says_what_it_omits():
-    cells = [Cell("1.0", strong=True), *["2.0"] * 12]
-    headings = ["", "settling time (s)", *[f"metric number {i} (rad)" for i in range(12)]]
-    lines, omitted = answers.table_lines(Tabular(headings=headings, rows=[["adrc", *cells]]))
-    assert max(map(len, lines)) <= answers.WIDTH
-    assert lines[2].split()[:2] == ["s", "rad"]
-    assert lines[3].split()[:3] == ["adrc", "1.0*", "2.0"]
-    assert omitted[-1] == "metric number 11"
-    assert len(omitted) + len(lines[3].split()) == len(headings)
 
 
 def test_a_doubtful_value_is_the_next_step_and_a_command_does_not_repeat_it():

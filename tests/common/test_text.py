@@ -92,9 +92,10 @@ def test_a_table_fits_into_a_width_with_all_its_words_marks_and_notes(width):
         "Another.",
     ):
         assert word in reported
-    ruled = min(k for k, line in enumerate(rows) if "─" in line)
-    assert any("law" in line for line in rows[:ruled])
-    assert any("pid" in line for line in rows[ruled:])
+    heads = [k for k, line in enumerate(rows) if line.startswith("law")]
+    units = rows[heads[0] + 1].split()
+    assert units[:3] == ["m", "s²", "m"]
+    assert rows[heads[0] + 2].startswith("pid")
 
 
 def test_a_table_for_notebooks_and_for_latex_has_all_its_words(snapshot):
@@ -104,8 +105,8 @@ def test_a_table_for_notebooks_and_for_latex_has_all_its_words(snapshot):
     assert any("2 of 9 fail" in cell for cell in cells)
     assert any("<b>1.2e-4</b>" in cell for cell in cells)
     assert TABLE.to_latex() == snapshot(name="latex")
-    long = Tabular(headings=["a"], rows=[["b"]] * 41)
-    assert long._repr_html_().count("<tr>") == 1 + 40 + 1
+    long = Tabular(headings=["a"], rows=[["b"]] * 100)
+    assert long._repr_html_().count("<tr>") == 1 + 99 + 1
     assert "and 1 more" in long._repr_html_()
     assert "addlinespace" not in long.to_latex()
 
@@ -161,8 +162,8 @@ def test_names_too_wide_for_a_line_are_broken_after_underscores():
     lines = str(Tabular(headings=headings, rows=[row], name_columns=7)).splitlines()
     assert max(map(len, lines)) <= tabular.PLAIN_WIDTH
     assert [line.split()[:2] for line in lines[-2:]] == [
-        ["inverted_", "super_twisting"],
-        ["pendulum"],
+        ["inverted_", "super_"],
+        ["pendulum", "twisting"],
     ]
 
 

@@ -18,6 +18,7 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.analysis.tuning.result import load_tuned
+from smc_mujoco.answers.explain import meaning
 from smc_mujoco.cli import main
 from smc_mujoco.cli.commands import options
 from smc_mujoco.common import html
@@ -26,7 +27,6 @@ from smc_mujoco.control import gain_sets
 from smc_mujoco.control.units import FORCE, RATE, Gain
 from smc_mujoco.robustness import worst_case
 from smc_mujoco.studies import batches, compare, fair_gains
-from smc_mujoco.studies.board_tables import UNDER
 from smc_mujoco.studies.leaderboard import METRICS, Holdout
 
 SHORT = {"duration": 0.5, "budget": 16, "progress": False}
@@ -161,8 +161,9 @@ def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
     last = found.leaderboard.tables[-1]
     rows = last.to_latex().partition("\nPID & ")[2].splitlines()
     assert rows[1].startswith(r"\footnotesize given & ")
-    assert f"{UNDER['shipped']} {UNDER['tuned here']}" in last.under[-1]
-    assert found.to_latex().count(UNDER["ITAE"]) == 1
+    assert meaning("shipped") in last.under[-1]
+    assert "`" not in last.under[-1]
+    assert found.to_latex().count(meaning("ITAE")) == 1
     assert found.to_latex().count(r"\begin{tabular}") == 6  # J on each plant, too
     assert found._repr_html_().count("<table") == 9  # times, runs and gains
     assert len(found.plot().axes) == 10  # of all five metrics, on both plants

@@ -5,11 +5,11 @@ over defaults.
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.answers.explain import meaning
 from smc_mujoco.answers.facts import Barred
 from smc_mujoco.cli import main
 from smc_mujoco.control import gain_sets
 from smc_mujoco.simulation import run_key
-from smc_mujoco.studies.board_tables import UNDER
 
 FAST, SLOW = (
     smc.law("observer_free", lam=6.0, k1=k1).named(name)
@@ -60,8 +60,7 @@ def test_boards_print_the_sources(folder):
     assert names == {"fast": "given", "slow": "default"}
     _, _, row = boards.to_latex().partition("\nslow & ")
     assert row.splitlines()[1].startswith(r"\footnotesize default & ")
-    for sentence in (UNDER["default"], UNDER["given"]):
-        assert sentence in boards.tables[0].under[-1]
+    assert meaning("default") in boards.tables[0].under[-1]
 
 
 def test_equal_gains_are_one_run_and_the_table_has_the_source_of_this_study(folder):

@@ -131,6 +131,7 @@ def _print_all(
     """
     with delay_signals():
         from smc_mujoco.cli import law_pages, tables
+        from smc_mujoco.common.tabular import of_fields
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.mechanisms.plant import catalogue as plants
         from smc_mujoco.metrics.catalogue import metrics
@@ -145,28 +146,26 @@ def _print_all(
         "Scenes, for smc-mujoco run": tables.listed(scene.scenes(), scene.question),
     }
     machine = as_plant(plant or "inverted_pendulum")
-    conditions = []
+    conditions = {}
     fit = applicable(NAMED, [machine], DURATION)
     for name, condition in NAMED.items():
         words = "not for this plant"
         if name in fit:
             words = condition.brief(machine, DURATION) or "the scenario's defaults"
-        conditions.append((name, words))
+        conditions[name] = words
     lists[f"Conditions, on {machine.name} for 10 s"] = conditions
-    lists["Metrics"] = [(metric.name, _about(metric)) for metric in metrics()]
+    lists["Metrics"] = {metric.name: _about(metric) for metric in metrics()}
     if names_alone:
-        terminal.printed += [tables.catalogue(title, rows) for title, rows in lists.items()]
-        pairs = [
-            (title.partition(",")[0], [name for name, _ in rows]) for title, rows in lists.items()
-        ]
+        terminal.printed += [of_fields(title, rows) for title, rows in lists.items()]
+        pairs = [(title.partition(",")[0], [*rows]) for title, rows in lists.items()]
         _print_names(terminal, pairs)
         return
     for title, rows in lists.items():
         listed = rows
         if kind not in title.lower():
-            listed = [row for row in rows if row[0] == kind]
+            listed = {name: about for name, about in rows.items() if name == kind}
         if listed:
-            terminal.print(tables.catalogue(title, listed), "")
+            terminal.print(of_fields(title, listed), "")
     terminal.print(
         "smc-mujoco list NAME shows a law or a plant in full; --need one-gain,continuous lists "
         "the laws that have both"

@@ -89,13 +89,10 @@ def rig(
 def _list(terminal: Terminal) -> None:
     """List the rigs."""
     with delay_signals():
-        from smc_mujoco.cli import tables
+        from smc_mujoco.common.tabular import of_fields
         from smc_mujoco.identification.published_rig import catalogue
 
-    rows = []
-    for name, entry in catalogue().items():
-        rows.append((name, entry.label))
-    terminal.print(tables.catalogue("Rigs", rows))
+    terminal.print(of_fields("Rigs", {name: entry.label for name, entry in catalogue().items()}))
 
 
 def _repeat(
@@ -111,9 +108,9 @@ def _repeat(
 ) -> None:
     """Show a record beside the runs of the rig's twins."""
     with delay_signals():
-        from smc_mujoco.cli import rig_tables
         from smc_mujoco.cli.run_scene import filmed
         from smc_mujoco.common.files import with_ending, writable
+        from smc_mujoco.common.tabular import Tabular
         from smc_mujoco.identification.published_rig import rig as find_rig
         from smc_mujoco.identification.records import load_record
         from smc_mujoco.simulation.run import run
@@ -131,7 +128,9 @@ def _repeat(
     for name, twin_shown in twins.items():
         if name != "twin":
             fits[name] = twin_shown.fits([record])[0]
-    terminal.print(rig_tables.fits(twin.label, fits))
+    rows = [(name, *(f"{value:z.1f}" for value in fit.values())) for name, fit in fits.items()]
+    heads = ["twin", *fits["twin"]]
+    terminal.print(Tabular(headings=heads, rows=rows, title=f"{twin.label}: fit, %"))
     title = f"{twin.name}: {file.stem}"
     if figure:
         from smc_mujoco.identification.residual_figure import residual_figure

@@ -25,11 +25,11 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from smc_mujoco.common import html
 from smc_mujoco.common.aliases import Fields, Names, Numbers
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.tabular import Cell, Tabular
 
 SUPPORTED = "supported"
 PARTLY = "partly supported"
@@ -358,9 +358,10 @@ class Claims(list[Claim]):
             words = f"{MARKS[claim.verdict]} {claim.verdict}"
             if claim.flips:
                 words += ", flips"
-            rows.append((claim.id, claim.text, claim.source, html.strong(words), decided))
+            rows.append((claim.id, claim.text, claim.source, Cell(words, strong=True), decided))
         heads = ("id", "claim", "whose, read", "verdict", "decided by")
-        return html.table(heads, rows, note=summary(self), max_rows=99)
+        table = Tabular(headings=heads, rows=rows, notes=[summary(self)], name_columns=5)
+        return table._repr_html_()
 
 
 def totals(claims: Sequence[Claim]) -> dict[str, int]:

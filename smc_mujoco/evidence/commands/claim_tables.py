@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from rich import box
-from rich.console import Console
-from rich.padding import Padding
-from rich.table import Column, Table
 from rich.text import Text
 
 from smc_mujoco.answers import answers
 from smc_mujoco.answers.command import instead
 from smc_mujoco.answers.facts import Fact, NextStep, Screen, Settles
 from smc_mujoco.cli.console import Terminal
+from smc_mujoco.common.tabular import Cell, Tabular, of_fields
 from smc_mujoco.common.text import capital
 from smc_mujoco.evidence.audit import verdict as verdicts
 from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Claim, measured
@@ -24,9 +21,7 @@ from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Claim, measure
 COLOURS = dict(zip(verdicts.VERDICTS, ("blue", "yellow", "red", "dim", "dim", "dim"), strict=True))
 COLOURS |= dict.fromkeys(verdicts.ANSWERS.values(), "cyan")
 MAX_NAMED = 8  # claims whose checks the next step shows; chosen
-CHECKED = {True: Text("✓", COLOURS[SUPPORTED]), False: Text("✗", COLOURS[REFUTED])}
-BARE = {"box": None, "padding": (0, 2, 0, 0), "pad_edge": False, "show_header": False}
-MARKS = {verdict: Text(mark, style=COLOURS[verdict]) for verdict, mark in verdicts.MARKS.items()}
+CHECKED = {True: Cell("✓", colour=COLOURS[SUPPORTED]), False: Cell("✗", colour=COLOURS[REFUTED])}
 
 
 def print_claims(claims: Sequence[Claim], terminal: Terminal, named: bool, full: bool) -> None:
@@ -69,27 +64,22 @@ def screen_of(claims: Sequence[Claim]) -> Screen:
     return Screen(facts=facts, next=step)
 
 
-def _claims_overview(claims: Sequence[Claim]) -> Table:
+def _claims_overview(claims: Sequence[Claim]) -> Tabular:
     """Return a table of claims: verdicts by set of gains, the words, and the check that decides for
     the last set.
     """
     sets = list(claims[0].verdicts)
-    columns = [Column("id", justify="right", style="cyan")]
-    columns.extend(Column(name, justify="center") for name in sets)
-    words = f"claim, verdict, whose (what was read)\ndecided by, {sets[-1]} gains"
-    options = {"padding": (0, 1, 0, 0), "show_edge": False, "pad_edge": False}
-    table = Table(*columns, words, box=box.SIMPLE_HEAD, **options)
+    rows = []
     for claim in claims:
-        marks = [MARKS[claim.verdicts[name]] for name in sets]
-        lines = Text.assemble(
-            (claim.text, "bold"),
-            "\n",
-            (_verdict(claim), COLOURS[claim.verdict]),
-            f"; {claim.source}\n",
-            (claim.decided(sets[-1]), "dim"),
-        )
-        table.add_row(claim.id, *marks, lines)
-    return table
+        verdict_of = claim.verdicts
+        marks = [
+            Cell(verdicts.MARKS[verdict_of[name]], colour=COLOURS[verdict_of[name]])
+            for name in sets
+        ]
+        below = f"{_verdict(claim)}; {claim.source}\n{claim.decided(sets[-1])}"
+        rows.append((claim.id, *marks, Cell(claim.text, below)))
+    words = f"claim, verdict, whose, decided by ({sets[-1]} gains)"
+    return Tabular(headings=("id", *sets, words), rows=rows, name_columns=len(sets) + 2)
 
 
 def _verdict(claim: Claim) -> str:
@@ -100,24 +90,15 @@ def _verdict(claim: Claim) -> str:
     return mark
 
 
-def _print_claim(claim: Claim, console: Console) -> None:
+def _print_claim(claim: Claim, terminal: Terminal) -> None:
     """Print one claim in full, then a table for each set of gains: its checks, and the numbers
     beside them.
     """
-    console.print(
-        Text.assemble((claim.id, "bold cyan"), f"  {claim.text}", (f"  {claim.where}", "dim"))
-    )
-    about = Table(Column(style="dim"), "", **BARE)
-    for label, text in claim.parts.items():
-        about.add_row(label, Text(text))
-    about.add_row("verdict", Text(_verdict(claim), f"bold {COLOURS[claim.verdict]}"))
-    console.print(Padding(about, (0, 0, 1, 2)))
+    about = {**claim.parts, "verdict": _verdict(claim)}
+    terminal.print(of_fields(f"{claim.id}  {claim.text}  {claim.where}", about), "")
     for name, verdict in claim.verdicts.items():
-        columns = "", "", Column(justify="right"), ""
-        title = Text(f"{name} gains: {verdict}", style=COLOURS[verdict])
-        table = Table(*columns, title=title, title_justify="left", **BARE)
-        for check in claim.checks(name):
-            table.add_row(CHECKED[check.holds], Text(check.what), *check.texts)
+        rows = [(CHECKED[check.holds], check.what, *check.texts) for check in claim.checks(name)]
         for what, value in claim.beside[name].items():
-            table.add_row("", Text(what, "dim"), Text(measured(value, what), "dim"), "")
-        console.print(Padding(table, (0, 0, 1, 2)))
+            rows.append((Cell(""), what, measured(value, what), ""))
+        title = f"{name} gains: {verdict}"
+        terminal.print(Tabular(headings=("",) * 4, rows=rows, title=title, name_columns=2), "")

@@ -108,10 +108,10 @@ def claims(
 
 def _list_claims(paper: "AuditedPaper", terminal: Terminal) -> None:
     """Print the claims of a paper, and end the command."""
-    from smc_mujoco.cli.tables import catalogue
+    from smc_mujoco.common.tabular import of_fields
 
-    rows = [(id, claim.text) for id, claim in paper.claims.items()]
-    terminal.print(catalogue(f"{paper.authors}: {paper.title}", rows))
+    texts = {id: claim.text for id, claim in paper.claims.items()}
+    terminal.print(of_fields(f"{paper.authors}: {paper.title}", texts))
     terminal.finish()
 
 
@@ -129,6 +129,7 @@ def _papers(listed: bool, new: Path | None, check: Path | None, terminal: Termin
     """Begin a paper of one's own, check evidence, or list the papers."""
     with delay_signals():
         from smc_mujoco.cli import tables
+        from smc_mujoco.common.tabular import of_fields
         from smc_mujoco.evidence.audit import evidence, paper
 
     if new:
@@ -142,9 +143,9 @@ def _papers(listed: bool, new: Path | None, check: Path | None, terminal: Termin
         about = f"{data['paper']['authors']}, {data['paper']['title']}"
         terminal.note(f"the seal is whole: {about}: {counts}", wrap=True)
     if listed:
-        rows = []
+        rows = {}
         for name, entry in paper.papers().items():
             line = f"{entry.authors}: {entry.title} ({entry.contents})"
-            rows.append((name, tables.with_package(line, paper.catalogue().package(name))))
-        terminal.print(tables.catalogue("Papers, for smc-mujoco claims --paper", rows))
+            rows[name] = tables.with_package(line, paper.catalogue().package(name))
+        terminal.print(of_fields("Papers, for smc-mujoco claims --paper", rows))
     terminal.finish()
