@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from smc_mujoco.answers.answers import screen_lines
+from smc_mujoco.answers.answers import screen_html, screen_lines
 from smc_mujoco.answers.explain import explain
 from smc_mujoco.answers.facts import Screen
 from smc_mujoco.common import html
@@ -81,7 +81,7 @@ class Answer(Tables):
 
     def _repr_html_(self) -> str:
         evidence = f"<details><summary>all tables</summary>{super()._repr_html_()}</details>"
-        return _preformatted(self.lines) + evidence
+        return screen_html(self.screen) + evidence
 
     def to_html(self, path: AnyPath) -> Path:
         """Write the answer and all its evidence as one page that needs no other file.
@@ -98,7 +98,7 @@ class Answer(Tables):
           ScenarioError: a file that cannot be written.
         """
         screen = dataclasses.replace(self.screen, report="")  # the page does not point at itself
-        parts = [_preformatted(screen_lines(screen)), *self.pictures]
+        parts = [screen_html(screen), *self.pictures]
         for table in self.tables:
             parts.append(table._repr_html_())
         if self.words:
@@ -109,17 +109,3 @@ class Answer(Tables):
         with replacing(Path(path)) as file:
             file.write_text(page, encoding="utf-8")
         return Path(path)
-
-
-def _preformatted(lines: Sequence[str]) -> str:
-    """Return lines as HTML, in their columns: those of the first part, which may be a table, in
-    letters that let them fit a phone, where those of the others are broken.
-    """
-    table, *parts = "\n".join(lines).split("\n\n")
-    columns = max(map(len, table.split("\n")))
-    style = f"overflow-x:auto;--columns:{columns}"
-    blocks = [f'<pre style="{style}">{html.text(table)}</pre>']
-    if parts:
-        text = "\n\n".join(parts)
-        blocks.append(f'<pre style="overflow-x:auto">{html.text(text)}</pre>')
-    return "".join(blocks)

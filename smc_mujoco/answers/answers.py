@@ -10,7 +10,7 @@ import math
 import shlex
 import textwrap
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from smc_mujoco.answers.command import PROGRAM, doubted
 from smc_mujoco.answers.facts import (
@@ -31,6 +31,7 @@ from smc_mujoco.answers.facts import (
     Verdict,
 )
 from smc_mujoco.answers.templates import LARGEST, said
+from smc_mujoco.common import html
 from smc_mujoco.common.tabular import Tabular, as_cell
 from smc_mujoco.common.text import joined
 
@@ -38,7 +39,6 @@ WIDTH = 80  # characters of a line
 LINES = 24  # of a screen
 BELOW = 2  # lines that a command prints below a screen, such as its files
 MAX_CONTESTS = 5  # that have a block each; more have one table of winners
-MAX_SUMMED = 2  # conditions that a block names as those of J; chosen
 SHARE = "settled runs"  # the metric that is a share
 ON_PLANT = "J"  # the metric that is of all conditions of a plant
 Labelled = tuple[str, str]  # the label of a line, and its text
@@ -54,48 +54,77 @@ KINDS: dict[type, tuple[str, tuple[str, ...]]] = {
 }
 
 
+class Block(NamedTuple):
+    """What is said of some numbers: their tables between a heading and notes, the law to use, and
+    lines below it.
+    """
+
+    heading: Sequence[Fact] = ()
+    tables: Sequence[Tabular] = ()
+    notes: Sequence[Fact] = ()
+    advice: Sequence[Fact] = ()
+    pairs: Sequence[Labelled] = ()
+
+
+def blocks(screen: Screen) -> list[Block]:
+    """Return what a screen says: a block for each contest, or one for many; the rest; the next
+    step, and where there is more.
+    """
+    contests = screen.contests
+    said_of = [_winners(contests)] if len(contests) > MAX_CONTESTS else [*map(block_of, contests)]
+    if screen.heading or screen.tables or screen.notes:
+        heading = [screen.heading] if screen.heading else []
+        said_of.append(Block(heading, screen.tables, screen.notes))
+    pairs = [*map(line_of, screen.facts), *([next_step(screen.next)] if screen.next else [])]
+    if screen.report or screen.word:
+        explained = f"{PROGRAM} explain {screen.word}" if screen.word else ""
+        pairs.append(("more", "; ".join(filter(None, (screen.report, explained)))))
+    return [*said_of, Block(pairs=pairs)] if pairs else said_of
+
+
 def screen_lines(screen: Screen) -> list[str]:
     """Return the answer of a result: what was asked, its tables, what is best, what to do next.
 
     Facts for which a screen has no room are counted.
     """
-    blocks = []
-    if len(screen.contests) > MAX_CONTESTS:
-        blocks.append(_winners(screen.contests))
-    else:
-        blocks += map(contest_lines, screen.contests)
-    if screen.heading or screen.tables or screen.notes:
-        blocks.append(_block(screen.heading, screen.tables, screen.notes))
-    pairs = list(map(line_of, screen.facts))
-    ends = [next_step(screen.next)] if screen.next else []
-    if screen.report or screen.word:
-        explained = f"{PROGRAM} explain {screen.word}" if screen.word else ""
-        ends.append(("more", "; ".join(filter(None, (screen.report, explained)))))
-    lines = "\n\n".join(map("\n".join, blocks)).splitlines()
-    if (screen.contests or screen.tables) and (pairs or ends):
-        lines.append("")
-    if not screen.contests:
-        pairs = _fitting(pairs, LINES - BELOW - len([*lines, *labelled(ends)]))
-    return [*lines, *labelled([*pairs, *ends])]
+    *said_of, last = blocks(screen) or [Block()]
+    parts = ["\n".join(_block_lines(block)) for block in said_of]
+    lines = "\n\n".join(parts).splitlines()
+    gap = [""] if any(block.tables for block in said_of) else []
+    if not screen.contests and screen.facts:
+        count = len(screen.facts)
+        ends = last.pairs[count:]
+        room = LINES - BELOW - len([*lines, *gap, *labelled(ends)])
+        last = last._replace(pairs=[*_fitting(last.pairs[:count], room), *ends])
+    return [*lines, *gap, *_block_lines(last)]
 
 
-def _block(
-    heading: Fact | None,
-    tables: Sequence[Tabular],
-    notes: Iterable[Fact],
-    advice: Iterable[Fact] = (),
-    pairs: Iterable[Labelled] = (),
-) -> list[str]:
-    """Return what is said of some numbers: their tables between a heading and notes, the law to
-    use, and lines below it.
-    """
-    lines = paragraph([heading] if heading else [])
-    for k, table in enumerate(tables):
+def _block_lines(block: Block) -> list[str]:
+    """Return the lines of a block."""
+    lines = paragraph(block.heading)
+    for k, table in enumerate(block.tables):
         lines += [*[""] * (k > 0), *str(table).splitlines()]
-    lines += paragraph(notes)
-    for fact in advice:
-        lines += ["", *paragraph([fact])]
-    return [*lines, *labelled(pairs)]
+    lines += paragraph(block.notes)
+    if block.advice:
+        lines += ["", *paragraph(block.advice)]
+    return [*lines, *labelled(block.pairs)]
+
+
+def screen_html(screen: Screen) -> str:
+    """Return an answer as HTML, whose lines the browser breaks."""
+    parts = []
+    for block in blocks(screen):
+        parts += [_html(block.heading), *(table._repr_html_() for table in block.tables)]
+        parts += [_html(block.notes), _html(block.advice)]
+        if block.pairs:
+            lines = Tabular(headings=("", ""), rows=block.pairs, name_columns=2)
+            parts.append(lines._repr_html_())
+    return "\n".join(parts)
+
+
+def _html(facts: Sequence[Fact]) -> str:
+    """Return the texts of facts as a paragraph of HTML."""
+    return f"<p>{html.text(' '.join(said(fact)[1] for fact in facts))}</p>" if facts else ""
 
 
 def paragraph(facts: Iterable[Fact]) -> list[str]:
@@ -248,18 +277,15 @@ def sample(fact: Sample) -> Fact:
     )
 
 
-def contest_lines(contest: Contest) -> list[str]:
-    """Return the block of a plant in a condition: the table, the law to use, who leads."""
+def block_of(contest: Contest) -> Block:
+    """Return what is said of a plant in a condition: the table, the law to use, who leads."""
     about = {"plant": contest.plant, "condition": contest.condition}
     starred = any(as_cell(cell).strong for row in contest.table.rows for cell in row)
     notes = [Fact("star"), Fact("lower")] if starred else [Fact("lower")]
     if contest.settled:
         notes.append(settled(contest.settled))
-    if summed := contest.summed:
-        count = len(summed) if len(summed) > MAX_SUMMED else None
-        notes.append(Fact("summed", count=count, conditions=summed, condition=contest.condition))
-    return _block(
-        Fact("contest", **about, sample=sample(contest.sample)),
+    return Block(
+        [Fact("contest", **about, sample=sample(contest.sample))],
         [contest.table],
         notes,
         [use(contest.use)] if contest.use else [],
@@ -267,17 +293,17 @@ def contest_lines(contest: Contest) -> list[str]:
     )
 
 
-def _winners(contests: Sequence[Contest]) -> list[str]:
+def _winners(contests: Sequence[Contest]) -> Block:
     """Return one table of the winners on many plants in many conditions, and what holds on each
     plant.
     """
     heads = [heading.partition(" (")[0] for heading in contests[0].table.headings]
-    columns = [i for i, head in enumerate(heads) if head not in ("", ON_PLANT)]
+    columns = [i for i, head in enumerate(heads) if head.split(" over ")[0] not in ("", ON_PLANT)]
     rows = []
     of_plants: dict[str, str] = {}
     for contest in contests:
         fact_of = {fact.metric: fact for fact in contest.verdicts}
-        row = [f"{contest.plant} {contest.condition}"]
+        row = [contest.plant, contest.condition]
         for i in columns:
             fact = fact_of.get(heads[i])
             row.append(_winner(fact, contest) if fact else as_cell(contest.table.rows[0][i]).text)
@@ -287,15 +313,12 @@ def _winners(contests: Sequence[Contest]) -> list[str]:
             ((label, text),) = verdict_lines([fact])
             said_of = Fact("of plant", advice=advice, label=label, text=text)
             of_plants[contest.plant] = said(said_of)[1]
-    return _block(
-        Fact("contests", count=len(contests), sample=sample(contests[0].sample)),
-        [
-            Tabular(
-                headings=["", *(heads[i] for i in columns)], rows=rows, name_columns=len(rows[0])
-            )
-        ],
+    heads = ["", "", *(heads[i] for i in columns)]
+    return Block(
+        [Fact("contests", count=len(contests), sample=sample(contests[0].sample))],
+        [Tabular(headings=heads, rows=rows, name_columns=len(heads))],
         [Fact("winners")],
-        pairs=of_plants.items(),
+        pairs=[*of_plants.items()],
     )
 
 

@@ -177,7 +177,6 @@ class Contest:
     condition: str
     sample: Sample
     table: Tabular  # a law a row, a metric a column; a winner's number is strong
-    summed: Names  # the conditions that J sums; () without J
     settled: tuple[tuple[str, Settles], ...]  # by law
     use: Use | None  # None if no law is to be preferred
     verdicts: tuple[Verdict, ...]

@@ -39,10 +39,6 @@ TEXTS = {
         "{seeds:run} a law[ ({distinct} distinct)], [gains of {sets} searches|gains of at least "
         "{least} searches|one set of gains][{single} (some laws: one set)]",
     ),
-    "summed": (
-        "",
-        "J is over [{count} tuning conditions|{conditions}], the rest under {condition}.",
-    ),
     "contest": ("", "{plant} under {condition}: {sample}"),
     "contests": ("", "{count} plants and conditions: {sample}"),
     "winners": (
@@ -114,7 +110,7 @@ TEXTS = {
         "Undecided",
         "[{raced} of {named} laws|each law] got [{shorter:shorter set}|{sets:set}][; deciding "
         "takes {needed}][ ({minutes:minute} more)][{close}, too close for more to tell];[ open "
-        "between {laws};| open between {many:law};] for now {law}",
+        "between {laws};] for now {law}",
     ),
     # which: the law
     "gains": ("{law}", GAINS),
@@ -147,6 +143,7 @@ TEXTS = {
         "{percent:.3g} % under {where}[, above the limit of {limit:g} %|: --need 'overshoot<10']",
     ),
     "limit": ("limit", "{runs} runs break {limits}, or fail"),
+    "late": ("beware", "it fails beyond a delay of {delay:ms}: measure that of your loop"),
     "no room": ("no room", "tuned at a delay of {delay:ms}, it fails at {fails:ms}"),
     "no margin": ("margins", "none: the error does not end below 5 % of its start"),
     "helped": (
@@ -155,7 +152,7 @@ TEXTS = {
     ),
     "at end": ("gains", f"{{gains}} at an end of its search: {BEYOND}"),
     "needless": ("without", "all runs settle with u = 0 under {where}: no law is needed there"),
-    "no time": ("no time", "for {laws}"),
+    "no time": ("no time", "for [{laws}|{many:law}]"),
     "left out": ("left out", "{law}: {reason}"),
     # tune
     "law on plant": ("", "{law} on {plant}"),
@@ -182,7 +179,10 @@ TEXTS = {
         "{plant}, {metric}, worst of {runs:run} a law, half of them drawn at random; bounds: "
         "{bounds}",
     ),
-    "may be worse": ("", "Lower is better. A worse case may exist."),
+    "may be worse": (
+        "",
+        "Lower is better. One search: a worse case may exist, and no lead is tested.",
+    ),
     # sensitivity
     "explains": (
         "",
@@ -195,7 +195,8 @@ TEXTS = {
     # identify
     "fits": (
         "",
-        "fits {fit}[, held out {held_out}] ([{pieces}pieces of 1 s|whole logs], worst column)",
+        "± is one standard error. Fits {fit}[, held out {held_out}] ([{pieces}pieces of 1 s|whole "
+        "logs], worst column)",
     ),
     "files": (
         "",
@@ -212,7 +213,8 @@ TEXTS = {
         "{entry} in {suite}: [not led by any of {others:other} in {level} problems|led in each of "
         "{problems} problems by some of {others:other}]",
     ),
-    "leaders": ("", "* no other entry leads. Errors are in counts; lower is better."),
+    "leaders": ("", "* no other entry leads."),
+    "counts": ("", "Errors are in counts; lower is better."),
     # list
     "listed": ("more", f"{PROGRAM} list laws has a line about each, list NAME a page"),
 }

@@ -10,10 +10,11 @@ ALL = "--help-all"
 ASKED, GAINS, OUTPUT, RARE = "What is asked", "Runs and gains", "Output", "Rarely used"
 # option -> its group; the others are of what is asked
 GROUPS: dict[str, str] = {}
-GROUPS |= dict.fromkeys(("--seeds", "--searches", "--quick", "--minutes", "--gains"), GAINS)
-GROUPS |= dict.fromkeys(("--out", "--figure", "--full", "--json", "--help"), OUTPUT)
+GROUPS |= dict.fromkeys(("--seeds", "--quick", "--minutes"), GAINS)
+GROUPS |= dict.fromkeys(("--out", "--figure", "--full", "--help"), OUTPUT)
 GROUPS |= dict.fromkeys(("--tune", "--worst", "--latex", "--rig", "--film", "--falling"), RARE)
-GROUPS |= dict.fromkeys(("--seed", "--relevant", "--allow-defaults"), RARE)
+GROUPS |= dict.fromkeys(("--seed", "--relevant", "--allow-defaults", "--searches"), RARE)
+GROUPS |= dict.fromkeys(("--gains", "--json", "--duration"), RARE)
 GROUPS |= dict.fromkeys(("--threads", "--device", "--executor"), RARE)
 MANY = 16  # options, with which a command's help has groups; chosen
 _wants_all: ContextVar[bool] = ContextVar("wants_all", default=False)

@@ -23,9 +23,7 @@ caption, td[colspan] div {{ position: sticky; left: 0; max-width: min(70ch, 100v
 caption, th:first-child, td:first-child {{ padding-left: 0 !important; }}
 img {{ display: block; width: 100%; height: auto; }}
 @media (max-width: {PHONE}px) {{
-  table {{ font-size: 14px; }}
-  pre {{ white-space: pre-wrap;
-    font-size: min(13px, (100vw - 34px) / var(--columns, 1) / 0.61); }} }}
+  table {{ font-size: 14px; }} }}
 @media (prefers-color-scheme: dark) {{
   img {{ filter: invert(0.9) hue-rotate(180deg); mix-blend-mode: lighten; }} }}
 """

@@ -285,7 +285,7 @@ class TrackingBoard:
         return Screen(
             heading=Fact("entered", **about, others=len(self.entries) - 1),
             tables=[Tabular(headings=headings, rows=rows)],
-            notes=[Fact("leaders")],
+            notes=[*[Fact("leaders")] * bool(count), Fact("counts")],
         )
 
     def shares(self) -> dict[str, float]:

@@ -16,6 +16,7 @@ from smc_mujoco.answers.facts import (
 )
 from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.tabular import Cell, Tabular
+from smc_mujoco.common.text import counted
 from smc_mujoco.studies.board import Block, Board
 from smc_mujoco.studies.board_numbers import heading, in_order, size
 
@@ -68,7 +69,6 @@ def _contest(columns: Sequence[Column], gains: Mapping[str, str], own: Names) ->
         condition=last.condition,
         sample=last.sample,
         table=Tabular(headings=["", *(_heading(board) for board, _ in with_numbers)], rows=rows),
-        summed=columns[0][0].summed,
         settled=_settled(columns),
         use=_use(columns, verdicts, gains),
         verdicts=tuple(verdicts),
@@ -80,8 +80,12 @@ def _contest(columns: Sequence[Column], gains: Mapping[str, str], own: Names) ->
 
 
 def _heading(board: Board) -> str:
-    """Return the heading of a board; beside a variation of u stands its share."""
+    """Return the heading of a board: J with the number of conditions that it sums, a variation of u
+    with its share.
+    """
     text = heading(board)
+    if board.summed:
+        return text.replace(" (", f" over {counted(len(board.summed), 'condition')} (")
     return f"{text.removesuffix(')')} (of bound))" if _has_share(board) else text
 
 

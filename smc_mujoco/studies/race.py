@@ -52,6 +52,7 @@ from smc_mujoco.studies.answer_time import AnswerTime
 from smc_mujoco.studies.fair_gains import Candidate, Trial
 from smc_mujoco.studies.study import REPEATED_SEEDS
 
+SETS = "sets of gains tried"  # what a bar counts
 LOOKS = (7, 12)  # numbers of sets after which the laws are judged
 WITHIN = 24  # sets that would decide, above which a race ends at the first look; chosen
 TIMED = 2  # sets after which the number of sets that fit is known: the first compiles, too
@@ -245,7 +246,7 @@ def race(course: RaceCourse, entrants: Sequence[Entrant], relevant: float) -> Ra
     stopped = False
     laws = [entrant for entrant in entrants if entrant.searched]
     count = len(entrants)
-    with bar("set of gains", LOOKS[0] * count, course.trial.progress, counted=True) as progress:
+    with bar(SETS, LOOKS[0] * count, course.trial.progress, counted=True) as progress:
         progress.latest = clock.ends
         begin = time.monotonic()
         in_folder = _are_kept(course, [RaceSearch(entrant, 0) for entrant in searched(entrants)])
@@ -277,8 +278,9 @@ def race(course: RaceCourse, entrants: Sequence[Entrant], relevant: float) -> Ra
                 for name in dropped:
                     del running[name]
                 if dropped:
-                    names = joined([*dropped]) if len(dropped) < TOLD else f"{len(dropped)} laws"
-                    progress.says(f"{names} dropped: set of gains")
+                    names = joined("u = 0" if name == WITHOUT else name for name in dropped)
+                    told = names if len(dropped) < TOLD else f"{len(dropped)} laws"
+                    progress.says(f"{SETS} (out of the race: {told})")
             if k + 1 in LOOKS:
                 comparison, looked = judged(running, course.goal, relevant), k + 1
                 if comparison is None or comparison.winners[0] or needed(comparison) > WITHIN:
@@ -316,12 +318,12 @@ def _first_sets(
     """
     clock = course.clock
     ready = [entrant for entrant in entrants if not entrant.searched]
-    progress.says("runs without a law, and with given gains: set of gains")
+    progress.says(f"{SETS} (now u = 0 and given gains)")
     _judge(course, ready, 1)
     if ready and math.isfinite(clock.ends):  # once more, as the first runs compiled
         _judge(course, ready[:1], 2)
         del ready[0].J[1:]
-    progress.says("set of gains", float(len(ready)))
+    progress.says(SETS, float(len(ready)))
     pieces = [RaceSearch(entrant, 0) for entrant in searched(entrants)]
     start = time.monotonic()
     for i, result in _results(course, pieces, clock.first_sets_end, shorten=True):
@@ -398,7 +400,7 @@ def _tell_if_short(progress: Bar, done: int, seconds: float, rounds: Sequence[fl
     fit = done + seconds / _expected(rounds)
     if fit < LOOKS[0]:
         enough = f"{LOOKS[0]} can name a winner"
-        progress.what = f"about {math.floor(fit)} sets of each law fit, and {enough}: set of gains"
+        progress.what = f"{SETS} (about {math.floor(fit)} of each law fit, and {enough})"
 
 
 def hopeless(J: Mapping[str, Sequence[float]]) -> dict[str, float]:

@@ -100,6 +100,7 @@ class Question(NamedTuple):
     metrics: Sequence[str]  # of the tables
     relevant: float  # as in `ranking`
     untried_laws: Sequence[str]  # further laws of the package that suit
+    asked: bool = True  # whether the user named conditions
 
 
 def recommend(
@@ -173,7 +174,7 @@ def recommend(
         tuned=tunings.get(first.name),
         left_out=left_out,
         untried_laws=question.untried_laws,
-        judged=_judged(trial, goal),
+        judged=_judged(trial, goal, question.asked),
         folder=trial.folder,
         pictured=clock.left + clock.spare > 2.0 * clock.pace * base.work,
     )
@@ -438,9 +439,11 @@ def _weighed(course: RaceCourse, law: Component) -> tuple[dict[str, float], NoLa
     )
 
 
-def _judged(trial: Trial, goal: Objective) -> dict[str, bool]:
-    """Return the conditions that J is of, and whether each was asked for."""
-    by_user = {condition.name for condition in trial.conditions}
+def _judged(trial: Trial, goal: Objective, asked: bool) -> dict[str, bool]:
+    """Return the conditions that J is of, and whether each was asked for; if none was, the nominal
+    one is.
+    """
+    by_user = {condition.name for condition in trial.conditions} if asked else {"nominal"}
     return {condition.name: condition.name in by_user for condition in goal.conditions}
 
 

@@ -36,7 +36,8 @@ from smc_mujoco.studies.table import Table
 RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
 FAR_OVER = 20.0  # %, an overshoot beyond which the answer says so; chosen
 NO_ROOM = 1.5  # times the delay of a condition: a margin within that leaves no room; chosen
-MOST_NAMED = 5  # laws that the first line names
+LEAST_DELAY = 5e-3  # s, of a usual loop with a bus and a filter; a margin below is told; chosen
+MOST_NAMED = 5  # laws that a line names
 MORE_MINUTES = 30  # of a next step, where the time that is needed is not known
 LATER = 1.2  # times an estimate: a time that it is likely to keep
 NOWHERE = Span(math.nan, math.nan)
@@ -150,18 +151,18 @@ class Recommendation(Answer):
         """
         if not self.race.laws:
             return "untried"
-        if len(self.never_settled) == len(self.settled[self.law.name]):
+        if len(self._vetoing) == len(self.settled[self.law.name]):
             return "unsettled"
         of_law = self.race.entrants[self.law.name].values if self.limits else []
         if of_law and min(of_law) >= LIMIT_COST:  # and those of the other laws, which come after it
             return "unkept"
         if self.law.name == WITHOUT:
-            return "unsettled" if self.never_settled else "unneeded"
+            return "unsettled" if self._vetoing else "unneeded"
         alone = len(self.race.laws) == 1 and WITHOUT in self.race.dropped
         decided = alone or (self.lead and {*self.race.first} <= {*self.rivals, self.law.name})
         if not decided or self.race.unsearched:
             return "undecided"
-        return "unsettled" if self.never_settled else "law"
+        return "unsettled" if self._vetoing else "law"
 
     @property
     def over_sets(self) -> bool:
@@ -235,6 +236,14 @@ class Recommendation(Answer):
         return never
 
     @property
+    def _vetoing(self) -> list[str]:
+        """Those of these conditions that were asked for, so that no law is the answer."""
+        never = self.never_settled
+        if len(never) == len(self.settled[self.law.name]):
+            return never
+        return [name for name in never if self.judged.get(name)]
+
+    @property
     def unsettled_in(self) -> dict[str, Settles]:
         """Condition -> how many runs of the law settle, where it does not do so reliably."""
         unsettled = {}
@@ -265,21 +274,19 @@ class Recommendation(Answer):
             return Fact(kind, runs=self.runs, lead=self.lead, **tried)
         if form == "undecided":
             laws = self.undecided
-            many = len(laws) > MOST_NAMED
             return Fact(
                 form,
                 **{"shorter" if race.shorter else "sets": race.sets},
                 needed=self.sets_needed if self.sets_needed > race.sets else None,
                 minutes=self.minutes_needed,
                 close=not self.sets_needed,
-                laws=laws if len(laws) > 1 and not many else (),
-                many=len(laws) if many else None,
+                laws=laws if 1 < len(laws) <= MOST_NAMED else (),
                 law=self.law.name,
                 **tried,
             )
         if form == "law":
             return self._gains(form)
-        never, limits = self.never_settled, list(map(str, self.limits))
+        never, limits = self._vetoing, list(map(str, self.limits))
         about = {"law": self.law.name, "never": never, "limits": limits}
         return Fact(form, minutes=self.minutes_needed, **about, **tried)
 
@@ -335,8 +342,9 @@ class Recommendation(Answer):
         for name, runs in self.unsettled_in.items():
             if name not in never:
                 cautions.append(Fact("rare", where=name, runs=runs))
-        if never and self.form != "unsettled":  # whose first line says so
-            cautions.append(Fact("never", where=never))
+        first = self._vetoing if self.form == "unsettled" else []  # whose first line says so
+        if further := [name for name in never if name not in first]:
+            cautions.append(Fact("never", where=further))
         if self.pictured and self.unsettled_in and leans(self.worst_trace):
             cautions.append(Fact("leans", where=str(self.worst_run.condition)))
         if self.apart:
@@ -394,8 +402,12 @@ class Recommendation(Answer):
                 cautions.append(Fact("no margin"))
                 break
             beyond = margin.value + margin.resolution
-            if margin.kind == "delay" and delay and not margin.open and beyond <= NO_ROOM * delay:
+            if margin.kind != "delay" or margin.open:
+                continue
+            if delay and beyond <= NO_ROOM * delay:
                 cautions.append(Fact("no room", delay=delay, fails=beyond))
+            elif beyond < LEAST_DELAY:
+                cautions.append(Fact("late", delay=margin.value))
         if self.tolerance.helped and any(margin.kind == "friction" for margin in self.margins):
             opposed = self.tolerance.opposed
             values = {"value": opposed.value, "unit": opposed.unit} if opposed else {}
@@ -415,7 +427,9 @@ class Recommendation(Answer):
         if self.no_law and self.no_law.needless and self.form != "unneeded":
             cautions.append(Fact("needless", where=self.no_law.needless))
         if self.race.unsearched and self.form != "untried":
-            cautions.append(Fact("no time", laws=self.race.unsearched))
+            laws = self.race.unsearched
+            few = len(laws) <= MOST_NAMED
+            cautions.append(Fact("no time", laws=laws if few else (), many=len(laws)))
         for name, why in self.left_out.items():
             cautions.append(Fact("left out", law=name, reason=why))
         return cautions
@@ -443,10 +457,12 @@ class Recommendation(Answer):
             command = instead("compare", {"--law": laws}, ("--condition", "--x0"))
             return NextStep(command, "shows where the laws differ")
         if self.apart:
-            combined = again({"--condition": "+".join(self.settled[self.law.name])})
+            names = "+".join(self.settled[self.law.name])
+            combined = again({"--condition": names, "--out": f"{self.folder}-at-once"})
             return NextStep(combined, "searches gains for all conditions at once")
         if self.untried_laws:
-            wide = again({"--law": None, "--minutes": str(MORE_MINUTES)}, ("--quick",))
+            other = {"--law": None, "--minutes": str(MORE_MINUTES)}
+            wide = again(other | {"--out": f"{self.folder}-all-laws"}, ("--quick",))
             count = len(self.untried_laws)
             return NextStep(wide, f"tries the usual ones of {count} other laws, too")
         gains = self._file or gains_text(self.law.gains).replace(" ", "")

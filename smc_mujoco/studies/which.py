@@ -141,7 +141,7 @@ def which(
     )
     names = {law.name for law in chosen}
     untried = [law.name for law in _of_package(machine, properties) if law.name not in names]
-    question = Question(chosen, shown_metrics, relevant, untried)
+    question = Question(chosen, shown_metrics, relevant, untried, conditions is not None)
     goal = trial.asked_goal(machine, limits)
     recommendation = recommend(trial, machine, question, goal, AnswerTime.within(began, minutes))
     recommendation.save()

@@ -137,6 +137,14 @@ def test_an_unknown_name_is_answered_with_the_nearest_or_with_all(typed):
     assert str(unknown("law", typed, LAWS)) == f"unknown law {typed!r}: {NAMES[typed]}"
 
 
+def test_of_many_names_three_are_said_and_where_all_are():
+    many = [f"law_{letter}" for letter in "abcdefghijklm"]
+    said = str(unknown("law", "zzz", many))
+    assert said.count("law_") == 3
+    assert "smc-mujoco list laws" in said
+    assert str(unknown("bound", "zzz", many)).count("law_") == 13
+
+
 def test_a_frozen_mapping_does_not_change():
     values = frozen({"a": 1})
     changes = (lambda: values.update(b=2), values.clear, values.popitem, lambda: values.pop("a"))

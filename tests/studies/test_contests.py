@@ -94,15 +94,11 @@ def test_the_numbers_of_the_screen_are_those_of_the_boards(boards, contest):
     assert dict(apart.settled) == {law: Settles(SEEDS - i, SEEDS) for i, law in enumerate(LAWS)}
 
 
-def test_the_screen_says_what_J_is_over_beside_its_condition(contest):
-    assert contest.summed == ()
-    conditions = ("nominal", "noise", "sine")
-    for summed, words in (
-        (conditions, "3 tuning conditions"),
-        (conditions[:2], "nominal and noise"),
-    ):
-        lines = " ".join(answers.contest_lines(dataclasses.replace(contest, summed=summed)))
-        assert f"J is over {words}, the rest under {contest.condition}." in lines
+def test_the_heading_of_J_says_over_how_many_conditions_it_is(boards):
+    (board,) = [candidate for candidate in boards if candidate.metric == "itae"]
+    summed = dataclasses.replace(board, metric="objective", unit="s^2", summed=("noise", "sine"))
+    (contest,) = contests([summed, board], OWN, ())
+    assert contest.table.headings[1] == "J over 2 conditions (s^2)"
 
 
 def test_a_lead_on_the_screen_is_the_least_lead_of_the_board(boards, contest):
@@ -115,7 +111,7 @@ def test_a_lead_on_the_screen_is_the_least_lead_of_the_board(boards, contest):
     assert lead.low < 1.0 - 1.0 / 1.3 < lead.high < 1.0 - 1.0 / 1.4  # and not over another rival
     medians = {law: cell.text for law, cell in zip(LAWS, column(contest, "ITAE"), strict=True)}
     assert float(medians[LAWS[1]]) == pytest.approx(0.13, rel=0.05)
-    lines = "\n".join(answers.contest_lines(contest))
+    lines = "\n".join(answers.screen_lines(Screen(contests=[contest])))
     assert f"{100 * lead.low:.2g} to {100 * lead.high:.2g} % below {lead.rival}" in lines
 
 
@@ -155,7 +151,7 @@ def test_more_than_five_plants_and_conditions_are_one_table_of_winners():
     assert max(map(len, lines)) <= answers.WIDTH
     text = " ".join(lines)
     for block in blocks:
-        assert len(re.findall(rf"^{block.plant} {block.condition}", "\n".join(lines), re.M)) == 1
+        assert len(re.findall(rf"^{block.plant} +{block.condition} ", "\n".join(lines), re.M)) == 1
     assert text.count("my_law") == 6
 
 

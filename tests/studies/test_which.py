@@ -19,7 +19,7 @@ from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.tuning import quick_search, search
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.analysis.tuning.run_limits import RunLimit
-from smc_mujoco.answers import command
+from smc_mujoco.answers import answers, command
 from smc_mujoco.answers.answers import LINES, WIDTH
 from smc_mujoco.answers.explain import explain
 from smc_mujoco.answers.facts import Settles
@@ -141,7 +141,8 @@ def test_every_fact_has_a_template_and_every_template_a_fact():
     code = "".join(path.read_text() for path in Path(smc.__file__).parent.rglob("*.py"))
     kinds = set(re.findall(r'Fact\(\s*"([A-Za-z ]+)"', code))
     assert kinds <= TEXTS.keys()
-    forms = {"law", "untried", "unneeded", "unbeaten", "unsettled", "unkept", "undecided", "gains"}
+    forms = {kind for kind, _ in answers.KINDS.values()}
+    forms |= {"law", "untried", "unneeded", "unbeaten", "unsettled", "unkept", "undecided", "gains"}
     assert TEXTS.keys() == kinds | forms
 
 
@@ -247,10 +248,15 @@ def test_each_form_has_its_first_line(raced):
     assert name in said
     assert first(race=lost)[0] != "unkept"
     partly = {law: {"coulomb": (4, 4), "noise": (0, 4)} for law in recommendation.settled}
-    form, said = first(settled=partly)
+    form, said = first(settled=partly, judged={"coulomb": True, "noise": True})
     assert form == "unsettled"
     assert "noise" in said
     assert "coulomb" not in said
+    unasked = dataclasses.replace(recommendation, settled=partly)
+    assert unasked.form == "law"
+    assert [fact.values["where"] for fact in unasked.cautions if fact.kind == "never"] == [
+        ["noise"]
+    ]
     open_race = dataclasses.replace(recommendation, settled=partly, race=few, fixed=None)
     assert open_race.form == "undecided"
     (never,) = [fact for fact in open_race.cautions if fact.kind == "never"]
@@ -282,6 +288,7 @@ def test_one_next_step_is_a_whole_command(raced, tmp_path, monkeypatch):
     together = apart.next_step.command
     assert together.count("--condition") == 1
     assert "--condition a+b" in together
+    assert f"--out {recommendation.folder}-at-once" in together  # and what stands there stays
     assert sum(text.startswith("next") for text in recommendation.lines) == 1
     tried = dataclasses.replace(recommendation, untried_laws=())
     done = tried.next_step.command
@@ -328,6 +335,11 @@ def test_cautions_are_lines_with_their_numbers(raced):
     )
     (room,) = near._of_margins
     assert (room.kind, room.values) == ("no room", {"delay": 0.01, "fails": 0.015})
+    for value, kinds in ((0.002, ["late"]), (0.005, [])):
+        early = dataclasses.replace(delay, value=value, resolution=0.001)
+        tolerance = recommendation.tolerance._replace(margins=[early])
+        cautions = dataclasses.replace(recommendation, tolerance=tolerance)._of_margins
+        assert [fact.kind for fact in cautions] == kinds
     helped = recommendation.tolerance._replace(helped=["z"], opposed=recommendation.margins[1])
     fights = dataclasses.replace(recommendation, tolerance=helped)._of_margins[-1]
     assert (fights.kind, fights.values["value"]) == ("helped", recommendation.margins[1].value)
