@@ -178,9 +178,10 @@ class Tabular:
 
     def _heading(self, i: int, width: int) -> list[str]:
         """Return a heading on lines as wide as the cells of its column, and its unit, or ""."""
-        name, _, unit = self.headings[i].partition(" (")
-        words = textwrap.wrap(name, max(HEADING_WIDTH, width), break_long_words=False)
-        return [*words, unit.removesuffix(")").replace("^2", "²")]
+        name, _, unit = self.headings[i].replace("^2", "²").partition(" (")
+        unit = unit.removesuffix(")")
+        least = max(HEADING_WIDTH, len(unit), width)
+        return [*textwrap.wrap(name, least, break_long_words=False), unit]
 
     def _repr_html_(self) -> str:
         heads = [heading.replace("^2", "²") for heading in self.headings]

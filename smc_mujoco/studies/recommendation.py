@@ -488,38 +488,46 @@ class Recommendation(Answer):
 
     @property
     def tables(self) -> list[Tabular]:
-        """J of the laws' sets of gains, the verdicts on J, the needs by condition, what the law
-        withstands, how the laws rest, and what was assumed.
+        """The laws with J and gains, the verdicts on J, the needs by condition, the conditions, and
+        what the law withstands.
         """
-        tables = [self._table_of_J, self._table_of_verdicts]
+        tables = [self._table_of_laws, self._table_of_verdicts]
         runs = next(iter(self.settled[self.law.name].values()))[1]
         groups = dict.fromkeys(" under ".join(board.group.values()) for board in self.leaderboard)
         for about, table in zip(groups, self.leaderboard.tables, strict=False):
             rows = [list(map(_unmarked, row)) for row in table.rows]
             title = f"{about}: {runs} of {self.seeds} seeds"
             tables.append(dataclasses.replace(table, rows=rows, notes=(), title=title))
-        tables += [self._table_of_settling, self._table_of_rest]
-        if self.margins:
-            tables.append(self._table_of_margins)
-        return [*tables, self._table_of_laws, self._table_of_assumptions]
+        tables.append(self._table_of_conditions)
+        return [*tables, self._table_of_margins] if self.margins else tables
 
     @property
-    def _table_of_J(self) -> Tabular:
-        """J of each law's sets of gains, those that were dropped last."""
+    def _table_of_laws(self) -> Tabular:
+        """J of each law's sets of gains, those that were dropped last, its gains, and how it rests
+        and overshoots.
+        """
+        laws = {law.name: law for law in self.laws}
         rows = []
         for names in (self.race.running, self.race.dropped):
             medians = {name: float(np.median(self.race.entrants[name].values)) for name in names}
             for name in sorted(names, key=medians.__getitem__):
                 J = self.race.entrants[name].values
+                far = self.race.dropped.get(name)
+                remark = f"dropped: best J {number(far)} times the leader's worst" if far else ""
+                law = laws.get(name)
+                gains = (gains_text(law.gains), f"{law.source}") if law else ("", "")
                 cell = Cell(_cost(medians[name]), span(_cost(min(J)), _cost(max(J))))
-                dropped = self.race.dropped.get(name)
-                far = (
-                    f"dropped: best J {number(dropped)} times the leader's worst" if dropped else ""
+                rows.append(
+                    (name, cell, f"{len(J)}", *gains, *_of_rest(self.rests.get(name)), remark)
                 )
-                rows.append([name, cell, f"{len(J)}", far])
-        headings = ["law", "J (s²)", "sets judged", "remark"]
-        title = f"J over {joined([*self.judged])}, on unseen runs"
-        return Tabular(headings=headings, rows=rows, title=title, name_columns=1)
+        notes = [f"{name}: not searched, no time" for name in self.race.unsearched]
+        notes += [f"{name}: {why}" for name, why in self.left_out.items()]
+        if self.untried_laws:
+            notes.append(f"not tried: {joined(self.untried_laws)}")
+        headings = "law", "J (s²)", "sets judged", "gains", "gains are"
+        headings += "swing of u", "of its bound", "Hz", "overshoot", "remark"
+        title = f"Laws: J over {joined([*self.judged])}, on unseen runs; at rest without noise"
+        return Tabular(headings=headings, rows=rows, title=title, notes=notes)
 
     @property
     def _table_of_verdicts(self) -> Tabular:
@@ -546,39 +554,34 @@ class Recommendation(Answer):
         return Tabular(headings=headings, rows=rows, title="Verdicts on J", name_columns=3)
 
     @property
-    def _table_of_settling(self) -> Tabular:
-        """Runs that settle, by law and condition, and the shares of J of the first law."""
+    def _table_of_conditions(self) -> Tabular:
+        """The runs of each law that settle, the shares of J of the first law, and what was
+        assumed, by condition.
+        """
+        cases = {str(run.condition): run for run in self._cases if run.law.name == self.law.name}
+        noises = {noise.condition: noise for noise in self.noises}
         rows = []
-        for law in self.laws:
-            for condition, (done, runs) in self.settled[law.name].items():
-                share = self.weighs.get(condition) if law == self.law else None
-                of_J = f"{100 * share:.0f} %" if share is not None else ""
-                without = self.no_law and self.no_law.settled.get(condition)
-                none = "" if without is None else f"{without} of {self.no_law.runs}"  # pyright: ignore[reportOptionalMemberAccess]
-                rows.append((law.name, condition, f"{done} of {runs}", of_J, none))
-        for condition, share in self.weighs.items():
-            if condition not in self.settled[self.law.name]:
-                rows.append((self.law.name, condition, "", f"{100 * share:.0f} %", ""))
+        for name in dict.fromkeys([*self.settled[self.law.name], *self.weighs]):
+            runs = [self.settled[law.name].get(name) for law in self.laws]
+            settled = [f"{count[0]} of {count[1]}" if count else "" for count in runs]
+            share = f"{100 * self.weighs[name]:.0f} %" if name in self.weighs else ""
+            without = ""
+            if self.no_law and name in self.no_law.settled:
+                without = f"{self.no_law.settled[name]} of {self.no_law.runs}"
+            period = velocity = size = added = ""
+            if case := cases.get(name):
+                period, velocity = f"{1e3 * case.control_period:g}", str(case.resolved.velocity)
+            if noise := noises.get(name):
+                size = f"{noise.position:g} {noise.units}, {noise.velocity:g} {noise.units}/s"
+                added = " (added: no condition had noise)" if noise.added else ""
+            rows.append((f"{name}{added}", *settled, share, without, period, velocity, size))
         if self.together:
-            done, runs = self.together
-            rows.append((self.law.name, "all at once", f"{done} of {runs}", "", ""))
-        headings = "law", "condition", "runs that settle", "share of J", "without a law"
-        return Tabular(headings=headings, rows=rows, title="Settled runs", name_columns=2)
-
-    @property
-    def _table_of_rest(self) -> Tabular:
-        """How each law rests, and how far it overshoots."""
-        rows = []
-        for law in self.laws:
-            if rest := self.rests.get(law.name):
-                swing = f"{number(rest.size)} {rest.unit}"
-                share = f"{100 * rest.share:.2g} %"
-                frequency = f"{rest.frequency:.3g}" if rest.shakes else ""
-                over = "" if math.isnan(rest.overshoot) else f"{rest.overshoot:.3g} %"
-                where = rest.condition, rest.overshoots_in
-                rows.append((law.name, swing, share, frequency, where[0], over, where[1]))
-        headings = "law", "swing of u", "of its bound", "Hz", "under", "overshoot", "under"
-        return Tabular(headings=headings, rows=rows, title="At rest, without noise", name_columns=1)
+            others = [""] * (len(self.laws) + 4)
+            rows.append(("all at once", f"{self.together[0]} of {self.together[1]}", *others))
+        headings = ["condition", *(f"settles ({law.name})" for law in self.laws)]
+        headings += ["share of J", "without a law", "u changes every (ms)", "velocity"]
+        headings.append("noise (standard deviations)")
+        return Tabular(headings=headings, rows=rows, title="Conditions")
 
     @property
     def _table_of_margins(self) -> Tabular:
@@ -601,48 +604,6 @@ class Recommendation(Answer):
         title = f"What {self.law.name} withstands, each alone; |u| at most {bounds}"
         return Tabular(headings=headings, rows=rows, title=title, name_columns=1)
 
-    @property
-    def _table_of_laws(self) -> Tabular:
-        """The laws with their gains, and why others did not race."""
-        rows = []
-        for law in self.laws:
-            entrant = self.race.entrants[law.name]
-            judged = min(entrant.count, len(entrant.values))
-            source = f"{law.source}, best of {judged} sets" if judged > 1 else f"{law.source}"
-            rows.append((law.name, source, gains_text(law.gains)))
-        for name in self.race.unsearched:
-            rows.append((name, "not searched: no time", ""))
-        for name, why in self.left_out.items():
-            rows.append((name, why, ""))
-        if self.untried_laws:
-            rows.append(
-                (f"{len(self.untried_laws)} others", "not tried", joined(self.untried_laws))
-            )
-        return Tabular(
-            headings=("law", "gains are", "gains"), rows=rows, title="Laws", name_columns=3
-        )
-
-    @property
-    def _table_of_assumptions(self) -> Tabular:
-        """How often u changes, from what it is made, and each noise."""
-        rows = []
-        for case in self._cases:
-            if case.law.name == self.law.name:
-                period = f"{1e3 * case.control_period:g} ms"
-                rows.append((str(case.condition), period, str(case.resolved.velocity), ""))
-        for noise in self.noises:
-            size = f"{noise.position:g} {noise.units}, {noise.velocity:g} {noise.units}/s"
-            added = " (added: no condition had noise)" if noise.added else ""
-            rows.append((f"{noise.condition}{added}", "", "", size))
-        headings = "condition", "u changes every", "velocity", "noise (standard deviations)"
-        return Tabular(headings=headings, rows=rows, title="Assumed", name_columns=4)
-
-    @property
-    def worst_words(self) -> str:
-        """Which run the worst one is."""
-        label = CATALOGUE["settling_time"].label
-        return f"{self.law.name} under {self.worst_run.condition}: its run of the latest {label}"
-
     def save(self) -> list[Path]:
         """Write the report and the gains to the folder, and return their files."""
         files = []
@@ -660,7 +621,9 @@ class Recommendation(Answer):
         def draw(file: Path, size: str | None) -> object:
             return figure.figure([self.worst_trace], file, size=size, format="svg")
 
-        return [html.picture(draw, f"Worst run: {self.worst_words}")]
+        about = f"{self.law.name} under {self.worst_run.condition}"
+        label = CATALOGUE["settling_time"].label
+        return [html.picture(draw, f"Worst run: {about}: its run of the latest {label}")]
 
     @property
     def title(self) -> str:
@@ -700,6 +663,19 @@ def lost_runs(comparison: Comparison | None) -> dict[str, int]:
 def _cost(J: float) -> str:
     """Return J as text; "fails" where a run of it fails."""
     return number(J) if J < FAILURE_COST else "fails"
+
+
+def _of_rest(rest: AtRest | None) -> list[Cell | str]:
+    """Return how a law rests, and how far it overshoots."""
+    if rest is None:
+        return [""] * 4
+    over = "" if math.isnan(rest.overshoot) else f"{rest.overshoot:.3g} %"
+    return [
+        Cell(f"{number(rest.size)} {rest.unit}", f"under {rest.condition}"),
+        f"{100 * rest.share:.2g} %",
+        f"{rest.frequency:.3g}" if rest.shakes else "",
+        Cell(over, f"under {rest.overshoots_in}" if over else ""),
+    ]
 
 
 def _unmarked(cell: Cell | str) -> Cell | str:

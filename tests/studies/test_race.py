@@ -207,7 +207,7 @@ def test_the_bar_never_shows_more_sets_than_are_to_be_made(run, shown, monkeypat
     assert (raced.sets, [*raced.dropped]) == (12, ["c"])
     assert all(done <= total for done, total, _ in counts)
     assert counts[-1][:2] == (24, 24)
-    assert str(bars[0]).startswith("c dropped: set of gains")
+    assert str(bars[0]).startswith(f"{module.SETS} (out of the race: c)")
 
 
 @pytest.mark.parametrize(("end", "fit"), [(85.0, 3), (105.0, 4), (150.0, 6), (190.0, None)])
@@ -220,10 +220,10 @@ def test_the_bar_says_once_the_sets_are_timed_if_too_few_fit(
     words = [what for done, _, what in shown[1] if done == 6]
     if fit is None:
         assert raced.sets >= module.LOOKS[0]
-        assert words[0] == "set of gains"
+        assert words[0] == module.SETS
     else:
         assert raced.sets == fit
-        assert words[0].startswith(f"about {fit} sets of each law fit, and 7 can name a winner")
+        assert f"(about {fit} of each law fit, and 7 can name a winner)" in words[0]
 
 
 def test_a_race_leaves_the_time_that_the_runs_after_it_take(run, now):

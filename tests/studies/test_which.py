@@ -152,22 +152,20 @@ def test_the_folder_has_the_report_and_the_gains(raced):
     page = (folder / "report.html").read_text()
     assert "report.html" not in page
     assert recommendation.lines[0].split()[1] in page
-    assert page.count("<table") == len(recommendation.tables)
+    assert page.count("<table") == 1 + len(recommendation.tables)  # of the answer
     if recommendation.tuned:
         assert smc.law(str(folder / "recommended.json")).gains == recommendation.law.gains
 
 
 def test_the_evidence_has_the_numbers_of_the_race_and_of_the_runs(raced):
     _, recommendation, _ = raced
-    by_title = {
-        table.title.split(",")[0].split(" over")[0]: table for table in recommendation.tables
-    }
-    J = {row[0]: row for row in by_title["J"].rows}
+    by_title = {table.title.partition(":")[0]: table for table in recommendation.tables}
+    J = {row[0]: row for row in by_title["Laws"].rows}
     assert J.keys() == recommendation.race.entrants.keys()
     for name, entrant in recommendation.race.entrants.items():
         assert float(J[name][1].text) == pytest.approx(np.median(entrant.values), rel=5e-3)
         assert int(J[name][2]) == len(entrant.values)
-        assert bool(J[name][3]) == (name in recommendation.race.dropped)
+        assert bool(J[name][-1]) == (name in recommendation.race.dropped)
     verdicts = by_title["Verdicts on J"].rows
     for about, compared in zip(
         ("over sets", "with these"),
@@ -176,9 +174,14 @@ def test_the_evidence_has_the_numbers_of_the_race_and_of_the_runs(raced):
     ):
         wins = {row[1] for row in verdicts if row[0].startswith(about) and row[6] == "yes"}
         assert wins == {*filter(None, compared.winners)}
-    shares = [float(row[3].rstrip(" %")) for row in by_title["Settled runs"].rows if row[3]]
+    conditions = by_title["Conditions"]
+    share = conditions.headings.index("share of J")
+    shares = [float(row[share].rstrip(" %")) for row in conditions.rows if row[share]]
     assert sum(shares) == pytest.approx(100.0, abs=1.5)
-    assert {row[0] for row in by_title["At rest"].rows} == {law.name for law in recommendation.laws}
+    first, *_ = recommendation.laws
+    (done, runs) = recommendation.settled[first.name]["coulomb"]
+    assert conditions.rows[0][:2] == ("coulomb", f"{done} of {runs}")
+    assert {name for name, row in J.items() if row[5]} == {law.name for law in recommendation.laws}
     (what,) = (table for table in recommendation.tables if " withstands" in table.title)
     for row, margin in zip(what.rows, recommendation.margins, strict=True):
         assert float(row[1].lstrip("≥ ")) == pytest.approx(margin.value, rel=5e-3)
@@ -187,9 +190,8 @@ def test_the_evidence_has_the_numbers_of_the_race_and_of_the_runs(raced):
             assert float(row[2]) == pytest.approx(beyond, rel=5e-3)
     for heading in [heading for table in recommendation.tables for heading in table.headings]:
         explain(heading.split(" (")[0])
-    noise = by_title["Assumed"].rows[-1]
-    assert noise[0].startswith("noise (added")
-    assert numbers(noise[3])[:2] == [0.01, 0.05]
+    (noise,) = [row for row in conditions.rows if row[0].startswith("noise (added")]
+    assert numbers(noise[-1])[:2] == [0.01, 0.05]
 
 
 def test_no_law_is_the_answer_where_it_has_the_lowest_J(tmp_path):
