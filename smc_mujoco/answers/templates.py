@@ -195,7 +195,7 @@ TEXTS = {
     # identify
     "fits": (
         "",
-        "± is one standard error. Fits {fit}[, held out {held_out}] ([{pieces}pieces of 1 s|whole "
+        "± is one standard error; fits {fit}[, held out {held_out}] ([{pieces}pieces of 1 s|whole "
         "logs], worst column)",
     ),
     "files": (

@@ -51,7 +51,7 @@ from smc_mujoco.common.files import (
     to_json,
 )
 from smc_mujoco.common.tabular import Cell, Tabular
-from smc_mujoco.common.text import counted, number, span
+from smc_mujoco.common.text import counted, span
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import scenario_json
 from smc_mujoco.simulation.run import run
@@ -75,10 +75,7 @@ RESULT_COLUMNS = {
 }
 RESULT_COLUMNS |= {"arrived": "bool", "touched": "bool"}
 RESULT_COLUMNS |= {"versions": "string", "scenario": "string"}
-PREVIEW = ("plant", "law", "source", "condition", "seed")
-FIRST_METRIC = len(PREVIEW)
-PREVIEW += ("settling_time", "ultimate_bound", "itae", "tv_rate", "failure")
-MAX_ROWS = 8  # of the preview in a notebook
+PREVIEW = ("settling_time", "ultimate_bound", "itae", "tv_rate")
 CASE = ("plant", "law", "condition")  # whose runs `print` sums up in a row
 MAX_CASES = 20  # that `print` shows; chosen
 DIGEST = b"digest"  # key in a file's metadata
@@ -133,13 +130,6 @@ def write(path: Path, schema: "pa.Schema", groups: "Iterable[pa.Table]") -> None
             writer.write_table(rows)
             digest.update(content(rows))
         writer.add_key_value_metadata({DIGEST: digest.hexdigest()})
-
-
-def _text(value: object) -> str:
-    """Return a value as a cell shows it."""
-    if isinstance(value, float):
-        return number(value)
-    return "" if value is None else str(value)
 
 
 def _median(metric: str, values: np.ndarray) -> Cell:
@@ -265,24 +255,15 @@ class Table:
         notes = []
         if len(rows_of) < len(self):
             notes.append("Medians; below each the least and the largest value.")
+        failed = self.column("failure") if "failure" in self.data.column_names else []
+        if failures := [text for text in failed if text]:
+            notes.append(f"{len(failures)} of {len(self)} runs failed, first: {failures[0]}.")
         if rest := len(rows_of) - len(cases):
             notes.append(f"And {rest} more: Table.select.")
         return Tabular(headings=[*CASE, *values], rows=cells, notes=notes, name_columns=len(CASE))
 
     def _repr_html_(self) -> str:
-        names = []
-        for name in PREVIEW:
-            if name in self.data.column_names:
-                names.append(name)
-        cells = []
-        for row in self.data.select(names).slice(0, MAX_ROWS).to_pylist():
-            cells.append(list(map(_text, row.values())))
-        rest = len(self) - len(cells)
-        notes = [f"and {rest} more: Table.rows, Table.column"] if rest else []
-        table = Tabular(
-            headings=names, rows=cells, title=repr(self), notes=notes, name_columns=FIRST_METRIC
-        )
-        return table._repr_html_()
+        return dataclasses.replace(self._summary(), title=repr(self))._repr_html_()
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
         """Return the rows as a stream of Arrow's C interface, as polars reads it."""

@@ -47,6 +47,11 @@ ANSWERS: dict[str, str] = {
 }
 MARKS: dict[str, str] = dict(zip((*VERDICTS, *ANSWERS.values()), "●◐○◌△–■◧□◇–", strict=True))
 
+# Verdicts have a colour beside their mark, from a palette for the colour-blind; answers to
+# questions have their own.
+COLOURS = dict(zip(VERDICTS, ("blue", "yellow", "red", "dim", "dim", "dim"), strict=True))
+COLOURS |= dict.fromkeys(ANSWERS.values(), "cyan")
+
 PAPER, DERIVED, OURS = "paper", "derived", "ours"  # whose a claim is
 LIMIT_IS_OURS = "none in the paper: the limit is ours, and refutes nothing"
 WHOSE_WORDS = {PAPER: "the paper's", DERIVED: "derived", OURS: "a question"}
@@ -312,6 +317,12 @@ class Claim(Statement):
                 text_by_part[name] = text
         return text_by_part
 
+    @property
+    def verdict_words(self) -> str:
+        """The verdict with its mark, and whether it flips."""
+        flips = ", flips with the gains" if self.flips else ""
+        return f"{MARKS[self.verdict]} {self.verdict}{flips}"
+
     def _repr_html_(self) -> str:
         return Claims([self])._repr_html_()
 
@@ -348,20 +359,25 @@ class Claim(Statement):
 class Claims(list[Claim]):
     """Claims with their verdicts, a list that notebooks show as a table."""
 
-    def _repr_html_(self) -> str:
+    @property
+    def table(self) -> Tabular:
+        """Verdicts by set of gains, the words, and the check that decides for the last set."""
+        sets = list(self[0].verdicts) if self else []
         rows = []
         for claim in self:
-            if claim.verdicts:
-                decided = claim.decided(list(claim.verdicts)[-1])
-            else:
-                decided = claim.note
-            words = f"{MARKS[claim.verdict]} {claim.verdict}"
-            if claim.flips:
-                words += ", flips"
-            rows.append((claim.id, claim.text, claim.source, Cell(words, strong=True), decided))
-        heads = ("id", "claim", "whose, read", "verdict", "decided by")
-        table = Tabular(headings=heads, rows=rows, notes=[summary(self)], name_columns=5)
-        return table._repr_html_()
+            marks = []
+            for name in sets:
+                verdict = claim.verdicts.get(name, claim.verdict)
+                marks.append(Cell(MARKS[verdict], colour=COLOURS[verdict]))
+            decided = claim.decided(sets[-1]) if claim.verdicts else claim.note
+            below = f"{claim.verdict_words}; {claim.source}\n{decided}"
+            rows.append((claim.id, *marks, Cell(claim.text, below)))
+        last = f" ({sets[-1]} gains)" if sets else ""
+        heads = ("id", *sets, f"claim, verdict, whose, decided by{last}")
+        return Tabular(headings=heads, rows=rows, name_columns=len(heads))
+
+    def _repr_html_(self) -> str:
+        return dataclasses.replace(self.table, notes=[summary(self)])._repr_html_()
 
 
 def totals(claims: Sequence[Claim]) -> dict[str, int]:

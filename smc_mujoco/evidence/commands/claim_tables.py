@@ -14,17 +14,16 @@ from smc_mujoco.cli.console import Terminal
 from smc_mujoco.common.tabular import Cell, Tabular, of_fields
 from smc_mujoco.common.text import capital
 from smc_mujoco.evidence.audit import verdict as verdicts
-from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Claim, measured
+from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Claim, Claims, measured
 
-# Verdicts have a colour beside their mark, from a palette for the colour-blind; answers to
-# questions have their own.
-COLOURS = dict(zip(verdicts.VERDICTS, ("blue", "yellow", "red", "dim", "dim", "dim"), strict=True))
-COLOURS |= dict.fromkeys(verdicts.ANSWERS.values(), "cyan")
 MAX_NAMED = 8  # claims whose checks the next step shows; chosen
-CHECKED = {True: Cell("✓", colour=COLOURS[SUPPORTED]), False: Cell("✗", colour=COLOURS[REFUTED])}
+CHECKED = {
+    True: Cell("✓", colour=verdicts.COLOURS[SUPPORTED]),
+    False: Cell("✗", colour=verdicts.COLOURS[REFUTED]),
+}
 
 
-def print_claims(claims: Sequence[Claim], terminal: Terminal, named: bool, full: bool) -> None:
+def print_claims(claims: Claims, terminal: Terminal, named: bool, full: bool) -> None:
     """Print the answer of an audit; or with `full` a table of claims with their verdicts; or those
     that were `named`, each in full. The two end with the totals of the paper's own sentences.
     """
@@ -35,7 +34,7 @@ def print_claims(claims: Sequence[Claim], terminal: Terminal, named: bool, full:
         for claim in claims:
             _print_claim(claim, terminal)
     else:
-        terminal.print(_claims_overview(claims))
+        terminal.print(claims.table)
     terminal.print(Text(f"{capital(verdicts.summary(claims))}."), highlight=False)
     if any(len(claim.verdicts) > 1 for claim in claims):
         terminal.print(Text(verdicts.over_gains(claims)), highlight=False)
@@ -64,37 +63,11 @@ def screen_of(claims: Sequence[Claim]) -> Screen:
     return Screen(facts=facts, next=step)
 
 
-def _claims_overview(claims: Sequence[Claim]) -> Tabular:
-    """Return a table of claims: verdicts by set of gains, the words, and the check that decides for
-    the last set.
-    """
-    sets = list(claims[0].verdicts)
-    rows = []
-    for claim in claims:
-        verdict_of = claim.verdicts
-        marks = [
-            Cell(verdicts.MARKS[verdict_of[name]], colour=COLOURS[verdict_of[name]])
-            for name in sets
-        ]
-        below = f"{_verdict(claim)}; {claim.source}\n{claim.decided(sets[-1])}"
-        rows.append((claim.id, *marks, Cell(claim.text, below)))
-    words = f"claim, verdict, whose, decided by ({sets[-1]} gains)"
-    return Tabular(headings=("id", *sets, words), rows=rows, name_columns=len(sets) + 2)
-
-
-def _verdict(claim: Claim) -> str:
-    """Return a claim's verdict with its mark, and whether it flips."""
-    mark = f"{verdicts.MARKS[claim.verdict]} {claim.verdict}"
-    if claim.flips:
-        return f"{mark}, flips with the gains"
-    return mark
-
-
 def _print_claim(claim: Claim, terminal: Terminal) -> None:
     """Print one claim in full, then a table for each set of gains: its checks, and the numbers
     beside them.
     """
-    about = {**claim.parts, "verdict": _verdict(claim)}
+    about = {**claim.parts, "verdict": claim.verdict_words}
     terminal.print(of_fields(f"{claim.id}  {claim.text}  {claim.where}", about), "")
     for name, verdict in claim.verdicts.items():
         rows = [(CHECKED[check.holds], check.what, *check.texts) for check in claim.checks(name)]
