@@ -306,14 +306,9 @@ def compare(
 ) -> None:
     """Compare control laws on plants in conditions, and say which is best and how sure that is.
 
-    Gains in brackets are used as they are. Otherwise a law of the package uses the gains that are
-    shipped for the plant. If there are none, or if the law is from your own file, it is tuned by
-    one rule, the same for all laws, in seconds to minutes for each law and plant. The default
-    values in your file are used only with --no-tune, with --gains other than tuned, or if the law
-    cannot be tuned.
-
-    Without --law, the usual laws that suit the plant are compared: common sliding-mode laws, pid,
-    adrc, pd_observer, lqi, mpc and loop_shaping; with --law all, every general-purpose law.
+    Gains in brackets are used as they are. Otherwise a law has the gains that are shipped for the
+    plant, or is tuned by one rule, the same for all laws, in seconds to minutes. Without --law the
+    usual laws that suit the plant are compared, with --law all every general-purpose law.
 
     Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition
     friction,encoder
