@@ -49,7 +49,9 @@ MARKS: dict[str, str] = dict(zip((*VERDICTS, *ANSWERS.values()), "●◐○◌�
 
 # Verdicts have a colour beside their mark, from a palette for the colour-blind; answers to
 # questions have their own.
-COLOURS = dict(zip(VERDICTS, ("blue", "yellow", "red", "dim", "dim", "dim"), strict=True))
+COLOURS: dict[str, str] = dict(
+    zip(VERDICTS, ("blue", "yellow", "red", "dim", "dim", "dim"), strict=True)
+)
 COLOURS |= dict.fromkeys(ANSWERS.values(), "cyan")
 
 PAPER, DERIVED, OURS = "paper", "derived", "ours"  # whose a claim is
