@@ -195,7 +195,8 @@ def verdict_lines(facts: Iterable[Judged]) -> list[Labelled]:
     groups: dict[tuple[Any, ...], list[Any]] = {}
     for fact in sorted(facts, key=lambda fact: [*KINDS].index(type(fact))):
         kind, names = KINDS[type(fact)]
-        alike = kind, fact.metric == SHARE, *(getattr(fact, name) for name in names)
+        share = isinstance(fact, Lead) and fact.metric == SHARE
+        alike = kind, share, *(getattr(fact, name) for name in names)
         groups.setdefault(alike, []).append(fact)
     texts_by_label: dict[str, list[str]] = {}
     for (kind, *_), of_group in groups.items():
