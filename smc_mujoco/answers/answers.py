@@ -329,8 +329,8 @@ def _winner(fact: Verdict, contest: Contest) -> str:
         case Lead():
             return said(Fact("least", law=fact.law, low=fact.low))[1]
         case Tied() | Open():
-            every = len(fact.laws) == len(contest.table.rows)
-            return f"{KINDS[type(fact)][0]}: {'all' if every else ', '.join(fact.laws)}"
+            laws = "all" if len(fact.laws) == len(contest.table.rows) else ", ".join(fact.laws)
+            return f"{KINDS[type(fact)][0]}: {laws}"
         case Barred():
             return "none"
 

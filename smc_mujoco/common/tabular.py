@@ -98,7 +98,7 @@ class Tabular:
         if self.title:
             yield Text(self.title, "bold")
         for part in _parts(list(map(_widest, columns)), options.max_width, self.name_columns):
-            shown = [columns[i] for i in part]
+            part_columns = [columns[i] for i in part]
             table = Table(
                 box=None,
                 padding=(0, GAP, 0, 0),
@@ -106,14 +106,14 @@ class Tabular:
                 header_style="",
                 show_header=any(self.headings),
             )
-            heights = [column[0].plain.count("\n") for column in shown]
+            heights = [column[0].plain.count("\n") for column in part_columns]
             unitless = not any(" (" in self.headings[i] for i in part)
-            for i, column, height in zip(part, shown, heights, strict=True):
+            for i, column, height in zip(part, part_columns, heights, strict=True):
                 head = Text("\n" * (max(heights) - height)).append_text(column[0])
                 if unitless:
                     head.right_crop(1)
                 table.add_column(head, justify="left" if i < self.name_columns else "right")
-            rows = list(zip(*(column[1:] for column in shown), strict=True))
+            rows = list(zip(*(column[1:] for column in part_columns), strict=True))
             tall = any(map(_below, itertools.chain.from_iterable(self.rows)))
             for k, row in enumerate(rows):
                 table.add_row(*row)
@@ -164,15 +164,15 @@ class Tabular:
         texts = []
         for cell in cells:
             text = folded(cell.text, name) if name else cell.text
-            shown = Text(text + pad, cell.colour)
+            styled = Text(text + pad, cell.colour)
             if cell.strong:
-                shown = Text(f"{text}*", f"bold {cell.colour}".strip())
+                styled = Text(f"{text}*", f"bold {cell.colour}".strip())
             below = folded(cell.below, name) if name else cell.below
             below = _narrow(cell.below) if narrow else below
             for lines, style in ((below, "dim not bold"), (cell.alarm, "red not bold")):
                 for line in lines.splitlines():
-                    shown.append(f"\n{line}{pad}", style)
-            texts.append(shown)
+                    styled.append(f"\n{line}{pad}", style)
+            texts.append(styled)
         lines = self._heading(i, max(map(_width, texts), default=0))
         return [Text("\n".join(line and f"{line}{pad}" for line in lines)), *texts]
 

@@ -257,7 +257,7 @@ def _boards(contests: Sequence[MetricContest], defaults: bool) -> list[Board]:
     boards = []
     for contest in contests:
         repeated = not np.isnan(contest.comparison.halves).all()
-        blocks = [_block(contest, at, defaults) for at in range(len(contest.blocks))]
+        blocks = [_block(contest, k, defaults) for k in range(len(contest.blocks))]
         board = Board(
             group=contest.group,
             metric=contest.metric,

@@ -279,8 +279,8 @@ def race(course: RaceCourse, entrants: Sequence[Entrant], relevant: float) -> Ra
                     del running[name]
                 if dropped:
                     names = joined("u = 0" if name == WITHOUT else name for name in dropped)
-                    told = names if len(dropped) < TOLD else f"{len(dropped)} laws"
-                    progress.says(f"{SETS} (out of the race: {told})")
+                    names = names if len(dropped) < TOLD else f"{len(dropped)} laws"
+                    progress.says(f"{SETS} (out of the race: {names})")
             if k + 1 in LOOKS:
                 comparison, looked = judged(running, course.goal, relevant), k + 1
                 if comparison is None or comparison.winners[0] or needed(comparison) > WITHIN:

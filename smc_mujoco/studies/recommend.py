@@ -100,7 +100,7 @@ class Question(NamedTuple):
     metrics: Sequence[str]  # of the tables
     relevant: float  # as in `ranking`
     untried_laws: Sequence[str]  # further laws of the package that suit
-    asked: bool = True  # whether the user named conditions
+    by_user: bool = True  # whether the user named conditions
 
 
 def recommend(
@@ -174,7 +174,7 @@ def recommend(
         tuned=tunings.get(first.name),
         left_out=left_out,
         untried_laws=question.untried_laws,
-        judged=_judged(trial, goal, question.asked),
+        judged=_judged(trial, goal, question.by_user),
         folder=trial.folder,
         pictured=clock.left + clock.spare > 2.0 * clock.pace * base.work,
     )

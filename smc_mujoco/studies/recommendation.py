@@ -461,8 +461,8 @@ class Recommendation(Answer):
             combined = again({"--condition": names, "--out": f"{self.folder}-at-once"})
             return NextStep(combined, "searches gains for all conditions at once")
         if self.untried_laws:
-            other = {"--law": None, "--minutes": str(MORE_MINUTES)}
-            wide = again(other | {"--out": f"{self.folder}-all-laws"}, ("--quick",))
+            options = {"--law": None, "--minutes": str(MORE_MINUTES)}
+            wide = again(options | {"--out": f"{self.folder}-all-laws"}, ("--quick",))
             count = len(self.untried_laws)
             return NextStep(wide, f"tries the usual ones of {count} other laws, too")
         gains = self._file or gains_text(self.law.gains).replace(" ", "")
@@ -576,8 +576,8 @@ class Recommendation(Answer):
                 added = " (added: no condition had noise)" if noise.added else ""
             rows.append((f"{name}{added}", *settled, share, without, period, velocity, size))
         if self.together:
-            others = [""] * (len(self.laws) + 4)
-            rows.append(("all at once", f"{self.together[0]} of {self.together[1]}", *others))
+            blank = [""] * (len(self.laws) + 4)
+            rows.append(("all at once", f"{self.together[0]} of {self.together[1]}", *blank))
         headings = ["condition", *(f"settles ({law.name})" for law in self.laws)]
         headings += ["share of J", "without a law", "u changes every (ms)", "velocity"]
         headings.append("noise (standard deviations)")

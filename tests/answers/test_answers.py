@@ -81,15 +81,15 @@ def test_the_law_to_use_comes_with_its_gains_and_the_laws_that_lead_elsewhere():
 def test_settled_runs_are_counted_by_law():
     all_but_one = text(answers.settled([("a", Settles(12, 12)), ("b", Settles(7, 12))]))
     assert all_but_one == "Settled runs: b 7 of 12, all of the others."
-    every = [("a", Settles(12, 12)), ("b", Settles(12, 12))]
-    assert text(answers.settled(every)) == "All 24 runs settled."
+    settled = [("a", Settles(12, 12)), ("b", Settles(12, 12))]
+    assert text(answers.settled(settled)) == "All 24 runs settled."
     assert text(answers.settled([("a", Settles(0, 12))])) == "No run of 12 settled."
 
 
 def test_a_law_that_loses_has_its_ratio_and_who_is_ahead():
     behind = {"law": "mine", "leader": "adrc", "metric": "J"}
-    both = Trails(**behind, times=1.783, ahead=("adrc", "pid"))
-    assert answers.verdict_lines([both]) == [("mine", "J 1.78 times adrc's; behind adrc and pid")]
+    two = Trails(**behind, times=1.783, ahead=("adrc", "pid"))
+    assert answers.verdict_lines([two]) == [("mine", "J 1.78 times adrc's; behind adrc and pid")]
     alone = Trails(**behind, times=1.783, ahead=("adrc",))
     assert answers.verdict_lines([alone]) == [("mine", "J 1.78 times adrc's")]
     unknown = Trails(**behind, times=math.nan, ahead=("adrc",))
