@@ -298,29 +298,35 @@ def _winners(contests: Sequence[Contest]) -> Block:
     """Return one table of the winners on many plants in many conditions, and what holds on each
     plant.
     """
-    heads = [heading.partition(" (")[0] for heading in contests[0].table.headings]
-    columns = [i for i, head in enumerate(heads) if head.split(" over ")[0] not in ("", ON_PLANT)]
+    metrics = [
+        name for name in _heads(contests[0]) if name.split(" over ")[0] not in ("", ON_PLANT)
+    ]
     rows = []
     of_plants: dict[str, str] = {}
     for contest in contests:
         fact_of = {fact.metric: fact for fact in contest.verdicts}
-        row = [contest.plant, contest.condition]
-        for i in columns:
-            fact = fact_of.get(heads[i])
-            row.append(_winner(fact, contest) if fact else as_cell(contest.table.rows[0][i]).text)
-        rows.append(row)
+        texts = {name: _winner(fact, contest) for name, fact in fact_of.items()}
+        if len(contest.table.rows) == 1:  # nothing to compare it with: its numbers
+            row = [as_cell(cell).text for cell in contest.table.rows[0]]
+            texts = dict(zip(_heads(contest), row, strict=True))
+        rows.append([contest.plant, contest.condition, *(texts.get(name, "") for name in metrics)])
         if (fact := fact_of.get(ON_PLANT)) and contest.plant not in of_plants:
             advice = contest.use and use(dataclasses.replace(contest.use, unless=()))
             ((label, text),) = verdict_lines([fact])
             said_of = Fact("of plant", advice=advice, label=label, text=text)
             of_plants[contest.plant] = said(said_of)[1]
-    heads = ["", "", *(heads[i] for i in columns)]
+    heads = ["", "", *metrics]
     return Block(
         [Fact("contests", count=len(contests), sample=sample(contests[0].sample))],
         [Tabular(headings=heads, rows=rows, name_columns=len(heads))],
         [Fact("winners")],
         pairs=[*of_plants.items()],
     )
+
+
+def _heads(contest: Contest) -> list[str]:
+    """Return the headings of a contest's table without their units."""
+    return [heading.partition(" (")[0] for heading in contest.table.headings]
 
 
 def _winner(fact: Verdict, contest: Contest) -> str:
