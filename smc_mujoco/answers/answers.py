@@ -54,7 +54,7 @@ KINDS: dict[type, tuple[str, tuple[str, ...]]] = {
 }
 
 
-class Block(NamedTuple):
+class ScreenPart(NamedTuple):
     """What is said of some numbers: their tables between a heading and notes, the law to use, and
     lines below it.
     """
@@ -66,7 +66,7 @@ class Block(NamedTuple):
     pairs: Sequence[Labelled] = ()
 
 
-def blocks(screen: Screen) -> list[Block]:
+def blocks(screen: Screen) -> list[ScreenPart]:
     """Return what a screen says: a block for each contest, or one for many; the rest; the next
     step, and where there is more.
     """
@@ -74,12 +74,12 @@ def blocks(screen: Screen) -> list[Block]:
     said_of = [_winners(contests)] if len(contests) > MAX_CONTESTS else [*map(block_of, contests)]
     if screen.heading or screen.tables or screen.notes:
         heading = [screen.heading] if screen.heading else []
-        said_of.append(Block(heading, screen.tables, screen.notes))
+        said_of.append(ScreenPart(heading, screen.tables, screen.notes))
     pairs = [*map(line_of, screen.facts), *([next_step(screen.next)] if screen.next else [])]
     if screen.report or screen.word:
         explained = f"{PROGRAM} explain {screen.word}" if screen.word else ""
         pairs.append(("more", "; ".join(filter(None, (screen.report, explained)))))
-    return [*said_of, Block(pairs=pairs)] if pairs else said_of
+    return [*said_of, ScreenPart(pairs=pairs)] if pairs else said_of
 
 
 def screen_lines(screen: Screen) -> list[str]:
@@ -87,8 +87,8 @@ def screen_lines(screen: Screen) -> list[str]:
 
     Facts for which a screen has no room are counted.
     """
-    *said_of, last = blocks(screen) or [Block()]
-    parts = ["\n".join(_block_lines(block)) for block in said_of]
+    *said_of, last = blocks(screen) or [ScreenPart()]
+    parts = ["\n".join(_part_lines(block)) for block in said_of]
     lines = "\n\n".join(parts).splitlines()
     gap = [""] if any(block.tables for block in said_of) else []
     if not screen.contests and screen.facts:
@@ -96,10 +96,10 @@ def screen_lines(screen: Screen) -> list[str]:
         ends = last.pairs[count:]
         room = LINES - BELOW - len([*lines, *gap, *labelled(ends)])
         last = last._replace(pairs=[*_fitting(last.pairs[:count], room), *ends])
-    return [*lines, *gap, *_block_lines(last)]
+    return [*lines, *gap, *_part_lines(last)]
 
 
-def _block_lines(block: Block) -> list[str]:
+def _part_lines(block: ScreenPart) -> list[str]:
     """Return the lines of a block."""
     lines = paragraph(block.heading)
     for k, table in enumerate(block.tables):
@@ -278,14 +278,14 @@ def sample(fact: Sample) -> Fact:
     )
 
 
-def block_of(contest: Contest) -> Block:
+def block_of(contest: Contest) -> ScreenPart:
     """Return what is said of a plant in a condition: the table, the law to use, who leads."""
     about = {"plant": contest.plant, "condition": contest.condition}
     starred = any(as_cell(cell).strong for row in contest.table.rows for cell in row)
     notes = [Fact("star"), Fact("lower")] if starred else [Fact("lower")]
     if contest.settled:
         notes.append(settled(contest.settled))
-    return Block(
+    return ScreenPart(
         [Fact("contest", **about, sample=sample(contest.sample))],
         [contest.table],
         notes,
@@ -294,7 +294,7 @@ def block_of(contest: Contest) -> Block:
     )
 
 
-def _winners(contests: Sequence[Contest]) -> Block:
+def _winners(contests: Sequence[Contest]) -> ScreenPart:
     """Return one table of the winners on many plants in many conditions, and what holds on each
     plant.
     """
@@ -316,7 +316,7 @@ def _winners(contests: Sequence[Contest]) -> Block:
             said_of = Fact("of plant", advice=advice, label=label, text=text)
             of_plants[contest.plant] = said(said_of)[1]
     heads = ["", "", *metrics]
-    return Block(
+    return ScreenPart(
         [Fact("contests", count=len(contests), sample=sample(contests[0].sample))],
         [Tabular(headings=heads, rows=rows, name_columns=len(heads))],
         [Fact("winners")],

@@ -56,7 +56,7 @@ MAX_NAMED_JOINTS = 4  # in the heading of a group
 # scores of runs
 
 
-class Column(NamedTuple):
+class ScoreColumn(NamedTuple):
     """A column of scores of labelled runs."""
 
     heading: str
@@ -82,7 +82,7 @@ def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) 
             if metric in metrics() and metric.applies_to(group):
                 head = metric.heading(group.unit, group.effort)
                 values = _picked(scored, lambda run, of=group.name, name=name: run[of][name])
-                columns.append(Column(head, values, partial(floor, metric=name)))
+                columns.append(ScoreColumn(head, values, partial(floor, metric=name)))
         tables.append(_table(", ".join(filter(None, (title, heading))), columns, traces))
     gains = {label: [trace.scenario.law.source] for label, trace in traces.items()}
     return _noted(tables, in_words(gains))
@@ -98,7 +98,7 @@ def tips(title: str, traces: Mapping[str, Trace], again: Again | None = None) ->
     for head, (name, unit, factor) in TIP_COLUMNS.items():
         if name in measured:
             values = _picked(scored, lambda run, name=name, by=factor: by * run.get(name, math.nan))
-            columns.append(Column(f"{head} ({unit})", values))
+            columns.append(ScoreColumn(f"{head} ({unit})", values))
     return _noted([_table(f"{title}, tip", columns, traces)])
 
 
@@ -112,7 +112,7 @@ def answers(
     """
     labelled = dict(chain.from_iterable(runs.items() for runs in traces.values()))
     scenarios = [trace.scenario for runs in traces.values() for trace in runs.values()]
-    tables: dict[str, list[Column]] = {}
+    tables: dict[str, list[ScoreColumn]] = {}
     for metric in map(CATALOGUE.__getitem__, names):
         if all(map(metric.refusal, scenarios)):
             continue
@@ -123,7 +123,7 @@ def answers(
             values = _scored(metric.of, suited, (again or {}).get(condition))
             title, head = (about, condition) if len(traces) > 1 else ("", about)
             least = partial(floor, metric=metric.name)
-            tables.setdefault(title, []).append(Column(head, values, least))
+            tables.setdefault(title, []).append(ScoreColumn(head, values, least))
     return _noted([_table(title, columns, labelled) for title, columns in tables.items()])
 
 
@@ -145,7 +145,7 @@ def _picked(
     return {label: [run and pick(run) for run in runs] for label, runs in scored.items()}
 
 
-def _table(title: str, columns: Sequence[Column], traces: Mapping[str, Trace]) -> Tabular:
+def _table(title: str, columns: Sequence[ScoreColumn], traces: Mapping[str, Trace]) -> Tabular:
     """Return a table with a row for each labelled run."""
     laws = {trace.scenario.law.name for trace in traces.values()}
     # labels of runs of one law say what differs
