@@ -379,10 +379,11 @@ def test_an_empty_title_draws_none_and_closes_the_gap(size, one):
         height = page.get_figheight() * page.dpi
         return height - max(ax.get_tightbbox().y1 for ax in page.axes), height
 
-    usual, height = top(figure([one], size=size))
+    panels = ["x", "u"]
+    usual, height = top(figure([one], size=size, panels=panels))
     (label,) = style.labels([one], None)
     for title in ("", " "):
-        page = figure([one], size=size, title=title)
+        page = figure([one], size=size, title=title, panels=panels)
         (legend,) = page.legends
         assert label in [text.get_text() for text in legend.get_texts()]
         assert not legend.get_title().get_text()
@@ -414,7 +415,7 @@ def test_the_error_is_the_largest_within_its_window_on_a_logarithmic_axis(one):
 
 
 def test_a_figure_is_returned_in_any_size_and_written_where_asked(one, tmp_path):
-    page = figure(one, size=(5.0, 4.0))
+    page = figure(one, size=(5.0, 4.0), panels=["x"])
     assert isinstance(page, Figure)
     assert tuple(page.get_size_inches()) == (5.0, 4.0)
     figure(
@@ -422,12 +423,13 @@ def test_a_figure_is_returned_in_any_size_and_written_where_asked(one, tmp_path)
         tmp_path / "a",
         format="pdf",
         size="ieee-column",
+        panels=["x"],
     )
-    figure(one, tmp_path / "b.pdf")
+    figure(one, tmp_path / "b.pdf", panels=["x"])
     assert {path.name for path in tmp_path.iterdir()} == {"a.pdf", "b.pdf"}
     assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
     mine = Figure(figsize=(9.0, 6.0))
-    assert figure(one, fig=mine) is mine
+    assert figure(one, fig=mine, panels=["x"]) is mine
     left_part, right = Figure(figsize=(12.0, 6.0), layout="constrained").subfigures(
         1, 2, squeeze=False
     )[0]
