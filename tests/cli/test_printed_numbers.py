@@ -77,8 +77,9 @@ def test_compare_prints_the_medians_and_the_counts_of_its_table(printed):
 
 def test_margins_are_printed_in_their_unit(printed):
     line = "margins duffing --law pid --kind mass --quick --json m.json"
-    margins = json.loads(Path("m.json").read_text()) if printed(line) else []
-    for out, full in ((printed(line), False), (printed(f"{line} --full"), True)):
+    answer = printed(line)
+    margins = json.loads(Path("m.json").read_text())
+    for out, full in ((answer, False), (printed(f"{line} --full"), True)):
         for margin in margins:
             if full:
                 words = row(out[out.index(f"largest {margin['kind']}") :], "duffing", "pid")
