@@ -187,7 +187,9 @@ class Machines:
     def push(self, force: float) -> None:
         """Push the first driven body to the right of the picture, with a peak in N."""
         names = [self.model.body(body).name for body in self.moved]
-        body = next(filter(None, names), "")
+        body = next(filter(None, names), None)
+        if body is None:
+            raise ScenarioError('no body that moves has a name: give one, as <body name="arm">')
         self.pushed(body, force * self.turn[:, 0])
 
     def show(self) -> None:

@@ -171,6 +171,17 @@ def test_the_mouse_pushes_a_body_once_when_it_lets_go(live):
         assert push.y == push.z == 0.0
 
 
+def test_a_push_of_a_machine_without_named_bodies_says_how_to_name_one():
+    plant = smc.plant_from(ARM, ["shoulder", "elbow"])
+    live = LiveView(Session([smc.Scenario(plant=plant, law="none", duration=0.1)]), 0)
+    try:
+        live.ask("run", lambda: live.machines.push(1.0))
+        live.answer()
+        assert "<body name=" in live.session.message
+    finally:
+        live.close()
+
+
 def test_a_push_and_u_have_arrows(live):
     live.session.advance(0.1)
     live.machines.push(live.panel.force.value)
