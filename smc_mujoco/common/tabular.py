@@ -99,6 +99,8 @@ class Tabular:
             yield Text(self.title, "bold")
         for part in _parts(list(map(_widest, columns)), options.max_width, self.name_columns):
             part_columns = [columns[i] for i in part]
+            if part[-1] >= len(part):  # not the first one
+                yield Text("")
             table = Table(
                 box=None,
                 padding=(0, GAP, 0, 0),

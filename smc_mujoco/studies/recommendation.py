@@ -22,6 +22,7 @@ from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import joined, number, span
 from smc_mujoco.control.component import Component, gains_text
+from smc_mujoco.control.source import in_words
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.metrics.conventions import leans
 from smc_mujoco.robustness.margins import Margin
@@ -515,16 +516,17 @@ class Recommendation(Answer):
                 far = self.race.dropped.get(name)
                 remark = f"dropped: best J {number(far)} times the leader's worst" if far else ""
                 law = laws.get(name)
-                gains = (gains_text(law.gains), f"{law.source}") if law else ("", "")
+                gains = gains_text(law.gains) if law else ""
                 cell = Cell(_cost(medians[name]), span(_cost(min(J)), _cost(max(J))))
                 rows.append(
-                    (name, cell, f"{len(J)}", *gains, *_of_rest(self.rests.get(name)), remark)
+                    (name, cell, f"{len(J)}", gains, *_of_rest(self.rests.get(name)), remark)
                 )
-        notes = [f"{name}: not searched, no time" for name in self.race.unsearched]
+        notes = [in_words({law.name: [law.source] for law in self.laws})]
+        notes += [f"{name}: not searched, no time" for name in self.race.unsearched]
         notes += [f"{name}: {why}" for name, why in self.left_out.items()]
         if self.untried_laws:
             notes.append(f"not tried: {joined(self.untried_laws)}")
-        headings = "law", "J (s²)", "sets judged", "gains", "gains are"
+        headings = "law", "J (s²)", "sets judged", "gains"
         headings += "swing of u", "of its bound", "Hz", "overshoot", "remark"
         title = f"Laws: J over {joined([*self.judged])}, on unseen runs; at rest without noise"
         return Tabular(headings=headings, rows=rows, title=title, notes=notes)
