@@ -135,7 +135,9 @@ class Tabular:
         numbers = range(count, len(self.headings))
         columns = list(map(self._column, numbers))
         last = range(count - (not numbers), count)  # the last names may take what others leave
-        room = width - (GAP + NAME_WIDTH) * len(last)
+        room = width
+        for i in last:
+            room -= GAP + min(NAME_WIDTH, _widest(self._column(i, name=width)))
         names: list[list[Text]] = []
         for limit in range(width, NARROW_WIDTH, -1):
             names = [self._column(i, name=limit) for i in range(count - len(last))]
