@@ -206,7 +206,8 @@ class Tabular:
         texts = []
         for i, cell in enumerate(cells):
             side = "left" if i < self.name_columns else "right"
-            texts.append(f'<{tag} style="{style}{HTML_CELL}{side}">{_html(cell)}</{tag}>')
+            whole = "white-space:nowrap;" if tag == "td" and side == "right" else ""
+            texts.append(f'<{tag} style="{style}{whole}{HTML_CELL}{side}">{_html(cell)}</{tag}>')
         return f"<tr>{''.join(texts)}</tr>"
 
     def about(self) -> dict[str, object]:
@@ -415,7 +416,7 @@ def _html(cell: Cell | str) -> str:
     """Return a cell as HTML, with the lines below in smaller letters."""
     cell = as_cell(cell)
     text = html.Html("<br>".join(map(html.text, cell.text.split("\n"))))
-    text = html.strong(text) if cell.strong else text
+    text = html.Html(f"{html.strong(text)}*") if cell.strong else text
     if below := "<br>".join(map(html.text, _below(cell))):
         return html.Html(f'{text}<br><small style="white-space:nowrap">{below}</small>')
     return text

@@ -150,7 +150,7 @@ def test_html_and_latex_have_the_numbers_of_the_text(boards):
             strict=True,
         ):
             parts = [cell.text, *cell.below.splitlines()]
-            assert " ".join(parts) in html_text
+            assert " ".join(parts) in html_text.replace(" *", "")
             for part in parts:
                 assert re.search(rf"(?<![\d.]){re.escape(part)}[* \n]", text), part
             for part, line in zip(parts, tex, strict=False):
