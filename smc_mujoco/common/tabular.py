@@ -206,8 +206,8 @@ class Tabular:
         texts = []
         for i, cell in enumerate(cells):
             side = "left" if i < self.name_columns else "right"
-            whole = "white-space:nowrap;" if tag == "td" and side == "right" else ""
-            texts.append(f'<{tag} style="{style}{whole}{HTML_CELL}{side}">{_html(cell)}</{tag}>')
+            breaks = "white-space:nowrap;" if tag == "td" and side == "right" else ""
+            texts.append(f'<{tag} style="{style}{breaks}{HTML_CELL}{side}">{_html(cell)}</{tag}>')
         return f"<tr>{''.join(texts)}</tr>"
 
     def about(self) -> dict[str, object]:
