@@ -70,6 +70,7 @@ from smc_mujoco.simulation.signals import Noise
 SHORT_TIME = 0.1  # s: a shorter one is printed in ms; chosen
 POOR_FIT = 80.0  # percent: a fit below may mean that the search ended in a wrong place; chosen
 UNSEEN = 0.3  # of a value, beyond which its error says that the log does not show it; chosen
+SLOW_SHARE = 0.1  # of the samples: of noise alone nearly all are independent; chosen
 PERFECT_FIT = 99.99  # percent: residuals beyond it are the simulation's; chosen
 FLOOR = 0.05  # of a value, by which drawn sets differ at least; chosen: friction warms up by more
 USUAL_STEPS = 6  # of a search; chosen: only the progress that is shown depends on it
@@ -80,7 +81,8 @@ Log = Source | AnyPath  # also a data frame
 Count = Annotated[int, Whole(low=1, high=1000)]
 SLOW = (
     "the residuals are slow, for example by a force that was not recorded, friction that drops "
-    "with speed, a softness, or a log whose u is late: true errors may be many standard errors"
+    "with speed, a spring or play between motor and joint (find its play), or a log whose u is "
+    "late: true errors may be many standard errors"
 )
 LEFT = (
     "a whole log is left in an open loop, as an arm under gravity leaves it however good its "
@@ -155,7 +157,9 @@ class Identified(Answer):
         worst = _worst(self.by_pieces or self.fits)
         for lack in self.lacks if worst < PERFECT_FIT else ():
             notes.append(f"{lack}; the errors include what that may change")
-        if self.independent < BLOCKS[0] and worst < PERFECT_FIT and self.rig.controller is None:
+        samples = sum(len(times) for *_, times in self.predictions)
+        slow = self.independent < max(BLOCKS[0], SLOW_SHARE * samples)
+        if slow and worst < PERFECT_FIT and self.rig.controller is None:
             notes.append(SLOW)
         if worst < POOR_FIT:
             notes.append(POOR)
