@@ -115,12 +115,13 @@ def recommend(
     margins_work = TRIED * kinds * _coarse(trial, plant, WITHOUT, trial.conditions[0]).work
     clock.unit = _work_of_judgement(course)
     few = min(trial.draws.seeds, FEWEST_SEEDS)
-    clock.table, clock.choice = few * table_work, AFTER * clock.unit
+    looked = bool(goal.limits)  # whether each law has a run more, which shows how it rests
+    clock.table, clock.choice = (few + looked) * table_work, AFTER * clock.unit
     clock.after = margins_work + 2 * len(BESIDE_NONE) * clock.unit
-    clock.least = LEAST_RUNS * table_work
+    clock.least = (LEAST_RUNS + looked) * table_work
     raced = race(course, entrants, question.relevant)
     names = _shown(raced)
-    if not clock.fits(len(names) * table_work):
+    if not clock.fits(len(names) * (1 + looked) * table_work):
         names = names[:1]
     chosen, tunings = _chosen(course, raced, names)
     fixed = None
@@ -128,7 +129,8 @@ def recommend(
         rivals = [*chosen][: max(2, len(raced.first))]
         fixed = _fixed(course, {law: chosen[law] for law in rivals}, question.relevant)
     candidates = [Candidate(law, (law,)) for law in chosen.values()]
-    count = clock.seeds(trial.draws.seeds, len(chosen) * table_work, margins_work)
+    count = clock.seeds(trial.draws.seeds + looked, len(chosen) * table_work, margins_work)
+    count = max(1, count - looked)
     with clock.timed(count * len(chosen) * table_work):
         table = trial.run({plant.name: candidates}, count, coarse=True)
     settled = _settled(table)

@@ -686,8 +686,9 @@ def test_a_film_of_an_answer_has_as_many_pictures_as_its_time_allows(tmp_path, m
     said = []
     note = lambda text, **how: said.append(text)  # noqa: E731
     terminal = types.SimpleNamespace(note=note, wrote=said.append)
-    studies._film(recommendation, tmp_path, time.monotonic(), terminal)
-    assert "no time for a film" in said.pop()
+    for seconds, least in ((0.0, 0.0), (20.0, 30.0)):
+        studies._film(recommendation, tmp_path, time.monotonic() + seconds, terminal, least)
+        assert "no time for a film" in said.pop()
     assert not list(tmp_path.iterdir())
     with monkeypatch.context() as patch:
         patch.setattr(studies, "MADE", 0.0)  # no share of the time is left for pictures

@@ -182,6 +182,7 @@ def test_a_fall_is_a_text_in_a_file(tmp_path):
 
 FREE = {name: AXIS.values[name] for name in AXIS.free}
 OPEN = {"twin": PENDULUM}  # its loop is not closed
+LONG = OPEN | {"predictions": (({}, {}, np.arange(1000.0)),)}
 
 
 @pytest.mark.parametrize(
@@ -201,6 +202,7 @@ OPEN = {"twin": PENDULUM}  # its loop is not closed
         ({"fits": ({"x": 80.0},)}, {"fits": ({"x": 79.9},)}, POOR),
         ({"fits": ({"x": 80.0},)}, {"fits": ({"x": Fall(8.44)},)}, POOR),
         (OPEN | {"independent": 60.0}, OPEN | {"independent": 59.0}, SLOW),
+        (LONG | {"independent": 100.0}, LONG | {"independent": 99.0}, SLOW),
         (
             OPEN | {"independent": 9.0, "fits": ({"x": 99.995},)},
             OPEN | {"independent": 9.0},

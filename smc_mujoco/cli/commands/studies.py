@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 # pictures a second of the film; the largest is enough to follow a run, the smallest to see it
 MAX_FPS, MIN_FPS = 15.0, 2.0
+LEAST_LEFT = 0.05  # of the minutes, in which a first picture is begun; chosen
 MADE = 0.8  # of the time that is left, in which they must be made: then they are written; chosen
 
 Seed = Annotated[int, typer.Option(min=0, help="Seed of initial states, noise and phases.")]
@@ -136,7 +137,7 @@ def which(
     terminal.answer(recommendation, full)
     if film:
         ends = began + 60.0 * length if length else math.inf
-        _film(recommendation, out, ends, terminal)
+        _film(recommendation, out, ends, terminal, LEAST_LEFT * 60.0 * (length or 0.0))
     _finish(recommendation.table, out, terminal)
 
 
@@ -148,14 +149,22 @@ def _worst_title(recommendation: "Recommendation") -> str:
     return f"Worst run, {run.condition}: {style.head([run])}"
 
 
-def _film(recommendation: "Recommendation", out: Path, ends: float, terminal: Terminal) -> None:
+def _film(
+    recommendation: "Recommendation",
+    out: Path,
+    ends: float,
+    terminal: Terminal,
+    least: float = 0.0,
+) -> None:
     """Film the worst run of the first law of a race until a time of `time.monotonic`, s, with as
-    many pictures a second as can be made by then; if these are too few, write one picture.
+    many pictures a second as can be made by then; if these are too few, write one picture. With
+    less than `least` left, s, or none after a first picture, write nothing.
     """
     from smc_mujoco.draw.film import film as films
 
-    if time.monotonic() >= ends:
-        terminal.note("no time for a film; the same command with more --minutes makes it")
+    late = "no time for a film; the same command with more --minutes makes it"
+    if ends - time.monotonic() <= least:
+        terminal.note(late)
         return
     run = [recommendation.worst_trace]
     title = _worst_title(recommendation)
@@ -175,6 +184,8 @@ def _film(recommendation: "Recommendation", out: Path, ends: float, terminal: Te
             fps = min(fps, fps * fit / len(frames))
         if fps >= MIN_FPS:
             terminal.wrote(films.film(run, out / "worst.mp4", title=title, fps=fps))
+        elif time.monotonic() > ends:
+            terminal.note(late)
         else:
             file = out / "worst.png"
             moment = _worst_time(recommendation.worst_trace)
