@@ -23,6 +23,7 @@ Line = tuple[Array, float]  # of an arrow: its points, (m, 3) m, and its width, 
 GHOST = 0.35  # opacity of the second run's machine, where it stands in the first
 SIZE = 800, 800  # px, of a picture in whose middle the machines are
 FREE = 0.17  # of its sides, around them
+DARKEST = 0.15  # of a colour, in which light and shade still show a shape
 OVER = 0.1  # sizes of what moves, from there to the name of its law
 LINE = 0.08  # the same, from one name to the next
 UP = 0.27  # of a phone's height, which the panel covers from below, to the machines
@@ -269,6 +270,7 @@ class MachineNodes:
         paint[stated] = model.mat_rgba[material[stated]]
         for geom in np.flatnonzero(material >= 0).tolist():
             paint[geom, :3] *= texture_colour(model, material[geom])
+        paint[:, :3] = np.maximum(paint[:, :3], DARKEST)
         rgb = np.array(self.rgb) / 255
         paint[self.between, 3] = 0.0
         if self.machines.session.scenarios[0].plant.on_stage:
