@@ -169,11 +169,9 @@ def _other_delay(
     slopes: Slopes,
     share: float,
     moves: Sequence[float] | Array = DELAY_MOVES,
-    by_steps: Sequence[Array] | None = None,
 ) -> Point | None:
     """Return the point with the delay that leaves least of what no number can cause, by the slopes;
-    None if no other leaves less by that share of it. `moves`: between delays, s. `by_steps`: what
-    steps of 0 would change in the residuals of each piece; None for nothing.
+    None if no other leaves less by that share of it. `moves`: between delays, s.
     """
     if DELAY not in replays.names:
         return None
@@ -187,10 +185,7 @@ def _other_delay(
                 values[k] + move / replays.scales[k], replays.low[k], replays.high[k]
             )
             points.append(Point(values, best.states))
-        lefts = []
-        for rows in replays.residuals(points):
-            without = rows if by_steps is None else list(map(operator.add, rows, by_steps))
-            lefts.append(_left(slopes, without))
+        lefts = [_left(slopes, rows) for rows in replays.residuals(points)]
         if min(lefts) >= least:
             return None if best is slopes.point else best
         least = min(lefts)
@@ -236,20 +231,20 @@ def extrapolated(replays: Replays, slopes: Slopes, most: int = 0) -> tuple[Slope
     if _solved(replays, slopes).cost < _solved(replays, ends).cost:
         return _solved(replays, refine(replays, slopes, most)), _moves(slopes, by_half)
     moved = LEFT_BY_STEPS * _moves(slopes, by_quarter)
-    replays.limit = True
-    for _ in range(MOST_SLOPES if most else 0):
+    if not most:
+        return _solved(replays, ends), moved
+    # these hardly depend on the numbers
+    replays.step_errors = list(map(operator.sub, ends.residuals, slopes.residuals))
+    for _ in range(MOST_SLOPES):
         ends = _settled(replays, ends, most)
         if _solved(replays, ends).cost >= (1.0 - LAST_CHANGE) * ends.cost:
             break
         ends = replays.slopes(ends.point)  # longer steps err by too much
     share = BETTER**2 / sum(map(len, ends.residuals))
     fine = LEAST_DELAY_MOVE * np.array([-2.0, -1.0, 1.0, 2.0])
-    replays.limit = False
-    if not most:
-        return _solved(replays, ends), moved
-    (full,) = replays.residuals([ends.point])
-    by_steps = list(map(operator.sub, ends.residuals, full))  # hardly depends on the delay
-    delayed = _other_delay(replays, ends, share, fine, by_steps)
+    delayed = _other_delay(replays, ends, share, fine)
+    full = list(map(operator.sub, ends.residuals, replays.step_errors))
+    replays.step_errors = None
     if delayed is not None:  # then derivatives by the delay do not hold over such a move
         (full,) = replays.residuals([delayed])
         ends = dataclasses.replace(ends, point=delayed)

@@ -670,23 +670,27 @@ def _solved(
     steps, (p,).
     """
     pieces = Replays(twin, names, data, False, report, kept=batches)
-    if twin.controller is None and not pieces.whole:
-        pieces.steps = twin.long_steps(pieces.pieces[0].part)  # pyright: ignore[reportArgumentType]
-    first = pieces.slopes(pieces.start)
+    pieces.steps = pieces.slope_steps
+    first = pieces.slopes(pieces.start, central=False)
     if doubts and first.fit < 0.0:
         raise ScenarioError(doubts[0])
     check_told_apart(pieces, first)
     extrapolates = twin.controller is None and not corrected
     tolerance = gauss_newton.SMALL_CHANGE if extrapolates else gauss_newton.COST_TOLERANCE
     reached = gauss_newton.search(pieces, first, starts, seed, most, tolerance)
-    point = pieces.in_order(reached.point)
+    point = reached.point
     pieces.steps = {}
     if twin.controller is None:
-        reached = pieces.slopes(point)
         if not corrected:
-            reached = gauss_newton.refine(pieces, reached, most)
+            if pieces.slope_steps:
+                (residuals,) = pieces.residuals([reached.point])
+                reached = dataclasses.replace(reached, residuals=residuals)
+                point = gauss_newton.refine(pieces, reached, most, tolerance, rough=True).point
+            reached = pieces.slopes(pieces.in_order(point))
+            reached = gauss_newton.refine(pieces, reached, most, tolerance)
             return pieces, *gauss_newton.extrapolated(pieces, reached, most)
-        slopes, moved = gauss_newton.accurate(pieces, reached)
+        pieces.slope_steps = {}
+        slopes, moved = gauss_newton.accurate(pieces, pieces.slopes(pieces.in_order(point)))
         return pieces, gauss_newton.not_worse(pieces, slopes), moved
     closed = Replays(twin, names, data, True, report, kept=batches)
     points = [closed.start, Point(point.values, closed.start.states)]

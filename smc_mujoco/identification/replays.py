@@ -12,13 +12,16 @@ MuJoCo's steps are of first order where there is dry friction or a motor, and th
 quantities by many standard errors. So replays of measured open loops are corrected by what short
 steps change, which is extrapolated from two runs with steps h and h/2: 2 x(h/2) - x(h). The
 correction hardly depends on the quantities. So a search keeps that of one point, and simulates its
-other points with longer steps.
+other points with longer steps. Derivatives are of longer steps too where dry friction alone asks
+for short ones: it makes them rough by as much with either.
 """
 
+import contextlib
 import copy
 import dataclasses
 import itertools
 import math
+import operator
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -214,10 +217,13 @@ class Replays:
         # integrator and step of replays; none for the scenario's own
         self.steps: Fields = {}
         self.corrections: list[Record] | None = None  # of each piece; None for none
-        self.limit = False  # whether residuals are extrapolated to steps of 0
+        # what steps of 0 would change in the residuals of each piece; None for nothing
+        self.step_errors: list[Array] | None = None
         self.pieces: list[Piece] = []
         for i in range(len(data)):
             self.pieces += self._pieces(i)
+        # those of derivatives, which may be longer; none: those of residuals
+        self.slope_steps: Fields = {} if closed else twin.long_steps(self._part(0))
 
     @property
     def start(self) -> Point:
@@ -247,6 +253,8 @@ class Replays:
         subset.pieces = [self.pieces[k] for k in indices]
         if self.corrections is not None:
             subset.corrections = [self.corrections[k] for k in indices]
+        if self.step_errors is not None:
+            subset.step_errors = [self.step_errors[k] for k in indices]
         return subset
 
     def rig(self, point: Point) -> Rig:
@@ -306,25 +314,21 @@ class Replays:
 
     def residuals(self, points: Sequence[Point]) -> list[list[Array]]:
         """Return the residuals of each piece, (N,), at each point. All replays are one batch."""
-        if not self.limit:
-            return self._residuals(points)
-        extrapolated = []
-        for halves, quarters in zip(*self.by_steps(points, PARTS), strict=True):
-            pairs = zip(halves, quarters, strict=True)
-            extrapolated.append([2.0 * quarter - half for half, quarter in pairs])
-        return extrapolated
+        residuals = self._residuals(points)
+        if self.step_errors is None:
+            return residuals
+        return [list(map(operator.add, rows, self.step_errors)) for rows in residuals]
 
     def by_steps(self, points: Sequence[Point], parts: Sequence[float]) -> list[list[list[Array]]]:
         """Return `residuals` with each of some parts of the physics step, and commands as fine."""
         plain = self.rig(points[0]).repeated(self._part(0))
-        steps, pieces = self.steps, self.pieces
+        pieces = self.pieces
         residuals = []
         for part in parts:
-            self.steps = {"physics_step": plain.resolved.physics_step / part}
-            self.pieces = self._finer(round(part))
-            residuals.append(self._residuals(points))
-            self.pieces = pieces
-        self.steps = steps
+            with self._stepping({"physics_step": plain.resolved.physics_step / part}):
+                self.pieces = self._finer(round(part))
+                residuals.append(self._residuals(points))
+                self.pieces = pieces
         return residuals
 
     def _residuals(self, points: Sequence[Point]) -> list[list[Array]]:
@@ -387,10 +391,16 @@ class Replays:
 
     def sharpened(self, slopes: Slopes) -> Slopes:
         """Return slopes with derivatives from shorter steps."""
-        steps, self.steps = self.steps, self.short_steps
-        sharp = self.slopes(slopes.point)
-        self.steps = steps
+        with self._stepping(self.short_steps):
+            sharp = self.slopes(slopes.point)
         return dataclasses.replace(sharp, residuals=slopes.residuals)
+
+    @contextlib.contextmanager
+    def _stepping(self, steps: Fields) -> Iterator[Fields]:
+        """Replay with other steps meanwhile, and yield them."""
+        before, self.steps = self.steps, steps
+        yield steps
+        self.steps = before
 
     def _replayed(
         self, rigs: Sequence[Rig], points: Sequence[Point], fields: Fields
@@ -466,12 +476,17 @@ class Replays:
         else:
             steps[point.values + steps > self.high] *= -1.0
         ahead = self._moved(point, steps, DIFFERENCE_STEP)
-        residuals, *rows = self.residuals([point, *ahead, *behind])
+        points = [point, *ahead, *behind]
+        with self._stepping(self.slope_steps or self.steps) as steps:
+            before, *rows = self.residuals(points)
+        residuals = before
+        if steps != self.steps:
+            (residuals,) = self.residuals([point])
         count = len(ahead)
         rows_behind = rows[count:]
         if not central:
             behind = [point] * count
-            rows_behind = [residuals] * count
+            rows_behind = [before] * count
         gaps = np.full(count, DIFFERENCE_STEP)
         if central:
             gaps = 2.0 * gaps

@@ -60,8 +60,9 @@ class Curve(Replays):
         self.tried = []
 
         self.steps = {}
+        self.slope_steps = {}
         self.corrections = None
-        self.limit = False
+        self.step_errors = None
         self.closed = False
         self.report = lambda count: None
         columns = SimpleNamespace(state=(), x=("y",))
@@ -571,6 +572,18 @@ def test_replays_are_solved_for_steps_of_0_with_the_slopes_of_longer_ones():
     assert max(count for _, count in curve.replayed) <= len(gauss_newton.SHARES) + 1
     once, _ = gauss_newton.extrapolated(curve, reached)
     assert abs(once.point.values[0] - TRUE[0]) > 5e-3  # one step of derivatives is not enough
+
+
+def test_derivatives_of_longer_steps_stand_beside_residuals_of_short_ones():
+    curve = Bent()
+    curve.slope_steps = {"physics_step": 4e-3}
+    slopes = curve.slopes(curve.start)
+    assert curve.replayed == [(4e-3, 7), (1e-3, 1)]
+    (residuals,) = curve.residuals([curve.start])
+    np.testing.assert_array_equal(np.concatenate(slopes.residuals), np.concatenate(residuals))
+    ahead = curve.slopes(curve.start, central=False)
+    gap = np.abs(ahead.freed_slopes - slopes.freed_slopes)
+    assert gap.max() < 0.01 * np.abs(slopes.freed_slopes).max()
 
 
 def test_what_steps_leave_is_the_error_of_the_extrapolation_where_they_err_at_random():
