@@ -125,7 +125,7 @@ def lacking_forces(rig: LogRig, replays: Replays, slopes: Slopes) -> list[Lack]:
         for of_pieces in zip(*shapes_by_piece, strict=True):
             words = SPRUNG if geared and of_pieces[0][0] == COMMAND else of_pieces[0][0]
             texts.append(f"lack of fit: the model lacks a force on {joint} {words}")
-            pieces += _pushed(replays.pieces, [force for _, force in of_pieces], i)
+            pieces += _slightly_pushed(replays.pieces, [force for _, force in of_pieces], i)
     trial = copy.copy(replays)
     trial.pieces = pieces
     trial.corrections = None
@@ -150,7 +150,7 @@ def _motions(
     late = rig.values.get(DELAY, rig.base.input_delay)
     x, v, a = [], [], []
     for piece, columns in zip(replays.pieces, predicted, strict=True):
-        period = _period(piece)
+        period = period_of(piece)
         place = columns[rig.columns.x[i]]
         speed = np.gradient(place, period)
         t = period * np.arange(len(place))
@@ -174,14 +174,14 @@ def _motions(
                 speed=v[k] / fast,
                 acceleration=a[k] / strong,
                 time=(before + share) / records.count(piece.record),
-                command=_command(piece, i) - _slow_part(piece, i),
+                command=command_of(piece, i) - _slow_part(piece, i),
                 load=None if sets_position else _slow_part(piece, i),
             )
         )
     return motions
 
 
-def _period(piece: Piece) -> float:
+def period_of(piece: Piece) -> float:
     """Return the time between samples of a piece, s."""
     assert isinstance(piece.part, LogPart)
     return piece.part.period * piece.part.stride
@@ -192,7 +192,7 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) or 1.0
 
 
-def _command(piece: Piece, i: int) -> Array:
+def command_of(piece: Piece, i: int) -> Array:
     """Return the command of motor i, (N,)."""
     part = piece.part
     assert isinstance(part, LogPart)
@@ -203,24 +203,29 @@ def _slow_part(piece: Piece, i: int) -> Array:
     """Return the command of motor i averaged over some samples, (N,)."""
     from scipy.ndimage import uniform_filter1d
 
-    size = 2 * max(1, round(AVERAGED / 2.0 / _period(piece))) + 1
-    return uniform_filter1d(_command(piece, i), size, mode="nearest")
+    size = 2 * max(1, round(AVERAGED / 2.0 / period_of(piece))) + 1
+    return uniform_filter1d(command_of(piece, i), size, mode="nearest")
 
 
-def _pushed(pieces: Sequence[Piece], forces: Sequence[Array], i: int) -> list[Piece]:
+def _slightly_pushed(pieces: Sequence[Piece], forces: Sequence[Array], i: int) -> list[Piece]:
     """Return the pieces with forces added to the commands of motor i, SIZE of its deviation."""
     commands = []
     for piece in pieces:
         assert isinstance(piece.part, LogPart)
         commands.append(piece.part.u[:, i])
     size = SIZE * (float(np.std(np.concatenate(commands))) or 1.0) / _rms(np.concatenate(forces))
-    pushed = []
+    return pushed(pieces, [size * force for force in forces], i)
+
+
+def pushed(pieces: Sequence[Piece], forces: Sequence[Array], i: int) -> list[Piece]:
+    """Return the pieces with forces added to the commands of motor i."""
+    moved = []
     for piece, force in zip(pieces, forces, strict=True):
         part = piece.part
         assert isinstance(part, LogPart)
         u = part.u.copy()
-        held = np.repeat(size * force, part.stride)
+        held = np.repeat(force, part.stride)
         u[: part.before, i] += held[0]
         u[part.before :, i] += held[: len(u) - part.before]
-        pushed.append(dataclasses.replace(piece, part=dataclasses.replace(part, u=u)))
-    return pushed
+        moved.append(dataclasses.replace(piece, part=dataclasses.replace(part, u=u)))
+    return moved

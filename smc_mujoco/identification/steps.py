@@ -195,7 +195,7 @@ def _least_squares(
 
     def unit_response(p: Array, late: float) -> Array:
         """Return the response of a gain of 1, (K,)."""
-        return np.interp(record["t"] - late, fine, _filtered(response(p), u, step / FINER))
+        return np.interp(record["t"] - late, fine, filtered(response(p), u, step / FINER))
 
     def solved(moved: Array) -> tuple[Array, Array]:
         """Return gain and offset of least squares, and what is left, (K,)."""
@@ -206,7 +206,7 @@ def _least_squares(
     starts = []
     for constant in np.geomspace(step, lasts / 2.0, GRID):
         p = np.array([constant, 1.0 if "damping_ratio" in names else constant / 5.0])[: len(names)]
-        moved = _filtered(response(p), u, step / FINER)
+        moved = filtered(response(p), u, step / FINER)
         for late in np.linspace(0.0, MOST_LATE * lasts, GRID):
             _, rest = solved(np.interp(record["t"] - late, fine, moved))
             starts.append((float(rest @ rest), *p, late))
@@ -243,7 +243,7 @@ def _least_squares(
     return values, errors, float(np.linalg.norm(residuals))
 
 
-def _filtered(system: tuple[Array, Array], u: Array, step: float) -> Array:
+def filtered(system: tuple[Array, Array], u: Array, step: float) -> Array:
     """Return the response of a transfer function to commands that are held, exactly."""
     from scipy.signal import cont2discrete, lfilter
 
