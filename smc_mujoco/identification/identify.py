@@ -671,14 +671,14 @@ def _solved(
     """
     pieces = Replays(twin, names, data, False, report, kept=batches)
     pieces.steps = pieces.slope_steps
-    first = pieces.slopes(pieces.start, central=False)
+    first = pieces.slopes(pieces.start)
     if doubts and first.fit < 0.0:
         raise ScenarioError(doubts[0])
     check_told_apart(pieces, first)
     extrapolates = twin.controller is None and not corrected
     tolerance = gauss_newton.SMALL_CHANGE if extrapolates else gauss_newton.COST_TOLERANCE
     reached = gauss_newton.search(pieces, first, starts, seed, most, tolerance)
-    point = reached.point
+    point = pieces.in_order(reached.point)
     pieces.steps = {}
     if twin.controller is None:
         if not corrected:
@@ -687,10 +687,10 @@ def _solved(
                 reached = dataclasses.replace(reached, residuals=residuals)
                 point = gauss_newton.refine(pieces, reached, most, tolerance, rough=True).point
             reached = pieces.slopes(pieces.in_order(point))
-            reached = gauss_newton.refine(pieces, reached, most, tolerance)
+            reached = gauss_newton.refine(pieces, reached, most)
             return pieces, *gauss_newton.extrapolated(pieces, reached, most)
         pieces.slope_steps = {}
-        slopes, moved = gauss_newton.accurate(pieces, pieces.slopes(pieces.in_order(point)))
+        slopes, moved = gauss_newton.accurate(pieces, pieces.slopes(point))
         return pieces, gauss_newton.not_worse(pieces, slopes), moved
     closed = Replays(twin, names, data, True, report, kept=batches)
     points = [closed.start, Point(point.values, closed.start.states)]
