@@ -165,7 +165,7 @@ def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
     assert "`" not in last.under[-1]
     assert found.to_latex().count(meaning("ITAE")) == 1
     assert found.to_latex().count(r"\begin{tabular}") == 6  # J on each plant, too
-    assert found._repr_html_().count("<table") == 9  # times, runs and gains
+    assert found.full._repr_html_().count("<table") == 9  # times, runs and gains
     assert len(found.plot().axes) == 10  # of all five metrics, on both plants
     assert found.traces[0].scenario == found.table.scenario(0)
     assert len(found.traces) == 12
