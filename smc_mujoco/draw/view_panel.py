@@ -58,8 +58,8 @@ class ViewPanel:
         names = channel_names(session.scenarios[0].plant)
         run = session.scenarios[0].resolved
         way = np.abs(np.subtract(run.x0, constant_goal(run) or run.plant.origin))
-        way[3:] *= not run.plant.pose  # of what flies, a place
-        self.channel = int(way[: run.plant.driven].argmax())  # has the longest way
+        longest = int(way[: run.plant.driven].argmax())
+        self.channel = 2 if run.plant.pose else longest  # of what flies, its height
         if len(names) > 1:
             channel_choice = gui.add_dropdown("charts of", names, initial_value=names[self.channel])
             channel_choice.on_update(
