@@ -671,7 +671,7 @@ def _solved(
     """
     pieces = Replays(twin, names, data, False, report, kept=batches)
     pieces.steps = pieces.slope_steps
-    first = pieces.slopes(pieces.start)
+    first = pieces.slopes(pieces.start, central=not pieces.slope_steps)
     if doubts and first.fit < 0.0:
         raise ScenarioError(doubts[0])
     check_told_apart(pieces, first)
@@ -686,8 +686,10 @@ def _solved(
                 (residuals,) = pieces.residuals([reached.point])
                 reached = dataclasses.replace(reached, residuals=residuals)
                 point = gauss_newton.refine(pieces, reached, most, tolerance, rough=True).point
+            else:
+                tolerance = gauss_newton.COST_TOLERANCE
             reached = pieces.slopes(pieces.in_order(point))
-            reached = gauss_newton.refine(pieces, reached, most)
+            reached = gauss_newton.refine(pieces, reached, most, tolerance)
             return pieces, *gauss_newton.extrapolated(pieces, reached, most)
         pieces.slope_steps = {}
         slopes, moved = gauss_newton.accurate(pieces, pieces.slopes(point))
