@@ -21,7 +21,7 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.session import Session, law_for, laws_of
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation.grid import listed_laws
+from smc_mujoco.simulation.grid import Starts, listed_laws
 from smc_mujoco.simulation.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -237,7 +237,8 @@ def runs_of(
         runs = []
         for law in named_laws or laws_of(plant)[:1] or ["none"]:
             own = law_for(plant, law)
-            runs.append(Scenario(plant=plant, law=own))
+            run = Scenario(plant=plant, law=own)
+            runs.append(Starts(spread=0.0).place(run, 0))  # beside the goal, where it is at it
     if len(runs) > 2:
         raise ScenarioError(
             f"{len(runs)} runs to show: give one or two, which are shown in one picture"

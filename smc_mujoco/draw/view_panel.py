@@ -165,7 +165,7 @@ class ViewPanel:
             start,
             tuple(series),
             title=self.title(signal),
-            scales={"x": uplot.Scale(time=False)},
+            scales={"x": uplot.Scale(time=False, range=(0.0, self.session.scenarios[0].duration))},
             axes=AXES,
             legend=uplot.Legend(show=False),
             height=CHART_HEIGHT,

@@ -13,6 +13,7 @@ import pytest
 pytest.importorskip("viser")
 import msgspec
 import zstandard
+from helpers.pages import ROOT
 
 import smc_mujoco as smc
 from smc_mujoco.common import html
@@ -450,3 +451,11 @@ def test_tendons_are_lines_from_site_to_site_that_move(tmp_path):
         assert np.abs(run.tendons.points - before).max() > 0.01
     finally:
         live.close()
+
+
+def test_an_arm_whose_start_is_its_goal_begins_beside_it():
+    """In view it stood still, and its charts were of rounding."""
+    (run,) = runs_of(f"{ROOT}/examples/arm.xml:shoulder+elbow", ["pid"])
+    assert run.resolved.x0 == (0.3, 0.3)
+    (own,) = runs_of("duffing", ["pid"])
+    assert own.resolved.x0 == smc.plant("duffing").x0
