@@ -118,7 +118,9 @@ def which(
         minutes = QUICK_MINUTES
     machine = as_plant(plant)
     if not falling and (why := falls(machine)):
-        raise ScenarioError(f"{why}; falling=True (--falling) goes on all the same")
+        raise ScenarioError(
+            f"{why}; falling=True (--falling) goes on, with a duration that ends first"
+        )
     asked_metrics, properties, limits = _read_needs(needs)
     chosen = _suited(machine, properties, laws)
     if machine.is_user_model and laws is None:

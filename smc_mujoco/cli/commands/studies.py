@@ -52,7 +52,9 @@ WhichQuick = Annotated[
 Falling = Annotated[
     bool,
     typer.Option(
-        "--falling", help="Go on even if the base of your model falls while its joints are held."
+        "--falling",
+        help="Go on though the base of your model falls while its joints are held. Give a "
+        "--duration that ends before it lies.",
     ),
 ]
 Minutes = Annotated[
