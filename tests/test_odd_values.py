@@ -49,7 +49,7 @@ REFUSED = {
     ),
     "metrics as a text": (lambda: smc.score([case(duration=0.1)], metrics="itae"), "give a list"),
     "a word of several names": (lambda: smc.plant("pendulum"), "'double_pendulum' or 'inverted"),
-    "a short word": (lambda: smc.law("smc"), "choose from"),
+    "a short word": (lambda: smc.law("smc"), "near it are mpc"),
     "gains of a law": (lambda: smc.law("pid")(kp=-3), "kp is -3"),
     "a value on which all fails": (lambda: smc.Coulomb(Awkward()), "level is <"),  # pyright: ignore
     "no text": (lambda: smc.Sine(1.0, 1.0, about=EMPTY), "about is array"),  # pyright: ignore

@@ -671,7 +671,7 @@ def _solved(
     """
     pieces = Replays(twin, names, data, False, report, kept=batches)
     pieces.steps = pieces.slope_steps
-    first = pieces.slopes(pieces.start, central=not pieces.slope_steps)
+    first = pieces.slopes(pieces.start)
     if doubts and first.fit < 0.0:
         raise ScenarioError(doubts[0])
     check_told_apart(pieces, first)
