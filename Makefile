@@ -31,7 +31,7 @@ slow: ## the tests of more than about 0.3 s each whose lines faster ones run, to
 	@./setup.sh requirements-test.lock
 	$(BIN)/python -m pytest -n auto --dist loadfile -m slow
 
-quick: ## the first case of each test that takes little: a minute, for every change
+quick: ## the first case of each test that takes little: two minutes, for every change
 	@./setup.sh requirements-test.lock
 	$(BIN)/python -m pytest --quick
 
