@@ -238,7 +238,8 @@ def runs_of(
         for law in named_laws or laws_of(plant)[:1] or ["none"]:
             own = law_for(plant, law)
             run = Scenario(plant=plant, law=own)
-            runs.append(Starts(spread=0.0).place(run, 0))  # beside the goal, where it is at it
+            # an arm that would rest at its goal begins beside it
+            runs.append(Starts(spread=0.0).place(run, 0))
     if len(runs) > 2:
         raise ScenarioError(
             f"{len(runs)} runs to show: give one or two, which are shown in one picture"

@@ -233,7 +233,7 @@ class Identified(Answer):
             fits["held_out"] = _fit([self.held_out.by_pieces or self.held_out.fit])
         doubts = []
         for note in self.notes:
-            if not note.startswith(self.lacks[1:]):  # the largest is told; numbers move by all
+            if not note.startswith(self.lacks[1:]):  # further lacks of fit are in the tables
                 doubts.append(Fact("doubt", text=note))
         return Screen(
             tables=[Tabular(headings=("",) * 4, rows=rows)],

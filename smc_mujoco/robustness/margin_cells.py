@@ -63,10 +63,10 @@ class Cells:
         self.done += now
         return results
 
-    def ends_by(self, found: Mapping[int, LevelSearch], covers: Callable) -> list[Tried]:
+    def ends_by(self, searches: Mapping[int, LevelSearch], covers: Callable) -> list[Tried]:
         """Return the ends of the intervals whose runs something covers."""
         ends = []
-        for i, search in found.items():
+        for i, search in searches.items():
             base, kind = self.pairs[i]
             for level in (search.low, search.high):
                 inside = kind.none < level < math.inf
