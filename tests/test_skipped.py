@@ -16,7 +16,6 @@ ROOT = Path(__file__).parents[1]
 SKIPPED = {  # module -> why it is skipped
     "tests/analysis/test_engine_gpu.py": "it needs a CUDA device",
     "tests/draw/test_view_browser.py": "it needs Chromium or Chrome, which CI's machines have",
-    "tests/evidence/rigs/test_qube_servo.py": "the public records are not in the repository",
 }
 PRINT = """
 import sys

@@ -22,7 +22,6 @@ from smc_mujoco.analysis.chattering import (
 )
 from smc_mujoco.analysis.differ import relative_range
 from smc_mujoco.analysis.harmonics import Loop, Wave, play
-from smc_mujoco.analysis.linear_theory import critical_delay
 from smc_mujoco.analysis.step_halving import StepChange
 from smc_mujoco.common.files import plain
 from smc_mujoco.design import chattering
@@ -282,35 +281,6 @@ def test_amplitude_and_frequency_follow_formulas_runs_and_exponents_of_the_lag(n
     assert frequencies == pytest.approx(-1.0, rel=0.02)
 
 
-BEHIND_LAG = {"actuator": smc.Lag(0.01)}
-LATE = {"input_delay": 0.01}
-SLOWLY = {"velocity": smc.estimator("filtered_difference", tau=0.01)}  # 1.5 times the amplitude
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("law", "plant", "fields"),
-    [
-        ("super_twisting", "duffing", BEHIND_LAG),
-        ("super_twisting", "duffing", BEHIND_LAG | SLOWLY),
-        ("twisting", "inverted_pendulum", LATE),
-        ("power_rate", "duffing", LATE),
-    ],
-)
-def test_predicted_chattering_of_plants_is_that_of_runs(plant, law, fields):
-    scenario = smc.Scenario(
-        plant=plant,
-        law=at_defaults(law),
-        x0=0.02,
-        duration=6.0,
-        **fields,
-    )
-    cycle = chattering(scenario)
-    assert (cycle.amplitude, cycle.frequency) == pytest.approx(
-        measured(smc.run(scenario)), rel=0.15
-    )
-
-
 def test_a_relay_without_an_actuator_chatters_from_sample_to_sample():
     scenario = smc.Scenario(
         plant="inverted_pendulum",
@@ -547,28 +517,3 @@ def test_under_an_integrator_of_first_order_what_half_the_step_leaves_counts_too
     never = (math.inf, math.inf), (math.nan,) * 2, (0.2,)
     assert [relative_range(values, first_order=True) for values in never] == [0.0, 0.0, 0.0]
     assert relative_range((0.2, math.inf), first_order=True) == math.inf
-
-
-@pytest.mark.slow
-@COARSELY
-def test_a_smooth_law_oscillates_only_above_its_critical_delay():
-    plant = smc.plant("duffing")
-    law = smc.law("observer_free", lam=6.0, k1=2.5)
-    critical = critical_delay(plant, lam=6.0, k1=2.5, control_period=1e-3)
-    calm, above = (
-        chattering(law, plant=plant, input_delay=round(q * critical, 3)) for q in (0.9, 1.15)
-    )
-    assert not calm
-    assert math.isnan(calm.frequency)
-    assert math.isnan(calm.uncertainty)
-    scenario = smc.Scenario(
-        plant=plant,
-        law=law,
-        input_delay=round(1.15 * critical, 3),
-        x0=0.1,
-        duration=40.0,
-    )
-    assert above
-    assert (above.amplitude, above.frequency) == pytest.approx(
-        measured(smc.run(scenario)), rel=0.15
-    )

@@ -77,16 +77,6 @@ def test_a_limit_cycle_with_default_steps_is_that_of_the_machine(name):
     )
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("coarse_grid")
-@pytest.mark.parametrize("name", VECTORS)
-def test_the_predicted_ranges_hold_the_limit_cycle_of_the_machine(name):
-    loop, amplitude, frequency = VECTORS[name]
-    cycle = smc.design.chattering(scenario(loop))
-    assert cycle.amplitude_range[0] <= amplitude <= cycle.amplitude_range[1]
-    assert cycle.frequency_range[0] <= frequency <= cycle.frequency_range[1]
-
-
 def loops(seed):
     """Random loops that oscillate, without end, with their exact cycles."""
     rng = np.random.default_rng(seed)
@@ -94,18 +84,6 @@ def loops(seed):
         amplitude, frequency = loop.cycle()
         if frequency > 1.0:
             yield loop, amplitude, frequency
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("drive", ["lags", "motor"])
-def test_random_loops_behind_drives_oscillate_as_the_machine_does(drive):
-    driven = (loop_and_start for loop_and_start in loops(1) if getattr(loop_and_start[0], drive))
-    for loop, _, _ in itertools.islice(driven, 2):
-        amplitude, frequency = loop.cycle(8.0)
-        trace = smc.run(scenario(loop, duration=8.0))
-        late = trace.t > 4.8
-        cycle = measured(trace.t[late], trace.s[late, 0])
-        assert cycle == pytest.approx((amplitude, frequency), rel=0.05), loop
 
 
 @pytest.mark.slow

@@ -1,7 +1,6 @@
 """What assumes Linux has a way without: files, locks, processes, processors, pictures, C."""
 
 import ast
-import builtins
 import os
 import subprocess
 import sys
@@ -15,18 +14,6 @@ from smc_mujoco.common import gl, process
 
 PACKAGE = Path(smc.__file__).parent
 POSITION = {"read_text": 0, "write_text": 1}  # of the encoding among the arguments
-
-
-def without_module(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the import of a module fail, as where Python has none."""
-    real = builtins.__import__
-
-    def fails(wanted: str, *args: object, **kwargs: object) -> object:
-        if wanted == name:
-            raise ImportError(name)
-        return real(wanted, *args, **kwargs)
-
-    monkeypatch.setattr(builtins, "__import__", fails)
 
 
 def test_every_text_file_is_read_and_written_as_utf_8():

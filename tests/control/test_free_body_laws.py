@@ -7,9 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from numba import njit
 from scipy.linalg import expm
-from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
 import smc_mujoco as smc
@@ -17,12 +15,10 @@ from smc_mujoco.common.files import shipped
 from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.attitude import of_thrust, rate_of
 from smc_mujoco.control.joint_law import JointMeasurement
-from smc_mujoco.control.units import Gain
 
 TEXT = (shipped("models").parent / "examples" / "quadrotor.xml").read_text(encoding="utf-8")
 J = 16.8e-6
 G = 9.81
-TORQUE = 3e-4  # N m
 SLIDING = ["quaternion_sliding", "adaptive_quaternion_sliding"]
 LAWS = [
     "geometric",
@@ -83,38 +79,6 @@ def original():
     )
 
 
-@njit
-def roll(y):
-    """A constant torque about the roll axis, N m."""
-    return np.array([TORQUE, 0.0, 0.0])
-
-
-@njit
-def wave(y):
-    """A torque about each axis, by 10 rad/s^2 of its inertia."""
-    return 10.0 * math.sin(4.0 * y.t) * np.diag(y.M)[3:]
-
-
-def pushed(law, torque=roll):
-    """A law of the library with a torque added to what it commands."""
-    base = njit(law.function)
-    gains = {name: Gain(value, shared=True) for name, value in law.gains.items()}
-
-    @smc.law_function(
-        joint=True,
-        requires_model=True,
-        plants=("a free body",),
-        gains=gains,
-        memory=law.memory,
-    )
-    def with_torque(y, gains, memory):
-        u, s = base(y, gains, memory)
-        u[3:] += torque(y)
-        return u, s
-
-    return with_torque
-
-
 def sag(K, rho, c, heavier):
     return math.atanh((heavier - 1.0) * G / K) / (rho * c)
 
@@ -143,27 +107,6 @@ def test_an_unknown_weight_sags_by_the_closed_form(drone, law, expected):
     assert -smc.run(scenario).e[-1, 2] == pytest.approx(expected, rel=1e-3)
 
 
-@pytest.mark.slow
-def test_an_unknown_torque_turns_the_body_by_the_closed_form(drone):
-    """The body hovers level, so that the wanted attitude is the one that is off, and the position
-    with it.
-    """
-    law = smc.law("quaternion_sliding")
-    common = {"plant": drone, "duration": 10.0, "control_period": 2e-3}
-    s = math.atanh(TORQUE / (J * law.gains["K"])) / law.gains["rho"]
-    trace = smc.run(smc.Scenario(law=pushed(law), **common))
-    assert trace.s[-1, 3] == pytest.approx(s, rel=1e-6)
-    # of the wanted thrust, m (c Kx rhox e) sideways and m g upwards
-    tilt = 2.0 * math.asin(s / law.gains["lam"])
-    sideways = 5.0 * math.tanh(1.25 * abs(trace.e[-1, 1])) / G
-    assert math.atan(sideways) == pytest.approx(tilt, rel=1e-4)
-    law = smc.law("geometric")
-    trace = smc.run(smc.Scenario(law=pushed(law), **common))
-    assert math.atan(7.0 * abs(trace.e[-1, 1]) / G) == pytest.approx(
-        math.asin(TORQUE / (J * 421.7)), rel=1e-4
-    )
-
-
 def test_a_constant_force_leaves_the_adaptive_law_its_closed_form_and_a_weight_what_was_published(
     original,
 ):
@@ -190,49 +133,6 @@ def test_a_constant_force_leaves_the_adaptive_law_its_closed_form_and_a_weight_w
         )
     )
     assert -heavy.e[-1, 2] == pytest.approx(0.34, rel=0.01)
-
-
-LEMNISCATES = {  # of that coding, rms in m: periods of 6, 4 and 3 s
-    "adaptive_quaternion_sliding": (0.0018, 0.0080, 0.0249),
-    "quaternion_sliding": (0.0016, 0.0068, 0.0217),
-    "geometric": (0.0038, 0.0148, 0.0315),
-}
-
-
-def lemniscate(plant, law, period):
-    """The rms of the position's error in the second lap, m."""
-    w = math.tau / period
-    path = [smc.Sine(1.0, w), smc.Sine(0.5, 2.0 * w), smc.Constant(1.0), *[smc.Constant(0.0)] * 3]
-    start = {
-        "v0": (w, w, 0.0, 0.0, 0.0, 0.0),
-        "duration": 2.0 * period,
-        "control_period": 2e-3,
-    }
-    trace = smc.run(
-        smc.Scenario(
-            plant=plant,
-            law=law,
-            reference=path,
-            **start,
-        )
-    )
-    return float(np.sqrt(np.mean(np.sum(trace.e[len(trace.t) // 2 :, :3] ** 2, axis=1))))
-
-
-@pytest.mark.slow
-def test_errors_on_a_lemniscate_have_the_order_and_the_size_of_another_coding(original):
-    """The geometric law is last, and errors grow as the period falls."""
-    laws = {name: smc.law(name) for name in LEMNISCATES} | {
-        "geometric": smc.law("geometric", kv=2.0)
-    }
-    rms = {
-        name: [lemniscate(original, law, period) for period in (6.0, 4.0, 3.0)]
-        for name, law in laws.items()
-    }
-    for name, published in LEMNISCATES.items():
-        assert rms[name] == pytest.approx(published, rel=0.25)
-        assert sorted(rms[name]) == rms[name]
-        assert name == "geometric" or np.all(np.array(rms[name]) < rms["geometric"])
 
 
 def test_the_adaptive_gains_grow_by_the_published_rule_and_stay_within_their_bounds():
@@ -356,72 +256,6 @@ def test_commands_are_those_of_the_law_in_python(drone, law):
             rtol=1e-8,
             atol=1e-10,
         )
-
-
-@pytest.mark.slow
-def test_super_twisting_is_of_second_order_without_a_lag_and_in_a_cycle_behind_one(
-    drone,
-):
-    """|d'| < 40 = L; then harmonic balance of the yaw, with G = (p + lam / 2) / (p (mu p^2 + p +
-    lam / 2)).
-    """
-    text = TEXT.replace('dyntype="filter" dynprm="0.0625" ', "").replace(
-        ' act="0.0782 0.0782 0.0782 0.0782"', ""
-    )
-    quick = smc.plant_from(
-        text,
-        channels=["body"],
-        name="quick",
-        keyframe="hover",
-    )
-    L = 45.0
-    law = pushed(smc.law("super_twisting_attitude"), wave)
-    law = law(
-        k1=1.5 * math.sqrt(L),
-        k2=1.1 * L,
-        **NOWHERE["super_twisting_attitude"],
-    )
-    common = {
-        "plant": quick,
-        "law": law,
-        "duration": 3.0,
-        "x0": (0.0, 0.0, 30.0, 0.1, 0.0, 0.2),
-    }
-    ends = []
-    for trace in smc.run(
-        [
-            smc.Scenario(
-                control_period=dt,
-                physics_step=1e-3,
-                **common,
-            )
-            for dt in (4e-3, 2e-3)
-        ]
-    ):
-        ends.append(np.abs(trace.s[trace.t > 2.0, 3:]).max())
-    assert ends[0] / ends[1] == pytest.approx(4.0, rel=0.3)
-    assert ends[1] < 6.0 * L * 2e-3**2
-
-    def balance(logs):
-        amplitude, omega = np.exp(logs)
-        p = 1j * omega
-        signs = 1.1128 * 22.6 / math.sqrt(amplitude) + 4.0 * 50.0 / (math.pi * amplitude * p)
-        rest = 1.0 + signs * (p + 4.0) / (p * (0.0625 * p * p + p + 4.0))
-        return rest.real, rest.imag
-
-    amplitude, omega = np.exp(fsolve(balance, np.log([0.05, 40.0])))
-    cycle = smc.run(
-        smc.Scenario(
-            plant=drone,
-            law="super_twisting_attitude",
-            x0=(0.0, 0.0, 1.0, 0.0, 0.0, 0.01),
-            duration=6.0,
-        )
-    )
-    s = cycle.s[cycle.t > 4.0, 5]
-    crossings = np.count_nonzero(np.diff(np.sign(s)))
-    assert np.abs(s).max() == pytest.approx(amplitude, rel=0.3)
-    assert crossings * math.pi / 2.0 == pytest.approx(omega, rel=0.15)
 
 
 def turn(plant, law, axis, **fields):

@@ -4,11 +4,9 @@ import copy
 import json
 from pathlib import Path
 
-import pyarrow.parquet
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.cli import main as cli
 from smc_mujoco.control import surface
 from smc_mujoco.control.from_text import component, parsed_gains
 from smc_mujoco.simulation import scenario_json
@@ -130,34 +128,6 @@ def test_a_tuning_is_its_law_and_keeps_its_source(files, tuned):
     )
     assert smc.law(tuned.law.template, c=9.0) == tuned.law.template(c=9.0)
     assert {s.law for s in smc.grid("duffing", ["st.json"], seeds=2)} == {tuned.law}
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:no set of gains tried")
-def test_a_tuning_goes_through_every_door(files, tuned, capsys):
-    tuned.save("st.json")
-    for words in (
-        (
-            "compare",
-            "duffing",
-            "--law",
-            "st.json,two.py",
-            "--seeds",
-            "1",
-            "--duration",
-            "0.1",
-            "--condition",
-            "nominal",
-            "--no-tune",
-        ),
-        ("margins", "duffing", "--law", "st.json", "--kind", "delay", "--quick"),
-        ("tune", "duffing", "--law", "st.json", "--budget", "1"),
-    ):
-        with pytest.raises(SystemExit) as end:
-            cli.main([*words])
-        assert not end.value.code, (words, capsys.readouterr().err)
-    rows = pyarrow.parquet.read_table("compared/results.parquet")
-    assert {*rows["law"].to_pylist()} == {"boundary_layer", "mine", "other"}
 
 
 TEXTS = (

@@ -138,37 +138,6 @@ def test_passivity_based_lowers_v_as_its_theorem_says():
     assert V[-1] < 1e-2 * V[0]
 
 
-@pytest.mark.slow
-def test_observer_free_joint_rests_at_its_reference_where_gravity_is_compensated():
-    """With gravity compensation e = 0, and V never grows on the way; without it, see
-    test_panda_laws.py.
-    """
-    lam = np.array([20.0, 6.0, 9.0])
-    k1 = np.array([3.0, 2.0, 4.0])
-    law = smc.law(
-        "observer_free_joint",
-        lam=lam,
-        k1=k1,
-    )
-    compensated = run(
-        law,
-        model="nominal",
-        reference=smc.Constant(0.3),
-        duration=30.0,
-    )
-    e = compensated.x - compensated.r
-    assert np.abs(e[-1]).max() < 1e-6
-    kinetic = np.array(
-        [
-            v @ inertia(x) @ v / 2
-            for x, v in zip(compensated.x[:4000], compensated.v[:4000], strict=True)
-        ]
-    )
-    V = kinetic + np.sum(lam / k1 * np.log(np.cosh(k1 * e[:4000])), axis=1)
-    assert np.diff(V).max() < 1e-3 * V[0] * 1e-3
-    assert V[-1] < 1e-2 * V[0]
-
-
 def test_unit_vector_keeps_its_direction_and_reaches_all_surfaces_at_once():
     rho = 8.0
     trace = run(

@@ -7,7 +7,6 @@ import dataclasses
 import pickle
 
 import pytest
-from matplotlib.text import Text
 
 import smc_mujoco as smc
 from smc_mujoco.control import gain_sets, source
@@ -102,30 +101,6 @@ def test_gains_outside_the_theorem_are_marked_wherever_their_source_is_told(law,
     for marked_law in alike:
         assert "outside its theorem" in str(marked_law.source), marked_law
     assert "outside" not in str(by_channel([law(), beyond]).of_channel(0).source)
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore")
-def test_tables_latex_and_figures_mark_gains_outside_the_theorem(tmp_path):
-    beyond = bounded(k=0.5)
-    trace = smc.run(smc.Scenario(plant=PLANT, law=beyond, duration=0.01))
-    table = smc.compare(
-        [beyond, "pid"],
-        PLANT,
-        "nominal",
-        seeds=1,
-        tune=False,
-        duration=0.02,
-        out=tmp_path / "c",
-        metrics=("itae",),
-        progress=False,
-    )
-    for reported in (str(table), table.to_latex(), words(table.plot()), words(smc.figure([trace]))):
-        assert "outside its theorem" in reported.replace("\n", " ")
-
-
-def words(figure):
-    return " ".join(text.get_text() for text in figure.findobj(Text))
 
 
 def test_replaced_gains_are_the_users():

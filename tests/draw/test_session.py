@@ -49,14 +49,6 @@ def same(session, scenarios):
             assert np.array_equal(log[name], getattr(trace, name)[: len(log)]), name
 
 
-@pytest.fixture
-def arm(tmp_path):
-    """A user's own model."""
-    path = tmp_path / "arm.xml"
-    path.write_text(ARM)
-    return path
-
-
 @pytest.mark.quick
 @pytest.mark.parametrize("scenario", [DUFFING, HARD, NETWORK], ids=lambda s: s.plant.name)
 def test_a_session_is_the_run_of_its_scenario(scenario):

@@ -4,10 +4,7 @@ import os
 import subprocess
 import sys
 
-import pytest
-
 from helpers.pages import ROOT
-from smc_mujoco.cli import main
 
 
 def python(*words, folder=None, path=ROOT, fine=True, **variables):
@@ -28,14 +25,3 @@ def python(*words, folder=None, path=ROOT, fine=True, **variables):
     )
     assert done.returncode == 0 or not fine, done.stdout + done.stderr
     return done
-
-
-def assert_refused(capsys, words, said):
-    """Fail unless a command ends with code 2 and one line that begins so."""
-    with pytest.raises(SystemExit) as end:
-        main.main(words)
-    printed = capsys.readouterr()
-    assert end.value.code == 2
-    assert printed.out == ""
-    assert printed.err.startswith(f"smc-mujoco: {said}")
-    assert len(printed.err.splitlines()) == 1

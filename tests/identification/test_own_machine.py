@@ -4,18 +4,10 @@ logs and paths that cannot be used.
 
 import dataclasses
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.machine_logs import chain, chirp, log, servo_log, sines
-from helpers.public_logs import (
-    DRY,
-    double_pendulum,
-    double_pendulum_log,
-    pendulum,
-    pendulum_log,
-)
+from helpers.machine_logs import chain, log, servo_log, sines
 from typer.testing import CliRunner
 
 import smc_mujoco as smc
@@ -24,7 +16,7 @@ from smc_mujoco.cli.main import app
 from smc_mujoco.errors import ScenarioWarning
 from smc_mujoco.identification.first_guess import first_guess
 from smc_mujoco.identification.friction_figure import curve_error, friction, measured_friction
-from smc_mujoco.identification.identify import SLOW, check
+from smc_mujoco.identification.identify import SLOW
 from smc_mujoco.identification.own_rig import own_rig
 from smc_mujoco.mechanisms.custom.model_numbers import KINDS
 from smc_mujoco.mechanisms.hardware.servos import ServoFriction
@@ -68,23 +60,6 @@ def test_one_joint_s_friction_armature_and_delay_are_found_without_a_start(found
     assert abs(found.values["input_delay"] - TRUTH["input_delay"]) < 1e-4
     assert min(found.by_pieces[0].values()) > 99.0
     assert not found.notes
-
-
-@pytest.mark.slow
-def test_numbers_that_a_motion_tells_apart_are_no_pair_however_few_residuals_remain(tmp_path):
-    """Of a log of this package, what remains is one pattern, that of the replays' steps."""
-    bounded = ONE.replace('joint="j1"/>', 'joint="j1" ctrlrange="-10 10"/>')
-    arm = smc.plant_from(bounded, ["j1"])
-    true = dict(TRUTH)
-    timing = {"input_delay": true.pop("input_delay"), "control_period": 0.002}
-    machine = {"plant": arm, "mismatch": true, **timing}
-    measured = {"sensor": smc.Encoder(counts=4096), "noise": smc.Noise(2e-4)}
-    motion = smc.Sine(0.5, 2.5) + smc.Sine(0.25, 9.0)
-    law = smc.law("pid", kp=20.0, ki=0.0, kd=1.5)
-    case = smc.Scenario(**machine, **measured, law=law, reference=motion, duration=3.0)
-    smc.run(case).export(tmp_path / "run.csv")
-    identified = smc.identify(arm, tmp_path / "run.csv", list(TRUTH))
-    assert not [note for note in identified.notes if "told apart" in note]
 
 
 def test_slow_residuals_that_nothing_explains_are_told(arm):
@@ -194,23 +169,6 @@ def test_a_first_guess_is_within_a_tenth_without_a_simulation(arm, run):
     guess = first_guess(own_rig(arm, list(TRUTH)), [run])
     for name, true in TRUTH.items():
         assert guess.values[name] == pytest.approx(true, rel=0.1 if name != "input_delay" else 0.3)
-
-
-@pytest.mark.slow
-def test_a_first_guess_of_three_joints_is_within_a_tenth():
-    """Forces below 5 Hz leave out the steps of dry friction, and a start from them is 18 % off."""
-    numbers = {"j1": (0.4, 0.6, 0.05), "j2": (0.2, 0.3, 0.02), "j3": (0.05, 0.1, 0.005)}
-    truth = {"input_delay": 0.002}
-    for joint, values in numbers.items():
-        for kind, value in zip(("damping", "frictionloss", "armature"), values, strict=True):
-            truth[f"{joint}.{kind}"] = value
-    three = chain([0.3, 0.3, 0.2], [1.5, 1.0, 0.5])
-    motion = chirp([0.0, 0.4, -0.3], 0.4, 0.2, 2.5, 3.0)
-    fields = {"joints": [*numbers], "rate": 1000.0, "counts": 16384, "duration": 3.0}
-    run = log(three, truth, motion, [40.0, 40.0, 15.0], [3.0, 3.0, 0.6], **fields)
-    guess = first_guess(own_rig(smc.plant_from(three, [*numbers]), list(truth)), [run])
-    for name, true in truth.items():
-        assert guess.values[name] == pytest.approx(true, rel=0.1), name
 
 
 @pytest.mark.slow
@@ -634,31 +592,6 @@ def test_expected_errors_follow_the_encoder_and_the_noise_which_are_said(arm):
         assert worse.motions[0].mean_share > 1.5 * fine.motions[0].mean_share
 
 
-@pytest.mark.slow
-def test_the_motion_that_the_command_writes_is_read_back_with_its_log(tmp_path):
-    """The log here is columns x_j1 and u_j1 beside t and r, which `identify` takes as they are."""
-    (tmp_path / "arm.xml").write_text(ONE)
-    machine = f"{tmp_path / 'arm.xml'}:j1"
-    motion = tmp_path / "motion.csv"
-    bounds = ["--u-max", "8", "--duration", "2", "--rate", "250"]
-    options = ["--for", "j1.damping", *bounds, "--out", str(motion)]
-    done = CliRunner().invoke(app, ["excitation", machine, *options])
-    assert done.exit_code == 0, done.output
-    assert "chirp from 0.2 to 3 Hz: condition number" in " ".join(done.output.split())
-    assert "record t, x, u, and run" in done.output
-    played = np.genfromtxt(motion, delimiter=",", names=True)
-    rate = np.gradient(played["r"], played["t"])
-
-    def reference(time):
-        return [np.interp(time, played["t"], row) for row in (played["r"], rate)]
-
-    run = log(ONE, TRUTH, reference, 20.0, 1.5, rate=250.0, duration=2.0)
-    rows = np.column_stack([played["t"][:-1], played["r"][:-1], run["x"], run["u"]])
-    np.savetxt(motion, rows, delimiter=",", header="t,r,x,u", comments="")
-    identified = smc.identify(machine, motion, list(TRUTH), most=1)
-    assert identified.values["j1.damping"] == pytest.approx(0.3, rel=0.1)
-
-
 def test_a_motion_stays_within_range_and_speed_and_an_unknown_one_is_refused(tmp_path):
     limited = smc.plant_from(ONE.replace('name="j1"', 'name="j1" range="-.2 .3"'), ["j1"])
     advice = smc.design.excitation(limited, ["j1.damping"], u_max=5.0, duration=2.0, rate=250.0)
@@ -675,33 +608,6 @@ def shares(told, expected):
         if name.endswith((".damping", ".frictionloss", ".armature")):
             ratios[name] = error / expected[name]
     return ratios
-
-
-@pytest.mark.slow
-def test_expected_errors_of_two_joints_are_of_the_size_that_a_log_tells():
-    """Within a factor of 5, of the best motion; of a log by the other simulation. With other noise
-    the same motion's log tells errors that are up to 4.4 times as large, as the page says, so that
-    the factor of 2 that was asked for cannot be held.
-    """
-    truth = {"j1.damping": 0.6, "j1.frictionloss": 0.8, "j1.armature": 0.05}
-    truth |= {"j2.damping": 0.15, "j2.frictionloss": 0.25, "j2.armature": 0.02}
-    two = chain([0.3, 0.4], [2.0, 0.7])
-    arm = smc.plant_from(two, ["j1", "j2"])
-    advice = smc.design.excitation(arm, list(truth), guess=truth, u_max=25.0, duration=6.0)
-    assert advice.motions[-1].name == "staircase"
-    motion = advice.motions[0]
-    t, r = np.array(motion.times), np.array(motion.positions)
-    rates = np.gradient(r, t, axis=1)
-
-    def reference(time):
-        return tuple(np.array([np.interp(time, t, row) for row in rows]) for rows in (r, rates))
-
-    fields = {"joints": ("j1", "j2"), "duration": 6.0, "seed": 3}
-    run = log(two, truth, reference, [120.0, 18.0], [7.4, 1.2], **fields)
-    identified = smc.identify(arm, run, list(truth))
-    for name, share in shares(identified.errors, motion.errors).items():
-        assert 0.2 < share < 5.0, (name, share)
-        assert abs(identified.values[name] - truth[name]) < 2.0 * identified.errors[name], name
 
 
 @pytest.mark.slow
@@ -807,25 +713,6 @@ def test_a_range_in_degrees_that_was_meant_in_rad_is_told(refused):
     assert "radian" not in said
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("integrator", "lead"), [("RK4", 0.0), ("implicitfast", 0.5)])
-def test_the_delay_of_a_simulated_log_is_short_by_half_a_step_of_its_integrator(integrator, lead):
-    """implicitfast moves positions by the speeds of a step's end, and RK4 does not."""
-    arm = smc.plant_from(ONE, ["j1"])
-    step = 1e-3
-    true = {"j1.damping": 0.3, "j1.armature": 0.02}
-    machine = {"plant": arm, "mismatch": true, "input_delay": 0.004, "control_period": 0.002}
-    law = smc.law("pid", kp=20.0, ki=0.0, kd=1.5)
-    motion = smc.Sine(0.5, 2.5) + smc.Sine(0.25, 9.0)
-    loop = {"law": law, "reference": motion, "noise": smc.Noise(2e-5), "duration": 3.0}
-    run = smc.Scenario(**machine, **loop, physics_step=step, integrator=integrator)
-    identified = smc.identify(arm, smc.run(run), [*true, "input_delay"])
-    assert identified.values["input_delay"] == pytest.approx(0.004 - lead * step, abs=0.01 * step)
-    # it also counts half of the damping of a step as inertia
-    inertia = 0.02 + lead * step * 0.3
-    assert identified.values["j1.armature"] == pytest.approx(inertia, abs=2e-5)
-
-
 def test_the_start_knows_where_other_joints_are_held():
     """A forearm that hangs from an upper arm held level: gravity pulls it by another angle."""
     key = '<keyframe><key name="home" qpos="1.57 0.3"/></keyframe></mujoco>'
@@ -837,35 +724,6 @@ def test_the_start_knows_where_other_joints_are_held():
     guess = first_guess(*own_rig(arm, list(true)).reading([smc.run(run)]))
     for name, value in true.items():
         assert guess.values[name] == pytest.approx(value, rel=0.15), name
-
-
-@pytest.mark.slow
-def test_the_dry_friction_of_a_public_double_pendulum_is_between_its_authors_fits():
-    """From two of their logs, in which both motors act. Their fits of one machine differ by five."""
-    folder = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
-    if not folder.is_dir():
-        pytest.skip("the public records are not at hand")
-    arm = smc.plant_from(double_pendulum(), ["shoulder", "elbow"])
-    logs = [double_pendulum_log(folder, name, 4.0) for name in ("03", "13")]
-    identified = smc.identify(arm, logs, [f"{joint}.frictionloss" for joint in DRY])
-    for joint, published in DRY.items():
-        name = f"{joint}.frictionloss"
-        assert min(published) < identified.values[name] < max(published), identified
-        assert identified.errors[name] < 0.1 * max(published), identified
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("dry", [0.13, 0.14])
-def test_pieces_that_begin_where_dry_friction_holds_are_fitted_as_well_as_others(dry):
-    """A public log in which a pendulum stands upright for a while. The fit depends on no number so
-    much as on the velocities at which pieces begin.
-    """
-    folder = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
-    if not folder.is_dir():
-        pytest.skip("the public records are not at hand")
-    values = {"m": 0.7244, "j.frictionloss": dry, "j.offset": -0.0168}
-    rig = own_rig(smc.plant_from(pendulum(), ["j"]), list(values)).with_values(values, "by hand")
-    assert check(rig, pendulum_log(folder, "energy_shaping")).by_pieces["x"] > 97.5
 
 
 def test_a_condition_that_was_found_has_no_servo_of_the_file_so_it_suits_ideal_motors():

@@ -13,7 +13,6 @@ from types import SimpleNamespace
 import mujoco
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.layout import joint_ids
@@ -160,50 +159,6 @@ def test_nominal_is_the_equation_without_dry_friction(name):
             inputs = (u,) if name == "double_pendulum" else ()
             f, g = plant.nominal(x, v, i, p, *inputs)
             assert f + g * u[i % plant.driven] == pytest.approx(expected[i], rel=1e-10, abs=1e-10)
-
-
-# the Furuta pendulum about hanging
-START = {
-    "furuta": (0.0, 2.6),
-    "servo_axis": 0.1,
-    "acrobot": (0.5, 1.0),
-}
-
-
-@pytest.mark.slow
-@PLANTS
-def test_two_seconds_of_free_motion_at_2_ms_follow_an_eighth_order_integration(name):
-    plant = smc.plant(name, **dict.fromkeys(smc.plant(name).dry, 0.0))
-    v0 = 1.0 if name == "servo_axis" else 0.0
-    common = {"control_period": 2e-3, "physics_step": 2e-3, "duration": 2.0}
-    trace = smc.run(
-        smc.Scenario(
-            plant=plant,
-            law="none",
-            x0=START.get(name, (1.0, 0.5)),
-            v0=v0,
-            **common,
-        )
-    )
-    assert trace.scenario.resolved.integrator == "RK4"
-    p = SimpleNamespace(**plant.parameters)
-    n = plant.n
-
-    def slope(t, y):
-        return np.concatenate([y[n:], acceleration(name, p, y[:n], y[n:], np.zeros(plant.driven))])
-
-    start = np.concatenate([trace.x[0], trace.v[0]])
-    integrated = solve_ivp(
-        slope,
-        (0, 2),
-        start,
-        "DOP853",
-        trace.t,
-        rtol=1e-11,
-        atol=1e-12,
-    )
-    assert np.abs(integrated.y[:n].T - trace.x).max() < 1e-6
-    assert np.ptp(trace.x) > 0.2
 
 
 def runge_kutta(p, x, torque, period=2e-3, seconds=2.0):

@@ -14,8 +14,6 @@ import mujoco
 import numba
 import numpy as np
 import pytest
-from helpers import reference
-from helpers.runs import assert_same
 
 import smc_mujoco as smc
 
@@ -180,82 +178,6 @@ def test_the_stops_end_the_rail(name):
     energy = energies(p, trace)
     assert energy[-1] < energy[0] - 0.2
     assert energy[-1] == pytest.approx(energy[np.argmin(trace.v[:, 0])], abs=0.05 * abs(energy[0]))
-
-
-PARTS = {
-    "ideal": {},
-    "viscous": {"friction": {"*": smc.Viscous(0.05)}},
-    "coulomb": {"friction": {"*": smc.Coulomb(0.001)}},
-    "lugre": {"friction": {"*": smc.hardware.LuGre(coulomb=0.001, static=0.0012, stribeck=0.05)}},
-    "lag": {"actuator": smc.Lag(0.01)},
-    "motor": {"actuator": smc.DCMotor()},
-    "rate": {"actuator": smc.hardware.RateLimit(200.0)},
-    "backlash": {"actuator": (smc.Lag(0.005), smc.Backlash(0.002))},
-    "encoder": {"sensor": smc.Encoder(counts=20_000)},
-    "late": {
-        "sensor": smc.Encoder(
-            counts=20_000,
-            bias=1e-3,
-            dropout=0.05,
-            period=2e-3,
-            delay=2e-3,
-        )
-    },
-    "stops": {"contact": "stops"},
-    "noise": {
-        "noise": smc.Noise(1e-3, 1e-2),
-        "disturbance": smc.signals.OrnsteinUhlenbeck(0.1, tau=0.1),
-    },
-    "gust": {"disturbance": smc.signals.Gust(0.3, time=0.1, width=0.2)},
-    "jump": {
-        "jump": smc.Jump(
-            time=0.1,
-            factors={
-                "M": 1.2,
-                "m": 0.8,
-                "l": 1.1,
-                "grav": 1.01,
-            },
-        )
-    },
-    "delay": {"input_delay": 5e-3},
-}
-
-
-@pytest.mark.slow
-@PLANTS
-def test_the_law_settles_both_joints_also_on_the_realistic_mechanism(name):
-    """Each part on one of the plants. And the compiled callback gives the reference loop's bits."""
-    parts = list(PARTS.values())[NAMES.index(name) :: len(NAMES)]
-    for trace in smc.run([scenario(name, **part) for part in parts]):
-        assert bound(trace) <= 0.05, trace.scenario
-    brief = []
-    for part in parts:
-        brief.append(scenario(name, duration=0.25, **part))
-    for start in smc.run(brief):
-        assert_same(start, reference.run(start.scenario))
-
-
-@pytest.mark.slow
-def test_dry_friction_at_the_hinge_is_not_matched_and_leaves_a_limit_cycle_in_proportion():
-    """Where the pole sticks, by up to level / (m grav l), the cart walks; no gain k on S helps:
-
-    S is 0 the while.
-    """
-    levels = np.array([0.001, 0.002, 0.004])
-    runs = []
-    for level in levels:
-        runs.append(
-            scenario(
-                "cart_pole",
-                friction={"hinge": smc.Coulomb(level)},
-                duration=20.0,
-            )
-        )
-    traces = smc.run(runs)
-    cycles = np.array([np.abs(trace.x[-6000:, 0]).max() for trace in traces])
-    assert max(np.abs(surface(trace)[-6000:]).max() for trace in traces) <= 2e-3 * LAW.k
-    np.testing.assert_allclose(cycles / levels, np.mean(cycles / levels), rtol=0.1)
 
 
 # the law

@@ -217,37 +217,6 @@ def test_rest_a_turn_away_does_not_converge_and_the_way_back_from_there_takes_ti
         assert basin.outcome.tolist() == [[outcome]]
 
 
-@pytest.mark.slow
-def test_what_a_switching_law_holds_has_converged_whatever_the_beat_of_its_ripple():
-    """Van der Pol, from everywhere on the study's map: an independent integration is at rest in the
-    end.
-    """
-    law = smc.law("adaptive", gamma=66.11, c=2.853)
-    x = np.linspace(-4.0, 4.0, 5)
-    v = np.linspace(-12.0, 12.0, 5)
-    assert (maps.basin_of(base("van_der_pol", law, 8.0), x, v).outcome == CONVERGES).all()
-    assert (to_the_end(base("van_der_pol", law, 8.0), x, v).outcome == CONVERGES).all()
-
-    state = np.array(np.meshgrid(x, v))
-    h = 1e-3
-    gain = np.zeros((5, 5))
-    for sample in range(8000):
-        s = state[1] + law.gains["c"] * state[0]
-        u = np.clip(-gain * np.sign(s), -6.0, 6.0)
-        gain = gain + h * law.gains["gamma"] * np.abs(s)
-
-        def rate(z, u=u):
-            return np.array([z[1], (1.0 - z[0] ** 2) * z[1] - z[0] + u])
-
-        a = rate(state)
-        b = rate(state + h / 2 * a)
-        c = rate(state + h / 2 * b)
-        state = state + h / 6 * (a + 2 * b + 2 * c + rate(state + h * c))
-        if sample >= 6400:
-            assert np.abs(state[0]).max() < 0.02 * 4.0
-            assert np.abs(state[1]).max() < 0.02 * 12.0
-
-
 def test_mujoco_decides_as_the_fast_engine_does(weak):
     assert weak.checked == "MuJoCo repeated 20 states, 0 with another outcome"
     fourths = slice(1, None, 4)

@@ -272,33 +272,6 @@ def test_the_class_where_none_is_given_is_what_the_machine_leaves_open():
     )
 
 
-@pytest.mark.slow
-def test_constants_and_relays_reach_what_another_adversary_found():
-    """Rms errors in m on duffing within |d| <= 2 N, by an evolution of 144 straight lines and by
-    constants.
-    """
-    worst_by_law = {
-        smc.law("implicit_first_order", k=4.744, c=4.382): 0.1165,
-        smc.law(
-            "extended_state",
-            k=6.484,
-            c=3.13,
-            w=36.11,
-            b=5.667,
-        ): 0.0863,
-        smc.law(
-            "boundary_layer",
-            k=5.139,
-            c=4.12,
-            phi=0.3788,
-        ): 0.0505,
-        smc.law("observer_free", lam=5.784, k1=3.193): 0.1206,
-    }
-    for law, value in worst_by_law.items():
-        worst = smc.worst_case(scenario(law=law, duration=8.0), within=CLASSES["force"], budget=8)
-        assert round(worst.value, 4) >= value
-
-
 @pytest.mark.parametrize("metric", ["tv_rate", "max_u", "energy", "rms_error", "peak"])
 def test_who_never_arrives_is_worst_in_metrics_of_u_alone(metric):
     base = scenario(plant="van_der_pol", law=smc.law("twisting"))

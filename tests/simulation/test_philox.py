@@ -8,8 +8,6 @@ import math
 import numpy as np
 import pytest
 from helpers import python_controller
-from numba import njit
-from scipy import stats
 
 import smc_mujoco as smc
 from smc_mujoco.simulation import philox
@@ -23,15 +21,6 @@ def test_every_stream_of_a_seed_gives_the_numbers_it_always_gave(snapshot):
     """
     streams = philox.MEASUREMENT, philox.PROCESS, philox.DROPOUT, philox.JITTER, philox.MISSED
     assert [[philox.uniform(5, 1, stream, k) for k in (0, 1, 7)] for stream in streams] == snapshot
-
-
-@njit
-def draws(seed, channel, stream, n):
-    """Pairs of normals of n consecutive blocks, (n, 2)."""
-    z = np.empty((n, 2))
-    for k in range(n):
-        z[k] = philox.normals(seed, channel, stream, k)
-    return z
 
 
 def numpys(seed, channel, stream, k):
@@ -68,17 +57,6 @@ def test_normals_are_box_muller_of_the_top_53_bits():
         np.testing.assert_allclose(
             philox.normals(5, 2, philox.MEASUREMENT, k), expected, rtol=1e-14, atol=1e-15
         )
-
-
-@pytest.mark.slow
-def test_normals_are_standard_normal():
-    z = draws(1, 0, philox.MEASUREMENT, 200_000)
-    for column in z.T:
-        assert stats.kstest(column, "norm").pvalue > 1e-3
-        assert abs(column.mean()) < 4 / math.sqrt(len(z))
-        assert abs(column.var() - 1) < 4 * math.sqrt(2 / len(z))
-        assert abs(stats.skew(column)) < 4 * math.sqrt(6 / len(z))
-        assert abs(stats.kurtosis(column)) < 4 * math.sqrt(24 / len(z))
 
 
 @smc.law_function()

@@ -6,7 +6,6 @@ test_sensors.
 """
 
 import dataclasses
-import functools
 import itertools
 import math
 
@@ -122,30 +121,6 @@ def test_callback_equals_plain_loop_with_every_part():
     scenarios = []
     for name, fields in zip(itertools.cycle(smc.paper.GAINS), PARTS.values()):
         scenarios.append(scenario(name, "super_twisting", duration=0.06, **fields))
-    assert_loops_agree(scenarios)
-
-
-@pytest.mark.slow
-@PLANTS
-def test_callback_equals_plain_loop_in_every_contact_and_mechanism(name):
-    """Each of them plain or with a motor, a play and friction in turn."""
-    plant = small(name)
-    full = {"friction": LUGRE, "actuator": (MOTOR, smc.Backlash(0.01))}
-    kinds = []
-    for c in ("none", *plant.contacts):
-        for m in ("equation", *plant.mechanisms):
-            kinds.append((c, m))
-    scenarios = []
-    for i, (contact, mechanism) in enumerate(kinds):
-        scenarios.append(
-            scenario(
-                plant,
-                contact=contact,
-                mechanism=mechanism,
-                **start(plant),
-                **(full if i % 2 and contact != "bobs" else {}),
-            )
-        )
     assert_loops_agree(scenarios)
 
 
@@ -435,44 +410,6 @@ def test_an_obstacle_that_is_not_reached_is_not_there(name, contact):
 # where smooth laws rest under friction
 
 
-RESTING = 4.0  # s
-LEVELS = (0.05, 0.5, 2.0, 8.0)  # N m, N
-STARTS = (1.0, 0.4, -0.05)  # of the plant's x0
-# barely pushing: Duffing rests near a well
-WEAK = {
-    "observer_free": {"lam": 0.4},
-    "boundary_layer": {"k": 0.4},
-}
-
-
-def resting(name):
-    """Scenarios of smooth laws, strong and weak, from near and far, under little and much
-    friction.
-    """
-    plant = small(name)
-    errors_at_rest = []
-    for law, weak in WEAK.items():
-        gains = smc.paper.GAINS[name][law]
-        for gains_of_run in (gains, gains | weak):
-            for level in LEVELS:
-                for friction in (smc.Coulomb(level), smc.hardware.LuGre(0.8 * level, level, 0.01)):
-                    for start in STARTS if isinstance(friction, smc.Coulomb) else STARTS[:1]:
-                        errors_at_rest.append(
-                            scenario(
-                                plant,
-                                law=smc.law(law, **gains_of_run),
-                                friction=friction,
-                                x0=tuple(start * x for x in plant.x0),
-                                duration=1.5 * RESTING
-                                if name == "van_der_pol"
-                                else RESTING,  # it swings longest
-                                control_period=2e-3,
-                                physics_step=5e-4,
-                            )
-                        )
-    return errors_at_rest
-
-
 def balance(trace, end=-1):
     """What the law's command and the plant's own forces exert on each joint at rest at a sample,
     (n,).
@@ -490,38 +427,6 @@ def balance(trace, end=-1):
     for i in range(s.plant.n):
         own.append(s.plant.nominal(x, 0.0 * x, i, values))
     return np.clip(u, -s.resolved.u_max, s.resolved.u_max) + np.array([f / g for f, g in own])
-
-
-def breakaway(friction):
-    if isinstance(friction, smc.Coulomb):
-        return friction.level
-    return friction.static
-
-
-@functools.cache
-def rested(name):
-    return smc.run(resting(name))
-
-
-@pytest.mark.slow
-@TWO
-def test_under_friction_a_smooth_law_rests_where_friction_holds_the_rest(name):
-    """|lam tanh(k1 x) - restoring force(x)| <= F within 2 %; and friction is what holds it."""
-    inside = far = rests = 0
-    for trace in rested(name):
-        assert trace.failure is None
-        level = breakaway(trace.scenario.friction[0])
-        if np.abs(trace.v[-200:]).max() > 1e-3:
-            continue  # a weak law leaves a plant swinging
-        rests += 1
-        unbalanced = balance(trace)
-        assert (np.abs(unbalanced) <= 1.02 * level).all(), trace.scenario
-        np.testing.assert_allclose(trace.reaction[-1], -unbalanced, atol=0.02 * level)
-        inside += np.any((np.abs(unbalanced) < 0.9 * level) & (np.abs(trace.x[-1]) > 1e-3))
-        far += np.abs(trace.x[-1]).max() > 0.3
-    assert rests >= 40
-    assert inside >= 10  # not all at the edge, where the bound would hold by a hair or not at all
-    assert far >= 5
 
 
 # energy

@@ -3,7 +3,6 @@ forward.
 """
 
 import dataclasses
-import itertools
 import math
 
 import numpy as np
@@ -22,7 +21,6 @@ REFERENCES = [
     MinimumJerk(-0.4, -0.1, 2.0),
     Sine(0.5, 3.0, 0.2),
 ]
-PLANTS = ("inverted_pendulum", "duffing", "van_der_pol")
 # Laws of e and its rate, on any plant, that act: their theory is the same for every reference.
 FOLLOWING = [
     n for n, t in catalogue().items() if t.relative_degree < 3 and not t.plants and n != "none"
@@ -134,45 +132,3 @@ def test_the_reference_s_acceleration_is_fed_forward_with_the_model_and_only_wit
         for name, a, b in zip(FOLLOWING, slow, quick, strict=True):
             changes[name] = b.u[0, 0] - a.u[0, 0]
         assert changes == pytest.approx(dict.fromkeys(FOLLOWING, expected), abs=1e-9)
-
-
-@pytest.fixture(scope="module")
-def followed():
-    """Every law, each on one of the plants, with the model, along a sine and along a smooth move
-    from where it stands.
-
-    It starts at a wrong speed of the sine.
-    """
-    sine = Sine(0.5, 2.0)
-    move = MinimumJerk(0.5, 0.5, 1.5)
-    # a third of the time of Runge and Kutta's rule
-    common = {"model": "nominal", "x0": 0.0, "integrator": "Euler"}
-    scenarios = []
-    for name, plant in zip(FOLLOWING, itertools.cycle(PLANTS)):
-        for r, T in (
-            (sine, 6.0),
-            (move, 2.5),
-        ):
-            scenarios.append(
-                smc.Scenario(
-                    plant=plant,
-                    law=at_defaults(name),
-                    reference=r,
-                    duration=T,
-                    **common,
-                )
-            )
-    traces = iter(smc.run(scenarios))
-    return {name: (next(traces), next(traces)) for name in FOLLOWING}
-
-
-@pytest.mark.slow
-def test_a_law_with_the_model_follows_a_sine_and_a_smooth_path_without_leaving_it(followed):
-    """On a sine e ends within 2 % of the amplitude: what is left is the sampling, and an
-    integrator's memory of the start. Where it starts on the path, e is at no time more than 0.5 %
-    of the way.
-    """
-    for name, (along_sine, along_move) in followed.items():
-        assert along_sine.failure is along_move.failure is None, name
-        assert np.abs(along_sine.x - along_sine.r)[along_sine.t > 4.5].max() < 0.02 * 0.5, name
-        assert np.abs(along_move.x - along_move.r).max() < 0.005 * 0.5, name

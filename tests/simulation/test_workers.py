@@ -3,7 +3,6 @@
 import os
 import pickle
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -290,37 +289,3 @@ def test_a_scheduler_that_is_killed_in_mid_run_is_one_sentence_and_finished_runs
     assert client.returncode == 1, log
     assert log.splitlines()[-1].startswith(("the executor has stopped (dask", "no dask at ")), log
     assert len(list((tmp_path / "there" / "parts").glob("*.parquet"))) >= 3
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(shutil.which("openssl") is None, reason="it makes a certificate by openssl")
-def test_dask_with_certificates_takes_calls_from_who_has_one(tmp_path):
-    pytest.importorskip("distributed")
-    key, certificate = str(tmp_path / "key.pem"), str(tmp_path / "cert.pem")
-    new = "openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=localhost"
-    subprocess.run(
-        [*new.split(), "-keyout", key, "-out", certificate], check=True, capture_output=True
-    )
-    names = {"CA_FILE": certificate}
-    for role in ("CLIENT", "SCHEDULER", "WORKER"):
-        names |= {f"{role}__CERT": certificate, f"{role}__KEY": key}
-    tls = {f"DASK_DISTRIBUTED__COMM__TLS__{name}": value for name, value in names.items()}
-    log = tmp_path / "scheduler.log"
-    where = "--host", "tls://127.0.0.1", "--port", "0", "--no-dashboard", "--protocol", "tls"
-    running = [start("-m", "distributed.cli.dask_scheduler", *where, log=log, **tls)]
-    try:
-        wait(lambda: "Scheduler at" in log.read_text())
-        (url,) = re.findall(r"Scheduler at:\s+(tls://[\d.:]+)", log.read_text())
-        options = "--no-nanny", "--nthreads", "1", "--no-dashboard"
-        worker = "-m", "distributed.cli.dask_worker", url, *options
-        running.append(start(*worker, log=tmp_path / "worker.log", **tls))
-        code = "import sys, smc_mujoco as smc\n"
-        code += 's = [smc.Scenario(plant="duffing", law="pid", duration=0.1)]\n'
-        code += "print(len(smc.study(s, sys.argv[1], executor=sys.argv[2])))"
-        client = start("-c", code, str(tmp_path), url, log=tmp_path / "client.log", **tls)
-        running.append(client)
-        assert client.communicate(timeout=200)[0] == "1\n", (tmp_path / "client.log").read_text()
-    finally:
-        for process in running:
-            process.kill()
-            process.communicate()

@@ -309,37 +309,6 @@ def test_of_a_failed_machine_the_failure_is_told(stuck):
     assert [now.words for now in at_once if now] == ["diverged at 0 s"] * 2
 
 
-@pytest.mark.slow
-@renders
-def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
-    slack = realistic(plant="inverted_pendulum", actuator=smc.Backlash(0.2), duration=0.5)
-    with staged(slack, (480, 170)) as stage:
-        rotor, joint = (stage.data.joint(f"m/{name}") for name in ("rotor:hinge", "hinge"))
-        for flank in (-1.0, 0.0, 1.0):
-            stage.arrange(np.array([0.3]), np.array([flank * 0.1]))
-            assert (rotor.qpos[0], joint.qpos[0]) == pytest.approx((0.3 + flank * 0.1, 0.3))
-    pushed = np.flatnonzero(slack.reaction[:, 0] > 0)[0]
-    clock = FilmClock(slack.t, np.ones(len(slack.t)))
-    ahead = MachineTrack(slack, "#0072B2", clock, slack.t[:2], {}).ahead
-    assert ahead[pushed + 1, 0] == pytest.approx(0.1)
-    assert np.abs(ahead).max() <= 0.1
-    soft = smc.hardware.ElasticJoint(20.0, 0.1, 0.01)
-    bent = realistic(plant="inverted_pendulum", actuator=soft, contact="none", duration=0.3)
-    clock = FilmClock(bent.t, np.ones(len(bent.t)))
-    ahead = MachineTrack(bent, "#0072B2", clock, bent.t[:2], {}).ahead[:, 0]
-    # at the sample before: the spring's force is what moves the joint, beside gravity
-    accelerations = np.gradient(bent.v[:, 0], bent.t)
-    p = bent.scenario.plant.parameters
-    weight = p["m"] * p["grav"] * p["l"] * np.sin(bent.x[:, 0])
-    force = p["m"] * p["l"] ** 2 * accelerations - weight
-    assert np.corrcoef(ahead[10:-10], force[10:-10])[0, 1] > 0.9
-    assert np.abs(ahead).max() > 0.02
-    resting = realistic(contact="floor", duration=0.2)
-    with staged(resting, (480, 170)) as stage:
-        stage.arrange(np.array([0.4]))
-        assert stage.data.joint("m/lift").qpos[0] == 0.0
-
-
 def test_friction_draws_an_arrow_of_its_own(stuck):
     scale = scales([stuck])[driven([stuck])]
     *_, violet = arrows(loads(stuck, np.array([0.1, 0.11])), 0, 0, scale, "#0072B2")

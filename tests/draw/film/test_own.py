@@ -44,29 +44,6 @@ def test_a_picture_that_shows_nothing_is_told(tmp_path, group, floor, words):
             smc.film([trace], tmp_path / "a.png", at=0.1, size=(320, 180))
 
 
-@pytest.mark.slow
-def test_arrows_of_a_foreign_cart_are_seen_and_its_rail_is_cut_to_what_moves():
-    """The arrow lies before the pole, which stands where it begins; the rail is longer than what
-    moves on it.
-    """
-    plant = smc.plant_from(FOREIGN / "cartpole.xml", {"slider": smc.Channel(partner="hinge_1")})
-    trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.1))
-    with staged(trace, (640, 360)) as scene:
-        scene.arrange(trace.x[0])
-        empty = scene.render().astype(int)
-        for push in (0.2, -0.2):
-            arrow = Arrow(0.0, push, (1.0, 0.0, 0.0, 1.0))
-            red = np.abs(scene.render([(0, arrow)]) - empty).max(axis=2) > 60
-            assert red.sum() > 50
-        rails = []
-        for geom in range(scene.model.ngeom):
-            if "rail" in scene.model.geom(geom).name:
-                rails.append(geom)
-        assert len(rails) == 2
-        assert (scene.model.geom_size[rails, 1] < 0.5).all()  # not 2 m
-        assert scene.mounts[0].unit == pytest.approx(0.25 * plant.load().stat.extent)
-
-
 def test_the_torque_of_a_foreign_hinge_bends_around_its_axis_before_its_body(tmp_path):
     """The body is wide and centred on a vertical axis: an arrow along the arc of its centre has no
     place.

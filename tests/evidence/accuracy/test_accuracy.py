@@ -47,24 +47,6 @@ def test_every_law_states_its_order_of_accuracy():
 
 
 @pytest.mark.slow
-def test_dry_friction_orders_the_laws_as_textbooks_do():
-    laws = ["observer_free", "classical", "super_twisting", "twisting"]
-    table = smc.accuracy.orders(
-        laws, "duffing", periods=(4e-3, 2e-3), conditions="coulomb", seeds=1
-    )
-    assert [row.law for row in table] == [
-        "super_twisting",
-        "twisting",
-        "classical",
-        "observer_free",
-    ]
-    by_law = {row.law: row.e for row in table}
-    assert promised(by_law["classical"])
-    assert promised(by_law["observer_free"])
-    assert by_law["super_twisting"].largest[-1] < 1e-3 * by_law["twisting"].largest[-1]
-
-
-@pytest.mark.slow
 def test_second_order_laws_are_of_second_order_on_the_double_integrator_or_the_table_says_why_not():
     names = []
     for name, law in catalogue().items():
@@ -86,18 +68,6 @@ def test_relays_are_of_first_order_and_layers_of_none():
     assert orders["boundary_layer"] == pytest.approx((0.0, 0.0), abs=0.01)
     assert orders["my_relay"] == pytest.approx(orders["classical"], abs=1e-6)
     assert [row.law for row in table][-1] == "boundary_layer"
-
-
-@pytest.mark.slow
-def test_gains_that_cannot_hold_the_disturbance_are_said_to_limit_the_error():
-    load = smc.condition("load", disturbance=smc.Sine(1.0, 3.0))
-    table = defaults(
-        [smc.law("super_twisting", k1=3.0, k2=0.5), smc.law("twisting")], conditions=load
-    )
-    weak = next(row.s for row in table if row.law == "super_twisting")
-    assert not promised(weak)
-    assert "these gains, not sampling, limit it" in weak.why
-    assert table[0].law == "twisting"
 
 
 def test_laws_that_fail_come_last_and_say_so():

@@ -2,25 +2,12 @@
 sys-id records.
 """
 
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
-from helpers.pages import ROOT
 
 import smc_mujoco as smc
 
-DATA = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
 RIG = smc.rig("realaigym_acrobot")
-TRAIN = "C1-sysid-03", "C1-sysid-13"
-UNUSED = (
-    "C1-sysid-01",
-    "C1-sysid-05",
-    "C1-sysid-07",
-    "acrobot-ilqr_tvlqr_lqr-01",
-    "pendubot-ilqr_tvlqr_lqr-01",
-)
 
 
 def rms(rig, record):
@@ -89,31 +76,3 @@ def test_the_published_dry_friction_is_what_its_arctangent_reaches():
         values = RIG.set(f"model_{model}").values
         for name, cf in zip(("cf1", "cf2"), frictions, strict=True):
             assert values[name] == pytest.approx(cf * reached, rel=1e-3)
-
-
-@pytest.fixture(scope="module")
-def known():
-    if not DATA.exists():
-        pytest.skip("the public records are not at hand")
-    return {name: dict(np.load(DATA / f"double_pendulum-{name}.npz")) for name in TRAIN + UNUSED}
-
-
-@pytest.mark.parametrize("name", UNUSED)
-def test_the_twin_predicts_unused_torques_better_than_the_published_model(known, name):
-    assert rms(RIG, known[name]) < rms(RIG.set("model_1_0"), known[name])
-
-
-def test_torques_of_unused_records_are_as_far_off_as_the_page_tells(known):
-    text = (ROOT / "docs" / "rigs.md").read_text(encoding="utf-8")
-    reported = np.array(re.findall(r"(\.\d{3}) / (\.\d{3})", text), float).reshape(2, 3, 2)
-    for rig, rows in zip((RIG, RIG.set("model_1_0")), reported, strict=True):
-        for name, row in zip(UNUSED[:3], rows, strict=True):
-            errors = np.sqrt(np.mean(apart(rig, known[name]) ** 2, axis=1))
-            np.testing.assert_allclose(errors, row, rtol=0.0, atol=6e-4)
-
-
-@pytest.mark.slow
-def test_the_numbers_are_those_that_the_records_give(known):
-    identified = smc.identify(RIG, [known[name] for name in TRAIN], starts=1, most=3)
-    for name in ("r1", "r2", "I1", "I2", "cf1", "cf2"):
-        assert identified.values[name] == pytest.approx(RIG.values[name], rel=0.01)

@@ -492,15 +492,3 @@ def test_the_command_writes_the_one_law_of_a_file(tmp_path, capsys):
     with pytest.raises(SystemExit) as end:
         cli.main(["export", f"{file}:other", str(tmp_path / "other.c")])
     assert not end.value.code
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:no set of gains tried")
-def test_a_tuning_is_exported_as_its_law(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    tuned = smc.tune("duffing", smc.law("boundary_layer", k=0.01), budget=4, searches=1)
-    tuned.save("st.json")
-    assert smc.exchange.law_to_c("st.json") == smc.exchange.law_to_c(tuned.law)
-    with pytest.raises(SystemExit) as end:
-        cli.main(["export", "st.json", "st.fmu", "--no-binary"])
-    assert not end.value.code

@@ -18,7 +18,6 @@ from helpers import reference
 from helpers.commands import python
 
 import smc_mujoco as smc
-from smc_mujoco.cli import main
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.exchange.c import build
@@ -52,19 +51,6 @@ def file(tmp_path):
         return tmp_path / name
 
     return written
-
-
-@pytest.fixture
-def call(capsys):
-    """Run the command line in this process: (exit code, stdout, stderr)."""
-
-    def called(*words: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as end:
-            main.main([str(word) for word in words])
-        printed = capsys.readouterr()
-        return int(end.value.code or 0), printed.out, printed.err
-
-    return called
 
 
 def shared(source: Path, target: Path, *flags: str) -> Path:

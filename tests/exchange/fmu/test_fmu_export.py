@@ -6,7 +6,6 @@ import itertools
 import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -130,27 +129,6 @@ def test_an_fmu_gives_the_bits_of_a_run(combined, folder, one):
     np.testing.assert_array_equal(stepped[:, 1], trace.s[:, 0])
     assert len(set(stepped[:, 1])) > 50
     assert ("v" in fmu.at) == (one[2] == "measured")
-
-
-@pytest.mark.slow
-def test_the_sources_compiled_by_another_tool_give_the_same(combined, folder):
-    combination = ("observer_free_third", None, "extended_state_observer")
-    trace = combined[combination][1]
-    source = smc.exchange.law_to_fmu(scenario(*combination), folder / "source.fmu", binary=False)
-    assert fmpy.supported_platforms(str(source)) == ["c-code"]
-    files = Path(fmpy.extract(str(source), str(folder / "source")))
-    from fmpy.build import build_platform_binary
-
-    environment = [str(Path(sys.executable).parent)]  # of FMPy's cmake
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PATH", ":".join(environment), prepend=":")
-        (build_folder := folder / "made").mkdir()
-        build_platform_binary(files, build_folder, configuration="Release", all_warnings=True)
-    fmu = Importer(source, files)
-    commands = []
-    for k, t in enumerate(trace.t):
-        commands.append(fmu.step(t, **seen(fmu, trace, k))[0])
-    np.testing.assert_array_equal(commands, trace.u[:, 0])
 
 
 @pytest.mark.slow

@@ -13,11 +13,10 @@ from exchange.helpers.fmu import Importer  # noqa: E402
 from fmpy.validation import validate_fmu  # noqa: E402
 from helpers import arms  # noqa: E402
 from helpers.python_controller import Controller  # noqa: E402
-from numba import njit  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.cli import main as cli  # noqa: E402
-from smc_mujoco.control.joint_law import coriolis, jacobian, product  # noqa: E402
+from smc_mujoco.control.joint_law import coriolis, jacobian  # noqa: E402
 from smc_mujoco.exchange.c import build  # noqa: E402
 
 pytestmark = needs_compiler
@@ -142,16 +141,6 @@ def test_its_inputs_are_those_that_the_law_reads(made, name):
     assert [n for n, v in variables.items() if v.causality == "output"] == [
         f"{n}[{i}]" for n in "us" for i in JOINTS
     ]
-
-
-@njit
-def inertia(seen, v):
-    return product(seen.M, v)
-
-
-@smc.law_function(joint=True)
-def other_words(y, gains, memory):
-    return inertia(y, -y.e), y.e
 
 
 def test_gains_and_bounds_are_those_of_the_joints_and_change_while_it_runs(made, folder):

@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import smc_mujoco as smc
@@ -20,11 +19,7 @@ from smc_mujoco.mechanisms import rotation
 TEXT = (shipped("models").parent / "examples" / "quadrotor.xml").read_text(encoding="utf-8")
 MASS = 0.0319
 LEVER = 0.03253
-YAW = 0.00705
-LAG = 0.0625
-MOST = 0.12
 G = 9.81
-J = np.diag([16.8e-6, 16.8e-6, 29.8e-6])
 
 
 @pytest.fixture(scope="module")
@@ -38,96 +33,11 @@ def drone():
 
 
 @smc.law_function(
-    joint=True, plants=("a free body",), gains={"time": smc.control.units.Gain(0.0, shared=True)}
-)
-def flip(y, gains, memory):
-    """A wrench of time alone: a roll, a pitch and a yaw while the thrust changes."""
-    u = np.zeros(6)
-    thrust = 0.3 + 0.05 * math.sin(9.0 * y.t)
-    q = rotation.quaternion(y.x[3], y.x[4], y.x[5])
-    u[0], u[1], u[2] = rotation.turned(q, 0.0, 0.0, thrust)
-    u[3] = 6e-4 * math.sin(5.0 * y.t)
-    u[4] = 3e-4 * math.cos(7.0 * y.t)
-    u[5] = 2e-4 * math.sin(3.0 * y.t + 1.0)
-    return u, np.zeros(6)
-
-
-@smc.law_function(
     joint=True,
     plants=("a free body",),
 )
 def nothing(y, gains, memory):
     return np.zeros(6), np.zeros(6)
-
-
-def newton_euler(duration, period):
-    """Return position, rotation matrix, velocities at the end of `flip`, by DOP853 between samples:
-    no MuJoCo.
-    """
-    state = np.concatenate([[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], np.zeros(6), np.full(4, 0.0782)])
-    for k in range(round(duration / period)):
-        t = k * period
-        F = 0.3 + 0.05 * math.sin(9.0 * t)
-        Mx = 6e-4 * math.sin(5.0 * t)
-        My = 3e-4 * math.cos(7.0 * t)
-        Mz = 2e-4 * math.sin(3.0 * t + 1.0)
-        # as in the firmware's power distribution
-        signs = np.array([(-1, -1, -1), (-1, 1, 1), (1, 1, -1), (1, -1, 1)])
-        thrusts = F / 4 + signs @ np.array([Mx / LEVER, My / LEVER, Mz / YAW]) / 4
-        thrusts = np.clip(thrusts - max(0.0, thrusts.max() - MOST), 0.0, MOST)
-
-        def rates(t, y, thrusts=thrusts):
-            q = y[3:7] / np.linalg.norm(y[3:7])
-            v = y[7:10]
-            w = y[10:13]
-            f = y[13:]
-            turn = Rotation.from_quat(q, scalar_first=True)
-            places = LEVER * np.array([(1, -1), (-1, -1), (-1, 1), (1, 1)])
-            torque = np.array(
-                [f @ places[:, 1], -f @ places[:, 0], YAW * (-f[0] + f[1] - f[2] + f[3])]
-            )
-            dq = 0.5 * np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))])
-            acceleration = turn.apply([0.0, 0.0, f.sum() / MASS]) - [0.0, 0.0, G]
-            return np.concatenate(
-                [
-                    v,
-                    dq,
-                    acceleration,
-                    np.linalg.solve(J, torque - np.cross(w, J @ w)),
-                    (thrusts - f) / LAG,
-                ]
-            )
-
-        state = solve_ivp(
-            rates,
-            (0.0, period),
-            state,
-            "DOP853",
-            rtol=1e-11,
-            atol=1e-13,
-        ).y[:, -1]
-    return (
-        state[:3],
-        Rotation.from_quat(state[3:7], scalar_first=True).as_matrix(),
-        state[7:10],
-        state[10:13],
-    )
-
-
-@pytest.mark.slow
-def test_two_seconds_of_a_flip_are_those_of_an_integration_without_mujoco(drone):
-    """MuJoCo's step is of order two, as it turns the body by one rotation."""
-    place, turn, v, w = newton_euler(2.0, 4e-3)
-    misses = []
-    for step in (2e-3, 1e-3):
-        common = {"control_period": 4e-3, "physics_step": step, "duration": 2.0}
-        trace = smc.run(smc.Scenario(plant=drone, law=flip, **common))
-        attitude = Rotation.from_rotvec(trace.x[-1, 3:].copy()).as_matrix()
-        off = trace.x[-1, :3] - place, attitude - turn, trace.v[-1] - [*v, *w]
-        misses.append([np.abs(values).max() for values in off])
-    assert np.abs(trace.v[:, 3:]).max() > 10.0  # rad/s: it does turn over
-    assert max(misses[1][:2]) < 1e-4
-    assert np.all(np.array(misses[0]) > 3.6 * np.array(misses[1]))
 
 
 def test_a_tumbling_body_keeps_its_angular_momentum_and_energy_and_falls_on_a_parabola(drone):

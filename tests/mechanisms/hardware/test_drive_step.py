@@ -7,14 +7,12 @@ import math
 
 import numpy as np
 import pytest
-from helpers import reference
 from helpers.reference import advance
-from helpers.runs import at_defaults, free_mass
+from helpers.runs import free_mass
 from scipy.integrate import solve_ivp
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.drives import drive_step
-from smc_mujoco.simulation.state import LOGGED
 
 H = 5e-4  # s
 INSTANT = 1e-9  # s, a lag that is none
@@ -356,92 +354,6 @@ def test_the_supply_and_the_amplifier_limit_the_torque(inductance):
         torque = smc.run(held).force[:, 0]
         assert torque.max() == pytest.approx(most, rel=1e-6)
         assert torque[-1] == pytest.approx(most, rel=1e-6)
-
-
-HARD = [
-    {"actuator": (smc.Lag(0.01), smc.Lag(0.03))},
-    {
-        "actuator": (smc.Lag(0.01), smc.Lag(0.03)),
-        "input_delay": 3.5e-3,
-        "u_max": 0.5,
-    },
-    {
-        "actuator": (smc.Lag(0.01), smc.DCMotor()),
-        "input_delay": 2e-3,
-    },
-    {
-        "actuator": (smc.Lag(0.01), smc.DCMotor(), smc.Backlash(0.02)),
-        "friction": smc.Coulomb(0.05),
-    },
-    {"actuator": (smc.Backlash(0.02), smc.Lag(0.01), smc.hardware.RateLimit(20.0))},
-    {
-        "actuator": (smc.Lag(0.0), smc.Lag(0.0)),
-        "integrator": "Euler",
-    },
-    {"actuator": smc.Lag(0.03)},
-    {},
-]
-
-
-def hard():
-    """Drives in series under noise, delays and bounds, in company of others."""
-    common = {
-        "duration": 0.1,
-        "control_period": 2e-3,
-        "physics_step": 5e-4,
-        "noise": smc.Noise(0.01, 0.05),
-        "seed": 3,
-    }
-    common |= {
-        "disturbance": smc.signals.OrnsteinUhlenbeck(0.2, tau=0.1),
-        "integrator": "implicitfast",
-    }
-    plants = {
-        "duffing": "classical",
-        "pendulum_network": "super_twisting",
-        "cart_pole": "cart_pole",
-    }
-    laws = {}
-    for name, law in plants.items():
-        if law in smc.laws(name):
-            laws[name] = law
-        else:
-            laws[name] = smc.laws(name)[0]
-    return [
-        smc.Scenario(
-            plant=name,
-            law=at_defaults(law),
-            **common | fields,
-        )
-        for name, law in laws.items()
-        for fields in HARD
-    ]
-
-
-@pytest.mark.slow
-def test_callback_equals_plain_loop_and_company_and_threads_change_no_bit():
-    scenarios = hard()
-    alone = [smc.run(s) for s in scenarios]
-    for threads in (1, 2):
-        for by_itself, trace in zip(alone, smc.run(scenarios, threads=threads), strict=True):
-            assert trace.failure is None
-            for name in LOGGED:
-                np.testing.assert_array_equal(
-                    getattr(trace, name),
-                    getattr(by_itself, name),
-                    err_msg=f"{name} of {by_itself!r}",
-                )
-    for s, trace in zip(scenarios, alone, strict=True):
-        in_python = reference.run(s)
-        for name in LOGGED:
-            if s.plant.name == "cart_pole":  # its nominal model compiles to other roundings
-                np.testing.assert_allclose(
-                    getattr(trace, name), getattr(in_python, name), rtol=1e-9, atol=1e-9
-                )
-            else:
-                np.testing.assert_array_equal(
-                    getattr(trace, name), getattr(in_python, name), err_msg=f"{name} of {s!r}"
-                )
 
 
 def test_u_is_bounded_and_delayed_before_the_drives():

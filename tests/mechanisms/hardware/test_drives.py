@@ -72,21 +72,6 @@ def test_a_locked_rotors_torque_comes_at_once_without_inductance():
     )
 
 
-@pytest.mark.slow
-def test_a_free_rotors_speed_rises_in_its_mechanical_time_constant():
-    motor = DCMotor(inductance=0.0)
-    inertia = 1.0 + motor.gear**2 * motor.rotor_inertia
-    volts = 6.0
-    t, _, speed, torque = driven(bare(motor), lambda t: volts, 8.0).T
-    time_constant = motor.resistance * inertia / motor.constant**2
-    decay = np.exp(-t / time_constant)
-    assert speed == pytest.approx(volts / motor.constant * (1.0 - decay), rel=1e-2)
-    early = t < 3 * time_constant
-    assert torque[early] == pytest.approx(
-        motor.constant * volts / motor.resistance * decay[early], rel=1e-2
-    )
-
-
 def test_cogging_is_a_sine_of_the_rotors_angle():
     motor = DCMotor(cogging=5e-3, poles=14.0)
     model = locked(motor)

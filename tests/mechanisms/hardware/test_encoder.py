@@ -13,7 +13,6 @@ import math
 import numpy as np
 import pytest
 from helpers import reference
-from helpers.runs import JOINTED
 
 import smc_mujoco as smc
 from smc_mujoco.simulation.trace import ARRAYS
@@ -295,51 +294,6 @@ def test_an_encoder_that_reads_once_a_sample_is_one_without_a_period():
 
 
 # all of it, both loops, networks
-
-
-def random_encoder(rng, step):
-    return smc.Encoder(
-        counts=float(rng.choice([2, 100, 4096, math.inf])),
-        bias=float(rng.choice([0.0, 0.01, -0.3])),
-        dropout=float(rng.choice([0.0, 0.2, 1.0])),
-        period=rng.choice([None, *(step * np.array([1, 3, 4, 20, 37]))]),
-        delay=float(step * rng.choice([0, 0, 1, 3, 4, 50])),
-    )
-
-
-def scattered(number):
-    rng = np.random.default_rng(number)
-    integrator = str(rng.choice(["RK4", "implicitfast", "Euler"]))
-    step = 1e-3 if integrator == "RK4" else 2.5e-4
-    name = str(rng.choice(JOINTED))
-    least, most = smc.plant(name).sizes
-    if least <= 3 <= most:
-        plant = smc.plant(name, n=3)
-    else:
-        plant = smc.plant(name)
-    return smc.Scenario(
-        plant=plant,
-        law=smc.law(str(rng.choice(["observer_free", "super_twisting"]))),
-        duration=0.15,
-        control_period=float(rng.choice([1, 2, 5])) * 1e-3,
-        physics_step=step,
-        integrator=integrator,
-        v0=float(rng.normal()),
-        noise=smc.Noise(*rng.choice([0.0, 0.01], 2)),
-        input_delay=step * int(rng.integers(0, 9)),
-        velocity=[None, "measured", "filtered_difference"][rng.integers(3)],
-        friction=[None, smc.Viscous(0.1), smc.Coulomb(0.1)][rng.integers(3)],
-        seed=number,
-        sensor=random_encoder(rng, step),
-    )
-
-
-@pytest.mark.slow
-def test_scattered_encoders_give_the_same_bits_in_both_loops_and_together():
-    scenarios = [scattered(number) for number in range(20)]
-    for i, (s, trace) in enumerate(zip(scenarios, smc.run(scenarios), strict=True)):
-        assert trace.failure is None
-        same(trace, reference.run(s) if i % 4 else smc.run(s, threads=1))
 
 
 def test_a_skew_reads_each_channel_earlier_than_the_channel_before():

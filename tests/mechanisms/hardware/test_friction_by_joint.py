@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from numba import njit
 
 import smc_mujoco as smc
 from smc_mujoco.common.files import shipped, to_json
@@ -123,86 +122,6 @@ def test_named_frictions_are_shares_of_the_bound_on_each_driven_joint(name, plan
             largest[joint] = max(level, largest.get(joint, 0.0))
     assert list(largest.values()) == pytest.approx([bound / 60.0 for bound in rubbing.limits])
     assert math.isclose(largest[next(iter(largest))], rubbing.limits[0] / 60.0)
-
-
-@njit
-def by_tiny_steps(M, m, inertia, l, hangs, x, q, level, where, seconds):
-    """Positions at the samples of a cart with a pole or a load, under `hierarchical` with its
-    default gains, (K + 1, 2): the equations of the source, in steps of 20 us, at the end of each of
-    which the friction on rail (0) or hinge (1) is in its set.
-    """
-    h = 2e-5
-    steps = 50
-    a = 0.67
-    c1 = 0.67
-    c2 = 3.6
-    k = 0.5
-    rate = 3.0
-    grav = 9.81
-    if hangs:
-        l = -l
-    samples = round(seconds * 1e3)
-    out = np.zeros((samples + 1, 2))
-    v = 0.0
-    w = 0.0
-    u = 0.0
-    for j in range(samples * steps + 1):
-        lever = m * l * math.cos(q)
-        det = (M + m) * inertia - lever * lever
-        along = m * l * math.sin(q) * w * w
-        about = m * l * grav * math.sin(q)
-        f = (inertia * along - lever * about) / det
-        fq = ((M + m) * about - lever * along) / det
-        g = inertia / det
-        gq = -lever / det
-        if j % steps == 0:
-            out[j // steps] = x, q
-            S = a * (v + c1 * x) + w + c2 * q
-            drift = a * (f + c1 * v) + fq + c2 * w
-            u = (-k * np.sign(S) - rate * S - drift) / (a * g + gq)
-            u = min(max(u, -6.0), 6.0)
-        new = v + h * (f + g * u), w + h * (fq + gq * u)
-        own = g if where == 0 else (M + m) / det  # speed of the joint by an impulse on it
-        impulse = min(max(-new[where] / own, -h * level), h * level)
-        if where == 0:
-            now = new[0] + g * impulse, new[1] + gq * impulse
-        else:
-            now = new[0] + gq * impulse, new[1] + own * impulse
-        x, q = x + 0.5 * h * (v + now[0]), q + 0.5 * h * (w + now[1])
-        v, w = now
-    return out
-
-
-CART_POLE = (1.0, 0.1, 0.1 * 0.25 * 4.0 / 3.0, 0.5, False, 0.0, 0.3)
-CRANE = (1.06, 0.73, 0.73 * 0.49, 0.7, True, 1.0, 0.0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("plant", "machine", "joint", "level"),
-    [
-        ("cart_pole", CART_POLE, "slide", 0.1),
-        ("cart_pole", CART_POLE, "slide", 0.3),
-        ("cart_pole", CART_POLE, "hinge", 1e-3),
-        ("overhead_crane", CRANE, "slide", 0.1),
-        ("overhead_crane", CRANE, "hinge", 1e-3),
-    ],
-)
-def test_the_verdict_on_a_cart_is_that_of_a_set_valued_integration(plant, machine, joint, level):
-    trace = smc.run(
-        smc.Scenario(
-            plant=plant, law="hierarchical", friction={joint: smc.Coulomb(level)}, duration=10.0
-        )
-    )
-    where = ("slide", "hinge").index(joint)
-    truth = by_tiny_steps(*machine, level, where, 10.0)
-    scores, true_scores = (smc.scores(t) for t in (trace, dataclasses.replace(trace, x=truth)))
-    for group in scores:
-        ours = scores[group]["settling_time"]
-        theirs = true_scores[group]["settling_time"]
-        assert theirs < 9.0
-        assert ours == pytest.approx(theirs, rel=5e-3)
-    assert np.abs(trace.x - truth).max() < 5e-3 * np.abs(truth).max()
 
 
 PARTNER = smc.Channel(partner="hinge", partner_x0=0.3)

@@ -300,30 +300,3 @@ def test_a_goal_in_an_obstacle_is_said(name):
                 reference=goal,
                 contact=part,
             )
-
-
-@pytest.mark.slow
-@EVERY
-def test_a_text_is_a_condition_of_compare(name, tmp_path):
-    plant, body, joint = machine(name)
-    text = f"stopped: contact=(Stops({{{joint!r}: (-9, 9)}}), Ball({body!r}, height=0.01))"
-    laws = [
-        smc.law(
-            "pid",
-            kp=40.0,
-            kd=9.0,
-            ki=0.0,
-        ),
-        smc.law("super_twisting", k1=5.0),
-    ]
-    out = tmp_path / "compared"
-    runs = {"seeds": 2, "duration": 0.2, "starts": smc.starts(by=1e-3), "tune": False}
-    compared = smc.compare(
-        laws,
-        [plant],
-        [text],
-        out=out,
-        progress=False,
-        **runs,
-    )
-    assert "stopped" in str(compared)

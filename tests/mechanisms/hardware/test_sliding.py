@@ -16,7 +16,6 @@ from smc_mujoco.control.units import Gain
 from smc_mujoco.control.written import state_feedback
 from smc_mujoco.mechanisms.hardware.servos import SERVOS
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
-from smc_mujoco.mechanisms.plants.double_pendulum import accelerations
 
 # Gaz et al. 2019, table of the Panda's friction: N m, s/rad, rad/s
 P1 = np.array([0.54615, 0.87224, 0.64068, 1.2794, 0.83904, 0.30301, 0.56489])
@@ -222,82 +221,6 @@ def test_a_joint_that_moves_with_others_rests_where_mujocos_set_valued_friction_
     ours, theirs = smc.run(runs)
     # m; MuJoCo's creeps
     assert np.abs(ours.x - theirs.x)[4000:, 0].max() < 2e-6
-
-
-def by_tiny_steps(values, numbers, start, kp, kd, seconds):
-    """Angles at the end of a run of a double pendulum under a PD law with a period of 1 ms: steps
-    of 20 us, at the end of each of which the friction of both joints is in its set.
-    """
-    h = 2e-5
-    x = np.array(start)
-    v = np.zeros(2)
-    u = np.zeros(2)
-    P = np.zeros(2)
-    for j in range(round(seconds / h)):
-        if j % 50 == 0:
-            u = np.clip(-kp * x - kd * v, -6.0, 6.0)
-        a1, a2, W11, W12, W22 = accelerations(*x, *v, *values)
-        W = np.array([[W11, W12], [W12, W22]])
-        levels = []
-        for speed, p in zip(v, numbers, strict=True):
-            f, low, _ = Stribeck.value(float(speed), 0.0, 0.0, p)
-            levels.append(abs(f) if abs(speed) > 1e-9 else -low)
-        new = v + h * (np.array([a1, a2]) + W @ u)
-        for _ in range(100):
-            before = P.copy()
-            for i in range(2):
-                P[i] -= (new[i] + W[i] @ P) / W[i, i]
-                P[i] = min(max(P[i], -h * levels[i]), h * levels[i])
-            if np.abs(P - before).max() < 1e-15:
-                break
-        new = new + W @ P
-        x = x + 0.5 * h * (v + new)
-        v = new
-    return x
-
-
-@dataclasses.dataclass(frozen=True)
-class Stribeck(Sliding):
-    """Friction that is larger at rest."""
-
-    c: float | tuple[float, ...] = 0.1
-    static: float | tuple[float, ...] = 0.2
-
-    @staticmethod
-    def value(v, motor, load, p):
-        dry = p.c + (p.static - p.c) * math.exp(-((v / 0.1) ** 2))
-        return math.copysign(dry, v), -p.static, p.static
-
-
-def of_a_file(plant, levels):
-    """The mechanism as a user's model with dry friction on its joints."""
-    spec = plant.spec()
-    for joint, level in zip(spec.joints, levels, strict=True):
-        joint.frictionloss = level
-        joint.solref_friction = 0.02, 1.0  # MuJoCo's default
-    return smc.plant_from(spec, [joint.name for joint in spec.joints])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("file", "bound"), [(False, 0.02), (True, 1e-3)])
-@pytest.mark.parametrize("seed", range(4))
-def test_joints_that_move_together_rest_where_a_set_valued_integration_does(seed, file, bound):
-    random = np.random.default_rng(seed)
-    plant = smc.plant("double_pendulum")
-    kp, kd = random.uniform(8.0, 20.0), random.uniform(1.0, 1.5)
-    c = random.uniform(0.1, 0.4, 2)
-    static = c if file else c * random.uniform(1.0, 1.4, 2)
-    part = None if file else Stribeck(tuple(c), tuple(static))
-    start = random.uniform(-0.5, 0.5, 2)
-    values = [v for name, v in plant.parameters.items() if not name.startswith("cf")]
-    law = state_feedback(np.hstack([kp * np.eye(2), kd * np.eye(2)]), "pd")
-    fields = {"law": law, "friction": part, "x0": tuple(start), "u_max": 6.0, "duration": 2.0}
-    plant = of_a_file(plant, c) if file else plant
-    trace = smc.run(smc.Scenario(plant=plant, **fields))
-    numbers = [SimpleNamespace(c=c[i], static=static[i]) for i in range(2)]
-    truth = by_tiny_steps(values, numbers, start, kp, kd, 2.0)
-    assert np.abs(trace.v[-1]).max() < 1e-5
-    np.testing.assert_allclose(trace.x[-1], truth, rtol=bound, atol=bound * 1e-3)
 
 
 # both loops, threads, numbers of a simulation's own
