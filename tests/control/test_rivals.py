@@ -7,7 +7,7 @@ import math
 import mujoco
 import numpy as np
 import pytest
-from helpers.plants_ab import called, constant, measured, plant_b, ramp, sine
+from helpers.plants_ab import called, constant, measured, plant_b
 from scipy.linalg import expm, solve_continuous_are, solve_discrete_are
 
 import smc_mujoco as smc
@@ -231,27 +231,6 @@ def test_hodob_is_stable_from_the_input_gain_of_its_docstring_on(wc, l):
             assert (np.abs(np.linalg.eigvals(loop)).max() < 1.0) == holds
 
 
-@pytest.mark.parametrize("h", [1e-3, 5e-3])
-def test_hodob_leaves_no_error_under_a_disturbance_of_constant_rate(h):
-    """Sampled, it leaves what holding u leaves, d' h^2 / (6 wc); `pd_observer` d' / (wc^2 l)."""
-    wc, l, rate = 4.0, 25.0, 0.7
-    rests = {"hodob": -rate * h * h / (6.0 * wc), "pd_observer": rate / (wc * wc * l)}
-    for (name, rest), precision in zip(rests.items(), (1e-4, 0.2), strict=True):
-        law = smc.law(name, wc=wc, l=l, b=1.0)
-        run = plant_b(law, constant(0.3) + ramp(rate), h=h, duration=12.0)
-        assert run.x[-1, 0] == pytest.approx(rest, rel=precision)
-
-
-def test_hodob_passes_a_sinusoidal_disturbance_as_its_transfer_function_does():
-    wc, l, omega, h = 4.0, 30.0, 6.0, 1e-4
-    law = smc.law("hodob", wc=wc, l=l, b=1.0)
-    run = plant_b(law, sine(1.0, omega), h=h, duration=6.0)
-    late = run.x[-round(4.0 * math.pi / omega / h) :, 0]
-    p = 1j * omega
-    exact = abs(p**2 / ((p + wc) ** 2 * (p + l) ** 2))
-    assert np.abs(late).max() == pytest.approx(exact, rel=5e-3)
-
-
 # LQR with an integral
 
 
@@ -270,34 +249,6 @@ def test_lqi_solves_its_riccati_equation(plant, q):
     B = np.array([[0.0], [0.0], [b]])
     ki, k1, k2 = (B.T @ solve_continuous_are(A, B, np.diag(q), np.eye(1)))[0]
     np.testing.assert_allclose(lqi.feedback(a1, a2, b, *q), (k1, k2, ki), rtol=1e-9)
-
-
-def test_lqi_tracks_back_from_the_bound_with_its_time_constant():
-    """At a constant reading u - sat(u) tends to -ki e tt, by the factor 1 - dt / tt a sample."""
-    q0 = 9.0
-    tt = 0.4
-    e = 2.0
-    h = 1e-3
-    law = smc.law("lqi", q0=q0, tt=tt, **UNIT)
-    memory = np.zeros(5)
-    commands = []
-    for _ in range(3000):
-        commands.append(
-            called(
-                law,
-                measured(
-                    e=e,
-                    de=0.0,
-                    dt=h,
-                    limit=1.0,
-                ),
-                memory,
-            )[0]
-        )
-    end = -math.sqrt(q0) * e * tt
-    k = np.arange(3000)
-    beyond = np.array(commands) + 1.0
-    np.testing.assert_allclose(beyond, end + (beyond[0] - end) * (1.0 - h / tt) ** k, rtol=1e-9)
 
 
 # model-predictive control
@@ -418,29 +369,6 @@ def test_loop_shaping_solves_both_riccati_equations(plant, k, wi):
     assert got[6] == pytest.approx(gamma, rel=1e-8)
     np.testing.assert_allclose(got[:3], (F.T @ X)[0], rtol=1e-8)
     np.testing.assert_allclose(got[3:6], (-Z @ C.T)[:, 0], rtol=1e-8)
-
-
-def test_loop_shaping_s_law_answers_as_its_controller():
-    """Sampled shortly and unsaturated, u over e is k (1 + wi / p) times the design's controller."""
-    h = 1e-4
-    omega = 6.0
-    k = 20.0
-    wi = 0.5
-    plant = (1.0, -0.2, 1.0)
-    law = smc.law(
-        "loop_shaping",
-        k=k,
-        wi=wi,
-        **dict(zip(("a1", "a2", "b"), plant, strict=True)),
-    )
-    got = answer(law, np.zeros(loop_shaping.SLOTS), omega, h)
-    A, B, C = shaped(*plant, k, wi)
-    FH = loop_shaping.design(*plant, k, wi)
-    F = np.array([FH[:3]])
-    Hs = np.array([FH[3:6]]).T
-    p = 1j * omega
-    Ks = (F @ np.linalg.solve(p * np.eye(3) - A - B @ F - Hs @ C, -Hs)).item()
-    assert got == pytest.approx(k * (1.0 + wi / p) * Ks, rel=5e-3)
 
 
 def test_loop_shaping_s_observer_is_sampled_exactly():

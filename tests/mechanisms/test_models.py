@@ -181,32 +181,6 @@ def test_nothing_moves_but_the_equation(name, n):
     assert np.all(model.actuator_gear[:, 0] == 1.0)
 
 
-def energy_drift(p, h, seconds=2.0):
-    """Largest change of the energy of the undamped, unforced plant, J."""
-    model = p.load()
-    model.opt.timestep = h
-    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_forward(model, data)
-    start = data.energy.sum()
-    drift = 0.0
-    for _ in range(round(seconds / h)):
-        mujoco.mj_step(model, data)
-        mujoco.mj_forward(model, data)
-        drift = max(drift, abs(data.energy.sum() - start))
-    return drift
-
-
-@pytest.mark.parametrize("name", [n for n in NAMES if "pendulum" in n or n == "duffing"])
-def test_the_undamped_plant_keeps_its_energy_to_the_order_of_rk4(name):
-    p = plant(name, **{key: 0.0 for key in ("delta", "b") if key in catalogue()[name].parameters})
-    coarse = energy_drift(p, 0.02)
-    fine = energy_drift(p, 0.01)
-    assert coarse < 1e-2
-    assert coarse / fine >= 16
-
-
 @pytest.mark.parametrize("name", ["cart_pole", "pendulum_network", "overhead_crane"])
 def test_a_true_parameter_beyond_what_a_plant_takes_is_refused(name):
     with pytest.raises(

@@ -66,15 +66,6 @@ LINKS = (
         (1.2516e-2, 1.0027e-2, 4.815e-3, -4.28e-4, -1.196e-3, -7.41e-4),
     ),
 )
-DELTA = (  # the second set, Tables VIII and IX of their supplement, in the same order
-    (2.0643e-5, (5.2e-8, 5.2e-8, -0.1750), (0.6, 0.6, 2e-6, 0, 0, 0)),
-    (9.2017, (0.0015, -0.0578, -0.0384), (0.028, 0.0291, 0.0011, 5.565e-5, 0.0056, -2.7636e-4)),
-    (1.4575, (0.1096, 0.05, -0.1), (2e-6, 2e-6, 2e-6, 0, 0, 0)),
-    (4.5856, (-0.0485, 0.15, 0.0147), (2e-6, 2e-6, 2e-6, 0, 0, 0)),
-    (0.5231, (-0.004, 0.045, -0.05), (2e-6, 2e-6, 2e-6, 0, 0, 0)),
-    (2.0604, (0.0732, -0.0251, -0.0276), (2e-6, 2e-6, 2e-6, 0, 0, 0)),
-    (0.1718, (-0.0326, 0.0087, 0.0396), (2e-6, 2e-6, 2e-6, 0, 0, 0)),
-)
 HOME = np.array([0.0, 0.0, 0.0, -math.pi / 2, 0.0, math.pi / 2, -math.pi / 4])
 LOW = np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973])  # rad
 HIGH = np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])
@@ -168,46 +159,6 @@ def test_a_thousand_states_obey_newton_and_euler(payload):
         expected = torques(q, v, data.qacc, payload)
         worst = max(worst, np.abs(expected - u).max() / max(1.0, np.abs(data.qacc).max()))
     assert worst < 1e-10
-
-
-def test_gravity_torques_of_a_thousand_states_are_the_published_ones():
-    rng = np.random.default_rng(8)
-    plant = smc.plant("panda")
-    values = plant.values({})
-    still = np.zeros(7)
-    for _ in range(STATES):
-        q = rng.uniform(LOW, HIGH)
-        dynamics = plant.nominal.dynamics(q, still, values)
-        np.testing.assert_allclose(dynamics.g, torques(q, still, still), atol=1e-11)
-        np.testing.assert_array_equal(dynamics.g, dynamics.h)
-
-
-def test_the_second_set_obeys_newton_and_euler():
-    rng = np.random.default_rng(10)
-    plant = smc.plant("panda", delta=1.0)
-    model = plant.load()
-    data = mujoco.MjData(model)
-    for _ in range(100):
-        q = rng.uniform(LOW, HIGH)
-        v = rng.uniform(-2.5, 2.5, 7)
-        u = rng.uniform(-1, 1, 7) * plant.limits
-        data.qpos[:] = q
-        data.qvel[:] = v
-        data.ctrl[:] = u
-        mujoco.mj_forward(model, data)
-        expected = torques(q, v, data.qacc, links=DELTA)
-        assert np.abs(expected - u).max() < 1e-10 * max(1.0, np.abs(data.qacc).max())
-
-
-def test_a_blend_of_both_sets_has_the_blend_of_their_inertia():
-    """M and g are linear in masses, first and second moments."""
-    inertias = []
-    for delta in (0.0, 0.3, 1.0):
-        plant = smc.plant("panda", delta=delta)
-        inertias.append(plant.nominal.dynamics(HOME + 0.2, np.zeros(7), plant.values({})))
-    first, blend, second = inertias
-    np.testing.assert_allclose(blend.M, 0.7 * first.M + 0.3 * second.M, atol=1e-12)
-    np.testing.assert_allclose(blend.g, 0.7 * first.g + 0.3 * second.g, atol=1e-12)
 
 
 def test_a_mismatch_makes_the_arm_that_of_the_second_set():

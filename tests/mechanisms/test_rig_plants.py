@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.mechanisms.layout import joint_ids
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_0
 
 GRAV = 9.81
@@ -121,30 +120,6 @@ def states(name, plant, rng):
             v,
             scale * rng.uniform(-1, 1, plant.driven) * plant.limits[0],
         )
-
-
-@pytest.mark.slow
-@PLANTS
-@pytest.mark.parametrize("rough", [False, True], ids=["smooth", "rough"])
-def test_a_thousand_accelerations_are_those_of_the_equation(name, rough):
-    rng = np.random.default_rng(5)
-    plant = smc.plant(name, **ROUGH[name] if rough else dict.fromkeys(smc.plant(name).dry, 0.0))
-    assert plant.smooth == (not rough)
-    model = plant.load()
-    p = SimpleNamespace(**plant.parameters)
-    data = mujoco.MjData(model)
-    joints = joint_ids(model)
-    worst = 0.0
-    for x, v, u in states(name, plant, rng):
-        data.qpos[joints] = x
-        data.qvel[joints] = v
-        data.ctrl[:] = u
-        mujoco.mj_forward(model, data)
-        expected = acceleration(name, p, x, v, u)
-        worst = max(
-            worst, np.abs(data.qacc[joints] - expected).max() / max(1.0, np.abs(expected).max())
-        )
-    assert worst < 1e-9
 
 
 @pytest.mark.quick

@@ -423,17 +423,6 @@ def doomed(y, gains, memory):
     return -1e-3 * (y.e + y.de), y.e
 
 
-def test_a_failure_leaves_its_neighbours_alone(together):
-    scenarios = []
-    for i, scenario in enumerate(batch()):
-        law = doomed(at=0.013 * (i % 3) + 0.011, how=i % 4)
-        scenarios += [dataclasses.replace(scenario, law=law, u_max=math.inf), scenario]
-    traces = smc.run(scenarios, threads=2)
-    for trace in traces[::2]:
-        assert trace.failure
-    assert digest(traces[1::2]) == digest(together)
-
-
 @pytest.mark.parametrize(("plant", "how"), list(zip(JOINTED, itertools.cycle(range(4)))))
 def test_a_failure_is_timed_and_what_came_before_is_kept(plant, how):
     unbounded = dataclasses.replace(smc.plant(plant), limits=())

@@ -148,40 +148,6 @@ def test_process_noise_is_a_path_that_does_not_depend_on_where_it_is_read():
     )
 
 
-def process(plant="duffing", **fields):
-    """d of a run under process noise."""
-    signal = smc.signals.OrnsteinUhlenbeck(SIGMA, tau=TAU)
-    common = {
-        "plant": plant,
-        "law": "none",
-        "duration": 0.4,
-        "disturbance": signal,
-        "seed": 4,
-    }
-    return smc.run(smc.Scenario(**(common | fields)))
-
-
-def test_process_noise_does_not_depend_on_steps_or_integrator():
-    d = process().d
-    assert d.std() > 0.1 * SIGMA
-    for fields in (
-        {"physics_step": 2.5e-4},
-        {"integrator": "Euler"},
-        {"law": smc.law("classical")},
-        {"noise": smc.Noise(1, 1)},
-    ):
-        np.testing.assert_allclose(
-            process(**fields).d,
-            d,
-            rtol=0,
-            atol=1e-12,
-        )
-    for period in (2e-3, 20e-3):
-        np.testing.assert_allclose(
-            process(control_period=period).d, d[:: round(period / 1e-3)], rtol=0, atol=1e-12
-        )
-
-
 def test_uniform_numbers_are_numpys_53_bits_of_a_block():
     for k in range(1, 50):
         word = int(numpys(7, 3, 5, k)[0])

@@ -16,7 +16,6 @@ from helpers import reference
 from helpers.runs import assert_loops_agree, assert_same
 
 import smc_mujoco as smc
-from smc_mujoco.control.law import suits
 from smc_mujoco.mechanisms.layout import joint_ids
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.integration import REALISTIC_STEP
@@ -122,93 +121,6 @@ def test_callback_equals_plain_loop_with_every_part():
     for name, fields in zip(itertools.cycle(smc.paper.GAINS), PARTS.values()):
         scenarios.append(scenario(name, "super_twisting", duration=0.06, **fields))
     assert_loops_agree(scenarios)
-
-
-def pick(rng, *options):
-    return options[rng.integers(len(options))]
-
-
-def scattered(number):
-    """A random valid realistic scenario."""
-    rng = np.random.default_rng(number)
-    plant = small(str(rng.choice(list(smc.paper.GAINS))))
-    u = rng.uniform
-    h = 2.5e-4
-    frictions = {
-        "viscous": smc.Viscous(u(0, 1)),
-        "coulomb": smc.Coulomb(pick(rng, 0.0, u(0, 2))),
-        "lugre": smc.hardware.LuGre(u(0.01, 0.5), u(0.5, 1.0), u(0.001, 0.1)),
-    }
-    drive = pick(
-        rng,
-        None,
-        smc.Lag(pick(rng, 0.0, u(1e-4, 0.1))),
-        smc.hardware.RateLimit(u(10, 1000)),
-        smc.hardware.RateLimit(math.inf),
-        smc.DCMotor(
-            inductance=pick(rng, 0.0, 1e-4),
-            voltage=u(5, 50),
-            current=u(5, 50),
-            cogging=u(0, 0.05),
-        ),
-    )
-    play = pick(
-        rng, None, None, smc.Backlash(pick(rng, 0.0, u(0, 0.1)), rotor_inertia=u(1e-3, 0.1))
-    )
-    sensor = smc.Encoder(
-        counts=pick(rng, 100, 4096, math.inf),
-        bias=pick(rng, 0.0, 0.01),
-        dropout=pick(rng, 0.0, 0.3),
-        period=pick(rng, None, 3 * h, 20 * h),
-        delay=h * int(rng.integers(0, 9)),
-    )
-    key = str(rng.choice([k for k in plant.parameters if k not in ("alpha", "beta", "l")]))
-    signals = [
-        smc.signals.Gust(u(-5, 5), time=u(0, 0.1), width=u(0.01, 0.1)),
-        smc.signals.Impulse(u(-0.5, 0.5), time=u(0, 0.1), width=5e-3),
-        smc.signals.BandLimited(u(0, 2), low=u(0, 5), high=u(6, 100)),
-        smc.Sine(u(0, 2), omega=u(1, 50)),
-        smc.signals.TimeSeries((0.0, u(0.01, 0.1)), tuple(rng.normal(size=2))),
-        smc.signals.OrnsteinUhlenbeck(u(0.1, 1), tau=u(0.01, 1)),
-    ]
-    contact = pick(rng, "none", "none", *plant.contacts)
-    if contact != "none":
-        edited = plant.spec()
-        plant.contacts[contact](edited)
-        takes = {"friction": any(p.name.startswith("rub:") for p in edited.pairs)}
-        takes["restitution"] = any(p.name.startswith("hit:") for p in edited.pairs)
-        numbers = {"friction": u(0, 1), "restitution": u(0, 0.9)}
-        contact = smc.hardware.Contact(
-            contact, **{k: numbers[k] for k, take in takes.items() if take and rng.integers(2)}
-        )
-    return smc.Scenario(
-        plant=plant,
-        law=smc.law(str(rng.choice([name for name in smc.laws() if suits(smc.law(name), plant)]))),
-        duration=0.05,
-        control_period=int(rng.integers(1, 20)) * h,
-        physics_step=h,
-        x0=start(plant)["x0"],
-        v0=u(-3, 3) if plant.n == 1 else (u(0, 12), 0.0, 0.0),
-        friction=tuple(frictions[k] for k in frictions if rng.integers(2)),
-        contact=contact,
-        mechanism=pick(rng, "equation", *plant.mechanisms),
-        actuator=tuple(part for part in (drive, play) if part),
-        sensor=pick(rng, None, sensor),
-        disturbance=tuple(signals[i] for i in rng.choice(6, size=rng.integers(4), replace=False)),
-        noise=smc.Noise(*rng.choice([0.0, 0.01], 2)),
-        input_delay=h * int(rng.integers(0, 30)),
-        mismatch={key: u(0.8, 1.2)},
-        jump=pick(rng, None, smc.Jump(u(0, 0.04), {"mass": u(0.5, 2.0)})),
-        velocity=pick(rng, None, "measured", "filtered_difference"),
-        seed=number,
-        integrator=pick(rng, "implicitfast", "implicitfast", "Euler"),
-    )
-
-
-def test_callback_equals_plain_loop_in_scattered_realistic_scenarios():
-    scenarios = [scattered(number) for number in range(8)]
-    for s, trace in zip(scenarios, smc.run(scenarios, threads=2), strict=True):
-        assert_same(trace, reference.run(s))
 
 
 # one batch

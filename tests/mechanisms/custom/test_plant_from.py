@@ -219,49 +219,6 @@ def test_the_plain_loop_gives_the_same_bits(arm, channels, fields):
     ] == []
 
 
-def test_a_disturbance_is_the_force_on_its_joint_alone(arm):
-    """A constant d in every channel is what the same u does."""
-    plant = arm(rest='<option gravity="0 0 0"/>' + ACTUATED)
-
-    @smc.law_function
-    def one(y, gains, memory):
-        return 1.0, 0.0
-
-    pushed = smc.run(
-        smc.Scenario(
-            plant=plant,
-            law="none",
-            duration=0.3,
-            disturbance=smc.Constant(1.0),
-        )
-    )
-    driven = smc.run(
-        smc.Scenario(
-            plant=plant,
-            law=one(),
-            duration=0.3,
-        )
-    )
-    np.testing.assert_allclose(pushed.x, driven.x, atol=1e-12)
-    np.testing.assert_array_equal(pushed.d, 1.0)
-
-
-def test_a_mismatch_is_in_the_true_model_alone(arm):
-    plant = arm()
-    base = smc.Scenario(
-        plant=plant,
-        law=TORQUE,
-        model="nominal",
-        duration=2.0,
-        u_max=50.0,
-        reference=smc.Constant(0.3),
-    )
-    right, wrong = smc.run([base, dataclasses.replace(base, mismatch={"mass": 1.3})])
-    assert np.abs(right.x[-1] - 0.3).max() < 1e-5
-    assert np.abs(wrong.x[-1] - 0.3).max() > 1e-3
-    assert plant.parameters["m"] == pytest.approx(2.0)
-
-
 # what is made of the file
 
 
@@ -688,21 +645,6 @@ def test_a_warning_says_how_far_a_limit_gives_way_before_the_run(solref, speed):
         smc.plant_from(hard, ["j"])
 
 
-@pytest.mark.filterwarnings("always:.* give way by")
-def test_contacts_and_limits_that_give_way_have_a_plain_sentence_each():
-    text = f"""<mujoco model="two"><worldbody><geom name="post" size=".05" pos="0 2 0"/><body>
-      <joint name="j" type="slide" axis="1 0 0" range="-.5 .4" limited="true"/>{LINK.format(0.3, 0.5)}
-      </body></worldbody><actuator><motor joint="j"/></actuator></mujoco>"""
-    with pytest.warns(smc.errors.ScenarioWarning, match="give way by") as caught:
-        smc.plant_from(text.replace('contype="0"', ""), ["j"])
-    assert [str(warning.message) for warning in caught if "give way" in str(warning.message)] == [
-        "contacts of the text of model 'two' give way by 7.4 mm if hit at 1 m/s, and by 0.2 mm under "
-        "the weight: a smaller first number of solref makes them harder",
-        "joint limits of the text of model 'two' give way by 7.4 mrad (mm) if hit at 1 rad/s (m/s): "
-        "a smaller first number of solreflimit makes them harder",
-    ]
-
-
 def test_a_motor_moves_a_joint_whatever_groups_the_file_turns_off(arm):
     plant = arm(
         {"elbow": smc.Channel(motor=True)},
@@ -1106,13 +1048,6 @@ def test_no_record_of_a_model_knows_its_folder(arm, tmp_path, monkeypatch):
     monkeypatch.setattr(mjcf, "_known", {})
     with pytest.raises(smc.ScenarioError, match=r"arm.xml is not there: put it back, or run in"):
         scenario_json.restore(about)
-
-
-def test_a_plant_of_one_s_own_goes_to_another_process(arm):
-    plant = arm()
-    again = pickle.loads(pickle.dumps(plant))
-    assert again == plant
-    assert hash(again) == hash(plant)
 
 
 DEFAULTS = {

@@ -15,7 +15,7 @@ import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.friction import LuGre
-from smc_mujoco.mechanisms.layout import ROTOR, dof_ids, drive_ids
+from smc_mujoco.mechanisms.layout import ROTOR, drive_ids
 from smc_mujoco.mechanisms.plant import field_array, plant
 
 H = 2.5e-4  # s
@@ -93,48 +93,6 @@ def test_the_rotors_inertia_is_reflected_to_the_joint(name):
     assert with_motor.dof_M0 == pytest.approx(own.dof_M0 + reflected, rel=1e-9)
 
 
-def test_a_motor_of_vanishing_constant_is_the_ideal_actuator():
-    own = driven(bare(), sine, 1.0)
-    errors = []
-    for constant in (1e-1, 1e-2, 1e-3):
-        motor = DCMotor(
-            0.3,
-            0.0,
-            constant,
-            1.0,
-            0.0,
-            voltage=math.inf,
-            current=math.inf,
-        )
-        rows = driven(bare(motor), lambda t, motor=motor: motor.scale * sine(t), 1.0)
-        errors.append(np.abs(rows[:, 1] - own[:, 1]).max())
-    assert errors[1] / errors[0] == pytest.approx(1e-2, rel=0.1)  # back-EMF: (gear k)^2 / R
-    assert errors[2] / errors[1] == pytest.approx(1e-2, rel=0.1)
-    assert errors[2] < 1e-5
-
-
-@NAMES
-def test_play_of_no_width_is_a_rigid_rotor(name):
-    with_rotor = build(plant(name), Backlash(0.0, 2e-3, 0.05))
-    rigid = build(plant(name))
-    dofs = dof_ids(rigid)
-    rigid.dof_armature[dofs] += 2e-3
-    rigid.dof_damping[dofs] += 0.05
-    mujoco.mj_setConst(rigid, mujoco.MjData(rigid))
-    a = home(with_rotor)
-    b = home(rigid)
-    seconds = 0.2 if name == "panda" else 2.0  # before it meets its stops
-    deviation = np.abs(
-        driven(with_rotor, sine, seconds, a)[:, 1] - driven(rigid, sine, seconds, b)[:, 1]
-    ).max()
-    at_twice_the_step = home(rigid)
-    rigid.opt.timestep = 2 * H
-    driven(rigid, sine, seconds, at_twice_the_step)
-    # a tenth of the step's own error
-    assert deviation < 0.1 * np.abs(at_twice_the_step.qpos - b.qpos).max()
-    assert a.qpos[: rigid.nq] == pytest.approx(b.qpos, abs=1e-4)
-
-
 @NAMES
 def test_the_joint_is_free_within_the_play_and_driven_beyond(name):
     model = build(plant(name), Backlash(0.02))
@@ -197,23 +155,6 @@ def test_play_comes_after_any_drive(name, order):
         for i in range(n):
             rotors.append(model.joint(ROTOR + model.joint(i).name).qposadr[0])
         assert np.abs(data.qpos[rotors] - data.qpos[:n]).max() < 0.0105
-
-
-VOLTAGE = DCMotor(
-    0.5,
-    0.0,
-    0.05,
-    2.0,
-    1e-5,
-    voltage=10.0,
-    command="voltage",
-)
-
-
-def test_a_voltage_is_what_the_winding_gets():
-    torque = driven(locked(VOLTAGE), lambda t: VOLTAGE.scale * 3.0, 0.01)[:, 3]
-    assert torque == pytest.approx(3.0 / 0.5 * 0.05 * 2.0, rel=1e-9)
-    assert VOLTAGE.stall == pytest.approx(10.0 / 0.5 * 0.05 * 2.0)
 
 
 @pytest.mark.parametrize("name", ["duffing", "furuta"])

@@ -163,6 +163,8 @@ def test_a_lost_reading_holds_the_last_one_with_its_noise_and_rounding():
     held = x[1:] == x[:-1]
     assert (arrived[1:] | held).all()
     assert 0.4 < (~arrived).mean() < 0.55
+    trace, x, _ = read(smc.Encoder(math.inf, dropout=1.0))
+    assert (x == trace.x[0]).all()  # the first is never lost
 
 
 def test_losses_are_independent_of_the_noise():

@@ -4,7 +4,6 @@ events and in tiny steps.
 
 import dataclasses
 import math
-from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -109,80 +108,6 @@ FORMULAS = {
 for model in ("m1", "m3", "m5", "m6"):
     servo_of_model = smc.hardware.servo("mx64", model)
     FORMULAS[f"servo {model}"] = Formula(servo_of_model.friction, servo_of_model.motor)
-
-
-@smc.law_function(gains={"kp": 1.0, "kd": 1.0})
-def pd(y, gains, memory):
-    """A PD loop of its own: `pid` filters the rate."""
-    return -gains.kp * y.e - gains.kd * y.de, 0.0
-
-
-def by_tiny_steps(friction, motor, kp, kd, sine, duration):
-    """Positions of the default inverted pendulum at the samples, (K + 1,), under a PD from 0.2 rad,
-    in steps of 40 us, each of which ends in friction's set.
-    """
-    parts = 25
-    h = PERIOD / parts
-    p = smc.plant("inverted_pendulum").values({})
-    inertia = p.m * p.l**2
-    numbers = SimpleNamespace(**dict(zip(friction.per_joint, friction.parameters(0), strict=True)))
-    gain = 1.0
-    voltage = math.inf
-    drag = 0.0
-    if motor is not None:
-        inertia += motor.gear**2 * motor.rotor_inertia
-        gain = motor.constant / motor.resistance
-        drag = gain * motor.constant
-        voltage = motor.voltage
-    x = 0.2
-    v = 0.0
-    positions = [x]
-    for k in range(round(duration / PERIOD)):
-        r = sine.amplitude * math.sin(sine.omega * k * PERIOD)
-        dr = sine.amplitude * sine.omega * math.cos(sine.omega * k * PERIOD)
-        u = min(max(-kp * (x - r) - kd * (v - dr), -6.0), 6.0)
-        for _ in range(parts):
-            push = gain * min(max(u / gain, -voltage), voltage) - drag * v
-            load = p.m * p.grav * p.l * math.sin(x)
-            f, low, high = friction.value(v, push, load, numbers)
-            if v >= 0.0:
-                high = f if v > 0.0 else high
-            if v <= 0.0:
-                low = f if v < 0.0 else low
-            stops = inertia * v / h + push + load - p.b * v
-            speed = h * (stops - min(max(stops, low), high)) / inertia
-            x += 0.5 * h * (v + speed)
-            v = speed
-        positions.append(x)
-    return np.array(positions)
-
-
-@pytest.mark.parametrize(
-    ("kp", "kd", "sine"),
-    [(80.0, 5.0, smc.Sine(0.0, 0.0)), (20.0, 2.0, smc.Sine(0.05, 6.0))],
-    ids=["rest", "sine"],
-)
-@pytest.mark.parametrize("name", FORMULAS)
-def test_rest_and_turns_under_a_formula_are_those_of_tiny_steps(name, kp, kd, sine):
-    """Bristles rested 5 % off without a motor, and 10 to 18 % where a sine turns back."""
-    friction, motor = FORMULAS[name]
-    scenario = smc.Scenario(
-        plant="inverted_pendulum",
-        law=pd(kp=kp, kd=kd),
-        x0=0.2,
-        duration=1.0,
-        friction=friction,
-        actuator=motor,
-        reference=sine,
-    )
-    trace = smc.run(scenario)
-    assert scenario.resolved.physics_step == PERIOD
-    exact = by_tiny_steps(friction, motor, kp, kd, sine, 1.0)
-    late = slice(-400, None)
-    r = sine.amplitude * np.sin(sine.omega * trace.t)
-    bound = np.abs(trace.x[:, 0] - r)[late].max()
-    assert bound == pytest.approx(np.abs(exact - r)[late].max(), rel=0.01)
-    assert np.abs(trace.x[:, 0] - exact).max() < 2e-4 * np.ptp(trace.x)
 
 
 CASES = [
