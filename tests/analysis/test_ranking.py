@@ -266,81 +266,6 @@ def test_two_laws_apart_by_what_is_just_relevant_have_a_false_winner_in_at_most_
     assert wrong > 8  # the test is not idle: one of its two sides is exact
 
 
-def test_a_winner_is_one_whose_intervals_of_the_ratio_end_beyond_the_least_relevant_difference():
-    rng = np.random.default_rng(2)
-    named = 0
-    for _ in range(60):
-        cells = spreading(3, 1, 0.1, rng)
-        cells[0] *= rng.choice([0.8, 0.9, 1.0])
-        comparison = Comparison({f"law{i}": cell for i, cell in enumerate(cells)})
-        for block, winner in enumerate(comparison.winners):
-            for law in comparison.laws:
-                rivals = []
-                for rival in comparison.laws:
-                    if rival != law:
-                        rivals.append(comparison.effect(block, law, rival))
-                beyond = all(effect.high < 1 - RELEVANT for effect in rivals)
-                assert (law == winner) == beyond
-                for effect in rivals:
-                    assert effect.low <= effect.value <= effect.high
-            named += winner is not None
-    assert 8 < named < 40
-
-
-@pytest.mark.parametrize("repeated", [1, 4])
-def test_a_winner_that_becomes_better_in_some_runs_stays_the_winner(repeated):
-    """In all runs y, y' or rho fall alone; where one run in four is repeated, y and y' of a run
-    fall together.
-    """
-    rng = np.random.default_rng(7)
-    again = np.arange(12) % repeated == 0
-    wins = 0
-    for _ in range(120):
-        cells = {}
-        halves = {}
-        trends = {}
-        for law in "abc":
-            cells[law] = np.exp(rng.normal(rng.normal(0.0, 0.4), 0.1, (1, 12)))
-            step = np.exp(rng.normal(0.0, 0.05, (1, 12)))
-            halves[law] = np.where(again, cells[law] * step, NAN)
-            trends[law] = np.exp(rng.normal(0.05, 0.05, (1, 12)))
-        comparison = Comparison(
-            cells,
-            0.5,
-            halves=halves,
-            trends=trends,
-        )
-        (winner,) = comparison.winners
-        if winner is None:
-            continue
-        less = np.where(rng.random(12) < 0.4, np.exp(-rng.exponential(1.0)), 1.0)
-        if repeated == 1:
-            fallen = [{k} for k in range(3)]
-        else:
-            fallen = [{0, 1}]
-        for parts in fallen:
-            better = []
-            for k, values in enumerate((cells, halves, trends)):
-                if k in parts:
-                    changed = {winner: values[winner] * less}
-                else:
-                    changed = {}
-                better.append(values | changed)
-            after = Comparison(
-                better[0],
-                0.5,
-                halves=better[1],
-                trends=better[2],
-            )
-            assert after.winners == [winner]
-            b = after.p[0]
-            a = comparison.p[0]
-            row = comparison.laws.index(winner)
-            assert np.all(b[row] <= a[row] + 1e-12)
-        wins += 1
-    assert wins > 25
-
-
 def test_units_cancel_and_equal_laws_are_never_separated():
     rng = np.random.default_rng(1)
     for _ in range(50):
@@ -615,27 +540,6 @@ def test_a_law_that_fails_wins_nothing_and_is_not_better_than_one_that_does_not(
         [False],
         [True],
     ]
-
-
-@pytest.mark.parametrize("laws", ["ab", "abc"])
-def test_of_equal_laws_none_is_beaten_because_a_run_in_ten_of_another_fails(laws):
-    draws = np.random.default_rng(3)
-    beaten = 0
-    for _ in range(40):
-        scores = {}
-        for name in laws:
-            scores[name] = draws.lognormal(sigma=0.1, size=(1, 12))
-        for values in scores.values():
-            values[draws.random(values.shape) < 0.1] = INF
-        beaten += Comparison(scores).worse.any()
-    assert beaten <= 4
-    scores = {"a": blocks(1.0), "b": blocks(1.0)}
-    for failing, wins in (
-        ([3], None),
-        (slice(3, None), "a"),
-    ):
-        scores["b"][0, failing] = INF
-        assert Comparison(scores).winners == [wins]
 
 
 def test_what_cannot_be_compared_is_refused(refused):

@@ -222,33 +222,6 @@ def test_within_chattering_the_line_is_a_whole_mean_whatever_is_held_shorter_tha
     assert (np.delete(line, slice(300, -300)) == np.delete(u, slice(300, -300))).all()
 
 
-def test_a_noisy_ramp_starts_and_ends_where_it_does_and_a_first_hold_is_drawn():
-    k = np.arange(2001)
-    noise = np.random.default_rng(0).normal(0.0, 0.03, 2001)
-    # as s in the first and last 0.1 s
-    for y in np.exp(-k / 40) + noise, np.exp((k - 2000) / 40) + noise:
-        line = decimate.smooth(y, 100)
-        truth = y - noise
-        assert np.abs(line - truth).max() < 0.13  # the nearest whole mean is 0.65 off
-        assert np.abs(line - truth).mean() < 0.02
-    u = switching([45, *[1, 2, 2, 1] * 200])
-    assert (decimate.smooth(u, 100)[:45] == -6.0).all()
-
-
-def test_a_line_of_a_u_that_rises_within_half_a_window_rises_with_it():
-    """It rests at its bound, and then is noisy."""
-    k = np.arange(571)
-    noise = np.random.default_rng(0).normal(0.0, 0.3, 571)
-    for rise in (25, 40):
-        truth = np.interp(k, [0, 100, 100 + rise, 570], [-6.0, -6.0, 5.0, 0.0])
-        u = np.where(k < 100, -6.0, truth + noise)
-        t, line = decimate.line(1e-3 * k, u, 100)
-        off = np.abs(line - np.interp(t, 1e-3 * k, truth))
-        assert (line[t < 0.0995] == -6.0).all()
-        assert off.max() < 1.5  # the nearest whole mean is 8 off
-        assert off.mean() < 0.2
-
-
 @pytest.mark.parametrize("condition", ["nominal", "noise", "delay_10ms"])
 def test_a_line_never_leaves_its_own_band_and_is_u_where_that_does_not_chatter(condition):
     laws = ["adrc", "boundary_layer", "adaptive", "twisting"]
@@ -264,25 +237,6 @@ def test_a_line_never_leaves_its_own_band_and_is_u_where_that_does_not_chatter(c
             middles, low, high = decimate.band(run.t, run.u)
             inside = (line >= np.interp(t, middles, low)) & (line <= np.interp(t, middles, high))
             assert (inside | (line == u[samples])).all()
-
-
-@pytest.mark.parametrize("count", [569, 10_093])
-def test_a_run_that_ends_soon_after_a_switch_ends_in_its_mean(count):
-    u = switching([15] * 700)[:count]  # the last value is held for 14 samples, or 13
-    t = 1e-3 * np.arange(count)
-    line_times, line = decimate.line(t, u, 100)
-    _, low, high = decimate.band(t, u[:, None])
-    assert (low[-1], high[-1]) == (-6.0, 6.0)
-    assert np.abs(line[line_times > t[-1] - 0.05]).max() < 0.5
-
-
-def test_the_mean_at_the_edge_of_a_panel_is_that_of_the_whole_run():
-    (trace,) = smc.run(smc.grid("inverted_pendulum", ["adrc"], "noise", 1))
-    (ax,) = smc.figure(trace, panels=["u"]).axes
-    edge = ax.get_xlim()[1]
-    assert edge < 0.5
-    u = np.interp(edge, trace.t, decimate.smooth(trace.u[:, 0], panels.window(trace)))
-    assert np.interp(edge, *ax.lines[0].get_data()) == pytest.approx(u, abs=0.05)
 
 
 @pytest.mark.parametrize("level", [-0.596, 0.0])

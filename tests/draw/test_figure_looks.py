@@ -148,17 +148,6 @@ def rows(ax) -> list:
     return ax.child_axes or [ax]
 
 
-def test_every_curve_has_one_width_and_a_colour_of_its_own(one):
-    for ax in figure(ten(one)).axes:
-        lines = []
-        for row in rows(ax):
-            for line in curves(row):
-                lines.append(line)
-        assert len(lines) == 10
-        assert len({line.get_linewidth() for line in lines}) == 1
-        assert len({to_hex(line.get_color()) for line in lines}) == 10
-
-
 def test_controls_whose_bands_would_hide_each_other_have_a_row_each(one):
     three = []
     for k, trace in enumerate(ten(one)[:3]):
@@ -340,23 +329,6 @@ def test_panels_over_time_end_where_all_rest_and_never_before_something_happens(
     over_time, settling = figure([still], panels=["x", "settling"]).axes
     assert over_time.get_xlim()[1] == pytest.approx(1.3 * one.t[rest_sample - 1])
     assert settling.get_xlim()[1] == pytest.approx(end_time)
-
-
-@pytest.mark.parametrize("size", [PAGE, COLUMN])
-def test_a_column_tells_of_its_reference_and_of_band_and_mean_of_a_control_that_chatters(size, one):
-    def notes(trace, *names):
-        page = figure([trace], size=size, panels=names or ["x", "error", "u", "s"])
-        return [ax.get_title(loc="right") for ax in page.axes]
-
-    aim = "thin dashes: reference; grey: settling band" if size == COLUMN else ""
-    words = "band: range; line: mean where it chatters" if size == COLUMN else ""
-    assert notes(one) == [aim, "", words, ""]
-    assert notes(one, "error") == [aim]
-    assert notes(calm(one)) == [aim, "", "", ""]
-    jump = dataclasses.replace(one.scenario, jump=smc.Jump(0.5, {"mass": 2.0}))
-    changed = dataclasses.replace(one, scenario=jump)
-    for name in "xu":
-        assert notes(changed, name) == [""]  # where the change is named
 
 
 def test_words_tell_of_a_band_only_where_one_is_seen(one):
@@ -575,22 +547,6 @@ def test_marks_of_a_board_are_medians_by_law_from_above_and_a_law_that_never_set
     assert settles.get_xlabel() == "settled runs\n(%)"  # as in the tables
 
 
-def test_the_ticks_of_a_board_are_apart_in_a_column():
-    page = smc.plot(Rows(), metrics=["settling_time"], size=COLUMN)
-    ax = page.axes[0]
-    low, high = 0.215, 0.432  # where labels nearly touched
-    ax.set_xlim(low, high)
-    with style.page(3.5):  # as when it is written
-        page.draw_without_rendering()
-    boxes = []
-    for tick in ax.xaxis.get_major_ticks():
-        if low <= tick.get_loc() <= high:
-            boxes.append(tick.label1.get_window_extent())
-    digit = boxes[0].width / 5
-    for label_box, next_box in itertools.pairwise(boxes):
-        assert label_box.x1 + 2 * digit < next_box.x0
-
-
 @pytest.mark.parametrize(
     "metric",
     [
@@ -720,20 +676,6 @@ def test_a_metric_s_axis_is_of_one_kind_on_all_plants():
     scales = [ax.get_xscale() for ax in page.axes]
     assert scales == ["log", "linear", "log", "linear"]
     assert [ax.get_xlabel().endswith(", log") for ax in page.axes] == [True, False] * 2
-
-
-def test_an_axis_of_less_than_two_decades_has_two_numbers_and_ticks_between(one):
-    ax = Figure().subplots()
-    ax.set_xscale("log")
-    ax.set_xlim(0.15, 0.9)
-    panels.number_decades(ax.xaxis, (0.15, 0.9))
-    ticks = ax.get_xticks(minor=True)
-    texts = [ax.xaxis.get_minor_formatter()(tick, None) for tick in ticks]
-    ticks_between = {
-        text: tick for text, tick in zip(texts, ticks, strict=True) if 0.15 <= tick <= 0.9
-    }
-    assert [*ticks_between] == ["0.2", "", "0.5"]
-    assert sum(0.15 <= tick <= 0.9 for tick in ticks) == 8
 
 
 def test_errors_too_small_to_draw_are_at_a_least_one_and_the_axis_says_so(one):

@@ -5,7 +5,6 @@ whole and inside.
 import dataclasses
 import re
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from helpers import arms
@@ -377,17 +376,6 @@ def test_lines_and_bands_are_the_run_from_its_start_to_its_end_or_its_failure():
     assert len(jumps) == 1
 
 
-def test_the_settling_band_is_two_percent_around_the_reference():
-    traces = machines()
-    ax = shown(figure(traces), "position x (m)")
-    band = next(
-        patch for patch in ax.collections if to_hex(patch.get_facecolor()[0]) == to_hex(style.BAND)
-    )
-    low, high = band.get_paths()[0].get_extents().intervaly
-    half = 0.02 * abs(traces[0].x[0, 0] - traces[0].r[0, 0])
-    assert (low, high) == pytest.approx((traces[0].r.min() - half, traces[0].r.max() + half))
-
-
 @pytest.mark.quick
 def test_every_joint_has_the_band_of_the_score_that_of_the_largest_error_at_the_start():
     """A joint near its goal had a narrower one, which a settled run left."""
@@ -463,17 +451,6 @@ def test_laws_whose_amplitudes_are_equal_at_a_lag_are_marked_there_and_doubtful_
             hollow.append(places(dot)[0, 0])
     assert hollow == pytest.approx([10.0, 10.0])
     assert len(dots) == 6
-
-
-@pytest.mark.parametrize("page", ["default", "dark_background"])
-def test_the_key_of_a_map_has_its_colours(page):
-    with plt.style.context(page):
-        for ax in region_figure.draw(basins()).axes:
-            legend = ax.get_legend()
-            assert legend is not None
-            keys = [to_hex(patch.get_facecolor()) for patch in legend.get_patches()]
-            (mesh,) = ax.collections
-            assert keys == [to_hex(colour) for colour in mesh.get_cmap()(range(5))]
 
 
 def test_shares_of_a_map_are_those_of_its_states_and_add_up():

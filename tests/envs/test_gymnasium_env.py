@@ -142,7 +142,6 @@ def test_a_part_that_fails_in_an_episode_is_named():
 
 OBSTACLES = {
     "stops": smc.Stops({"hinge": (-0.3, 0.3)}),
-    "wall": smc.Wall("pendulum", direction=(1, 0, 0), gap=0.01),
     "ball": smc.Ball(
         "pendulum",
         mass=0.3,

@@ -268,26 +268,6 @@ def test_a_step_is_least_squares_with_damping_within_a_factor_of_ten():
         assert gauss_newton._moved(curve, slopes, 0.0)[0] == pytest.approx(reached, rel=1e-3)
 
 
-def test_moves_of_the_states_are_what_the_quantities_leave():
-    curve = Curve()
-    slopes = curve.slopes(curve.start)
-    step = TRUE - 1.0
-    np.testing.assert_allclose(slopes.moves(step).ravel(), [0.3, -0.3, 0.15], atol=1e-9)
-    after = slopes.stepped(step)
-    np.testing.assert_allclose(after.point.values, TRUE)
-    np.testing.assert_allclose(after.point.states.ravel(), [0.3, -0.3, 0.15], atol=1e-9)
-    assert after.cost < 1e-20
-    variants = gauss_newton._variants(curve, slopes, TRUE)
-    expected = []
-    for share in (1.0, *gauss_newton.SHARES, 0.0):
-        expected.append(share * np.array([0.3, -0.3, 0.15]))
-    np.testing.assert_allclose(
-        [variant.states.ravel() for variant in variants], expected, atol=1e-9
-    )
-    curve.free = np.zeros(0, int)
-    assert len(gauss_newton._variants(curve, slopes, TRUE)) == 1
-
-
 def test_a_search_reaches_least_squares_and_tries_no_rival_of_a_good_start():
     curve = Curve(noise=0.002)
     reached = gauss_newton.search(curve, curve.slopes(curve.start), 4, 0, 30, 1e-5)
@@ -301,34 +281,6 @@ def test_a_search_reaches_least_squares_and_tries_no_rival_of_a_good_start():
     none = gauss_newton.refine(curve, curve.slopes(curve.start), 0)
     assert none.point is not reached.point
     np.testing.assert_array_equal(none.point.values, curve.start.values)
-
-
-@pytest.mark.parametrize(("rough", "pieces_tried"), [(True, 1), (False, 3)])
-def test_in_a_rough_step_only_pieces_that_miss_their_promise_try_other_starts(rough, pieces_tried):
-    curve = Jumpy((1.0, 3.0), stuck=True)
-    slopes = curve.slopes(curve.start)
-    curve.tried.clear()
-    values = gauss_newton._moved(curve, slopes, 0.0)
-    after = gauss_newton._chosen(curve, slopes, values, rough)
-    pieces = [len(point.states) for point in curve.tried]
-    assert pieces == [3] + [pieces_tried] * (len(gauss_newton.SHARES) + 1)
-    assert after.point.states[1] == 0.0
-
-
-def test_a_refinement_tries_other_starts_of_every_piece_in_its_first_step_alone(monkeypatch):
-    steps = []
-    best_step = gauss_newton._best_step
-
-    def recorded(replays, slopes, rough):
-        steps.append(rough)
-        return best_step(replays, slopes, rough)
-
-    monkeypatch.setattr(gauss_newton, "_best_step", recorded)
-    curve = Curve(noise=0.002, start=(5.0, 1.0))
-    slopes = curve.slopes(curve.start)
-    gauss_newton.refine(curve, slopes, 2)
-    gauss_newton.refine(curve, slopes, 2, rough=True)
-    assert steps == [False, True, True, True]
 
 
 @pytest.mark.parametrize("late", [1.0, 5.0, 12.0])
@@ -459,33 +411,6 @@ def test_slow_residuals_widen_standard_errors_where_the_blocks_of_the_jackknife_
         assert (np.sqrt(np.mean(np.square(blocks))) > 2.0) == (memory > 0.0)
 
 
-def test_groups_that_agree_scatter_as_white_noise_and_one_that_does_not_widens_the_errors():
-    """Of 200 slopes of a line; the last of three groups has most of the information. The root mean
-    square is then that of least squares, within four of its own errors.
-    """
-    random = np.random.default_rng(5)
-    J = np.concatenate([np.full(50, 1.0), np.full(50, 1.0), np.full(50, 4.0)])[:, None]
-    exact = 1.0 / np.linalg.norm(J)
-    deviations = []
-    for _ in range(200):
-        deviations.append(_scatter(J, random.normal(size=150)))
-    assert np.sqrt(np.mean(np.square(deviations))) == pytest.approx(exact, rel=0.25)
-    odd = random.normal(size=150)
-    odd[:50] += 5.0
-    assert _scatter(J, odd) > 3.0 * exact
-    one_piece = Slopes(Point(np.zeros(1), np.zeros((1, 0))), [odd], [J], [np.zeros((150, 0))], 1, 1)
-    assert standard_errors.between(one_piece, [0]).tolist() == [0.0]
-
-
-def _scatter(J, noise):
-    """Deviation of the slope of a line by the scatter between three groups."""
-    residuals = noise - J @ np.linalg.lstsq(J, noise, rcond=None)[0]
-    pieces = np.split(residuals, 3)
-    none = [np.zeros((50, 0))] * 3
-    slopes = Slopes(Point(np.zeros(1), np.zeros((3, 0))), pieces, np.split(J, 3), none, 1, 1)
-    return standard_errors.between(slopes, [0, 1, 2])[0]
-
-
 @pytest.mark.parametrize(
     ("value", "least", "most", "scale"),
     [
@@ -547,19 +472,6 @@ def test_replays_are_corrected_by_what_two_step_sizes_leave():
         assert not uncorrected.correct(uncorrected.start, 1)
 
 
-def test_a_corrected_search_ends_when_a_halving_moves_nothing():
-    curve = Curve(noise=0.002)
-    reached = gauss_newton.search(curve, curve.slopes(curve.start), 1, 0, 30, 1e-5)
-    ideal, moved = gauss_newton.accurate(curve, reached)
-    assert ideal is reached
-    assert moved.tolist() == [0.0, 0.0]
-    curve.lag = 80.0
-    slopes, moved = gauss_newton.accurate(curve, curve.slopes(reached.point))
-    assert (moved <= 0.5 * np.sqrt(np.diag(standard_errors.jackknife(slopes)))).all()
-    np.testing.assert_allclose(slopes.point.values, reached.point.values, atol=2e-4)
-    assert curve.replayed[-1]["physics_step"] == 2.5e-4  # residuals with the first step, corrected
-
-
 def test_replays_are_solved_for_steps_of_0_with_the_slopes_of_longer_ones():
     curve = Bent()
     searched = gauss_newton.search(curve, curve.slopes(curve.start), 1, 0, 30, 1e-5)
@@ -572,18 +484,6 @@ def test_replays_are_solved_for_steps_of_0_with_the_slopes_of_longer_ones():
     assert max(count for _, count in curve.replayed) <= len(gauss_newton.SHARES) + 1
     once, _ = gauss_newton.extrapolated(curve, reached)
     assert abs(once.point.values[0] - TRUE[0]) > 5e-3  # one step of derivatives is not enough
-
-
-def test_derivatives_of_longer_steps_stand_beside_residuals_of_short_ones():
-    curve = Bent()
-    curve.slope_steps = {"physics_step": 4e-3}
-    slopes = curve.slopes(curve.start)
-    assert curve.replayed == [(4e-3, 7), (1e-3, 1)]
-    (residuals,) = curve.residuals([curve.start])
-    np.testing.assert_array_equal(np.concatenate(slopes.residuals), np.concatenate(residuals))
-    ahead = curve.slopes(curve.start, central=False)
-    gap = np.abs(ahead.freed_slopes - slopes.freed_slopes)
-    assert gap.max() < 0.01 * np.abs(slopes.freed_slopes).max()
 
 
 def test_what_steps_leave_is_the_error_of_the_extrapolation_where_they_err_at_random():

@@ -126,20 +126,6 @@ def test_friction_that_gives_way_before_it_slides_is_told_and_in_the_errors():
     assert cured.values["j1.armature"] == pytest.approx(TRUTH["j1.armature"], rel=0.02)
 
 
-@pytest.mark.quick
-def test_commands_of_one_sample_break_a_joint_away_though_a_delay_is_between_samples(arm):
-    """A mean of such a command and the one before would not. The delay is 1.5 samples."""
-    level, force, period = TRUTH["j1.frictionloss"], 0.7, 2e-3
-    t = period * np.arange(501)
-    u = np.where(np.arange(501) % 10 == 5, force, 0.0)
-    rig = own_rig(arm, list(TRUTH)).with_values(TRUTH | {"input_delay": 0.003}, "true")
-    part = rig.part({"t": t, "x": 0.1 * np.sin(10.0 * t), "u": u})
-    trace = smc.run(rig.repeated(part, state=np.zeros(2)))
-    inertia = float(arm.load().dof_M0[0]) + TRUTH["j1.armature"]
-    travel = 0.5 * (force - level) * period**2 / inertia * force / level  # sped up, then stopped
-    assert trace.x[-1, 0] == pytest.approx(50.0 * travel, rel=0.05)
-
-
 @pytest.mark.parametrize(("late", "coarse"), [(0.003, 1.0), (0.0035, 0.48)])
 def test_finer_commands_break_a_joint_away_though_a_delay_is_between_commands(arm, late, coarse):
     """A mean of two commands is too weak for that, so it moves for half of the time."""
@@ -282,16 +268,6 @@ def test_dry_friction_that_is_added_is_as_soft_as_the_file_says():
     np.testing.assert_array_equal(runs[0].x, runs[1].x)
 
 
-def test_a_run_with_a_joint_s_number_is_restored_from_its_file(tmp_path):
-    arm = smc.plant_from(ONE, ["j1"])
-    run = smc.run(
-        smc.Scenario(plant=arm, law="none", x0=0.3, duration=0.1, mismatch={"j1.armature": 0.1})
-    )
-    run.save(tmp_path / "run.npz")
-    again = smc.run(smc.load(tmp_path / "run.npz").scenario)
-    np.testing.assert_array_equal(run.x, again.x)
-
-
 def test_the_numbers_of_a_part_have_the_ranges_of_its_type(arm):
     servo = ServoFriction(kc=0.1, kcs=0.05, vs=0.3)
     machine = smc.Scenario(plant=arm, law="none", friction={"j1": servo}, actuator=smc.DCMotor())
@@ -307,6 +283,7 @@ def test_the_numbers_of_a_part_have_the_ranges_of_its_type(arm):
     assert moved.scenario("none").friction[0].vs == 0.5
 
 
+@pytest.mark.quick
 def test_the_units_of_a_slide_s_friction_are_those_of_a_slide():
     sled = ONE.replace('axis="0 1 0"', 'type="slide" axis="1 0 0"')
     bristles = smc.hardware.LuGre(0.2, 0.3, 0.1)
@@ -374,18 +351,6 @@ def test_the_friction_panel_of_a_servo_has_its_force_and_no_set_point():
     rig = own_rig(smc.plant_from(xml, {"j1": smc.Channel(servo=True)}), list(truth))
     rig = rig.with_values(truth)
     t = np.arange(0.0, 3.0, 2e-3)
-    log = servo_log(xml, truth, t, 0.4 * np.sin(3.0 * t))
-    check_friction_of_servo(rig, log)
-
-
-def test_the_friction_panel_has_the_file_s_friction_where_none_is_searched():
-    servo = '<position joint="j1" kp="60" kv="3" ctrlrange="-1.5 1.5" forcerange="-12 12"/>'
-    xml = chain([0.5], [0.8]).replace('<motor joint="j1"/>', servo)
-    own = xml.replace('<joint name="j1"', '<joint name="j1" damping="0.4" frictionloss="0.3"')
-    rig = own_rig(smc.plant_from(own, {"j1": smc.Channel(servo=True)}), ["j1.armature"])
-    rig = rig.with_values({"j1.armature": 0.03})
-    t = np.arange(0.0, 3.0, 2e-3)
-    truth = {"j1.damping": 0.4, "j1.frictionloss": 0.3, "j1.armature": 0.03}
     log = servo_log(xml, truth, t, 0.4 * np.sin(3.0 * t))
     check_friction_of_servo(rig, log)
 

@@ -54,34 +54,6 @@ def counts_no_turns(y, gains, memory):
 # verdicts
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("plant", "law"),
-    [
-        ("inverted_pendulum", smc.law("classical", k=1.945, c=12.0)),
-        ("duffing", smc.law("observer_free", lam=0.9, k1=1.0)),
-        ("van_der_pol", smc.law("observer_free", lam=6.0, k1=1.976)),
-        (
-            "van_der_pol",
-            smc.law(
-                "super_twisting",
-                k1=4.567,
-                k2=45.47,
-                c=2.16,
-            ),
-        ),
-    ],
-    ids=lambda value: value if isinstance(value, str) else value.name,
-)
-def test_states_that_leave_early_get_the_verdict_of_a_run_to_the_end(plant, law):
-    x = np.linspace(-2.2, 2.2, 5)
-    v = np.linspace(-5.0, 5.0, 4)
-    early = maps.basin_of(base(plant, law), x, v)
-    late = to_the_end(base(plant, law), x, v)
-    assert (early.outcome == late.outcome).all()
-    assert (late.decided_at == 6.0).all()
-
-
 def verdict(first, second, final, start=1.0, v=0.0, u=(0.0, 0.0), u_max=6.0, **ended):
     """The verdict on a run that is at `start`, then in both halves of the part that counts at
     `first` and `second`.
@@ -174,17 +146,6 @@ def test_a_run_that_leaves_slowly_does_not_converge_early():
     slow = base("duffing", smc.law("observer_free", lam=lam, k1=k1), 10.0)
     basin = maps.basin_of(slow, [-3.0, -0.05, -0.02, 0.02, 0.05, 3.0], [-9.0, 0.0, 9.0])
     assert (basin.outcome[1] != CONVERGES).all()
-
-
-@pytest.mark.slow
-def test_sticking_under_a_growing_command_is_not_decided_early():
-    stuck = base("duffing", smc.law("pid"), 10.0)
-    stuck = dataclasses.replace(stuck, friction=smc.Coulomb(3.0), u_max=math.inf)
-    early, full_run = (
-        run(stuck, [0.1, 0.5], [0.0]).outcome.tolist() for run in (maps.basin_of, to_the_end)
-    )
-    assert early == full_run
-    assert DOES_NOT not in full_run[0]
 
 
 @pytest.mark.slow

@@ -142,17 +142,6 @@ def test_errors_of_measurement_reach_the_law_alike_in_both_loops():
     assert fast.s[0, 0] - plain.s[0, 0] == pytest.approx(2.874 * 0.02 + 0.1)
 
 
-@pytest.mark.slow
-def test_a_larger_budget_continues_the_search():
-    base = scenario(duration=1.0)
-    values = []
-    for n in (1, 5, 12):
-        values.append(smc.worst_case(base, within=CLASSES["all"], budget=n).value)
-    for a, b in itertools.pairwise(values):
-        assert a <= b
-    assert values[0] < values[-1]
-
-
 @pytest.mark.parametrize(
     ("name", "disturbance"),
     [

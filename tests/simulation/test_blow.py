@@ -18,7 +18,7 @@ MACHINE = """<mujoco model="{name}"><compiler angle="radian"/><worldbody><body p
 <joint name="j" type="{kind}" axis="0 {axis}" {joint}/><geom type="capsule" fromto="0 0 0 {tip}"
 size="{size}" mass="{mass}"/>{more}</body></worldbody><actuator><motor joint="j"
 ctrlrange="-{bound} {bound}"/>{motors}</actuator></mujoco>"""
-LINK = """<body pos=".3 0 0"><joint name="k" axis="0 1 0" damping=".1" {joint}/><geom type="capsule"
+LINK = """<body pos=".3 0 0"><joint name="k" axis="0 1 0" damping=".1"/><geom type="capsule"
 fromto="0 0 0 .3 0 0" size=".02" mass=".6"/></body>"""
 ARM = {"kind": "hinge", "axis": "1 0", "tip": ".3 0 0", "size": 0.02, "mass": 0.5, "joint": ""}
 ARM |= {"bound": 20, "more": "", "motors": ""}
@@ -26,14 +26,10 @@ K = '<motor joint="k" ctrlrange="-9 9"/>'
 LIFTED = {"axis": "-1 0"}  # gravity pulls from the stop to the start
 BUILT = {
     "calf": ({"joint": 'range="-1 1" damping=".1"', "tip": "0 0 -.4", "bound": 10}, ["j"], None),
-    "chain": ({"more": LINK.format(joint=""), "motors": K}, ["j", "k"], None),
-    "held": ({"more": LINK.format(joint=""), "motors": K}, ["k"], "held"),
-    "locked": ({"more": LINK.format(joint=""), "motors": K}, ["k"], "locked"),
+    "locked": ({"more": LINK, "motors": K}, ["k"], "locked"),
     "slide": ({"kind": "slide", "joint": 'range="0 .04"', "mass": 0.1, "bound": 5}, ["j"], None),
     "wheel": ({"joint": 'armature="1e-5"', "tip": "0 .01 0", "size": 1e-3, "mass": 1e-4}
               | {"bound": 0.05}, ["j"], None),
-    "boom": ({"tip": "7 0 0", "size": 0.1, "mass": 100, "bound": 9000}, ["j"], None),
-    "spring": ({"joint": 'stiffness="30" damping="2" frictionloss=".5"'}, ["j"], None),
     # what holds each back besides u: a spring, the load and damping that are large beside the bound
     "stiff": ({"joint": 'stiffness="120" damping="1"', "bound": 2} | LIFTED, ["j"], None),
     "loaded": ({"bound": 0.8} | LIFTED, ["j"], None),
@@ -58,11 +54,10 @@ def machine(name):
     return smc.plant_from(MACHINE.format(name="m", **ARM | parts), joints, others=what_others_do)
 
 
-@pytest.mark.parametrize("more", ["", pytest.param(" + friction", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", [*BUILT, "duffing", "double_pendulum", "inverted_pendulum"])
-def test_a_blow_reaches_the_stops_whatever_u_does(name, more):
+def test_a_blow_reaches_the_stops_whatever_u_does(name):
     plant = machine(name)
-    fields = conditions.find_condition(f"contact{more}").on(plant, 2.0 * TIME)
+    fields = conditions.find_condition("contact").on(plant, 2.0 * TIME)
     blow = fields["disturbance"]
     moments = at_goal(plant)
     limits = smc.Scenario(plant=plant, law=smc.law("none")).limits

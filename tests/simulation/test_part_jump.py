@@ -10,7 +10,6 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.engine import group
 from smc_mujoco.simulation import model as models
-from smc_mujoco.simulation.conditions import parse
 
 BLOCK = """<mujoco><worldbody><body><joint name="j" type="slide" axis="1 0 0"/>
 <geom type="box" size=".1 .1 .1" mass="2" contype="0" conaffinity="0"/></body></worldbody>
@@ -145,27 +144,6 @@ def test_bristles_against_mujoco_alone():
     np.testing.assert_allclose(trace.x[:-1, 0], places, atol=1e-12)
     # it holds up to the jump, and slides soon after it
     assert smc.score(trace, ["stick_time"])["stick_time"] == pytest.approx(AT, abs=0.1)
-
-
-def test_a_condition_with_it_is_kept_and_run(tmp_path):
-    warm = parse("warm: friction=Coulomb(0.4), jump=Jump(0.1, {'friction.level': 0.5})")
-    fields = warm.on(smc.plant("inverted_pendulum"), 0.3)
-    trace = smc.run(smc.Scenario(plant="inverted_pendulum", law="none", duration=0.3, **fields))
-    assert trace.scenario.machines[1].friction == (smc.Coulomb(0.2),)
-    trace.save(tmp_path / "run.npz")
-    again = smc.load(tmp_path / "run.npz").scenario
-    assert again == trace.scenario
-    np.testing.assert_array_equal(smc.run(again).x, trace.x)
-
-
-def test_runs_side_by_side_and_alone_are_equal():
-    fields = {"friction": smc.Coulomb(1.0), "feedforward": smc.Constant(3.0)}
-    blocks = [block({"friction.level": 1.0 + k}, **fields) for k in range(3)]
-    blocks.append(dataclasses.replace(blocks[1], jump=None))
-    together = smc.run(blocks)
-    for scenario, trace in zip(blocks, together, strict=True):
-        np.testing.assert_array_equal(trace.x, smc.run(scenario).x)
-    assert together[1].x[-1] < together[0].x[-1] == together[3].x[-1]
 
 
 def test_the_fast_engine_leaves_it_to_mujoco():

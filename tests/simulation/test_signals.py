@@ -248,6 +248,14 @@ def test_band_limited_noise_has_no_power_outside_its_band():
     np.testing.assert_allclose(quarters, 0.25, atol=0.04)  # a spectral line may sit on a border
 
 
+def test_a_phase_of_band_limited_noise_does_not_tell_its_frequency():
+    memory = np.zeros(NOISE.memory)
+    BandLimited.value(0.0, NOISE, memory, 3, 0, 1)
+    part = (memory[:SINUSOIDS] / (2 * math.pi) - 5.0) / 10.0 * SINUSOIDS
+    assert np.floor(part).tolist() == list(range(SINUSOIDS))
+    assert abs(np.corrcoef(part % 1.0, memory[SINUSOIDS:])[0, 1]) < 0.5
+
+
 def test_band_limited_noise_is_a_function_of_time_alone():
     times = np.random.default_rng(0).uniform(0.0, 10.0, 200)
     alone = [path(NOISE, [t])[0] for t in times]

@@ -10,7 +10,7 @@ from PIL import Image
 
 import smc_mujoco as smc
 from smc_mujoco.draw import style
-from smc_mujoco.draw.film import arm, pace
+from smc_mujoco.draw.film import arm
 from smc_mujoco.metrics import tip
 
 COLOUR = "#0072B2"
@@ -131,21 +131,3 @@ def test_the_usual_force_of_a_contact_sets_the_scale_of_its_arrow(trace, monkeyp
         rows = np.flatnonzero(inked.all(axis=1))
         assert 1 + np.ptp(rows) == pytest.approx(length, abs=3)
         assert (np.diff(rows) > 1).any() == (frame == 0)  # the one that is cut has a break mark
-
-
-def test_a_blow_on_an_arm_is_shown_in_slow_motion(trace, monkeypatch):
-    still = dataclasses.replace(trace, x=np.zeros_like(trace.x))
-    hit = struck(
-        still,
-        disturbance=smc.signals.Push(
-            "hand",
-            y=50.0,
-            time=0.3,
-            width=0.02,
-        ),
-    )
-    film_clock = pace.clock([hit], 30.0)
-    slow = np.abs(film_clock.times - 0.31) < 0.02
-    assert set(film_clock.speeds[slow]) == {0.5**pace.MAX_HALVINGS}
-    monkeypatch.setattr(pace, "MAX_LENGTH", (1.0, 0.0))
-    assert len(pace.clock([hit], 30.0).times) <= 0.5 * 30 + 2

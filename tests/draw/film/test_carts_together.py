@@ -60,43 +60,6 @@ def test_a_long_name_is_broken_after_underscores_before_it_makes_machines_small(
     assert label_sizes(names, SIZE, 400.0)[1] == 1.0
 
 
-def test_a_still_holds_a_hit_as_long_as_the_film_does():
-    """In a still it was held for .15 s of the run, while the bob was upright."""
-    blow = smc.signals.Impulse(2.0, time=0.1, width=0.01)
-    stops = smc.hardware.Contact("stops", restitution=0.8)
-    run = smc.run(
-        smc.Scenario(
-            plant="inverted_pendulum",
-            law=smc.law("classical"),
-            x0=0.0,
-            contact=stops,
-            disturbance=blow,
-            duration=0.6,
-        )
-    )
-    touch = run.t[states.in_contact(run).any(axis=1)]
-    last = float(touch[touch < touch[0] + 0.1].max())
-    for after, blow_told in ((0.0, True), (0.08, False)):
-        clock = smc.film(run, at=last + after).clock
-        (state,) = states.timeline(run, clock.times, clock.played)
-        assert (state is not None) == blow_told
-        assert state is None or state.peak
-
-
-def test_a_number_at_an_arrow_hides_nothing_where_there_is_room_beside_it():
-    from PIL import Image
-
-    image = Image.new("RGB", (180, 170), style.PAPER)
-    line = np.linspace((100.0, 25.0), (150.0, 25.0), 40)
-    arrow = arrows.Arrow(0.0, 1.0, arrows.rgba(style.DISTURBANCE), words="180 N·m")
-    drawn = [arrows.stamp(image, line, 6.0, arrow)]
-    arrows.write_numbers(image, drawn, 0.625, arrows.boxes(drawn, 0.625), image.width)
-    dark = np.asarray(image).min(axis=2) < 128
-    assert not dark[45:].any()
-    assert dark[:, :95].any()
-    assert dark[20:30, 130:150].any()
-
-
 @pytest.mark.parametrize("drives", [False, True])
 def test_a_picture_says_how_far_what_the_camera_follows_is_off_its_place(drives):
     """A robot that rolled away for ever looked the stillest of three."""

@@ -29,7 +29,6 @@ from smc_mujoco.draw.film.arrows import (
     scales_by_channel,
     weights,
 )
-from smc_mujoco.draw.film.arrows import frames as arrow_frames
 from smc_mujoco.draw.film.pace import FilmClock
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.draw.film.track import MachineTrack
@@ -253,23 +252,6 @@ def test_only_dry_friction_sticks():
     )
 
 
-def test_a_blow_of_milliseconds_is_told_with_its_size_as_long_as_it_takes_to_read(hit):
-    touching = hit.t[states.in_contact(hit)[:, 0]]
-    assert 0.0 < np.ptp(touching) < 0.05
-    (before, _), (blow, frames), (after, _) = moods(hit)
-    assert before is None
-    assert blow == f"hit, {style.short(float(np.abs(hit.reaction).max()))} N"
-    assert after is None
-    assert frames / 30 >= states.HOLD_TIME
-    reported = states.timeline(hit, seconds(hit))
-    frames_told = [k for k, now in enumerate(reported) if now]
-    assert frames_told[0] == np.ceil(touching[0] * 30)  # at once, and not before
-    faded = [now.opacity for now in reported if now]
-    assert faded[0] > 0.7
-    assert faded[-1] < 0.4
-    assert faded == sorted(faded, reverse=True)
-
-
 def test_what_is_told_lasts_in_the_film_not_in_the_run(hit):
     """In slow motion the word is gone from the picture of a cart that has left its stop."""
     slow = pace.clock([hit], 30.0, 0.125)
@@ -373,24 +355,6 @@ def test_an_arrow_longer_than_the_longest_has_its_number_and_others_have_none(hi
     assert not any(arrow.words for arrow in arrows(acting, 2, 0, scale, "#0072B2"))
 
 
-@renders
-def test_a_cut_arrow_is_broken_and_says_its_number():
-    trace = smc.run(smc.Scenario(plant="inverted_pendulum", law="none", duration=0.01, x0=0.0))
-    red = (1.0, 0.0, 0.0, 1.0)
-    inked = []
-    with staged(trace, (640, 360)) as stage:
-        stage.arrange(np.array([0.0]))
-        upright = stage.render().astype(int)
-        for value, cut, words in ((1.0, False, ""), (50.0, True, ""), (50.0, True, "310 N·m")):
-            arrow = Arrow(0.0, value, red, cut=cut, words=words)
-            picture = stage.render([(0, arrow)]).astype(int)
-            inked.append(((picture - upright)[..., 1:].min(axis=2) < -60) & (picture[..., 0] > 200))
-    unbroken, broken, numbered = inked
-    assert (unbroken & ~broken).sum() > 20  # the break
-    assert not (broken & ~numbered).any()  # the number is not over the arrow
-    assert (numbered & ~broken).sum() > 100
-
-
 @pytest.mark.parametrize(
     ("peak", "samples", "longest", "words"),
     [
@@ -441,17 +405,6 @@ def test_a_set_point_is_no_arrow_and_without_a_law_the_servo_is_named(tmp_path):
     assert names == ["No control", "Servo alone"]
 
 
-def test_each_joint_of_a_double_pendulum_has_its_own_arrow():
-    """A shoulder and an elbow are not alike: their mean says nothing."""
-    run = smc.Scenario(plant="double_pendulum", law=smc.law("pid"), duration=0.2)
-    trace = smc.run(run)
-    arrow_scales = scales([trace])
-    assert key([trace], arrow_scales)[0].startswith("→ u ")
-    sizes = scales_by_channel(arrow_scales)
-    drawn = arrow_frames(trace, np.array([0.0, 0.05]), np.zeros(1), sizes, "#112233")
-    assert {channel for channel, _ in drawn[0].arrows} == {0, 1}
-
-
 def test_behind_a_drive_the_force_is_shown_and_the_command_pale():
     slow = realistic(plant="inverted_pendulum", actuator=smc.Lag(0.2), duration=0.2)
     arrow_scales = scales([slow])
@@ -470,14 +423,6 @@ def test_behind_a_drive_the_force_is_shown_and_the_command_pale():
     assert strong.control == pytest.approx(3.0 * np.abs(slow.applied).max())
     for words in key(runs(laws=LAWS[:1]), scales(runs(laws=LAWS[:1]))):
         assert "drive" not in words
-
-
-def test_touch_is_where_the_stop_pushes_and_there_only(hit):
-    pushed = np.abs(hit.reaction[:, 0]) > 1e-6
-    touch = states.in_contact(hit)[:, 0]
-    assert touch.any()
-    # the reaction is that of the step before, and a dashpot lets go before the buffers part
-    assert not (pushed & ~touch & ~np.roll(touch, 1)).any()
 
 
 def test_sizes_that_a_user_s_file_gives_leave_nothing_on_the_terminal(capfd):

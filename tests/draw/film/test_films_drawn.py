@@ -7,7 +7,6 @@ import dataclasses
 import itertools
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from helpers.films import picture, sheet, staged
@@ -55,37 +54,6 @@ def test_labels_stay_below_their_tiles_on_as_many_lines_as_were_measured(wide):
         assert left_edge <= box.x0 < box.x1 <= right
         assert top <= size[1] - box.y1 < size[1] - box.y0 <= bottom + 1.0
     assert ("\n" in drawn[1].get_text()) == (wide == 150)
-
-
-def test_ticks_stay_on_the_page():
-    page = sheet([machine("duffing"), machine("duffing", input_delay=0.01)])
-    for panel in page.moving:
-        for label in panel.axes.get_xticklabels():
-            box = label.get_window_extent()
-            assert 0.0 <= box.x0 <= box.x1 <= 1280.0, label.get_text()
-
-
-@pytest.mark.parametrize(("duration", "inner"), [(0.6, True), (1.0, False), (0.51, True)])
-def test_words_of_the_last_tick_are_under_its_line_unless_it_is_the_end(duration, inner):
-    """The words of a line at 0.5 s stood 28 px left of it."""
-    run = machine("duffing", duration=duration)
-    page = sheet([run], size=(800, 450))
-    ax = page.moving[0].axes
-    label = ax.get_xticklabels()[-1]
-    box = label.get_window_extent()
-    line, _ = ax.transData.transform((ax.get_xticks()[-1], 0.0))
-    middle = 0.5 * (box.x0 + box.x1)
-    assert (abs(middle - line) < 2.0) == inner
-    assert box.x1 <= 800.0
-
-
-@pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
-def test_a_film_is_the_same_on_a_dark_page():
-    traces = [machine("duffing"), machine("duffing", input_delay=0.01)]
-    (light,) = film.Frames(traces, at=0.5, size=SIZE)
-    with plt.style.context("dark_background"):
-        (dark,) = film.Frames(traces, at=0.5, size=SIZE)
-    np.testing.assert_array_equal(light, dark)
 
 
 def test_the_clock_the_pace_what_changed_and_what_is_said_are_told_at_their_time():
@@ -362,23 +330,6 @@ def test_a_machine_is_told_to_stick_touch_or_lie_on_a_flank_when_it_does(
         } <= touching | resting
     assert ("hit, 1 N" in words) is stops
     assert states.has_dry_friction(trace.scenario).tolist() == [dry]
-
-
-def test_of_two_joints_the_state_told_is_of_what_happens_in_either():
-    two = made(
-        smc.Scenario(
-            plant="cart_pole",
-            law="none",
-            duration=1.0,
-            **RUB,
-            **GEAR,
-        )
-    )
-    v = np.column_stack([0.0 * two.t, 1.0 + two.t])
-    force = np.column_stack([two.t, 0.0 * two.t])
-    (reported,) = states.timeline(dataclasses.replace(two, v=v, force=force), np.array([0.5]))
-    assert reported
-    assert reported.words == "slide sticks, 1 of 2 in play"
 
 
 @pytest.mark.parametrize(

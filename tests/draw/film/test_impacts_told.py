@@ -157,28 +157,6 @@ def test_the_arrow_of_a_reaction_is_hollow_and_that_of_a_disturbance_has_a_bar()
 
 
 @renders
-def test_no_number_is_written_over_what_is_said_of_the_machine(run):
-    with staged(run, (640, 360)) as stage:
-        stage.track.states[0] = states.State("blow, 200 N·m", style.INK)
-        stage.pose(0, 0.0)
-        (said,) = stage.words
-        high = arrows.LETTERS * stage.scale
-        wide = style.width("blow, 200 N·m", high, bold=True)
-        assert said[1] == pytest.approx([wide, 1.5 * high], rel=0.05)
-        arrow = arrows.Arrow(0.0, -1.0, RED)
-        bare = stage.render([(0, arrow)]).astype(int)
-        taken = []
-        for _ in range(3):  # the second and third are not where those before are
-            stage.words = taken
-            numbered = stage.render([(0, arrow._replace(words="9 N·m"))])
-            y, x = np.nonzero((np.abs(numbered - bare) > 60).any(axis=2))
-            assert len(x) > 100
-            number = np.array([(x.min(), y.min()), (x.max(), y.max())])
-            assert arrows.is_apart(number, taken)
-            taken = [*taken, number]
-
-
-@renders
 def test_the_arrow_of_a_hit_is_not_drawn_under_the_words_that_have_its_number(run):
     """Its head stood out of the digits."""
     with staged(run, (640, 360)) as stage:

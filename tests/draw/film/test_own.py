@@ -10,7 +10,7 @@ from helpers.films import staged, without_charts
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film.arrows import MAX_SWEEP, Arrow, Scale, frames, key, path, scales
+from smc_mujoco.draw.film.arrows import MAX_SWEEP, Scale, frames, key, path, scales
 
 pytestmark = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 SUITE = importlib.util.find_spec("dm_control")
@@ -42,28 +42,6 @@ def test_a_picture_that_shows_nothing_is_told(tmp_path, group, floor, words):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             smc.film([trace], tmp_path / "a.png", at=0.1, size=(320, 180))
-
-
-def test_the_torque_of_a_foreign_hinge_bends_around_its_axis_before_its_body(tmp_path):
-    """The body is wide and centred on a vertical axis: an arrow along the arc of its centre has no
-    place.
-    """
-    (tmp_path / "one.xml").write_text("""
-      <mujoco><worldbody><body pos="0 0 .5"><joint name="j" axis="0 0 1"/>
-        <geom type="cylinder" size=".3 .1"/><geom size=".1" pos=".5 0 0"/></body></worldbody>
-      <actuator><motor joint="j"/></actuator></mujoco>""")
-    trace = smc.run(
-        smc.Scenario(plant=smc.plant_from(tmp_path / "one.xml", ["j"]), law="none", duration=0.1)
-    )
-    with staged(trace, (640, 360)) as scene:
-        centre = scene.project(scene.data.xanchor[:1])[0]
-        for push in (0.8, -0.8):
-            red = scene.render([(0, Arrow(0.0, push, (1.0, 0.0, 0.0, 1.0)))])[..., 0] > 250
-            x = np.nonzero(red)[1]
-            assert red.sum() > 100
-            assert np.abs(x.mean() - centre[0]) < 100
-            # seen from the front, the near side goes right
-            assert (x.mean() > centre[0]) == (push > 0.0)
 
 
 def test_the_key_names_what_pushes_a_foreign_model_of_its_own_accord():

@@ -2,10 +2,7 @@
 few real ones.
 """
 
-import json
 import math
-import re
-import zlib
 from collections.abc import Callable
 from types import SimpleNamespace
 
@@ -18,12 +15,11 @@ from smc_mujoco.evidence.audit.audit import claims, measure
 from smc_mujoco.evidence.audit.claim_runs import ClaimRuns
 from smc_mujoco.evidence.audit.paper import paper
 from smc_mujoco.evidence.audit.variants import variant, with_gains
-from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED, Beside, Check, verdict
+from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED, Check, verdict
 from smc_mujoco.evidence.papers.gaber import lyapunov
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.robustness.margin_kinds import TOLERATED_ERROR
 from smc_mujoco.simulation.gaber_study import LAWS
-from smc_mujoco.simulation.run_key import description
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import ARRAYS, Trace
 
@@ -88,79 +84,6 @@ def test_what_a_law_may_ask_for_beyond_the_actuator_is_no_bound():
     runs = Stub(lambda s: {"tv_rate": 1.1e-3 * s.limits[0], "max_step": 0.021 * s.limits[0]})
     runs.mutated = lambda law: with_gains(law, lam=60.0)
     assert [judged(runs, id) for id in ("11", "49")] == [REFUTED, REFUTED]
-
-
-def lots(scenario: Scenario, *names: str) -> dict[str, float]:
-    """Return name -> a number in 0.5 .. 1.5 that depends on all that a scenario says beyond
-    defaults, to six digits.
-    """
-    plain = description(Scenario(plant=scenario.plant, law=scenario.law))
-    said = description(scenario) | {"versions": None, "condition": None}
-    fields = {}
-    for name, value in said.items():
-        if name in ("plant", "law") or value != plain[name]:
-            fields[name] = value
-    text = re.sub(
-        r"-?\d+\.\d*(e-?\d+)?",
-        lambda one: f"{float(one[0]):.6g}",
-        json.dumps(fields, sort_keys=True),
-    )
-    drawn = zlib.crc32(text.encode())
-    return {name: 0.5 + zlib.crc32(name.encode(), drawn) / 2**32 for name in names}
-
-
-def drawn_by_lot(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
-    """Return x that decays as fast, and u that turns as fast, as was drawn."""
-    x0, (fast, large, often) = (
-        max(map(abs, scenario.resolved.x0)),
-        lots(scenario, "x", "u", "turns").values(),
-    )
-    return x0 * np.exp(-fast * T), 6.0 * large * np.sin(40.0 * often * T)
-
-
-def ends(values: list[float]) -> str:
-    """Return a number, or the mean, the least and the largest of several."""
-    texts = []
-    for value in (np.mean(values), np.min(values), np.max(values)):
-        texts.append(f"{value:.4g}")
-    if texts[1] == texts[2]:
-        return texts[0]
-    return "{} ({} to {})".format(*texts)
-
-
-@pytest.mark.slow
-def test_the_evidence_of_runs_drawn_by_lot_is_the_recorded_one(snapshot, monkeypatch):
-    """Which runs a claim looks at, what it makes of them, and its limits; the numbers come from no
-    simulation.
-
-    What is measured at several places is told by its mean, its ends and their number.
-    """
-    monkeypatch.setitem(CODE, "nanoseconds", lambda laws: {law: 1.0 + len(law) for law in laws})
-
-    def reported(s: Scenario) -> dict[str, float]:
-        scores = lots(s, *(m.name for m in metrics()))
-        small = 0.7 * TOLERATED_ERROR * max(map(abs, s.resolved.x0)) * (1.0 + 10.0 * s.input_delay)
-        return scores | {"ultimate_bound": small * scores["ultimate_bound"]}
-
-    said = {}
-    for id, quick in [(id, id == "18") for id in GABER.claims] + [
-        (id, True) for id in ("20", "24", "61")
-    ]:
-        runs = Stub(reported, drawn_by_lot, quick=quick).of(GABER.claims[id])
-        groups: dict[tuple[str, ...], list[Check | Beside]] = {}
-        for check in measure(GABER.claims[id], runs):
-            if isinstance(check, Check):
-                criterion = (check.relation, check.sentence)
-            else:
-                criterion = ()
-            groups.setdefault((check.what.rpartition(": ")[2], *criterion), []).append(check)
-        numbers = []
-        for (_, *criterion), checks in groups.items():
-            limits = [check.limit for check in checks if isinstance(check, Check)]
-            asks = f" {criterion[0]} {ends(limits)}" if criterion else ""
-            numbers.append(f"{ends([check.value for check in checks])}{asks}, {len(checks)}")
-        said[f"{id}{', quick' * quick}"] = "; ".join(numbers)
-    assert said == snapshot
 
 
 def by_law(**reported: tuple[float, ...]) -> Told:

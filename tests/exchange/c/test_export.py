@@ -37,16 +37,6 @@ WAYS = (
 FIELDS = ("x", "v", "u", "applied", "s")
 # which a scenario gives to a law of the library, and to none in C
 OF_PLANT = {"a1": 0.5, "a2": -0.2, "b": 2.0}
-# Laws whose C takes every turn there is: powers, roots, tables, loops, branches, several results,
-# state.
-SINGLE = (
-    "extended_state",
-    "fuzzy_gain",
-    "nested_third_order",
-    "observer_free_table",
-    "observer_free_taylor",
-    "terminal",
-)
 
 
 @pytest.fixture(scope="module")
@@ -152,27 +142,6 @@ def test_a_law_written_out_and_read_back_gives_its_own_trace_to_the_last_bit(tra
             np.testing.assert_array_equal(
                 getattr(second, field), getattr(first, field), err_msg=str(name)
             )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", SINGLE)
-def test_in_single_precision_it_is_the_same_python_in_numpy_s_float32(folder, name):
-    law = LAWS[name]()
-    f = np.float32
-    ours = back(folder, law, "float", flags=["-Wdouble-promotion"])
-    theirs = rebuild(law.function, lambda g: g)
-    read = gains_of(law)
-    gains = type(read)(*map(f, read))
-    memory = np.zeros(law.memory, f)
-    rng = np.random.default_rng(0)
-    for k in range(200):
-        y = Measurement(*map(f, measured(k, rng)))
-        before = memory.astype(float)
-        (u, s), (wanted_u, wanted_s) = ours(y, gains, before), theirs(y, gains, memory)
-        assert abs(u - wanted_u) <= 2e-6 * (1.0 + abs(u))
-        assert abs(s - wanted_s) <= 2e-6 * (1.0 + abs(s))
-        assert f(u) == u
-        np.testing.assert_allclose(before, memory, rtol=4e-6, atol=4e-6)
 
 
 @pytest.mark.slow

@@ -645,6 +645,15 @@ def test_a_warning_says_how_far_a_limit_gives_way_before_the_run(solref, speed):
         smc.plant_from(hard, ["j"])
 
 
+@pytest.mark.filterwarnings("always:.* give way by")
+def test_contacts_give_way_under_the_weight_too():
+    text = f"""<mujoco><worldbody><geom size=".05" pos="0 2 0"/><body><joint name="j" type="slide"
+      axis="1 0 0"/>{LINK.format(0.3, 0.5)}</body></worldbody>
+      <actuator><motor joint="j"/></actuator></mujoco>""".replace('contype="0"', "")
+    with pytest.warns(smc.errors.ScenarioWarning, match="by 7.4 mm if .* by 0.2 mm under"):
+        smc.plant_from(text, ["j"])
+
+
 def test_a_motor_moves_a_joint_whatever_groups_the_file_turns_off(arm):
     plant = arm(
         {"elbow": smc.Channel(motor=True)},
