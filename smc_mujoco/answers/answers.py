@@ -30,7 +30,7 @@ from smc_mujoco.answers.facts import (
     Use,
     Verdict,
 )
-from smc_mujoco.answers.templates import LARGEST, said
+from smc_mujoco.answers.templates import LARGEST, is_said, said
 from smc_mujoco.common import html
 from smc_mujoco.common.tabular import Tabular, as_cell
 from smc_mujoco.common.text import joined
@@ -75,7 +75,9 @@ def blocks(screen: Screen) -> list[ScreenPart]:
     if screen.heading or screen.tables or screen.notes:
         heading = [screen.heading] if screen.heading else []
         said_of.append(ScreenPart(heading, screen.tables, screen.notes))
-    pairs = [*map(line_of, screen.facts), *([next_step(screen.next)] if screen.next else [])]
+    pairs = lines_of(screen.facts)
+    if screen.next:
+        pairs.append(next_step(screen.next))
     if screen.report or screen.word:
         explained = f"{PROGRAM} explain {screen.word}" if screen.word else ""
         pairs.append(("more", "; ".join(filter(None, (screen.report, explained)))))
@@ -92,7 +94,7 @@ def screen_lines(screen: Screen) -> list[str]:
     lines = "\n\n".join(parts).splitlines()
     gap = [""] if any(block.tables for block in said_of) else []
     if not screen.contests and screen.facts:
-        count = len(screen.facts)
+        count = len(lines_of(screen.facts))
         ends = last.pairs[count:]
         room = LINES - BELOW - len([*lines, *gap, *labelled(ends)])
         last = last._replace(pairs=[*_fitting(last.pairs[:count], room), *ends])
@@ -101,12 +103,12 @@ def screen_lines(screen: Screen) -> list[str]:
 
 def _part_lines(block: ScreenPart) -> list[str]:
     """Return the lines of a block."""
-    lines = paragraph(block.heading)
+    lines = _paragraph(block.heading)
     for k, table in enumerate(block.tables):
         lines += [*[""] * (k > 0), *str(table).splitlines()]
-    lines += paragraph(block.notes)
+    lines += _paragraph(block.notes)
     if block.advice:
-        lines += ["", *paragraph(block.advice)]
+        lines += ["", *_paragraph(block.advice)]
     return [*lines, *labelled(block.pairs)]
 
 
@@ -124,17 +126,29 @@ def screen_html(screen: Screen) -> str:
 
 def _html(facts: Sequence[Fact]) -> str:
     """Return the texts of facts as a paragraph of HTML."""
-    return f"<p>{html.text(' '.join(said(fact)[1] for fact in facts))}</p>" if facts else ""
+    text = _joined(facts)
+    return f"<p>{html.text(text)}</p>" if text else ""
 
 
-def paragraph(facts: Iterable[Fact]) -> list[str]:
+def _paragraph(facts: Sequence[Fact]) -> list[str]:
     """Return the texts of facts after each other, on lines of a screen."""
-    return textwrap.wrap(" ".join(said(fact)[1] for fact in facts), WIDTH, break_on_hyphens=False)
+    return textwrap.wrap(_joined(facts), WIDTH, break_on_hyphens=False)
 
 
-def line_of(fact: Fact | Judged) -> Labelled:
-    """Return the line of a fact."""
-    return said(fact) if isinstance(fact, Fact) else verdict_lines([fact])[0]
+def _joined(facts: Sequence[Fact]) -> str:
+    """Return the texts of facts after each other."""
+    return " ".join(text for _, text in lines_of(facts))
+
+
+def lines_of(facts: Iterable[Fact | Judged]) -> list[Labelled]:
+    """Return the lines of facts, of those that are said."""
+    pairs = []
+    for fact in facts:
+        if not isinstance(fact, Fact):
+            pairs += verdict_lines([fact])
+        elif is_said(fact):
+            pairs.append(said(fact))
+    return pairs
 
 
 def _fitting(pairs: Sequence[Labelled], room: int) -> list[Labelled]:
@@ -226,7 +240,7 @@ def _values(alike: Sequence[Any]) -> dict[str, Any]:
 
 def evidence(fact: Verdict) -> str:
     """Return a verdict with its ratio, interval and samples."""
-    label, text = line_of(fact)
+    ((label, text),) = verdict_lines([fact])
     values = {**vars(fact), "label": label, "text": text}
     values["charged"] = values.get("charged") or None
     if isinstance(fact, Lead):

@@ -2,7 +2,8 @@
 
 A field is filled with a value of its name: `{law}`, with a format of `as_text` behind a colon, as
 in `{runs:run}`. A part in square brackets is left out if one of its values is not known; of
-`[a|b]` it is the first part whose values all are.
+`[a|b]` it is the first part whose values all are. A fact is not said if a value that its text has
+in no brackets is not known.
 """
 
 import math
@@ -20,7 +21,7 @@ OPTIONAL = re.compile(r"\[([^\]]*)\]")
 OVER = "over 99"  # percent, of larger shares
 LARGEST = 0.995  # a share that is printed: of the leads that might not show; chosen
 PART = "[ ({raced} of {named} laws tried)]"
-GAINS = "{gains}[ for u in {unit}][   {file}]"
+IN_FILE = "[ for u in {unit}][   {file}]"
 BEYOND = "a value beyond may do better"
 LEVELS = {"disturbance": "force"}  # a kind of margin, as `which` says it
 # a kind of fact -> the label of its line, and the text
@@ -94,7 +95,7 @@ TEXTS = {
     "not ranked": ("not ranked", "{laws}: {samples} {unit}, of {needed} that it takes"),
     "defaults": ("gains", "the defaults of {laws}, not searched"),
     # which: its first line, in seven forms
-    "law": ("Use {law}", GAINS),
+    "law": ("Use {law}", f"[{{gains}}]{IN_FILE}"),
     "untried": (
         "Open",
         "No law was tried to the end[: this machine needs {minutes:minute} for one law]",
@@ -113,7 +114,7 @@ TEXTS = {
         "between {laws};] for now {law}",
     ),
     # which: the law
-    "gains": ("{law}", GAINS),
+    "gains": ("{law}", f"{{gains}}{IN_FILE}"),
     "best": (
         "best of {laws:law}",
         "J {lead}, [after {searches} searches of each|with these gains] (95 %)",
@@ -152,7 +153,7 @@ TEXTS = {
     ),
     "at end": ("gains", f"{{gains}} at an end of its search: {BEYOND}"),
     "needless": ("without", "all runs settle with u = 0 under {where}: no law is needed there"),
-    "no time": ("no time", "for [{laws}|{many:law}]"),
+    "no time": ("no time", "for {laws}"),
     "left out": ("left out", "{law}: {reason}"),
     # tune
     "law on plant": ("", "{law} on {plant}"),
@@ -228,19 +229,26 @@ def said(fact: Fact) -> tuple[str, str]:
     return filled(label, fact.values), filled(template, fact.values)
 
 
+def is_said(fact: Fact) -> bool:
+    """Return whether all values are known that the text of a fact has in no brackets."""
+    return _has(fact.values, OPTIONAL.sub("", TEXTS[fact.kind][1]))
+
+
 def filled(template: str, values: Mapping[str, Any]) -> str:
     """Return a template with its values."""
 
-    def known(part: str) -> bool:
-        return all(_is_known(values.get(name)) for name, _ in FIELD.findall(part))
-
     def chosen(match: re.Match[str]) -> str:
-        return next(filter(known, match[1].split("|")), "")
+        return next((part for part in match[1].split("|") if _has(values, part)), "")
 
     def written(match: re.Match[str]) -> str:
         return as_text(values[match[1]], match[2])
 
     return FIELD.sub(written, OPTIONAL.sub(chosen, template))
+
+
+def _has(values: Mapping[str, Any], part: str) -> bool:
+    """Return whether all values of a part of a template are known."""
+    return all(_is_known(values.get(name)) for name, _ in FIELD.findall(part))
 
 
 def _is_known(value: Any) -> bool:

@@ -20,7 +20,7 @@ from smc_mujoco.answers.facts import Fact, Lead, Level, NextStep, Screen, Settle
 from smc_mujoco.common import html
 from smc_mujoco.common.cached import cached_property
 from smc_mujoco.common.tabular import Cell, Tabular
-from smc_mujoco.common.text import joined, number, span
+from smc_mujoco.common.text import counted, joined, number, span
 from smc_mujoco.control.component import Component, gains_text
 from smc_mujoco.control.source import in_words
 from smc_mujoco.metrics.catalogue import CATALOGUE
@@ -266,30 +266,29 @@ class Recommendation(Answer):
     @property
     def _first_line(self) -> Fact:
         """What to do."""
-        race = self.race
-        named = len(race.laws) + len(race.unsearched) + len(self.left_out)
-        tried = {"raced": len(race.laws) if len(race.laws) < named else None, "named": named}
-        form = self.form
-        if form == "unneeded":
-            kind = form if self.runs.count == self.runs.total else "unbeaten"
-            return Fact(kind, runs=self.runs, lead=self.lead, **tried)
-        if form == "undecided":
-            laws = self.undecided
-            return Fact(
-                form,
-                **{"shorter" if race.shorter else "sets": race.sets},
-                needed=self.sets_needed if self.sets_needed > race.sets else None,
-                minutes=self.minutes_needed,
-                close=not self.sets_needed,
-                laws=laws if 1 < len(laws) <= MOST_NAMED else (),
-                law=self.law.name,
-                **tried,
-            )
+        race, form = self.race, self.form
+        if form == "untried":
+            return Fact(form, minutes=self.minutes_needed)
         if form == "law":
             return self._gains(form)
-        never, limits = self._vetoing, list(map(str, self.limits))
-        about = {"law": self.law.name, "never": never, "limits": limits}
-        return Fact(form, minutes=self.minutes_needed, **about, **tried)
+        if form == "unneeded" and self.runs.count < self.runs.total:
+            form = "unbeaten"
+        named = len(race.laws) + len(race.unsearched) + len(self.left_out)
+        return Fact(
+            form,
+            law=self.law.name,
+            runs=self.runs,
+            lead=self.lead,
+            never=self._vetoing,
+            limits=list(map(str, self.limits)),
+            raced=len(race.laws) if len(race.laws) < named else None,
+            named=named,
+            **{"shorter" if race.shorter else "sets": race.sets},
+            needed=self.sets_needed if self.sets_needed > race.sets else None,
+            minutes=self.minutes_needed,
+            close=not self.sets_needed,
+            laws=self.undecided if 1 < len(self.undecided) <= MOST_NAMED else (),
+        )
 
     def _gains(self, kind: str) -> Fact:
         """Return the gains of the law, and the file that has them."""
@@ -304,13 +303,11 @@ class Recommendation(Answer):
     @property
     def _of_law(self) -> list[Fact]:
         """What the runs say of the law."""
-        form = self.form
+        form, none = self.form, self.no_law
         if form == "untried":
             return []
-        facts = []
-        if self.law.gains and form in ("undecided", "unsettled", "unkept"):
-            facts.append(self._gains("gains"))
-        if form in ("law", "unsettled") and self.lead:
+        facts = [] if form in ("law", "unneeded") else [self._gains("gains")]
+        if form in ("law", "unsettled"):
             searched = any(entrant.count > 1 for entrant in self.race.entrants.values())
             laws = 1 + len([law for law in self.rivals if law != WITHOUT])
             searches = self.race.sets if searched and self.over_sets else None
@@ -322,7 +319,7 @@ class Recommendation(Answer):
         levels = [Level(margin.kind, margin.value, margin.unit, margin.open) for margin in margins]
         if levels or self.tolerance.untried:
             facts.append(Fact("withstands", levels=levels, untried=self.tolerance.untried))
-        if (none := self.no_law) and form != "unneeded":
+        if none and form != "unneeded":
             done = Settles(sum(none.settled.values()), none.runs * len(none.settled))
             over = NOWHERE
             if self.law.name != WITHOUT and self.fixed and self.law.name in self.fixed.laws:
@@ -332,28 +329,33 @@ class Recommendation(Answer):
 
     @property
     def cautions(self) -> list[Fact]:
-        """What to know before the law is used."""
-        return [*self._of_runs, *self._of_rest, *self._of_margins, *self._of_race]
-
-    @property
-    def _of_runs(self) -> list[Fact]:
-        """What the runs of the law warn of."""
-        cautions = []
-        never = self.never_settled
-        for name, runs in self.unsettled_in.items():
-            if name not in never:
-                cautions.append(Fact("rare", where=name, runs=runs))
-        first = self._vetoing if self.form == "unsettled" else []  # whose first line says so
-        if further := [name for name in never if name not in first]:
-            cautions.append(Fact("never", where=further))
-        if self.pictured and self.unsettled_in and leans(self.worst_trace):
-            cautions.append(Fact("leans", where=str(self.worst_run.condition)))
-        if self.apart:
-            names = "+".join(map(str, self.settled[self.law.name]))
-            cautions.append(Fact("together", where=names, runs=Settles(*self.together or (0, 0))))
-        if ahead := self._lower_J:
-            cautions.append(Fact("unreliable", law=ahead))
-        return cautions
+        """What to know before the law is used. Those whose values are not known are not said."""
+        never, laws = self.never_settled, self.race.unsearched
+        told = self._vetoing if self.form == "unsettled" else []  # in the first line
+        rare = {name: runs for name, runs in self.unsettled_in.items() if name not in never}
+        leaning = self.pictured and self.unsettled_in and leans(self.worst_trace)
+        apart = "+".join(self.settled[self.law.name]) if self.apart else ""
+        lost = lost_runs(self.fixed).get(self.law.name)
+        broken = Settles(lost, len(self.fixed.cells[0, 0])) if lost and self.fixed else None
+        without = self.no_law.needless if self.no_law and self.form != "unneeded" else []
+        if self.form == "untried":
+            laws = ()
+        elif len(laws) > MOST_NAMED:
+            laws = counted(len(laws), "law")
+        return [
+            *(Fact("rare", where=name, runs=runs) for name, runs in rare.items()),
+            Fact("never", where=[name for name in never if name not in told]),
+            Fact("leans", where=str(self.worst_run.condition) if leaning else ""),
+            Fact("together", where=apart, runs=Settles(*self.together or (0, 0))),
+            Fact("unreliable", law=self._lower_J),
+            *self._of_rest,
+            *self._of_margins,
+            Fact("limit", limits=list(map(str, self.limits)), runs=broken),
+            Fact("at end", gains=list(self.tuned.at_bound) if self.tuned else []),
+            Fact("needless", where=without),
+            Fact("no time", laws=laws),
+            *(Fact("left out", law=name, reason=why) for name, why in self.left_out.items()),
+        ]
 
     @property
     def apart(self) -> bool:
@@ -379,61 +381,43 @@ class Recommendation(Answer):
         rest = self.rests.get(self.law.name)
         if not rest:
             return []
-        cautions = []
-        if rest.shakes:
-            swing = {"size": rest.size, "unit": rest.unit, "share": rest.share}
-            where = {"frequency": rest.frequency, "where": rest.condition}
-            cautions.append(Fact("shakes", **swing, **where))
         limit = min((limit.most for limit in self.limits if limit.what == OVERSHOOT), default=None)
-        if rest.overshoot > (limit or FAR_OVER):
-            where = {"percent": rest.overshoot, "where": rest.overshoots_in}
-            cautions.append(Fact("overshoots", **where, limit=limit))
-        return cautions
+        far = rest.overshoot > (limit or FAR_OVER)
+        return [
+            Fact(
+                "shakes",
+                size=rest.size if rest.shakes else None,
+                unit=rest.unit,
+                share=rest.share,
+                frequency=rest.frequency,
+                where=rest.condition,
+            ),
+            Fact(
+                "overshoots",
+                percent=rest.overshoot if far else None,
+                where=rest.overshoots_in,
+                limit=limit,
+            ),
+        ]
 
     @property
     def _of_margins(self) -> list[Fact]:
         """Where the law has no room."""
-        cautions = []
-        delay = max(
-            (case.input_delay for case in self._cases if case.law.name == self.law.name),
-            default=0.0,
-        )
+        own = [case.input_delay for case in self._cases if case.law.name == self.law.name]
+        delay = max(own, default=0.0)
+        facts = [Fact("no margin")] * any(math.isnan(margin.value) for margin in self.margins)
         for margin in self.margins:
-            if math.isnan(margin.value):
-                cautions.append(Fact("no margin"))
-                break
-            beyond = margin.value + margin.resolution
-            if margin.kind != "delay" or margin.open:
-                continue
-            if delay and beyond <= NO_ROOM * delay:
-                cautions.append(Fact("no room", delay=delay, fails=beyond))
-            elif beyond < LEAST_DELAY:
-                cautions.append(Fact("late", delay=margin.value))
-        if self.tolerance.helped and any(margin.kind == "friction" for margin in self.margins):
-            opposed = self.tolerance.opposed
-            values = {"value": opposed.value, "unit": opposed.unit} if opposed else {}
-            cautions.append(Fact("helped", joints=self.tolerance.helped, **values))
-        return cautions
-
-    @property
-    def _of_race(self) -> list[Fact]:
-        """What the race leaves open."""
-        cautions = []
-        lost = lost_runs(self.fixed).get(self.law.name, 0)
-        if self.limits and lost and self.fixed:
-            runs = Settles(lost, len(self.fixed.cells[0, 0]))
-            cautions.append(Fact("limit", limits=list(map(str, self.limits)), runs=runs))
-        if self.tuned and self.tuned.at_bound:
-            cautions.append(Fact("at end", gains=list(self.tuned.at_bound)))
-        if self.no_law and self.no_law.needless and self.form != "unneeded":
-            cautions.append(Fact("needless", where=self.no_law.needless))
-        if self.race.unsearched and self.form != "untried":
-            laws = self.race.unsearched
-            few = len(laws) <= MOST_NAMED
-            cautions.append(Fact("no time", laws=laws if few else (), many=len(laws)))
-        for name, why in self.left_out.items():
-            cautions.append(Fact("left out", law=name, reason=why))
-        return cautions
+            fails = margin.value + margin.resolution
+            if margin.kind == "delay" and not margin.open:
+                if delay and fails <= NO_ROOM * delay:
+                    facts.append(Fact("no room", delay=delay, fails=fails))
+                elif fails < LEAST_DELAY:
+                    facts.append(Fact("late", delay=margin.value))
+        opposed = self.tolerance.opposed
+        against = {"value": opposed.value, "unit": opposed.unit} if opposed else {}
+        of_friction = any(margin.kind == "friction" for margin in self.margins)
+        helped = self.tolerance.helped if of_friction else ()
+        return [*facts, Fact("helped", joints=helped, **against)]
 
     @cached_property
     def _cases(self) -> list[Scenario]:

@@ -34,7 +34,7 @@ def rows(table):
 
 def facts(screen):
     """Return label -> text of the facts."""
-    return dict(map(answers.line_of, screen.facts))
+    return dict(answers.lines_of(screen.facts))
 
 
 def test_margins_stand_below_their_kind_and_the_star_is_at_the_largest():

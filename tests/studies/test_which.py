@@ -23,7 +23,7 @@ from smc_mujoco.answers import answers, command
 from smc_mujoco.answers.answers import LINES, WIDTH
 from smc_mujoco.answers.explain import explain
 from smc_mujoco.answers.facts import Settles
-from smc_mujoco.answers.templates import TEXTS
+from smc_mujoco.answers.templates import TEXTS, is_said
 from smc_mujoco.cli import main
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
@@ -78,6 +78,15 @@ def raced(tmp_path_factory):
         "seeds": 4,
     }
     return settings, smc.which(plant, **settings, quick=True, duration=1.5), plant
+
+
+def said_of(recommendation, kind=""):
+    """Return the cautions that are said, of a kind."""
+    return [
+        fact
+        for fact in recommendation.cautions
+        if is_said(fact) and (not kind or fact.kind == kind)
+    ]
 
 
 def numbers(text):
@@ -259,12 +268,10 @@ def test_each_form_has_its_first_line(raced):
     assert "coulomb" not in said
     unasked = dataclasses.replace(recommendation, settled=partly)
     assert unasked.form == "law"
-    assert [fact.values["where"] for fact in unasked.cautions if fact.kind == "never"] == [
-        ["noise"]
-    ]
+    assert [fact.values["where"] for fact in said_of(unasked, "never")] == [["noise"]]
     open_race = dataclasses.replace(recommendation, settled=partly, race=few, fixed=None)
     assert open_race.form == "undecided"
-    (never,) = [fact for fact in open_race.cautions if fact.kind == "never"]
+    (never,) = said_of(open_race, "never")
     assert never.values["where"] == ["noise"]
     partly[name] = {"coulomb": (4, 4), "noise": (1, 4)}
     assert first(settled=partly)[0] == "law"
@@ -317,16 +324,16 @@ def test_cautions_are_lines_with_their_numbers(raced):
     shaking = dataclasses.replace(recommendation, rests={name: shaky})
     assert numbers(line(shaking, "at rest"))[:3] == [8.4, 17.0, 22.0]
     assert numbers(line(shaking, "overshoot"))[0] == 56.0
-    kinds = [fact.kind for fact in shaking.cautions]
+    kinds = [fact.kind for fact in said_of(shaking)]
     assert kinds[:2] == ["shakes", "overshoots"]
     calm = shaky._replace(share=0.009, overshoot=19.0)
     rested = dataclasses.replace(recommendation, rests={name: calm})
-    assert not {"shakes", "overshoots"} & {fact.kind for fact in rested.cautions}
+    assert not {"shakes", "overshoots"} & {fact.kind for fact in said_of(rested)}
     limit = SimpleNamespace(what="overshoot", most=10.0)
     limited = dataclasses.replace(rested, limits=[limit])
     assert numbers(line(limited, "overshoot"))[:2] == [19.0, 10.0]
     rare = dataclasses.replace(recommendation, settled={name: {"coulomb": (2, 4)}})
-    assert Settles(2, 4) in [fact.values.get("runs") for fact in rare.cautions]
+    assert Settles(2, 4) in [fact.values["runs"] for fact in said_of(rare, "rare")]
     delay = recommendation.margins[0]
     tight = dataclasses.replace(delay, value=0.01, resolution=0.005)
     late = dataclasses.replace(recommendation.worst_run, input_delay=0.01)
@@ -338,13 +345,13 @@ def test_cautions_are_lines_with_their_numbers(raced):
             column=lambda column: np.array([name if column == "law" else "coulomb"]),
         ),
     )
-    (room,) = near._of_margins
+    (room,) = filter(is_said, near._of_margins)
     assert (room.kind, room.values) == ("no room", {"delay": 0.01, "fails": 0.015})
     for value, kinds in ((0.002, ["late"]), (0.005, [])):
         early = dataclasses.replace(delay, value=value, resolution=0.001)
         tolerance = recommendation.tolerance._replace(margins=[early])
         cautions = dataclasses.replace(recommendation, tolerance=tolerance)._of_margins
-        assert [fact.kind for fact in cautions] == kinds
+        assert [fact.kind for fact in filter(is_said, cautions)] == kinds
     helped = recommendation.tolerance._replace(helped=["z"], opposed=recommendation.margins[1])
     fights = dataclasses.replace(recommendation, tolerance=helped)._of_margins[-1]
     assert (fights.kind, fights.values["value"]) == ("helped", recommendation.margins[1].value)
