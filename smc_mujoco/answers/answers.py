@@ -4,7 +4,6 @@ A line has a label of one or two words and a text, from `templates`. Numbers hav
 most.
 """
 
-import dataclasses
 import itertools
 import math
 import shlex
@@ -21,19 +20,15 @@ from smc_mujoco.answers.facts import (
     NextStep,
     NotRanked,
     Open,
-    Sample,
     Screen,
-    Settles,
     Span,
     Tied,
     Trails,
-    Use,
     Verdict,
 )
 from smc_mujoco.answers.templates import LARGEST, is_said, said
 from smc_mujoco.common import html
-from smc_mujoco.common.tabular import Tabular, as_cell
-from smc_mujoco.common.text import joined
+from smc_mujoco.common.tabular import Tabular
 
 WIDTH = 80  # characters of a line
 LINES = 24  # of a screen
@@ -255,55 +250,15 @@ def _size(lead: Lead) -> Fact:
     return Fact("size", **{**vars(lead), "share": lead.share, "medians_differ": differ})
 
 
-def use(fact: Use) -> Fact:
-    """Return the law to use, and the laws to use where something else matters most."""
-    aims_of: dict[tuple[str, str], list[str]] = {}
-    for aim, law, gains in fact.unless:
-        aims_of.setdefault((law, gains), []).append(aim)
-    unless = []
-    for (law, gains), aims in aims_of.items():
-        unless.append(Fact("unless", aims=joined(aims, "or"), law=law, gains=gains))
-    return Fact("use", **{**vars(fact), "unless": unless})
-
-
-def settled(facts: Sequence[tuple[str, Settles]]) -> Fact:
-    """Return how many runs of each law settled."""
-    count = sum(fact.count for _, fact in facts)
-    total = sum(fact.total for _, fact in facts)
-    short = [Fact("of law", law=law, runs=fact) for law, fact in facts if fact.count < fact.total]
-    return Fact(
-        "settled runs",
-        all=total if count == total else None,
-        none=None if count else total,
-        short=short,
-        others=0 < len(short) < len(facts),
-    )
-
-
-def sample(fact: Sample) -> Fact:
-    """Return what a number of a table is of."""
-    sets = fact.sets if fact.sets > 1 else None
-    return Fact(
-        "sample",
-        seeds=fact.seeds,
-        distinct=fact.runs if fact.runs < fact.seeds else None,
-        single=bool(sets and fact.single),
-        **{"least" if fact.more else "sets": sets},
-    )
-
-
 def block_of(contest: Contest) -> ScreenPart:
     """Return what is said of a plant in a condition: the table, the law to use, who leads."""
     about = {"plant": contest.plant, "condition": contest.condition}
-    starred = any(as_cell(cell).strong for row in contest.table.rows for cell in row)
-    notes = [Fact("star"), Fact("lower")] if starred else [Fact("lower")]
-    if contest.settled:
-        notes.append(settled(contest.settled))
+    notes = [Fact("star")] * contest.table.starred + [Fact("lower")]
     return ScreenPart(
-        [Fact("contest", **about, sample=sample(contest.sample))],
+        [Fact("contest", **about, sample=contest.sample)],
         [contest.table],
-        notes,
-        [use(contest.use)] if contest.use else [],
+        [*notes, contest.settled] if contest.settled else notes,
+        [contest.use] if contest.use else [],
         verdict_lines([*contest.verdicts, *contest.trails, *contest.not_ranked]),
     )
 
@@ -312,35 +267,28 @@ def _winners(contests: Sequence[Contest]) -> ScreenPart:
     """Return one table of the winners on many plants in many conditions, and what holds on each
     plant.
     """
-    metrics = [
-        name for name in _heads(contests[0]) if name.split(" over ")[0] not in ("", ON_PLANT)
-    ]
+    metrics = [name for name in contests[0].metrics if name != ON_PLANT]
     rows = []
     of_plants: dict[str, str] = {}
     for contest in contests:
         fact_of = {fact.metric: fact for fact in contest.verdicts}
         texts = {name: _winner(fact, contest) for name, fact in fact_of.items()}
         if len(contest.table.rows) == 1:  # nothing to compare it with: its numbers
-            row = [as_cell(cell).text for cell in contest.table.rows[0]]
-            texts = dict(zip(_heads(contest), row, strict=True))
+            _, *numbers = contest.table.rows[0]
+            texts = dict(zip(contest.metrics, numbers, strict=True))
         rows.append([contest.plant, contest.condition, *(texts.get(name, "") for name in metrics)])
         if (fact := fact_of.get(ON_PLANT)) and contest.plant not in of_plants:
-            advice = contest.use and use(dataclasses.replace(contest.use, unless=()))
+            advice = contest.use and Fact("use", **contest.use.values | {"unless": ()})
             ((label, text),) = verdict_lines([fact])
             said_of = Fact("of plant", advice=advice, label=label, text=text)
             of_plants[contest.plant] = said(said_of)[1]
     heads = ["", "", *metrics]
     return ScreenPart(
-        [Fact("contests", count=len(contests), sample=sample(contests[0].sample))],
+        [Fact("contests", count=len(contests), sample=contests[0].sample)],
         [Tabular(headings=heads, rows=rows, name_columns=len(heads))],
         [Fact("winners")],
         pairs=[*of_plants.items()],
     )
-
-
-def _heads(contest: Contest) -> list[str]:
-    """Return the headings of a contest's table without their units."""
-    return [heading.partition(" (")[0] for heading in contest.table.headings]
 
 
 def _winner(fact: Verdict, contest: Contest) -> str:

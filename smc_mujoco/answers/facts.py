@@ -147,38 +147,16 @@ def renamed(fact: Verdict, name: Callable[[str], str]) -> Verdict:
 
 
 @keyword_dataclass
-class Sample:
-    """What a number of a table is of."""
-
-    seeds: int
-    runs: int  # distinct ones
-    sets: int  # the least number of sets of gains of a law that has several
-    more: bool  # whether some laws have more sets
-    single: bool  # whether a law has one set of gains
-
-
-@keyword_dataclass
-class Use:
-    """The law to use, with its gains, and the laws that lead in other metrics."""
-
-    law: str
-    gains: str  # as a user writes them, "k1=41.2, k2=310"; "" for a law without gains
-    # (what matters most, the law then, its gains)
-    unless: tuple[tuple[str, str, str], ...] = ()
-    rivals: Names = ()  # the laws between which it is undecided; () for a winner
-    metric: str = "J"  # in which
-
-
-@keyword_dataclass
 class Contest:
     """Laws compared on a plant in a condition."""
 
     plant: str
     condition: str
-    sample: Sample
+    sample: Fact
     table: Tabular  # a law a row, a metric a column; a winner's number is strong
-    settled: tuple[tuple[str, Settles], ...]  # by law
-    use: Use | None  # None if no law is to be preferred
+    metrics: Names  # of its columns, as a reader says them
+    settled: Fact | None  # how many runs of each law; None if that was not asked
+    use: Fact | None  # the law to use; None if none is to be preferred
     verdicts: tuple[Verdict, ...]
     trails: tuple[Trails, ...] = ()
     not_ranked: tuple[NotRanked, ...] = ()

@@ -85,6 +85,11 @@ class Tabular:
     label: str = ""  # what LaTeX prints instead of the title
     under: Sequence[str] = ()  # paragraphs that LaTeX prints below the table
 
+    @property
+    def starred(self) -> bool:
+        """Whether a cell is marked."""
+        return any(as_cell(cell).strong for cell in itertools.chain.from_iterable(self.rows))
+
     def __str__(self) -> str:
         return plain(self)
 

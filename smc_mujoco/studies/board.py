@@ -1,14 +1,13 @@
 """A board: laws compared in one metric, and the verdict in each of its blocks, as facts."""
 
 import dataclasses
-import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.paired_runs import OBJECTIVE, SETTLES, without_floor
-from smc_mujoco.analysis.ranking import Rank, needed_to_rank, needed_to_win
+from smc_mujoco.analysis.ranking import Rank
 from smc_mujoco.answers import answers
-from smc_mujoco.answers.facts import Barred, Lead, NotRanked, Open, Sample, Tied, Trails, Verdict
+from smc_mujoco.answers.facts import Barred, Fact, Lead, NotRanked, Trails, Verdict
 from smc_mujoco.common.aliases import Names, Numbers, Pair
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.text import joined
@@ -46,70 +45,31 @@ class Block:
     medians: Numbers
     lacking: Mapping[str, int]  # number of runs that failed or have no value
     best: Names  # laws that may be the best, see `ranking`
-    worse: Names  # laws that another is better than
-    below: Names  # laws below the floor, which are not ranked among themselves
-    floor: str  # in words, such as "0.01 rad"; "" where it is not known
     away: Names  # laws with runs that failed or have not arrived, which do not win
-    ahead: str | None  # the law that is better than every other, laws with default gains included
-    # None for one law, for "settles", or if the law in front has runs without a value
-    lead: Lead | None
-    behind: Mapping[str, Trails]  # those of `worse`
-    seeds: int  # in which every law ran
-    # distinct runs in these seeds; in the others every law repeats the result of an earlier one
-    runs: int
-    level: bool  # whether the `best` laws are all level with each other
-    # the least lead with which one of the `best` would have won, a share; NaN without a test
-    resolves: float
-    charged: float  # what half the step and trends take from that lead, a share
+    below: Names  # laws below the floor, which are not ranked among themselves
+    rising: Names  # laws whose median is below the floor, but need not stay there
+    floor: str  # in words, such as "0.01 rad"; "" where it is not known
+    verdict: Verdict | None  # who wins, or why nobody does; None for a single law
+    behind: Mapping[str, Trails]  # the laws that others are better than
+    not_ranked: Sequence[NotRanked]  # the laws with too few samples beside others that are ranked
     # medians at the step and at half of it, where they differ much
     by_step: Mapping[str, Pair]
-    samples: int  # largest number of any two laws, see `ranking`; for one law, of its runs
-    sets: int  # smallest number of sets of gains of a law that has several; 1 if none has
-    single_set: bool  # whether a law has one set of gains
-    few: Mapping[str, int]  # laws that are not ranked, as they have so few sets of gains or runs
-    rising: Names = ()  # laws whose median is below the floor, but need not stay there
-    # the laws with default gains, over which no other law is named the winner
-    untuned: Names = ()
-    bound: float = math.nan  # of |u|, in the unit of u; NaN where it is not one number
+    # distinct runs; in the other seeds every law repeats the result of an earlier one
+    runs: int
+    sample: Fact  # what a number is of
+    bound: float  # of |u|, in the unit of u; NaN where it is not one number
 
     @property
     def winner(self) -> str | None:
-        """The law that is better than every other, among several, unless `barred`."""
-        return None if self.barred else self.ahead
+        """The law that is better than every other, among several."""
+        return self.verdict.law if isinstance(self.verdict, Lead) else None
 
     @property
-    def barred(self) -> Names:
-        """The laws with default gains that are worse than the law ahead, which is then not named
-        the winner.
+    def barred(self) -> bool:
+        """Whether the law that is better than every other does not win, as others have their
+        default gains.
         """
-        if self.ahead:
-            return tuple(law for law in self.untuned if law != self.ahead)
-        return ()
-
-    @property
-    def lowest(self) -> Names:
-        """Those of the best laws, or all laws, that are below the floor, if these are several."""
-        low = tuple(law for law in self.best if law in self.below)
-        if len(self.below) == len(self.medians) and not self.away:
-            low = tuple(self.medians)
-        return low if len(low) > 1 else ()
-
-    @property
-    def all_settle_or_none(self) -> bool:
-        """Whether every run of every law settles, or none, for the share of runs that do not."""
-        shares = set(self.medians.values())
-        return shares in ({0.0}, {1.0})
-
-    @property
-    def sample(self) -> Sample:
-        """The size of the sample."""
-        return Sample(
-            seeds=self.seeds,
-            runs=self.runs,
-            sets=self.sets,
-            more=self.samples > self.sets,
-            single=self.sets > 1 and self.single_set,
-        )
+        return isinstance(self.verdict, Barred) and self.verdict.defaults
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, repr=False)
@@ -122,8 +82,6 @@ class Board:
     unit: str
     entries: tuple[BoardEntry, ...]  # lowest mean rank first
     blocks: tuple[Block, ...]  # the same laws in each condition
-    family: int  # number of blocks of the table for which winners are corrected
-    relevant: float  # share of a value that is relevant
     # whether halving the physics step may change its numbers, and no run was repeated with it
     by_step: bool
     x: str = ""  # the unit of positions, "rad" or "m"; "" where it is not known
@@ -159,67 +117,12 @@ class Board:
     @property
     def verdicts(self) -> dict[str, Verdict | None]:
         """Condition -> who wins there, or why nobody does; None for a single law."""
-        return {block.condition: self.verdict(block) for block in self.blocks}
-
-    def verdict(self, block: Block) -> Verdict | None:
-        """Return who wins a block, or why nobody does."""
-        metric = self.label
-        laws = tuple(block.medians)
-        if len(laws) < 2:
-            return None
-        if block.winner and block.lead and block.lead.law == block.winner:
-            return block.lead
-        if block.winner:
-            return Lead(law=block.winner, rival="", metric=metric)
-        if block.barred:
-            return Barred(metric=metric, laws=block.barred, defaults=True)
-        if len(block.away) == len(laws):
-            return Barred(metric=metric, laws=laws, defaults=False)
-        return self._undecided(block, metric)
-
-    def _undecided(self, block: Block, metric: str) -> Tied | Open:
-        """Return why no law wins a block in which one might."""
-        laws = tuple(block.medians)
-        if self.metric == SETTLES and block.all_settle_or_none:
-            return Tied(metric=metric, laws=laws)
-        if block.lowest:
-            return Tied(metric=metric, laws=block.lowest, floor=block.floor)
-        if needed := self.needed(block):
-            return Open(metric=metric, laws=laws, needed=needed, unit=self.samples_unit(block))
-        if block.level and len(block.best) > 1:
-            return Tied(metric=metric, laws=block.best)
-        unbeaten = block.best or tuple(law for law in laws if law not in block.worse)
-        charged = block.charged if block.charged > self.relevant else 0.0
-        return Open(metric=metric, laws=unbeaten, hidden=block.resolves, charged=charged)
-
-    def needed(self, block: Block) -> int:
-        """Return how many samples a verdict takes in a block that has fewer; 0 if it has enough."""
-        least = needed_to_win(self.family)
-        ranked = len(block.medians) - len(block.few)
-        if ranked < 2 or block.samples < least:
-            return max(least, block.samples + 1)
-        rank = needed_to_rank(len(self.entries))
-        return rank if block.samples < rank else 0
-
-    @staticmethod
-    def samples_unit(block: Block) -> str:
-        """Return what a sample of a block is."""
-        if block.sets == 1:
-            return "runs"
-        return "sets of gains or runs" if block.single_set else "sets of gains"
+        return {block.condition: block.verdict for block in self.blocks}
 
     @property
     def not_ranked(self) -> list[NotRanked]:
-        """The laws with too few samples to be ranked beside others that are."""
-        least = min(needed_to_win(self.family), needed_to_rank(len(self.entries)))
-        facts: dict[str, NotRanked] = {}
-        for block in self.blocks:
-            if len(block.medians) - len(block.few) > 1:
-                for law, samples in block.few.items():
-                    unit = self.samples_unit(block)
-                    facts[law] = NotRanked(
-                        metric=self.label, law=law, samples=samples, needed=least, unit=unit
-                    )
+        """The laws with too few samples to be ranked beside others that are, each once."""
+        facts = {fact.law: fact for block in self.blocks for fact in block.not_ranked}
         return list(facts.values())
 
     @property

@@ -4,11 +4,10 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
-from smc_mujoco.analysis.paired_runs import OBJECTIVE, SETTLED, SETTLES
+from smc_mujoco.analysis.paired_runs import OBJECTIVE, SETTLES
 from smc_mujoco.common.aliases import Pair
 from smc_mujoco.common.text import in_one_notation, number
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.metrics.conventions import Metric
 from smc_mujoco.studies.board import Board
 
 
@@ -44,22 +43,15 @@ def sizes(values: Sequence[float], metric: str) -> list[str]:
     return texts
 
 
-def heading(board: Board) -> str:
-    """Return a metric's label with its unit, if that is known."""
-    if board.metric == SETTLES:
-        return SETTLED
-    if board.metric == OBJECTIVE:
-        return "J (s^2)"
-    return _in_unit(board).heading(board.x)
+def heading(board: Board, about: str = "", of_unit: str = "") -> str:
+    """Return a metric's label with its unit, if that is known, and what is said `about` each."""
+    unit = "%" if board.metric == SETTLES else unit_of(board)
+    return f"{board.label}{about} ({unit}{of_unit})" if unit else f"{board.label}{about}"
 
 
 def unit_of(board: Board) -> str:
     """Return the unit of a board's medians; "" for a share, or where positions have none."""
     if board.metric not in CATALOGUE or not board.x:
         return "" if "{" in board.unit else board.unit
-    return _in_unit(board).unit_for(board.x)
-
-
-def _in_unit(board: Board) -> Metric:
-    """Return the metric of a board, in the board's unit: in V for voltages."""
-    return dataclasses.replace(CATALOGUE[board.metric], unit=board.unit)
+    # in the board's unit: in V for voltages
+    return dataclasses.replace(CATALOGUE[board.metric], unit=board.unit).unit_for(board.x)

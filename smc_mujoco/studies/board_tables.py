@@ -2,7 +2,6 @@
 
 import dataclasses
 import itertools
-import re
 from collections.abc import Callable, Mapping, Sequence
 
 from smc_mujoco.analysis.step_halving import UNTRIED
@@ -14,24 +13,18 @@ from smc_mujoco.answers.templates import said
 from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import capital, joined, span
-from smc_mujoco.control.source import kinds
+from smc_mujoco.control.source import NONE, kinds
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.studies.board import Board, BoardEntry, sources
 from smc_mujoco.studies.board_numbers import heading, in_order, sizes
 from smc_mujoco.studies.contests import contests
 
-# a word that print explains below the last table -> where a table has it
-IN_PRINT = {
-    "interval": "",
-    "J": r"'J \(",
-    **{name: name for name in ("settled runs", "settling time", "final error", "ITAE")},
-    "variation of u": "variation of u",
-    "shipped": "shipped|tuned here|given|default",
-    "may be the best": "strong=True",
-    "floor": "floor |may exceed ",
-    "some runs": "at half",
-}
+# words that print explains below the last table, where a table has them
+IN_PRINT = (
+    *("interval", "J", "settled runs", "settling time", "final error", "ITAE", "variation of u"),
+    *("shipped", "may be the best", "floor", "some runs"),
+)
 NO_BOARDS = "no boards: no metric applies"
 # what boards and comparisons explain on their pages
 WORDS = (
@@ -116,14 +109,27 @@ class Boards(Answer, list[Board]):
         if not groups:
             return [Tabular(headings=[NO_BOARDS], rows=[], notes=self.absent)]
         tables = list(map(self._table, groups.values()))
-        words = str([(table.headings, table.rows) for table in tables])
         notes = [*tables[-1].notes, *self.remarks]
         if any(board.by_step for board in self):
             notes.append(f"{capital(UNTRIED)}.")
-        explained = [word for word, mark in IN_PRINT.items() if re.search(mark, words)]
-        key = " ".join(f"{capital(word)}: {meaning(word)}" for word in explained)
+        starred = any(table.starred for table in tables)
+        key = " ".join(f"{capital(word)}: {meaning(word)}" for word in self._explained(starred))
         last = dataclasses.replace(tables[-1], notes=notes, under=[*tables[-1].under, key])
         return [*tables[:-1], last]
+
+    def _explained(self, starred: bool) -> list[str]:
+        """Return the words of the tables that print explains; `starred`: whether one has a star."""
+        entries = [(board, entry) for board in self for entry in board.entries]
+        words = {"interval", *(board.label for board in self)}
+        if any(source.kind != NONE for _, entry in entries for source in entry.sources):
+            words.add("shipped")
+        if starred:
+            words.add("may be the best")
+        if any(_floor(board, entry.law) for board, entry in entries):
+            words.add("floor")
+        if any(block.by_step for board in self for block in board.blocks):
+            words.add("some runs")
+        return [word for word in IN_PRINT if word in words]
 
     def _name(self, law: str) -> str:
         """Return what LaTeX calls a law."""
@@ -143,7 +149,7 @@ class Boards(Answer, list[Board]):
             rows.append([name, *cells[law]])
         largest = max(boards, key=lambda board: len(board.blocks))
         plant = largest.group["plant"]
-        facts = [board.verdict(board.blocks[0]) for board in boards if _is_one(board)]
+        facts = [board.blocks[0].verdict for board in boards if _is_one(board)]
         in_print = [renamed(fact, self._name) for fact in facts if fact]
         return Tabular(
             headings=["law", *map(heading, boards)],
@@ -171,7 +177,7 @@ def _title(board: Board, plant: str, named: Callable[[str], str] = str) -> str:
         about += f", {named(board.blocks[0].condition)}"
     if board.summed:
         about += f" under {joined(map(named, board.summed))}"
-    samples = dict.fromkeys(said(answers.sample(block.sample))[1] for block in board.blocks)
+    samples = dict.fromkeys(said(block.sample)[1] for block in board.blocks)
     return f"{about}: {'; '.join(samples)}"
 
 
@@ -190,7 +196,7 @@ def _cell(board: Board, entry: BoardEntry) -> Cell:
         before, after = step
         alarms.append(f"some runs {before}, at half the step {after}")
     says = entry.law == board.winner or not entry.vague
-    barred: Names = tuple(itertools.chain.from_iterable(block.barred for block in board.blocks))
+    barred = any(block.barred for block in board.blocks)
     best = entry.rank.best and says and median != "" and not barred
     lines = "\n".join(filter(None, below))
     return Cell(median, lines, best, alarm="\n".join(filter(None, alarms)))

@@ -121,21 +121,21 @@ class Compared(Answer):
             return self.leaderboard.screen
         return Screen(
             contests=self._contests,
-            facts=[*self._defaults, *self.leaderboard.bewares],
+            facts=[self._defaults, *self.leaderboard.bewares],
             next=self._next,
             report=self.report,
             word="lead",
         )
 
     @property
-    def _defaults(self) -> list[Fact]:
+    def _defaults(self) -> Fact:
         """The laws that ran with the gains of their own files."""
         laws = {}
         for candidates in self.candidates.values():
             for law, *_ in candidates:
                 if law.source.kind == source.DEFAULT and law.gains:
                     laws[law.name] = None
-        return [Fact("defaults", laws=list(laws))] if laws else []
+        return Fact("defaults", laws=list(laws))
 
     @cached_property
     def _contests(self) -> tuple[Contest, ...]:
@@ -157,11 +157,11 @@ class Compared(Answer):
         facts = [fact for contest in self._contests for fact in contest.verdicts]
         needed = max((fact.needed for fact in facts if isinstance(fact, Open)), default=0)
         laws = dict.fromkeys(itertools.chain.from_iterable(self.gains.values()))
-        seeds = max(contest.sample.seeds for contest in self._contests)
+        seeds = max(contest.sample.values["seeds"] for contest in self._contests)
         of_runs = all(fact.unit == "runs" for fact in facts if isinstance(fact, Open))
         more_runs = {"--seeds": f"{needed}"} if of_runs else _sets(needed)
         barred = any(isinstance(fact, Barred) and fact.defaults for fact in facts)
-        undecided = any(contest.use and contest.use.rivals for contest in self._contests)
+        undecided = any(contest.use and contest.use.values["rivals"] for contest in self._contests)
         steps = [
             (not facts, {"--law": ",".join(laws | dict.fromkeys(RIVALS))}, "adds rivals"),
             (needed, more_runs, "makes enough runs to decide what is open"),

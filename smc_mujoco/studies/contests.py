@@ -4,19 +4,10 @@ import math
 from collections.abc import Mapping, Sequence
 
 from smc_mujoco.analysis.paired_runs import OBJECTIVE, SETTLES
-from smc_mujoco.answers.facts import (
-    Contest,
-    Lead,
-    NotRanked,
-    Open,
-    Settles,
-    Tied,
-    Use,
-    Verdict,
-)
+from smc_mujoco.answers.facts import Contest, Fact, Lead, NotRanked, Open, Settles, Tied, Verdict
 from smc_mujoco.common.aliases import Names
 from smc_mujoco.common.tabular import Cell, Tabular
-from smc_mujoco.common.text import counted
+from smc_mujoco.common.text import counted, joined
 from smc_mujoco.studies.board import Block, Board
 from smc_mujoco.studies.board_numbers import heading, in_order, size
 
@@ -55,7 +46,7 @@ def _contest(columns: Sequence[Column], gains: Mapping[str, str], own: Names) ->
     verdicts: list[Verdict] = []
     not_ranked: list[NotRanked] = []
     for board, block in columns:
-        fact = board.verdict(block)
+        fact = block.verdict
         # that all laws settle in the same runs is seen in the number of runs that settle
         if fact and not (board.metric == SETTLES and isinstance(fact, Tied)):
             verdicts.append(fact)
@@ -69,6 +60,7 @@ def _contest(columns: Sequence[Column], gains: Mapping[str, str], own: Names) ->
         condition=last.condition,
         sample=last.sample,
         table=Tabular(headings=["", *(_heading(board) for board, _ in with_numbers)], rows=rows),
+        metrics=tuple(board.label for board, _ in with_numbers),
         settled=_settled(columns),
         use=_use(columns, verdicts, gains),
         verdicts=tuple(verdicts),
@@ -83,10 +75,8 @@ def _heading(board: Board) -> str:
     """Return the heading of a board: J with the number of conditions that it sums, a variation of u
     with its share.
     """
-    text = heading(board)
-    if board.summed:
-        return text.replace(" (", f" over {counted(len(board.summed), 'condition')} (")
-    return f"{text.removesuffix(')')} (of bound))" if _has_share(board) else text
+    summed = f" over {counted(len(board.summed), 'condition')}" if board.summed else ""
+    return heading(board, summed, " (of bound)" if _has_share(board) else "")
 
 
 def _has_share(board: Board) -> bool:
@@ -113,20 +103,31 @@ def _share(share: float) -> str:
     return f"{float(f'{100.0 * share:.2g}'):g} %"
 
 
-def _settled(columns: Sequence[Column]) -> tuple[tuple[str, Settles], ...]:
-    """Return how many runs of each law settle; () if that was not asked."""
+def _settled(columns: Sequence[Column]) -> Fact | None:
+    """Return how many runs of each law settle; None if that was not asked."""
     for board, block in columns:
         if board.metric == SETTLES:
             facts = []
+            count = 0
             for law, share in block.medians.items():
-                facts.append((law, Settles(round((1.0 - share) * block.runs), block.runs)))
-            return tuple(facts)
-    return ()
+                runs = Settles(round((1.0 - share) * block.runs), block.runs)
+                count += runs.count
+                if runs.count < runs.total:
+                    facts.append(Fact("of law", law=law, runs=runs))
+            laws = len(block.medians)
+            return Fact(
+                "settled runs",
+                all=None if facts else count,
+                none=None if count else laws * block.runs,
+                short=facts,
+                others=0 < len(facts) < laws,
+            )
+    return None
 
 
 def _use(
     columns: Sequence[Column], verdicts: Sequence[Verdict], gains: Mapping[str, str]
-) -> Use | None:
+) -> Fact | None:
     """Return the law to use: the one that is best in the first metric, or of those that may be
     best there, the first; without the first metric's verdict, none. A law with a run that does not
     arrive in this condition is not recommended.
@@ -146,14 +147,19 @@ def _use(
             return None
     if law in lost:
         return None
-    unless = []
+    aims_of: dict[str, list[str]] = {}  # law -> the metrics in which it leads
     for fact in verdicts[1:]:
         if isinstance(fact, Lead) and fact.law != law and fact.law not in lost:
-            unless.append((fact.metric, fact.law, gains.get(fact.law, "")))
-    return Use(
+            aims_of.setdefault(fact.law, []).append(fact.metric)
+    unless = []
+    for leader, aims in aims_of.items():
+        about = {"aims": joined(aims, "or"), "law": leader, "gains": gains.get(leader)}
+        unless.append(Fact("unless", **about))
+    return Fact(
+        "use",
         law=law,
-        gains=gains.get(law, ""),
-        unless=tuple(unless),
+        gains=gains.get(law),
+        unless=unless,
         rivals=rivals if len(rivals) > 1 else (),
         metric=first.metric,
     )

@@ -10,7 +10,7 @@ the laws ran.
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from smc_mujoco.analysis.bootstrap import Interval, median_of, share_interval
 from smc_mujoco.analysis.paired_runs import (
     EPS,
     OBJECTIVE,
-    OF_J,
     SETTLES,
     UNITS,
     RunColumns,
@@ -28,15 +27,15 @@ from smc_mujoco.analysis.paired_runs import (
 from smc_mujoco.analysis.ranking import Comparison, corrected, linked, ranks
 from smc_mujoco.analysis.relevant import RELEVANT
 from smc_mujoco.analysis.step_halving import first_order, repeats_every_run
-from smc_mujoco.answers.facts import Lead, Trails
 from smc_mujoco.common.aliases import Array, Names
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.common.text import joined
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.board import Block, Board, BoardEntry, label_of
+from smc_mujoco.studies.board import Block, Board, BoardEntry
 from smc_mujoco.studies.board_tables import Boards
+from smc_mujoco.studies.verdicts import BlockComparison
 
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 MAX_RATIO = 4.0  # of the ends of a median's interval, above which it says too little; chosen
@@ -257,15 +256,13 @@ def _boards(contests: Sequence[MetricContest], defaults: bool) -> list[Board]:
     boards = []
     for contest in contests:
         repeated = not np.isnan(contest.comparison.halves).all()
-        blocks = [_block(contest, k, defaults) for k in range(len(contest.blocks))]
+        blocks = [_block(contest, k, defaults, family) for k in range(len(contest.blocks))]
         board = Board(
             group=contest.group,
             metric=contest.metric,
             unit=contest.unit,
             entries=_entries(contest.comparison, contest.sets, contest.sources),
             blocks=tuple(blocks),
-            family=family,
-            relevant=contest.comparison.relevant,
             by_step=not repeated and any(map(repeats_every_run, filter(None, contest.ran))),
             x=contest.x,
             summed=contest.summed,
@@ -296,138 +293,34 @@ def _unit(metric: str, ran: Sequence[Scenario | None]) -> str:
     return UNITS[metric].replace("({u})", bracketed).replace("{u}", effort)
 
 
-def _block(contest: MetricContest, at: int, defaults: bool) -> Block:
+def _block(contest: MetricContest, at: int, defaults: bool, family: int) -> Block:
     """Return a block of a contest; `defaults`: whether a law may win over default gains."""
     comparison, scenario = contest.comparison, contest.ran[at]
-    laws = np.array(comparison.laws)
-
-    def named(chosen: Array) -> Names:
-        return tuple(laws[chosen].tolist())
-
-    def by_law(values: Array) -> dict[str, Any]:
-        return dict(zip(comparison.laws, values.tolist(), strict=True))
-
-    medians = by_law(comparison.centres[:, at])
-    lacking = by_law(comparison.without_value[:, at])
-    best, below = comparison.best[:, at], comparison.below[:, at]
-    few = ~comparison.ranked[:, at]
-    sets = comparison.sets[:, at]
-    winner = comparison.winners[at]
-    # by failed runs, then by median
-    order = sorted(comparison.laws, key=lambda law: (law != winner, lacking[law], medians[law]))
-    ranked = [law for law in order if law not in named(few)]
-    unbeaten = [law for law in order if law in named(best)]
-    resolves, charged = _resolves(comparison, at, unbeaten)
-    changes = {law: comparison.step_change(at, law) for law in comparison.laws}
-    floor = paired_runs.floor_words(scenario, contest.metric)
-    runs = int(comparison.seeds[at])
     untuned = []
     if not defaults:
         untuned = [law for law, of_law in contest.sources.items() if any(map(_is_default, of_law))]
+    floor = paired_runs.floor_words(scenario, contest.metric)
+    block = BlockComparison(comparison, at, contest.metric, floor, family, tuple(untuned))
+    changes = {law: comparison.step_change(at, law) for law in comparison.laws}
     plant, condition = contest.blocks[at]
     return Block(
         plant=plant,
         condition=condition,
-        medians=medians,
-        lacking=lacking,
-        best=named(best),
-        below=named(below),
-        rising=named((comparison.centres[:, at] <= comparison.floors[at]) & ~below),
+        medians=block.by_law(comparison.centres),
+        lacking=block.by_law(comparison.without_value),
+        best=block.named(comparison.best),
+        away=block.away,
+        below=block.named(comparison.below),
+        rising=block.named((comparison.centres <= comparison.floors) & ~comparison.below),
         floor=floor,
-        away=named(comparison.away[:, at].any(axis=1)),
-        worse=named(comparison.worse[:, at]),
-        ahead=winner,
-        lead=_lead(comparison, at, ranked, floor, contest.metric),
-        behind=_behind(comparison, at, order, label_of(contest.metric)),
-        level=bool(comparison.level[at][np.ix_(best, best)].all()),
-        resolves=resolves,
-        charged=charged,
+        verdict=block.verdict,
+        behind=block.behind,
+        not_ranked=block.not_ranked,
         by_step={law: change for law, change in changes.items() if change},
-        seeds=contest.seeds[at],
-        runs=runs,
-        samples=int(comparison.samples[at].max()) if len(laws) > 1 else runs,
-        sets=min(sets[sets > 1].tolist(), default=1),
-        few=dict(zip(named(few), comparison.units[few, at].tolist(), strict=True)),
-        single_set=bool((sets == 1).any()),
-        untuned=tuple(untuned),
+        runs=int(comparison.seeds[at]),
+        sample=block.sample(contest.seeds[at]),
         bound=_bound(scenario),
     )
-
-
-def _lead(
-    comparison: Comparison, at: int, order: Sequence[str], floor: str, metric: str
-) -> Lead | None:
-    """Return the least lead of the law in front of a block, which comes first in `order`, over the
-    rival over which it is least by the upper end of the interval.
-    """
-    if len(order) < 2 or comparison.shares:
-        return None
-    first, *rivals = order
-    effects = {}
-    for rival in rivals:
-        effects[rival] = comparison.effect(at, first, rival)
-    rival = max(rivals, key=lambda rival: effects[rival].high)
-    a = comparison.laws.index(first)
-    b = comparison.laws.index(rival)
-    lacking = comparison.without_value[:, at]
-    effect = effects[rival]
-    if lacking[a] or not effect.samples or comparison.pairs_below_floor[at, a, b]:
-        return None
-    low, high = 1.0 - effect.high, 1.0 - effect.low
-    interval = {"low": low, "high": high, "ratio": effect.value}
-    gaps = ""
-    if lacking[b]:
-        interval = {}
-        gaps = f"{lacking[b]} of {comparison.seeds[at]}"
-    elif effect.below and floor:
-        interval = {"low": low}
-    unit = OF_J if metric == OBJECTIVE else "runs"
-    return Lead(
-        law=first,
-        rival=rival,
-        metric=label_of(metric),
-        gaps=gaps,
-        floor=floor if effect.below else "",
-        ahead=effect.ahead,
-        samples=effect.samples,
-        unit="sets of gains" if effect.sets else unit,
-        medians_differ=bool(comparison.centres[a, at] > comparison.centres[b, at]),
-        **interval,
-    )
-
-
-def _behind(comparison: Comparison, at: int, order: Sequence[str], label: str) -> dict[str, Trails]:
-    """Return the laws of a block that others are better than; the law in front is first in
-    `order`.
-    """
-    better = comparison.better[at]
-    behind = {}
-    for law in order[1:]:
-        b = comparison.laws.index(law)
-        ahead = tuple(rival for rival in order if better[comparison.laws.index(rival), b])
-        if not ahead:
-            continue
-        times = math.nan
-        if not comparison.shares:
-            effect = comparison.effect(at, ahead[0], law)
-            if not effect.below and effect.value > 0.0:
-                times = 1.0 / effect.value
-        times = times if math.isfinite(times) else math.nan
-        behind[law] = Trails(law=law, leader=ahead[0], metric=label, times=times, ahead=ahead)
-    return behind
-
-
-def _resolves(comparison: Comparison, at: int, unbeaten: Sequence[str]) -> tuple[float, float]:
-    """Return the least lead of the first of the unbeaten laws with which it would have been seen to
-    be better than all others of them, and what half the step and trends take from it, shares; NaN
-    and 0 without a test.
-    """
-    seen = [(math.nan, 0.0)]
-    if not comparison.shares:
-        for rival in unbeaten[1:]:
-            pair = at, unbeaten[0], rival
-            seen.append((comparison.visible(*pair), comparison.charged(*pair)))
-    return max(seen, key=lambda found: (not math.isnan(found[0]), found[0]))
 
 
 def _entries(

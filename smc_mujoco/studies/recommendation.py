@@ -33,6 +33,7 @@ from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.board_tables import Boards
 from smc_mujoco.studies.race import LOOKS, WITHOUT, Race, needed
 from smc_mujoco.studies.table import Table
+from smc_mujoco.studies.verdicts import nearest
 
 RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
 FAR_OVER = 20.0  # %, an overshoot beyond which the answer says so; chosen
@@ -622,21 +623,16 @@ def _lead(comparison: Comparison, law: str, rival: str = "") -> Lead:
     least.
     """
     rivals = [name for name in comparison.laws if name not in (law, WITHOUT)]
-    if rival or not rivals:
-        rivals = [rival or WITHOUT]
-    effects = {name: comparison.effect(0, law, name) for name in rivals}
-    nearest = max(effects, key=lambda name: effects[name].high)
-    effect = effects[nearest]
-    lost = lost_runs(comparison)
-    if lost[nearest]:
-        return Lead(
-            law=law,
-            rival=nearest,
-            metric="J",
-            low=math.nan,
-            gaps=f"{lost[nearest]} of {effect.samples}",
-        )
-    return Lead(law=law, rival=nearest, metric="J", low=1.0 - effect.high, high=1.0 - effect.low)
+    rival, effect = nearest(comparison, 0, law, [rival] if rival else rivals or [WITHOUT])
+    lost = lost_runs(comparison)[rival]
+    return Lead(
+        law=law,
+        rival=rival,
+        metric="J",
+        low=math.nan if lost else 1.0 - effect.high,
+        high=math.nan if lost else 1.0 - effect.low,
+        gaps=f"{lost} of {effect.samples}" if lost else "",
+    )
 
 
 def lost_runs(comparison: Comparison | None) -> dict[str, int]:

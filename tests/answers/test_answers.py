@@ -11,7 +11,7 @@ from helpers.words import words
 from smc_mujoco.answers import answers
 from smc_mujoco.answers.answer import Answer
 from smc_mujoco.answers.explain import explain, glossary
-from smc_mujoco.answers.facts import Fact, Lead, NextStep, Open, Screen, Settles, Tied, Trails, Use
+from smc_mujoco.answers.facts import Fact, Lead, NextStep, Open, Screen, Settles, Tied, Trails
 from smc_mujoco.answers.templates import percent, said
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import shipped
@@ -70,20 +70,20 @@ def text(fact):
 
 
 def test_the_law_to_use_comes_with_its_gains_and_the_laws_that_lead_elsewhere():
-    unless = ("ITAE", "pid", "kp=2"), ("J", "sta", ""), ("energy", "pid", "kp=2")
-    words = text(answers.use(Use(law="adrc", gains="wc=30", unless=unless)))
+    elsewhere = [
+        Fact("unless", aims="ITAE or energy", law="pid", gains="kp=2"),
+        Fact("unless", aims="J", law="sta", gains=None),
+    ]
+    words = text(Fact("use", law="adrc", gains="wc=30", unless=elsewhere))
     assert words.index("adrc") < words.index("wc=30") < words.index("pid") < words.index("sta")
-    assert words.count("pid") == 1
-    assert "(" not in text(answers.use(Use(law="none", gains="")))
-    assert text(answers.use(Use(law="a", gains="", rivals=("a", "b")))).startswith("Undecided")
+    assert "(" not in text(Fact("use", law="none", gains=None))
+    assert text(Fact("use", law="a", rivals=("a", "b"), metric="J")).startswith("Undecided")
 
 
 def test_settled_runs_are_counted_by_law():
-    all_but_one = text(answers.settled([("a", Settles(12, 12)), ("b", Settles(7, 12))]))
+    short = [Fact("of law", law="b", runs=Settles(7, 12))]
+    all_but_one = text(Fact("settled runs", short=short, others=True))
     assert all_but_one == "Settled runs: b 7 of 12, all of the others."
-    settled = [("a", Settles(12, 12)), ("b", Settles(12, 12))]
-    assert text(answers.settled(settled)) == "All 24 runs settled."
-    assert text(answers.settled([("a", Settles(0, 12))])) == "No run of 12 settled."
 
 
 def test_a_law_that_loses_has_its_ratio_and_who_is_ahead():

@@ -19,16 +19,16 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.analysis.ranking import Effect
 from smc_mujoco.answers.explain import meaning
-from smc_mujoco.answers.facts import Barred, Lead, NotRanked, Open, Sample, Tied
+from smc_mujoco.answers.facts import Barred, Lead, NotRanked, Open, Tied
 from smc_mujoco.common.tabular import TEX, plain
 from smc_mujoco.common.text import number, span
 from smc_mujoco.draw import dot_plot
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.studies import leaderboard as module
 from smc_mujoco.studies.board import Board
 from smc_mujoco.studies.board_numbers import size, sizes
 from smc_mujoco.studies.board_tables import Boards
 from smc_mujoco.studies.leaderboard import leaderboard
+from smc_mujoco.studies.verdicts import BlockComparison
 
 pytestmark = pytest.mark.quick
 
@@ -225,11 +225,10 @@ def test_only_what_no_law_beats_is_marked(boards):
     wide.columns["itae"] = np.exp(20.0 * np.random.default_rng(1).normal(size=60))
     blind = leaderboard(wide, metrics=["itae"])
     (block,) = blind[0].blocks
-    assert blind[0].needed(block) == 0
     assert len(blind[0].best) == 3
     assert not any(map(any, marked(blind)))
-    fact: Any = blind[0].verdict(block)
-    assert fact.hidden > 0.995
+    fact: Any = block.verdict
+    assert (fact.hidden > 0.995, fact.needed) == (True, 0)
     some_boards = made()  # the first median is known within a factor of 10, the others within 1.2
     random = np.random.default_rng(3)
     some_boards.columns["itae"] = np.exp(np.repeat([2.5, 0.1, 0.1], 20) * random.normal(size=60))
@@ -238,8 +237,8 @@ def test_only_what_no_law_beats_is_marked(boards):
     assert EVIL in board.best
     cells = {row[0].text: row[1] for row in Boards([board]).tables[0].rows}
     assert [cells[law].strong for law in LAWS] == [False, True, True]
-    fact: Any = board.verdict(board.blocks[0])
-    assert fact == Open(metric="ITAE", laws=board.best, hidden=board.blocks[0].resolves)
+    fact: Any = board.blocks[0].verdict
+    assert fact == Open(metric="ITAE", laws=board.best, hidden=fact.hidden)
     seen = f"{100 * fact.hidden:.2g}"
     assert f"{seen} %" in repr(board)
     assert rf"(leads below {seen}~\% might not show)" in Boards([board]).to_latex()
@@ -260,7 +259,7 @@ def test_a_law_that_wins_is_marked_and_its_ratio_is_a_number(never, spread, cond
     assert board.winner == "third"
     assert ranked_boards.tables[0].rows[0][1].strong
     for block in board.blocks:
-        fact: Any = board.verdict(block)
+        fact: Any = block.verdict
         assert (fact.law, fact.metric, fact.samples) == ("third", "settling time", 20)
         if never:
             assert re.fullmatch(r"\d+ of 20", fact.gaps)
@@ -484,58 +483,98 @@ def pair() -> Board:
     return leaderboard(made(conditions=("nominal", "noise")), metrics=["itae"])[0]
 
 
-LOST = {"ahead": None, "best": ()}
-FEW = {"ahead": None, "samples": 3, "sets": 3, "single_set": False}
+def verdicts_of(metric="itae", floor="0.1 m", untuned=(), samples=20, **fields) -> BlockComparison:
+    """A block of three laws in one family, the last of which wins; `fields` are arrays by law."""
+
+    def column(name, default):
+        return np.broadcast_to(np.atleast_2d(fields.pop(name, default)).T, (3, 1))
+
+    centres = column("centres", (1.0, 2.0, 0.5))
+    comparison: Any = SimpleNamespace(
+        laws=LAWS,
+        shares=metric == "settles",
+        relevant=0.05,
+        winners=[fields.pop("winner", "third")],
+        centres=centres,
+        without_value=column("without_value", 0),
+        away=column("away", False)[..., None],
+        below=column("below", False),
+        best=column("best", False),
+        worse=column("worse", False),
+        ranked=column("ranked", True),
+        sets=column("sets", 1),
+        units=column("units", 20),
+        samples=np.full((1, 3, 3), samples),
+        seeds=np.array([20]),
+        level=np.full((1, 3, 3), fields.pop("level", True)),
+        effect=lambda at, law, rival: fields["effect"],
+        visible=lambda at, law, rival: fields["visible"],
+        charged=lambda at, law, rival: fields["charged"],
+    )
+    return BlockComparison(comparison, 0, metric, floor, 1, untuned)
+
+
+TWO = (True, True, False)
+LOST = {"winner": None}
+OPEN = LOST | {"best": TWO, "level": False, "visible": 0.27}
+FEW = LOST | {"samples": 3, "sets": 3}
 REASONS = {  # changes of a block -> the verdict
     "few sets below the floor": (
-        LOST | {"samples": 3, "sets": 3, "below": LAWS, "floor": "0.1 m"},
+        FEW | {"below": True, "floor": "0.1 m"},
         Tied(metric="ITAE", laws=LAWS, floor="0.1 m"),
+    ),
+    "two of the best below the floor": (
+        LOST | {"below": TWO, "best": True, "floor": "0.1 m"},
+        Tied(metric="ITAE", laws=LAWS[:2], floor="0.1 m"),
     ),
     "barred": (
         {"untuned": ("second", "third")},
         Barred(metric="ITAE", laws=("second",), defaults=True),
     ),
-    "all fail": (LOST | {"away": LAWS}, Barred(metric="ITAE", laws=LAWS, defaults=False)),
-    "few sets": (FEW, Open(metric="ITAE", laws=LAWS, needed=7, unit="sets of gains")),
+    "all fail": (LOST | {"away": True}, Barred(metric="ITAE", laws=LAWS, defaults=False)),
+    "few sets": (FEW, Open(metric="ITAE", laws=LAWS, needed=6, unit="sets of gains")),
     "few runs": (
-        {"ahead": None, "samples": 4, "runs": 4},
-        Open(metric="ITAE", laws=LAWS, needed=7, unit="runs"),
+        LOST | {"samples": 4},
+        Open(metric="ITAE", laws=LAWS, needed=6, unit="runs"),
     ),
     "few runs and sets": (
-        {"ahead": None, "samples": 4, "runs": 4, "sets": 12},
-        Open(metric="ITAE", laws=LAWS, needed=7, unit="sets of gains or runs"),
+        LOST | {"samples": 4, "sets": (12, 12, 1)},
+        Open(metric="ITAE", laws=LAWS, needed=6, unit="sets of gains or runs"),
     ),
-    "level": (LOST | {"best": LAWS[:2]}, Tied(metric="ITAE", laws=LAWS[:2])),
-    "open": (
-        LOST | {"best": LAWS[:2], "level": False, "resolves": 0.27},
-        Open(metric="ITAE", laws=LAWS[:2], hidden=0.27),
+    "enough to win but not to rank": (
+        LOST | {"samples": 7},
+        Open(metric="ITAE", laws=LAWS, needed=9, unit="runs"),
     ),
+    "one ranked": (
+        LOST | {"ranked": (True, False, False)},
+        Open(metric="ITAE", laws=LAWS, needed=21, unit="runs"),
+    ),
+    "level": (LOST | {"best": TWO}, Tied(metric="ITAE", laws=LAWS[:2])),
+    "open": (OPEN | {"charged": 0.0}, Open(metric="ITAE", laws=LAWS[:2], hidden=0.27)),
     "charged": (
-        LOST | {"best": LAWS[:2], "level": False, "resolves": 0.27, "charged": 0.2},
+        OPEN | {"charged": 0.2},
         Open(metric="ITAE", laws=LAWS[:2], hidden=0.27, charged=0.2),
     ),
     "charged by less than counts": (
-        LOST | {"best": LAWS[:2], "level": False, "resolves": 0.27, "charged": 0.02},
+        OPEN | {"charged": 0.02},
         Open(metric="ITAE", laws=LAWS[:2], hidden=0.27),
     ),
+    "all runs settle": (
+        FEW | {"metric": "settles", "centres": (0.0, 0.0, 0.0)},
+        Tied(metric="settled runs", laws=LAWS),
+    ),
+    "some runs settle": (
+        FEW | {"metric": "settles", "centres": (0.0, 0.5, 1.0)},
+        Open(metric="settled runs", laws=LAWS, needed=6, unit="sets of gains"),
+    ),
+    "a share": ({"metric": "settles"}, Lead(law="third", rival="", metric="settled runs")),
 }
 
 
 @pytest.mark.parametrize("case", REASONS)
-def test_where_there_is_no_winner_the_reason_is_a_fact(case, pair):
+def test_where_there_is_no_winner_the_reason_is_a_fact(case):
     change, fact = REASONS[case]
-    block = dataclasses.replace(pair.blocks[0], **change)
-    assert pair.verdict(block) == fact
-
-
-def test_few_sets_are_no_reason_where_every_run_settles(boards):
-    block = dataclasses.replace(boards[0].blocks[0], medians=dict.fromkeys(LAWS, 0.0), **FEW)
-    settles = dataclasses.replace(boards[0], metric="settles", blocks=(block,))
-    assert settles.verdict(block) == Tied(metric="settled runs", laws=LAWS)
-    shares = dict(zip(LAWS, (0.0, 0.5, 1.0), strict=True))
-    apart = dataclasses.replace(block, medians=shares)
-    fact: Any = settles.verdict(apart)
-    assert fact.needed == 6  # of one block
+    assert verdicts_of(**change).verdict == fact
 
 
 LEADS = {  # how a law compares with its runner-up -> the fields of its lead
@@ -553,28 +592,25 @@ LEADS = {  # how a law compares with its runner-up -> the fields of its lead
     ),
     "no value": (
         Effect(0.0, 0.0, 0.0, 8, 8, True, below=True),
-        {"low": math.nan, "gaps": "8 of 8"},
+        {"low": math.nan, "gaps": "8 of 20"},
     ),
 }
 
 
 @pytest.mark.parametrize("case", LEADS)
-@pytest.mark.parametrize("medians", [(1.0, 2.0), (2.0, 1.0)])
-def test_a_lead_has_its_interval_as_shares_and_says_where_medians_differ(case, medians):
+@pytest.mark.parametrize("median", [0.5, 3.0])
+def test_a_lead_has_its_interval_as_shares_and_says_where_medians_differ(case, median):
     effect, fields = LEADS[case]
-    comparison: Any = SimpleNamespace(
-        laws=["a", "b"],
-        shares=False,
-        effect=lambda at, law, rival: effect,
-        without_value=np.array([[0], [8 * (case == "no value")]]),
-        pairs_below_floor=np.zeros((1, 2, 2), bool),
-        centres=np.array([medians]).T,
-        seeds=[8],
-    )
-    fact = module._lead(comparison, 0, ["a", "b"], "1 m", "itae")
-    assert fact
-    assert (fact.law, fact.rival, fact.metric, fact.samples) == ("a", "b", "ITAE", 8)
-    assert fact.medians_differ == (medians[0] > medians[1])
+    lost = (0, 8 * (case == "no value"), 0)
+    fact: Any = verdicts_of(
+        floor="1 m",
+        effect=effect,
+        without_value=lost,
+        ranked=(False, True, True),
+        centres=(0.1, 2.0, median),
+    ).verdict
+    assert (fact.law, fact.rival, fact.metric, fact.samples) == ("third", "second", "ITAE", 8)
+    assert fact.medians_differ == (median > 2.0)
     for name, value in fields.items():
         expected = value if isinstance(value, str) else pytest.approx(value, nan_ok=True)
         assert getattr(fact, name) == expected
@@ -582,10 +618,10 @@ def test_a_lead_has_its_interval_as_shares_and_says_where_medians_differ(case, m
 
 def test_over_several_conditions_each_verdict_stands_once(pair):
     assert repr(pair).count("under nominal") == repr(pair).count("under noise") == 1
-    fact: Any = pair.verdict(pair.blocks[0])
+    fact: Any = pair.blocks[0].verdict
     assert f"ratio {number(fact.ratio)}" in repr(pair)
     first, second = pair.blocks
-    turned = dataclasses.replace(second, ahead="second", worse=("third", EVIL), lead=None)
+    turned = dataclasses.replace(second, verdict=Lead(law="second", rival="", metric="ITAE"))
     split = dataclasses.replace(pair, blocks=(first, turned)).lines
     assert ["third" in split[0], "nominal" in split[0]] == [True, True]
     assert ["second" in split[1], "noise" in split[1]] == [True, True]
@@ -593,31 +629,33 @@ def test_over_several_conditions_each_verdict_stands_once(pair):
 
 
 def test_a_law_that_is_not_ranked_is_named_beside_the_winner_of_the_others(pair):
-    blocks = []
-    for block in pair.blocks:
-        blocks.append(dataclasses.replace(block, few={"second": 3}, sets=3))
-    board = dataclasses.replace(pair, blocks=tuple(blocks))
-    assert isinstance(board.verdict(blocks[0]), Lead)
-    assert board.not_ranked == [
-        NotRanked(metric="ITAE", law="second", samples=3, needed=7, unit="sets of gains or runs")
-    ]
+    block = verdicts_of(ranked=(True, False, True), units=(20, 3, 20), sets=(7, 3, 1))
+    (fact,) = block.not_ranked
+    unit = "sets of gains or runs"
+    assert fact == NotRanked(metric="ITAE", law="second", samples=3, needed=6, unit=unit)
+    blocks = [dataclasses.replace(of_pair, not_ranked=[fact]) for of_pair in pair.blocks]
+    assert dataclasses.replace(pair, blocks=tuple(blocks)).not_ranked == [fact]
 
 
 def test_a_law_that_others_beat_has_its_ratio_to_the_law_in_front(pair):
     (block, _) = pair.blocks
-    assert set(block.behind) == set(block.worse) == {EVIL, "second"}
+    assert set(block.behind) == {EVIL, "second"}
     behind = block.behind["second"]
     assert (behind.leader, behind.ahead) == ("third", ("third", EVIL))
     ratio = block.medians["second"] / block.medians["third"]
     assert behind.times == pytest.approx(ratio, rel=0.1)
 
 
-def test_a_heading_says_if_some_laws_have_more_sets_of_gains(boards):
-    block = dataclasses.replace(boards[0].blocks[0], seeds=8, runs=8, samples=7, sets=7)
-    assert block.single_set
-    sample = Sample(seeds=8, runs=8, sets=7, more=False, single=True)
-    assert block.sample == sample
-    block = dataclasses.replace(block, single_set=False)
-    assert block.sample == dataclasses.replace(sample, single=False)
-    more = dataclasses.replace(block, sets=3).sample
-    assert more == dataclasses.replace(sample, single=False, sets=3, more=True)
+@pytest.mark.parametrize(
+    ("sets", "samples", "said"),
+    [
+        ((7, 7, 1), 7, {"sets": 7, "single": True}),
+        ((7, 8, 7), 7, {"sets": 7, "single": False}),
+        ((3, 7, 7), 7, {"least": 3, "single": False}),
+        ((1, 1, 1), 20, {"least": None, "single": False}),
+    ],
+)
+def test_a_heading_says_if_some_laws_have_more_sets_of_gains(sets, samples, said):
+    block = verdicts_of(sets=sets, samples=samples)
+    assert block.sample(20).values == {"seeds": 20, "distinct": None} | said
+    assert block.sample(24).values["distinct"] == 20

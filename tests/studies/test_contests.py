@@ -64,8 +64,8 @@ def contest(boards):
 
 def column(contest, name):
     """Return the cells of a metric, in the order of LAWS."""
-    (i,) = [i for i, head in enumerate(contest.table.headings) if head.split(" (")[0] == name]
-    return [row[i] for row in sorted(contest.table.rows, key=lambda row: LAWS.index(row[0]))]
+    i = contest.metrics.index(name)
+    return [row[1 + i] for row in sorted(contest.table.rows, key=lambda row: LAWS.index(row[0]))]
 
 
 def test_five_laws_in_one_condition_fit_a_screen_of_80_by_24(contest):
@@ -79,19 +79,30 @@ def test_five_laws_in_one_condition_fit_a_screen_of_80_by_24(contest):
 
 def test_the_numbers_of_the_screen_are_those_of_the_boards(boards, contest):
     for law, *cells in contest.table.rows:
-        for heading, cell in zip(contest.table.headings[1:], cells, strict=True):
-            name, _, unit = heading.partition(" (")
+        for heading, name, cell in zip(
+            contest.table.headings[1:], contest.metrics, cells, strict=True
+        ):
+            label, _, unit = heading.partition(" (")
+            assert label == name
             (board,) = [candidate for candidate in boards if candidate.label == name]
             (entry,) = [entry for entry in board.entries if entry.law == law]
             assert cell.text == size(entry.interval.median, board.metric)
             assert unit.removesuffix(")") == unit_of(board)
             assert cell.strong == (board.winner == law)
-    assert dict(contest.settled) == dict.fromkeys(LAWS, Settles(SEEDS, SEEDS))
+    assert contest.settled
+    assert said(contest.settled)[1] == f"All {len(LAWS) * SEEDS} runs settled."
     (board,) = [candidate for candidate in boards if candidate.metric == "settles"]
     unsettled = {law: i / SEEDS for i, law in enumerate(LAWS)}  # shares
     block = dataclasses.replace(board.blocks[0], medians=unsettled)
     (apart,) = contests([boards[-1], dataclasses.replace(board, blocks=(block,))], OWN, ())
-    assert dict(apart.settled) == {law: Settles(SEEDS - i, SEEDS) for i, law in enumerate(LAWS)}
+    assert apart.settled
+    short = {fact.values["law"]: fact.values["runs"] for fact in apart.settled.values["short"]}
+    assert short == {law: Settles(SEEDS - i, SEEDS) for i, law in enumerate(LAWS) if i}
+    assert apart.settled.values["others"]
+    none = dataclasses.replace(block, medians=dict.fromkeys(LAWS, 1.0))
+    (lost,) = contests([boards[-1], dataclasses.replace(board, blocks=(none,))], OWN, ())
+    assert lost.settled
+    assert said(lost.settled)[1] == f"No run of {len(LAWS) * SEEDS} settled."
 
 
 def test_the_heading_of_J_says_over_how_many_conditions_it_is(boards):
@@ -106,7 +117,7 @@ def test_a_lead_on_the_screen_is_the_least_lead_of_the_board(boards, contest):
         fact for fact in contest.verdicts if isinstance(fact, Lead) and fact.metric == "ITAE"
     ]
     (board,) = [candidate for candidate in boards if candidate.metric == "itae"]
-    assert lead == board.blocks[0].lead
+    assert lead == board.blocks[0].verdict
     assert (lead.law, lead.rival) == (LAWS[0], LAWS[1])
     assert lead.low < 1.0 - 1.0 / 1.3 < lead.high < 1.0 - 1.0 / 1.4  # and not over another rival
     medians = {law: cell.text for law, cell in zip(LAWS, column(contest, "ITAE"), strict=True)}
@@ -116,11 +127,14 @@ def test_a_lead_on_the_screen_is_the_least_lead_of_the_board(boards, contest):
 
 
 def test_the_law_to_use_is_the_first_metrics_and_others_are_named_where_they_win(contest):
-    assert contest.use is not None
-    assert contest.use.law == LAWS[-1]
+    use = contest.use.values
+    assert use["law"] == LAWS[-1]
     assert [row[0] for row in contest.table.rows if row[1].strong] == [LAWS[-1]]
-    assert [law for _, law, _ in contest.use.unless] == [LAWS[0]]
-    assert contest.use.gains in said(answers.use(contest.use))[1]
+    assert [(fact.values["law"], fact.values["aims"]) for fact in use["unless"]] == [
+        (LAWS[0], "ITAE")
+    ]
+    assert use["gains"] == use["unless"][0].values["gains"] == OWN["duffing"][LAWS[0]]
+    assert use["gains"] in said(contest.use)[1]
 
 
 def test_an_own_law_that_loses_has_its_ratio(contest):

@@ -41,7 +41,7 @@ def test_a_winner_is_named_over_rivals_at_their_defaults_only_where_it_is_asked_
     (unfair,) = boards
     assert unfair.winner is None
     assert unfair.blocks[0].winner is None
-    fact = unfair.verdict(unfair.blocks[0])
+    fact = unfair.blocks[0].verdict
     assert isinstance(fact, Barred)
     assert fact.laws == ("slow",)
     assert "textbf" not in boards.to_latex()
