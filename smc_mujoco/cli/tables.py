@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
+import numpy as np
 from rich.padding import Padding
 
 from smc_mujoco.analysis.differ import differ
@@ -60,7 +62,8 @@ class ScoreColumn(NamedTuple):
     """A column of scores of labelled runs."""
 
     heading: str
-    values: Mapping[str, Sequence[float | None]]  # label -> of its runs, None for one that failed
+    runs: Mapping[str, Sequence[Trace]]  # label -> a run, and the same run again
+    score: Callable[[Trace], float]
     least: Callable[[Scenario], float] = lambda scenario: 0.0  # what matters
 
 
@@ -73,16 +76,22 @@ def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) 
     """
     style.traces_of_one_plant(list(traces.values()))
     scenario = next(iter(traces.values())).scenario
-    scored = _scored(metric_scores, traces, again)
+    runs = _repeated(traces, again)
+    scored = functools.cache(metric_scores)
     tables = []
     for group, heading in headings(scenario).items():
         columns = []
         for name in SCORES:
             metric = CATALOGUE[name]
             if metric in metrics() and metric.applies_to(group):
-                head = metric.heading(group.unit, group.effort)
-                values = _picked(scored, lambda run, of=group.name, name=name: run[of][name])
-                columns.append(ScoreColumn(head, values, partial(floor, metric=name)))
+                columns.append(
+                    ScoreColumn(
+                        heading=metric.heading(group.unit, group.effort),
+                        runs=runs,
+                        score=lambda run, of=group.name, name=name: scored(run)[of][name],
+                        least=partial(floor, metric=name),
+                    )
+                )
         tables.append(_table(", ".join(filter(None, (title, heading))), columns, traces))
     gains = {label: [trace.scenario.law.source] for label, trace in traces.items()}
     return _noted(tables, in_words(gains))
@@ -92,13 +101,20 @@ def tips(title: str, traces: Mapping[str, Trace], again: Again | None = None) ->
     """Return a table of the tips of arms, with scores marked as in `scores`; [] elsewhere."""
     if not next(iter(traces.values())).scenario.plant.tip:
         return []
-    scored = _scored(tip_scores, traces, again)
-    measured = set().union(*filter(None, chain.from_iterable(scored.values())))
+    runs = _repeated(traces, again)
+    scored = functools.cache(tip_scores)
+    ended = [run for run in chain.from_iterable(runs.values()) if run.diverged_at is None]
+    measured = set().union(*map(scored, ended))
     columns = []
     for head, (name, unit, factor) in TIP_COLUMNS.items():
         if name in measured:
-            values = _picked(scored, lambda run, name=name, by=factor: by * run.get(name, math.nan))
-            columns.append(ScoreColumn(f"{head} ({unit})", values))
+            columns.append(
+                ScoreColumn(
+                    f"{head} ({unit})",
+                    runs,
+                    lambda run, name=name, by=factor: by * scored(run).get(name, math.nan),
+                )
+            )
     return _noted([_table(f"{title}, tip", columns, traces)])
 
 
@@ -118,31 +134,18 @@ def answers(
             continue
         units = dict.fromkeys(metric.unit_for(s.plant.unit, s.efforts[0]) for s in scenarios)
         about = f"{metric.name} ({' or '.join(units)})"
-        for condition, runs in traces.items():
-            suited = {k: run for k, run in runs.items() if not metric.refusal(run.scenario)}
-            values = _scored(metric.of, suited, (again or {}).get(condition))
+        for condition, of_condition in traces.items():
+            suited = {k: run for k, run in of_condition.items() if not metric.refusal(run.scenario)}
+            runs = _repeated(suited, (again or {}).get(condition))
             title, head = (about, condition) if len(traces) > 1 else ("", about)
-            least = partial(floor, metric=metric.name)
-            tables.setdefault(title, []).append(ScoreColumn(head, values, least))
+            column = ScoreColumn(head, runs, metric.of, partial(floor, metric=metric.name))
+            tables.setdefault(title, []).append(column)
     return _noted([_table(title, columns, labelled) for title, columns in tables.items()])
 
 
-def _scored(
-    score: Callable[[Trace], T], traces: Mapping[str, Trace], again: Again | None
-) -> dict[str, list[T | None]]:
-    """Return label -> scores of a run and of its repetitions, None for one that failed."""
-    scored = {}
-    for label, trace in traces.items():
-        runs = trace, *(again or {}).get(label, ())
-        scored[label] = [score(run) if run.diverged_at is None else None for run in runs]
-    return scored
-
-
-def _picked(
-    scored: Mapping[str, Sequence[Any]], pick: Callable[[Any], float]
-) -> dict[str, list[float | None]]:
-    """Return label -> one of the scores of each run."""
-    return {label: [run and pick(run) for run in runs] for label, runs in scored.items()}
+def _repeated(traces: Mapping[str, Trace], again: Again | None) -> dict[str, list[Trace]]:
+    """Return label -> a run, and the same run again."""
+    return {label: [trace, *(again or {}).get(label, ())] for label, trace in traces.items()}
 
 
 def _table(title: str, columns: Sequence[ScoreColumn], traces: Mapping[str, Trace]) -> Tabular:
@@ -152,37 +155,33 @@ def _table(title: str, columns: Sequence[ScoreColumn], traces: Mapping[str, Trac
     head = "run" if len(laws) == 1 < len(traces) else "law"
     rows = []
     for label, trace in traces.items():
-        row: list[Cell | str] = [Cell(label, colour=style.law_colour(trace.scenario.law.name))]
-        for column in columns:
-            values = column.values.get(label)
-            row.append(_marked(values, trace.scenario, column.least) if values else "")
-        rows.append(row)
+        name = Cell(label, colour=style.law_colour(trace.scenario.law.name))
+        rows.append([name, *(_cell(column, label) for column in columns)])
     heads = [head, *(column.heading for column in columns)]
     return Tabular(headings=heads, rows=rows, title=title)
 
 
-def _marked(
-    values: Sequence[float | None], scenario: Scenario, least: Callable[[Scenario], float]
-) -> Cell:
-    """Return a number as text; with its range, marked, if its values in the same run again are
-    apart.
+def _cell(column: ScoreColumn, label: str) -> Cell | str:
+    """Return the score of a run; with its range, marked, if those of the same run again are apart;
+    "" where the column has no such run.
 
-    None is a run that failed, which counts as the largest value.
+    A run that failed counts as the largest value, and one without the score as the smallest.
     """
-
-    def size(value: float | None) -> float:
-        if value is None:
-            return math.inf
-        return -math.inf if math.isnan(value) else value
-
-    ordered = sorted(values, key=size)
-    low, high = (
-        "failed" if value is None else number(value) for value in (ordered[0], ordered[-1])
-    )
-    numbers = [math.inf if value is None else value for value in values]
-    if low != high and differ(numbers, least(scenario), first_order(scenario)):
+    runs = column.runs.get(label)
+    if not runs:
+        return ""
+    texts = []
+    numbers = []
+    for run in runs:
+        failed = run.diverged_at is not None
+        numbers.append(math.inf if failed else column.score(run))
+        texts.append("failed" if failed else number(numbers[-1]))
+    order = sorted(range(len(runs)), key=lambda i: np.nan_to_num(numbers[i], nan=-math.inf))
+    low, high = texts[order[0]], texts[order[-1]]
+    scenario = runs[0].scenario
+    if low != high and differ(numbers, column.least(scenario), first_order(scenario)):
         return Cell(f"{low}{MARK} (..{high})")
-    return Cell("failed", colour="red") if values[0] is None else Cell(number(values[0]))
+    return Cell(texts[0], colour="red" if texts[0] == "failed" else "")
 
 
 def _noted(tables: list[Tabular], *words: str) -> list[Tabular]:
