@@ -220,6 +220,10 @@ def test_only_what_no_law_beats_is_marked(boards):
     assert "100*" in repr(boards.full)
     few = leaderboard(made(seeds=3), metrics=["itae"])
     assert not few[0].best
+    for conditions, needed in (("nominal",), 6), (("nominal", "noise"), 7):
+        (board,) = leaderboard(made(seeds=3, conditions=conditions), metrics=["itae"])
+        fact: Any = board.blocks[0].verdict
+        assert fact.needed == needed  # of one block, and of two
     assert not any(map(any, marked(few)))
     wide = made()  # twenty runs are enough, but these say too little of a median
     wide.columns["itae"] = np.exp(20.0 * np.random.default_rng(1).normal(size=60))
