@@ -332,7 +332,7 @@ class Recommendation(Answer):
     def cautions(self) -> list[Fact]:
         """What to know before the law is used. Those whose values are not known are not said."""
         never, laws = self.never_settled, self.race.unsearched
-        told = self._vetoing if self.form == "unsettled" else []  # in the first line
+        in_first_line = self._vetoing if self.form == "unsettled" else []
         rare = {name: runs for name, runs in self.unsettled_in.items() if name not in never}
         leaning = self.pictured and self.unsettled_in and leans(self.worst_trace)
         apart = "+".join(self.settled[self.law.name]) if self.apart else ""
@@ -345,7 +345,7 @@ class Recommendation(Answer):
             laws = counted(len(laws), "law")
         return [
             *(Fact("rare", where=name, runs=runs) for name, runs in rare.items()),
-            Fact("never", where=[name for name in never if name not in told]),
+            Fact("never", where=[name for name in never if name not in in_first_line]),
             Fact("leans", where=str(self.worst_run.condition) if leaning else ""),
             Fact("together", where=apart, runs=Settles(*self.together or (0, 0))),
             Fact("unreliable", law=self._lower_J),
