@@ -25,7 +25,7 @@ from helpers.exact_cycles import random_loop  # noqa: E402
 from test_exact_cycles import scenario  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
-from smc_mujoco.analysis.chattering import AMPLITUDE_FACTOR, FREQUENCY_FACTOR  # noqa: E402
+from smc_mujoco.chattering.prediction import AMPLITUDE_FACTOR, FREQUENCY_FACTOR  # noqa: E402
 from smc_mujoco.control import gain_sets  # noqa: E402
 from smc_mujoco.simulation.grid import case  # noqa: E402
 

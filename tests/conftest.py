@@ -117,8 +117,8 @@ def coarse_grid(monkeypatch):
 
     What is found there is refined as ever; a law with several cycles may lose one.
     """
-    monkeypatch.setattr("smc_mujoco.analysis.chattering.GRID_FREQUENCIES", 23)
-    monkeypatch.setattr("smc_mujoco.analysis.chattering.GRID_AMPLITUDES", 14)
+    monkeypatch.setattr("smc_mujoco.chattering.prediction.GRID_FREQUENCIES", 23)
+    monkeypatch.setattr("smc_mujoco.chattering.prediction.GRID_AMPLITUDES", 14)
 
 
 @pytest.fixture

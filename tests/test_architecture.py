@@ -43,11 +43,12 @@ ROOMS = (
     "envs",
     "testing",
     "cli",
+    "chattering",
     "exchange",
     "evidence",
     "problems",
 )
-ANNEXES = ROOMS[-3:]
+ANNEXES = ROOMS[-4:]
 HEAVY = {
     "numpy",
     "mujoco",
@@ -136,6 +137,7 @@ def test_the_package_has_these_rooms_and_no_other():
         "__init__.pyi",
         "__main__.py",
         "accuracy.pyi",
+        "design.pyi",
         "py.typed",
     } == {
         *annexes.here(ROOMS),

@@ -62,7 +62,6 @@ def test_arrays_and_others_where_a_list_a_table_or_a_flag_belongs_are_refused():
         lambda: smc.margins("duffing", "pid", quick=many),  # type: ignore[arg-type]
         lambda: smc.compare("pid", np.zeros(0)),  # type: ignore[arg-type]
         lambda: smc.identify(AXIS, {}, columns=many),  # type: ignore[arg-type]
-        lambda: smc.design.chattering("pid", many, plant="duffing"),  # type: ignore[arg-type]
     ):
         with pytest.raises(smc.ScenarioError, match=r": (give|choose)"):
             call()

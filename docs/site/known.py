@@ -47,7 +47,7 @@ OTHERS = {  # title -> names of modules that are no public names
     analysis.tuning.result.Tuned
     identification.identify.Identified
     evidence.accuracy.orders.AccuracyTable
-    analysis.chattering.Chattering
+    chattering.prediction.Chattering
     analysis.step_halving.StepChange
     robustness.worst_case.WorstCase
     evidence.audit.audit.Audit

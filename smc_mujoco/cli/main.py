@@ -50,7 +50,6 @@ GROUPS: dict[str, list[Callable[..., None]]] = {
         analysis.margins,
         analysis.worst,
         analysis.sensitivity,
-        analysis.chatter,
     ],
     "Machines": [machine_numbers.excitation, machine_numbers.identify, rigs.rig],
 }

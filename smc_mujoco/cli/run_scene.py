@@ -9,7 +9,7 @@ from rich.text import Text
 from smc_mujoco.analysis.step_halving import repetitions
 from smc_mujoco.cli import tables
 from smc_mujoco.cli.console import Terminal
-from smc_mujoco.common import gl
+from smc_mujoco.common import annexes, gl
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.files import slug
 from smc_mujoco.draw import style
@@ -119,9 +119,9 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
     from smc_mujoco.draw.page import files
 
     if scene.figure == "chattering":
-        from smc_mujoco.draw.amplitudes import amplitudes
-
-        amplitudes(traces, out / "chattering", title=scene.title)
+        what = "a figure of chattering"
+        drawing = annexes.module("smc_mujoco.chattering.amplitudes", what)
+        drawing.amplitudes(traces, out / "chattering", title=scene.title)
         return files(out / "chattering")
     panels = ["u"] if scene.figure == "signals" else None
     written: list[Path] = []

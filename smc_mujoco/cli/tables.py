@@ -1,4 +1,4 @@
-"""Tables of the command line: scores, margins, chattering."""
+"""Tables of the command line: scores, margins."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rich.padding import Padding
 
 from smc_mujoco.analysis.differ import differ
 from smc_mujoco.analysis.paired_runs import floor
-from smc_mujoco.analysis.step_halving import MARK, NOTE, SCORE_NOTE, first_order
+from smc_mujoco.analysis.step_halving import MARK, SCORE_NOTE, first_order
 from smc_mujoco.answers.answer import Answer
 from smc_mujoco.common.registry import Catalogue
 from smc_mujoco.common.tabular import Cell, Tables, Tabular, as_cell
@@ -31,8 +31,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
 if TYPE_CHECKING:
-    from smc_mujoco.analysis.chattering import Chattering
-    from smc_mujoco.analysis.step_halving import StepChange
+    pass
 
 T = TypeVar("T")
 # label -> the same run again, as `step_halving.repetitions` has it
@@ -262,43 +261,3 @@ def with_package(line: str, package: str) -> str:
     package.
     """
     return f"{line} [{package}]" if package else line
-
-
-# chattering
-
-
-def chattering(
-    scenarios: Sequence[Scenario],
-    channel: int,
-    cycles: Sequence[Chattering],
-    measured: Sequence[tuple[float, float]],
-    changes: Sequence[StepChange],
-) -> Tabular:
-    """Return predicted and measured limit cycles of a channel (amplitude of s, Hz), a line for each
-    scenario.
-    """
-    plant = scenarios[0].plant
-    last = "coupling" if plant.driven > 1 else "third harmonic"
-    unit = f"{plant.units[channel]}/s"
-    heads = [f"s predicted ({unit})", f"s measured ({unit})"]
-    heads = ["law", *heads, "predicted (Hz)", "measured (Hz)", "±", last]
-    rows = []
-    for scenario, cycle, (amplitude, frequency), change in zip(
-        scenarios, cycles, measured, changes, strict=True
-    ):
-        law = Cell(scenario.law.name, colour=style.law_colour(scenario.law.name))
-        mark = MARK if change.marked else ""
-        sizes = number(cycle.amplitude), number(amplitude) + mark
-        rates = number(cycle.frequency), number(frequency) + mark
-        share = cycle.coupling if plant.driven > 1 else cycle.third_harmonic
-        off = "irregular" if cycle.uncertainty > 1.0 else _share(cycle.uncertainty)
-        rows.append((law, *sizes, *rates, off, _share(share)))
-    notes = [NOTE] if any(change.marked for change in changes) else []
-    return Tabular(headings=heads, rows=rows, title=f"chattering of {plant.name}", notes=notes)
-
-
-def _share(share: float) -> str:
-    """Return a share in percent; "" for NaN."""
-    if math.isnan(share):
-        return ""
-    return f"{100 * share:.0f} %" if share <= 1.0 else "> 100 %"

@@ -4,7 +4,7 @@ import importlib
 import importlib.util
 from types import ModuleType
 
-ANNEXES = ("exchange", "evidence", "problems")
+ANNEXES = ("chattering", "exchange", "evidence", "problems")
 
 
 def module(name: str, what: str) -> ModuleType:

@@ -88,7 +88,7 @@ CALLS = {
         "simulation.grid.case"
     ],
     "chatter duffing --law pid --channel 1 --figure c --json c.json --threads 2": [
-        "analysis.chattering.chattering"
+        "chattering.prediction.chattering"
     ],
     "excitation arm.xml --for m,input_delay --u-max 5 --v-max 2 --amplitude 0.3 --duration 4 "
     "--rate 250 --noise 0.0001 --counts 8192 --figure f --out m.csv --json e.json": [

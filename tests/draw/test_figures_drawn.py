@@ -8,21 +8,16 @@ import re
 import numpy as np
 import pytest
 from helpers import arms
+from helpers.drawn_pages import every, has_units_names_and_places, places
 from helpers.runs import at_defaults
 from helpers.sketch import failed, made
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
-from matplotlib.legend import Legend
-from matplotlib.lines import Line2D
-from matplotlib.text import Text
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.chattering import Chattering
-from smc_mujoco.analysis.step_halving import StepChange
-from smc_mujoco.draw import amplitudes, panels, style
+from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.figure import figure
-from smc_mujoco.draw.nyquist import nyquist
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.robustness import region_figure
 from smc_mujoco.robustness.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED, Basin
@@ -44,11 +39,6 @@ ALL = (
     "settling",
     "end",
 )
-# a disturbance that all runs have is named above its panel
-NEUTRAL = {style.INK, style.MUTED, style.RULE, style.PAPER, style.GRID, style.DISTURBANCE}
-NEUTRAL = set(map(to_hex, NEUTRAL))
-UNIT = re.compile(r"\((?:s|ms|1/s|s²|unit of s|[µm]?(?:m|rad|N|N·m|V)(?:/s)?)\)")
-UNITLESS = re.compile(r"share of .*|(real|imaginary) part|.*\bs")  # also s, whose unit is the law's
 
 
 def switching(trace: smc.Trace, size: float) -> smc.Trace:
@@ -108,49 +98,6 @@ def arm() -> list[smc.Trace]:
     return [near, dataclasses.replace(near, x=near.r + 50.0 * (near.x - near.r))]
 
 
-def lags():
-    """Two laws whose amplitudes are equal at a lag of 50 ms; half the step changes the run at 10
-    ms.
-    """
-    times = (0.002, 0.01, 0.05)
-    laws = {"relay": ("classical", 3.0, 1.0), "smooth": ("super_twisting", 60.0, 2.0)}
-    sizes = {}
-    runs = {f"{tau:g} s": {} for tau in times}
-    for label, (law, factor, power) in laws.items():
-        for tau in times:
-            trace = duffing(law, actuator=smc.Lag(tau), duration=0.01)
-            sizes[id(trace.scenario)] = sizes[id(trace)] = factor * tau**power
-            runs[f"{tau:g} s"][label] = trace
-    changes = [StepChange(0.05, 0.0), StepChange(0.2, 0.0), StepChange(0.0, 0.01)]
-    with pytest.MonkeyPatch.context() as patch:
-        predicted = lambda one, ranges: Chattering(amplitude=sizes[id(one)], frequency=1.0)  # noqa: E731
-        patch.setattr(amplitudes, "predict", predicted)
-        patch.setattr(amplitudes, "channel_cycle", lambda trace: (1.1 * sizes[id(trace)], 3.0))
-        patch.setattr(amplitudes, "step_halving", lambda traces, channel: changes)
-        return amplitudes.amplitudes(runs)
-
-
-def balance():
-    lag = {
-        "plant": "duffing",
-        "actuator": smc.Lag(0.01),
-        "duration": 1.2,
-    }
-    scenarios = []
-    for law in ("super_twisting", "observer_free"):
-        scenarios.append(smc.Scenario(law=at_defaults(law), **lag))
-    cycle = Chattering(
-        amplitude=0.2,
-        amplitude_x=0.01,
-        frequency=8.0,
-        response=complex(-0.02, 0.003),
-    )
-    changes = [StepChange(0.06, 0.0), StepChange(0.04, 0.05)]
-    return nyquist(
-        scenarios, 0, [cycle, Chattering()], [made(scenario) for scenario in scenarios], changes
-    )
-
-
 def basins() -> list[Basin]:
     outcome = np.array(
         [[CONVERGES, CONVERGES, DOES_NOT], [CONVERGES, UNDECIDED, DOES_NOT]], np.int8
@@ -180,57 +127,13 @@ PAGES = {
     "network": lambda: figure(network(), title="Pendulums", size=(9.0, 6.0)),
     "every panel": lambda: figure(cart(), size="ieee-column", panels=ALL, labels=["small"]),
     "arm": lambda: figure(arm(), labels=["near", "far"]),
-    "lags": lags,
-    "balance": balance,
     "maps": lambda: region_figure.draw(basins()),
 }
 
 
-def places(line: Line2D) -> np.ndarray:
-    """The points of a line or a mark, (points, 2)."""
-    return np.array(line.get_xydata(), float)
-
-
-def every(page) -> list[Axes]:
-    """All axes that show data, also those within others."""
-    drawn_axes = list(page.axes)
-    for ax in page.axes:
-        drawn_axes += ax.child_axes
-    return [ax for ax in drawn_axes if ax.lines or ax.collections]
-
-
 @pytest.mark.parametrize("kind", PAGES)
 def test_every_axis_has_its_unit_every_colour_its_name_and_every_mark_a_place(kind):
-    page = PAGES[kind]()
-    page.draw_without_rendering()
-    outer = [ax for ax in page.axes if ax.get_visible()]
-    words = {label for ax in outer for label in (ax.get_xlabel(), ax.get_ylabel())} - {""}
-    for label in words:
-        assert UNIT.search(label) or UNITLESS.fullmatch(label)
-    assert all(ax.get_ylabel() for ax in outer)
-    labelled = [ax for ax in every(page) if ax.get_xlabel()]
-    for ax in every(page):
-        assert ax in labelled or any(
-            np.allclose(ax.get_xlim(), labelled_axes.get_xlim()) for labelled_axes in labelled
-        )
-        low, high = sorted(ax.get_xlim())
-        for line in ax.lines:
-            if line.get_transform() == ax.transData and len(places(line)) == 1:
-                assert low <= places(line)[0, 0] <= high
-        for text in ax.get_children():
-            if isinstance(text, Text):  # also a title
-                box = text.get_window_extent()
-                assert 0.0 <= box.x0 <= box.x1 <= page.bbox.x1
-    entries = set()
-    legends: list = page.findobj(Legend)
-    for legend in legends:
-        assert all(text.get_text() for text in legend.get_texts())
-        for handle in legend.legend_handles:
-            entries.add(
-                to_hex(handle.get_color() if isinstance(handle, Line2D) else handle.get_facecolor())
-            )
-    drawn = {to_hex(line.get_color()) for ax in every(page) for line in ax.lines} - NEUTRAL
-    assert drawn <= entries
+    has_units_names_and_places(PAGES[kind]())
 
 
 def unprefixed(label: str) -> str:
@@ -432,25 +335,6 @@ def test_no_axis_has_an_exponent_and_its_numbers_are_in_its_unit(size, unit, fac
             if axis.get_scale() == "linear":
                 linear.append(axis)
     assert not [axis.offsetText.get_text() for axis in linear if axis.offsetText.get_text()]
-
-
-def test_laws_whose_amplitudes_are_equal_at_a_lag_are_marked_there_and_doubtful_runs_are_hollow():
-    (ax,) = lags().axes
-    assert [text.get_text() for text in ax.texts] == ["equal at 50 ms"]
-    (mark,) = [x for line in ax.lines for x in [places(line)[:, 0]] if len(x) == 2 and x[0] == x[1]]
-    assert mark[0] == pytest.approx(50.0)
-    lines = [line for line in ax.lines if len(places(line)) == 3]
-    expected = [(3.0 * 1e-3, 1.0), (60.0 * 1e-6, 2.0)]
-    for line, (factor, power) in zip(lines, expected, strict=True):
-        np.testing.assert_allclose(line.get_xdata(), [2.0, 10.0, 50.0])
-        np.testing.assert_allclose(line.get_ydata(), factor * np.array([2.0, 10.0, 50.0]) ** power)
-    dots = [line for line in ax.lines if line.get_marker() == "o"]
-    hollow = []
-    for dot in dots:
-        if to_hex(dot.get_mfc()) == to_hex(style.PAPER):
-            hollow.append(places(dot)[0, 0])
-    assert hollow == pytest.approx([10.0, 10.0])
-    assert len(dots) == 6
 
 
 def test_shares_of_a_map_are_those_of_its_states_and_add_up():

@@ -11,14 +11,19 @@ from helpers.pages import ROOT
 from smc_mujoco.common import annexes, lazy
 
 HERE = tuple(filter(annexes.installed, annexes.ANNEXES))
-COMMANDS = {"claims": "evidence", "enter": "problems", "export": "exchange"}
+COMMANDS = {
+    "chatter": "chattering",
+    "claims": "evidence",
+    "enter": "problems",
+    "export": "exchange",
+}
 MACHINES = re.compile(r"\brigs?[( ]")  # published machines are data of an annex
 
 
 def _public() -> dict[str, str]:
     """Public name -> its annex."""
     names = {}
-    for shelf in ("__init__", "accuracy"):
+    for shelf in ("__init__", "accuracy", "design"):
         stub = (ROOT / "smc_mujoco" / f"{shelf}.pyi").read_text(encoding="utf-8")
         for module, name in lazy.NAMES.findall(stub):
             annex = f"{module}.{name}".split(".")[1]

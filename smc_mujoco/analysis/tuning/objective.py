@@ -32,8 +32,8 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis import step_halving
-from smc_mujoco.analysis.chattering import predict
 from smc_mujoco.analysis.tuning.run_limits import RunLimit
+from smc_mujoco.common import annexes
 from smc_mujoco.common.aliases import Array, ArrayPair, Data, Fields, Floats, Pair
 from smc_mujoco.common.constraints import Natural, Positive, Whole, constrain
 from smc_mujoco.common.data import keyword_dataclass
@@ -273,7 +273,9 @@ class Objective:
         """
         if self.chattering is None:
             return 0.0
-        cycle = predict(case, ranges=False)
+        what = "a bound on predicted chattering"
+        prediction = annexes.module("smc_mujoco.chattering.prediction", what)
+        cycle = prediction.predict(case, ranges=False)
         # the largest possible if none is predicted
         if cycle:
             amplitude = cycle.amplitude

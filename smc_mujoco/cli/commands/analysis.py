@@ -13,8 +13,6 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_signals
 
 if TYPE_CHECKING:
-    from smc_mujoco.analysis.chattering import Chattering
-    from smc_mujoco.common.progress import Report
     from smc_mujoco.control.law import Law
     from smc_mujoco.mechanisms.plant import Plant as Machine
     from smc_mujoco.robustness.uncertainty import Uncertainty
@@ -378,14 +376,13 @@ def _cases(
     condition: str,
     duration: float,
     gains: str,
-    changes: dict[str, Any],
 ) -> "list[Scenario]":
-    """Return the scenario of each law under a condition, with changes of its fields."""
+    """Return the scenario of each law under a condition."""
     from smc_mujoco.simulation.grid import case
 
     cases = []
     for law in laws:
-        cases.append(case(machine, law, condition, duration, gains, changes=changes))
+        cases.append(case(machine, law, condition, duration, gains))
     return cases
 
 
@@ -412,104 +409,6 @@ def _attacked_cases(
     chosen = options.laws(law, gain_sets.LAWS)
     machine = as_plant(plant)
     cases = []
-    for scenario in _cases(machine, chosen, condition, duration, gains, {}):
+    for scenario in _cases(machine, chosen, condition, duration, gains):
         cases.append([scenario])
     return cases
-
-
-Actuator = Annotated[
-    str | None,
-    typer.Option(
-        metavar="PART:NUMBERS",
-        help="What drives the joints, as lag:0.01, ratelimit:200 or dcmotor.",
-    ),
-]
-ChatterDuration = Annotated[
-    float, typer.Option(min=0.1, help="Duration of the runs that measure it, s.")
-]
-
-
-def chatter(
-    plant: options.PlantName,
-    law: options.Laws = None,
-    actuator: Actuator = None,
-    condition: options.Condition = "nominal",
-    gains: options.Gains = "tuned",
-    channel: Annotated[int, typer.Option(min=0, help="The driven channel.")] = 0,
-    duration: ChatterDuration = 8.0,
-    figure: Annotated[Path | None, options.picture("Nyquist plots and runs")] = None,
-    json: options.Json = None,
-    threads: options.Threads = None,
-) -> None:
-    """Predict the chattering of laws by harmonic balance, and measure it in simulations.
-
-    If a law switches and the actuator lags, the loop oscillates without end. Amplitude and
-    frequency are those at which N L = 1: N is the law's describing function, L the response of the
-    linearised mechanism. The column "±" is how far the prediction may be off, and "irregular" where
-    that is more than 100 %, as the cycle may lock to the control's samples. A star marks a run
-    that changes by more than 5 % if its start changes by a relative 1e-9, or at half the physics
-    step (2.5 % without RK4). The column "third harmonic" is that over the first. With several
-    driven channels, "coupling" is how far this channel's command moves another channel, over how
-    far it moves its own. If that is large, the prediction fails.
-
-    Example: smc-mujoco chatter duffing --law classical,super_twisting --actuator lag:0.01 --figure
-    chatter
-    """
-    with delay_signals():
-        from smc_mujoco.analysis.chattering import rows
-        from smc_mujoco.analysis.step_halving import step_halving
-        from smc_mujoco.cli import tables
-        from smc_mujoco.common.progress import bar
-        from smc_mujoco.control import gain_sets
-        from smc_mujoco.draw.page import files
-        from smc_mujoco.mechanisms.named import jointed
-        from smc_mujoco.metrics.limit_cycle import channel_cycle
-        from smc_mujoco.simulation.run import run
-
-    terminal = Terminal(json)
-    pictures = files(figure)
-    chosen = options.laws(law, gain_sets.LAWS)
-    options.check_files(None, *pictures)
-    fields = {} if actuator is None else {"actuator": options.actuator(actuator)}
-    machine = jointed(plant, "chattering")
-    cases = _cases(machine, chosen, condition, duration, gains, fields)
-    with bar("chattering") as progress:
-        cycles = _cycles(cases, channel, progress.reached)
-        traces = run(cases, threads=threads)
-        measured = [channel_cycle(trace, channel) for trace in traces]
-        changes = step_halving(traces, channel, threads)
-    terminal.print(tables.chattering(cases, channel, cycles, measured, changes))
-    terminal.note(f"assumed: {_assumed(cycles)}", wrap=True)
-    terminal.note(f"{_sources_of(cases)}, {terminal.seconds:.0f} s", "dim", wrap=True)
-    terminal.finish(rows(cases, cycles, measured, changes))
-    if pictures:
-        from smc_mujoco.draw.nyquist import nyquist
-
-        nyquist(cases, channel, cycles, traces, changes, figure)
-        terminal.wrote(*pictures)
-
-
-def _sources_of(scenarios: "Sequence[Scenario]") -> str:
-    """Return where the gains of the scenarios' laws come from, in words."""
-    from smc_mujoco.control.source import in_words
-
-    return in_words({scenario.law.name: [scenario.law.source] for scenario in scenarios})
-
-
-def _assumed(cycles: "Sequence[Chattering]") -> str:
-    """Return each assumption of some predictions once."""
-    assumed = {}
-    for cycle in cycles:
-        assumed |= dict.fromkeys(cycle.assumptions)
-    return "; ".join(assumed)
-
-
-def _cycles(cases: "Sequence[Scenario]", channel: int, report: "Report") -> "list[Chattering]":
-    """Return the limit cycles that harmonic balance predicts, a case after the other."""
-    from smc_mujoco.analysis.chattering import chattering
-
-    cycles = []
-    for done, scenario in enumerate(cases):
-        report(done, len(cases) + 1)
-        cycles.append(chattering(scenario, channel))
-    return cycles

@@ -661,52 +661,6 @@ def test_warns_if_and_only_if_the_laws_own_gains_are_better():
     )
 
 
-LAGGING = smc.condition("lagging", actuator=smc.Lag(0.01))
-LAGGED = Objective(conditions=(LAGGING,), duration=0.5)
-
-
-def predicted(tuned) -> float:
-    return smc.design.chattering(tuned.law, plant=tuned.plant, actuator=smc.Lag(0.01)).amplitude
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("coarse_grid")
-def test_gains_are_tuned_within_a_bound_on_predicted_chattering():
-    free = tune(
-        "duffing",
-        "classical",
-        20,
-        objective=LAGGED,
-    )
-    bound = tune(
-        "duffing",
-        "classical",
-        20,
-        objective=LAGGED,
-        chattering=1e-4,
-    )
-    assert predicted(bound) <= 1e-4 < predicted(free)
-    assert bound.objective < FAILURE_COST
-    assert "predicted chattering of s <= 0.0001" in str(bound.definition)
-
-
-@pytest.mark.usefixtures("coarse_grid", "by_mujoco")
-@pytest.mark.filterwarnings("ignore:no set of gains")
-def test_it_warns_if_all_gains_tried_chatter_too_much():
-    with pytest.warns(
-        smc.errors.ScenarioWarning, match="are predicted to chatter with more than 1e-12"
-    ):
-        tuned = tune(
-            "duffing",
-            "classical",
-            2,
-            objective=LAGGED,
-            chattering=1e-12,
-            searches=1,
-        )
-    assert tuned.objective > 2.0 * FAILURE_COST
-
-
 def test_a_law_with_the_name_of_one_of_the_library_is_refused_before_any_search(refused):
     @smc.law_function(gains={"k": 1.0})
     def terminal(y, gains, memory):

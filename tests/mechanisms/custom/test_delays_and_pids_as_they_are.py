@@ -189,27 +189,6 @@ def test_a_delay_is_kept_in_texts_and_records_and_goes_with_an_ideal_motor():
         smc.Scenario(plant=late, law="pid", actuator=(smc.Lag(0.01), PositionServo(9.0)))
 
 
-BARE = """<mujoco><compiler angle="radian"/><option timestep="1e-3" gravity="0 0 0"/><worldbody>
-  <body><joint name="j" axis="0 -1 0" damping=".6" armature=".028"/>
-  <geom type="capsule" fromto="0 0 0 .2 0 0" size=".02" mass=".3" contype="0" conaffinity="0"/>
-  </body></worldbody><actuator><motor joint="j" ctrlrange="-3 3"%s/></actuator></mujoco>"""
-
-
-@pytest.mark.parametrize(
-    ("own", "given"),
-    [
-        (LATE % (0.01, 10), {"input_delay": 0.01}),
-        (' dyntype="filterexact" dynprm=".01"', {"actuator": smc.Lag(0.01)}),
-    ],
-)
-def test_predicted_chattering_has_the_delay_and_the_filter_of_an_actuator(own, given):
-    fields = {"law": smc.law("classical", k=0.5, c=8.0), "x0": 0.1}
-    of_file = smc.plant_from(BARE.replace("<motor", "<general") % own, ["j"])
-    predicted = smc.design.chattering(smc.Scenario(plant=of_file, **fields))
-    plain = smc.Scenario(plant=smc.plant_from(BARE % "", ["j"]), **fields, **given)
-    assert predicted.frequency == pytest.approx(smc.design.chattering(plain).frequency)
-
-
 def test_the_default_step_divides_the_delay_of_an_actuator():
     fields = {"plant": link(MOTOR.replace('"b"', '"j"') % ""), "law": "pid"}
     steps = []

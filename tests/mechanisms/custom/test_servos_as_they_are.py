@@ -358,30 +358,9 @@ def run_again(scenario):
     return trace
 
 
-# without weight and friction: a limit cycle is predicted about 0
+# without weight and friction
 BARE = (HOBBY % POSITION).replace("<worldbody>", '<option gravity="0 0 0"/><worldbody>', 1)
 BARE = BARE.replace('frictionloss=".052" range="-1.9 1.9"', "")
-STRONG = BARE.replace('forcerange="-2.94 2.94"', "")
-
-
-@pytest.mark.parametrize(
-    ("law", "late"),
-    [(smc.law("classical", k=0.2, c=8.0), 0.01), (smc.law("super_twisting", k1=0.5, k2=0.5), 0.02)],
-)
-def test_predicted_chattering_has_the_servo_s_spring(law, late):
-    fields = {"law": law, "x0": 0.1, "duration": 6.0, "input_delay": late, "u_max": 1.9}
-    scenario = smc.Scenario(plant=servo(STRONG), **fields)
-    predicted = smc.design.chattering(scenario)
-    ideal = smc.plant_from(BARE, {"j": smc.Channel(motor=True)})
-    part = PositionServo(kp=KP, kv=0.1, forcerange=(-2.94, 2.94), ctrlrange=(-1.9, 1.9))
-    weak = smc.design.chattering(smc.Scenario(plant=ideal, actuator=part, **fields))
-    assert weak.frequency == pytest.approx(predicted.frequency)
-    assert {*weak.assumptions} - {*predicted.assumptions} == {"no forcerange"}
-    trace = run_again(scenario)
-    x = trace.x[trace.t > 4.0, 0]
-    assert predicted.amplitude_x == pytest.approx(0.5 * np.ptp(x), rel=0.02)
-    turns = np.flatnonzero(np.diff(np.sign(x)) > 0)
-    assert predicted.frequency == pytest.approx(1e3 * np.diff(turns).mean() ** -1, rel=0.02)
 
 
 @smc.law_function(gains={"one": 1.0})
@@ -429,24 +408,6 @@ def test_a_rate_limit_before_a_servo_is_its_profile_velocity():
     for plant in (servo(BARE, set_point_step=0.1), servo(by_file)):
         with pytest.raises(ScenarioError, match="RateLimit: leave one of them out"):
             smc.Scenario(plant=plant, law="pid", actuator=RateLimit(0.48))
-
-
-def test_predicted_chattering_has_the_filter_of_a_servo_once():
-    fields = {"law": smc.law("classical", k=0.2, c=8.0), "x0": 0.1, "input_delay": 0.01}
-    filtered = servo(STRONG.replace('kv=".1"', 'kv=".1" timeconst=".01"'))
-    own = smc.Scenario(plant=filtered, **fields, duration=6.0)
-    lagged = smc.Scenario(plant=servo(STRONG), actuator=smc.Lag(0.01), **fields)
-    predicted = smc.design.chattering(own)
-    assert smc.design.chattering(lagged).frequency == pytest.approx(predicted.frequency)
-    trace = run_again(own)
-    turns = np.flatnonzero(np.diff(np.sign(trace.x[trace.t > 4.0, 0])) > 0)
-    assert predicted.frequency == pytest.approx(1e3 / np.diff(turns).mean(), rel=0.03)
-
-
-def test_chattering_is_not_predicted_for_a_goal_or_steps_of_a_set_point():
-    stepped = smc.Scenario(plant=servo(BARE, set_point_step=0.01), law="classical")
-    with pytest.raises(ScenarioError, match=r"goal 0 and step 0.01: measure it in a run"):
-        smc.design.chattering(stepped)
 
 
 def test_gains_tables_figures_and_files_have_the_unit_of_the_set_point(tmp_path):

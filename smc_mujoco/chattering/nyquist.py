@@ -16,9 +16,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from smc_mujoco.analysis.chattering import Chattering
-from smc_mujoco.analysis.harmonics import Loop
 from smc_mujoco.analysis.step_halving import NOTE, StepChange
+from smc_mujoco.chattering.harmonics import Loop
+from smc_mujoco.chattering.prediction import Chattering
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Handle

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from helpers.drawn_pages import has_units_names_and_places
 from helpers.runs import at_defaults
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.chattering import predict
 from smc_mujoco.analysis.step_halving import StepChange
-from smc_mujoco.draw.nyquist import nyquist
+from smc_mujoco.chattering.nyquist import nyquist
+from smc_mujoco.chattering.prediction import predict
 
 
 @pytest.fixture(scope="module")
@@ -69,3 +70,7 @@ def test_a_calm_law_has_no_empty_panel_and_no_band(page):
     assert not page.axes[2].patches
     assert page.axes[2].get_position().width > 1.3 * page.axes[1].get_position().width
     assert "do not cross" in page.legends[0].get_texts()[1].get_text()
+
+
+def test_every_axis_has_its_unit_and_every_colour_its_name(page):
+    has_units_names_and_places(page)

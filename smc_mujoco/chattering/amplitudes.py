@@ -16,8 +16,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from smc_mujoco.analysis.chattering import predict
 from smc_mujoco.analysis.step_halving import step_halving
+from smc_mujoco.chattering.prediction import predict
 from smc_mujoco.common.aliases import AnyPath, Fields
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style

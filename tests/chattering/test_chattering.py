@@ -13,16 +13,16 @@ import pytest
 from helpers.runs import at_defaults
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.chattering import (
+from smc_mujoco.analysis.differ import relative_range
+from smc_mujoco.analysis.step_halving import StepChange
+from smc_mujoco.chattering.cycle_tables import rows
+from smc_mujoco.chattering.harmonics import Loop, Wave, play
+from smc_mujoco.chattering.prediction import (
     Chattering,
     _assumptions,
     cycles,
-    rows,
     switches,
 )
-from smc_mujoco.analysis.differ import relative_range
-from smc_mujoco.analysis.harmonics import Loop, Wave, play
-from smc_mujoco.analysis.step_halving import StepChange
 from smc_mujoco.common.files import plain
 from smc_mujoco.design import chattering
 from smc_mujoco.metrics.limit_cycle import channel_cycle
@@ -517,3 +517,7 @@ def test_under_an_integrator_of_first_order_what_half_the_step_leaves_counts_too
     never = (math.inf, math.inf), (math.nan,) * 2, (0.2,)
     assert [relative_range(values, first_order=True) for values in never] == [0.0, 0.0, 0.0]
     assert relative_range((0.2, math.inf), first_order=True) == math.inf
+
+
+def test_an_array_in_place_of_a_channel_is_refused(refused):
+    refused(lambda: chattering("pid", np.ones(3), plant="duffing"), "give")  # type: ignore[arg-type]

@@ -21,9 +21,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from smc_mujoco.analysis.harmonics import Loop, Wave
-from smc_mujoco.analysis.step_halving import StepChange
-from smc_mujoco.common.aliases import Array, Fields, Names, Pair
+from smc_mujoco.chattering.harmonics import Loop, Wave
+from smc_mujoco.common.aliases import Array, Names, Pair
 from smc_mujoco.common.data import keyword_dataclass
 from smc_mujoco.common.errors import ScenarioError, whole
 from smc_mujoco.control.component import Component, Template
@@ -574,28 +573,3 @@ def _assumptions(loop: Loop) -> Iterator[str]:
         yield "no dry friction"
     if loop.s_of_one_count:
         yield "no rounding by the encoder"
-
-
-def rows(
-    scenarios: Sequence[Scenario],
-    cycles: Sequence[Chattering],
-    measured: Sequence[Pair],
-    changes: Sequence[StepChange],
-) -> list[Fields]:
-    """Return predicted cycles of scenarios, measured amplitudes of s and frequencies, and their
-    changes, as JSON data.
-    """
-    rows = []
-    for scenario, cycle, (amplitude, frequency), change in zip(
-        scenarios, cycles, measured, changes, strict=True
-    ):
-        row = {"plant": scenario.plant.name, "law": scenario.law.name}
-        gains = dict(scenario.law.gains)
-        row |= {"gains": gains, **vars(cycle)}
-        row["gain"] = [cycle.gain.real, cycle.gain.imag]
-        row["response"] = [cycle.response.real, cycle.response.imag]
-        row["uncertainty"] = cycle.uncertainty
-        row |= {"measured_amplitude": amplitude, "measured_frequency": frequency}
-        row |= {"half_step_changes": vars(change), "marked": change.marked}
-        rows.append(row)
-    return rows
