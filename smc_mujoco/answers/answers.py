@@ -280,8 +280,9 @@ def _winners(contests: Sequence[Contest]) -> ScreenPart:
         if (fact := fact_of.get(ON_PLANT)) and contest.plant not in of_plants:
             advice = contest.use and Fact("use", **contest.use.values | {"unless": ()})
             ((label, text),) = verdict_lines([fact])
-            said_of = Fact("of plant", advice=advice, label=label, text=text)
-            of_plants[contest.plant] = said(said_of)[1]
+            undecided = advice and advice.values["rivals"]  # which says all of it
+            verdict = None if undecided else f"{label}: {text}"
+            of_plants[contest.plant] = said(Fact("of plant", advice=advice, verdict=verdict))[1]
     heads = ["", "", *metrics]
     return ScreenPart(
         [Fact("contests", count=len(contests), sample=contests[0].sample)],

@@ -47,7 +47,7 @@ TEXTS = {
         "The winner and its least lead, or the laws that are tied or open. All are judged "
         "together: fewer at once show smaller leads.",
     ),
-    "of plant": ("", "[{advice} ]{label}: {text}"),
+    "of plant": ("", "[{advice} {verdict}|{advice}|{verdict}]"),
     "least": ("", "{law}[ {low:%}]"),
     "use": (
         "",
@@ -172,6 +172,7 @@ TEXTS = {
     ),
     "tolerates": ("{law}", "tolerates the most {places:;}"),
     "on plant": ("", "{kinds} on {plant}"),
+    "gains are": ("", "{gains}."),
     "most": ("", "* more than any other of these laws, by more than the search resolves."),
     "fails": ("fails", "unchanged: {laws:,}"),
     # worst

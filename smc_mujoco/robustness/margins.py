@@ -149,12 +149,9 @@ class Margins(Answer, list[Margin]):
         )
         if self.coarse:
             step = NextStep(again({}, without=("--quick",)), "finds them more exactly")
-        notes = [Fact("most")] if places_of else []
-        if self.gains:
-            notes.append(Fact("sentence", label="", text=f"{capital(self.gains)}."))
+        notes = [Fact("most")] * bool(places_of) + [Fact("gains are", gains=capital(self.gains))]
         facts = [Fact("tolerates", law=law, places=places) for law, places in places_of.items()]
-        if failing:
-            facts.append(Fact("fails", laws=list(failing)))
+        facts.append(Fact("fails", laws=list(failing)))
         ranges = any(margin.over_sets for margin in self)
         return Screen(
             heading=Fact("tolerated", duration=self.duration, ranges=ranges),

@@ -189,8 +189,7 @@ class WorstCases(Answer, list[WorstCase]):
             facts.append(Lead(law=names[0], rival=names[1], metric=metric, low=share, high=share))
         headings = "", f"worst found ({first.unit})", f"median ({first.unit})"
         for case in self:
-            if case.outside:
-                facts.append(Fact("sentence", label=case.nominal.law.name, text=case.outside))
+            facts.append(Fact("sentence", label=case.nominal.law.name, text=case.outside))
         step = NextStep(again({"--figure": "worst"}), "draws the worst runs")
         if typed("--figure"):
             command = instead("margins", {}, ("--law", "--gains", "--condition"))

@@ -141,8 +141,8 @@ def _use(
         case Lead():
             law = first.law
         case Open() | Tied():
-            fine = [law for law in in_order([columns[0][0]]) if law in first.laws]
-            law, rivals = fine[0], first.laws
+            order = in_order([board for board, _ in columns])  # as the rows of the table
+            law, rivals = next(law for law in order if law in first.laws), first.laws
         case _:
             return None
     if law in lost:

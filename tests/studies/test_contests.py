@@ -137,6 +137,17 @@ def test_the_law_to_use_is_the_first_metrics_and_others_are_named_where_they_win
     assert use["gains"] in said(contest.use)[1]
 
 
+def test_without_J_the_law_for_now_is_the_first_row_of_the_table():
+    """All settle alike, so the next metric orders the laws, and not their names."""
+    few = table()
+    boards = leaderboard(few.taken(few.column("seed") < 3), by=("plant", "condition"))
+    (contest,) = contests(boards, OWN, ())
+    assert contest.use
+    assert contest.use.values["rivals"]
+    assert contest.use.values["law"] == contest.table.rows[0][0] == LAWS[-1]
+    assert min(LAWS) != LAWS[-1]
+
+
 def test_an_own_law_that_loses_has_its_ratio(contest):
     (fact,) = [fact for fact in contest.trails if fact.law == "pid"]
     assert isinstance(fact, Trails)

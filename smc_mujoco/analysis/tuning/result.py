@@ -109,12 +109,14 @@ class Tuned(Answer):
             step = NextStep(again({"--budget": f"{4 * self.budget}"}), "searches longer")
         gains = ", ".join(f"{gain}={value:.4g}" for gain, value in self.gains.items())
         lower = 1.0 - self.objective / self.before if self.before > 0.0 else 0.0
-        own = {}
-        if math.isfinite(self.before):
-            own = {"lower": lower} if lower > 0.0 else {"before": self.before}
         facts = [
             Fact("sentence", label="gains", text=gains),
-            Fact("J", objective=self.objective, **own),
+            Fact(
+                "J",
+                objective=self.objective,
+                lower=lower if lower > 0.0 and math.isfinite(self.before) else None,
+                before=self.before if math.isfinite(self.before) else None,
+            ),
             Fact("searches", count=len(self.searches), spread=self.search.apart),
         ]
         for gain, end in self.at_bound.items():

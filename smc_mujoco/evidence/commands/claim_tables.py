@@ -46,13 +46,11 @@ def screen_of(claims: Sequence[Claim]) -> Screen:
     for whose, words in verdicts.WHOSE_WORDS.items():
         of_whose = Counter(claim.verdict for claim in claims if claim.whose == whose)
         texts = [f"{verdicts.MARKS[kind]} {count} {kind}" for kind, count in of_whose.items()]
-        if texts:
-            facts.append(Fact("names", label=words, names=texts))
+        facts.append(Fact("names", label=words, names=texts))
     of_paper = [claim for claim in claims if claim.whose == verdicts.PAPER]
     supported = [claim for claim in of_paper if claim.verdict == SUPPORTED]
-    if supported:
-        holds = Settles(sum(claim.for_every_set for claim in supported), len(supported))
-        facts.append(Fact("every gain", holds=holds))
+    holds = Settles(sum(claim.for_every_set for claim in supported), len(supported))
+    facts.append(Fact("every gain", holds=holds if supported else None))
     refuted = [claim for claim in of_paper if claim.verdict == REFUTED]
     step = None
     if refuted:
