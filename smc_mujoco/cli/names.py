@@ -40,7 +40,7 @@ def names() -> list[tuple[str, list[str]]]:
 
 def _conditions() -> Iterator[str]:
     """Yield the keys of the suite's tables."""
-    for part in _source("simulation.conditions"):
+    for part in _source("simulation.suite_conditions"):
         if isinstance(part, ast.AnnAssign) and ast.unparse(part.target) in SUITE:
             assert isinstance(part.value, ast.Dict)
             for key in part.value.keys:

@@ -22,12 +22,12 @@ from smc_mujoco.simulation.conditions import (  # noqa: F401
     DURATION,
     NAMED,
     PLANTS,
-    SINE,
     Condition,
 )
 from smc_mujoco.simulation.force_bounds import U_MAX  # noqa: F401
 from smc_mujoco.simulation.grid import case
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.suite_conditions import SINE  # noqa: F401
 
 # The four laws that the paper compares; its higher-order one is the last.
 LAWS = ("observer_free", "classical", "adaptive", "super_twisting")

@@ -13,7 +13,8 @@ import smc_mujoco as smc
 from smc_mujoco.cli import run_scene as show
 from smc_mujoco.common.scripts import execute
 from smc_mujoco.draw import page
-from smc_mujoco.simulation.conditions import NAMED, REAL
+from smc_mujoco.simulation.conditions import NAMED
+from smc_mujoco.simulation.suite_conditions import REAL
 from smc_mujoco.studies import scene as scenes
 
 FOLDER = Path(smc.__file__).parents[1] / "scenes"

@@ -382,7 +382,7 @@ def actuator(text: str) -> "tuple[Actuator, ...]":
     from smc_mujoco.common.scripts import WITHIN
     from smc_mujoco.mechanisms.hardware import backlash, drives  # noqa: F401
     from smc_mujoco.mechanisms.hardware.part import Actuator
-    from smc_mujoco.simulation.conditions import read_fields
+    from smc_mujoco.simulation.condition_text import read_fields
 
     kinds: dict[str, type[Actuator]] = {}
     for kind in subclasses(Actuator):

@@ -47,8 +47,9 @@ from smc_mujoco.mechanisms.named import from_text
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.simulation.condition_text import read_fields
 from smc_mujoco.simulation.conditions import NAMED as CONDITIONS
-from smc_mujoco.simulation.conditions import Condition, condition, find_condition, read_fields
+from smc_mujoco.simulation.conditions import Condition, condition, find_condition
 from smc_mujoco.simulation.scenario import Scenario
 
 PAPER_FILE = "paper.toml"
